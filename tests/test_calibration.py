@@ -118,7 +118,7 @@ def test_a_calibration_comes_back_from_the_log_as_it_was(model, one):
 @pytest.mark.parametrize(
     "change",
     [
-        lambda t: t.replace('"schema": 1', '"schema": 9'), lambda t: t.replace('"leak"', '"rust"', 1),
+        lambda t: t.replace('"schema": 2', '"schema": 9'), lambda t: t.replace('"leak"', '"rust"', 1),
         lambda _: "[]", lambda _: "{", lambda t: t.replace('"covariance": [[', '"covariance": [[[', 1),
         lambda t: t.replace('"at"', '"it"'),
     ],

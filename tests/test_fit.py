@@ -9,9 +9,10 @@ import yaml
 from drawn_sensor import sensor_of
 from scipy import stats
 
+from sensorgen.analysis.comparison.allowed import Allowed
 from sensorgen.analysis.fit import Fit, Fitted, Untold, fit, text
 from sensorgen.analysis.fit.fitting import held_back
-from sensorgen.analysis.fit.resistance import Allowed, leak, resistivity
+from sensorgen.analysis.fit.resistance import leak, resistivity
 from sensorgen.analysis.fit.tones import _together
 from sensorgen.cli import cli
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
@@ -189,7 +190,7 @@ def test_a_source_cannot_have_the_name_of_one_that_ships():
 def test_words_in_a_source_are_text():
     bad = 'a": }\n# b: [&x]'
     made = Fit(
-        1, 1, (Fitted("etpu", "resistivity_ohm_m", 1.0, 0.5, 2.0, bad),), (Untold("E", bad),), (), 1, (), (), bad
+        1, (), 1, (Fitted("etpu", "resistivity_ohm_m", 1.0, 0.5, 2.0, bad),), (Untold("E", bad),), (), 1, (), (), bad
     )
     data = yaml.safe_load(text(made))
     assert data["materials"]["etpu"]["resistivity_ohm_m"]["note"] == bad
@@ -197,7 +198,10 @@ def test_words_in_a_source_are_text():
 
 
 def test_recordings_give_back_what_they_were_made_with(tmp_path):
-    """Factors to the prediction: resistivity 0.5, capacitance 1.3, modulus 0.5; a leak of 2 nS on 10 cm2."""
+    """Factors to the prediction: resistivity 0.5, capacitance 1.3, modulus 0.5; a leak of 2 nS on 10 cm2.
+
+    Values are as sure as a bench is that may have a lead, a stray capacitance and gains of its own.
+    """
     names = [f"30 triX .1mm {k}" for k in (1, 2)]
     design = design_of(parse(names[0]))
     sensor = bench_files.truth(design, **bench_files.TRUTH)
@@ -207,9 +211,10 @@ def test_recordings_give_back_what_they_were_made_with(tmp_path):
         made = fit(log, 30)
     top, bottom = (r.value for r in electrode_resistance(default_body(design)).values())
     both = (top + bottom) / (top / 0.07 + bottom / 0.2)  # one resistivity for both, one of them with cogs
-    assert value(made, "resistivity_ohm_m").value == pytest.approx(0.5 * both, rel=3e-3)
-    assert value(made, "youngs_modulus_pa").value == pytest.approx(0.5 * 6e6, rel=5e-3)
-    assert value(made, "leak_s_per_m2").value == pytest.approx(2e-9 / 1e-3, rel=0.1)
+    assert value(made, "resistivity_ohm_m").value == pytest.approx(0.5 * both, rel=0.02)
+    assert value(made, "youngs_modulus_pa").value == pytest.approx(0.5 * 6e6, rel=0.015)
+    leak_ = next(u.why for u in made.untold if u.parameter == "leak")  # 0.3 % of what C takes: a phase of 0.2 degrees
+    assert 2e-9 / 1e-3 < float(leak_.partition("no more than ")[2].split()[0]) < 3 * 2e-9 / 1e-3
     eps = value(made, "relative_permittivity")
     known = materials.load("x60").value("relative_permittivity").value
 
@@ -218,7 +223,7 @@ def test_recordings_give_back_what_they_were_made_with(tmp_path):
         own_value = {"x60": {"relative_permittivity": permittivity}}
         return rest_state(default_body(make(data | {"material_values": own_value}))).capacitance.value
 
-    assert capacitance(eps.value) / capacitance(known) == pytest.approx(1.3, rel=1e-2)
+    assert capacitance(eps.value) / capacitance(known) == pytest.approx(1.3, rel=1.5e-2)
     assert eps.high / eps.low > 1.5  # the bounds of the cell's model are in it
     for v in made.values:
         assert v.low < v.value < v.high
@@ -239,11 +244,11 @@ def test_a_leak_comes_back_in_the_next_prediction(tmp_path):
     found, unfitted = (evaluate(default_body(d), plain) for d in (fitted, design))
     truth = [complex(sensor.impedance(z.frequency_hz, 0.0, 0.05)) for z in found.impedance]
     for z, now in zip(truth, found.impedance, strict=True):
-        assert (now.re.value, now.im.value) == (pytest.approx(z.real, rel=0.02), pytest.approx(z.imag, rel=0.02))
+        assert (now.re.value, now.im.value) == (pytest.approx(z.real, rel=0.03), pytest.approx(z.imag, rel=0.03))
     assert unfitted.impedance[0].re.value < truth[0].real / 20
     assert {"leak_s_per_m2": "fit-30"}.items() <= {v.quantity: v.source for v in found.values}.items()
     line_of = sensor_of(make({"shape": "tri", "materials": taken})).sensor
-    assert line_of.leak_s_per_m * line_of.length_m == pytest.approx(4e-7, rel=0.02)
+    assert line_of.leak_s_per_m * line_of.length_m == pytest.approx(4e-7, rel=0.03)
 
 
 def test_a_leak_that_the_design_sets_itself():
@@ -288,3 +293,29 @@ def test_the_command(tmp_path, capsys):
     assert own.names() == ["fit-60"]
     with pytest.raises(SensorgenError):
         cli.main(["fit", "--iteration", "61", "--log", place], standalone_mode=False)
+
+
+def test_specimens_of_any_name(tmp_path, capsys):
+    """Three plates of an own design, bound by their names: an LCR meter's C 20 % above the prediction, and R_Y."""
+    place, file = str(tmp_path / "log.db"), tmp_path / "mine.yaml"
+    file.write_text("shape: tri\nname: mine\nparameters:\n  dielectric_mm: 0.2\n")
+    design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}})
+    c_pf = rest_state(drawn(design)).capacitance.value * 1e12
+    resistance = max(r.value for r in rest_state(drawn(design)).resistance.values())
+    for k, name in enumerate(("S1", "S2", "S3")):
+        words = ["--design", str(file), "--y", f"{resistance * (0.97 + 0.03 * k):.6g}"]
+        words += ["--C", f"{1.2 * c_pf * (0.99 + 0.01 * k):.6g}pF@1kHz", "--instrument", "HP 4284A"]
+        assert not cli.main(["log", "add", name, *words, "--log", place], standalone_mode=False)
+    cli.main(["fit", "S1", "S2", "S3", "--drawn", "--log", place], standalone_mode=False)
+    said = " ".join(capsys.readouterr().out.split())
+    assert "S1, S2, S3: fitted to 3, 0 held back" in said
+    assert own.names() == ["fit-s1-and-2"]
+    fitted = yaml.safe_load(own.path("fit-s1-and-2").read_text("utf-8"))["materials"]
+    eps = fitted["x60"]["relative_permittivity"]
+    data = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}, "materials": {"dielectric": "x60@fit-s1-and-2"}}
+    assert rest_state(drawn(make(data))).capacitance.value * 1e12 == pytest.approx(1.2 * c_pf, rel=0.02)
+    assert eps["low"] < eps["value"] < eps["high"]
+    with pytest.raises(BadInput, match="expected either specimens"):
+        cli.main(["fit", "S1", "--iteration", "3", "--log", place], standalone_mode=False)
+    with pytest.raises(BadInput, match="nobody"):
+        cli.main(["fit", "nobody", "--log", place], standalone_mode=False)

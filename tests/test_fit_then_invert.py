@@ -2,7 +2,7 @@
 
 The readings are those of a ladder of 2000 lumped sections (``lumped_line``): capacitance and its rise with pressure
 from the reference files, resistivities 1.12 times the default ones. A recording of presses is fitted; 29 other presses,
-read with a noise of 0.1 %, are inverted with the fitted materials.
+read with a noise of 0.1 %, are inverted with the fitted materials, as ratios to a reading at rest.
 """
 
 import csv
@@ -80,13 +80,13 @@ def test_force_and_position_come_back(truth, design, specimen, body, told, comma
 
     predicted = json.loads(command("predict", *fitted, "--json"))
     ohm = sum(end["value"] for end in predicted["resistance"].values())
-    assert ohm == pytest.approx(line.resistance_ohm, rel=3e-3)
-    assert predicted["capacitance"]["value"] == pytest.approx(line.capacitance_f, rel=1e-3)
+    assert ohm == pytest.approx(line.resistance_ohm, rel=0.02)  # a bench may have gains, a lead and a stray
+    assert predicted["capacitance"]["value"] == pytest.approx(line.capacitance_f, rel=0.01)
 
     lumped_line.readings_csv(tmp_path / "m.csv", line, made, noise=1e-3)
-    command("invert", fitted[0], "--perfect", "m.csv", *fitted[1:], "-o", "found.csv")
+    command("invert", fitted[0], "m.csv", *fitted[1:], "-o", "found.csv")
     with (tmp_path / "found.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+        rows = [row for row in csv.DictReader(file) if row["status"] != "rest"]
     statuses = [row["status"] for row in rows]
     assert len(rows) == COUNT
     assert "no fit" not in statuses

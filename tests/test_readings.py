@@ -1,6 +1,7 @@
 """CSV files of impedances: what passes, and what is said about the rest."""
 
 import io
+import os
 import sys
 import tracemalloc
 from contextlib import suppress
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from sensorgen.core.errors import BadInput
+from sensorgen.measure.csv_table import Waiting
 from sensorgen.measure.readings import readings
 
 HEAD = "time_s,re_ohm_1.1kHz,im_ohm_1.1kHz,re_ohm_99.7kHz,im_ohm_99.7kHz\n"
@@ -199,20 +201,27 @@ def test_files_that_cannot_be_read(tmp_path):
         pass
 
 
-def test_the_standard_input_comes_row_by_row(monkeypatch):
-    class Pipe(io.StringIO):
-        taken = 0
+def test_a_block_of_the_standard_input_is_what_has_come(monkeypatch):
+    reader, writer = os.pipe()
+    with os.fdopen(reader, "rb") as end, os.fdopen(writer, "wb", buffering=0) as pipe:
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(end))
+        pipe.write(b"\xef\xbb\xbf" + (HEAD + ROW).encode())
+        with readings("-") as source:
+            blocks = source.blocks()
+            assert next(blocks).rows == [2]
+            pipe.write((ROW * 3 + ROW[:3]).encode())
+            assert next(blocks).rows == [3, 4, 5]
+            pipe.write((ROW[3:] + ROW.rstrip()).encode())
+            assert next(blocks).rows == [6]
+            pipe.close()
+            assert [block.rows for block in blocks] == [[7]]
 
-        def readline(self, *limit):
-            self.taken += 1
-            return super().readline(*limit)
 
-    pipe = Pipe(HEAD + ROW * 3)
-    monkeypatch.setattr(sys, "stdin", pipe)
-    with readings("-") as source:
-        for k, block in enumerate(source.blocks(1)):
-            assert pipe.taken == k + 2
-            assert block.rows == [k + 2]
+@pytest.mark.parametrize("limit", [1, 3, 7, 100])
+def test_lines_of_a_stream_are_those_of_a_file(limit):
+    text = "a,b\n1,2\n\nlonger than the limit\r\nno end"
+    stream, file = Waiting(io.BytesIO(text.encode())), io.StringIO(text, newline="\n")
+    assert [stream.readline(limit) for _ in text] == [file.readline(limit) for _ in text]
 
 
 def test_memory_does_not_grow_with_the_file(tmp_path):

@@ -29,7 +29,7 @@ def made(tmp_path_factory):
         log_recording(log, "S1", folder / "run-lcr.csv", folder / "run-rig.csv")
     shutil.copytree(folder, folder / "calibrated")
     with Log(folder / "calibrated" / "log.db") as log:
-        one = calibration.calibrate(log, ["S1"], body_of=drawn_body)
+        one = calibration.calibrate(log, ["S1"], calibration.Bench(tip_m=5e-3), body_of=drawn_body)
         log.add(calibration.rows(log, [one[0].calibration]))
     return folder
 
@@ -74,7 +74,7 @@ def covered(found, name, unit):
 
 
 def test_from_files_of_the_bench_to_force_and_place(bench, tmp_path):
-    said = bench("calibrate", "S1", "--drawn", "--page", "cal.html")
+    said = bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--page", "cal.html")
     assert (said.code, said.err) == (0, "")
     assert "S1, design mine: calibrated by 24 known presses" in said.words
     assert "of 24 forces and" in said.words
@@ -95,8 +95,8 @@ def test_from_files_of_the_bench_to_force_and_place(bench, tmp_path):
 
 
 def test_the_record_of_the_log_says_it_all(bench):
-    found = json.loads(bench("calibrate", "S1", "--drawn", "--dry-run", "--json").out)
-    assert found["schema"] == 1
+    found = json.loads(bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--dry-run", "--json").out)
+    assert found["schema"] == 2
     assert len(found["posterior"]["at"]) == len(found["values"]) == len(found["parameters"])
     assert found["held_out"]["presses"] == 24
     assert "was never calibrated" in bench("invert", "S1", "none.csv").line
@@ -186,3 +186,61 @@ def test_what_is_missing_is_one_line(bench, words, said):
     found = bench("calibrate", *words)
     assert found.code == 2
     assert said in found.line
+
+
+def meter(truth, frequency_hz):
+    """Parallel capacitance [pF] and loss factor that an LCR meter at the contacts would show of a specimen."""
+    z = replace(truth, gain=(), lead_ohm=0.0, stray_f=0.0).impedance(0.0, 0.05, frequency_hz=TONES_HZ)[0]
+    k = int(np.flatnonzero(frequency_hz == TONES_HZ)[0])
+    return (1 / z[k]).imag / (2 * np.pi * frequency_hz) * 1e12, z[k].real / -z[k].imag
+
+
+def told(found, name):
+    return next(v for v in found["values"] if v["name"] == name)
+
+
+def test_readings_of_meters_count(bench):
+    """The same presses with and without them: R, C and stray of the specimen are known better, and still right."""
+    alone = json.loads(bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--dry-run", "--json").out)
+    (c1, d1), (c2, d2) = (meter(TRUTH, f) for f in (1.1e3, 19.9e3))
+    for words in (
+        ("--C", f"{c1:.6g}pF@1.1kHz", "--D", f"{d1:.6g}@1.1kHz"),
+        ("--C", f"{c2:.6g}pF@19.9kHz", "--D", f"{d2:.6g}@19.9kHz"),
+    ):
+        assert bench("log", "add", "S1", *words, "--instrument", "HP 4284A").code == 0
+    both = json.loads(bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--dry-run", "--json").out)
+    assert any("2 readings of meters count" in note for note in both["notes"])
+    truth_pf = 64.256829 * np.exp(TRUTH.capacitance)
+    one = told(both, "capacitance")
+    assert one["lower"] < truth_pf < one["upper"]
+    stray = [told(found, "stray") for found in (alone, both)]
+    assert stray[1]["lower"] < max(TRUTH.stray_f * 1e12, 0.05) < stray[1]["upper"]
+    for name in ("resistance", "capacitance"):
+        widths = [told(found, name)["upper"] / told(found, name)["lower"] for found in (alone, both)]
+        assert widths[1] <= widths[0] * 1.001
+
+
+def test_meters_alone_calibrate_what_they_can(bench):
+    """A specimen that was never on the bench, 30 % above its prediction, then baked: the last state counts."""
+    assert bench("log", "specimen", "S2", "--design", "mine.yaml").code == 0
+    c, d = meter(replace(TRUTH, capacitance=float(np.log(1.3))), 1.1e3)
+    wrong = ("--C", f"{2 * c:.6g}pF@1.1kHz", "--unbaked")
+    assert bench("log", "add", "S2", *wrong).code == 0
+    right = ("--C", f"{c:.6g}pF@1.1kHz", "--D", f"{d:.6g}@1.1kHz", "--baked", "--instrument", "HP 4284A")
+    assert bench("log", "add", "S2", *right).code == 0
+    assert bench("log", "add", "S2", "--y", "25.5k", "--baked").code == 0
+    found = json.loads(bench("calibrate", "S2", "--drawn", "--json").out)
+    assert any("no recording: R, C and leak by meters alone" in note for note in found["notes"])
+    assert any("2 readings of meters count, baked" in note for note in found["notes"])
+    known = told(found, "capacitance")
+    assert known["lower"] < 1.3 * 64.256829 < known["upper"]
+    assert 1.06 < known["upper"] / known["lower"] < 1.1  # C differs by 2 % from session to session
+    for f in TONES_HZ[1:]:
+        c, d = meter(replace(TRUTH, capacitance=float(np.log(1.3))), f)
+        words = ("--C", f"{c:.6g}pF@{f}Hz", "--D", f"{d:.6g}@{f}Hz", "--baked", "--instrument", "HP 4284A")
+        assert bench("log", "add", "S2", *words).code == 0
+    more = told(json.loads(bench("calibrate", "S2", "--drawn", "--dry-run", "--json").out), "capacitance")
+    assert more["lower"] < 1.3 * 64.256829 < more["upper"]
+    assert more["upper"] / more["lower"] > 1.05  # however many frequencies one session has
+    assert bench("log", "withdraw", "reading", "3", "--reason", "slipped").code == 0
+    assert "were withdrawn or corrected" in bench("invert", "S2", "none.csv").line

@@ -22,7 +22,7 @@ def test_page_and_markdown_are_written(run, few, tmp_path):
     said = run("thesis", "-o", "out/here")
     assert said.code == 0
     assert said.out.split("\n")[:2] == ["out/here/thesis.html", "out/here/thesis.md"]
-    assert said.out.split("\n")[2] == "3 agrees, 3 misprint confirmed"
+    assert said.out.split("\n")[2] == "3 misprint confirmed, 3 differs, 1 cannot be reproduced"
     assert (tmp_path / "out/here/thesis.html").read_text("utf-8") == thesis.html(few)
     assert (tmp_path / "out/here/thesis.md").read_text("utf-8") == thesis.markdown(few)
     assert not (tmp_path / "out/here/thesis.json").exists()

@@ -128,10 +128,12 @@ def noisy(z, share, rng):
 
 
 def readings_csv(path, line, made, frequency_hz=TONES_HZ, noise=1e-3, seed=2):
-    """A row for every press, as invert reads it; the truth stands beside it."""
+    """A row for every press after ten at rest, as invert reads it; the truth stands beside it."""
+    made = np.concatenate([np.zeros((10, 2)), made])
     z = np.stack([line.impedance(frequency_hz, f, x * 1e-3) for f, x in made])
     z = noisy(z, noise, np.random.default_rng(seed))
-    write(path, ["true_force_n", "true_position_mm", *columns(frequency_hz)], np.hstack([made, _parts(z)]))
+    names = ["rest", "true_force_n", "true_position_mm", *columns(frequency_hz)]
+    write(path, names, np.hstack([made[:, :1] == 0, made, _parts(z)]))
     return path
 
 

@@ -168,3 +168,22 @@ def test_groups_count_what_is_known_only():
     assert tri.words == {"intact": 1, "short": 1, "unknown": 1}
     assert found[0].shorted.count == 0
     assert expected_from([v for of in made for v in least(of)]) == 600
+
+
+def test_intervals_hold_where_plates_differ():
+    """Plates of ten whose yields scatter (beta distribution, mean 0.6): 95 % intervals, taken apart or as one."""
+    rng = np.random.default_rng(7)
+    inside = np.zeros(2)
+    for _ in range(400):
+        made = rng.binomial(10, rng.beta(1.2, 0.8, 12))
+        count, plates = int(made.sum()), [(int(k), 10) for k in made]
+        for k, found in enumerate((share(count, 120), share(count, 120, plates=plates))):
+            inside[k] += found.low <= 0.6 <= found.high
+    assert inside[0] / 400 < 0.7
+    assert inside[1] / 400 > 0.93
+
+
+def test_a_plate_alone_and_plates_of_one_change_nothing():
+    assert share(3, 10, plates=[(3, 10)]) == share(3, 10)
+    assert share(3, 10, plates=[(1, 1)] * 3 + [(0, 1)] * 7) == share(3, 10)
+    assert share(4, 8, plates=[(4, 4), (0, 4)]).high > share(4, 8).high

@@ -8,6 +8,7 @@ from sensorgen.verification.thesis.items import Item
 from sensorgen.verification.thesis.verdicts import (
     DIFFERS,
     MISPRINT,
+    TRANSCRIBED,
     UNEXPLAINED,
     Part,
     digits,
@@ -53,6 +54,32 @@ def test_a_difference_is_as_large_as_announced():
     assert word(part(0.5), **known, off={"x": 0.5}) == UNEXPLAINED  # the other way round
     assert word(part(1.5), part(1.5, name="y"), **known, off={"x": 0.5}) == UNEXPLAINED
     assert word(part(1.5), off={"x": 0.5}, within=0.01) == UNEXPLAINED  # no reason
+
+
+def test_what_was_typed_on_both_sides_confirms_nothing():
+    typed = part(1.0, copied=True)
+    assert judged(expected_of(), [typed, typed]).text() == "transcribed (2 values, which nothing else gives)"
+    assert judged(expected_of(), [part(1.0), typed]).text() == "agrees to 9 digits or more; transcribed: 1"
+    assert word(typed, part(None)) == TRANSCRIBED
+
+
+def test_a_wrong_copy_is_never_announced_away():
+    typed = part(1.5, copied=True, corrected=1.0)
+    assert word(typed) == word(typed, erratum="said") == UNEXPLAINED
+    assert word(part(1.5, copied=True), because="so", off={"x": 0.5}, within=0.1) == UNEXPLAINED
+
+
+def test_a_limit_agrees_with_anything_below():
+    assert judged(expected_of(), [part(2.0, limit=True)]).text() == "agrees with the limit"
+    assert word(part(0.9, limit=True)) == UNEXPLAINED
+    assert word(part(2.0, ours=np.nan, limit=True)) == UNEXPLAINED
+    assert shown.thesis([part(2.0, limit=True)], 1e-6) == ["x: at most 2 m"]
+
+
+def test_what_is_announced_of_many_times_as_much_is_relative():
+    known = {"because": "so", "within": 0.01, "off": {"x": 999.0}}
+    assert judged(expected_of(**known), [part(1005.0)]).word == DIFFERS
+    assert judged(expected_of(**known), [part(1011.0)]).word == UNEXPLAINED
 
 
 def test_no_number_is_never_agreement():

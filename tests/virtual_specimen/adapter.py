@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from sensorgen.analysis.calibration import Bench, model_of
+from sensorgen.analysis.calibration import Bench, spread_of
 from sensorgen.design.design import make
 from sensorgen.prediction import bodies
 from sensorgen.prediction.calibration.fitting import Data
-from sensorgen.prediction.calibration.specimen import Presses
+from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel
+from sensorgen.prediction.planning import sensor_model
+from sensorgen.prediction.query import Query, Tip
 from virtual_specimen import TONES_HZ, Truth, drawn, session
 
 ETPU = "etpu@thesis-3.2"  # 1/1.2 ohm m
@@ -41,7 +43,8 @@ ERRORS = {  # what is off, as a truth by a seed
 
 def specimen_model():
     """The model of the design that all of them were printed of, without errors of its own."""
-    return model_of(bodies.drawn(make(DESIGN)), TONES_HZ, Bench())[0]
+    predicted = sensor_model(bodies.drawn(make(DESIGN)), Query(tip=Tip(5e-3)))[0]
+    return SpecimenModel(predicted.sensor, TONES_HZ, spread_of(predicted, Bench()))
 
 
 def data(found, truth):

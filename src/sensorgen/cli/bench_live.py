@@ -29,7 +29,7 @@ def _live(measured: str, rate_hz: tuple[float, ...], cutoff_hz: tuple[float, ...
     smooth = Live(one("--rate", rate_hz), one("--cutoff", cutoff_hz) if cutoff_hz else CUTOFF_HZ)
     with readings(measured) as source:
         render.say(_header(source))
-        for block in source.blocks(1) if measured == "-" else source.blocks():
+        for block in source.blocks():
             render.say("".join(_rows(block, smooth(block.impedance_ohm))), nl=False)
 
 

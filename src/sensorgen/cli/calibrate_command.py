@@ -6,9 +6,7 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
-from sensorgen.cli import FOUND_ERRORS, body_options, log_words, render, show
-from sensorgen.cli.words import Length
-from sensorgen.core import units
+from sensorgen.cli import FOUND_ERRORS, body_options, log_words, options, render, show
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
@@ -19,15 +17,15 @@ def _work(
     specimens: tuple[str, ...], tip_mm: float, force_offset: str, recordings: tuple[int, ...], page: str | None,
     file: str | None, *, again: bool, dry_run: bool,
 ) -> int:  # fmt: skip
-    """Calibrate specimens by recordings with known presses that the log has of them.
+    """Calibrate specimens by recordings with known presses, and by readings of meters, that the log has of them.
 
     Several specimens share the bench. Some 30 presses, half of them after a higher one and held for 0.3 to 30 s, are
-    enough; with none, R, C and leak are calibrated by the readings at rest. 'sensorgen invert SPECIMEN' then uses the
+    enough; with none, R, C and leak are calibrated by what was read at rest. 'sensorgen invert SPECIMEN' then uses the
     result, which the log keeps.
     """
     from sensorgen.analysis import calibration
 
-    bench = calibration.Bench(tip_mm * units.M_PER_MM, _offset(force_offset))
+    bench = options.bench_of(tip_mm, force_offset)
     if again and len(specimens) > 1:
         raise BadInput(f"--recheck of {len(specimens)} specimens; expected one")
     given = click.get_current_context().get_parameter_source
@@ -53,25 +51,11 @@ def _work(
     return FOUND_ERRORS if any(isinstance(one, calibration.Recheck) and one.alarm for one in made) else 0
 
 
-def _offset(text: str) -> tuple[float, float]:
-    mean, mark, spread = text.replace(" ", "").replace("±", "+-").partition("+-")
-    if not mark:
-        raise BadInput(f"--force-offset {text!r:.40}: expected mean and standard deviation, as 0.9+-0.1 (N)")
-    try:
-        return units.force_n(mean), units.force_n(spread)
-    except BadInput as error:
-        raise error.within("--force-offset") from None
-
-
 command = click.Command(
     "calibrate", callback=_work, help=_work.__doc__,
     params=[
         click.Argument(["specimens"], nargs=-1, required=True, metavar="SPECIMEN..."),
-        click.Option(["--tip", "tip_mm"], type=Length(), default="5mm", show_default=True, help="Length of the tip."),
-        click.Option(
-            ["--force-offset"], default="0+-0.1", show_default=True, metavar="N+-N",
-            help="Force on the sensor above what the rig says, as the weight of its piston: 0.9+-0.1 for the thesis's.",
-        ),
+        *options.bench(),
         click.Option(
             ["--recording", "recordings"], type=click.IntRange(1), multiple=True, metavar="NUMBER",
             help="Only this recording of the log.",

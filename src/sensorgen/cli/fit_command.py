@@ -5,17 +5,22 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import body_options, log_words, render, show
+from sensorgen.cli import body_options, log_words, options, render, show
+from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
     from sensorgen.analysis.fit import Fit
 
 
-def _work(iteration: int, file: str | None, output: str | None, seed: int, *, dry_run: bool) -> None:
-    """Fit material values to what was measured, and keep them as a source.
+def _work(
+    specimens: tuple[str, ...], iteration: int | None, file: str | None, output: str | None, seed: int, tip_mm: float,
+    force_offset: str, *, dry_run: bool,
+) -> None:  # fmt: skip
+    """Fit material values to what was measured of specimens or of an iteration, and keep them as a source.
 
-    A design takes them where it names the source, as in etpu@fit-23. A quarter of the specimens is held back, to
-    see whether the values predict what they were not fitted to.
+    Each specimen that the bench or an LCR meter has measured is calibrated, as by 'sensorgen calibrate'; the values
+    hold for all prints, and their intervals the scatter between them. A design takes them where it names the source,
+    as in etpu@fit-23. A quarter of the specimens is held back, to see whether the values predict them.
     """
     from dataclasses import replace
 
@@ -23,8 +28,11 @@ def _work(iteration: int, file: str | None, output: str | None, seed: int, *, dr
     from sensorgen.core import files as store
     from sensorgen.design.materials import own
 
+    if bool(specimens) == (iteration is not None):
+        raise BadInput("expected either specimens, as in 'sensorgen fit S1 S2', or --iteration")
+    bench = options.bench_of(tip_mm, force_offset)
     with log_words.opened(file) as log, show.progress(STEPS) as step:
-        made = fit(log, iteration, seed, body_options.body_of(), step)
+        made = fit(log, iteration, seed, body_options.body_of(), step, bench, specimens=specimens)
     if made.values and not dry_run:
         path = Path(output) if output else own.path(made.source)
         store.replace(path, text(made).encode())
@@ -46,10 +54,12 @@ def _taken(made: "Fit") -> str:
 command = click.Command(
     "fit", callback=_work, help=_work.__doc__,
     params=[
-        click.Option(["--iteration"], type=click.IntRange(0), required=True, help="Of the design."),
+        click.Argument(["specimens"], nargs=-1, metavar="[SPECIMEN...]"),
+        click.Option(["--iteration"], type=click.IntRange(0), help="Of the design, in place of specimens."),
         log_words.where(),
         click.Option(["--output", "-o"], metavar="FILE", help="File to write instead of the source's own."),
         click.Option(["--seed"], type=int, default=23, show_default=True, help="Of the split."),
+        *options.bench(),
         *body_options.body_options(),
         click.Option(["--dry-run"], is_flag=True, help="Write no file."),
         *render.options(file=False),

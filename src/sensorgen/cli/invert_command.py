@@ -82,14 +82,17 @@ def _work(
         if rest_file:
             raise BadInput("--perfect needs no reading at rest; expected one of --perfect and --rest")
         return _perfect(body, query, measured, output, **how)
-    from sensorgen.analysis.calibration import Bench, model_of
+    from sensorgen.analysis.calibration import Bench, spread_of
     from sensorgen.prediction.calibration import fitting
+    from sensorgen.prediction.calibration.specimen import SpecimenModel
+    from sensorgen.prediction.planning import sensor_model
 
     def inverter(rest: "Rest", tones_hz: Any, noise: Any, limit_n: float | None) -> "tuple[Inverter, float, int, Any]":
         from sensorgen.prediction.calibration.inversion import Inverter
         from sensorgen.prediction.inverse import FORCE_LIMIT_N
 
-        model, found = model_of(body, tones_hz, Bench(tip_mm * units.M_PER_MM))
+        found, _ = sensor_model(body, query)
+        model = SpecimenModel(found.sensor, tones_hz, spread_of(found, Bench(query.tip.length_m)))
         limit, (mean, count) = limit_n or FORCE_LIMIT_N, rest.mean()
         if not np.isfinite(mean).all():
             raise BadInput(f"{measured}: a frequency without a reading at rest; expected one at each")
@@ -156,11 +159,11 @@ def _by_ratio(
             )
         rest = _taken_apart(rest_file, source.frequency_hz) if rest_file else Rest()
         summary, made, told = answers.Summary(), None, False
-        write, live, terminal = _writer(stack, measured, output)
+        write, terminal = _writer(stack, measured, output)
         step = stack.enter_context(show.progress(["reading"]))
         kept = [_TIME] * (_TIME in source.numbers) + source.kept
         write(answers.header(kept))
-        for block in source.blocks(1) if live else source.blocks():
+        for block in source.blocks():
             at_rest, time_s = _beside(source, block)
             ratio, age_s = rest.ratios(block.impedance_ohm, at_rest, time_s)
             if rest and not at_rest.all() and (made is None or (rest.tells_noise and not told and noise is None)):
@@ -200,10 +203,9 @@ def _taken_apart(path: str, tones_hz: Any) -> "Rest":
         return Rest(np.concatenate([block.impedance_ohm for block in blocks])[:, order], float(times[0]))
 
 
-def _writer(stack: ExitStack, measured: str, output: str | None) -> tuple[Callable[[str], None], bool, bool]:
-    """What takes rows: the terminal, at once, or a file that is there when it is whole; whether live, and which."""
-    live = measured == "-" and output is None
-    terminal = live or output == "-"
+def _writer(stack: ExitStack, measured: str, output: str | None) -> tuple[Callable[[str], None], bool]:
+    """What takes rows: the terminal, at once, or a file that is there when it is whole; and whether it is the first."""
+    terminal = output == "-" or (measured == "-" and output is None)
     file = stack.enter_context(store.replacing(Path(output))) if output and not terminal else None
 
     def write(text: str) -> None:
@@ -212,7 +214,7 @@ def _writer(stack: ExitStack, measured: str, output: str | None) -> tuple[Callab
         elif file:
             file.write(text.encode())
 
-    return write, live, terminal
+    return write, terminal
 
 
 def _said(result: "Documented", terminal: bool, output: str | None) -> None:
@@ -238,10 +240,10 @@ def _perfect(
             model.sensor, source.frequency_hz, NOISE if noise is None else noise, _prior(prior), limit
         )
         summary = answers.Summary(estimator, model.doubts)
-        write, live, terminal = _writer(stack, measured, output)
+        write, terminal = _writer(stack, measured, output)
         step = stack.enter_context(show.progress(["reading"]))
         write(answers.header(source.kept))
-        for block in source.blocks(1) if live else source.blocks():
+        for block in source.blocks():
             found = estimator.batch(block.impedance_ohm)
             summary.add(found)
             step(f"{summary.samples} samples")

@@ -1,13 +1,16 @@
 """Options that several commands have."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from sensorgen.cli import render
-from sensorgen.cli.words import OneOf, Ratio, Share, Values
+from sensorgen.cli.words import Length, OneOf, Ratio, Share, Values
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
+
+if TYPE_CHECKING:
+    from sensorgen.analysis.calibration import Bench
 
 
 def option(
@@ -46,6 +49,30 @@ def force() -> click.Option:
 def tip(flags: str, about: str) -> click.Option:
     """Length of a tip, one [mm]."""
     return option(flags, Values(units.LENGTH_MM, zero=False), about, default="10mm", metavar="MM")
+
+
+def bench() -> list[click.Parameter]:
+    """``--tip`` and ``--force-offset`` of the bench that pressed; :func:`bench_of` reads them."""
+    return [
+        option("--tip tip_mm", Length(), "Length of the tip.", default="10mm"),
+        option(
+            "--force-offset", None, "Force above what the rig says, as its piston's weight: 0.9+-0.1 for the thesis's.",
+            default="0+-0.1", metavar="N+-N",
+        ),
+    ]  # fmt: skip
+
+
+def bench_of(tip_mm: float, force_offset: str) -> "Bench":
+    """The bench that the options say."""
+    from sensorgen.analysis.calibration import Bench
+
+    mean, mark, spread = force_offset.replace(" ", "").replace("±", "+-").partition("+-")
+    if not mark:
+        raise BadInput(f"--force-offset {force_offset!r:.40}: expected mean and standard deviation, as 0.9+-0.1 (N)")
+    try:
+        return Bench(tip_mm * units.M_PER_MM, (units.force_n(mean), units.force_n(spread)))
+    except BadInput as error:
+        raise error.within("--force-offset") from None
 
 
 def frequencies() -> click.Option:

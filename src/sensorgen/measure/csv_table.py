@@ -5,15 +5,17 @@ cells are nan. Rows are counted as an editor counts them: the header is row 1. N
 fails, cells are converted one by one, so that the message can name the cell.
 """
 
+import codecs
 import csv
 import sys
+from collections import deque
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime
 from itertools import islice
 from pathlib import Path
-from typing import IO
+from typing import IO, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,49 @@ LONGEST_LINE = 1 << 18
 _BLOCK_CHARACTERS = 1 << 21  # of a block: rows may be long
 _MOST_LINES = 200  # of one row, whose cells may have line feeds
 SAME_NAMES: Mapping[str, str] = {}
+
+
+class Lines(Protocol):
+    """What a table needs of a text stream."""
+
+    def readline(self, limit: int, /) -> str:
+        """The next line with its line feed, at most so many characters of it; empty at the end."""
+
+
+class Waiting:
+    """Lines of a binary stream that knows how many have come already.
+
+    Parameters
+    ----------
+    file : binary stream
+        With ``read1``, which gives what is there without waiting for more.
+    """
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file, self._lines, self._rest = file, deque[bytes](), b""
+        self._begun = False
+
+    def __len__(self) -> int:
+        """Whole lines that have come."""
+        return len(self._lines)
+
+    def readline(self, limit: int, /) -> str:
+        """The next line, as :meth:`Lines.readline`."""
+        while not self._lines and len(self._rest) < limit:
+            more = self._file.read1(1 << 16)  # type: ignore[attr-defined]
+            if not more:
+                break
+            *whole, self._rest = (self._rest + more).split(b"\n")
+            self._lines.extend(line + b"\n" for line in whole)
+        if self._lines:
+            line = self._lines.popleft()
+            if len(line) > limit:
+                self._lines.appendleft(line[limit:])
+        else:
+            line, self._rest = self._rest[:limit], self._rest[limit:]
+        if not self._begun:
+            line, self._begun = line.removeprefix(codecs.BOM_UTF8), True
+        return line[:limit].decode(errors="surrogateescape")
 
 
 @dataclass(frozen=True)
@@ -55,7 +100,7 @@ class Table:
     name : str
         Of the file, for messages.
     file : text stream
-        Opened with ``errors="surrogateescape"``.
+        Opened with ``errors="surrogateescape"``; of one that is :class:`Waiting`, a block is what has come.
     columns : mapping of str to str
         From the file's column names to sensorgen's.
 
@@ -67,7 +112,7 @@ class Table:
         Whether an incomplete last row was dropped.
     """
 
-    def __init__(self, name: str, file: IO[str], columns: Mapping[str, str] = SAME_NAMES) -> None:
+    def __init__(self, name: str, file: Lines, columns: Mapping[str, str] = SAME_NAMES) -> None:
         self.name, self.truncated = name, False
         self._file, self._row = file, 0
         header = self._line()
@@ -125,7 +170,7 @@ class Table:
         for line in islice(iter(self._line, ""), size):
             yield self._row, line
             characters += len(line)
-            if characters > _BLOCK_CHARACTERS:
+            if characters > _BLOCK_CHARACTERS or (isinstance(self._file, Waiting) and not len(self._file)):
                 return
 
     def _line(self) -> str:
@@ -229,9 +274,7 @@ def opened(path: Path | str, columns: Mapping[str, str] = SAME_NAMES) -> Iterato
         A file that is missing or cannot be read; a header without a column that ``columns`` names.
     """
     if path == "-":
-        if hasattr(sys.stdin, "reconfigure"):
-            sys.stdin.reconfigure(encoding="utf-8-sig", errors="surrogateescape", newline="\n")
-        yield Table("standard input", sys.stdin, columns)
+        yield Table("standard input", Waiting(sys.stdin.buffer), columns)
         return
     if Path(path).is_dir():
         raise BadInput(f"{path} is a folder; expected a CSV file")

@@ -12,11 +12,16 @@ Series and parallel values differ by :math:`C_s = (1 + D^2) C_p`.
 import cmath
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from types import MappingProxyType
+from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.units import PREFIXES, frequency_hz, si
 
@@ -187,14 +192,56 @@ def impedance(values: Mapping[str, float], frequency_hz: float) -> complex | Non
     >>> round(z.real), round(z.imag)
     (318183, -15909131)
     """
-    for (one, other), closed in _PAIRS.items():
-        if one in values and other in values:
-            try:
-                z = closed(values[one], values[other], 2 * math.pi * frequency_hz)
-            except (ZeroDivisionError, OverflowError):
-                return None
-            return z if cmath.isfinite(z) else None
-    return None
+    found = pair(values)
+    if found is None:
+        return None
+    one, other = found
+    try:
+        z = _PAIRS[found](values[one], values[other], 2 * math.pi * frequency_hz)
+    except (ZeroDivisionError, OverflowError):
+        return None
+    return z if cmath.isfinite(z) else None
+
+
+def pair(quantities: Collection[str]) -> tuple[str, str] | None:
+    """The first pair among quantities that determines an impedance; None without one.
+
+    >>> pair(["D", "Z", "Cp"])
+    ('Cp', 'D')
+    """
+    return next((both for both in _PAIRS if both[0] in quantities and both[1] in quantities), None)
+
+
+_OF: Mapping[str, Callable[[Any, Any], Any]] = MappingProxyType({  # impedance and angular frequency to a quantity
+    "R": lambda z, _w: z.real, "X": lambda z, _w: z.imag, "Z": lambda z, _w: np.abs(z),
+    "phase": lambda z, _w: np.angle(z), "G": lambda z, _w: (1 / z).real, "B": lambda z, _w: (1 / z).imag,
+    "Y": lambda z, _w: 1 / np.abs(z), "Cp": lambda z, w: (1 / z).imag / w, "Cs": lambda z, w: -1 / (w * z.imag),
+    "Lp": lambda z, w: -1 / (w * (1 / z).imag), "Ls": lambda z, w: z.imag / w, "Rp": lambda z, _w: 1 / (1 / z).real,
+    "D": lambda z, _w: z.real / np.abs(z.imag), "Q": lambda z, _w: np.abs(z.imag) / z.real,
+})  # fmt: skip
+
+
+def quantity_of(quantity: str, z_ohm: ArrayLike, frequency_hz: ArrayLike) -> Real:
+    """A quantity of impedances.
+
+    Parameters
+    ----------
+    quantity : str
+        One of ``QUANTITIES``.
+    z_ohm, frequency_hz : (...) array
+        Impedances [ohm] and their frequencies [Hz].
+
+    Returns
+    -------
+    (...) array
+        In SI units.
+
+    Examples
+    --------
+    >>> round(float(quantity_of("Cp", 318183 - 15909131j, 1e3)) * 1e12, 4)
+    10.0
+    """
+    return np.asarray(_OF[quantity](np.asarray(z_ohm, complex), 2 * math.pi * np.asarray(frequency_hz)), float)
 
 
 def shown_value(quantity: str, value: float) -> str:

@@ -255,9 +255,9 @@ def compare(log: Log, iteration: int) -> Comparison:
     return of_iteration(log, iteration)
 
 
-def fit(log: Log, iteration: int) -> Fit:
-    """Material values from the readings and recordings of an iteration; as :func:`sensorgen.analysis.fit.fit`."""
-    return fit_values(log, iteration)
+def fit(log: Log, *specimens: str, iteration: int | None = None) -> Fit:
+    """Material values by what was measured of specimens or of an iteration; as :func:`sensorgen.analysis.fit.fit`."""
+    return fit_values(log, iteration, specimens=specimens)
 
 
 def _named(design: Design) -> Design:

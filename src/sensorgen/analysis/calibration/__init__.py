@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sensorgen.analysis.calibration.pairs import known_presses
-from sensorgen.core.arrays import Real
+from sensorgen.analysis.calibration.meters import readings_of
+from sensorgen.analysis.calibration.pairs import known_presses, nothing_recorded
 from sensorgen.core.document import Part
 from sensorgen.core.errors import BadInput, MissingValue, within
 from sensorgen.core.version import __version__
-from sensorgen.design.body import Body, BodyOf
+from sensorgen.design.body import BodyOf
 from sensorgen.design.design import Design
-from sensorgen.measure.log import BenchRun, Log, batches, notes
+from sensorgen.measure.log import BenchRun, Log, Reading, batches, notes
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log.entries import Specimen
 from sensorgen.prediction import bodies
@@ -26,12 +26,13 @@ from sensorgen.prediction.calibration.rest import checked
 from sensorgen.prediction.calibration.specimen import SpecimenModel, Spread
 from sensorgen.prediction.inverse.verdict import NORMAL_90
 from sensorgen.prediction.planning import sensor_model
-from sensorgen.prediction.query import Query, Tip
+from sensorgen.prediction.query import TIP_M, TONES_HZ, Query, Tip
 from sensorgen.prediction.sensor_model import SensorModel
 
 FEWEST_RECHECK = 3  # presses from which on a change can be told
 _ALARM = 2.5758293035489004  # normal deviate of 0.5 %
 _SURE = 2 * NORMAL_90  # widths of a 90 % interval, in standard deviations
+_BAKED = {True: "baked", False: "not baked", None: "of unknown bake"}
 _INSTRUMENT = ("lead", "stray", "force offset", "position offset")  # shared by specimens that are measured in one go
 
 
@@ -91,7 +92,7 @@ class Bench:
         Mean and standard deviation of what the sensor feels above the force that the rig says [N].
     """
 
-    tip_m: float = 5e-3
+    tip_m: float = TIP_M
     force_offset_n: tuple[float, float] = (0.0, 0.1)
 
     def __post_init__(self) -> None:
@@ -129,20 +130,75 @@ def design_of(log: Log, specimen: str) -> tuple[str, Design]:
     return name, found
 
 
-def model_of(body: Body, frequency_hz: Real, bench: Bench) -> tuple[SpecimenModel, SensorModel]:
-    """The model of a specimen, its spread from what the prediction leaves open."""
-    found, _ = sensor_model(body, Query(tip=Tip(bench.tip_m)))
+def spread_of(predicted: SensorModel, bench: Bench) -> Spread:
+    """Spread of the specimens of a design, from what its prediction leaves open."""
     mean, sd = bench.force_offset_n
-    usual, c = Spread(), found.rest.capacitance
-    ends = [np.log(end / r.value) for r in found.rest.resistance.values() for end in (r.lower, r.upper)]
-    moduli = [v for v in found.values if v.quantity == "youngs_modulus_pa"]
-    spread = replace(
+    usual, c = Spread(), predicted.rest.capacitance
+    ends = [np.log(end / r.value) for r in predicted.rest.resistance.values() for end in (r.lower, r.upper)]
+    moduli = [v for v in predicted.values if v.quantity == "youngs_modulus_pa"]
+    return replace(
         usual, force_n=sd, force_offset_n=mean,
         resistance=max(usual.resistance, float(np.ptp(ends)) / _SURE) if ends else usual.resistance,
         capacitance=max(usual.capacitance, float(np.log(c.upper / c.lower)) / _SURE),
         law=usual.law if moduli else 2 * usual.law,
     )  # fmt: skip
-    return SpecimenModel(found.sensor, frequency_hz, spread), found
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What the log has of a specimen, and the model that it is compared with.
+
+    Attributes
+    ----------
+    specimen : str
+        Its name.
+    design : Design
+        What it was printed of.
+    predicted : SensorModel
+        Of its body.
+    model : SpecimenModel
+        That, with all in which specimens differ.
+    data : Data
+        Presses, rest, readings of meters.
+    rows : tuple of str
+        Of the log.
+    left_out, notes : tuple of str
+        What was left out; all that is to be said of the data.
+    """
+
+    specimen: str
+    design: Design
+    predicted: SensorModel
+    model: SpecimenModel
+    data: Data
+    rows: tuple[str, ...]
+    left_out: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def known(
+    log: Log, specimen: str, bench: Bench, recordings: Sequence[int] = (), body_of: BodyOf = bodies.default_body
+) -> Known:
+    """Gather what the log has of a specimen; parameters and errors as of :func:`calibrate`."""
+    name, design = design_of(log, specimen)
+    rows = _chosen(log, name, recordings)
+    body = body_of(design)
+    predicted, _ = sensor_model(body, Query(tip=Tip(bench.tip_m)))
+    meter, read = readings_of(log, name, body_of, predicted.sensor.common_resistivity_ohm_m())
+    if rows or meter is None:
+        data, tones, left_out = known_presses(log, name, rows)
+        notes = list(left_out)
+    else:
+        data, tones, left_out = nothing_recorded(), np.array(TONES_HZ), []
+        notes = ["no recording: R, C and leak by meters alone"]
+    model = SpecimenModel(predicted.sensor, tones, spread_of(predicted, bench))
+    _check_presses(name, model, data)
+    if meter:
+        notes.append(f"{len(read)} readings of meters count, {_BAKED[read[-1].baked]}")
+    uids = (*(row.uid for row in rows), *(one.uid for one in read))
+    return Known(
+        name, design, predicted, model, replace(data, meter=meter), uids, tuple(left_out), (*notes, *predicted.doubts)
+    )
 
 
 def stored(log: Log, specimen: str) -> Calibration | None:
@@ -160,9 +216,11 @@ def stored(log: Log, specimen: str) -> Calibration | None:
     again = f"calibrate it again: sensorgen calibrate {specimen!r}"
     if design_of(log, specimen)[1].id() != found.design_id:
         raise BadInput(f"{specimen} was calibrated as {found.design} ({found.design_id}), but is no longer; {again}")
-    current = {run.uid for run in log.recordings(specimen=specimen)}
-    if lost := set(found.recordings) - current:
-        raise BadInput(f"{specimen}: {len(lost)} recordings of its calibration were withdrawn or corrected; {again}")
+    current = {row.uid for row in (*log.recordings(specimen=specimen), *log.entries(Reading, specimen=specimen))}
+    if lost := set(found.rows) - current:
+        raise BadInput(
+            f"{specimen}: {len(lost)} recordings or readings of its calibration were withdrawn or corrected; {again}"
+        )
     return found
 
 
@@ -194,31 +252,26 @@ def calibrate(
         the sensor.
     """
     bench = bench or Bench()
-    fitted: list[tuple[str, Design, SpecimenModel, Data, list[BenchRun], list[str]]] = []
     if len(set(specimens)) < len(specimens):
         raise BadInput(f"a specimen stands twice in {', '.join(specimens)}; expected each once")
+    found = []
     for specimen in specimens:
         step(specimen)
-        name, design = design_of(log, specimen)
-        rows = _chosen(log, name, recordings)
-        data, tones, left_out = known_presses(log, name, rows)
-        model, found = model_of(body_of(design), tones, bench)
-        _check_presses(name, model, data)
-        fitted.append((name, design, model, data, rows, [*left_out, *found.doubts]))
-    posteriors = [calibrated(model, data) for _, _, model, data, _, _ in fitted]
+        found.append(known(log, specimen, bench, recordings, body_of))
+    posteriors = [calibrated(one.model, one.data) for one in found]
     if len(posteriors) > 1:
-        posteriors = shared([model for _, _, model, *_ in fitted], posteriors, _INSTRUMENT)
+        posteriors = shared([one.model for one in found], posteriors, _INSTRUMENT)
     made = []
-    for (name, design, model, data, rows, left_out), posterior in zip(fitted, posteriors, strict=True):
-        most = float(data.presses.force_n.max(initial=0.0)) or 6.0
-        held = held_out(model, data, BEYOND * most, step)
-        if len(fitted) > 1:
-            left_out.append(f"lead, stray and offsets shared with {', '.join(f[0] for f in fitted if f[0] != name)}")
+    for one, posterior in zip(found, posteriors, strict=True):
+        most = float(one.data.presses.force_n.max(initial=0.0)) or 6.0
+        held = held_out(one.model, one.data, BEYOND * most, step)
+        others = ", ".join(other.specimen for other in found if other is not one)
+        notes = (*one.notes, f"lead, stray and offsets shared with {others}") if others else one.notes
         calibration = Calibration(
-            name, design.name, design.id(), model, posterior, most, held[0] if held else None,
-            tuple(row.uid for row in rows), tuple(gain(model, data, posterior.at).tolist()), tuple(left_out),
+            one.specimen, one.design.name, one.design.id(), one.model, posterior, most, held[0] if held else None,
+            one.rows, tuple(gain(one.model, one.data, posterior.at).tolist()), notes,
         )  # fmt: skip
-        made.append(Made(calibration, data, held[1] if held else None))
+        made.append(Made(calibration, one.data, held[1] if held else None))
     return made
 
 
@@ -301,7 +354,7 @@ def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
     old = stored(log, name)
     if old is None:
         raise BadInput(f"{name} was never calibrated: sensorgen calibrate {name!r} first")
-    rows = [row for row in _chosen(log, name, recordings) if row.uid not in old.recordings]
+    rows = [row for row in _chosen(log, name, recordings) if row.uid not in old.rows]
     data, tones, left_out = known_presses(log, name, rows)
     with within(name):
         order = checked(tones, old.model.frequency_hz)
@@ -321,7 +374,7 @@ def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
     posterior = calibrated(old.model, data, widened(old.model, old.posterior))
     new = replace(
         old, posterior=posterior, force_n=most, held_out=None,
-        recordings=(*old.recordings, *(row.uid for row in rows)),
+        rows=(*old.rows, *(row.uid for row in rows)),
         notes=(*left_out, f"mended by {count} presses after a recheck"),
     )  # fmt: skip
     return Recheck(new, count, coverage_of(at, data.presses).force, z)

@@ -18,8 +18,10 @@ from sensorgen.measure.signal.run import processed
 from sensorgen.prediction.calibration.fitting import Data
 from sensorgen.prediction.calibration.rest import checked
 from sensorgen.prediction.calibration.specimen import Presses
+from sensorgen.prediction.query import TONES_HZ
 
 _LEAST_ERROR = 3e-4  # of a mean at rest: from one recording to the next it differs by more than its noise
+_UNKNOWN = 1e3  # standard deviation of what was never measured [-]
 _SHORTEST_S = 0.1  # of a hold: its logarithm counts
 
 
@@ -68,6 +70,15 @@ def known_presses(log: Log, name: str, rows: Sequence[BenchRun]) -> tuple[Data, 
             order = checked(other, tones)
         same.append((pairs and _ordered(pairs, order), rest[order], noise[order]))
     return _data(same), tones, left_out
+
+
+def nothing_recorded() -> Data:
+    """Of a specimen that was never on the bench: no press, nothing known at the tones of the thesis's multi-sine."""
+    m, none = len(TONES_HZ), np.empty(0)
+    nothing = np.empty((0, m))
+    return Data(
+        Presses(none, none, none, none), nothing.astype(complex), nothing, np.zeros(m, complex), np.full(m, _UNKNOWN)
+    )
 
 
 def _ordered(pairs: Pairs, order: NDArray[np.intp]) -> Pairs:

@@ -8,16 +8,18 @@ from math import isfinite, log, nan, sqrt
 
 import numpy as np
 
+from sensorgen.analysis.calibration import Bench, Known, known
 from sensorgen.analysis.comparison import Comparison, of_iteration, predicted
-from sensorgen.analysis.comparison.moved import Movable, at_rest, moved
-from sensorgen.analysis.comparison.runs import Run, runs
+from sensorgen.analysis.comparison.allowed import Allowed, allowed, usable
+from sensorgen.analysis.comparison.moved import Movable, at_rest
 from sensorgen.analysis.fit import resistance, tones
 from sensorgen.analysis.fit.results import Error, Fit, Fitted, Untold
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
-from sensorgen.measure.log import Log, Reading
+from sensorgen.measure.log import BenchRun, Log, Reading
+from sensorgen.measure.log.notes import specimen as named
 from sensorgen.prediction import bodies
 
 HELD_BACK = 0.25  # of the specimens
@@ -26,65 +28,96 @@ STEPS = ("readings", "recordings", "values", "errors")
 _ACROSS = Untold("resistivity_ohm_m across", "nothing was measured across the electrodes: R_Y and Re Z run along them")
 
 
+_Which = tuple[int | None, Sequence[str]]  # iteration, or specimens
+
+
 def fit(
-    log: Log, iteration: int, seed: int = SEED, body_of: BodyOf = bodies.default_body,
-    step: Callable[[str], None] = lambda _: None,
+    log: Log, iteration: int | None, seed: int = SEED, body_of: BodyOf = bodies.default_body,
+    step: Callable[[str], None] = lambda _: None, bench: Bench | None = None, *, specimens: Sequence[str] = (),
 ) -> Fit:  # fmt: skip
-    """Fit material values to the readings and recordings of an iteration.
+    """Fit material values to the readings and recordings of an iteration or of specimens.
 
     Parameters
     ----------
     log : Log
         An open one.
-    iteration : int
-        Of the design.
+    iteration : int or None
+        Of the design; None where specimens are given.
     seed : int
         Of the split between specimens that are fitted to and specimens that are held back.
     body_of : callable
         Makes the body of a design that the readings are of.
     step : callable
         Called with each of ``STEPS``, and with the name of each design to predict, before it is done.
+    bench : Bench, optional
+        Its tip and force.
+    specimens : sequence of str
+        Specimens as written, in place of an iteration.
 
     Raises
     ------
     BadInput
-        Nothing of that iteration in the log that a fit could use.
+        Nothing of them in the log that a fit could use; no such specimen.
     """
     step("readings")
-    found = of_iteration(log, iteration, step, body_of)
+    specimens = tuple(dict.fromkeys(named(name, log).specimen for name in specimens))
+    found = of_iteration(log, iteration, step, body_of, specimens=specimens)
     left_out = list(found.left_out)
     step("recordings")
-    recorded = list(runs(log, iteration, left_out))
-    usable = list(_usable(found))
-    names = sorted({specimen for specimen, _ in usable} | {run.entry.specimen for run in recorded})
+    measured = list(_measured(log, (iteration, specimens), found, bench or Bench(), body_of, left_out))
+    readings = list(_usable(found))
+    names = sorted({specimen for specimen, _ in readings} | {one.specimen for one, _ in measured})
     if not names:
+        of = ", ".join(specimens) or f"iteration {iteration}"
         raise BadInput(
-            f"no readings of sound electrodes and no recordings of iteration {iteration} in {str(log.path)!r}; "
+            f"no readings of sound electrodes and no recordings of {of} in {str(log.path)!r}; "
             "expected some to fit to: sensorgen log list shows what there is"
         )
     kept_back = held_back(names, seed)
     step("values")
     values, untold = _fitted(
-        [allowed for specimen, allowed in usable if specimen not in kept_back],
-        _of_runs([run for run in recorded if run.entry.specimen not in kept_back], found, left_out),
+        [reading for specimen, reading in readings if specimen not in kept_back],
+        [
+            tones.of_specimen(one, print_, Movable(found.bodies[found.names[one.specimen]]))
+            for one, print_ in measured if one.specimen not in kept_back
+        ],
         next(iter(found.bodies.values())).design, seed,
     )  # fmt: skip
     step("errors")
     errors = [
-        *_reading_errors({specimen for specimen, _ in usable} & kept_back, found, values),
-        *_run_errors([run for run in recorded if run.entry.specimen in kept_back], found, values),
+        *_reading_errors({specimen for specimen, _ in readings} & kept_back, found, values),
+        *_rest_errors([one for one, _ in measured if one.specimen in kept_back], found, values),
     ]
     return Fit(
-        iteration, seed, tuple(values), tuple(untold), tuple(errors), len(names) - len(kept_back),
-        tuple(sorted(kept_back)), tuple(left_out), _fingerprint(log, iteration, recorded),
+        iteration, specimens, seed, tuple(values), tuple(untold), tuple(errors), len(names) - len(kept_back),
+        tuple(sorted(kept_back)), tuple(left_out), _fingerprint(log, (iteration, specimens)),
     )  # fmt: skip
 
 
-def _usable(found: Comparison) -> Iterator[tuple[str, resistance.Allowed]]:
+def _measured(
+    log: Log, which: _Which, found: Comparison, bench: Bench, body_of: BodyOf, left_out: list[tuple[str, str]]
+) -> Iterator[tuple[Known, str]]:
+    """Specimens that the bench or an LCR meter has measured, each with the name of its print."""
+    prints: dict[str, str] = {}
+    for row in (*log.about(BenchRun, *which), *found.alternating):
+        prints[row.specimen] = row.batch or prints.get(row.specimen, "")
+    for specimen, print_ in prints.items():
+        try:
+            if specimen not in found.names:
+                raise BadInput(f"no design is known of {specimen}")
+            one = known(log, specimen, bench, body_of=body_of)
+        except SensorgenError as error:
+            left_out.append((specimen, str(error)))
+            continue
+        left_out += [(specimen, note) for note in one.left_out]
+        yield one, print_ or specimen
+
+
+def _usable(found: Comparison) -> Iterator[tuple[str, Allowed]]:
     """Specimens, and what each of their readings allows."""
     for row in found.rows:
-        if row.predicted and (allowed := resistance.allowed(row, found.bodies[row.predicted.design])):
-            yield row.reading.specimen, allowed
+        if row.predicted and (reading := allowed(row, found.bodies[row.predicted.design])):
+            yield row.reading.specimen, reading
 
 
 def held_back(names: Sequence[str], seed: int) -> frozenset[str]:
@@ -98,25 +131,8 @@ def held_back(names: Sequence[str], seed: int) -> frozenset[str]:
     return frozenset(sorted(names)[k] for k in drawn.tolist())
 
 
-def _of_runs(recorded: Sequence[Run], found: Comparison, left_out: list[tuple[str, str]]) -> list[tones.OfRun]:
-    fits = []
-    for run in recorded:
-        try:
-            fits.append(tones.of_run(run, Movable(_body(found, run.entry.specimen))))
-        except SensorgenError as error:
-            left_out.append((run.name, str(error)))
-    return fits
-
-
-def _body(found: Comparison, specimen: str) -> Body:
-    name = found.names.get(specimen)
-    if name is None:
-        raise BadInput(f"no design is known of {specimen}")
-    return found.bodies[name]
-
-
 def _fitted(
-    readings: Sequence[resistance.Allowed], fits: Sequence[tones.OfRun], design: Design, seed: int
+    readings: Sequence[Allowed], fits: Sequence[tones.OfSpecimen], design: Design, seed: int
 ) -> tuple[list[Fitted], list[Untold]]:
     """All values and all that stays open; of two values of one quantity the one that is known better."""
     electrode, film = design.slot("top_electrode")[0].name, design.slot("film")[0].name
@@ -134,7 +150,7 @@ def _fitted(
     known = {quantity for _, quantity in best}
     open_ = [u for u in found if isinstance(u, Untold)]
     untold = [u for u in open_ if not any(quantity.startswith(u.parameter.split()[0]) for quantity in known)]
-    return list(best.values()), [_ACROSS, *untold]
+    return list(best.values()), [_ACROSS, *{u.parameter: u for u in reversed(untold)}.values()]
 
 
 def with_values(body: Body, values: Sequence[Fitted]) -> Body:
@@ -150,7 +166,7 @@ def _reading_errors(specimens: Container[str], found: Comparison, values: Sequen
     before, residuals, after = array("d"), array("d"), dict[str, Bounds | None]()
     for row in found.rows:
         of = row.predicted
-        if of is None or row.reading.specimen not in specimens or not resistance.usable(row):
+        if of is None or row.reading.specimen not in specimens or not usable(row):
             continue
         if of.design not in after:
             after[of.design] = predicted(with_values(found.bodies[of.design], values)).ry_ohm
@@ -165,26 +181,22 @@ def _rms(values: Sequence[float]) -> float:
     return sqrt(sum(v * v for v in known) / len(known)) if known else nan
 
 
-def _run_errors(recorded: Sequence[Run], found: Comparison, values: Sequence[Fitted]) -> list[Error]:
+def _rest_errors(specimens: Sequence[Known], found: Comparison, values: Sequence[Fitted]) -> list[Error]:
     before: list[float] = []
     after: list[float] = []
-    for run in recorded:
-        try:
-            body = _body(found, run.entry.specimen)
-            pair = [Movable(b).model.sensor for b in (body, with_values(body, values))]
-        except SensorgenError:
-            continue
-        f, measured = run.tones_hz, np.log(run.rest_ohm)
-        for sensor, into in zip(pair, (before, after), strict=True):
-            into.extend(np.abs(measured - at_rest(moved(sensor), f)).tolist())
+    for one in specimens:
+        body = found.bodies[found.names[one.specimen]]
+        f, told = one.model.frequency_hz, one.data.rest_noise < 1
+        for of, into in ((body, before), (with_values(body, values), after)):
+            into.extend(np.abs(one.data.rest - at_rest(Movable(of).model.sensor, f))[told].tolist())
     return [Error("Z at rest", len(before), _rms(before), _rms(after))] if before else []
 
 
-def _fingerprint(log: Log, iteration: int, recorded: Sequence[Run]) -> str:
+def _fingerprint(log: Log, which: _Which) -> str:
     """SHA-256 of what was fitted to."""
     digest, mark = sha256(), ""
-    readings = (f"{r.uid} {r.specimen} {r.y_ohm} {r.z_ohm}" for r in log.entries(Reading, iteration=iteration))
-    recordings = (f"{run.entry.uid} {run.entry.file} {run.entry.rig_file}" for run in recorded)
+    readings = (f"{r.uid} {r.specimen} {r.y_ohm} {r.z_ohm} {r.quantity} {r.value}" for r in log.about(Reading, *which))
+    recordings = (f"{run.uid} {run.file} {run.rig_file}" for run in log.about(BenchRun, *which))
     for line in chain(readings, recordings):
         digest.update(f"{mark}{line}".encode())
         mark = "\n"

@@ -1,68 +1,19 @@
-r"""Resistivity and leak from a multimeter's readings.
-
-An electrode's resistance over its resistivity is known between bounds, so that each reading allows a range of
-:math:`\varrho`. A film that leaks evenly lets R_Y read less than the electrode has; a bridge at the contacts does not:
-which it was is not recorded, so the range runs from R_Y as it was read to R_Y as an even leak would have it.
-"""
+"""Resistivity and leak from a multimeter's readings."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
-from math import exp, isfinite, log
+from math import exp, isfinite
 
 import numpy as np
 
-from sensorgen.analysis.comparison import Compared
+from sensorgen.analysis.comparison.allowed import Allowed
 from sensorgen.analysis.fit.results import LEVEL, Fitted, Untold
-from sensorgen.core.units import M_PER_MM
-from sensorgen.design.body import Body
 from sensorgen.design.materials import FILM_LEAK
-from sensorgen.design.values import resistivities
 from sensorgen.measure.recording.samples import Real
-from sensorgen.measure.signal.leakage import electrode_and_leak
-from sensorgen.prediction.electrodes import electrode_resistance
 
 RESISTIVITY = "resistivity_ohm_m"
 LEAST = 3  # readings that a scatter can be told from
 _DRAWS = 2000
 _PROPERTY = 10.0  # leaks that scatter by more than this factor about their median are no property of a material
-
-
-@dataclass(frozen=True, slots=True)
-class Allowed:
-    """ln of the resistivities [ohm m] that a reading allows, and of the leak per area [S/m2]; nan where unknown."""
-
-    low: float
-    high: float
-    leak: float
-
-
-def usable(row: Compared) -> bool:
-    """Whether a reading is one of a sound electrode."""
-    return row.verdict.electrode == "sound" and isfinite(row.verdict.ry_ohm) and row.verdict.ry_ohm > 0
-
-
-def allowed(row: Compared, body: Body) -> Allowed | None:
-    """What a reading allows; None where it is none of a sound electrode."""
-    if not usable(row):
-        return None
-    ry, rz = row.verdict.ry_ohm, row.verdict.rz_ohm
-    per, design = _per_resistivity(body), body.design
-    highest, leak = electrode_and_leak(ry, rz) if rz > 0 else (ry, float("nan"))
-    area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
-    return Allowed(log(ry / per[1]), log(highest / per[0]), log(leak / area) if leak > 0 else float("nan"))
-
-
-@lru_cache(maxsize=64)
-def _per_resistivity(body: Body) -> tuple[float, float]:
-    """Bounds of an electrode's resistance over its resistivity [1/m]."""
-    rho = resistivities(body.design)
-    found = [
-        end / rho[name].value
-        for name, r in electrode_resistance(body).items()
-        for end in (r.model.lower, r.model.upper, r.print.lower, r.print.upper)
-    ]
-    return min(found), max(found)
 
 
 def resistivity(readings: Sequence[Allowed], material: str, seed: int) -> Fitted | Untold:
@@ -100,7 +51,7 @@ def leak(readings: Sequence[Allowed], material: str, seed: int) -> Fitted | Unto
     """Leak per area, where it scatters little enough to be anything of the material's."""
     known = np.array([r.leak for r in readings if isfinite(r.leak)])
     if len(known) < LEAST:
-        return Untold("leak", f"{len(known)} specimens that leak; expected {LEAST} or more")
+        return Untold("leak", f"{len(known)} readings of films that leak; expected {LEAST} or more")
     middle, spread = float(np.median(known)), float(np.exp(np.median(np.abs(known - np.median(known)))))
     if spread > _PROPERTY:
         least, most = np.exp(known.min()), np.exp(known.max())

@@ -1,5 +1,6 @@
 """What a fit gives: values with their uncertainty, what the data do not determine, and errors before and after."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import exp
@@ -66,8 +67,12 @@ class Fit:
 
     Attributes
     ----------
-    iteration, seed : int
-        What was fitted, and how the specimens were split.
+    iteration : int or None
+        Of the design; None of specimens that were named.
+    names : tuple of str
+        Those specimens.
+    seed : int
+        How the specimens were split.
     values : tuple of Fitted
         From all specimens but those held back.
     untold : tuple of Untold
@@ -86,7 +91,8 @@ class Fit:
         Where the source is kept; None if it is not.
     """
 
-    iteration: int
+    iteration: int | None
+    names: tuple[str, ...]
     seed: int
     values: tuple[Fitted, ...]
     untold: tuple[Untold, ...]
@@ -100,11 +106,19 @@ class Fit:
     @property
     def source(self) -> str:
         """Name of the source that it makes."""
-        return f"fit-{self.iteration}"
+        if self.iteration is not None:
+            return f"fit-{self.iteration}"
+        first, *others = (re.sub(r"[^a-z0-9.]+", "-", name.lower()).strip("-.") for name in self.names)
+        return f"fit-{first}" + (f"-and-{len(others)}" if others else "")
+
+    @property
+    def of(self) -> str:
+        """What was fitted, in words."""
+        return f"iteration {self.iteration}" if self.iteration is not None else ", ".join(self.names)
 
     def document(self) -> Iterator[Part]:
         """Values, what stays open, errors, and where the source is."""
-        yield f"iteration {self.iteration}: {self.specimens} specimens fitted to, {len(self.held_back)} held back"
+        yield f"{self.of}: fitted to {self.specimens}, {len(self.held_back)} held back"
         if self.values:
             yield Table.of("values", "", self.values)
             yield Facts(tuple((f"{v.quantity}:", v.note) for v in self.values))
@@ -113,6 +127,7 @@ class Fit:
             before, after = (f"a factor of {exp(e):.3g}" for e in (error.before, error.after))
             yield f"{error.observable} of {error.count} held back: off by {before} before, {after} after (rms)"
         if self.left_out:
-            yield f"left out: {len(self.left_out)}; sensorgen report --iteration {self.iteration} says why"
+            of = f"--iteration {self.iteration}" if self.iteration is not None else " ".join(map(repr, self.names))
+            yield f"left out: {len(self.left_out)}; sensorgen report {of} says why"
         if self.file:
             yield f"in {self.file}"

@@ -1,32 +1,35 @@
-"""Resistivity, permittivity, leak and modulus from recordings of the bench."""
+"""Resistivity, permittivity, leak and modulus from what the bench and LCR meters said of specimens.
+
+Each specimen is calibrated (:mod:`sensorgen.prediction.calibration`); what its readings say beyond the prior counts.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, log, pi, sqrt
+from math import exp, inf, log, pi, sqrt
 
 import numpy as np
 
-from sensorgen.analysis.comparison.moved import PERMITTIVITY, Movable, at_rest, moved, pressed
-from sensorgen.analysis.comparison.runs import Run
+from sensorgen.analysis.calibration import Known
+from sensorgen.analysis.comparison.moved import PERMITTIVITY, Movable
 from sensorgen.analysis.fit.results import LEVEL, Fitted, Untold
-from sensorgen.core.errors import SensorgenError
-from sensorgen.core.units import M_PER_MM
+from sensorgen.core.arrays import Real
 from sensorgen.design.materials import FILM_LEAK
-from sensorgen.measure.recording.samples import Complex, Real
+from sensorgen.prediction.calibration.fitting import Posterior, calibrated
+from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel
 
 MODULUS = "youngs_modulus_pa"
 _SURE = 2.0  # standard errors on either side of a value
 _UNSURE = log(3.0)  # standard error of a logarithm from which on the data do not tell
-_FLOOR = 1e-4  # of ln Z: no bench is right to more
-_BOUND = log(1e3)  # factors beyond are no fit
 _BETWEEN, _WEIGHT = 0.1, 3  # prior of the scatter of ln of a value between prints: its size, worth so many of them
+_SOFTER = 1.05  # factor on a force, to see how the rise depends on it
 
 
 @dataclass(frozen=True, eq=False)
-class OfRun:
-    """What a recording says: ln of factors to the prediction, with standard errors; leak of the whole film [S]."""
+class OfSpecimen:
+    """What a specimen says: ln of factors to the prediction, with standard errors; leak of the whole film [S]."""
 
-    run: Run
+    name: str
+    print_: str
     of: Movable
     resistivity: tuple[float, float]
     capacitance: tuple[float, float]
@@ -34,68 +37,73 @@ class OfRun:
     stiffness: tuple[float, float] | None
 
 
-def of_run(run: Run, of: Movable) -> OfRun:
-    """Fit a recording.
+def of_specimen(known: Known, print_: str, of: Movable) -> OfSpecimen:
+    """Calibrate a specimen, and take what its readings say.
 
-    Raises
-    ------
-    SensorgenError
-        The line model does not apply to the design.
+    Parameters
+    ----------
+    known : Known
+        What the log has of it.
+    print_ : str
+        Name of its print bed; its own if that is unknown.
+    of : Movable
+        Its body.
     """
-    from scipy.optimize import least_squares
-
-    sensor, f = of.model.sensor, run.tones_hz
-    measured = np.log(run.rest_ohm)
-    weight = 1 / np.maximum(np.abs(run.rest_error_ohm / run.rest_ohm), _FLOOR)
-    scale = 2 * pi * float(f.min()) * sensor.capacitance_f()
-
-    def left(at: Real) -> Real:
-        found = at_rest(moved(sensor, exp(at[0]), exp(at[1]), at[2] * scale), f)
-        return _parts((measured - found) * weight)
-
-    done = least_squares(
-        left, [0.0, 0.0, 1e-3], bounds=([-_BOUND, -_BOUND, 0], [_BOUND, _BOUND, np.inf]), x_scale="jac"
-    )
-    errors = _errors(done.jac, done.fun)
-    found = moved(sensor, exp(done.x[0]), exp(done.x[1]), done.x[2] * scale)
-    stiffness = None
-    if run.pairs is not None and len(run.pairs.time_s) >= 3:
-        stiffness = _stiffness(run, found)
-    return OfRun(
-        run, of, (done.x[0], errors[0]), (done.x[1], errors[1]), (done.x[2] * scale, errors[2] * scale), stiffness
-    )
+    model, found = known.model, calibrated(known.model, known.data)
+    c = model.sensor.capacitance_f() * exp(model.spread.capacitance * _at(model, found, "capacitance")[0])
+    leak, sd = _at(model, found, "leak")
+    at, ln = model.spread.leak * exp(model.spread.leak_spread * leak), model.spread.leak_spread * sd
+    siemens = at * 2 * pi * float(model.frequency_hz.min()) * c
+    stiffness = _stiffness(known, found) if len(known.data.presses.force_n) >= 3 else None
+    return OfSpecimen(
+        known.specimen, print_, of, _alone(model, found, "resistance", model.spread.resistance),
+        _alone(model, found, "capacitance", model.spread.capacitance),
+        (siemens, siemens * (exp(_SURE * ln) - 1) / _SURE), stiffness,
+    )  # fmt: skip
 
 
-def _parts(values: Complex) -> Real:
-    return np.concatenate([values.real.ravel(), values.imag.ravel()])
+def _at(model: SpecimenModel, found: Posterior, name: str) -> tuple[float, float]:
+    k = model.names.index(name)
+    return float(found.at[k]), sqrt(found.covariance[k, k])
 
 
-def _errors(jacobian: Real, left: Real) -> Real:
-    """Standard errors, with the scatter that is left where it is more than the readings' own."""
-    spread = max(1.0, float(left @ left) / max(len(left) - jacobian.shape[1], 1))
-    return np.asarray(np.sqrt(np.diag(np.linalg.pinv(jacobian.T @ jacobian)) * spread))
+def _alone(model: SpecimenModel, found: Posterior, name: str, scale: float) -> tuple[float, float]:
+    """What the readings say of a parameter without the prior, which is standard normal."""
+    at, sd = _at(model, found, name)
+    told = 1 - sd**2
+    return (scale * at / told, scale * sd / sqrt(told)) if told > 0 else (0.0, inf)
 
 
-def _stiffness(run: Run, sensor: "object") -> tuple[float, float] | None:
-    from scipy.optimize import least_squares
-
-    pairs, f = run.pairs, run.tones_hz
-    assert pairs is not None  # noqa: S101 - asked before
-    moves = np.log(pairs.pressed_ohm / pairs.before_ohm)
-    weight = 1 / np.maximum(np.abs(pairs.error_ohm / pairs.before_ohm), _FLOOR)
-
-    def left(at: Real) -> Real:
-        made = pressed(sensor, f, pairs.force_n, pairs.position_mm * M_PER_MM, exp(at[0]))  # type: ignore[arg-type]
-        return _parts((moves - made) * weight)
-
-    try:
-        done = least_squares(left, [0.0], bounds=([-log(10.0)], [_BOUND]))
-    except SensorgenError:
-        return None
-    return float(done.x[0]), float(_errors(done.jac, done.fun)[0])
+def _stiffness(known: Known, found: Posterior) -> tuple[float, float]:
+    """Ln of one factor on all moduli by the rise at each force, whose own deviations from the law are marginalised."""
+    model, sensor = known.model, known.model.sensor
+    weights = model.law_weights()
+    prior = np.linalg.inv(weights @ weights.T)
+    posterior = np.linalg.inv(weights @ found.covariance @ weights.T)
+    told, pull = posterior - prior, posterior @ (weights @ found.at)  # of the readings alone
+    common = weights[:, model.names.index("rise")]
+    shape = np.linalg.inv(weights @ weights.T - np.outer(common, common))
+    through = shape @ np.linalg.inv(told + shape)
+    slope = -_slopes(model)  # a film that is stiffer by a factor answers as to a weaker press
+    in_range = np.array(FORCES_N) <= sensor.width_m * sensor.tip_m * model.most_pa
+    slope = np.where(in_range, slope, 0.0)
+    information = float(slope @ through @ told @ slope)
+    return (float(slope @ through @ pull) / information, 1 / sqrt(information)) if information > 0 else (0.0, inf)
 
 
-def values(fits: Sequence[OfRun]) -> list[Fitted | Untold]:
+def _slopes(model: SpecimenModel) -> Real:
+    """Of ln of the predicted rise over ln force at ``FORCES_N``."""
+    sensor = model.sensor
+
+    def rise(force_n: Real) -> Real:
+        share, _ = sensor.compression.capacitive_strain(force_n / (sensor.width_m * sensor.tip_m))
+        return np.log(share / (1 - share))
+
+    force = np.minimum(np.array(FORCES_N), sensor.width_m * sensor.tip_m * model.most_pa / _SOFTER)
+    return np.asarray((rise(force * _SOFTER) - rise(force)) / log(_SOFTER))
+
+
+def values(fits: Sequence[OfSpecimen]) -> list[Fitted | Untold]:
     """What the recordings say together, each counting the same."""
     if not fits:
         none = "no recording of the bench: resistances at direct current do not depend on it"
@@ -109,13 +117,13 @@ def values(fits: Sequence[OfRun]) -> list[Fitted | Untold]:
         (fit, (fit.stiffness[0] + log(t.value), fit.stiffness[1])) for fit in fits if fit.stiffness
         for t in fit.of.model.values if t.material == film and t.quantity == MODULUS
     ]  # fmt: skip
-    rho = f"Re Z of {len(fits)} recordings: one value for both electrodes, along them"
+    rho = f"Re Z of {_specimens(len(fits))}: one value for both electrodes, along them"
     law = f"by the law of compression {sensor.compression.name}; all moduli move together"
     modulus: Fitted | Untold = Untold(MODULUS, "no recording with presses whose force and position are known")
     if pressed:
         moduli = [pair for _, pair in pressed]
         together = _together(moduli, _prints([fit for fit, _ in pressed]))
-        modulus = _value(film, MODULUS, together, f"presses of {len(moduli)} recordings, {law}", len(moduli))
+        modulus = _value(film, MODULUS, together, f"presses of {_specimens(len(moduli))}, {law}", len(moduli))
     return [
         _value(electrode, "resistivity_ohm_m", _together(along, _prints(fits)), rho, len(fits)),
         _permittivity(fits, film), modulus, _leak(fits, film),
@@ -126,12 +134,16 @@ def _value(material: str, quantity: str, ln: tuple[float, float], note: str, cou
     """A value by the logarithm and its standard error, unless that leaves it open."""
     at, error = ln
     if error > _UNSURE:
-        return Untold(quantity, f"{count} recordings leave a factor of {exp(error):.3g} open")
+        return Untold(quantity, f"{_specimens(count)} leave a factor of {exp(error):.3g} open")
     return Fitted(material, quantity, exp(at), exp(at - _SURE * error), exp(at + _SURE * error), note)
 
 
-def _prints(fits: Sequence[OfRun]) -> list[str]:
-    return [fit.run.entry.batch or fit.run.entry.specimen for fit in fits]
+def _specimens(count: int) -> str:
+    return f"{count} specimen{'s' * (count != 1)}"
+
+
+def _prints(fits: Sequence[OfSpecimen]) -> list[str]:
+    return [fit.print_ for fit in fits]
 
 
 def _together(
@@ -139,7 +151,7 @@ def _together(
 ) -> tuple[float, float]:
     """Mean over prints, and its standard error from the errors or from the scatter between prints, whichever is more.
 
-    Recordings of one specimen count as one print, and specimens of one plate as one: they share its conditions. Few
+    Specimens of one plate count as one print: they share its conditions. Few
     prints tell their own scatter badly: a prior stands in for it, and it counts as much more as Student's interval is
     wider. One print alone therefore never gives its own value for the material's.
     """
@@ -155,14 +167,14 @@ def _together(
     return float(at.mean()), max(own, wider * scatter / sqrt(count))
 
 
-def _permittivity(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
+def _permittivity(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
     found = []
     for fit in fits:
         factor, curve = fit.of.by_permittivity
         if not curve[0] <= fit.capacitance[0] <= curve[-1]:
             return Untold(
                 PERMITTIVITY,
-                f"{fit.run.name} has {exp(fit.capacitance[0]):.3g} times the predicted capacitance; a permittivity of "
+                f"{fit.name} has {exp(fit.capacitance[0]):.3g} times the predicted capacitance; a permittivity of "
                 f"{fit.of.permittivity * exp(factor[0]):.3g} to {fit.of.permittivity * exp(factor[-1]):.3g} makes none",
             )
         slope = float(np.interp(fit.capacitance[0], curve, np.gradient(curve, factor)))
@@ -172,20 +184,20 @@ def _permittivity(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
         found.append((log(fit.of.permittivity) + at, sqrt(fit.capacitance[1] ** 2 + open_**2) / slope))
     at, between = _together(found, _prints(fits))
     error = max(between, max(e for _, e in found))  # bounds of a model do not average out
-    note = f"Im Z of {len(fits)} recordings; the interval holds the bounds of the cell's model"
+    note = f"Im Z of {_specimens(len(fits))}; the interval holds the bounds of the cell's model"
     return _value(film, PERMITTIVITY, (at, error), note, len(fits))
 
 
-def _leak(fits: Sequence[OfRun], film: str) -> Fitted | Untold:
+def _leak(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
     """Per area, where it stands out of its error in every recording."""
     areas = [fit.of.model.sensor.length_m * fit.of.model.sensor.width_m for fit in fits]
     found = [(fit.leak_s[0] / a, fit.leak_s[1] / a) for fit, a in zip(fits, areas, strict=True)]
     if any(at < _SURE * error for at, error in found):
         most = max(at + _SURE * error for at, error in found)
-        return Untold("leak", f"in {len(found)} recordings no more than {most:.2g} S/m2, and none of it certain")
+        return Untold("leak", f"in {_specimens(len(found))} no more than {most:.2g} S/m2, and none of it certain")
     typical = sum(at for at, _ in found) / len(found)
     at, error = _together(found, _prints(fits), _BETWEEN * typical)
     if at <= _SURE * error:
-        return Untold("leak", f"{len(found)} recordings differ too much: {at:.2g} S/m2, give or take {error:.2g}")
+        return Untold("leak", f"{_specimens(len(found))} differ too much: {at:.2g} S/m2, give or take {error:.2g}")
     return Fitted(film, FILM_LEAK, at, at - _SURE * error, at + _SURE * error,
-                  f"Z of {len(found)} recordings at their lowest tones")  # fmt: skip
+                  f"Z of {_specimens(len(found))} at their lowest tones")  # fmt: skip

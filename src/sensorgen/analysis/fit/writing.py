@@ -31,7 +31,7 @@ def text(made: Fit) -> str:
 def about(made: Fit) -> str:
     """What the source is, in a sentence."""
     return (
-        f"fit of iteration {made.iteration}: {made.specimens} specimens, {len(made.held_back)} held back (seed "
+        f"fit of {made.of}: {made.specimens} specimens, {len(made.held_back)} held back (seed "
         f"{made.seed}); sensorgen {__version__}; data {made.log[:16]}"
     )
 

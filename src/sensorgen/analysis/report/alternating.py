@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import degrees, hypot, inf, isfinite, nan, pi, sqrt
-from statistics import mean, median, stdev
+from math import degrees, inf, isfinite, nan, pi
+from statistics import median
 from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison, Predicted
@@ -11,7 +11,6 @@ from sensorgen.analysis.plots.figure import GREY, ORANGE, Axis, Curve, Figure, P
 from sensorgen.core.document import Cell, Column, Table
 from sensorgen.core.units import frequency_text
 from sensorgen.measure import accuracy
-from sensorgen.measure.immittance import impedance
 from sensorgen.measure.log import Reading
 from sensorgen.prediction.query import TONES_HZ
 
@@ -21,14 +20,6 @@ NOTE = (
     "root of 3, or what was stated (type B), added in squares. A specimen is a capacitor at a frequency where its "
     "phase is beyond -45 deg. Ranges of predictions hold the errors of models, print and materials."
 )
-
-
-@dataclass(frozen=True)
-class Value:
-    """A measured value, and its standard uncertainty; nan where none is known."""
-
-    value: float
-    error: float = nan
 
 
 @dataclass(frozen=True)
@@ -80,30 +71,15 @@ def rows(found: Comparison) -> list[AcRow]:
 
 
 def _row(reading: Reading, frequency_hz: float, of: Predicted | None) -> AcRow:
-    meter = accuracy.find(reading.instrument) if reading.instrument else None
-    values, stated = _values(reading, frequency_hz)
-    repeats = [dict(zip(values, some, strict=True)) for some in zip(*values.values(), strict=False)]
-    known = [z for one in repeats if (z := impedance(one, frequency_hz)) is not None]
-    z = sum(known) / len(known) if known else None
-    omega = 2 * pi * frequency_hz
-    about = z or (complex(0, -1 / (omega * mean(values["Cp"]))) if mean(values.get("Cp", [0.0])) > 0 else None)
-
-    def value(name: str, derived: Sequence[float]) -> Value:
-        these = values.get(name, derived)
-        if not these:
-            return Value(nan)
-        middle = mean(these)
-        a = stdev(these) / sqrt(len(these)) if len(these) > 1 else 0.0
-        b = stated.get(name) or (meter.ac(name, middle, frequency_hz, about) if meter and about else None)
-        return Value(middle, hypot(a, b) if b is not None else a or nan)
-
-    c = value("Cp", [(1 / each).imag / omega for each in known if each])
-    size = value("Z", [abs(each) for each in known])
+    at = accuracy.at_frequency(reading, frequency_hz)
+    meter, about = at.meter, at.z_ohm
+    z = about if at.impedances else None
+    c, size = at.value("Cp"), at.value("Z")
     c_range, z_range = _predicted(of, frequency_hz)
     in_pf = [None if each is None else each / _F_PER_PF for each in c_range]
     outside = meter is not None and about is not None and meter.ac("Z", abs(about), frequency_hz, about) is None
     flags = (
-        "negative resistance" if (z.real if z is not None else mean(values.get("R", [0.0]))) < 0 else "",
+        "negative resistance" if (z.real if z is not None else at.value("R").value) < 0 else "",
         f"outside the range of {meter.name}" if meter and outside else "",
         "no positive capacitance" if isfinite(c.value) and c.value <= 0 else "",
     )
@@ -121,17 +97,6 @@ def _phase(z: complex) -> float:
     from cmath import phase
 
     return phase(z)
-
-
-def _values(reading: Reading, frequency_hz: float) -> tuple[dict[str, list[float]], dict[str, float]]:
-    """Values at one frequency by quantity, and the largest stated uncertainty of each."""
-    values, stated = dict[str, list[float]](), dict[str, float]()
-    errors = reading.uncertainty or (0.0,) * len(reading.value)
-    for name, value, at, error in zip(reading.quantity, reading.value, reading.frequency_hz, errors, strict=True):
-        if at == frequency_hz:
-            values.setdefault(name, []).append(value)
-            stated[name] = max(error, stated.get(name, 0.0))
-    return values, stated
 
 
 _Range = tuple[float | None, float | None, float | None]

@@ -7,7 +7,7 @@ from math import comb, nan
 from statistics import geometric_mean, median
 from typing import Annotated
 
-from sensorgen.analysis.comparison import Comparison, Predicted
+from sensorgen.analysis.comparison import Compared, Comparison, Predicted
 from sensorgen.analysis.report.electrodes import usable
 from sensorgen.core.document import Column, Table
 
@@ -29,7 +29,7 @@ class DirectionRow:
     second_ohm: Annotated[float, Column("median of the second", "ohm")]
     ratio: Annotated[float, Column("second / first")]
     predicted: Annotated[float, Column("ratio predicted", "", "of the better electrodes, as printed")]
-    p: Annotated[float, Column("p", "", "Wilcoxon rank-sum test")]
+    p: Annotated[float, Column("p", "", "Wilcoxon rank-sum test of the plates' medians")]
 
 
 def rows(found: Comparison) -> list[DirectionRow]:
@@ -45,14 +45,22 @@ def rows(found: Comparison) -> list[DirectionRow]:
         if len(by) != 2 or min(map(len, by.values())) < 2:
             continue
         (first, ones), (second, others) = sorted(by.items())
-        one, other = ([last[name].verdict.ry_ohm for name in names] for names in (ones, others))
+        one, other = (_by_plate([last[name] for name in names]) for names in (ones, others))
         expected = [_predicted([last[name].predicted for name in names]) for names in (ones, others)]
         made.append(DirectionRow(
-            shape, "unknown" if film_mm is None else f"{film_mm:g} mm", first, len(one), median(one), second,
-            len(other), median(other), median(other) / median(one), expected[1] / expected[0],
+            shape, "unknown" if film_mm is None else f"{film_mm:g} mm", first, len(ones), median(one), second,
+            len(others), median(other), median(other) / median(one), expected[1] / expected[0],
             rank_p(one, other),
         ))  # fmt: skip
     return made
+
+
+def _by_plate(of: Sequence[Compared]) -> list[float]:
+    """Electrode resistances [ohm]: of the specimens of one plate, which are not independent, their median."""
+    plates: dict[str, list[float]] = {}
+    for row in of:
+        plates.setdefault(row.evidence.plate or row.reading.specimen, []).append(row.verdict.ry_ohm)
+    return [median(values) for values in plates.values()]
 
 
 def _predicted(of: Sequence[Predicted | None]) -> float:

@@ -153,7 +153,8 @@ def notes(found: Comparison) -> tuple[str, ...]:
     return (
         how,
         f"Each specimen counts once, with its last reading{more}. Specimens shorted by design have a verdict, but "
-        "count for no share. Intervals are Clopper's and Pearson's. Differences between films and between shapes are "
+        "count for no share. Intervals are Clopper's and Pearson's, wider where plates differ (Korn and Graubard). "
+        "Differences between films and between shapes are "
         f"tested (Fisher; Freeman and Halton) and affirmed below p = {DIFFER:g}; every other comparison of groups is "
         "exploratory.",
     )

@@ -9,13 +9,16 @@ distribution: its standard uncertainty is the limit over the root of 3 (GUM, JCG
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from statistics import mean, stdev
 from typing import Any
 
 from sensorgen.core import yamlfile
+from sensorgen.measure.immittance import impedance, quantity_of
+from sensorgen.measure.log.entries import Reading
 
 
 @dataclass(frozen=True)
@@ -117,27 +120,109 @@ class Instrument:
         share = self._share(frequency_hz, abs(z_ohm))
         if share is None:
             return None
-        share /= math.sqrt(3)
-        loss = abs(z_ohm.real / z_ohm.imag) if z_ohm.imag else math.inf
-        if quantity in ("R", "X"):
-            return share * abs(z_ohm)
-        if quantity in ("G", "B"):
-            return share / abs(z_ohm)
-        if quantity in ("Cp", "Cs", "Lp", "Ls"):
-            return abs(value) * share * math.hypot(1, loss)
-        if quantity == "Rp":
-            return abs(value) * share * math.hypot(1, 1 / loss) if loss else math.inf
-        if quantity == "phase":
-            return share
-        if quantity == "D":
-            return share * (1 + loss**2)
-        return share * (1 + value**2) if quantity == "Q" else abs(value) * share
+        return uncertainty(share / math.sqrt(3), quantity, value, z_ohm)
 
     def _share(self, frequency_hz: float, z_ohm: float) -> float | None:
         band = next((one for one in self.bands if one.from_hz <= frequency_hz <= one.to_hz), None)
         if band is None or not self.least_ohm <= z_ohm <= self.most_ohm:
             return None
         return band.share + band.short_ohm / z_ohm + z_ohm * band.open_s
+
+
+def uncertainty(share: float, quantity: str, value: float, z_ohm: complex) -> float:
+    """Standard uncertainty of an AC quantity by that of the complex impedance.
+
+    Parameters
+    ----------
+    share : float
+        Standard uncertainty of the impedance over its magnitude, in any direction [-].
+    quantity, value, z_ohm
+        As of :meth:`Instrument.ac`.
+    """
+    loss = abs(z_ohm.real / z_ohm.imag) if z_ohm.imag else math.inf
+    if quantity in ("R", "X"):
+        return share * abs(z_ohm)
+    if quantity in ("G", "B"):
+        return share / abs(z_ohm)
+    if quantity in ("Cp", "Cs", "Lp", "Ls"):
+        return abs(value) * share * math.hypot(1, loss)
+    if quantity == "Rp":
+        return abs(value) * share * math.hypot(1, 1 / loss) if loss else math.inf
+    if quantity == "phase":
+        return share
+    if quantity == "D":
+        return share * (1 + loss**2)
+    return share * (1 + value**2) if quantity == "Q" else abs(value) * share
+
+
+@dataclass(frozen=True)
+class Value:
+    """A measured value, and its standard uncertainty; nan where none is known."""
+
+    value: float
+    error: float = math.nan
+
+
+@dataclass(frozen=True, eq=False)
+class At:
+    """What one reading says at one frequency.
+
+    Attributes
+    ----------
+    meter : Instrument or None
+        That it was read from; None if its accuracy is not known.
+    frequency_hz : float
+        Frequency [Hz].
+    values : dict of str to list of float
+        Repeats by quantity, in SI units.
+    impedances : tuple of complex
+        By every repeat that has a pair of quantities [ohm].
+    stated : dict of str to float
+        Largest uncertainty of each quantity as stated by who measured; 0 where none is.
+    """
+
+    meter: Instrument | None
+    frequency_hz: float
+    values: Mapping[str, Sequence[float]]
+    impedances: tuple[complex, ...]
+    stated: Mapping[str, float]
+
+    @property
+    def z_ohm(self) -> complex | None:
+        """Mean impedance [ohm]; that of Cp alone if nothing else is known, None if not even that is."""
+        if self.impedances:
+            return sum(self.impedances) / len(self.impedances)
+        c = mean(self.values.get("Cp", [0.0]))
+        return complex(0, -1 / (2 * math.pi * self.frequency_hz * c)) if c > 0 else None
+
+    def value(self, quantity: str) -> Value:
+        """Mean, and its uncertainty: scatter of the repeats (type A) and the meter's limit, or what was stated."""
+        z = self.z_ohm
+        these = self.values.get(quantity) or [
+            float(quantity_of(quantity, each, self.frequency_hz)) for each in self.impedances if each
+        ]
+        if not these:
+            return Value(math.nan)
+        middle = mean(these)
+        a = stdev(these) / math.sqrt(len(these)) if len(these) > 1 else 0.0
+        b = self.stated.get(quantity) or (
+            self.meter.ac(quantity, middle, self.frequency_hz, z) if self.meter and z else None
+        )
+        return Value(middle, math.hypot(a, b) if b is not None else a or math.nan)
+
+
+def at_frequency(reading: Reading, frequency_hz: float) -> At:
+    """What a reading says at one frequency."""
+    values, stated = dict[str, list[float]](), dict[str, float]()
+    errors = reading.uncertainty or (0.0,) * len(reading.value)
+    for name, value, at, error in zip(reading.quantity, reading.value, reading.frequency_hz, errors, strict=True):
+        if at == frequency_hz:
+            values.setdefault(name, []).append(value)
+            stated[name] = max(error, stated.get(name, 0.0))
+    repeats = [dict(zip(values, some, strict=True)) for some in zip(*values.values(), strict=False)]
+    known = tuple(z for one in repeats if (z := impedance(one, frequency_hz)) is not None)
+    meter = find(reading.instrument) if reading.instrument else None
+    return At(meter, frequency_hz, values, known, stated)
 
 
 @cache

@@ -1,7 +1,9 @@
 r"""Yield of groups of specimens with confidence intervals, and exact tests of independence.
 
 Intervals are those of Clopper and Pearson: they hold at least the stated confidence for every true yield, also with few
-specimens and yields near 0 or 1. Wilson's are narrower because they hold it only on average.
+specimens and yields near 0 or 1. Wilson's are narrower because they hold it only on average. Specimens of one plate
+have its faults in common: with plates known, the interval is that of as many independent specimens as have the same
+standard error (Korn and Graubard 1998).
 """
 
 from array import array
@@ -64,7 +66,7 @@ class Group:
 Judged = tuple[Evidence, Verdict]
 
 
-def share(count: int, total: int, confidence: float = CONFIDENCE) -> Share:
+def share(count: int, total: int, confidence: float = CONFIDENCE, plates: Sequence[tuple[int, int]] = ()) -> Share:
     """Share with its exact confidence interval (Clopper and Pearson 1934).
 
     Parameters
@@ -73,6 +75,8 @@ def share(count: int, total: int, confidence: float = CONFIDENCE) -> Share:
         Count and total.
     confidence : float
         Least coverage of the interval [-].
+    plates : sequence of (int, int)
+        Count and total of each plate; all specimens are independent if not given.
 
     Raises
     ------
@@ -90,9 +94,25 @@ def share(count: int, total: int, confidence: float = CONFIDENCE) -> Share:
     if not 0 <= count <= total or not 0 < confidence < 1:
         raise OutOfRange(f"{count} of {total} at a confidence of {confidence:g}; expected a count up to the total")
     tail = (1 - confidence) / 2
-    low = float(betaincinv(count, total - count + 1, tail)) if count else 0.0
-    high = float(betaincinv(count + 1, total - count, 1 - tail)) if count < total else 1.0
+    part = _independent(count, total, confidence, plates) / total if total else 1.0
+    yes, no = count * part, (total - count) * part
+    low = float(betaincinv(yes, no + 1, tail)) if count else 0.0
+    high = float(betaincinv(yes + 1, no, 1 - tail)) if count < total else 1.0
     return Share(count, total, low, high)
+
+
+def _independent(count: int, total: int, confidence: float, plates: Sequence[tuple[int, int]]) -> float:
+    """Number of independent specimens of the same standard error; all of them where no plate can tell."""
+    from scipy.special import stdtrit
+
+    m = len(plates)
+    if m < 2 or m == total or count in (0, total):
+        return float(total)
+    share_ = count / total
+    variance = m / (m - 1) * sum((k - share_ * n) ** 2 for k, n in plates) / total**2
+    tail = (1 + confidence) / 2
+    wider = float(stdtrit(m - 1, tail) / stdtrit(total - 1, tail)) ** 2
+    return min(float(total), share_ * (1 - share_) / variance / wider) if variance else float(total)
 
 
 def groups(
@@ -114,25 +134,37 @@ def groups(
     order : float
         R_Z over R_Y up to which a specimen counts as shorted [-].
     """
-    members: dict[tuple[Hashable, ...], tuple[Counter[tuple[str, bool, bool | None]], array[float]]] = {}
+    members: dict[tuple[Hashable, ...], tuple[Counter[tuple[str, str, bool, bool | None]], array[float]]] = {}
     for of, v in judged:
         counts, ratios = members.setdefault(by(of), (Counter(), array("d")))
-        counts[v.word, of.touching, None if isnan(v.ratio) else v.ratio <= order] += 1
+        counts[of.plate, v.word, of.touching, None if isnan(v.ratio) else v.ratio <= order] += 1
         if not isnan(v.ratio):
             ratios.append(v.ratio)
     found = []
     for key in sorted(members, key=lambda key: [(k is None, str(k)) for k in key]):
         counts, ratios = members[key]
-        words, known, both = Counter[str](), Counter[bool](), Counter[bool]()
-        for (word, touching, low), count in counts.items():
+        words, known, both = Counter[str](), _Plates(), _Plates()
+        for (plate, word, touching, low), count in counts.items():
             words[word] += count
             if not touching and word != "unknown":
-                known[word == "intact"] += count
+                known[plate, word == "intact"] += count
             if not touching and low is not None:
-                both[low] += count
-        intact, shorted = (share(such[True], such.total(), confidence) for such in (known, both))
+                both[plate, low] += count
+        intact, shorted = (_shared(such, confidence) for such in (known, both))
         found.append(Group(key, intact, shorted, median(ratios) if ratios else nan, words))
     return found
+
+
+_Plates = Counter[tuple[str, bool]]
+
+
+def _shared(such: _Plates, confidence: float) -> Share:
+    """A share by plates; a specimen whose plate is not known is a plate of its own."""
+    count = sum(n for (_, yes), n in such.items() if yes)
+    named = {plate for plate, _ in such if plate}
+    plates = [(such[plate, True], such[plate, True] + such[plate, False]) for plate in sorted(named)]
+    plates += [(1, 1)] * such["", True] + [(0, 1)] * such["", False]
+    return share(count, such.total(), confidence, plates)
 
 
 def dependence(of: Sequence[Group]) -> float:

@@ -21,7 +21,7 @@ from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, S
 from sensorgen.prediction.inverse.prior import Prior
 from sensorgen.prediction.inverse.verdict import NORMAL_90
 
-SCHEMA = 1
+SCHEMA = 2
 _TOLD = 0.8  # of the prior's standard deviation: a parameter that keeps more was not identified
 BEYOND = 1.25  # times the largest known force: up to which a press is looked for
 _LAWS = {"plate": Plate, "curve": Curve}
@@ -57,8 +57,8 @@ class Calibration:
         Largest known force [N].
     held_out : Coverage or None
         Of presses held back in turn; None of too few.
-    recordings : tuple of str
-        Rows of the log that it rests on.
+    rows : tuple of str
+        Recordings and readings of the log that it rests on.
     gain : tuple of complex
         Most probable ln of each tone's gain, phase as its imaginary part [-].
     notes : tuple of str
@@ -72,7 +72,7 @@ class Calibration:
     posterior: Posterior
     force_n: float
     held_out: Coverage | None
-    recordings: tuple[str, ...]
+    rows: tuple[str, ...]
     gain: tuple[complex, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -151,7 +151,8 @@ class Calibration:
         p, held = self.posterior, self.held_out
         yield (
             f"{self.specimen}, design {self.design}: calibrated by {p.presses} known "
-            f"press{'es' * (p.presses != 1)} up to {self.force_n:.3g} N and its readings at rest"
+            f"press{'es' * (p.presses != 1)} up to {self.force_n:.3g} N under a tip of "
+            f"{self.model.sensor.tip_m * 1e3:g} mm and its readings at rest"
         )
         if held:
             yield (
@@ -190,7 +191,7 @@ class Calibration:
             "parameters": list(self.model.names),
             "posterior": {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in vars(p).items()},
             "force_n": self.force_n, "held_out": asdict(self.held_out) if self.held_out else None,
-            "recordings": self.recordings, "gain": [[g.real, g.imag] for g in self.gain], "notes": self.notes,
+            "rows": self.rows, "gain": [[g.real, g.imag] for g in self.gain], "notes": self.notes,
         }  # fmt: skip
         return json.dumps(data, ensure_ascii=False)
 
@@ -210,6 +211,8 @@ def from_json(text: str) -> Calibration:
     """
     try:
         data = json.loads(text)
+        if data["schema"] == 1:  # knew recordings alone
+            data |= {"schema": SCHEMA, "rows": data["recordings"]}
         if data["schema"] != SCHEMA:
             raise BadInput(f"a calibration of schema {data['schema']!r:.20}; this sensorgen reads {SCHEMA}")
         sensor = dict(data["sensor"])
@@ -226,7 +229,7 @@ def from_json(text: str) -> Calibration:
             raise BadInput("a calibration with other parameters than this sensorgen has: calibrate again")
         return Calibration(
             data["specimen"], data["design"], data["design_id"], model, posterior, float(data["force_n"]),
-            Coverage(**data["held_out"]) if data["held_out"] else None, tuple(data["recordings"]),
+            Coverage(**data["held_out"]) if data["held_out"] else None, tuple(data["rows"]),
             tuple(complex(*pair) for pair in data["gain"]), tuple(data["notes"]),
         )  # fmt: skip
     except (KeyError, TypeError, ValueError, AttributeError) as error:

@@ -1,13 +1,14 @@
 """Calibration: posterior of a specimen's parameters, and of what changes from press to press."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
-from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, parts
+from sensorgen.prediction.calibration.specimen import STEP, Presses, SpecimenModel, parts
 
 ROUNDS = 3  # Gauss-Newton and variance components in turn
 _STEPS = 12
@@ -17,6 +18,45 @@ _FEWEST_COURSES = 10  # presses from which on their usual course is known
 _FLOOR = 1e-5  # of ln Z: no bench is right to more
 _USUAL = (0.25, 0.25), (0.5, 0.6)  # mean and standard deviation of how presses come about: unloading, decades
 _LN_SPREAD = 1.5  # of ln of each variance component's standard deviation, before calibration
+_LN_LOOSE = 3.0  # the same where presses tell: tighter, a specimen that never wanders gets the interval of one that may
+
+
+@dataclass(frozen=True, eq=False)
+class Meter:
+    """What meters said of the specimen apart from the bench, with nothing on it.
+
+    Attributes
+    ----------
+    frequency_hz : (k,) array
+        Of each reading [Hz].
+    observed : callable
+        From impedances at the contacts (..., k) [ohm] to what was read (..., k).
+    value : (k,) array
+        What was read.
+    root : (k, k) array
+        Inverse of the root of its covariance: turns differences to independent ones of standard deviation 1.
+    ln_resistance : (float, float) or None
+        Ln of both electrodes' resistance over the predicted one, and its standard deviation [-].
+    """
+
+    frequency_hz: Real
+    observed: Callable[[Complex], Real]
+    value: Real
+    root: Real
+    ln_resistance: tuple[float, float] | None = None
+
+    def off(self, model: SpecimenModel, at: Real) -> Real:
+        """Readings less what the parameters make of them, in standard deviations, (..., k + 1)."""
+        said = self.observed(np.exp(model.rest(at, self.frequency_hz)))
+        ln_r, sd = self.ln_resistance or (0.0, np.inf)
+        resistance = (ln_r - model.spread.resistance * at[..., model.names.index("resistance")]) / sd
+        return np.concatenate([(self.value - said) @ self.root.T, resistance[..., None]], -1)
+
+    def slopes(self, model: SpecimenModel, at: Real) -> Real:
+        """Derivatives of what is made of them by the parameters, (k + 1, p)."""
+        step = np.eye(len(at)) * STEP
+        more, less = np.split(self.off(model, np.concatenate([at + step, at - step])), 2)
+        return (less - more).T / (2 * STEP)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +77,8 @@ class Data:
         Standard deviation of its real and imaginary part [-].
     single : (m,) array or None
         Standard deviation of the parts of a ratio of single readings, where ``ratio`` has means [-].
+    meter : Meter or None
+        Readings apart from the bench.
     """
 
     presses: Presses
@@ -45,11 +87,11 @@ class Data:
     rest: Complex
     rest_noise: Real
     single: Real | None = None
+    meter: Meter | None = None
 
     def rows(self, which: NDArray[np.intp] | Mask) -> "Data":
         """Some of the presses."""
-        ratio, noise = self.ratio[which], self.noise[which]
-        return Data(self.presses.rows(which), ratio, noise, self.rest, self.rest_noise, self.single)
+        return replace(self, presses=self.presses.rows(which), ratio=self.ratio[which], noise=self.noise[which])
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,6 +211,30 @@ def _rest_covariance(model: SpecimenModel, data: Data) -> Real:
     return np.asarray(np.diag(noise + gain**2 / 2) + common * gain**2 / 2)
 
 
+@dataclass(frozen=True, eq=False)
+class _Resting:
+    """All that was read with nothing on the sensor, in standard deviations."""
+
+    model: SpecimenModel
+    data: Data
+
+    @cached_property
+    def _root(self) -> Real:
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(_rest_covariance(self.model, self.data))))
+
+    def off(self, at: Real) -> Real:
+        """Readings less what the parameters make of them, (q,)."""
+        bench = self._root @ parts(self.data.rest - self.model.rest(at))
+        meter = self.data.meter
+        return np.concatenate([bench, meter.off(self.model, at)]) if meter else bench
+
+    def slopes(self, at: Real) -> Real:
+        """Derivatives of what the parameters make of them, (q, p)."""
+        bench = self._root @ self.model.rest_slopes(at)
+        meter = self.data.meter
+        return np.concatenate([bench, meter.slopes(self.model, at)]) if meter else bench
+
+
 def covariances(model: SpecimenModel, at: Real, data: Data, components: Real, vectors: Real | None = None) -> Real:
     """Of the ratios given the parameters, (n, 2 m, 2 m): noise, and what changes from press to press."""
     presses = data.presses
@@ -193,13 +259,12 @@ def information(model: SpecimenModel, data: Data, at: Real, weight: Real) -> Rea
     weight : (n, 2 m, 2 m) array
         Inverse of those.
     """
-    rest_weight = np.asarray(np.linalg.inv(_rest_covariance(model, data)))
-    return _information(model.slopes(at, data.presses), weight, model.rest_slopes(at), rest_weight)
+    return _information(model.slopes(at, data.presses), weight, _Resting(model, data).slopes(at))
 
 
-def _information(slopes: Real, weight: Real, rest_slopes: Real, rest_weight: Real) -> Real:
+def _information(slopes: Real, weight: Real, resting: Real) -> Real:
     of_presses = np.einsum("nia,nij,njb->ab", slopes, weight, slopes, optimize=True)
-    return np.asarray(of_presses + rest_slopes.T @ rest_weight @ rest_slopes)
+    return np.asarray(of_presses + resting.T @ resting)
 
 
 def memory(model: SpecimenModel, at: Real, name: str) -> float:
@@ -212,22 +277,22 @@ def _descended(
 ) -> tuple[Real, Real]:
     """Gauss-Newton with damping: the most probable parameters, and the information on them."""
     middle, inverse = before
-    rest_weight = np.asarray(np.linalg.inv(_rest_covariance(model, data)))
+    resting = _Resting(model, data)
     weight = np.asarray(np.linalg.inv(covariances(model, at, data, components)))
 
     def off(x: Real) -> tuple[Real, Real, float]:
         ratio = parts(data.ratio - model.ratio(x, data.presses))
-        rest = parts(data.rest - model.rest(x))
-        cost = np.einsum("ni,nij,nj->", ratio, weight, ratio) + rest @ rest_weight @ rest
+        rest = resting.off(x)
+        cost = np.einsum("ni,nij,nj->", ratio, weight, ratio) + rest @ rest
         return ratio, rest, float(cost + (x - middle) @ inverse @ (x - middle))
 
     ratio, rest, cost = off(at)
     damping, found = 0.0, inverse
     for _ in range(_STEPS):
-        slopes, rest_slopes = model.slopes(at, data.presses), model.rest_slopes(at)
-        found = inverse + _information(slopes, weight, rest_slopes, rest_weight)
+        slopes, rest_slopes = model.slopes(at, data.presses), resting.slopes(at)
+        found = inverse + _information(slopes, weight, rest_slopes)
         gradient = np.einsum("nia,nij,nj->a", slopes, weight, ratio, optimize=True)
-        gradient = gradient + rest_slopes.T @ rest_weight @ rest - inverse @ (at - middle)
+        gradient = gradient + rest_slopes.T @ rest - inverse @ (at - middle)
         step = np.linalg.solve(found + damping * np.eye(len(at)), gradient)
         step *= min(1.0, 3.0 / np.abs(step).max())
         tried = off(at + step)
@@ -245,12 +310,12 @@ def _components(model: SpecimenModel, data: Data, at: Real, before: tuple[Real, 
     from scipy.optimize import minimize
 
     middle, inverse = before
-    slopes, rest_slopes = model.slopes(at, data.presses), model.rest_slopes(at)
-    rest_weight = np.asarray(np.linalg.inv(_rest_covariance(model, data)))
+    resting = _Resting(model, data)
+    slopes, rest_slopes = model.slopes(at, data.presses), resting.slopes(at)
     left = parts(data.ratio - model.ratio(at, data.presses)) + slopes @ (at - middle)
-    rest = parts(data.rest - model.rest(at)) + rest_slopes @ (at - middle)
-    fixed = inverse + rest_slopes.T @ rest_weight @ rest_slopes
-    pull = rest_slopes.T @ rest_weight @ rest
+    rest = resting.off(at) + rest_slopes @ (at - middle)
+    fixed = inverse + rest_slopes.T @ rest_slopes
+    pull = rest_slopes.T @ rest
 
     vectors = model.scatters(at, data.presses)
 
@@ -262,7 +327,7 @@ def _components(model: SpecimenModel, data: Data, at: Real, before: tuple[Real, 
         gradient = pull + np.einsum("nia,ni->a", by, white)
         logs = -2 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum() + np.linalg.slogdet(information)[1]
         return float(
-            logs + (white**2).sum() - gradient @ np.linalg.solve(information, gradient) + ln @ ln / _LN_SPREAD**2
+            logs + (white**2).sum() - gradient @ np.linalg.solve(information, gradient) + ln @ ln / _LN_LOOSE**2
         )
 
     count = len(usual)

@@ -3,6 +3,7 @@
 Each parameter is a standard normal number before calibration; its unit is the standard deviation of the prior.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import pairwise
@@ -19,7 +20,7 @@ from sensorgen.prediction.inverse.forward import Forward, tones
 FORCES_N = (0.2, 0.5, 1.0, 2.0, 4.0, 8.0)  # at which the law of compression may differ from the predicted one
 _BENDS = 4  # modes of the resistivity's profile, half waves along the strip
 _PIECES = 3  # on either side of the tip
-_STEP = 1e-3  # of finite differences [standard deviations]
+STEP = 1e-3  # of finite differences [standard deviations]
 _FAR_N = 1e4  # more than any press
 _NOTHING_N = 1e-6  # least force, as its logarithm counts
 
@@ -151,7 +152,7 @@ class SpecimenModel:
         return {name: k for k, name in enumerate(self.names)}
 
     @cached_property
-    def _most_pa(self) -> float:
+    def most_pa(self) -> float:
         """Pressure up to which the law of compression reaches; beyond, the rise goes on in proportion [Pa]."""
         sensor = self.sensor
         return Forward(sensor, self.frequency_hz).force_limit_n(_FAR_N) / (sensor.width_m * sensor.tip_m / 2)
@@ -170,20 +171,25 @@ class SpecimenModel:
         found[:, common + 1 : common + 1 + len(FORCES_N)] = self.spread.law_shape * self._shapes
         return found
 
-    def rest(self, at: Real) -> Complex:
+    def rest(self, at: Real, frequency_hz: Real | None = None) -> Complex:
         """Ln of the impedance that the bench reads with nothing on the sensor, without its gain.
 
         Parameters
         ----------
         at : (..., p) array
             Parameters in standard deviations.
+        frequency_hz : (k,) array, optional
+            In place of the tones, by a meter at the specimen's contacts: without lead and stray [Hz].
 
         Returns
         -------
-        (..., m) array
+        (..., m) or (..., k) array
         """
         nothing = unknown(np.zeros(1), np.full(1, self.sensor.length_m / 2))
-        return self._read(at, nothing, loaded=False)[..., 0, :]
+        if frequency_hz is not None:
+            at = np.array(at)
+            at[..., [self._at["lead"], self._at["stray"]]] = -np.inf
+        return self._read(at, nothing, loaded=False, frequency_hz=frequency_hz)[..., 0, :]
 
     def ratio(self, at: Real, presses: Presses, changes: Real | None = None) -> Complex:
         """Ln of pressed over rest.
@@ -204,9 +210,12 @@ class SpecimenModel:
         # at rest, too, cut where the tip would be: what the cuts leave of a profile cancels
         return self._read(at, presses, changes) - self._read(at, presses, loaded=False)
 
-    def _read(self, at: Real, presses: Presses, changes: Real | None = None, *, loaded: bool = True) -> Complex:
-        sensor, spread, of = self.sensor, self.spread, self._at
-        value = {name: at[..., k, None] for name, k in of.items()}
+    def _read(
+        self, at: Real, presses: Presses, changes: Real | None = None, *, loaded: bool = True,
+        frequency_hz: Real | None = None,
+    ) -> Complex:  # fmt: skip
+        sensor, spread = self.sensor, self.spread
+        value = {name: at[..., k, None] for name, k in self._at.items()}
         rise, c, r = np.moveaxis(np.zeros(3) if changes is None else changes, -1, 0)[..., None]
         position = np.clip(presses.position_m + spread.position_m * value["position offset"], 0, sensor.length_m)
         force = np.zeros(position.shape)
@@ -217,25 +226,17 @@ class SpecimenModel:
         patch = sensor.patch(position)
         length = np.broadcast_to(patch.length_m, position.shape)
         stress = force / (sensor.width_m * length)
-        share, _ = sensor.compression.capacitive_strain(np.minimum(stress, self._most_pa))
-        first = of[f"rise at {FORCES_N[0]:g} N"]
+        share, _ = sensor.compression.capacitive_strain(np.minimum(stress, self.most_pa))
+        first = self._at[f"rise at {FORCES_N[0]:g} N"]
         knots = spread.law_shape * (at[..., first : first + len(FORCES_N)] @ self._shapes.T)
         ln_rise = rise + spread.law * value["rise"] + _interpolated(np.log(np.maximum(force, _NOTHING_N)), knots)
         for name, course in (("hysteresis", presses.unloading), ("creep", presses.decades)):
             ln_rise = ln_rise + getattr(spread, name) * np.exp(value[name] - 0.5) * np.nan_to_num(course)
-        lifted = 1 + share / (1 - share) * np.maximum(stress / self._most_pa, 1.0) * np.exp(ln_rise)
+        lifted = 1 + share / (1 - share) * np.maximum(stress / self.most_pa, 1.0) * np.exp(ln_rise)
 
-        omega = 2 * np.pi * self.frequency_hz
-        lowest = omega.min()
-        per_m = (sensor.capacitance_f_per_m * np.exp(spread.capacitance * value["capacitance"] + c))[..., None]
-        exponent = spread.dispersion * np.exp(value["dispersion"] - 0.5)[..., None]
-        leak = (
-            sensor.leak_s_per_m + spread.leak * np.exp(spread.leak_spread * value["leak"])[..., None] * lowest * per_m
-        )
-        film = 1j * omega * (omega / lowest) ** -exponent * np.exp(-0.5j * np.pi * exponent)
-        loose = leak + (film + sensor.tan_delta * omega) * per_m
-        pressed = leak + (film + sensor.tan_delta * omega) * per_m * lifted[..., None]
-
+        omega = 2 * np.pi * (self.frequency_hz if frequency_hz is None else frequency_hz)
+        leak, stored = self._film(value, c, omega)
+        loose, pressed = leak + stored, leak + stored * lifted[..., None]
         track, by_pressure = sensor.track_ohm_per_m()
         whole = track * np.exp(spread.resistance * value["resistance"] + r)
         left, right = patch.left_m, np.maximum(sensor.length_m - patch.left_m - length, 0.0)
@@ -250,6 +251,15 @@ class SpecimenModel:
         stray, lead = (np.exp(value[name] - 0.5)[..., None] for name in ("stray", "lead"))
         return np.asarray(np.log(spread.lead_ohm * lead + 1 / (1 / z + 1j * omega * spread.stray_f * stray)))
 
+    def _film(self, value: Mapping[str, Real], c: Real, omega: Real) -> tuple[Complex, Complex]:
+        """Admittance of the film with nothing on it [S/m]: of its leak, and of what rises with C."""
+        sensor, spread, lowest = self.sensor, self.spread, 2 * np.pi * self.frequency_hz.min()
+        per_m = (sensor.capacitance_f_per_m * np.exp(spread.capacitance * value["capacitance"] + c))[..., None]
+        leak = spread.leak * np.exp(spread.leak_spread * value["leak"])[..., None] * lowest * per_m
+        exponent = spread.dispersion * np.exp(value["dispersion"] - 0.5)[..., None]
+        stored = 1j * omega * (omega / lowest) ** -exponent * np.exp(-0.5j * np.pi * exponent)
+        return sensor.leak_s_per_m + leak, (stored + sensor.tan_delta * omega) * per_m
+
     def _bent(self, at: Real, start_m: Real, end_m: Real) -> Real:
         """Mean of ln resistivity over parts of the strip, less that of the whole."""
         first, found = self._at["profile 1"], np.zeros(1)
@@ -261,24 +271,24 @@ class SpecimenModel:
 
     def slopes(self, at: Real, presses: Presses) -> Real:
         """Derivatives of the ratio's real and imaginary parts by the parameters, (n, 2 m, p)."""
-        step = np.eye(len(at)) * _STEP
+        step = np.eye(len(at)) * STEP
         return _slopes(self.ratio(np.concatenate([at + step, at - step]), presses))
 
     def rest_slopes(self, at: Real) -> Real:
         """Derivatives of the rest reading's parts by the parameters, (2 m, p)."""
-        step = np.eye(len(at)) * _STEP
+        step = np.eye(len(at)) * STEP
         return _slopes(self.rest(np.concatenate([at + step, at - step])))
 
     def scatters(self, at: Real, presses: Presses) -> Real:
         """Derivatives of the ratio's parts by ln of the rise, of C and of R since the rest reading, (n, 2 m, 3)."""
-        step = np.eye(3) * _STEP
+        step = np.eye(3) * STEP
         return _slopes(self.ratio(at, presses, np.concatenate([step, -step])))
 
 
 def _slopes(ends: Complex) -> Real:
     """Central differences of parts, from values at all steps forward, then backward."""
     more, less = np.split(parts(ends), 2)
-    return np.moveaxis(more - less, 0, -1) / (2 * _STEP)
+    return np.moveaxis(more - less, 0, -1) / (2 * STEP)
 
 
 def _interpolated(ln_force: Real, knots: Real) -> Real:

@@ -1,4 +1,4 @@
-"""What is numbered in the thesis, chapter by chapter: the files in ``chapters/``, in our own words."""
+"""What is numbered in the thesis, and claims of its text, by chapter: the files in ``chapters/``, in our own words."""
 
 from collections.abc import Iterator
 from functools import cache
@@ -12,15 +12,15 @@ from sensorgen.core.errors import within
 from sensorgen.core.records import Strict, checked
 from sensorgen.verification.thesis.verdicts import EXACT
 
-CHAPTERS = ("2", "3", "4", "5", "6", "7", "B", "C", "D")
-Kind = Literal["equation", "figure", "table"]
-KINDS: tuple[Kind, ...] = ("equation", "figure", "table")
+CHAPTERS = ("1", "2", "3", "4", "5", "6", "7", "B", "C", "D")
+Kind = Literal["equation", "figure", "table", "claim"]
+KINDS: tuple[Kind, ...] = ("equation", "figure", "table", "claim")
 
 Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]*$", examples=["one line without control characters"])]
 
 
 class Item(Strict):
-    """One numbered thing.
+    """One numbered thing, or a claim of a section's text.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Item(Strict):
     erratum, because : str
         What is misprinted; why a difference is no misprint. Or "".
     off, within : dict of str to float, float
-        By part, how far the thesis then is from ours, and the tolerance of that [-].
+        By part, how far the thesis then is from ours, and the tolerance of that, relative where it is above 1 [-].
     lost, uncovered : str
         Why it cannot be reproduced; why nothing here covers it. What a check then gives is shown, not judged.
     """
@@ -61,10 +61,11 @@ class Chapter(Strict):
     equations: list[Item] = Field(default=[])
     figures: list[Item] = Field(default=[])
     tables: list[Item] = Field(default=[])
+    claims: list[Item] = Field(default=[])
 
     def items(self) -> Iterator[tuple[Kind, Item]]:
         """All of them, with what they are."""
-        for kind, found in zip(KINDS, (self.equations, self.figures, self.tables), strict=True):
+        for kind, found in zip(KINDS, (self.equations, self.figures, self.tables, self.claims), strict=True):
             yield from ((kind, item) for item in found)
 
 

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from sensorgen.verification.thesis import shown
 from sensorgen.verification.thesis.items import CHAPTERS, KINDS, chapter
 from sensorgen.verification.thesis.reproduced import Row
-from sensorgen.verification.thesis.verdicts import UNEXPLAINED, WORDS
+from sensorgen.verification.thesis.verdicts import JUDGED, LOST, NOT_COVERED, TRANSCRIBED, UNEXPLAINED, WORDS
 
 ABOUT = (
-    "Every numbered equation, table and figure of chapters 2 to 7 and appendices B to D of the thesis, compared with "
-    "this package. Its values are computed as `sensorgen thesis` runs; what stands under “thesis” is a printed value, "
+    "Every numbered equation, table and figure of the thesis, and claims of its text, by the section where they stand. "
+    "Values of models are computed as `sensorgen thesis` runs; what stands under “thesis” is a printed value, "
     "or a printed equation put into numbers. Lines are those of Table 3.1 with the mean resistivity of Table C.1, "
     "0.135 ohm m, at 99.7 kHz where nothing else is said; cells are the default ones with a film of 0.1 mm."
 )
@@ -18,6 +18,7 @@ VERDICTS = {
     "agrees": "the thesis's value and ours have these leading digits in common",
     "misprint confirmed": "as printed it differs from ours, corrected it agrees",
     "differs": "it differs by as much as is known, for the reason that is given",
+    "transcribed": "ours was typed from the thesis, too: both copies are the same, and nothing confirms the value",
     "not covered": "nothing here covers it, or nothing in it can be compared",
     "cannot be reproduced": "numbers did not survive or were never published; ours are shown where we have some",
     "unexplained": "it differs for an unknown reason: report it",
@@ -29,6 +30,20 @@ def markdown(rows: Sequence[Row]) -> str:
     return "\n".join(_lines(rows)) + "\n"
 
 
+def lead(rows: Sequence[Row]) -> str:
+    """What the counts come to."""
+    found = Counter(row.verdict.word for row in rows)
+    copies = [sum(part.copied for part in row.parts) for row in rows if row.verdict.word in JUDGED]
+    counts = [f"{found[word]} {text}" for word, text in zip(JUDGED, ("agree", "are misprints", "differ"), strict=True)]
+    return (
+        f"Of {len(rows)} items {sum(found[word] for word in JUDGED)} are compared with something that does not come "
+        "from the item itself (a model, a solved field, a reading, another table of the thesis): "
+        f"{', '.join(counts)}; {sum(map(bool, copies))} of these also have transcribed values, {sum(copies)} in all. "
+        f"Transcribed only: {found[TRANSCRIBED]}; not covered: {found[NOT_COVERED]}; cannot be reproduced: "
+        f"{found[LOST]}."
+    )
+
+
 def words(rows: Sequence[Row]) -> list[str]:
     """Verdicts in use, in their order; the one that should not occur only where it does."""
     found = {row.verdict.word for row in rows}
@@ -37,13 +52,14 @@ def words(rows: Sequence[Row]) -> list[str]:
 
 def _lines(rows: Sequence[Row]) -> Iterator[str]:
     yield from ("# The thesis, reproduced", "", "Written by `sensorgen thesis`; a test holds the two together.", "")
-    yield from (ABOUT, "")
-    yield from (f"- **{word}**: {VERDICTS[word]}" for word in words(rows))
-    yield ""
+    yield from (lead(rows), "")
     yield f"| | {' | '.join(f'{kind}s' for kind in KINDS)} | all |"
     yield f"|---|{'---|' * (len(KINDS) + 1)}"
     for word, counts in counted(rows):
         yield f"| {word or 'all'} | {' | '.join(map(str, counts))} |"
+    yield ""
+    yield from (f"- **{word}**: {VERDICTS[word]}" for word in words(rows))
+    yield from ("", ABOUT)
     for name in CHAPTERS:
         yield from ("", f"## {heading(name)}", "")
         yield "| number | what it says | thesis | ours | verdict | erratum |"

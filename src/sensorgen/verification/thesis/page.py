@@ -7,7 +7,7 @@ from markupsafe import Markup, escape
 from sensorgen.analysis.plots.pages import render
 from sensorgen.verification.thesis import shown
 from sensorgen.verification.thesis.items import CHAPTERS, KINDS
-from sensorgen.verification.thesis.markdown import ABOUT, VERDICTS, counted, heading, verdict, words
+from sensorgen.verification.thesis.markdown import ABOUT, VERDICTS, counted, heading, lead, verdict, words
 from sensorgen.verification.thesis.reproduced import Row
 
 
@@ -15,7 +15,8 @@ def html(rows: Sequence[Row]) -> str:
     """The whole page."""
     used = words(rows)
     return render(
-        "sensorgen.verification.thesis", "thesis.html", title="The thesis, reproduced", about=ABOUT, kinds=KINDS,
+        "sensorgen.verification.thesis", "thesis.html", title="The thesis, reproduced", lead=lead(rows), about=ABOUT,
+        kinds=KINDS,
         headings=[(name, heading(name)) for name in CHAPTERS], plurals=[(kind, f"{kind}s") for kind in KINDS],
         used={word: VERDICTS[word] for word in used}, counts=list(counted(rows)), code=_code, shown=shown,
         chapters={name: (heading(name), [row for row in rows if row.chapter == name]) for name in CHAPTERS},

@@ -24,19 +24,22 @@ def thesis(parts: Sequence[Part], tolerance: float) -> list[str]:
     for part in _chosen(parts, tolerance):
         if part.printed is not None:
             corrected = "" if part.corrected is None else f"; corrected {_number(part, part.corrected)}"
-            found.append(f"{part.name}: {_number(part, part.printed)}{corrected}")
+            limit = "at most " if part.limit else ""
+            found.append(f"{part.name}: {limit}{_number(part, part.printed)}{corrected}")
     return found
 
 
 def ours(parts: Sequence[Part], tolerance: float) -> list[str]:
     """Ours of the same, and how many more there are."""
     chosen = _chosen(parts, tolerance)
-    more = len(parts) - len(chosen)
+    more = sum(not part.copied for part in parts) - sum(not part.copied for part in chosen)
     rest = [f"{more} more values that agree"] if more else []
     return [f"{part.name}: {_number(part, part.ours)}" for part in chosen] + rest
 
 
 def _chosen(parts: Sequence[Part], tolerance: float) -> Sequence[Part]:
+    """Those that differ, or the first few; transcribed ones only where there are no others."""
+    parts = [part for part in parts if not part.copied] or parts
     if len(parts) <= _FEW:
         return parts
     return [part for part in parts if not abs(part.off()) <= tolerance] or parts[:_FEW]

@@ -14,10 +14,12 @@ if TYPE_CHECKING:
 AGREES = "agrees"
 MISPRINT = "misprint confirmed"
 DIFFERS = "differs"
+TRANSCRIBED = "transcribed"
 NOT_COVERED = "not covered"
 LOST = "cannot be reproduced"
 UNEXPLAINED = "unexplained"  # an error of ours until somebody knows better
-WORDS = (AGREES, MISPRINT, DIFFERS, NOT_COVERED, LOST, UNEXPLAINED)
+WORDS = (AGREES, MISPRINT, DIFFERS, TRANSCRIBED, NOT_COVERED, LOST, UNEXPLAINED)
+JUDGED = (AGREES, MISPRINT, DIFFERS)  # compared with something that does not come from the number itself
 
 MOST_DIGITS = 9  # what is left is rounding, which machines do differently
 EXACT = 1e-6
@@ -43,6 +45,10 @@ class Part:
         What counts as large, where the quantity itself is 0.
     shown : int
         Digits to show: fewer where a solver's own last ones differ from machine to machine.
+    copied : bool
+        Whether ours was typed from the same place of the thesis: both copies have to agree, which confirms nothing.
+    limit : bool
+        Whether the thesis gives a limit, with which anything below agrees.
     """
 
     name: str
@@ -52,10 +58,14 @@ class Part:
     corrected: ArrayLike | None = None
     scale: float = 0.0
     shown: int = 5
+    copied: bool = False
+    limit: bool = False
 
     def off(self) -> float:
         """How far the thesis is from ours, as a share of ours; by its sign more or less, where both are real [-]."""
         if self.printed is None:
+            return 0.0
+        if self.limit and self.ours <= self.printed:  # type: ignore[operator]
             return 0.0
         printed, ours = np.broadcast_arrays(np.asarray(self.printed), np.asarray(self.ours))
         if printed.size == 1 and np.isrealobj(printed) and np.isrealobj(ours) and ours.item():
@@ -97,18 +107,40 @@ def judged(item: "Item", parts: Sequence[Part]) -> Verdict:
         What was computed.
     """
     wrong = [part for part in parts if not abs(part.off()) <= item.tolerance]
+    copies = [part for part in parts if part.copied]
+    also = f"; transcribed: {len(copies)}" if copies else ""
     if not wrong and (item.off or any(part.corrected is not None for part in parts)):
         return Verdict(UNEXPLAINED, "(what is announced as wrong agrees with ours)")
+    if not wrong and copies and not compared(parts):
+        return Verdict(TRANSCRIBED, f"({len(copies)} value{'s' * (len(copies) > 1)}, which nothing else gives)")
     if not wrong:
-        return Verdict(AGREES, f"to {digits(max(abs(part.off()) for part in parts))}")
-    if all(part.mended() <= item.tolerance for part in wrong) and item.erratum:
-        return Verdict(MISPRINT, f"(corrected: to {digits(max(part.mended() for part in wrong))})")
-    announced = all(abs(part.off() - item.off.get(part.name, np.nan)) <= item.within for part in wrong)
-    if item.because and announced:
+        held = [abs(part.off()) for part in compared(parts) if not part.limit]
+        return Verdict(AGREES, (f"to {digits(max(held))}" if held else "with the limit") + also)
+    wrongly_copied = any(part.copied for part in wrong)
+    if all(part.mended() <= item.tolerance for part in wrong) and item.erratum and not wrongly_copied:
+        return Verdict(MISPRINT, f"(corrected: to {digits(max(part.mended() for part in wrong))}){also}")
+    announced = all(_as_announced(part, item) for part in wrong)
+    if item.because and announced and not wrongly_copied:
         worst = max(wrong, key=lambda part: abs(part.off()))
-        return Verdict(DIFFERS, f"(the thesis has {share(worst.off())}), because {item.because}")
+        return Verdict(DIFFERS, f"({_how_far(worst)}), because {item.because}{also}")
     named = ", ".join(f"{part.name} {share(part.off())}" for part in wrong)
     return Verdict(UNEXPLAINED, f"(off: {named})")
+
+
+def _how_far(part: Part) -> str:
+    if part.printed is not None and np.size(part.printed) > 1:
+        return f"off by {100 * part.off():.3g} % of the largest"
+    return f"the thesis has {share(part.off())}"
+
+
+def _as_announced(part: Part, item: "Item") -> bool:
+    known = item.off.get(part.name, np.nan)
+    return bool(abs(part.off() - known) <= item.within * max(1.0, abs(known)))
+
+
+def compared(parts: Sequence[Part]) -> list[Part]:
+    """Those that compare the thesis with something that does not come from the number itself."""
+    return [part for part in parts if part.printed is not None and not part.copied]
 
 
 def digits(off: float) -> str:

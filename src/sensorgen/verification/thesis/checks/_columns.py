@@ -20,15 +20,15 @@ Layer = tuple[str, float]  # material and thickness [mm]
 _ELECTRODE_MM = 0.1
 
 
-def piles_f(piles: Sequence[tuple[float, Sequence[Layer]]], depth_mm: float = 1.0) -> float:
-    """Capacitance of columns side by side, each of a width [mm] and of layers from below [F].
+Pile = tuple[float, Sequence[Layer]]  # of a width [mm], and of layers from below
 
-    The top electrode reaches down to each of them, so that a column holds what is named.
-    """
-    top = 2 * _ELECTRODE_MM + max(sum(thickness for _, thickness in layers) for _, layers in piles)
-    end = sum(width for width, _ in piles)
+
+def piles(side_by_side: Sequence[Pile], depth_mm: float) -> Scene:
+    """Columns between two electrodes; the top one reaches down to each of them, so that it holds what is named."""
+    top = 2 * _ELECTRODE_MM + max(sum(thickness for _, thickness in layers) for _, layers in side_by_side)
+    end = sum(width for width, _ in side_by_side)
     solid, conductor, left = [], [], 0.0
-    for width, layers in piles:
+    for width, layers in side_by_side:
         z = _ELECTRODE_MM
         for material, thickness in layers:
             if material == "x60":
@@ -41,7 +41,12 @@ def piles_f(piles: Sequence[tuple[float, Sequence[Layer]]], depth_mm: float = 1.
         Body("film", "x60", tuple(solid)),
         Body("top_electrode", "etpu", tuple(conductor), "top"),
     )
-    return columns.capacitance(Scene(bodies, (end, depth_mm, top)), PERMITTIVITY).lower
+    return Scene(bodies, (end, depth_mm, top))
+
+
+def piles_f(side_by_side: Sequence[Pile], depth_mm: float = 1.0) -> float:
+    """Capacitance of columns side by side [F]."""
+    return columns.capacitance(piles(side_by_side, depth_mm), PERMITTIVITY).lower
 
 
 def pile_f_per_m2(layers: Sequence[Layer]) -> float:

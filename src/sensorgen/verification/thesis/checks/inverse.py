@@ -5,21 +5,26 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.models import compression, line_fit
 from sensorgen.models.sensor import Sensor
+from sensorgen.verification.thesis.checks._text import table
 from sensorgen.verification.thesis.verdicts import Part
 
 Real = NDArray[np.float64]
 
-_TONE_HZ = 99.7e3
-_LENGTH_M = 0.178
+_LOW_HZ, _TONE_HZ = 1.1e3, 99.7e3
+_MISSED_OHM = 2.0
+_GIVEN = table("C.1")
+_LENGTH_M, _WIDTH_M = (mm * M_PER_MM for mm in _GIVEN["size_mm"])
 _FORCES_N = np.linspace(0.5, 6.0, 8)
 _PLACES_M = np.linspace(0.01, 0.165, 9)
 # An electrode of 0.3 mm: Table C.1 gives none.
 _SENSOR = Sensor(
-    _LENGTH_M, 8.4e-3, (3e-4, 3e-4), (0.07, 0.2), EPS0_F_PER_M * 6.33 * 8.4e-3 / 6e-4, compression.unconfined(1e6)
-)
+    _LENGTH_M, _WIDTH_M, (3e-4, 3e-4), (_GIVEN["resistivity_ohm_m"]["top"], _GIVEN["resistivity_ohm_m"]["bottom"]),
+    EPS0_F_PER_M * _GIVEN["x60"]["relative_permittivity"] * _WIDTH_M / (_GIVEN["plate_mm"] * M_PER_MM),
+    compression.unconfined(_GIVEN["x60"]["youngs_modulus_pa"]),
+)  # fmt: skip
 # A polynomial as C.2 has it, whose root on the sensor is one: R0 [ohm], A, B, D, E [per N and m].
 _R0, _A, _B, _D, _E = 5000.0, 2.0, -3e4, 9e3, 15.0
 _C0_F, _CF_F_PER_N = 140e-12, 0.5e-12
@@ -38,10 +43,28 @@ def _least_squares(columns: list[Real], wanted: Real) -> Real:
     return np.asarray(basis @ (np.linalg.lstsq(basis / scale, wanted, rcond=None)[0] / scale))
 
 
+def _straight(tone_hz: float) -> tuple[Real, Real, float]:
+    """Rise of C over rest of all presses, that by C.1, and the slope C_F of C.1 [F], [F], [F/N]."""
+    force, x, _, _ = _readings()
+    c, _ = line_fit.series(tone_hz, _SENSOR.impedance(tone_hz, force, x))
+    rest, _ = line_fit.series(tone_hz, _SENSOR.impedance(tone_hz, 0.0, _LENGTH_M / 2))
+    straight = _least_squares([np.ones_like(force), force], c)
+    return c - rest, straight - rest, float(np.ptp(straight) / np.ptp(force))
+
+
 def capacitance() -> list[Part]:
-    """C.1: a straight line for what is a hyperbola."""
-    force, _, c, _ = _readings()
-    return [Part("C", "F", c, _least_squares([np.ones_like(force), force], c))]
+    """C.1: one straight line for all positions; by what a press changes, at the lowest and the highest tone."""
+    return [Part(f"C - C(0) at {tone / 1e3:g} kHz", "F", *_straight(tone)[:2]) for tone in (_LOW_HZ, _TONE_HZ)]
+
+
+def force() -> list[Part]:
+    """C.4: the force that C.1 reads from these capacitances."""
+    pressed, _, _, _ = _readings()
+    found = []
+    for tone in (_LOW_HZ, _TONE_HZ):
+        rise, straight, slope = _straight(tone)
+        found.append(Part(f"F at {tone / 1e3:g} kHz", "N", pressed, pressed + (rise - straight) / slope))
+    return found
 
 
 def resistance() -> list[Part]:
@@ -55,31 +78,26 @@ def resistance() -> list[Part]:
 
 
 def cost() -> list[Part]:
-    """C.3: what a fit leaves, with the square around the sum and inside it."""
-    force, x, c, r = _readings()
-    fit = line_fit.fit(force, x, c, r, form="printed")
-    left = r - _least_squares([np.ones_like(force), force, x * x, x, force * x], r)
-    outside, inside = np.sqrt(np.sum(left) ** 2 / len(left)), np.sqrt(np.mean(left**2))
-    return [Part("what is left of R", "ohm", fit.residual_ohm, float(outside), float(inside))]
+    """C.3: readings that miss C.2 by a known amount, which bends with the force and so no fit can follow."""
+    force, x, c, r = _polynomial()
+    bent = 3 * (force - force.mean()) ** 2
+    bent -= bent.mean()
+    missed = _MISSED_OHM * bent / np.sqrt(np.mean(bent**2))
+    fit = line_fit.fit(force, x, c, r + missed, form="printed")
+    outside = np.sqrt(np.sum(missed) ** 2 / len(missed))
+    return [Part("what is left of R", "ohm", fit.residual_ohm, float(outside), _MISSED_OHM)]
 
 
-def _polynomial() -> tuple[line_fit.LineFit, Real, Real, Real, Real]:
-    """A fit of presses that obey C.1 and C.2 exactly, and these presses."""
+def _polynomial() -> tuple[Real, Real, Real, Real]:
+    """Presses that obey C.1 and C.2 exactly."""
     force, x, _, _ = _readings()
-    c = _C0_F + force * _CF_F_PER_N
-    r = _R0 + _A * force + _B * x * x + _D * x + _E * force * x
-    return line_fit.fit(force, x, c, r, form="printed"), force, x, c, r
-
-
-def force() -> list[Part]:
-    """C.4."""
-    fit, _, _, c, _ = _polynomial()
-    return [Part("F", "N", fit.force_n(c), (c - _C0_F) / _CF_F_PER_N)]
+    return force, x, _C0_F + force * _CF_F_PER_N, _R0 + _A * force + _B * x * x + _D * x + _E * force * x
 
 
 def position() -> list[Part]:
     """C.5, on presses whose resistance is that polynomial."""
-    fit, f, x, c, r = _polynomial()
+    f, x, c, r = _polynomial()
+    fit = line_fit.fit(f, x, c, r, form="printed")
     roots = fit.presses(c, r).position_m
     ours = np.take_along_axis(roots, abs(roots - x[:, None]).argmin(1)[:, None], 1)[:, 0]
     linear = _D + _E * f
@@ -87,3 +105,8 @@ def position() -> list[Part]:
     both = np.stack([(-linear + sign * np.sqrt(under)) / (2 * _B) for sign in (1, -1)], -1)
     corrected = np.take_along_axis(both, abs(both - x[:, None]).argmin(1)[:, None], 1)[:, 0]
     return [Part("x", "m", ours, fit.printed_position_m(c), corrected)]
+
+
+def weights(w_fit: list[float]) -> list[Part]:
+    """C.1.1: weights of R0, C0, C_F, A, B, D, E, in the order of its list: B has none, and C.5 divides by it."""
+    return [Part("B of C.5 over its first estimate", "", w_fit[4])]

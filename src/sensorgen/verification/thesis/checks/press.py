@@ -1,23 +1,29 @@
-"""What a press does: figures 6.1 to 6.12, by the line, by finite elements under load, and by plates."""
+"""Presses and the bench: figures 5.6 to 6.12 and what the text concludes from them, by the line and finite elements."""
+
+from typing import Any
 
 import numpy as np
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
+from sensorgen.measure.signal import lowpass
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import compression as compressed
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor
+from sensorgen.verification.thesis.checks._text import table
 from sensorgen.verification.thesis.verdicts import Part
 
 _KPA = 100.0
 _M_PER_UM = 1e-6
 _SHOWN = 3  # digits that a mesh leaves as they are
-_DEPTH_M, _PERIOD_M = 20e-3, 2e-3  # of the cell of 6.1.2
+_PERIOD_M = 2e-3
+_CELL_M2 = _PERIOD_M * 20e-3  # of the triangular cell of 3.1.2
 _CORNERS_N, _CORNERS_M = np.array([0.0, 6.0]), np.array([0.01, 0.09])
 _MIDDLE_N, _MIDDLE_M = 3.0, 0.05
+_GRAVITY_M_PER_S2 = 9.81
 _LOW_AND_HIGH_HZ = np.array([TONES_HZ[0], TONES_HZ[-1]])
 
 
@@ -40,27 +46,85 @@ def _top(name: str, moved: compressed.CompressionResult, thesis_mm: float) -> Pa
     return Part(name, "m", ours, thesis_mm * M_PER_MM, shown=_SHOWN)
 
 
-def top(shape: str, displacement_mm: float, film_mm: float, base: str = "bonded", period: str = "fixed") -> list[Part]:
-    """6.5: triangular cell; 6.8: on a base that slides, its period free to widen; 6.9: the rectangular one, in 3D."""
-    found = _pressed(shape, parameters={"dielectric_mm": film_mm}, base=base, period=period)
-    return [_top("displacement of the top at 100 kPa", found, displacement_mm)]
-
-
-def plates(two_mm: float, three_mm: float) -> list[Part]:
-    """6.11: the plain plate, fixed at its sides so that only its bulk deforms."""
-    found = _pressed("reference", parameters={})
-    return [_top("2D", found, two_mm), _top("3D", found, three_mm)]
-
-
-def gain(rise_f: float, film_mm: float) -> list[Part]:
-    """6.12: by how much the capacitance of the triangular cell rises."""
-    found = _pressed("tri", parameters={"dielectric_mm": film_mm})
+def _rise_f(found: compressed.CompressionResult, cell_m2: float) -> float:
+    """By how much the capacitance of a cell has risen [F]."""
     lower, upper = np.array(found.lower_f_per_m2, float), np.array(found.upper_f_per_m2, float)
     rest, *_, last = (lower + upper) / 2
+    return float(last - rest) * cell_m2
+
+
+def top(shape: str, displacement_mm: float, ways: list[dict[str, Any]]) -> list[Part]:
+    """6.5: triangular cell with both films; 6.8: fixed, and free to slide and widen; 6.9: rectangular cell, in 3D."""
+    found = []
+    for way in ways:
+        film, boundary = way["film_mm"], {k: v for k, v in way.items() if k != "film_mm"}
+        named = ", ".join([f"film {film:g} mm", *(f"{key} {value}" for key, value in boundary.items())])
+        moved = _pressed(shape, parameters={"dielectric_mm": film}, **boundary)
+        found.append(_top(f"displacement at 100 kPa, {named}", moved, displacement_mm))
+    return found
+
+
+def plates(two_mm: float, three_mm: float, two_f: float, three_f: float) -> list[Part]:
+    """6.11: the plain plate, fixed at its sides so that only its bulk deforms."""
+    found = _pressed("reference", parameters={})
     return [
+        _top("2D", found, two_mm), _top("3D", found, three_mm),
+        *(Part(f"gain of C, {name}, 2 mm by 20 mm", "F", _rise_f(found, _CELL_M2), printed, shown=2)
+          for name, printed in (("2D", two_f), ("3D", three_f))),
+    ]  # fmt: skip
+
+
+def gain(rise_f: float, deepest_mm: float, rect_f: float, film_mm: float) -> list[Part]:
+    """6.12: by how much the capacitance of both cells rises, and how far the slope has to be extended."""
+    tri, rect = (_pressed(shape, parameters={"dielectric_mm": film_mm}) for shape in ("tri", "rect"))
+    rise = _rise_f(tri, _CELL_M2)
+    deep = float(tri.displacement_um[-1]) * _M_PER_UM * rise_f / rise
+    return [
+        Part("(a) rise at 100 kPa, 2 mm by 20 mm", "F", rise, rise_f, shown=_SHOWN),
+        Part("(a) displacement for 10 pF by this slope", "m", deep, deepest_mm * M_PER_MM, shown=_SHOWN, limit=True),
+        Part("(b) rise at 100 kPa, 2 mm by 2 mm", "F", _rise_f(rect, _PERIOD_M**2), rect_f, shown=2),
+    ]
+
+
+def sensitivity(shape: str, film_mm: float, increase: float, cell_f: float, plate_f: float) -> list[Part]:
+    """6.1.2, 7.1.1: relative rise of C at 100 kPa over that of the plate; and the quotient of the thesis's numbers."""
+    return [
+        Part("increase by its own numbers", "", cell_f / plate_f - 1, increase, scale=1.0, shown=_SHOWN),
         Part(
-            "rise of C at 100 kPa, 2 mm by 20 mm", "F", float(last - rest) * _DEPTH_M * _PERIOD_M, rise_f, shown=_SHOWN
-        )
+            "relative rise of the plate over the cell's, solved",
+            "",
+            _plate_share(shape, film_mm),
+            1 / (1 + increase),
+            shown=2,
+        ),
+    ]
+
+
+def _plate_share(shape: str, film_mm: float) -> float:
+    """Relative rise of the plate's capacitance at 100 kPa over that of a cell [-]."""
+    cell, plate = _pressed(shape, parameters={"dielectric_mm": film_mm}), _pressed("reference", parameters={})
+    by = [_rise_f(found, 1.0) / float(found.lower_f_per_m2[0] or np.nan) for found in (plate, cell)]
+    return by[0] / by[1]
+
+
+def more_sensitive(film_mm: float) -> list[Part]:
+    """First research question: a plate's relative rise has to be the smaller one."""
+    return [
+        Part(f"plate's relative rise at 100 kPa over that of {shape}", "", _plate_share(shape, film_mm), 1.0,
+             shown=2, limit=True)
+        for shape in ("tri", "rect")
+    ]  # fmt: skip
+
+
+def several_tones() -> list[Part]:
+    """Second research question: errors of force and position by seven tones, over seven readings at the highest one."""
+    found = _plate().response(np.array(TONES_HZ), _MIDDLE_N, _MIDDLE_M)
+    z, by = found.impedance_ohm, np.stack([found.by_force_ohm_per_n, found.by_position_ohm_per_m])
+    known = np.einsum("ik,jk->kij", by / abs(z), by.conj() / abs(z)).real  # of noise that is a share of |Z|
+    every, highest = (np.sqrt(np.diag(np.linalg.inv(k))) for k in (known.sum(axis=0), len(z) * known[-1]))
+    return [
+        Part(f"error of {name}", "", float(every[k] / highest[k]), 1.0, shown=_SHOWN, limit=True)
+        for k, name in enumerate(("force", "position"))
     ]
 
 
@@ -98,5 +162,36 @@ def way_back() -> list[Part]:
 
 
 def charge(charge_c: float, capacitance_f: float) -> list[Part]:
-    """6.1 to 6.3: charge at 1 V."""
+    """6.3: charge at 1 V."""
     return [Part("C of 1 pC at 1 V", "F", charge_c / 1.0, capacitance_f, charge_c)]
+
+
+def piston(mass_kg: float, force_n: float) -> list[Part]:
+    """5.1.2: weight of the piston."""
+    return [Part("weight", "N", mass_kg * _GRAVITY_M_PER_S2, force_n)]
+
+
+def tip(diameter_mm: float, radius_mm: float) -> list[Part]:
+    """5.6: outer diameter of the extension, and a radius of the whole."""
+    return [Part("radius (ours: half the diameter)", "mm", diameter_mm / 2, radius_mm)]
+
+
+def flat_end(flat_mm: float) -> list[Part]:
+    """5.1.3: what presses, against the length that is pressed by Table C.1."""
+    return [Part("flat end (ours: pressed length of Table C.1)", "mm", table("C.1")["tip_mm"], flat_mm)]
+
+
+def bridge() -> list[Part]:
+    """5.9: currents of the tones at 1 V over one another, with the weights of Table 5.1 and with equal ones."""
+    tones, weights = (np.array(table(number)[key]) for number, key in (("3.1", "tones_hz"), ("5.1", "weights")))
+    current = 1 / abs(_plate().impedance(tones, 0.0, _MIDDLE_M))
+    spread = [float(np.ptp(np.log(i))) for i in (current, current * weights)]
+    return [Part("largest over smallest current, equal and weighted tones", "", np.exp(spread), shown=_SHOWN)]
+
+
+def filtered(cutoff_hz: float, order: int) -> list[Part]:
+    """5.3: the low-pass, as ours is set."""
+    return [
+        Part("cut-off", "Hz", lowpass.CUTOFF_HZ, cutoff_hz, copied=True),
+        Part("order", "", lowpass.ORDER, order, copied=True),
+    ]

@@ -1,4 +1,4 @@
-"""The pressed line and its lumped readings: 2.24, 2.25, B.49 to B.51, B.54, 5.1, and the circuits of chapter 2."""
+"""The line and its lumped readings, at rest and pressed: 2.24, 2.25, B.49 to B.51, B.54, 5.1, circuits of chapter 2."""
 
 from typing import Any
 
@@ -22,7 +22,8 @@ _FORCE_N, _PATCH_M, _LEFT_M, _MODULUS_PA = 3.0, 0.01, 0.045, 6e6  # Table 3.1; t
 _S_PER_N = 0.02  # a piezoresistance that shows; no source gives one
 _TONES_HZ = np.array([1.1e3, 99.7e3])
 _CELLS = 2000  # of a ladder: its error is below 1e-6 then
-_LEAST_HZ, _MOST_HZ = 1e5, 1e7
+_LEAST_HZ, _MOST_HZ = 1e5, 2e6
+_GAUSS = 24  # points of a quadrature
 
 _TRACKS: dict[str, Any] = {**_field.TRACKS, "length_m": LENGTH_M}
 _PRESS = {"force_n": _FORCE_N, "modulus_pa": _MODULUS_PA, "tip_m": _PATCH_M, "left_m": _LEFT_M}
@@ -42,37 +43,44 @@ def _both(name: str, ours: Any, printed: Any) -> list[Part]:
     ]
 
 
-def in_series() -> list[Part]:
-    """2.24, B.54: a resistor and a capacitor in series, in place of a line, at the lowest tone."""
-    tone = _TONES_HZ[0]
-    printed = _RESISTANCE_OHM + 1 / (2j * np.pi * tone * _CAPACITANCE_F)
-    rise = np.array([float(np.real(_z(frequency_hz=f))) for f in _TONES_HZ])
-    return [*_both("Z", _z(frequency_hz=tone), printed), Part("Re Z, lowest and highest tone", "ohm", rise)]
+def by_powers() -> list[Part]:
+    """2.24, 5.1, B.54: R from what the tracks turn into heat, X from what the film stores, per current squared."""
+    nodes, weights = np.polynomial.legendre.leggauss(_GAUSS)
+    x = (nodes + 1) / 2 * LENGTH_M
+    current, voltage = _field.LINE.current_a.at(x), _field.LINE.difference_v.at(x)
+    heat = weights @ abs(current) ** 2 * _RESISTANCE_OHM / 2
+    stored = weights @ abs(voltage) ** 2 * _field.OMEGA * _CAPACITANCE_F / 2
+    return _both("Z", _field.LINE.impedance_ohm, complex(heat, -stored) / abs(_field.LINE.input_a) ** 2)
 
 
 def corner() -> list[Part]:
-    """2.25: the formula, and where the line's resistance has really fallen by a tenth."""
+    """2.25: where R and the size of X are alike: of one R and one C, and of the line, whose R and C vary."""
     from scipy.optimize import brentq
 
-    def left(ln_hz: float) -> float:
-        return float(np.real(_z(frequency_hz=np.exp(ln_hz)))) / rest - 0.9
+    def apart(ln_hz: float) -> float:
+        z = _z(frequency_hz=np.exp(ln_hz))
+        return float((z.real + z.imag) / abs(z))
 
-    printed, rest = 1 / (2 * np.pi * _RESISTANCE_OHM * _CAPACITANCE_F), float(np.real(_z(frequency_hz=1.0)))
     sensor = Sensor(
         LENGTH_M, WIDTH_M, (HEIGHT_M,) * 2, (RHO_OHM_M,) * 2, CAPACITANCE_F_PER_M, compression.unconfined(_MODULUS_PA)
     )
-    falls = float(np.exp(brentq(left, np.log(_LEAST_HZ), np.log(_MOST_HZ), xtol=1e-14)))
+    alike = float(np.exp(brentq(apart, np.log(_LEAST_HZ), np.log(_MOST_HZ), xtol=1e-14)))
+    capacitance, resistance = line_fit.series(_TONES_HZ[0], _z(frequency_hz=_TONES_HZ[0]))
     return [
-        Part("1/(2 pi R C)", "Hz", sensor.corner_frequency_hz(), printed),
-        Part("where Re Z has fallen by 10 %", "Hz", falls, printed),
-    ]
+        Part("1/(2 pi R C), R of both tracks", "Hz", sensor.corner_frequency_hz(),
+             1 / (2 * np.pi * _RESISTANCE_OHM * _CAPACITANCE_F)),
+        Part("where R and |X| of the line are alike", "Hz", alike, float(1 / (2 * np.pi * resistance * capacitance))),
+    ]  # fmt: skip
 
 
-def parts_of_z() -> list[Part]:
-    """5.1: resistance and capacitance that a reading is taken apart into make it up again."""
-    ours = _z(frequency_hz=_TONES_HZ, **_PRESS)
-    taken = [(tone, *line_fit.series(tone, z)) for tone, z in zip(_TONES_HZ, ours, strict=True)]
-    return _both("Z", ours, np.array([complex(r + 1j * (-1 / (2 * np.pi * tone * c))) for tone, c, r in taken]))
+def by_frequency() -> list[Part]:
+    """7.1.2: R hardly depends on the frequency, and X does; no numbers are given but the tones."""
+    low, high = _z(frequency_hz=_TONES_HZ)
+    return [
+        Part("change of R over that of |X|, 1.1 to 99.7 kHz", "", abs(np.log(high.real / low.real)) /
+             abs(np.log(high.imag / low.imag)), 0.01, shown=3, limit=True),
+        Part("X at 1.1 kHz over X at 99.7 kHz, by 1/f", "", low.imag / high.imag, _TONES_HZ[1] / _TONES_HZ[0]),
+    ]  # fmt: skip
 
 
 def thinner() -> list[Part]:
@@ -115,8 +123,8 @@ def cog_resistance() -> list[Part]:
 
 
 def reactance_of(eps_r: float) -> list[Part]:
-    """2.6, 2.8: a capacitor's impedance, and the positive number that stands for it."""
+    """2.6, 2.8: the size of a capacitor's reactance."""
     tone = float(_TONES_HZ[0])
     printed = FILM_M / (2 * np.pi * tone * EPS0_F_PER_M * eps_r * WIDTH_M * LENGTH_M)
     ours = _z(frequency_hz=tone, top_resistivity_ohm_m=0.0, bottom_resistivity_ohm_m=0.0, eps_r=eps_r)
-    return [Part("X", "ohm", ours, complex(printed), printed / 1j)]
+    return [Part("size of X", "ohm", float(abs(ours)), printed)]

@@ -115,12 +115,10 @@ def general_solution() -> list[Part]:
 
 
 def eigenvectors() -> list[Part]:
-    """B.27: what changes along the line is opposite on both tracks, and their sum changes evenly."""
-    top, bottom = LINE.top_v(_X, order=2), LINE.bottom_v(_X, order=2)
-    return [
-        Part("d2U2/dx2 : d2U1/dx2", "", np.mean(bottom / top), -1.0),
-        Part("d2(U1+U2)/dx2", "V/m2", np.max(abs(top + bottom)), 0.0, scale=float(np.max(abs(top)))),
-    ]
+    """B.27: of the matrix of B.21; what changes along the line is opposite on both tracks, the rest is alike."""
+    values, vectors = np.linalg.eig(_MATRIX)
+    alike, opposite = (vectors[1, k] / vectors[0, k] for k in np.argsort(abs(values)))
+    return [Part("U2 : U1 of lambda 1, 2", "", alike, 1.0), Part("U2 : U1 of lambda 3, 4", "", opposite, -1.0)]
 
 
 def slope_of_solution() -> list[Part]:

@@ -1,24 +1,29 @@
-"""The rectangular cell: 3.36 to 3.54, figures 2.14, 3.5, 3.6 and 3.7, against columns and field solvers."""
+"""The rectangular cell: 3.36 to 3.54, figures 3.6, 3.7 and 6.10, against columns and field solvers."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
-from sensorgen.design.shapes import rect
-from sensorgen.models import thesis_cells
+from sensorgen.design import design as designs
+from sensorgen.design.shapes import rect, tri
+from sensorgen.models import columns as every_column
+from sensorgen.models import thesis_cells, thesis_swept
 from sensorgen.verification.thesis.checks._columns import (
     EPS_R,
     FILM_MM,
+    PERMITTIVITY,
     SHOWN,
     Layer,
     exact_f_per_m2,
     pile_f_per_m2,
+    piles_f,
 )
+from sensorgen.verification.thesis.checks._text import table
 from sensorgen.verification.thesis.verdicts import Part
 
 _CELL = rect.Params(dielectric_mm=FILM_MM)
 _AREA_M2 = (_CELL.period_mm * M_PER_MM) ** 2
 _D, _T1, _T2 = FILM_MM, _CELL.upper_height_mm, _CELL.lower_height_mm
-_PRESS_MM = 0.05
+_STRAIN = 1e-3
 
 # Thickness of X60 that 3.39 to 3.47 give a column, by what lies in its lower and in its upper layer [mm].
 _PRINTED_MM = {
@@ -49,51 +54,122 @@ def in_series() -> list[Part]:
     ]
 
 
-def sixteen_columns() -> list[Part]:
-    """3.36: the sum over the lower strips, by 3.49, its widths those of these and its L a quarter of the period."""
-    widths = {"air": 2 * _CELL.air_width_mm, "x60": _CELL.x60_width_mm, "etpu": _CELL.etpu_width_mm}
+def _summed_f(upper_mm: dict[str, float]) -> float:
+    """3.49, its widths those of the lower strips, and its L those of the upper ones [F]."""
+    lower = {"air": 2 * _CELL.air_width_mm, "x60": _CELL.x60_width_mm, "etpu": _CELL.etpu_width_mm}
     counts = {"etpu": 1, "x60": 1, "air": 2}
     over = sum(
-        widths[below] * counts[above] / thickness
+        lower[below] * upper_mm[above] * counts[above] / thickness
         for below, row in _PRINTED_MM.items()
         for above, thickness in row.items()
     )
-    printed_f = EPS0_F_PER_M * EPS_R * _CELL.period_mm / 4 * M_PER_MM * over
-    return [Part("C_eq", "F", thesis_cells.strips_f_per_m2(_CELL, EPS_R) * _AREA_M2, printed_f)]
+    return EPS0_F_PER_M * EPS_R * over * M_PER_MM
+
+
+_OWN_MM = {"air": _CELL.air_width_mm, "x60": _CELL.x60_width_mm, "etpu": _CELL.etpu_width_mm}
+_EVEN_MM = dict.fromkeys(_OWN_MM, _CELL.period_mm / 4)  # the best reading of one L for strips of different widths
+
+
+def _columns_f(cell: rect.Params = _CELL) -> float:
+    """Columns of a cell as drawn [F]."""
+    sizes = asdict(replace(cell, length_mm=cell.period_mm, width_mm=cell.period_mm))
+    made = designs.make({"shape": "rect", "parameters": sizes})
+    return every_column.capacitance(made.in_use, PERMITTIVITY).lower
+
+
+def sixteen_columns() -> list[Part]:
+    """3.36, figure 3.6: the sum over the lower strips, each of the upper ones with its own width."""
+    kept = thesis_cells.strips_f_per_m2(_CELL, EPS_R, even=False) * _AREA_M2
+    return [
+        Part("C_eq", "F", _columns_f(), _summed_f(_OWN_MM)),
+        Part("as kept in thesis_cells", "F", kept, _summed_f(_OWN_MM), copied=True),
+    ]
 
 
 def whole() -> list[Part]:
     """3.49: the formula, and its cell."""
-    (summed,) = sixteen_columns()
-    return [summed, replace(summed, name="of the exact cell", ours=exact_f_per_m2("rect") * _AREA_M2, shown=SHOWN)]
+    printed, kept = _summed_f(_EVEN_MM), thesis_cells.strips_f_per_m2(_CELL, EPS_R) * _AREA_M2
+    return [
+        Part("C_eq, columns of their own widths", "F", _columns_f(), printed),
+        Part("of the exact cell", "F", exact_f_per_m2("rect") * _AREA_M2, printed, shown=SHOWN),
+        Part("as kept in thesis_cells", "F", kept, printed, copied=True),
+    ]
 
 
-def _bulged() -> tuple[float, float]:
-    """How many times the dielectric's term grows when pressed, by our model; and its height [-], [mm]."""
+def _hooke() -> tuple[float, float]:
+    """Width and height of a strip that is pressed a little, its long side held, over those at rest [-]."""
+    nu = table("3.2")["x60"]["poisson_ratio"]
+    return 1 + nu / (1 - nu) * _STRAIN, 1 - _STRAIN
+
+
+def _gain() -> float:
+    """By how much a strip's capacitance grows that Hooke's law widens: of our columns [-]."""
+    wide, high = _hooke()
+    we, h1 = _CELL.x60_width_mm, _T1 + _T2 + _D
+    return piles_f([(we * wide, [("x60", h1 * high)])]) / piles_f([(we, [("x60", h1)])]) - 1
+
+
+def _kept(dh_mm: float) -> float:
+    """How many times the dielectric's term grows, as thesis_cells keeps it [-]."""
     rest = thesis_cells.strips_f_per_m2(_CELL, EPS_R)
-    pressed, free = (thesis_cells.bulging_f_per_m2(_CELL, EPS_R, dh) - rest for dh in (_PRESS_MM, 0.0))
-    return pressed / free, _T1 + _T2 + _D
+    pressed, free = (thesis_cells.bulging_f_per_m2(_CELL, EPS_R, dh) - rest for dh in (dh_mm, 0.0))
+    return pressed / free - 1
 
 
 def constant_volume() -> list[Part]:
-    """3.50 to 3.52: the bulge that keeps the area of the cross-section, and what it does to a plate's capacitance."""
-    times, h1 = _bulged()
-    we = _CELL.x60_width_mm
-    bulge = _PRESS_MM * we / (h1 - _PRESS_MM)
+    """3.50 to 3.52: the bulge that keeps the area of the cross-section, against Hooke's law."""
+    wide, high = _hooke()
+    bulge = _STRAIN / (1 - _STRAIN)  # 3.51
+    printed = (1 + bulge) / (1 - _STRAIN) - 1
     return [
-        Part("area after / before", "", 1.0, (we + bulge) * (h1 - _PRESS_MM) / (we * h1)),
-        Part("capacitance after / before", "", times, (we + bulge) / (h1 - _PRESS_MM) / (we / h1)),
+        Part("change of area over the strain", "", (wide * high - 1) / _STRAIN, 0.0, scale=1.0),
+        Part("bulge over width", "", wide - 1, bulge),
+        Part("gain of capacitance", "", _gain(), printed),
+        Part("gain as kept in thesis_cells", "", _kept(_STRAIN * (_T1 + _T2 + _D)), printed, copied=True),
     ]
 
 
 def bulging_term() -> list[Part]:
     """3.53: the square belongs to the bracket. Lengths are in metres: as printed, that matters."""
-    times, h1_mm = _bulged()
-    h1, dh = h1_mm * M_PER_MM, _PRESS_MM * M_PER_MM
-    return [Part("capacitance after / before", "", times, h1 / (h1 - dh**2), (h1 / (h1 - dh)) ** 2)]
+    h1 = (_T1 + _T2 + _D) * M_PER_MM
+    dh = h1 * _STRAIN
+    return [Part("gain of capacitance", "", _gain(), h1 / (h1 - dh**2) - 1, (h1 / (h1 - dh)) ** 2 - 1)]
 
 
 def bulging() -> list[Part]:
-    """3.54: what it adds to a cell that nothing presses."""
-    ours, printed = (thesis_cells.bulging_f_per_m2(_CELL, EPS_R, 0.0, printed=way) for way in (False, True))
-    return [Part("C_r at rest", "F/m2", ours, printed)]
+    """3.54: what it adds to a cell that nothing presses: columns of their own widths have no such term."""
+    area_mm2 = _CELL.x60_width_mm * _CELL.period_mm / 4
+    added = 8 / 16 * EPS0_F_PER_M * EPS_R * area_mm2 / (_T1 + _T2 + _D) * M_PER_MM
+    rest = _summed_f(_EVEN_MM)
+    kept = [thesis_cells.bulging_f_per_m2(_CELL, EPS_R, 0.0, printed=way) * _AREA_M2 for way in (False, True)]
+    return [
+        Part("C_r at rest, strips of their own widths", "F", _columns_f(), _summed_f(_OWN_MM) + added),
+        Part("as kept in thesis_cells, corrected and not", "F", kept, [rest, rest + added], copied=True),
+    ]
+
+
+def turned_out(rise_f: float, press_mm: float) -> list[Part]:
+    """Figure 6.10: what the strips gain that 3.1.2 makes lower and wider, by columns of these."""
+    now = thesis_swept.swept(_CELL, press_mm)
+    rise = _columns_f(now) - _columns_f()
+    return [
+        Part("gain by 5 µm, a cell of 2 mm by 2 mm", "F", rise, rise_f, shown=SHOWN),
+        Part("gain by 5 µm, the square of 1 mm that 6.1.2 names", "F", rise / _CELL.period_mm**2, rise_f, shown=SHOWN),
+    ]
+
+
+def volumes() -> list[Part]:
+    """2.4.1: X60 and cogs of both designs per area: of a triangle half its box, of a strip its share of the period."""
+    cell = tri.Params(dielectric_mm=FILM_MM)
+    x60 = (cell.hang_height_mm + cell.lower_height_mm) / 2 + FILM_MM
+    cogs = cell.hang_height_mm / 2
+    layers = (_T1 + _T2) / _CELL.period_mm
+    return [
+        Part(
+            "X60 of the triangular design over that of the rectangular one",
+            "",
+            x60 / (layers * _CELL.x60_width_mm + _D),
+            1.0,
+        ),
+        Part("cogs, likewise", "", cogs / (layers * _CELL.etpu_width_mm), 1.0),
+    ]

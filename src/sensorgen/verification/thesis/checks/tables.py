@@ -1,21 +1,39 @@
-"""Tables of the thesis, against the files of materials, printers and qualities, and the defaults of designs."""
+"""Tables of the thesis, against its other tables, its text and the readings of Table D.1.
+
+What nothing else gives is transcribed: compared with the files of materials, printers and designs, which are copies.
+"""
+
+from functools import cache
+from statistics import median
+from typing import Any
 
 import numpy as np
 
-from sensorgen.core.errors import MissingValue
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design import materials, printer
 from sensorgen.design.shapes import reference
+from sensorgen.measure.log import tables as readings
+from sensorgen.measure.log.entries import Reading
+from sensorgen.measure.signal.verdicts import Evidence, verdict
+from sensorgen.prediction import electrodes
+from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.query import TIP_M, TONES_HZ
 from sensorgen.verification.thesis.checks._columns import FILM_MM
+from sensorgen.verification.thesis.checks._text import table
 from sensorgen.verification.thesis.verdicts import Part
 
 _UNITS = {"_pa": "Pa", "_kg_m3": "kg/m3", "_c": "°C", "_percent": "%"}  # by the ending of a quantity
 _PRINTER = "diabase-h5"
-_SIEMENS = "S/m"
+_SENSOR_M2 = 1e-3  # 100 mm by 10 mm
 
 Printed = dict[str, float]
+
+
+@cache
+def _prints() -> list[Reading]:
+    """Table D.1."""
+    return readings.thesis()
 
 
 def _named(material: str, quantity: str) -> tuple[str, str]:
@@ -31,80 +49,172 @@ def _of_source(material: str, quantity: str, source: str) -> float:
     return next((v.value for v in values if v.source == source), np.nan)
 
 
-def of_source(source: str, **said: Printed) -> list[Part]:
-    """Values by material and quantity, against what is kept of that source."""
+def _copied(source: str, said: dict[str, Printed]) -> list[Part]:
+    """Values by material and quantity, and what is kept of that source."""
     return [
-        Part(*_named(material, quantity), _of_source(material, quantity, source), value)
+        Part(*_named(material, quantity), _of_source(material, quantity, source), value, copied=True)
         for material, values in said.items()
         for quantity, value in values.items()
     ]
 
 
-def _conductivity(material: str, source: str = "") -> float:
-    """What a prediction takes [S/m]: none where the files have no value for it to take."""
-    try:
-        return 1 / materials.load(material).value("resistivity_ohm_m", source).value
-    except MissingValue:
-        return 0.0
+def beside(other: str, **said: Printed) -> list[Part]:
+    """Values by material and quantity, against those of another table of the thesis that has them."""
+    there = table(other)
+    return [
+        Part(f"{name} (ours: Table {other})", unit, there[material][quantity], value)
+        for material, values in said.items()
+        for quantity, value in values.items()
+        for name, unit in [_named(material, quantity)]
+        if quantity in there.get(material, {})
+    ]
+
+
+def filaments(ranges_c: dict[str, list[float]], text_c: dict[str, list[float]], **said: Printed) -> list[Part]:
+    """Table 4.1: against Table 3.2, and its printing temperatures against those of 4.2.5."""
+    return [
+        *beside("3.2", **said),
+        *(Part(f"{name}: printing temperatures (ours: 4.2.5)", "°C", text_c[name], ranges_c[name]) for name in text_c),
+        *_copied("thesis-4.1", said),
+    ]
 
 
 def simulated(conductivity: Printed, **said: Printed) -> list[Part]:
-    """Table 3.2: its materials; and X60, which as printed conducts better than the electrodes."""
+    """Table 3.2: X60, which as printed conducts better than the electrodes, against the least leaky film of D.1."""
+    largest_ohm = max(max(r.z_ohm, default=0.0) for r in _prints())
+    film = FILM_MM * M_PER_MM / (largest_ohm * _SENSOR_M2)
     return [
-        *of_source("thesis-3.2", **said),
-        Part("etpu: conductivity", _SIEMENS, _conductivity("etpu", "thesis-3.2"), conductivity["etpu"]),
-        Part("x60: conductivity", _SIEMENS, _conductivity("x60"), conductivity["x60"], 0.0, scale=1.0),
-        Part("air: conductivity", _SIEMENS, _conductivity("air", "thesis-3.2"), conductivity["air"], scale=1.0),
+        Part("x60: conductivity (ours: Table D.1, most)", "S/m", film, conductivity["x60"], 0.0, scale=1.0),
+        *_copied("thesis-3.2", said),
     ]
 
 
 def plate(sizes: Printed, relative_permittivity: list[float], tones_hz: list[float], **said: Printed) -> list[Part]:
-    """Table 3.1: sizes of the plain plate, tones, and a pair of permittivities in the wrong order."""
-    ours = [materials.load(name).value("relative_permittivity").value for name in ("etpu", "x60")]
+    """Table 3.1: a pair of permittivities in the wrong order, and moduli, against Table 3.2."""
+    ours = [table("3.2")[name]["relative_permittivity"] for name in ("etpu", "x60")]
+    taken = [materials.load(name).value("relative_permittivity").value for name in ("etpu", "x60")]
     plain = reference.Params()
     return [
-        *(Part(name.removesuffix("_mm"), "mm", float(getattr(plain, name)), value) for name, value in sizes.items()),
-        Part("relative permittivity of (electrodes, dielectric)", "", ours, relative_permittivity,
+        Part("relative permittivity of (electrodes, dielectric) (ours: Table 3.2)", "", ours, relative_permittivity,
              relative_permittivity[::-1]),
-        Part("tones", "Hz", TONES_HZ, tones_hz),
-        *of_source("thesis-3.1", **said),
+        *beside("3.2", **said),
+        Part("relative permittivities of a prediction", "", taken, relative_permittivity[::-1], copied=True),
+        *(Part(name.removesuffix("_mm"), "mm", float(getattr(plain, name)), value, copied=True)
+          for name, value in sizes.items()),
+        Part("tones", "Hz", TONES_HZ, tones_hz, copied=True),
+        *_copied("thesis-3.1", said),
     ]  # fmt: skip
 
 
-def cell(shape: str, **said: float) -> list[Part]:
-    """Figures 2.12, 2.14 and 3.5: sizes of a cell as the text has them [mm]."""
+def flank(radius_mm: float, **said: float) -> list[Part]:
+    """Figure 2.12: the flank's length, by which 3.1.2 turns it; its sizes are our defaults [mm]."""
+    length = np.hypot(said["period_mm"] / 4, said["hang_height_mm"])
+    return [Part("length of a flank (ours: by its sides)", "mm", length, radius_mm), *_sizes("tri", said)]
+
+
+def strips(half_mm: float, **said: float) -> list[Part]:
+    """Figures 2.14 and 3.5: four strips make up a period, of which 6.1.2 solves half; their sizes are our defaults."""
+    period = said["etpu_width_mm"] + said["x60_width_mm"] + 2 * said["air_width_mm"]
+    return [Part("period (ours: sum of the strips' widths)", "mm", period, 2 * half_mm), *_sizes("rect", said)]
+
+
+def _sizes(shape: str, said: Printed) -> list[Part]:
     params = designs.make({"shape": shape, "parameters": {"dielectric_mm": FILM_MM}}).params
-    return [Part(n.removesuffix("_mm").replace("_", " "), "mm", float(getattr(params, n)), v) for n, v in said.items()]
-
-
-def tones(frequency_hz: list[float], corrected_hz: list[float]) -> list[Part]:
-    """Table 5.1: the tones, one of them ten times too low."""
-    return [Part("tones", "Hz", TONES_HZ, frequency_hz, corrected_hz)]
-
-
-def settings(
-    layer_mm: list[float], nozzle_mm: float, line_mm: float, multiplier: float, **said: Printed
-) -> list[Part]:  # fmt: skip
-    """Table 4.2: layers, nozzle and lines; and what is set by material."""
-    machine = printer.load_printer(_PRINTER)
-    flow = [_of_source(name, "flow_percent", "thesis-4.2") / 100 for name in ("etpu", "x60")]
     return [
-        Part("layer heights", "mm", [printer.load_quality(q).layer_mm for q in ("fine", "extrafine")], layer_mm),
-        Part("nozzle", "mm", machine.nozzle_mm, nozzle_mm),
-        Part("extrusion width", "mm", machine.line_mm(), line_mm),
-        Part("extrusion multiplier", "", flow, [multiplier] * 2),
-        *of_source("thesis-4.2", **said),
+        Part(n.removesuffix("_mm").replace("_", " "), "mm", float(getattr(params, n)), v, copied=True)
+        for n, v in said.items()
     ]
 
 
-def earlier(tip_mm: float, resistivity_ohm_m: Printed, **said: Printed) -> list[Part]:
-    """Table C.1: materials of the earlier sensor, and its tip."""
+def tones(frequency_hz: list[float], corrected_hz: list[float], weights: list[float]) -> list[Part]:
+    """Table 5.1: one tone is ten times too low, by Table 3.1 and by weights that fall with the frequency."""
+    printed, corrected = ([w for _, w in sorted(zip(f, weights, strict=True))] for f in (frequency_hz, corrected_hz))
     return [
-        Part("length of the tip", "mm", TIP_M / M_PER_MM, tip_mm),
-        *(
-            Part(f"resistivity of the {end} electrode", "ohm m",
-                 _of_source("etpu", "resistivity_ohm_m", f"thesis-c.1-{end}"), value)
-            for end, value in resistivity_ohm_m.items()
-        ),
-        *of_source("thesis-c.1", **said),
+        Part("tones (ours: Table 3.1)", "Hz", table("3.1")["tones_hz"], frequency_hz, corrected_hz),
+        Part("weights by rising frequency (ours: falling)", "", sorted(weights, reverse=True), printed, corrected),
+    ]
+
+
+def settings(
+    layer_mm: list[float], nozzle_mm: float, line_mm: float, multiplier: float, infill_percent: list[float],
+    **said: Printed,
+) -> list[Part]:  # fmt: skip
+    """Table 4.2: temperatures within the makers' ranges, infill by the remarks of D.1; the rest is transcribed."""
+    machine, least = printer.load_printer(_PRINTER), next(r.remark for r in _prints() if "infill" in r.remark)
+    flow = [_of_source(name, "flow_percent", "thesis-4.2") / 100 for name in ("etpu", "x60")]
+    ranges = table("4.1")["ranges_c"]
+    return [
+        *(Part(f"{name}: nozzle temperature (ours: nearest within Table 4.1)", "°C",
+               float(np.clip(values["nozzle_temperature_c"], *ranges[name])), values["nozzle_temperature_c"])
+          for name, values in said.items()),
+        Part("x60: least infill (ours: Table D.1)", "%", float(least.partition("%")[0]), min(infill_percent)),
+        Part("layer heights", "mm", [printer.load_quality(q).layer_mm for q in ("fine", "extrafine")], layer_mm,
+             copied=True),
+        Part("nozzle", "mm", machine.nozzle_mm, nozzle_mm, copied=True),
+        Part("extrusion width", "mm", machine.line_mm(), line_mm, copied=True),
+        Part("extrusion multiplier", "", flow, [multiplier] * 2, copied=True),
+        *_copied("thesis-4.2", said),
     ]  # fmt: skip
+
+
+def earlier(
+    tip_mm: float, resistivity_ohm_m: Printed, plate_mm: float, size_mm: list[float], **said: Printed
+) -> list[Part]:
+    """Table C.1: the earlier sensor, against Tables 3.1, 3.2 and 4.1."""
+    plate = table("3.1")["sizes"]
+    found: list[Part] = [
+        Part(f"resistivity of the {end} electrode (ours: 1/conductivity of Table 3.2)", "ohm m",
+             1 / table("3.2")["conductivity"]["etpu"], value)
+        for end, value in resistivity_ohm_m.items()
+    ]  # fmt: skip
+    kept = [_of_source("etpu", "resistivity_ohm_m", f"thesis-c.1-{end}") for end in resistivity_ohm_m]
+    return [
+        *found,
+        Part("dielectric (ours: Table 3.1)", "mm", plate["dielectric_mm"], plate_mm),
+        Part("length and width (ours: Table 3.1)", "mm", [plate["length_mm"], plate["width_mm"]], size_mm),
+        *beside("4.1", **said),
+        Part("length of the tip", "mm", TIP_M / M_PER_MM, tip_mm, copied=True),
+        Part("resistivities", "ohm m", kept, list(resistivity_ohm_m.values()), copied=True),
+        *_copied("thesis-c.1", said),
+    ]
+
+
+def multimeter(rows: int, y_ohm: dict[str, list[float]], z_ohm: dict[str, list[float]]) -> list[Part]:
+    """Table D.1: its readings, as typed; and cogs along the electrode against cogs across it, by their field."""
+    found = _prints()
+    orders = [verdict(Evidence(r.written, r.y_ohm, r.z_ohm)).same_order for r in found]
+    both = [order for order in orders if order is not None]
+    by_name = {reading.written: reading for reading in found}
+    y = {axis: median(r.y_ohm[0] for r in found if r.iteration == 23 and r.design == f"tri{axis}-d0") for axis in "xy"}
+    ours: dict[str, Any] = {
+        axis: electrodes.electrode_resistance(drawn(designs.make(
+            {"shape": "tri", "parameters": {"dielectric_mm": 0.0, "along": axis}}
+        )))["top"].value
+        for axis in "xy"
+    }  # fmt: skip
+    return [
+        Part("R of 23 triY over 23 triX, medians", "", ours["y"] / ours["x"], y["y"] / y["x"], shown=3),
+        Part("rows with both readings, and those whose Z is of Y's order or less", "", [len(both), sum(both)]),
+        Part("rows", "", len(found), rows, copied=True),
+        *(Part(f"{name}, Y", "ohm", by_name[name].y_ohm, value, copied=True) for name, value in y_ohm.items()),
+        *(Part(f"{name}, Z", "ohm", by_name[name].z_ohm, value, copied=True) for name, value in z_ohm.items()),
+    ]
+
+
+def baked() -> list[Part]:
+    """4.2.7: baking lowers an electrode's resistance; by the remarks of Table D.1."""
+    raw, done = (
+        median(r.y_ohm[0] for r in _prints() if r.y_ohm and (r.remark == "not baked") == unbaked)
+        for unbaked in (True, False)
+    )
+    return [Part("R_Y of baked prints over that of the others, medians", "", done / raw, 1.0, shown=3, limit=True)]
+
+
+def infill(distance_mm: float, least_percent: float) -> list[Part]:
+    """7.2.2, figure 7.2: distance of a grid's lines, of which half of an infill lies each way, as Cura counts it."""
+    line_mm = table("4.2")["line_mm"]
+    found = [2 * line_mm * 100 / percent for percent in (100.0, least_percent)]
+    return [
+        Part(f"line distance at {percent:g} % infill", "mm", at, distance_mm, limit=True)
+        for percent, at in zip((100.0, least_percent), found, strict=True)
+    ]

@@ -1,0 +1,10 @@
+"""Numbers of the thesis by the place where they are printed: its tables are compared with each other."""
+
+from typing import Any
+
+from sensorgen.verification.thesis.items import chapter
+
+
+def table(number: str) -> dict[str, Any]:
+    """What a table of the thesis prints, as the chapters keep it."""
+    return next(item.given for item in chapter(number.partition(".")[0]).tables if item.number == number)
