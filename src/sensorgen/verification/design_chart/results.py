@@ -225,7 +225,7 @@ def _climbed(
 
 
 def _started_s(found: Sequence[tuple[Series, str, Run]]) -> float:
-    """Of a run, what starting the process and loading libraries took, at most: the least difference of cold and warm [s]."""
+    """Start of a process and loading of libraries, at most: the least difference of cold and warm [s]."""
     return min((run.cold.cpu_s - run.warm.cpu_s for _, _, run in found), default=0.0)
 
 
