@@ -142,7 +142,10 @@ def report(
             "Log some with: sensorgen log add SPECIMEN --y 0.65k --z OL"
         )
     step("residuals")
-    explanations = explained.explanations(found, recorded)
+    names = {row.reading.specimen for row in found.rows} | {run.entry.specimen for run in recorded}
+    calibrated = calibrations.latest(log, names, left_out)
+    own = {one.specimen for one in calibrated}  # a calibration explains more than one parameter can
+    explanations = explained.explanations(found, [run for run in recorded if run.entry.specimen not in own])
     impedances = recordings.impedances(recorded, found) if recorded else None
     verdicts = (*yields.headline(found),) if found.direct else ()
     shorts = (*yields.findings(found), *direction.findings(found)) if found.direct else ()
@@ -154,8 +157,6 @@ def report(
         *electrodes.beyond_meter(found),
         *recordings.findings(recorded, impedances),
     )
-    names = {row.reading.specimen for row in found.rows} | {run.entry.specimen for run in recorded}
-    calibrated = calibrations.latest(log, names, left_out)
     findings = (
         *calibrations.findings(calibrated), *shorts, *by_frequency, *explained.sentences(explanations),
         *electrodes.findings(found),
