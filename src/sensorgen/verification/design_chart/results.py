@@ -278,7 +278,8 @@ def _point(question: Question, series: Series, said: str, run: Run, references: 
     reference = _best(references, series.program)
     answer = run.answer
     off = question.measure(answer.value, reference.value)
-    contradicted = answer.stated is not None and off > answer.stated + reference.doubt
+    within = question.measure(reference.value, answer.value)  # of what was stated of the answer
+    contradicted = answer.stated is not None and within > answer.stated + reference.doubt
     if answer.certified and answer.stated is not None:  # the bound that is further off
         off = max(
             question.measure((answer.value[0] * end,), reference.value)
