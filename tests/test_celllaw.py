@@ -117,7 +117,7 @@ def test_an_unknown_cell_is_solved_once(monkeypatch):
     at = np.array([1e4, 3e4, 6e4, 1e5])
     rise, expected = (1 / (1 - c.capacitive_strain(at)[0]) - 1 for c in (law.compression, stored))
     within = (law.others[1].ratio[-1] - 1) / (law.compression.ratio[-1] - 1) - 1
-    assert 0.00599 <= within < 0.03
+    assert 0.00599 <= within < 0.032
     assert rise == pytest.approx(expected, rel=0.006 + within)
     assert {t.quantity for t in law.taken} == {"youngs_modulus_pa", "poisson_ratio"}
     monkeypatch.setattr(press2d, "press", lambda *_, **__: pytest.fail("pressed again"))

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 import sys
 from functools import partial
 
@@ -239,19 +240,20 @@ def test_a_plan_and_what_came_of_it(run):
     said = run(*PLATE_1, "1e-2", "--explain")
     assert said.code == 0
     plan, _, rest = said.out.partition("\n\n")
-    assert "plan for an accuracy of 0.01 of C up to 100 kPa" in plan
+    assert "plan for an accuracy of 0.01 of the rise of C up to 100 kPa" in plan
     assert "displacement alone," in plan
-    chosen = next(line.split() for line in plan.splitlines() if line.startswith(">  press2d "))
-    assert max(float(chosen[2]), float(chosen[6])) <= 1e-2  # expected and reached
+    chosen = next(line for line in plan.splitlines() if line.startswith(">  press2d, mesh x 0.7"))
+    expected, reached = re.findall(r"(\S+) in", chosen)
+    assert max(float(expected), float(reached)) <= 1e-2
     assert "all levels together" not in plan
     assert "(target 0.01)" in rest
     found = json.loads(run(*PLATE_1, "1e-2", "--json").out)
     assert (found["reached"], found["accuracy"]) == (True, 1e-2)
     chosen = found["plan"]["levels"][0]
-    assert (chosen["name"], chosen["chosen"]) == ("compression", "press2d")
-    width = [2 * (b - a) / (b + a) for a, b in zip(found["lower_f_per_m2"], found["upper_f_per_m2"], strict=True)]
-    assert max(width) == pytest.approx(found["relative_width"])
-    assert max(width) <= 1e-2
+    assert (chosen["name"], chosen["chosen"]) == ("compression", "press2d, mesh x 0.7")
+    error = [off / rise for off, rise in zip(found["rise_error_f_per_m2"], found["rise_f_per_m2"], strict=True) if rise]
+    assert max(error) == pytest.approx(found["largest_rise_error"])
+    assert max(error) <= 1e-2
     assert "an estimate" in found["bounds"]
 
 
@@ -302,7 +304,7 @@ def asked(monkeypatch):
 
     def press(cell, solids, stress_pa, permittivity, held, mesh, step=None, **how):
         modulus = solids["x60"].youngs_modulus_pa
-        moduli.append(modulus)
+        moduli.extend([modulus] * (mesh == press2d.Fineness()))  # not the coarser one that it is compared with
         if modulus == 7e6:
             raise ZeroDivisionError("no pivot")
         if modulus == 8e6:
@@ -349,13 +351,15 @@ def test_a_sweep_as_csv_and_table(run, asked):
     assert (rows[0]["stress_kpa"], rows[0]["model"]) == ("", "")
     assert [float(row["stress_kpa"]) for row in rows[1:4]] == [0, 50, 100]
     assert float(rows[3]["displacement_um"]) == pytest.approx(20)
-    rise = float(rows[3]["lower_f_per_m2"]) / float(rows[1]["lower_f_per_m2"])
-    assert rise == pytest.approx(1 + 1 / 30, rel=1e-3)
+    rest = (float(rows[1]["lower_f_per_m2"]) + float(rows[1]["upper_f_per_m2"])) / 2
+    assert float(rows[3]["rise_f_per_m2"]) / rest == pytest.approx(1 / 30, rel=1e-3)
     assert (rows[3]["model"], rows[3]["converged_kpa"], rows[3]["reason"]) == ("press2d", "100.0", "")
     table = run(*MODULI).out.splitlines()
-    assert table[1].split() == ["10000", "–", "–", "–", "–"]
-    modulus, stress, displacement, lower, unit, upper, _ = table[4].split()
-    assert (modulus, stress, displacement, unit) == ("3e+06", "100", "20", "nF/m2")
+    assert table[1].split() == ["10000", *"–" * 7]
+    modulus, stress, displacement, off, rise, rise_unit, *_, lower, _, upper, unit = table[4].split()
+    assert (modulus, stress, displacement, rise_unit, unit) == ("3e+06", "100", "20", "nF/m2", "nF/m2")
+    assert float(off) == pytest.approx(float(rows[3]["displacement_error_um"]), rel=0.05)
+    assert float(rise) == pytest.approx(1e9 * float(rows[3]["rise_f_per_m2"]), rel=1e-3)
     assert float(lower) == pytest.approx(1e9 * float(rows[3]["lower_f_per_m2"]), rel=1e-6)
     assert float(upper) == pytest.approx(1e9 * float(rows[3]["upper_f_per_m2"]), rel=1e-6)
     below = " ".join(" ".join(table[8:]).split())

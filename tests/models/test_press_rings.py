@@ -90,10 +90,8 @@ def test_stairs_are_near_their_limit_on_the_mesh_that_is_used():
     assert grown[0] == pytest.approx(grown[1], rel=7e-3)
 
 
-def test_finer_levels_leave_the_apex_where_triangles_do_not_fold():
-    assert LEVELS[1] == Fineness(1e-3, 0.025, 0.075, 0.25)
-    assert Fineness(3e-3).scaled(1 / 2).apex_mm == 1.5e-3
-    assert Fineness(5e-4).scaled(1 / 2).apex_mm == 5e-4
+def test_finer_levels_are_finer_at_the_apex_too():
+    assert LEVELS[1] == Fineness(5e-4, 0.025, 0.075, 0.25)
     assert Fineness().scaled(2) == Fineness(2e-3, 0.1, 0.3, 1.0)
 
 

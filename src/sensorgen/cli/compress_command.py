@@ -35,7 +35,7 @@ OWN: list[click.Parameter] = [
         "sideways (B.49) or bonded; the first that fits if not given.",
     ),
     options.accuracy(
-        "How far the bounds of C may be apart, the error of the mesh in them: the coarsest mesh that will do."
+        "Largest relative error of the rise C(p) - C(0), as 2e-2: the coarsest mesh within it. 1e-2 is the least."
     ),
     options.explain(), *body_options.body_options(),
     options.flag("--check-mesh", "Solve on a finer mesh too, and compare."),

@@ -7,17 +7,16 @@ load reached, volume, penetration of faces, work equal to the energy stored.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput
+from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.solvers.contact.cell import Cell
 from sensorgen.solvers.contact.cell import cell_of as cell
-from sensorgen.solvers.contact.mesh import Fineness, Mesh, Unmeshed, mesh_of
-from sensorgen.solvers.contact.pressed import Elastic, Pressed, Run, check, compared, solve, with_capacitances
+from sensorgen.solvers.contact.mesh import Fineness, Mesh, Unmeshed, mesh_of, pinches
+from sensorgen.solvers.contact.pressed import Elastic, Pressed, Run, check, compared, joined, solve, with_capacitances
 
 SOURCE = (
     "neo-Hookean plane strain, displacement with bubble and pressure (Crouzeix and Raviart 1973), penalty contact with "
@@ -29,9 +28,13 @@ __all__ = ["BoundaryConditions", "Elastic", "Fineness", "Pressed", "cell", "comp
 
 _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 6 MPa [-]
 _STICKING_STEP = _STEP / 16  # the same where faces stick: how far they had slid when they touched counts [-]
-_FIELD_GROWTH = 0.2  # of the triangles of the capacitance's mesh, per distance [-]
+_FIELD_GROWTH = 0.2  # of the triangles of the capacitance's mesh, per distance, at most [-]
+_FIELD_SHARE = 0.4  # the same over the growth of the solids' mesh [-]
+_UM = 1e-3  # in mm
 _MISFIT = 1e-3  # of a solid's area: gaps that were closed in the wrong place change more [-]
-_APEX = (1.0, 3.0, 9.0)  # times the size of the triangles at an apex, the next where the finer ones do not converge [-]
+_APEX = (1.0, 3.0, 9.0, 20.0)  # times the size of the triangles at an apex, the next where pressure folds the finer [-]
+_FOLDS = 0.04  # pressure over least modulus and growth that folds triangles of 1 um at an apex; 0.045 was seen [-]
+_FOLDS_POWER = 0.85  # of their size
 
 
 def press(
@@ -42,10 +45,11 @@ def press(
     boundary: BoundaryConditions | None = None,
     fineness: Fineness | None = None,
     step: Callable[[float], None] | None = None,
-    enough: float = 1.0,
-    apex: float = 1.0,
 ) -> Pressed:
     """Solve a cell under pressure on its top.
+
+    The triangles at an apex grow with the pressure, which folds small ones and makes their size matter less. Which size
+    a pressure has does not depend on the others that are asked for.
 
     Parameters
     ----------
@@ -63,10 +67,6 @@ def press(
         Of the mesh.
     step : callable, optional
         Called with every pressure of ``stress_pa`` that is reached [Pa].
-    enough : float
-        Share of the last pressure: what is sound up to there is not solved again on coarser triangles [-].
-    apex : float
-        Factor on the size of triangles at an apex to begin with: one of those that a solution tells [-].
 
     Raises
     ------
@@ -77,22 +77,28 @@ def press(
     """
     boundary, fineness = boundary or BoundaryConditions(), fineness or Fineness()
     check(stress_pa, boundary)
-    told = step or (lambda _: None)
-    meshes = {factor: replace(fineness, apex_mm=factor * fineness.apex_mm) for factor in _APEX if factor >= apex}
-    first, run = _solved(cell, solids, stress_pa, boundary, meshes.pop(apex), told)
-    best = replace(first, apex=apex)
-    for factor, coarser in meshes.items():
-        if not best.faults or best.sound().converged_pa >= enough * stress_pa[-1]:
+    told, sharp = step or (lambda _: None), bool(pinches(cell))
+    least_pa = min(solid.youngs_modulus_pa for solid in solids.values())
+    parts: list[Pressed] = []
+    left, failed = [float(p) for p in stress_pa[1:]], False
+    for factor in _APEX if sharp else _APEX[:1]:
+        sizes, last = replace(fineness, apex_mm=factor * fineness.apex_mm), not sharp or factor == _APEX[-1]
+        folds_pa = _FOLDS * (sizes.apex_mm / _UM) ** _FOLDS_POWER * sizes.growth * least_pa
+        loads = left if last else [p for p in left if p <= folds_pa]
+        if not loads:
+            continue
+        part, run = _solved(cell, solids, [0.0, *loads], boundary, sizes, told)
+        part = part if last else replace(part.first(part.sound_loads()), faults=())
+        reached = len(part.stress_pa) - 1
+        if failed and reached:
+            size = f"triangles of {sizes.apex_mm / _UM:.3g} um at the apex from {loads[0] / 1e3:.4g} kPa on"
+            part = replace(part, doubts=(*part.doubts, f"{size}, because finer ones do not converge"))
+        part = replace(part, apex_m=(sizes.apex_mm * M_PER_MM,) * (reached + 1) if sharp else ())
+        parts.append(_with_fields(part, cell, run, permittivity, sizes) if permittivity else part)
+        left, failed = left[reached:], reached < len(loads)
+        if not left:
             break
-        again, other = _solved(cell, solids, stress_pa, boundary, coarser, told)
-        if (again.converged_pa, -len(again.faults)) > (best.converged_pa, -len(best.faults)):
-            both = len(first.stress_pa)
-            apart = float(np.abs(again.displacement_m[1:both] / first.displacement_m[1:] - 1).max(initial=0.0))
-            known = f"displacement {apart:.1%} off up to {first.converged_pa / 1e3:.4g} kPa"
-            size = f"triangles of {coarser.apex_mm * 1e3:.3g} um at the apex, because finer ones do not converge"
-            doubt = f"{size}: {known if both > 1 else 'error not known'}"
-            best, run = replace(again, doubts=(*again.doubts, doubt), apex=factor), other
-    return _with_fields(best, cell, run, permittivity) if permittivity else best
+    return joined(parts, stress_pa[-1])
 
 
 def _solved(
@@ -113,13 +119,19 @@ def _solved(
     return found, run
 
 
-def _with_fields(found: Pressed, cell: Cell, run: Run[Mesh], permittivity: Mapping[str, float]) -> Pressed:
+def _with_fields(
+    found: Pressed, cell: Cell, run: Run[Mesh], permittivity: Mapping[str, float], fineness: Fineness
+) -> Pressed:
     """The same with the capacitance of the deformed outlines."""
-    fields = [_field(cell, run, s.u_m, permittivity) for s in run.states]
+    growth = min(_FIELD_GROWTH, _FIELD_SHARE * fineness.growth)
+    states = run.states[: len(found.stress_pa)]
+    fields = [_field(cell, run, state.u_m, permittivity, growth) for state in states]
     return with_capacitances(found, [c for c, _ in fields], tuple(outline for _, outline in fields))
 
 
-def _field(cell: Cell, run: Run[Mesh], u_m: Real, permittivity: Mapping[str, float]) -> tuple[Interval | None, Cell]:
+def _field(
+    cell: Cell, run: Run[Mesh], u_m: Real, permittivity: Mapping[str, float], growth: float = _FIELD_GROWTH
+) -> tuple[Interval | None, Cell]:
     """Capacitance and outlines of a deformed cell; None where no sound mesh of them was found."""
     from sensorgen.solvers.contact import deformed, plane_field
 
@@ -128,7 +140,7 @@ def _field(cell: Cell, run: Run[Mesh], u_m: Real, permittivity: Mapping[str, flo
     if deformed.misfit(outline, mesh, u_m) > _MISFIT:
         return None, outline
     try:
-        return plane_field.capacitance(outline, permittivity, cell.width_mm() / 4, _FIELD_GROWTH), outline
+        return plane_field.capacitance(outline, permittivity, cell.width_mm() / 4, growth), outline
     except Unmeshed:
         return None, outline
 

@@ -3,11 +3,9 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import takewhile
-from math import inf
+from math import inf, isfinite, nan
 
-import numpy as np
-
+from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table
@@ -15,20 +13,21 @@ from sensorgen.core.errors import BadInput, MissingValue, NotInstalled, OutOfRan
 from sensorgen.design.body import Body
 from sensorgen.design.values import permittivities
 from sensorgen.models import press2d
-from sensorgen.models.press2d import BoundaryConditions, Pressed
+from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.prediction import capacitance_answer as at_rest
 from sensorgen.prediction import closed_form_compression as closed_form
 from sensorgen.prediction.capacitance import Unpredictable
-from sensorgen.prediction.compression_law import elastic, expected
+from sensorgen.prediction.compression_law import elastic
 from sensorgen.prediction.mesh_ladder import (
     MODELS,
-    SAFETY,
     USUAL,
+    VERIFIED,
     Case,
+    Estimate,
     MeshLevel,
     Piece,
+    estimated,
     mesh_levels,
-    pressed,
     why_not_applicable,
 )
 from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, run_until_within
@@ -39,22 +38,22 @@ from sensorgen.prediction.sweep import sweep as swept
 __all__ = ["ALL", "Asked", "BoundaryConditions", "CompressionResult", "answer", "planned", "stresses_kpa", "sweep"]
 
 Step = Callable[[float], None]
-Bounded = tuple[Pressed, tuple[float, ...]]  # and the share by which each capacitance may be off [-]
 ALL = (*MODELS, *closed_form.MODELS)
 
 COLUMNS = (
     Column("stress", "kPa", key="stress_kpa"), Column("displacement", "um", key="displacement_um"),
+    Column("+/-", "um", key="displacement_error_um", digits=2),
+    Column("rise of C", "F/m2", key="rise_f_per_m2", si=True),
+    Column("+/-", "F/m2", key="rise_error_f_per_m2", digits=2, si=True),
     Column("C, lower", "F/m2", key="lower_f_per_m2", digits=7, si=True),
     Column("C, upper", "F/m2", key="upper_f_per_m2", digits=7, si=True),
-    *(Column(k, key=k, hidden=True) for k in ("converged_kpa", "relative_width", "model", "reached", "reason")),
+    *(Column(k, key=k, hidden=True) for k in ("converged_kpa", "largest_rise_error", "model", "reached", "reason")),
 )  # fmt: skip
 
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
-_OF_OUTLINES = "of the capacitance of the deformed outlines as computed; the outlines' own error is not in them"
-_OF_ALL = "of the capacitance of the deformed outlines, plus the difference from the next coarser mesh: an estimate"
+_OF_BOTH = "of the capacitance at rest plus its rise, whose error is an estimate from two meshes"
 _NO_C = "displacement alone, no capacitance"
-_MEASURE = "bounds of C apart, at the worst stress"
-_BRACKET = {"press2d": 3.4e-4, "press3d": 2e-3}  # how far the outlines' own bounds are apart, on prototypes [-]
+_MEASURE = "relative error of the rise of C, at the worst stress"
 
 
 @dataclass(frozen=True)
@@ -70,8 +69,7 @@ class Asked:
     model : str
         One of ``ALL``, or "" for the first that applies to the scene.
     accuracy : float
-        How far the bounds of the capacitance may be apart at every stress, relative to their middle, the outlines' own
-        error in them; where infinite, the usual mesh is taken, without an error [-].
+        Largest relative error of the rise C(p) - C(0) at any stress; where infinite, the usual mesh is taken [-].
     check_mesh : bool
         Hold the displacement against the next coarser mesh.
     keep : bool
@@ -100,6 +98,10 @@ class CompressionResult(Displayed):
         Boundary conditions.
     stress_kpa, displacement_um : tuple of float
         On the top [kPa], of the top [um].
+    rise_f_per_m2 : tuple of float or None
+        Capacitance per area above that at rest, at each stress [F/m2].
+    displacement_error_um, rise_error_f_per_m2 : tuple of float or None
+        Estimated errors of both, of the mesh at an apex too; None where unknown.
     lower_f_per_m2, upper_f_per_m2 : tuple of float or None
         Bounds of the capacitance per area at each stress [F/m2]; None where unknown.
     converged_kpa : float or None
@@ -108,8 +110,10 @@ class CompressionResult(Displayed):
         Why the answer is not to be trusted; why its numbers are uncertain.
     bounds : str
         What the bounds hold.
-    accuracy, relative_width : float or None
-        Width of the bounds that was asked for, and the largest that was reached, relative [-].
+    accuracy : float or None
+        Relative error of the rise that was asked for [-].
+    largest_rise_error, largest_displacement_error : float or None
+        The largest at any stress, relative [-].
     reached : bool or None
         Whether the accuracy is reached; None where none was asked for.
     plan : Plan or None
@@ -124,6 +128,9 @@ class CompressionResult(Displayed):
     held: dict[str, str] = field(default_factory=dict)
     stress_kpa: tuple[float, ...] = ()
     displacement_um: tuple[float, ...] = ()
+    displacement_error_um: tuple[float | None, ...] = ()
+    rise_f_per_m2: tuple[float | None, ...] = ()
+    rise_error_f_per_m2: tuple[float | None, ...] = ()
     lower_f_per_m2: tuple[float | None, ...] = ()
     upper_f_per_m2: tuple[float | None, ...] = ()
     converged_kpa: float | None = None
@@ -131,25 +138,31 @@ class CompressionResult(Displayed):
     doubts: tuple[str, ...] = ()
     bounds: str = ""
     accuracy: float | None = None
-    relative_width: float | None = None
+    largest_rise_error: float | None = None
+    largest_displacement_error: float | None = None
     reached: bool | None = None
     plan: Plan | None = None
     reason: str = ""
 
     def table(self) -> Table:
         """A row for each stress; one with the reason where there is no answer."""
-        curve = zip(self.stress_kpa, self.displacement_um, self.lower_f_per_m2, self.upper_f_per_m2, strict=True)
-        more = self.converged_kpa, self.relative_width, self.model, self.reached, self.reason or "; ".join(self.faults)
-        rows = curve if self.model else [(None,) * 4]
+        curve = zip(
+            self.stress_kpa, self.displacement_um, self.displacement_error_um, self.rise_f_per_m2,
+            self.rise_error_f_per_m2, self.lower_f_per_m2, self.upper_f_per_m2, strict=True,
+        )  # fmt: skip
+        said = self.reason or "; ".join(self.faults)
+        more = self.converged_kpa, self.largest_rise_error, self.model, self.reached, said
+        rows = curve if self.model else [(None,) * 7]
         return Table("compression", "", COLUMNS, tuple((*row, *more) for row in rows))
 
     def document(self) -> Iterator[Part]:
         """The curve, how the cell was held, and what is uncertain."""
         yield self.design
         yield self.table()
-        width = "" if self.relative_width is None else f"; largest relative width {self.relative_width:.2g}"
-        target = "" if self.accuracy is None else f" (target {self.accuracy:g})"
-        yield f"converged up to {self.converged_kpa:.4g} kPa{width}{target}"
+        errors = (("displacement", self.largest_displacement_error), ("rise of C", self.largest_rise_error))
+        known = "".join(f"; {name} known to {error:.1%}" for name, error in errors if error is not None)
+        target = "" if self.accuracy is None else f" (target {self.accuracy:.3g})"
+        yield f"converged up to {self.converged_kpa:.4g} kPa{known}{target}"
         yield from self.remarks()
 
     def explained(self) -> Iterator[Part]:
@@ -173,7 +186,8 @@ class CompressionResult(Displayed):
             return (f"no answer: {self.reason}",)
         wrong = [f"not to be trusted: {fault}" for fault in self.faults]
         if self.reached is False:
-            best = "error unknown" if self.relative_width is None else f"{self.relative_width:.2g}"
+            error = self.largest_rise_error
+            best = "error unknown" if error is None else f"the rise of C is known to {error:.2g}"
             wrong.append(f"accuracy {self.accuracy:g} not reached: {best}")
         return wrong
 
@@ -206,10 +220,11 @@ def answer(body: Body, asked: Asked, *, step: Step | None = None) -> Compression
         if model in closed_form.MODELS:
             return _closed_form(body, asked, model)
         case = _case(body, asked)
-        found = _pressed(case, asked, USUAL, step)
+        found = _estimated(case, asked, USUAL, step)
         if asked.check_mesh:
-            found = press2d.compared(found, _pressed(case, asked, USUAL + 1, step))
-        return _result(body, case, found, _OF_OUTLINES, asked)
+            finer = _estimated(case, asked, USUAL + 1, step)
+            found = replace(finer, found=press2d.compared(found.found, finer.found))
+        return _result(body, case, found, asked)
     except NotInstalled as error:
         if asked.model:
             raise
@@ -247,14 +262,11 @@ def planned(body: Body, asked: Asked) -> Plan:
             without_c = _NO_C if name in closed_form.MODELS else ""
             unfit = without_c or why_not_applicable(piece, name) or "the model before it applies to the cell"
             candidates.append(Candidate(name, passed_over=f"--model {model}" if asked.model else unfit))
-    for mesh in _mesh_levels(piece, model, asked):
-        curve = expected(body.design, mesh)  # where the cell rises like a prototype
-        last_pa = min(asked.stress_kpa[-1] * _PA_PER_KPA, float(curve.stress_pa[-1]))
-        share = float(curve.capacitive_strain(np.asarray(last_pa))[0])
-        candidates.append(Candidate(mesh.name, _BRACKET[mesh.model] + 2 * mesh.rise_error * share, mesh.seconds))
+    meshes = _mesh_levels(piece, model, asked)
+    candidates += [Candidate(mesh.name, max(mesh.rise_error, VERIFIED), mesh.seconds) for mesh in meshes]
     chosen = cheapest(tuple(candidates), asked.accuracy)
     level = Level("compression", _MEASURE, asked.accuracy, tuple(candidates), chosen)
-    return Plan(asked.accuracy, f"C up to {asked.stress_kpa[-1]:g} kPa", (level,))
+    return Plan(asked.accuracy, f"the rise of C up to {asked.stress_kpa[-1]:g} kPa", (level,))
 
 
 def _model(piece: Piece, asked: Asked) -> str:
@@ -269,45 +281,21 @@ def _within(body: Body, asked: Asked, step: Step | None) -> CompressionResult:
     """The first mesh within tolerance, from the expected one upwards; the best where none is."""
     plan, case = planned(body, asked), _case(body, asked)
     find = {
-        mesh.name: partial(_bounded, case, asked, mesh, step) for mesh in _mesh_levels(case.piece, case.model, asked)
+        mesh.name: partial(_estimated, case, asked, mesh.level, step)
+        for mesh in _mesh_levels(case.piece, case.model, asked)
     }
-    (found, off), level = run_until_within(plan.levels[0], find, lambda answer: _width(*answer))
-    width = _width(found, off)
+    found, level = run_until_within(plan.levels[0], find, _rise_error)
     return replace(
-        _result(body, case, _widened(found, off), _OF_ALL, asked), accuracy=asked.accuracy,
-        relative_width=width if width < inf else None, reached=width <= asked.accuracy,
+        _result(body, case, found, asked),
+        accuracy=asked.accuracy,
+        reached=_rise_error(found) <= asked.accuracy,
         plan=replace(plan, levels=(level,)),
-    )  # fmt: skip
-
-
-def _bounded(case: Case, asked: Asked, mesh: MeshLevel, step: Step | None) -> Bounded:
-    """A case on one mesh, and the share by which each capacitance may be off for it [-]."""
-    fine, coarse = (_pressed(case, asked, level, step) for level in (mesh.level, mesh.level - 1))
-    rises, others = (_rises(found) for found in (fine, coarse))
-    off = [max(mesh.rise_error * a, SAFETY * abs(a - b)) / (1 + a) for a, b in zip(rises, others, strict=False)]
-    return fine, tuple(off)
-
-
-def _rises(found: Pressed) -> list[float]:
-    """By how much each capacitance is above the first, as far as they are known [-]."""
-    known = [c.middle() for c in takewhile(bool, found.capacitance_f_per_m2) if c]
-    return [c / known[0] - 1 for c in known]
-
-
-def _widened(found: Pressed, off: Sequence[float]) -> Pressed:
-    """The same, its bounds moved outwards by a share of their middle; none where no share is known."""
-    bounds = (
-        Interval(c.lower - share * c.middle(), c.upper + share * c.middle()) if c else None
-        for c, share in zip(found.capacitance_f_per_m2, off, strict=False)
     )
-    missing = (None,) * (len(found.capacitance_f_per_m2) - len(off))
-    return replace(found, capacitance_f_per_m2=(*bounds, *missing))
 
 
-def _width(found: Pressed, off: Sequence[float]) -> float:
-    """How far the widened bounds are apart at worst; infinite where one is not known, or not to be trusted [-]."""
-    widened = _widened(found, off).capacitance_f_per_m2
-    return max((c.width() if c else inf for c in widened), default=inf) if not found.faults else inf
+def _rise_error(found: Estimate) -> float:
+    """Largest relative error of the rise; infinite where the solution is not to be trusted [-]."""
+    return inf if found.found.faults else found.relative()[1]
 
 
 def _case(body: Body, asked: Asked) -> Case:
@@ -325,39 +313,44 @@ def _case(body: Body, asked: Asked) -> Case:
     return Case(piece, _model(piece, asked), elastic(body.design, piece.scene), permittivity, asked.boundary)
 
 
-def _pressed(case: Case, asked: Asked, level: int, step: Step | None) -> Pressed:
+def _estimated(case: Case, asked: Asked, level: int, step: Step | None) -> Estimate:
     stress_pa = [_PA_PER_KPA * kpa for kpa in asked.stress_kpa]
-    return pressed(case, stress_pa, level, keep=asked.keep, step=step)
+    return estimated(case, stress_pa, level, keep=asked.keep, step=step)
 
 
-def _result(body: Body, case: Case, found: Pressed, bounds: str, asked: Asked) -> CompressionResult:
-    c = _from_rest(body, found.capacitance_f_per_m2, asked)
+def _result(body: Body, case: Case, estimate: Estimate, asked: Asked) -> CompressionResult:
+    """In the units of results; the capacitance begins with that of the sensor at rest, as all predictions have it.
+
+    The rise of a sensor of whole and broken periods, of which one was pressed, is scaled by what both differ at rest.
+    """
+    found, first = estimate.found, estimate.found.capacitance_f_per_m2[0]
+    try:
+        rest = at_rest.answer(body, at_rest.Asked(keep=asked.keep))
+    except Unpredictable:
+        rest = None
+    known, factor = first, 1.0
+    if first and rest and rest.lower_f_per_m2 is not None and rest.upper_f_per_m2 is not None:
+        known = Interval(rest.lower_f_per_m2, rest.upper_f_per_m2)
+        apart = known.upper < first.lower or first.upper < known.lower
+        factor = known.middle() / first.middle() if apart else 1.0
+    rise, off = factor * estimate.rise_f_per_m2, factor * estimate.rise_error_f_per_m2
+    lower, upper = (rise - off + known.lower, rise + off + known.upper) if known else (nan + rise, nan + rise)
+    down, up = estimate.relative() if not found.faults else (inf, inf)
     return CompressionResult(
         design=body.design.name, body=body.provenance, model=case.model, held=dict(vars(case.boundary)),
         stress_kpa=tuple(p / _PA_PER_KPA for p in found.stress_pa.tolist()),
         displacement_um=tuple(d * _UM_PER_M for d in found.displacement_m.tolist()),
-        lower_f_per_m2=tuple(i.lower if i else None for i in c),
-        upper_f_per_m2=tuple(i.upper if i else None for i in c),
-        converged_kpa=found.converged_pa / _PA_PER_KPA, faults=found.faults, doubts=found.doubts, bounds=bounds,
+        displacement_error_um=_known(_UM_PER_M * estimate.displacement_error_m),
+        rise_f_per_m2=_known(rise), rise_error_f_per_m2=_known(off),
+        lower_f_per_m2=_known(lower), upper_f_per_m2=_known(upper),
+        converged_kpa=found.converged_pa / _PA_PER_KPA, faults=found.faults, doubts=found.doubts, bounds=_OF_BOTH,
+        largest_rise_error=up if up < inf else None, largest_displacement_error=down if down < inf else None,
     )  # fmt: skip
 
 
-def _from_rest(body: Body, found: Sequence[Interval | None], asked: Asked) -> Sequence[Interval | None]:
-    """Capacitances that begin with that of the sensor at rest, as all predictions have it [F/m2].
-
-    Those of a sensor of whole and broken periods, of which one was pressed, are scaled by what both differ at rest.
-    """
-    try:
-        rest = at_rest.answer(body, at_rest.Asked(keep=asked.keep))
-    except Unpredictable:
-        return found
-    first = found[0] if found else None
-    if first is None or rest.lower_f_per_m2 is None or rest.upper_f_per_m2 is None:
-        return found
-    known = Interval(rest.lower_f_per_m2, rest.upper_f_per_m2)
-    apart = known.upper < first.lower or first.upper < known.lower
-    factor = known.middle() / first.middle() if apart else 1.0
-    return [known, *(c and c.times(factor) for c in found[1:])]
+def _known(values: Real) -> tuple[float | None, ...]:
+    """Values as JSON holds them: None where one is not finite."""
+    return tuple(value if isfinite(value) else None for value in values.tolist())
 
 
 def _closed_form(body: Body, asked: Asked, model: str) -> CompressionResult:
@@ -366,8 +359,9 @@ def _closed_form(body: Body, asked: Asked, model: str) -> CompressionResult:
     found = closed_form.MODELS[model](body.design, piece_of(body), [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
     return CompressionResult(
         design=body.design.name, body=body.provenance, model=model, held=found.boundary, stress_kpa=asked.stress_kpa,
-        displacement_um=tuple((found.displacement_m * _UM_PER_M).tolist()), lower_f_per_m2=unknown,
-        upper_f_per_m2=unknown, converged_kpa=asked.stress_kpa[-1], doubts=found.doubts, bounds="none",
+        displacement_um=tuple((found.displacement_m * _UM_PER_M).tolist()), displacement_error_um=unknown,
+        rise_f_per_m2=unknown, rise_error_f_per_m2=unknown, lower_f_per_m2=unknown, upper_f_per_m2=unknown,
+        converged_kpa=asked.stress_kpa[-1], doubts=found.doubts, bounds="none",
     )  # fmt: skip
 
 

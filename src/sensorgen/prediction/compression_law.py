@@ -11,6 +11,8 @@ from hashlib import sha256
 from json import dumps
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
@@ -20,12 +22,12 @@ from sensorgen.models.compression import Compression, Curve, curve_of
 from sensorgen.prediction.capacitance import Answer, is_plate
 from sensorgen.prediction.mesh_ladder import (
     COARSEST,
-    SAFETY,
     USUAL,
     Case,
     MeshLevel,
     Piece,
     drawn,
+    estimated,
     mesh_levels,
     model_of,
     pressed,
@@ -37,10 +39,10 @@ if TYPE_CHECKING:
     from sensorgen.models.press2d import BoundaryConditions, Elastic
 
 LAWS = ("unconfined", "bonded", "solved")
-STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)))  # 6 N on a tip of 10 x 10 mm are 60 kPa
+STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)), 1.2e5)  # 6 N on a tip of 5 x 10 mm are 120 kPa
 _LANDING = f"feet land at negligible force: the rise of C up to {STRESS_PA[1] / 1e3:g} kPa is mostly their fall"
 _SAME_RATIO = 1e-3  # difference of Poisson's ratios: 0.4999 and 0.5 are one cell, 0.45 deforms by 11 % more
-_ENOUGH = 0.5  # of the last of them: a curve that is known so far is extended, not solved again on another mesh [-]
+_ENOUGH = 0.5  # of the last of them: a curve that is known so far is extended [-]
 _ONSET = 0.25  # largest relative error of a curve's onset, on films of 0.02 to 0.2 mm from 0.5 kPa on
 _LIKE = {"press2d": "tri", "press3d": "rect"}  # prototypes that other cells are assumed to resemble
 
@@ -243,20 +245,18 @@ def solved(
     piece = printed or drawn(design)
     model = model_of(piece)
     case = _case(design, piece, model, boundary or BoundaryConditions())
-    found = pressed(case, STRESS_PA, level, enough=_ENOUGH)
-    sound = found.sound()
-    found = sound if sound.converged_pa >= _ENOUGH * STRESS_PA[-1] else found
+    estimate = estimated(case, STRESS_PA, level, sound=True)
+    found = estimate.found
+    if found.converged_pa < _ENOUGH * STRESS_PA[-1]:
+        found = pressed(case, STRESS_PA, level)
     curve = curve_of(found)
-    # Loads, not the mesh, cost the coarsest mesh its time, and its solution serves for nothing else.
-    last = len(curve.stress_pa) - 1
-    shared = sorted({0, 1, *range(last, 0, -4)}) if level - 1 == COARSEST else list(range(last + 1))
-    stress = [curve.stress_pa[k] for k in shared]
-    other = curve_of(pressed(case, stress, level - 1, enough=_ENOUGH, apex=found.apex).sound())
-    rises = zip((curve.ratio[k] for k in shared[1:]), other.ratio[1:], strict=False)
-    least = next(mesh.rise_error for mesh in mesh_levels(piece, model, 1) if mesh.level == level)
+    shares = estimate.rise_error_f_per_m2[1:] / estimate.rise_f_per_m2[1:]
+    known = shares[np.isfinite(shares)]
+    if not known.size:
+        raise OutOfRange("the error of the solved cell is unknown: the next coarser mesh did not converge")
     curve = replace(
         curve,
-        within=max(least, *(SAFETY * abs((b - 1) / (a - 1) - 1) for a, b in rises)),
+        within=float(known.max()),
         boundary_changes=compression.prototype(_LIKE[model]).boundary_changes,
         displacement_m=float(found.displacement_m[-1]) - found.fall_m,
     )

@@ -133,7 +133,7 @@ def compress(
     pressure_kpa : sequence of float
         Rising [kPa].
     accuracy : float, optional
-        Relative width of the bounds of the capacitance, the error of the mesh in them [-].
+        Largest relative error of the rise of the capacitance at any pressure [-].
 
     Raises
     ------

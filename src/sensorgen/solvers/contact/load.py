@@ -18,8 +18,6 @@ _LEAST = 1e-7  # of the penalty: pressures below it are lost in the rounding of 
 _NEARLY = 1e-3  # residual over load before the contact partners are updated
 _STILL = 1e-10  # a step so much shorter than the displacement is rounding: nu near 1/2 turns it into forces
 _MOST_STEPS = 15
-_MOST_UPDATES = 4  # of contact partners within one load step
-_SETTLED = 0.05  # change of penetration over a side's length, below which the contact partners are kept [-]
 _LEAST_J = 0.05  # a step may not compress an element below this share of its volume at once [-]
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # of Newton's step
 _MOST_CUTS = 4  # failed load steps in all before a cell is given up
@@ -60,6 +58,10 @@ class Problem:
         Of the linear systems; None where a matrix is singular or not positive.
     sound : callable, optional
         Whether places of the nodes are admissible; a step that ends elsewhere is cut.
+    settled : float
+        Change of penetration over a side's length, below which the contact partners are kept [-].
+    updates : int
+        Of contact partners within one load step, at most.
     """
 
     elements: Elements
@@ -70,6 +72,8 @@ class Problem:
     stick: bool = False
     solver: Callable[[csr_matrix, Real], Real | None] = by_lu
     sound: Callable[[Real], bool] | None = None
+    settled: float = 0.05
+    updates: int = 4
 
     @property
     def dimension(self) -> int:
@@ -230,7 +234,7 @@ class Problem:
             return None
         stuck = self._stuck(state.u_m, found) if self.stick else None
         pairs = self.project(found.u_m, stuck)
-        for _ in range(_MOST_UPDATES):
+        for _ in range(self.updates):
             again = self.newton(found, pressure_pa, pairs, _ENOUGH)
             if again is None:
                 return None
@@ -238,7 +242,7 @@ class Problem:
             depths = np.zeros((2, 1 + max(p.point.max(initial=0) for p in (found.pairs, pairs))))
             for depth, seen in zip(depths, (found.pairs, pairs), strict=True):
                 depth[seen.point] = np.maximum(-self.gaps(seen, found.u_m), 0.0) / seen.length_m
-            if np.ptp(depths, axis=0).max() < _SETTLED:
+            if np.ptp(depths, axis=0).max() < self.settled:
                 break
         return found if self.sound is None or self.sound(self.places(found.u_m)) else None
 
@@ -254,7 +258,7 @@ class Problem:
 
 
 def curve(problem: Problem, pressures_pa: Sequence[float], longest_pa: float) -> Iterator[State]:
-    """Equilibria at increasing pressures, in steps of at most ``longest_pa``; ends early where small steps fail too."""
+    """Equilibria at increasing pressures, and at each step of at most ``longest_pa`` between; ends where steps fail."""
     state = problem.start()
     yield state
     state = before = problem.lowered(state, min(pressures_pa[1], longest_pa))
@@ -266,8 +270,8 @@ def curve(problem: Problem, pressures_pa: Sequence[float], longest_pa: float) ->
             reached = problem.stepped(state, aim, before)
             if reached is not None:
                 before, state, step = state, reached, min(2 * step, longest_pa)
+                yield state
                 continue
             cuts, step = cuts + 1, min(step, left) / 2
             if cuts > _MOST_CUTS:
                 return
-        yield state

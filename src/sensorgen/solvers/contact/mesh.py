@@ -17,7 +17,6 @@ from sensorgen.solvers.contact.element import TRIANGLE, ElementMesh
 Run = tuple[int, int]
 
 _SAME = 1e-9  # of the cell's size: places nearer than this are one
-_LEAST_APEX_MM = 1e-3
 _RINGS = 4  # around a notch
 _SIDES = ((0, 1), (1, 2), (2, 0))
 
@@ -117,9 +116,8 @@ class Fineness:
     growth: float = 0.5
 
     def scaled(self, factor: float) -> "Fineness":
-        """Every length and the growth times a factor; but triangles of less than 1 um at an apex fold easily."""
-        apex = max(factor * self.apex_mm, min(self.apex_mm, _LEAST_APEX_MM))
-        return Fineness(apex, *(factor * value for value in (self.corner_mm, self.coarse_mm, self.growth)))
+        """Every length and the growth times a factor."""
+        return Fineness(*(factor * value for value in (self.apex_mm, self.corner_mm, self.coarse_mm, self.growth)))
 
     def finer(self) -> "Fineness":
         """The next level."""

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,20 @@ _LEAST_VOLUME = 0.2  # J below which an element's answer is not to be trusted [-
 DEEPEST = 0.3  # penetration over the side it happens on [-]
 _BALANCE = 0.01  # by which work and energy may differ [-]
 _LEVELS = 0.01  # by which two meshes may differ [-]
+_FIRST = (
+    1 / 16,
+    1 / 8,
+    1 / 4,
+    1 / 2,
+    1,
+)  # of the longest load step: steps of a cross-section in which contact begins [-]
+_SETTLED, _UPDATES = 0.005, 8  # of a cross-section: ``settled`` and ``updates`` of its problem
+_NEAR = 0.2  # relative distance of two loads, of which only the one that was asked for is solved [-]
+
+_BY_LOAD = (
+    "stress_pa", "displacement_m", "capacitance_f_per_m2", "outlines", "volume_ratio", "penetration", "imbalance",
+    "apex_m",
+)  # fmt: skip
 
 AnyMesh = TypeVar("AnyMesh", Mesh, "BrickMesh")
 
@@ -65,8 +79,8 @@ class Pressed:
         Other remarks.
     source : str
         Method.
-    apex : float
-        Factor on the size of triangles at an apex with which it converged [-].
+    apex_m : tuple of float
+        Size of the triangles at an apex, at each pressure [m]; empty where there is no apex.
     """
 
     stress_pa: Real
@@ -80,7 +94,7 @@ class Pressed:
     faults: tuple[str, ...]
     doubts: tuple[str, ...] = ()
     source: str = ""
-    apex: float = 1.0
+    apex_m: tuple[float, ...] = ()
 
     @property
     def converged_pa(self) -> float:
@@ -89,13 +103,20 @@ class Pressed:
 
     def sound(self) -> "Pressed":
         """The part before the first pressure at which a check fails, without faults; all where it has no two."""
+        n = self.sound_loads()
+        return replace(self.first(n), faults=()) if n > 1 else self
+
+    def sound_loads(self) -> int:
+        """Number of pressures before the first at which a check fails."""
         known = [c.middle() if c else -np.inf for c in self.capacitance_f_per_m2]
         rises = [b >= a * (1 - _LEVELS) for a, b in pairwise(known)]
         holds = (self.volume_ratio >= _LEAST_VOLUME) & (self.penetration <= DEEPEST) & (abs(self.imbalance) <= _BALANCE)
         holds[: len(known)] &= np.isfinite(known) & np.array([True, *rises])
-        n = len(holds) if holds.all() else int(holds.argmin())
-        arrays = ("stress_pa", "displacement_m", "capacitance_f_per_m2", "volume_ratio", "penetration", "imbalance")
-        return replace(self, faults=(), **{name: getattr(self, name)[:n] for name in arrays}) if n > 1 else self
+        return len(holds) if holds.all() else int(holds.argmin())
+
+    def first(self, n: int) -> "Pressed":
+        """Its first pressures."""
+        return replace(self, **{name: getattr(self, name)[:n] for name in _BY_LOAD})
 
 
 @dataclass(frozen=True)
@@ -155,6 +176,7 @@ def solve(
     from sensorgen.solvers.contact.factors import Solver
     from sensorgen.solvers.contact.load import Problem, curve
 
+    ramp: list[float] = []
     moduli, ratios = np.array([[s.youngs_modulus_pa, s.poisson_ratio] for s in solids]).T
     softest, elements = float(moduli.min()), Elements(mesh, law(moduli, ratios))
     load, penalty, stick = top_load(mesh.points_m, *mesh.top()), penalty_pa(softest), boundary.contact == "stick"
@@ -164,29 +186,40 @@ def solve(
         def sound(places_m: Real) -> bool:
             return not faces.crossed(places_m, outline, DEEPEST)
 
-        problem = Problem(elements, faces, free_of(mesh.points_m, boundary), load, penalty, stick, sound=sound)
+        free = free_of(mesh.points_m, boundary)
+        problem = Problem(elements, faces, free, load, penalty, stick, sound=sound, settled=_SETTLED, updates=_UPDATES)
+        ramp = [k * longest * softest for k in _FIRST]
     else:
         used = np.isin(np.arange(len(mesh.points_m)), mesh.outer)
         free = free_of(mesh.points_m, boundary, mesh.bricks.spans_m(), used)
-        first = free.tocsc().indices[free.tocsc().indptr[:-1]]
-        solver = Solver(mesh.lattice[first // 3])
+        one = free.tocsc().indices[free.tocsc().indptr[:-1]]
+        solver = Solver(mesh.lattice[one // 3])
         problem = Problem(elements, brick_faces_of(mesh), free, load, penalty, stick, solver)
-    states = []
-    for state in curve(problem, stress_pa, longest * softest):
-        states.append(state)
-        step(state.pressure_pa)
-    return _checked(problem, states, stress_pa[-1], source), Run(problem, mesh, states)
+    ramp = [p for p in ramp if p < stress_pa[-1] and np.abs(np.divide(stress_pa, p) - 1).min() > _NEAR]
+    every = []
+    for state in curve(problem, sorted({*stress_pa, *ramp}), longest * softest):
+        every.append(state)
+        if state.pressure_pa in stress_pa:
+            step(state.pressure_pa)
+    found = _checked(problem, every, stress_pa, source)
+    return found, Run(problem, mesh, [state for state in every if state.pressure_pa in stress_pa])
 
 
-def _checked(problem: "Problem", states: "Sequence[State]", last_pa: float, source: str) -> Pressed:
-    """Displacements at each load, and the faults of the solution: load, volume, penetration, balance of energy."""
+def _checked(problem: "Problem", every: "Sequence[State]", stress_pa: Sequence[float], source: str) -> Pressed:
+    """Displacements at each load, and the faults of the solution: load, volume, penetration, balance of energy.
+
+    Work is summed over ``every`` load step, so that the balance does not depend on the loads asked for.
+    """
+    asked = np.array([k for k, state in enumerate(every) if state.pressure_pa in stress_pa])
+    states, last_pa = [every[k] for k in asked], stress_pa[-1]
     area, fall = np.abs(problem.load).sum(), problem.fall_m(states[0])
-    stress = np.array([s.pressure_pa for s in states])
-    down = np.array([problem.load @ s.u_m / area for s in states])
+    steps = np.array([s.pressure_pa for s in every])
+    moved = np.array([problem.load @ s.u_m / area for s in every])
     volume = np.array([problem.elements.volume_ratio(s.u_m, s.inner).min() for s in states])
     depth = np.array([-(problem.gaps(s.pairs, s.u_m) / s.pairs.length_m).min(initial=0.0) for s in states])
-    energy = np.array([problem.elements.energy_j(s.u_m, s.inner) + problem.contact_energy(s) for s in states])
-    imbalance = _imbalance(stress, (down - fall) * area, energy)
+    energy = np.array([problem.elements.energy_j(s.u_m, s.inner) + problem.contact_energy(s) for s in every])
+    imbalance = _imbalance(steps, (moved - fall) * area, energy)[asked]
+    stress, down = steps[asked], moved[asked]
     reached, wanted = f"{stress[-1] / 1e3:.4g}", f"{last_pa / 1e3:.4g}"
     faults = {
         f"converged up to {reached} of {wanted} kPa": stress[-1] < last_pa * (1 - 1e-9),
@@ -229,6 +262,26 @@ def with_capacitances(found: Pressed, bounds: Sequence[Interval | None], outline
     if any(after < before * (1 - _LEVELS) for before, after in pairwise(known)):
         faults.append("the capacitance falls under pressure: some outlines were closed in the wrong place")
     return replace(found, capacitance_f_per_m2=tuple(bounds), outlines=outlines, faults=tuple(faults))
+
+
+def joined(parts: Sequence[Pressed], last_pa: float) -> Pressed:
+    """Solutions that continue each other, as one; each begins with the unloaded cell.
+
+    That one of them ended early is a fault only where none goes on.
+    """
+    kept = [parts[0], *(part for part in parts[1:] if len(part.stress_pa) > 1)]
+    arrays = ("stress_pa", "displacement_m", "volume_ratio", "penetration", "imbalance")
+    lists = ("capacitance_f_per_m2", "outlines", "apex_m")
+    tails = [part if part is kept[0] else replace(part, **{k: getattr(part, k)[1:] for k in _BY_LOAD}) for part in kept]
+    whole: dict[str, Any] = {k: np.concatenate([getattr(part, k) for part in tails]) for k in arrays}
+    whole |= {k: tuple(each for part in tails for each in getattr(part, k)) for k in lists}
+    reached = whole["stress_pa"][-1]
+    short = (
+        [f"converged up to {reached / 1e3:.4g} of {last_pa / 1e3:.4g} kPa"] if reached < last_pa * (1 - 1e-9) else []
+    )
+    faults = dict.fromkeys(fault for part in kept for fault in part.faults if not fault.startswith("converged up to"))
+    doubts = dict.fromkeys(doubt for part in kept for doubt in part.doubts)
+    return replace(kept[0], faults=(*short, *faults), doubts=tuple(doubts), **whole)
 
 
 def compared(found: Pressed, finer: Pressed) -> Pressed:
