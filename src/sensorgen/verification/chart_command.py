@@ -1,31 +1,87 @@
-"""``sensorgen chart``: every model on every standard scene, time against error."""
+"""``sensorgen chart``: time against error of every model, on scenes of known answers or for one design."""
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from sensorgen.cli import escaped, render, show
-from sensorgen.cli.words import Ratio
-from sensorgen.core.errors import UnknownName
+from sensorgen.cli import body_options, escaped, render, show
+from sensorgen.cli.designs import DesignGroup
+from sensorgen.cli.words import OneOf, Ratio
+from sensorgen.core.errors import BadInput, UnknownName
+
+if TYPE_CHECKING:
+    from sensorgen.design.design import Design
 
 FILES = ("chart.csv", "chart.png", "chart.html")
+QUANTITIES = ("capacitance", "compression", "line", "prediction")
+_BUDGET_S = 60.0
 
 
-@click.command("chart")
-@click.option("--scene", multiple=True, metavar="NAME", help="A standard scene, as 'tri, 0.1 mm'; all if not given.")
-@click.option(
-    "--budget", type=Ratio(), default="60", show_default=True, metavar="SECONDS", help="Leave out what takes longer."
-)
-@click.option("--output", "-o", default="out/chart", show_default=True, metavar="DIR", help="Folder of the files.")
-@click.option("--json", "as_json", is_flag=True, help="Print what was measured as JSON, too.")
-def command(scene: tuple[str, ...], budget: float, output: str, as_json: bool) -> None:
-    """Measure every model on every standard scene.
+def _output() -> click.Option:
+    return click.Option(
+        ["--output", "-o"], default="out/chart", show_default=True, metavar="DIR", help="Folder of the files."
+    )
 
-    Writes processor time against error, with the Pareto front marked: chart.png, chart.html to ask with the mouse,
-    and chart.csv, which also says why a model is silent on a scene. The scenes are cells at rest and pressed, blocks,
-    lines, sheets, stacks and printed tracks of which the answer is known from elsewhere.
-    """
+
+_SCENES: list[click.Parameter] = [
+    click.Option(
+        ["--scene"], multiple=True, metavar="NAME",
+        help="Without a design: a standard scene, as 'tri, 0.1 mm'; all if not given.",
+    ),
+    click.Option(["--budget"], type=Ratio(), metavar="SECONDS", help="Leave out what takes longer.  [default: 60]"),
+    _output(),
+    click.Option(["--json", "as_json"], is_flag=True, help="Print what was measured as JSON, too."),
+]  # fmt: skip
+
+OWN: list[click.Parameter] = [
+    click.Option(
+        ["--quantity"], type=OneOf(QUANTITIES), multiple=True, help="Of these alone; may be given several times."
+    ),
+    click.Option(
+        ["--force", "force_n"], type=Ratio(), default="5", show_default=True, metavar="N",
+        help="Force in the middle, on a tip of 10 mm.",
+    ),
+    click.Option(
+        ["--budget"], type=Ratio(), default="5", show_default=True, metavar="SECONDS",
+        help="Leave out each step that should take longer.",
+    ),
+    *body_options.body_options(), _output(), *render.options(file=False),
+]  # fmt: skip
+
+
+def _of_design(design: "Design", *, quantity: tuple[str, ...], force_n: float, budget: float, output: str) -> int:
+    from sensorgen.analysis.plots.libraries import needed
+    from sensorgen.core import files as store
+    from sensorgen.core.document import to_json
+    from sensorgen.prediction.query import Query
+    from sensorgen.verification.design_chart import plot
+    from sensorgen.verification.design_chart.results import chart
+
+    needed("matplotlib", "plotly")
+    body = body_options.body_of()(design)
+    keys = quantity or QUANTITIES
+    with show.progress(keys) as step:
+
+        def on(words: str) -> None:
+            step(words.partition(":")[0])
+            step(words)
+
+        found = chart(body, Query(force_n=force_n), keys, budget_s=budget, step=on)
+    contents = {"chart.json": to_json(found).encode(), "chart.csv": "".join(found.csv()).encode()}
+    if found.points:
+        contents |= {"chart.png": plot.png(found)}
+    contents["chart.html"] = plot.html(found).encode()
+    for name, content in contents.items():
+        store.replace(Path(output) / name, content)
+    render.deliver(found)
+    if not render.form():
+        render.say("\n".join(str(Path(output) / name) for name in contents))
+    return render.verdict(*found.problems())
+
+
+def _of_scenes(scene: tuple[str, ...], budget: float | None, output: str, as_json: bool) -> None:
     import csv
     import io
 
@@ -40,17 +96,43 @@ def command(scene: tuple[str, ...], budget: float, output: str, as_json: bool) -
             raise UnknownName("standard scene", name, chart.SCENES)
     names = scene or chart.SCENES
     with show.progress(names) as step:
-        points = chart.points(names, budget, step)
+        points = chart.points(names, _BUDGET_S if budget is None else budget, step)
     rows = [vars(one) for one in (*points, *chart.silent(names, points))]
     text = io.StringIO()
     table = csv.DictWriter(text, list(dict.fromkeys(key for row in rows for key in row)), lineterminator="\n")
     table.writeheader()
     table.writerows(rows)
-    for name, content in zip(
-        FILES, (text.getvalue().encode(), plot.png(points), plot.html(points).encode()), strict=True
-    ):
+    contents = dict(zip(FILES, (text.getvalue().encode(), plot.png(points), plot.html(points).encode()), strict=True))
+    if overview := plot.overview(points):
+        contents["overview.png"] = overview
+    for name, content in contents.items():
         store.replace(Path(output) / name, content)
         if not as_json:
             render.say(Path(output) / name)
     if as_json:
         render.say(escaped(json.dumps(rows, indent=2, ensure_ascii=False)))
+
+
+def _begin(**given: Any) -> None:
+    """Without a design, the standard scenes; before one, no options."""
+    context = click.get_current_context()
+    if context.invoked_subcommand is None:
+        _of_scenes(given["scene"], given["budget"], given["output"], given["as_json"])
+        return
+    for option in context.command.params:
+        if option.name and context.get_parameter_source(option.name) is not click.core.ParameterSource.DEFAULT:
+            word = option.opts[0]
+            raise BadInput(f"{word} stands before the design; write {context.command_path} DESIGN {word} ...")
+
+
+command = DesignGroup(
+    _of_design, OWN, name="chart", params=_SCENES, callback=_begin, invoke_without_command=True,
+    help="""Measure speed against accuracy of every model.
+
+    With a design: every model that applies to it, and scikit-fem, NGSolve, FastCap, scikit-rf and ngspice where they
+    are installed, for its capacitance, compression, line and whole prediction; time (cold and warm), memory and error
+    against the best answer of another program. Writes chart.html, chart.png, chart.json and chart.csv.
+
+    Without one: every model on every standard scene of which the answer is known from elsewhere. Writes overview.png,
+    chart.png, chart.html and chart.csv, which also says why a model is silent on a scene.""",
+)  # fmt: skip

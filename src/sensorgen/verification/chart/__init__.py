@@ -8,10 +8,10 @@ from types import ModuleType
 
 from sensorgen import models
 from sensorgen.core import plugins as registry
-from sensorgen.verification.chart import blocks, cells, lines, membrane, networks, presses, readback, rounds
+from sensorgen.verification.chart import blocks, cells, lines, membrane, networks, presses, readback, rounds, whole
 from sensorgen.verification.chart.measured import Point, Silent, with_front
 
-KINDS = (cells, presses, blocks, membrane, rounds, lines, readback, networks)
+KINDS = (cells, presses, blocks, membrane, rounds, lines, readback, networks, whole)
 SCENES = tuple(name for kind in KINDS for name in kind.STANDARD)
 
 

@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from sensorgen.core.units import EPS0_F_PER_M
-from sensorgen.models import compression, line, line_abcd, line_closed, line_ladder, line_tip, sheet, stack
-from sensorgen.models.sheet import Patch, Sheet
-from sensorgen.solvers.line.inputs import PressedLine, read
-from sensorgen.verification.chart.measured import DIGITS, Point, climbed
+from sensorgen.solvers.line.inputs import PressedLine
+from sensorgen.verification import line_models, peers
+from sensorgen.verification.chart.measured import DIGITS, Level, Point, climbed
+from sensorgen.verification.peers import line as circuits
 
 ASKED = "the impedance of a pressed line"
 
@@ -87,6 +86,7 @@ STANDARD = {
 
 _LADDERS = (1, 10, 100, 1000, 10_000)  # cells per section
 _GRIDS = (20, 40, 80)  # cells along the sheet
+_CIRCUITS = (1, 10, 100)  # cells per section in ngspice
 _PIECES = (1, 4, 16, 64, 256)  # of a tip
 
 
@@ -108,21 +108,27 @@ def points(name: str, budget_s: float) -> list[Point]:
         real = float(np.max(abs(found.real - known.real) / abs(known.real)))
         return max(whole, real, DIGITS), f"abs(Z) off by {whole:.2g}, Re Z by {real:.2g}"
 
-    def of(work: Callable[..., Any], **more: Any) -> Callable[[], Any]:
-        return lambda: work(standard.line(), **more)
+    def of(work: Callable[..., Any], *words: str, **more: Any) -> Callable[[], Any]:
+        return lambda: work(*words, standard.line(), **more)
+
+    theirs: dict[str, list[Level]] = {}
+    if standard.profile == "uniform":
+        theirs["scikit-rf"] = [("", of(circuits.scikit_rf))]
+        theirs["ngspice"] = [(f"{n} cells, ", of(circuits.ngspice, cells=n)) for n in _CIRCUITS]
 
     pieces = _PIECES if standard.profile != "uniform" else _PIECES[:1]
     ladders = [
-        ("line", [("", of(line.impedance))]),
-        ("line_abcd", [("", of(line_abcd.impedance))]),
-        ("line_closed", [("", of(line_closed.impedance))]),
-        ("line_closed: B.48 as printed", [("", of(line_closed.impedance, as_printed="B.48"))]),
-        ("line_closed: uniform", [("", of(line_closed.uniform))]),
-        ("line_closed: R and C in series", [("", of(line_closed.series))]),
-        ("stack: one film", [("", of(_stack))]),
-        ("line_ladder", [(f"{n} cells, ", of(line_ladder.impedance, cells=n)) for n in _LADDERS]),
-        ("sheet", [(f"{n} cells, ", of(_sheet, cells=n)) for n in _GRIDS]),
-        ("line_tip", [(f"{n} pieces, ", of(_tip, pieces=n, profile=standard.profile)) for n in pieces]),
+        *((name, [("", of(line_models.impedance, name))]) for name in line_models.AT_ONCE),
+        ("line_ladder", [(f"{n} cells, ", of(line_models.impedance, "line_ladder", cells=n)) for n in _LADDERS]),
+        ("sheet", [(f"{n} cells, ", of(line_models.impedance, "sheet", cells=n)) for n in _GRIDS]),
+        (
+            "line_tip",
+            [
+                (f"{n} pieces, ", of(line_models.impedance, "line_tip", pieces=n, profile=standard.profile))
+                for n in pieces
+            ],
+        ),
+        *((peer, levels) for peer, levels in theirs.items() if not peers.missing(peer)),
     ]
     return list(climbed(name, ladders, judge, budget_s))
 
@@ -132,41 +138,3 @@ def why_not_applicable(name: str) -> dict[str, str]:
     if STANDARD[name].profile == "uniform":
         return {"pressure": "a flat tip presses evenly"}
     return {"pressure": "it cuts the tip into the pieces of line_tip"}
-
-
-def _stack(line: PressedLine) -> Any:
-    """Two tracks and the film between them."""
-    sections = read(line).sections()
-    tracks = [[0.5 * r, 0.5 * r] for r in sections.r_ohm_per_m]  # what a loop runs through is their sum
-    return stack.impedance(tracks, [[y] for y in sections.y_s_per_m], sections.length_m)[..., 0, 0]
-
-
-def _sheet(line: PressedLine, cells: int) -> Any:
-    """Two sheets with contacts all along one edge, pressed across their whole width."""
-    p = vars(line)
-    resistances = (
-        p["top_resistivity_ohm_m"] / p["top_thickness_m"],
-        p["bottom_resistivity_ohm_m"] / p["bottom_thickness_m"],
-    )
-    plate = Sheet(p["length_m"], p["width_m"], resistances, EPS0_F_PER_M * p["eps_r"] / p["film_m"])
-    thinner = 1 / (1 - p["force_n"] / (p["width_m"] * p["tip_m"] * p["modulus_pa"]))
-    press = Patch(p["left_m"], 0.0, p["tip_m"], p["width_m"], thinner)
-    contacts = plate.edge("top", "left"), plate.edge("bottom", "left")
-    return sheet.impedance(plate, [contacts], p["frequency_hz"], press, cells)[:, 0, 0]
-
-
-def _tip(line: PressedLine, pieces: int, profile: str) -> Any:
-    """The patch in pieces, each with its own pressure."""
-    p = vars(line)
-    law = compression.unconfined(p["modulus_pa"])
-    r = (
-        p["top_resistivity_ohm_m"] / p["top_thickness_m"] + p["bottom_resistivity_ohm_m"] / p["bottom_thickness_m"]
-    ) / p["width_m"]
-    track = line_tip.Track(
-        p["length_m"], r, 0.0, EPS0_F_PER_M * p["eps_r"] * p["width_m"] / p["film_m"], 0.0, 0.0, "open"
-    )
-    middle, contact = p["left_m"] + p["tip_m"] / 2, (np.asarray(p["tip_m"]), np.zeros(()))
-    tip = line_tip.resting(
-        p["length_m"], p["width_m"], (profile, pieces), np.asarray(p["force_n"]), np.asarray(middle), contact
-    )
-    return line_tip.impedance(track, tip, law, p["frequency_hz"])

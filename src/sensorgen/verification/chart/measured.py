@@ -1,7 +1,6 @@
 """What a model gave, and how long it took; which of them nothing beats; and which had nothing to say."""
 
 import math
-import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sensorgen.core.errors import OutOfRange
+from sensorgen.verification.apart import used_s
 
 _QUICK_S = 0.3  # runs shorter than this are repeated, and the median counts
 _REPEATS = 5
@@ -73,9 +73,9 @@ def timed(work: Callable[[], Any]) -> tuple[Any, float]:
     """What some work gives, and the processor's time for it: the median of several runs of quick work [s]."""
     taken: list[float] = []
     while len(taken) < _REPEATS and sum(taken) < (_AGAIN_S if len(taken) == 1 else _QUICK_S):
-        start = time.process_time()
+        start = used_s()
         found = work()
-        taken.append(time.process_time() - start)
+        taken.append(used_s() - start)
     return found, sorted(taken)[(len(taken) - 1) // 2]
 
 

@@ -17,12 +17,25 @@ ALT = (
     "bounds. Dashed: Pareto front."
 )
 
+OVERVIEW = (  # a cell in the plane and in 3D, a press, a line, a network, and the whole prediction
+    "tri, 0.1 mm", "rect, 0.1 mm", "tri pressed, 0.1 mm: rise of C", "line, seven tones",
+    "sheet, contacts on one edge", "prediction of tri, 0.1 mm",
+)  # fmt: skip
+
 
 def png(points: Sequence[Point]) -> bytes:
     """All scenes in one picture."""
     panels = {figure.title: figure.choices[""] for figure in figures(points)}
     title = "\n".join([TITLE, *wrap(ALT, 120)])
     return static.png(Figure("chart", title, ALT, panels, "scene", columns=2, beside=True))
+
+
+def overview(points: Sequence[Point]) -> bytes | None:
+    """The scenes that decide, in one picture; None where none of them was measured."""
+    here = [p for name in OVERVIEW for p in points if p.scene == name]
+    panels = {figure.title: figure.choices[""] for figure in figures(here)}
+    title = "\n".join([TITLE, *wrap(ALT, 110)])
+    return static.png(Figure("overview", title, ALT, panels, "scene", columns=2, beside=True)) if here else None
 
 
 def html(points: Sequence[Point]) -> str:

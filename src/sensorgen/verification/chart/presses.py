@@ -23,7 +23,7 @@ from sensorgen.verification.chart.measured import Ladder, Level, Point, climbed,
 Real = NDArray[np.float64]
 
 _EPS = {"x60": 4.68, "air": 1.00059}
-_SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
+SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
 ASKED = "compression of a cell"
 _WIDTH_M = 10e-3  # of the sensor, for a film that is bonded
 
@@ -112,7 +112,7 @@ def _down(known: Known) -> Iterator[Ladder]:
     """Displacement of the top by each model, in um."""
     for law in _laws(known):
         yield f"compression: {law.name}", [("", partial(_by_law, known, law, rise=False))]
-    plane = {name: s.youngs_modulus_pa / (1 - s.poisson_ratio**2) for name, s in _SOLIDS.items()}
+    plane = {name: s.youngs_modulus_pa / (1 - s.poisson_ratio**2) for name, s in SOLIDS.items()}
     yield "springs", [("", lambda: 1e6 * springs.displacement_m(_scene(known), plane, list(known.stress_pa())))]
     yield "press2d", _levels(known, None)
 
@@ -129,7 +129,7 @@ def _rise(known: Known) -> Iterator[Ladder]:
 
 def _laws(known: Known) -> tuple[compression.Plate, ...]:
     """The film as a plate; the solved curves of :mod:`sensorgen.models.compression` are the reference here."""
-    modulus = _SOLIDS["x60"].youngs_modulus_pa
+    modulus = SOLIDS["x60"].youngs_modulus_pa
     return compression.unconfined(modulus), compression.bonded(modulus, _WIDTH_M, known.film_mm * M_PER_MM)
 
 
@@ -162,7 +162,7 @@ def _levels(known: Known, permittivity: dict[str, float] | None) -> list[Level]:
 def _pressed(known: Known, permittivity: dict[str, float] | None, mesh: Fineness) -> Real | None:
     """Displacement [um], or with permittivities the rise [pF/m]; None where not the whole load was reached."""
     cell, stress = press2d.cell(_scene(known), known.params().period_mm), [0.0, *known.stress_pa()]
-    found = press2d.press(cell, _SOLIDS, stress, permittivity, fineness=mesh)
+    found = press2d.press(cell, SOLIDS, stress, permittivity, fineness=mesh)
     if found.converged_pa != stress[-1]:
         return None
     if permittivity is None:

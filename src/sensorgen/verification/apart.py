@@ -1,0 +1,161 @@
+"""One piece of work in a new process with an empty cache: its answer, time and peak memory, first and once more.
+
+As a program, ``python -m sensorgen.verification.apart`` reads a piece of work from its input and writes what it found.
+"""
+
+import io
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from sensorgen.core import cache
+from sensorgen.core.errors import SensorgenError
+
+_MB = 1024  # kB
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a model gives.
+
+    Attributes
+    ----------
+    value : tuple of complex
+        A capacitance [F], a rise [-], or impedances [ohm].
+    stated : float or None
+        Relative error that the model states [-]; None where it states none.
+    certified : bool
+        Whether the truth must lie within it.
+    """
+
+    value: tuple[complex, ...]
+    stated: float | None = None
+    certified: bool = False
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Time of the processor, and by the clock [s]."""
+
+    cpu_s: float
+    wall_s: float
+
+
+@dataclass(frozen=True)
+class Run:
+    """An answer and what it cost.
+
+    Attributes
+    ----------
+    answer : Answer
+        Of the first time.
+    cold, warm : Cost
+        From the start of the process, nothing stored; once more in the same process, with what it has stored.
+    memory_mb : float or None
+        Peak of the process, libraries included [MB]; None on a system without such a record.
+    """
+
+    answer: Answer
+    cold: Cost
+    warm: Cost
+    memory_mb: float | None
+
+
+Work = Callable[[], Answer]
+Runner = Callable[[Work], Run]
+
+
+def here(work: Work) -> Run:
+    """Run a piece of work in this process; raises what it raises."""
+    return _measured(work, used_s(), time.time())
+
+
+def apart(work: Work) -> Run:
+    """Run a piece of work in a process of its own.
+
+    Parameters
+    ----------
+    work : callable
+        A function of a module, or a partial of one.
+
+    Raises
+    ------
+    SensorgenError
+        As the work does; the process ended before its answer, as when the memory is full.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        environment = {**os.environ, cache.PLACE: folder, "PYTHONSAFEPATH": "1"}
+        environment.setdefault("OPENBLAS_NUM_THREADS", "1")
+        started = time.time()
+        done = subprocess.run(
+            [sys.executable, "-W", "ignore", "-m", "sensorgen.verification.apart"],
+            input=pickle.dumps((started, pickle.dumps(work))), capture_output=True, env=environment, check=False,
+        )  # fmt: skip
+    if done.returncode:
+        last = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
+        raise SensorgenError(f"the process ended before its answer: {last or 'as when the memory is full'}")
+    found: Run | str = pickle.loads(done.stdout)  # noqa: S301 - of our own process
+    if isinstance(found, str):
+        raise SensorgenError(found)
+    return found
+
+
+def _measured(work: Work, before_s: float, started: float) -> Run:
+    """An answer with its costs; the first one from when ``before_s`` were used and the clock stood at ``started``."""
+    answer = work()
+    cold = Cost(used_s() - before_s, time.time() - started)
+    before_s, started = used_s(), time.time()
+    work()
+    return Run(answer, cold, Cost(used_s() - before_s, time.time() - started), _peak_mb())
+
+
+def used_s() -> float:
+    """Processor time of this process and of those that it has started [s]."""
+    try:
+        from resource import RUSAGE_CHILDREN, getrusage
+    except ImportError:  # Windows has no record of others
+        return time.process_time()
+    of_others = getrusage(RUSAGE_CHILDREN)
+    return time.process_time() + of_others.ru_utime + of_others.ru_stime
+
+
+def _peak_mb() -> float | None:
+    """Peak memory of this process, or of the largest that it has started [MB]."""
+    peak = 0.0
+    with suppress(OSError):
+        lines = Path("/proc/self/status").read_text("utf-8").splitlines()
+        peak = next((float(line.split()[1]) for line in lines if line.startswith("VmHWM")), 0.0)
+    with suppress(ImportError):
+        import resource
+
+        unit = 1 / _MB if sys.platform == "darwin" else 1.0  # bytes there
+        of = (resource.RUSAGE_CHILDREN,) if peak else (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+        peak = max(peak, *(resource.getrusage(whose).ru_maxrss * unit for whose in of))
+    return peak / _MB if peak else None
+
+
+def answer_input() -> None:
+    """Answer on the standard output, which nothing else may write to: programs of others print what they please."""
+    target = os.dup(1)
+    os.dup2(2, 1)
+    started, packed = pickle.loads(sys.stdin.buffer.read())  # noqa: S301 - of our own process
+    found: Run | str
+    try:
+        found = _measured(pickle.loads(packed), 0.0, started)  # noqa: S301
+    except SensorgenError as error:
+        found = str(error)
+    with io.FileIO(target, "wb") as file:
+        file.write(pickle.dumps(found))
+
+
+if __name__ == "__main__":  # its classes are those of the module, not of the program
+    from sensorgen.verification import apart as module
+
+    module.answer_input()

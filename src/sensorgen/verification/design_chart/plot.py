@@ -1,0 +1,92 @@
+"""Time and memory against error of one design's models, a panel per quantity (PNG, HTML)."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from math import floor, log10
+from textwrap import wrap
+
+from markupsafe import Markup
+
+from sensorgen.analysis.plots import pages, static
+from sensorgen.analysis.plots.figure import GREY, Axis, Curve, Figure, Panel, look
+from sensorgen.core import document
+from sensorgen.core.document import Table
+from sensorgen.verification.design_chart.results import DesignChart, Point
+
+ALT = (
+    "Hollow: cold, in a new process with nothing stored. Filled: warm, once more in the same process. Dotted: what the "
+    "references are known to; no error is drawn below."
+)
+_COSTS = {
+    "processor time": ("processor time [s]", "cold_cpu_s", "warm_cpu_s"),
+    "time by the clock": ("time by the clock [s]", "cold_wall_s", "warm_wall_s"),
+    "peak memory": ("peak memory of the process [MB]", "memory_mb", ""),
+}
+_IN_PICTURE = ("processor time", "peak memory")
+
+
+def png(found: DesignChart) -> bytes:
+    """Time and memory of all quantities in one picture."""
+    panels = {
+        f"{figure.key}, {cost}": figure.choices[cost] for figure in figures(found) for cost in _IN_PICTURE
+        if cost in figure.choices
+    }  # fmt: skip
+    title = "\n".join([_title(found), *wrap(ALT, 120)])
+    return static.png(Figure("chart", title, ALT, panels, "quantity", columns=2, beside=True))
+
+
+def html(found: DesignChart) -> str:
+    """A page: each quantity with its figure, whose axis can be chosen, and its table."""
+    drawn = list(figures(found))
+    tables = {key: _table(found, key) for key in found.titles}
+    bare = {key: table for key, table in tables.items() if key not in {figure.key for figure in drawn}}
+    return pages.render(
+        "sensorgen.verification.design_chart", "chart.html", drawn, title=_title(found),
+        words=[f"{found.body}; {found.force_n:g} N at {found.position_m * 1e3:g} mm.", ALT], tables=tables, bare=bare,
+    )  # fmt: skip
+
+
+def _table(found: DesignChart, key: str) -> Markup:
+    """The table of one quantity, which scrolls on a narrow screen, and the words below it."""
+    parts = [(isinstance(part, Table), document.html([part])) for part in found.parts(key)]
+    tables = (f'<div class="scroll" tabindex="0">{text}</div>' if table else text for table, text in parts)
+    return Markup("".join(tables))  # noqa: S704 - escaped by the document
+
+
+def _title(found: DesignChart) -> str:
+    return f"Speed and accuracy for {found.design}"
+
+
+def figures(found: DesignChart) -> Iterator[Figure]:
+    """A figure per quantity, to choose time or memory in."""
+    for key, title in found.titles.items():
+        points = [p for p in found.points if p.question == key]
+        if points:
+            choices = {
+                cost: (_panel(points, title, *about),) for cost, about in _COSTS.items()
+                if any(getattr(p, about[1]) is not None for p in points)
+            }  # fmt: skip
+            yield Figure(key, title, f"Relative error of {title}. {ALT}", choices, "across")
+
+
+def _panel(points: Sequence[Point], title: str, axis: str, cold: str, warm: str) -> Panel:
+    """Marks of every model, joined from coarse to fine, and what the references are known to."""
+    curves: list[Curve] = []
+    for k, model in enumerate(dict.fromkeys(p.model for p in points)):
+        mine, style = [p for p in points if p.model == model and getattr(p, cold) is not None], look(k)
+        y = [p.error for p in mine]
+        text = [f"{p.model} {p.level}: {p.error:.2g} off, against {p.against}" for p in mine]
+        for cost, hollow in ((cold, bool(warm)), (warm, False)):
+            if cost:
+                x = [getattr(p, cost) for p in mine]
+                curves += [Curve("line", "", x, y, colour=style["colour"])] * (len(mine) > 1)
+                marks = Curve("points", "" if hollow else model, x, y, text=text, **style)
+                curves.append(replace(marks, symbol=f"{marks.symbol}-open") if hollow else marks)
+    ends = [getattr(p, cost) for p in points for cost in (cold, warm) if cost and getattr(p, cost) is not None]
+    for doubt in sorted({p.doubt for p in points}):
+        words = "known to" if doubt == min(p.doubt for p in points) else ""
+        curves.append(Curve("line", words, [min(ends), max(ends)], [doubt, doubt], colour=GREY, dash="dot"))
+    low = 10.0 ** (floor(log10(min(p.doubt for p in points))) - 0.3)
+    high = 10.0 ** (floor(log10(max(p.error for p in points))) + 1.3)
+    about = "\n".join(wrap(f"relative error: {title} [-]", 34))
+    return Panel(tuple(curves), Axis(axis, log=True), Axis(about, log=True, low=low, high=high), title=title)

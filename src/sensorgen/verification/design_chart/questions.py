@@ -1,0 +1,304 @@
+"""What is asked of a design: models, other programs, and their references."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from math import inf
+
+import numpy as np
+
+from sensorgen.core.errors import SensorgenError
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.design.body import Body
+from sensorgen.design.values import film, permittivities
+from sensorgen.models import capacitance_models, thesis_cells
+from sensorgen.models.press2d import BoundaryConditions
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction import mesh_ladder, planning
+from sensorgen.prediction.capacitance import is_plate
+from sensorgen.prediction.compression_law import elastic, law_of
+from sensorgen.prediction.cost_model import expected
+from sensorgen.prediction.query import Query
+from sensorgen.prediction.rest_state import rest_state
+from sensorgen.prediction.sensor_model import piece
+from sensorgen.solvers.line.inputs import PressedLine, read
+from sensorgen.verification import line_models, many_digits, peers
+from sensorgen.verification.apart import Work
+from sensorgen.verification.design_chart import works
+
+OWN = "sensorgen"
+WIDTHS, WIDTHS_IN_3D = (1e-3, 1e-5, 1e-7), (1e-1, 1e-2, 1e-3, 1e-4)  # of the bounds of C, wanted
+ACCURACIES = (1e-1, 1e-2, 1e-3)
+LADDERS = (1, 10, 100, 1000)
+CIRCUITS = (1, 10, 100)  # cells of a ladder in ngspice
+GRIDS = (20, 40)
+DIGITS = 2.0**-52
+_SPATIAL = 3  # cost of a field solve in space
+
+
+@dataclass(frozen=True)
+class Series:
+    """A model, or another program, with its levels from coarse to fine.
+
+    Attributes
+    ----------
+    model, program : str
+        Name, and the program that it is of.
+    levels : tuple of (str, callable, float)
+        Words; work that gives an answer, of a module; expected time, 0 where unknown [s].
+    """
+
+    model: str
+    program: str
+    levels: tuple[tuple[str, Work, float], ...]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What answers are compared with.
+
+    Attributes
+    ----------
+    name, program : str
+        In words, and the program that it is of.
+    value : tuple of complex
+        The answer.
+    doubt : float
+        Relative error of it [-].
+    """
+
+    name: str
+    program: str
+    value: tuple[complex, ...]
+    doubt: float
+
+
+@dataclass(frozen=True)
+class Question:
+    """A quantity of a design.
+
+    Attributes
+    ----------
+    key, title, asked : str
+        Name, title of its panel, and the quantity in words.
+    series : tuple of Series
+        Who is asked.
+    silent : tuple of (str, str)
+        Who is not, and why.
+    references : tuple of Reference
+        Those that are known before anything runs.
+    measure : callable
+        From an answer and a reference to their relative distance.
+    """
+
+    key: str
+    title: str
+    asked: str
+    series: tuple[Series, ...]
+    silent: tuple[tuple[str, str], ...]
+    references: tuple[Reference, ...]
+    measure: Callable[[tuple[complex, ...], tuple[complex, ...]], float]
+
+
+def questions(body: Body, query: Query) -> list[Question]:
+    """Capacitance, compression, line and whole prediction of a body, under the reference load of a query.
+
+    Raises
+    ------
+    SensorgenError
+        Nothing can be predicted of it, as of a short; a load that the sensor cannot take.
+    """
+    load = query.load(body.design)
+    sensor = planning.rough_sensor(body, "", query.tip).sensor
+    stress_pa = float(sensor.stress_pa(load.force_n, load.position_m))
+    return [
+        _capacitance(body), _compression(body, stress_pa), _line(sensor, query, body), _prediction(body, query),
+    ]  # fmt: skip
+
+
+def _capacitance(body: Body) -> Question:
+    scene, count = body.cells.first(), body.cells.count
+    eps = {v.material: v.value for v in permittivities(body.design)}
+    series, silent = [], []
+    for name, module in capacitance_models().items():
+        if why := module.why_not_applicable(scene):
+            silent.append((name, why))
+            continue
+        widths = (None,) if inf == module.WIDTH else WIDTHS if module.COST < _SPATIAL else WIDTHS_IN_3D
+        levels = tuple(
+            (f"width {w:g}" if w else "", partial(works.capacitance, name, scene, eps, w, count),
+             (expected(name, scene, w)[1] or 0.0) if w else 0.0)
+            for w in widths
+        )  # fmt: skip
+        series.append(Series(name, OWN, levels))
+    params = body.design.params
+    area_m2 = params.length_mm * params.width_mm * M_PER_MM**2
+    for name, law in thesis_cells.NAMED.items():
+        if body.design.shape in law.shapes:
+            work = partial(works.formula, name, params, eps[film(body.design)], area_m2)
+            series.append(Series(f"thesis_cells: {name.removeprefix('thesis-')}", OWN, (("", work, 0.0),)))
+    for name in peers.FIELD:
+        try:
+            found = [] if peers.missing(name) else peers.levels(name, scene, eps)
+            why = peers.missing(name)
+        except ValueError as error:
+            found, why = [], str(error)
+        if why:
+            silent.append((name, why))
+            continue
+        levels = tuple(
+            (said.rstrip(", "), partial(works.peer, name, scene, eps, k, count), 0.0)
+            for k, (said, _) in enumerate(found)
+        )
+        series.append(Series(name, name, levels))
+    return Question("capacitance", "capacitance at rest", "C at rest", tuple(series), tuple(silent), (), largest)
+
+
+def _compression(body: Body, stress_pa: float) -> Question:
+    rest, pressed = rest_state(body, inf), piece(body)
+    series, silent = [], [("springs", "it has a displacement and no capacitance")]
+    for law in ("unconfined", "bonded", ""):
+        try:
+            found = law_of(body.design, rest.answer, law, printed=None if body.is_drawn else pressed)
+        except SensorgenError as error:
+            silent.append((f"compression: {law}", str(error)))
+            continue
+        if law or not (is_plate(rest.answer) or not found.bounded):
+            name = f"compression: {law or 'stored curve'}"
+            series.append(Series(name, OWN, (("", partial(works.rise_by_law, body, law, stress_pa), 0.0),)))
+    references: tuple[Reference, ...] = ()
+    for name in mesh_ladder.MODELS:
+        why = mesh_ladder.why_not_applicable(pressed, name)
+        if why or is_plate(rest.answer):
+            silent.append((name, why or "a solid plate lies between its two laws, free and bonded"))
+            continue
+        eps = {v.material: v.value for v in permittivities(body.design)}
+        case = mesh_ladder.Case(pressed, name, elastic(body.design, pressed.scene), eps, BoundaryConditions())
+        levels = tuple(
+            (mesh.name.removeprefix(name).strip(", ") or "usual mesh",
+             partial(works.rise_by_mesh, case, mesh.level, stress_pa, mesh.rise_error), mesh.seconds)
+            for mesh in mesh_ladder.mesh_levels(pressed, name, 2)
+        )  # fmt: skip
+        series.append(Series(name, OWN, levels))
+        references = _published(body, case, stress_pa)
+    if is_plate(rest.answer):
+        ends = [works.rise_by_law(body, law, stress_pa).value[0].real for law in ("unconfined", "bonded")]
+        middle = (ends[0] + ends[1]) / 2
+        references = (Reference("between a free and a bonded plate", "laws", (middle,), abs(ends[0] / middle - 1)),)
+    asked = f"rise of C at {stress_pa / 1e3:.4g} kPa"
+    return Question("compression", asked, asked, tuple(series), tuple(silent), references, largest)
+
+
+def _published(body: Body, case: mesh_ladder.Case, stress_pa: float) -> tuple[Reference, ...]:
+    """What two other programs found for this very cell under this pressure, if they were asked."""
+    from sensorgen.verification.chart import presses
+
+    for known in presses.CELLS.values():
+        drawn = {k: v for k, v in vars(known.params()).items() if k not in ("length_mm", "width_mm")}
+        same = body.design.shape == "tri" and drawn.items() <= vars(body.design.params).items()
+        soft = all(
+            name in presses.SOLIDS and np.isclose(solid.youngs_modulus_pa, presses.SOLIDS[name].youngs_modulus_pa)
+            for name, solid in case.solids.items()
+        )
+        at = [k for k, kpa in enumerate(known.stress_kpa) if np.isclose(kpa * 1e3, stress_pa)]
+        if body.is_drawn and same and soft and at:
+            rise = known.rise_pf_per_m[at[0]] / known.rest_pf_per_m
+            return (Reference("two other programs", "published", (rise,), known.known_to[1]),)
+    return ()
+
+
+def pressed_line(sensor: Sensor, query: Query, position_m: float) -> PressedLine:
+    """The line of a sensor under a load, its film replaced by one of vacuum with the same capacitance."""
+    stress = sensor.stress_pa(query.force_n, position_m)
+    strain = float(sensor.compression.capacitive_strain(stress)[0])
+    patch = sensor.patch(position_m)
+    by_force = [float(rise * stress / query.force_n) for rise in sensor.piezoresistance_per_pa]
+    length_m = float(patch.length_m)
+    return PressedLine(
+        length_m=sensor.length_m, width_m=sensor.width_m, top_thickness_m=sensor.electrode_m[0],
+        bottom_thickness_m=sensor.electrode_m[1], top_resistivity_ohm_m=sensor.resistivity_ohm_m[0],
+        bottom_resistivity_ohm_m=sensor.resistivity_ohm_m[1], eps_r=1.0,
+        film_m=EPS0_F_PER_M * sensor.width_m / sensor.capacitance_f_per_m, frequency_hz=np.array(query.frequency_hz),
+        force_n=query.force_n, modulus_pa=query.force_n / (sensor.width_m * length_m * strain),
+        left_m=float(patch.left_m), tip_m=length_m, top_piezoresistance_per_n=by_force[0],
+        bottom_piezoresistance_per_n=by_force[1], tan_delta=sensor.tan_delta, leak_s_per_m=sensor.leak_s_per_m,
+    )  # fmt: skip
+
+
+def exact(line: PressedLine) -> tuple[complex, ...]:
+    """Impedance of a line at every frequency, in many digits [ohm]."""
+    r, y, length = read(line).sections()
+    return tuple(
+        many_digits.impedance(
+            [float(np.ravel(a)[0]) for a in r], [complex(np.ravel(a)[min(k, np.size(a) - 1)]) for a in y],
+            [float(a) for a in length],
+        )
+        for k in range(np.size(line.frequency_hz))
+    )  # fmt: skip
+
+
+def _line(sensor: Sensor, query: Query, body: Body) -> Question:
+    line = pressed_line(sensor, query, query.load(body.design).position_m)
+    lossy = sensor.tan_delta or sensor.leak_s_per_m
+    series, silent = [], [("pressure", "a flat tip presses evenly")]
+
+    def own(name: str, *levels: tuple[str, int]) -> Series:
+        parts = [({kind: n}, f"{n} {kind}") for kind, n in levels] or [({}, "")]
+        return Series(name, OWN, tuple((said, partial(works.line, name, line, how), 0.0) for how, said in parts))
+
+    series += [own(name) for name in line_models.AT_ONCE]
+    series += [own("line_ladder", *(("cells", n) for n in LADDERS)), own("line_tip", ("pieces", 1))]
+    if lossy or any(sensor.piezoresistance_per_pa):
+        silent.append(("sheet", "the film loses, or the tracks are piezoresistive"))
+    else:
+        series.append(own("sheet", *(("cells", n) for n in GRIDS)))
+    for name, cells in (("scikit-rf", ()), ("ngspice", CIRCUITS)):
+        why = peers.missing(name) or ("the film loses: its ladder has capacitors alone" * bool(lossy and cells))
+        if why:
+            silent.append((name, why))
+            continue
+        levels = [({"cells": n}, f"{n} cells") for n in cells] or [({}, "")]
+        series.append(
+            Series(name, name, tuple((said, partial(works.circuit, name, line, how), 0.0) for how, said in levels))
+        )
+    known = (Reference("chain matrices in 220 digits", "decimal numbers", exact(line), DIGITS),)
+    return Question("line", "pressed line", "Z of the line, |Z| and Re Z", tuple(series), tuple(silent), known, of_line)
+
+
+def _prediction(body: Body, query: Query) -> Question:
+    series: list[Series] = []
+    ways: list[tuple[str, str, Query, bool]] = [
+        ("closed forms", "", query, True), ("plate, free", "", replace(query, law="unconfined"), False),
+        ("default", "", query, False),
+        *(("accuracy", f"{a:g}", replace(query, accuracy=a), False) for a in ACCURACIES),
+    ]  # fmt: skip
+    for name in dict.fromkeys(way[0] for way in ways):
+        levels = []
+        for _, said, asked, rough in (way for way in ways if way[0] == name):
+            work = partial(works.predicted, body, asked, rough=rough)
+            levels.append((said, work, 0.0 if rough else _seconds(body, asked)))
+        series.append(Series(f"predict: {name}", OWN, tuple(levels)))
+    return Question("prediction", "whole prediction", "|Z| under the load", tuple(series), (), (), of_modulus)
+
+
+def _seconds(body: Body, query: Query) -> float:
+    """Expected time of a prediction [s]."""
+    plan = planning.plan(body, query.load(body.design), query.accuracy, query.law, query.tip).plan
+    chosen = (next(c for c in level.candidates if c.model == level.chosen) for level in plan.levels)
+    return sum(c.expected_seconds or 0.0 for c in chosen)
+
+
+def largest(found: tuple[complex, ...], known: tuple[complex, ...]) -> float:
+    """Largest relative distance [-]."""
+    return max(abs(a / b - 1) for a, b in zip(found, known, strict=True))
+
+
+def of_line(found: tuple[complex, ...], known: tuple[complex, ...]) -> float:
+    """The larger one of abs(Z) and of Re Z by itself, at the worst frequency [-]."""
+    real = (abs(a.real / b.real - 1) for a, b in zip(found, known, strict=True))
+    return max(largest(found, known), *real)
+
+
+def of_modulus(found: tuple[complex, ...], known: tuple[complex, ...]) -> float:
+    """Of abs(Z), at the worst frequency [-]."""
+    return max(abs(abs(a) / abs(b) - 1) for a, b in zip(found, known, strict=True))

@@ -1,0 +1,292 @@
+"""Measured points of a chart of one design, each compared with the best answer of another program."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Annotated
+
+from sensorgen.core.display import Displayed
+from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.errors import SensorgenError
+from sensorgen.design.body import Body
+from sensorgen.models.compression import Plate
+from sensorgen.prediction.planning import rough_sensor
+from sensorgen.prediction.query import Query
+from sensorgen.verification import peers
+from sensorgen.verification.apart import Run, Runner, apart
+from sensorgen.verification.design_chart.questions import (
+    DIGITS,
+    OWN,
+    Question,
+    Reference,
+    Series,
+    exact,
+    of_modulus,
+    pressed_line,
+    questions,
+)
+
+KEYS = ("capacitance", "compression", "line", "prediction")
+_LEAST = 2  # levels of another program, whose difference is its doubt: without it there is no reference
+_DEARER = 5.0  # how many times longer the next level should take than the last one
+
+
+@dataclass(frozen=True)
+class Point:
+    """What one model gave, and what it cost.
+
+    Attributes
+    ----------
+    question, model, level : str
+        Of ``KEYS``; a model or another program; how fine it was.
+    program : str
+        "sensorgen", or another one.
+    error : float
+        Relative distance from the reference; no less than the reference's own doubt [-].
+    doubt : float
+        Relative error of the reference [-].
+    against : str
+        The reference in words.
+    independent : bool
+        Whether the reference is of another program, or a closed form.
+    stated : float or None
+        Relative error that the model states itself [-].
+    certified : bool
+        Whether that is a bound; the error is then of the end that is further off.
+    contradicted : bool
+        Whether it is further off than it states, by more than the reference is in doubt.
+    cold_cpu_s, cold_wall_s, warm_cpu_s, warm_wall_s : float
+        Time of the processor and by the clock: in a new process with nothing stored, from its start; and once more in
+        the same process [s].
+    memory_mb : float or None
+        Peak of the process [MB].
+    """
+
+    question: str
+    model: Annotated[str, Column("model")]
+    level: Annotated[str, Column("level")]
+    program: str
+    error: Annotated[float, Column("error", digits=2)]
+    doubt: Annotated[float, Column("known to", digits=2)]
+    stated: Annotated[float | None, Column("stated", digits=2)]
+    cold_cpu_s: Annotated[float, Column("cold", "s", digits=2)]
+    warm_cpu_s: Annotated[float, Column("warm", "s", digits=2)]
+    cold_wall_s: Annotated[float, Column("cold, clock", "s", digits=2, hidden=True)]
+    warm_wall_s: Annotated[float, Column("warm, clock", "s", digits=2, hidden=True)]
+    memory_mb: Annotated[float | None, Column("peak", "MB", digits=3)]
+    against: Annotated[str, Column("against", hidden=True)]
+    independent: Annotated[bool, Column("independent", hidden=True)]
+    certified: bool
+    contradicted: bool
+
+
+@dataclass(frozen=True)
+class Silent:
+    """Who gave nothing to a question, and why."""
+
+    question: str
+    model: str
+    why: str
+
+
+@dataclass(frozen=True)
+class DesignChart(Displayed):
+    """Speed against accuracy for one design.
+
+    Attributes
+    ----------
+    design, body : str
+        Name, and what of it.
+    force_n, position_m : float
+        The load [N], [m].
+    titles : dict of str to str
+        Of the questions.
+    points : tuple of Point
+        In the order in which they were measured.
+    silent : tuple of Silent
+        Who gave nothing.
+    """
+
+    design: str
+    body: str
+    force_n: float
+    position_m: float
+    titles: dict[str, str]
+    points: tuple[Point, ...]
+    silent: tuple[Silent, ...]
+
+    def document(self) -> Iterator[Part]:
+        """A table for each question, with its references and who gave nothing."""
+        yield f"{self.design}, {self.body}: {self.force_n:g} N at {self.position_m * 1e3:g} mm"
+        for key in self.titles:
+            yield ""
+            yield from self.parts(key)
+
+    def parts(self, key: str) -> Iterator[Part]:
+        """The table of one question."""
+        here = [p for p in self.points if p.question == key]
+        yield Table.of(key, f"{self.titles[key]}: relative error; time of the processor", here)
+        for words in dict.fromkeys(p.against for p in here):
+            of = [p for p in here if p.against == words]
+            own = "" if of[0].independent else ", which is not independent"
+            yield f"against {words}{own}, known to {of[0].doubt:.2g}: {', '.join(dict.fromkeys(p.model for p in of))}"
+        yield from (
+            f"error larger than stated: {p.model} {p.level}".rstrip()
+            for p in here if p.contradicted
+        )  # fmt: skip
+        if silent := [s for s in self.silent if s.question == key]:
+            yield Facts(tuple((s.model, s.why) for s in silent))
+
+    def problems(self) -> Sequence[str]:
+        """Models whose error is larger than they state."""
+        wrong = [p for p in self.points if p.contradicted]
+        return [f"{p.model} {p.level}".rstrip() + f": error {p.error:.2g}, {p.stated:.2g} stated" for p in wrong]
+
+    def csv(self) -> Iterator[str]:
+        """All points in one table."""
+        from sensorgen.core.document import comma_separated
+
+        yield comma_separated(Table.of("chart", "", self.points))
+
+
+def chart(
+    body: Body, query: Query, keys: Sequence[str] = KEYS, *, budget_s: float = 10.0,
+    step: Callable[[str], None] = lambda _: None, runner: Runner = apart,
+) -> DesignChart:  # fmt: skip
+    """Measure every model that applies to a body.
+
+    Parameters
+    ----------
+    body : Body
+        Drawn or printed.
+    query : Query
+        Frequencies and reference load.
+    keys : sequence of str
+        Of ``KEYS``; a prediction is compared with the best of capacitance and compression, which run for it too.
+    budget_s : float
+        A level is not run that should take longer [s].
+    step : callable
+        Called with the name of each model before it runs.
+    runner : callable
+        Runs a piece of work and times it.
+
+    Raises
+    ------
+    SensorgenError
+        Nothing can be predicted of the body.
+    """
+    needed = {*keys, *(KEYS[:2] if "prediction" in keys else ())}
+    asked = [q for q in questions(body, query) if q.key in needed]
+    points: list[Point] = []
+    silent: list[Silent] = []
+    best: dict[str, list[Reference]] = {}
+    for question in asked:
+        silent += [Silent(question.key, *each) for each in question.silent]
+        runs: list[tuple[Series, str, Run]] = []
+        for series in question.series:
+            found, why = _climbed(series, budget_s, partial(step, f"{question.key}: {series.model}"), runner)
+            runs += found
+            silent += [Silent(question.key, series.model, why)] if why else []
+        known = list(question.references)
+        if question.key == "prediction":
+            known += composed(body, query, best)
+        best[question.key] = known + list(_from(runs)) if question.key != "prediction" else known
+        if not best[question.key]:
+            why = f"no reference within --budget {budget_s:g}"
+            silent += [Silent(question.key, series.model, why) for series in dict.fromkeys(run[0] for run in runs)]
+            continue
+        points += [_point(question, *run, best[question.key]) for run in runs]
+    load = query.load(body.design)
+    return DesignChart(
+        body.design.name, body.provenance, load.force_n, load.position_m,
+        {q.key: q.title for q in asked if q.key in keys}, tuple(p for p in points if p.question in keys),
+        tuple(s for s in silent if s.question in keys),
+    )  # fmt: skip
+
+
+def _climbed(
+    series: Series, budget_s: float, step: Callable[[], None], runner: Runner
+) -> tuple[list[tuple[Series, str, Run]], str]:
+    """Runs of a model from coarse to fine until the next one would take too long; and why there are no more."""
+    found: list[tuple[Series, str, Run]] = []
+    for said, work, expected_s in series.levels:
+        last_s = max((run.cold.cpu_s - _started_s(found) for _, _, run in found[-1:]), default=0.0)
+        likely_s = max(expected_s, _DEARER * last_s if not expected_s else 0.0)
+        if likely_s > budget_s and (
+            series.program == OWN or len(found) >= _LEAST or series.model in peers.SLOW_TO_CONVERGE
+        ):
+            return found, f"{said}: some {likely_s:.2g} s, more than --budget {budget_s:g}".removeprefix(": ")
+        step()
+        try:
+            found.append((series, said, runner(work)))
+        except SensorgenError as error:
+            return found, f"{said}: {error}".removeprefix(": ")
+    return found, ""
+
+
+def _started_s(found: Sequence[tuple[Series, str, Run]]) -> float:
+    """Start of a process and loading of libraries, at most: the least difference of cold and warm [s]."""
+    return min((run.cold.cpu_s - run.warm.cpu_s for _, _, run in found), default=0.0)
+
+
+def _from(runs: Sequence[tuple[Series, str, Run]]) -> Iterator[Reference]:
+    """References: bounds, and the finest answer of a program with its last change as its doubt."""
+    bounds = [(run.answer.stated or 0.0, series, run) for series, _, run in runs if run.answer.certified]
+    if bounds:
+        width, series, run = min(bounds, key=lambda each: each[0])
+        yield Reference(f"the bounds of {series.model}", OWN, run.answer.value, max(width, DIGITS))
+    for series in dict.fromkeys(series for series, _, _ in runs):
+        levels = [run.answer for of, _, run in runs if of is series]
+        stated = levels[-1].stated
+        if levels[-1].certified or series.model in peers.SLOW_TO_CONVERGE or (len(levels) < 2 and stated is None):
+            continue
+        change = max((abs(levels[-1].value[0] / before.value[0] - 1) for before in levels[-2:-1]), default=0.0)
+        yield Reference(
+            f"the finest {series.model}", series.program, levels[-1].value, max(change, stated or 0.0, DIGITS)
+        )
+
+
+def composed(body: Body, query: Query, best: dict[str, list[Reference]]) -> Iterator[Reference]:
+    """Impedance of a line in many digits, with the best capacitance and the best rise of the others."""
+    model = rough_sensor(body, "", query.tip)
+    load = query.load(body.design)
+    query = replace(query, position_m=load.position_m)
+    if not all(best[key] for key in KEYS[:2]):
+        return
+    c, rise = (_best(best[key], OWN) for key in KEYS[:2])
+    farad, rises = c.value[0].real, rise.value[0].real
+
+    def z(farad: float, rises: float) -> tuple[complex, ...]:
+        law = Plate("given", "", float(model.sensor.stress_pa(load.force_n, load.position_m)) * (1 + rises) / rises)
+        sensor = replace(model.sensor, capacitance_f_per_m=farad / model.sensor.length_m, compression=law)
+        return exact(pressed_line(sensor, query, load.position_m))
+
+    value = z(farad, rises)
+    doubt = of_modulus(z(farad * (1 + c.doubt), rises), value) + of_modulus(z(farad, rises * (1 + rise.doubt)), value)
+    program = OWN if OWN in (c.program, rise.program) else "others"
+    yield Reference(f"C by {c.name}, rise by {rise.name}, line in 220 digits", program, value, doubt)
+
+
+def _best(references: Sequence[Reference], program: str) -> Reference:
+    """The least doubtful one that is not of a program; where there is none, the least doubtful one of all."""
+    others = [r for r in references if r.program != program]
+    return min(others or references, key=lambda r: r.doubt)
+
+
+def _point(question: Question, series: Series, said: str, run: Run, references: Sequence[Reference]) -> Point:
+    """A run beside the best answer of another program; beside one of its own program where there is no other."""
+    reference = _best(references, series.program)
+    answer = run.answer
+    off = question.measure(answer.value, reference.value)
+    within = question.measure(reference.value, answer.value)  # of what was stated of the answer
+    contradicted = answer.stated is not None and within > answer.stated + reference.doubt
+    if answer.certified and answer.stated is not None:  # the bound that is further off
+        off = max(
+            question.measure((answer.value[0] * end,), reference.value)
+            for end in (1 - answer.stated, 1 + answer.stated)
+        )
+    return Point(
+        question.key, series.model, said, series.program, max(off, reference.doubt), reference.doubt, answer.stated,
+        run.cold.cpu_s, run.warm.cpu_s, run.cold.wall_s, run.warm.wall_s, run.memory_mb, reference.name,
+        reference.program != series.program, answer.certified, contradicted,
+    )  # fmt: skip

@@ -1,0 +1,90 @@
+"""Pieces of work of a chart; each imports what it needs when it runs, so that a new process loads nothing else."""
+
+from collections.abc import Mapping
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from sensorgen.verification.apart import Answer
+
+if TYPE_CHECKING:
+    from sensorgen.design.body import Body
+    from sensorgen.prediction.mesh_ladder import Case
+    from sensorgen.prediction.query import Query
+    from sensorgen.scene.scene import Scene
+    from sensorgen.solvers.line.inputs import PressedLine
+
+
+def capacitance(
+    model: str, scene: "Scene", permittivity: Mapping[str, float], width: float | None, count: float
+) -> Answer:  # fmt: skip
+    """Of the whole sensor [F], by one of our models; ``width`` of the bounds is relative [-], or None."""
+    module = import_module(f"sensorgen.models.{model}")
+    found = module.capacitance(scene, permittivity, *([] if width is None else [width]))
+    middle = (found.lower + found.upper) / 2
+    return Answer((count * middle,), (found.upper - found.lower) / 2 / middle, certified=True)
+
+
+def formula(name: str, params: Any, eps_r: float, area_m2: float) -> Answer:
+    """Capacitance of the whole sensor as drawn [F], by a formula of the thesis."""
+    from sensorgen.models import thesis_cells
+
+    return Answer((area_m2 * thesis_cells.NAMED[name].value_f_per_m2(params, eps_r),))
+
+
+def peer(name: str, scene: "Scene", permittivity: Mapping[str, float], level: int, count: float) -> Answer:
+    """Capacitance of the whole sensor [F] by another program."""
+    from sensorgen.verification import peers
+
+    return Answer((count * peers.levels(name, scene, permittivity)[level][1](),))
+
+
+def rise_by_law(body: "Body", law: str, stress_pa: float) -> Answer:
+    """Relative rise of the capacitance under a pressure [-], by a law that solves no field."""
+    import numpy as np
+
+    from sensorgen.prediction.planning import rough_sensor
+
+    found = rough_sensor(body, law).law.compression
+    strain = float(found.capacitive_strain(np.asarray(stress_pa))[0])
+    return Answer((strain / (1 - strain),), getattr(found, "within", None))
+
+
+def rise_by_mesh(case: "Case", level: int, stress_pa: float, stated: float) -> Answer:
+    """Relative rise of the capacitance under a pressure [-], by finite elements."""
+    from sensorgen.core.errors import OutOfRange
+    from sensorgen.prediction.mesh_ladder import pressed
+
+    found = pressed(case, [0.0, stress_pa / 2, stress_pa], level)
+    first, last = found.capacitance_f_per_m2[0], found.capacitance_f_per_m2[-1]
+    if found.faults or not (first and last) or found.converged_pa < stress_pa:
+        raise OutOfRange("; ".join(found.faults) or f"solved up to {found.converged_pa / 1e3:.3g} kPa only")
+    return Answer((last.middle() / first.middle() - 1,), stated)
+
+
+def line(model: str, line: "PressedLine", fineness: Mapping[str, int]) -> Answer:
+    """Impedance at every frequency [ohm] by one of our models of lines."""
+    from sensorgen.verification.line_models import impedance
+
+    return Answer(tuple(impedance(model, line, **fineness).ravel().tolist()))
+
+
+def circuit(name: str, line: "PressedLine", fineness: Mapping[str, int]) -> Answer:
+    """Impedance at every frequency [ohm] by another program."""
+    from sensorgen.verification.peers import line as programs
+
+    found = programs.ngspice(line, **fineness) if name == "ngspice" else programs.scikit_rf(line)
+    return Answer(tuple(found.ravel().tolist()))
+
+
+def predicted(body: "Body", query: "Query", *, rough: bool = False) -> Answer:
+    """Impedance of the sensor under the reference load at every frequency [ohm]."""
+    from sensorgen.prediction import planning
+
+    load, width = query.load(body.design), None
+    if rough:
+        model = planning.rough_sensor(body, query.law, query.tip)
+    else:
+        model, plan = planning.sensor_model(body, query)
+        width = plan.width
+    z = model.sensor.impedance(list(load.frequency_hz), load.force_n, load.position_m)
+    return Answer(tuple(z.tolist()), width)

@@ -1,0 +1,70 @@
+"""Programs of others on the same scenes and lines, to compare with: scikit-fem, NGSolve, FastCap, scikit-rf, ngspice.
+
+They get a geometry of triangles, boxes or panels that is made here without any of the models' meshes.
+"""
+
+import shutil
+from collections.abc import Callable, Mapping
+from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
+
+from sensorgen.scene.scene import Scene
+
+Levels = list[tuple[str, Callable[[], float]]]  # words, and work that gives a capacitance [F]
+
+FIELD = {"scikit-fem": "skfem", "NGSolve": "ngsolve", "FastCap": "fastcap2"}
+_FILES = {"scikit-fem": "scikit_fem", "NGSolve": "ngsolve_fem", "FastCap": "fastcap"}
+_UNKNOWNS = {"scikit-fem": (200, 1000, 5000, 20_000), "NGSolve": (200, 1000, 5000, 20_000)}
+_BRICKS: dict[str, tuple[tuple[int, ...], ...]] = {  # layers; and order, where it can be chosen
+    "scikit-fem": ((0,), (1,), (2,)), "NGSolve": ((0, 2), (0, 4), (1, 3), (1, 5), (2, 6)),
+}  # fmt: skip
+SLOW_TO_CONVERGE = ("FastCap",)  # off by more than its last step: no reference
+_PANELS = (2, 3, 4, 7)  # along the height of the cell
+
+
+def missing(peer: str) -> str:
+    """Why a peer cannot run here, or ""."""
+    if peer == "ngspice":
+        return "" if shutil.which("ngspice") else "ngspice is not installed (Debian: apt install ngspice)"
+    name = {**FIELD, "scikit-rf": "skrf"}[peer]
+    packages = {"fastcap2": "fastcap2", "ngsolve": "ngsolve", "skfem": "scikit-fem", "skrf": "scikit-rf"}
+    return "" if find_spec(name) else f"not installed: pip install {packages[name]}"
+
+
+def levels(peer: str, scene: Scene, permittivity: Mapping[str, float]) -> Levels:
+    """A peer's capacitances of a scene, from coarse to fine.
+
+    Parameters
+    ----------
+    peer : str
+        Of ``FIELD``.
+    scene : Scene
+        As models see it.
+    permittivity : mapping of str to float
+        Of its dielectrics and of "air" [-].
+
+    Raises
+    ------
+    ValueError
+        The scene is neither a constant cross-section nor made of boxes, or has no mirrors; for FastCap also a cell
+        that the sensor's end cuts.
+    """
+    from sensorgen.verification.peers import cells
+
+    geometry = cells.geometry(scene)
+    module = import_module(f"sensorgen.verification.peers.{_FILES[peer]}")
+    if peer == "FastCap":
+        cells.share(geometry)  # refuses a cell that is cut
+        return [
+            (f"{n} panels along the height, ", partial(module.capacitance, scene, permittivity, n)) for n in _PANELS
+        ]
+    if isinstance(geometry, cells.Plane):
+        return [(f"{n} unknowns, ", partial(module.plane, scene, permittivity, n)) for n in _UNKNOWNS[peer]]
+    return [
+        (
+            f"{how[0]} layers{''.join(f' of order {p}' for p in how[1:])}, ",
+            partial(module.boxes, scene, permittivity, *how),
+        )
+        for how in _BRICKS[peer]
+    ]

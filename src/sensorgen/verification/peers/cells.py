@@ -1,0 +1,131 @@
+"""Geometry of a cell for other programs: triangles of a cross-section, or a grid of boxes, between mirrors."""
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from sensorgen.core.arrays import Real, Whole
+from sensorgen.scene.scene import Scene
+from sensorgen.scene.sections import ROUNDING_MM, Section, sections
+from sensorgen.scene.unit_cell import Slice, cell
+from sensorgen.solvers.electrostatics.bounds import unmirrored
+from sensorgen.solvers.electrostatics.bricks import Grid, grid
+
+Vertex = tuple[float, float]
+Edge = tuple[Vertex, Vertex]
+ENDS = ("bottom", "top")
+RATIO = 0.15  # of a layer's distance from an edge to the next one's
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A cross-section between two mirrors.
+
+    Attributes
+    ----------
+    points_mm : (n, 2) array
+        Corners of triangles, across and up [mm].
+    triangles : (m, 3) array
+        Their corners, counter-clockwise; of dielectrics alone.
+    materials : tuple of str
+        Of each triangle.
+    shares : (m,) array
+        How often each, or its mirror image, occurs in the sensor [-].
+    faces : mapping of ((u, v), (u, v)) to (str, str)
+        Edges of what lies in the cell, with the material or the end ("bottom", "top") to the left and to the right of
+        them; "" at a mirror.
+    depth_mm : float
+        Of the sensor, square to the section [mm].
+    """
+
+    points_mm: Real
+    triangles: Whole
+    materials: tuple[str, ...]
+    shares: Real
+    faces: dict[Edge, tuple[str, str]]
+    depth_mm: float
+
+    def held(self) -> dict[Edge, str]:
+        """Edges of dielectrics on an electrode, and which one."""
+        found = {}
+        for edge, sides in self.faces.items():
+            ends = [s for s in sides if s in ENDS]
+            if len(ends) == 1 and all(sides):
+                found[edge] = ends[0]
+        return found
+
+
+def geometry(scene: Scene) -> Plane | Grid:
+    """The cell of a scene.
+
+    Raises
+    ------
+    ValueError
+        It has no mirrors or other electrodes than two, or is neither a constant cross-section nor made of boxes.
+    """
+    if reason := unmirrored(scene):
+        raise ValueError(reason)
+    found = sections(scene)
+    if len(found) > 1:
+        return grid(scene)
+    return _plane(found[0], scene.size_mm[2])
+
+
+def _plane(section: Section, height_mm: float) -> Plane:
+    """The cell of a cross-section, its bands cut into triangles around their middles."""
+    piece = cell(section, height_mm)
+    heights: dict[float, set[float]] = defaultdict(set)  # of corners on each vertical line
+    for part in piece.slices:
+        for band in part.bands:
+            for at, k in ((part.left_mm, 0), (part.right_mm, 1)):
+                heights[round(at, 9)] |= {round(band.bottom_mm[k], 9), round(band.top_mm[k], 9)}
+    points: dict[Vertex, int] = {}
+    triangles, materials, shares = [], [], []
+    faces: dict[Edge, tuple[str, str]] = {}
+    for part, often in zip(piece.slices, piece.shares, strict=True):
+        for name, outline in _polygons(part, heights):
+            middle = (sum(u for u, _ in outline) / len(outline), sum(v for _, v in outline) / len(outline))
+            for a, b in pairwise([*outline, outline[0]]):
+                left, right = faces.get((a, b) if a < b else (b, a), ("", ""))
+                faces[(a, b) if a < b else (b, a)] = (name, right) if a < b else (left, name)
+                if name not in ENDS:
+                    triangles.append([points.setdefault(p, len(points)) for p in (middle, a, b)])
+                    materials.append(name)
+                    shares.append(often)
+    return Plane(
+        np.array(list(points)), np.array(triangles), tuple(materials), np.array(shares), faces, section.depth_mm
+    )
+
+
+def _polygons(part: Slice, heights: dict[float, set[float]]) -> Iterator[tuple[str, list[Vertex]]]:
+    """Bands of a slice, counter-clockwise, with every corner that their neighbours have on their sides."""
+    left, right = round(part.left_mm, 9), round(part.right_mm, 9)
+    for band in part.bands:
+        (low_l, low_r), (top_l, top_r) = ((round(v, 9) for v in line) for line in (band.bottom_mm, band.top_mm))
+        up = [(right, v) for v in sorted(heights[right]) if low_r <= v <= top_r]
+        down = [(left, v) for v in sorted(heights[left], reverse=True) if low_l <= v <= top_l]
+        if max(top_l - low_l, top_r - low_r) > ROUNDING_MM:
+            yield band.terminal or band.material, [*up, *down]
+
+
+def share(found: Plane | Grid) -> float:
+    """How often the cell occurs in the sensor [-]; raises ValueError where the sensor's end cuts it."""
+    if np.ptp(found.shares) > ROUNDING_MM:
+        raise ValueError("the sensor's end cuts its repeating cell")
+    return float(np.ravel(found.shares)[0])
+
+
+def permittivities(found: Plane, permittivity: "dict[str, float]") -> Real:
+    """Of each triangle, times how often it occurs [-]."""
+    return np.array([permittivity[name] for name in found.materials]) * found.shares
+
+
+def nodes(planes_mm: Real, layers: int) -> Real:
+    """Planes of a finer grid, with layers that shrink towards both ends of each distance [mm]."""
+    near = RATIO ** np.arange(layers, 0, -1)
+    steps = np.concatenate([[0.0], near, 1 - near[::-1]]) if layers else np.zeros(1)
+    inner = planes_mm[:-1, None] + np.diff(planes_mm)[:, None] * steps
+    return np.append(inner.ravel(), planes_mm[-1])

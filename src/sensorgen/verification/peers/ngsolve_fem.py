@@ -1,0 +1,109 @@
+"""Capacitance by NGSolve: triangles refined by Zienkiewicz and Zhu's estimate, or bricks; elements of high order.
+
+Run it in a process that does not load the CAD kernel.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.scene.scene import Scene
+from sensorgen.verification.peers import cells
+
+_ORDER = 3  # on triangles
+_WORST = 0.25  # of the largest error: triangles with more are refined
+_BRICK = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
+_SIDES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (2, 3, 7, 6), (1, 2, 6, 5), (3, 0, 4, 7))  # of a brick
+
+
+def plane(scene: Scene, permittivity: Mapping[str, float], unknowns: int) -> float:
+    """From above [F]: triangles are refined until there are that many unknowns."""
+    import netgen.meshing as netgen
+    import ngsolve as ng
+
+    found = cells.geometry(scene)
+    if not isinstance(found, cells.Plane):
+        raise ValueError("its cross-section changes along its depth")
+    values = cells.permittivities(found, dict(permittivity))
+    kinds, which = np.unique(values, return_inverse=True)
+    made = netgen.Mesh(2)
+    made.AddPoints(np.column_stack([found.points_mm, np.zeros(len(found.points_mm))]))
+    for k in range(len(kinds)):
+        made.Add(netgen.FaceDescriptor(surfnr=k + 1, domin=k + 1, domout=0, bc=k + 1))
+        made.AddElements(dim=2, index=k + 1, data=found.triangles[which == k].astype(np.int32), base=0)
+        made.SetMaterial(k + 1, f"m{k}")
+    number = {tuple(p): k for k, p in enumerate(found.points_mm.tolist())}
+    for k, end in enumerate(cells.ENDS):
+        edges = [[number[a], number[b]] for (a, b), held in found.held().items() if held == end]
+        made.AddElements(dim=1, index=k + 1, data=np.array(edges, np.int32), base=0)
+        made.SetBCName(k, end)
+    mesh = ng.Mesh(made)
+    eps = ng.CoefficientFunction(kinds.tolist())
+    while True:
+        energy, field, count = _solved(ng, mesh, eps, _ORDER)
+        if count >= unknowns:
+            return energy * EPS0_F_PER_M * M_PER_MM * found.depth_mm
+        smooth = ng.GridFunction(ng.HDiv(mesh, order=_ORDER - 1))
+        smooth.Set(eps * ng.grad(field))
+        off = eps * ng.grad(field) - smooth
+        error = ng.Integrate(off * off / eps, mesh, ng.VOL, element_wise=True).NumPy()
+        mesh.ngmesh.Elements2D().NumPy()["refine"] = (error > _WORST * error.max())[: mesh.ne]
+        mesh.Refine()
+
+
+def _solved(ng: Any, mesh: Any, eps: Any, order: int) -> tuple[float, Any, int]:
+    """Energy over that of empty space, the potential, and unknowns."""
+    fes = ng.H1(mesh, order=order, dirichlet="top|bottom")
+    u, v = fes.TnT()
+    field = ng.GridFunction(fes)
+    field.Set(ng.CF(1), definedon=mesh.Boundaries("top"))
+    form = ng.BilinearForm(eps * ng.grad(u) * ng.grad(v) * ng.dx, symmetric=True).Assemble()
+    residual = form.mat.CreateColVector()
+    residual.data = form.mat * field.vec
+    field.vec.data -= form.mat.Inverse(fes.FreeDofs(), "sparsecholesky") * residual
+    energy = ng.Integrate(eps * ng.grad(field) * ng.grad(field), mesh, order=2 * order)  # 5 unless given
+    return float(energy), field, fes.ndof
+
+
+def boxes(scene: Scene, permittivity: Mapping[str, float], layers: int, order: int) -> float:
+    """From above [F], each box of the cell with so many layers that shrink towards its edges."""
+    import netgen.meshing as netgen
+    import ngsolve as ng
+
+    found = cells.geometry(scene)
+    if isinstance(found, cells.Plane):
+        raise ValueError("it is a cross-section")
+    planes = [cells.nodes(p, layers) for p in found.planes_mm]
+    pieces = 2 * layers + 1
+    fill = found.fill.repeat(pieces, 0).repeat(pieces, 1).repeat(pieces, 2)
+    shares = found.shares.repeat(pieces, 0).repeat(pieces, 1)
+    values = np.array([0.0, 0.0, *(permittivity[name] for name in found.names[2:])])
+    kinds = {v: k + 1 for k, v in enumerate(np.unique((values[fill] * shares[:, :, None])[fill > 1]))}
+    made = netgen.Mesh(3)
+    made.Add(netgen.FaceDescriptor(surfnr=1, domin=1, domout=0, bc=1))
+    made.Add(netgen.FaceDescriptor(surfnr=2, domin=1, domout=0, bc=2))
+    points: dict[tuple[int, ...], Any] = {}
+
+    def point(at: tuple[int, ...]) -> Any:
+        if at not in points:
+            points[at] = made.Add(netgen.MeshPoint(netgen.Pnt(*(float(planes[n][k]) for n, k in enumerate(at)))))
+        return points[at]
+
+    padded = np.pad(fill, 1, constant_values=-1)
+    for at in np.argwhere(fill > 1).tolist():
+        corners = [point(tuple(a + d for a, d in zip(at, step, strict=True))) for step in _BRICK]
+        made.Add(netgen.Element3D(kinds[values[fill[tuple(at)]] * shares[at[0], at[1]]], corners))
+        x, y, z = (a + 1 for a in at)
+        around = (padded[x, y, z - 1], padded[x, y, z + 1], padded[x, y - 1, z], padded[x, y + 1, z],
+                  padded[x + 1, y, z], padded[x - 1, y, z])  # fmt: skip
+        for side, neighbour in zip(_SIDES, around, strict=True):
+            if neighbour in (0, 1):
+                made.Add(netgen.Element2D(int(neighbour) + 1, [corners[k] for k in side]))
+    made.SetBCName(0, "bottom")
+    made.SetBCName(1, "top")
+    for k in kinds.values():
+        made.SetMaterial(k, f"m{k}")
+    energy, _, _ = _solved(ng, ng.Mesh(made), ng.CoefficientFunction(list(kinds)), order)
+    return energy * EPS0_F_PER_M * M_PER_MM
