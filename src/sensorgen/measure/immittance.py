@@ -16,14 +16,15 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.units import PREFIXES, frequency_hz, si
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from sensorgen.core.arrays import Real
 
 UNITS: Mapping[str, str] = MappingProxyType({
     "R": "ohm", "X": "ohm", "Z": "ohm", "phase": "rad", "G": "S", "B": "S", "Y": "S", "Cp": "F", "Cs": "F", "Lp": "H",
@@ -213,15 +214,15 @@ def pair(quantities: Collection[str]) -> tuple[str, str] | None:
 
 
 _OF: Mapping[str, Callable[[Any, Any], Any]] = MappingProxyType({  # impedance and angular frequency to a quantity
-    "R": lambda z, _w: z.real, "X": lambda z, _w: z.imag, "Z": lambda z, _w: np.abs(z),
-    "phase": lambda z, _w: np.angle(z), "G": lambda z, _w: (1 / z).real, "B": lambda z, _w: (1 / z).imag,
-    "Y": lambda z, _w: 1 / np.abs(z), "Cp": lambda z, w: (1 / z).imag / w, "Cs": lambda z, w: -1 / (w * z.imag),
+    "R": lambda z, _w: z.real, "X": lambda z, _w: z.imag, "Z": lambda z, _w: abs(z),
+    "G": lambda z, _w: (1 / z).real, "B": lambda z, _w: (1 / z).imag,
+    "Y": lambda z, _w: 1 / abs(z), "Cp": lambda z, w: (1 / z).imag / w, "Cs": lambda z, w: -1 / (w * z.imag),
     "Lp": lambda z, w: -1 / (w * (1 / z).imag), "Ls": lambda z, w: z.imag / w, "Rp": lambda z, _w: 1 / (1 / z).real,
-    "D": lambda z, _w: z.real / np.abs(z.imag), "Q": lambda z, _w: np.abs(z.imag) / z.real,
+    "D": lambda z, _w: z.real / abs(z.imag), "Q": lambda z, _w: abs(z.imag) / z.real,
 })  # fmt: skip
 
 
-def quantity_of(quantity: str, z_ohm: ArrayLike, frequency_hz: ArrayLike) -> Real:
+def quantity_of(quantity: str, z_ohm: "ArrayLike", frequency_hz: "ArrayLike") -> "Real":
     """A quantity of impedances.
 
     Parameters
@@ -241,7 +242,12 @@ def quantity_of(quantity: str, z_ohm: ArrayLike, frequency_hz: ArrayLike) -> Rea
     >>> round(float(quantity_of("Cp", 318183 - 15909131j, 1e3)) * 1e12, 4)
     10.0
     """
-    return np.asarray(_OF[quantity](np.asarray(z_ohm, complex), 2 * math.pi * np.asarray(frequency_hz)), float)
+    import numpy as np
+
+    z = np.asarray(z_ohm, complex)
+    if quantity == "phase":
+        return np.angle(z)
+    return np.asarray(_OF[quantity](z, 2 * math.pi * np.asarray(frequency_hz)), float)
 
 
 def shown_value(quantity: str, value: float) -> str:
