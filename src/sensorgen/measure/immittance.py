@@ -246,7 +246,7 @@ def quantity_of(quantity: str, z_ohm: "ArrayLike", frequency_hz: "ArrayLike") ->
 
     z = np.asarray(z_ohm, complex)
     if quantity == "phase":
-        return np.angle(z)
+        return np.asarray(np.angle(z), float)
     return np.asarray(_OF[quantity](z, 2 * math.pi * np.asarray(frequency_hz)), float)
 
 
