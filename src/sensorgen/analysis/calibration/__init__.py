@@ -175,6 +175,11 @@ class Known:
     left_out: tuple[str, ...]
     notes: tuple[str, ...]
 
+    @property
+    def recorded(self) -> bool:
+        """Whether the bench measured it."""
+        return bool((self.data.rest_noise < 1).all())
+
 
 def known(
     log: Log, specimen: str, bench: Bench, recordings: Sequence[int] = (), body_of: BodyOf = bodies.default_body
@@ -194,7 +199,8 @@ def known(
     model = SpecimenModel(predicted.sensor, tones, spread_of(predicted, bench))
     _check_presses(name, model, data)
     if meter:
-        notes.append(f"{len(read)} readings of meters count, {_BAKED[read[-1].baked]}")
+        count = "1 reading of a meter counts" if len(read) == 1 else f"{len(read)} readings of meters count"
+        notes.append(f"{count}, {_BAKED[read[-1].baked]}")
     uids = (*(row.uid for row in rows), *(one.uid for one in read))
     return Known(
         name, design, predicted, model, replace(data, meter=meter), uids, tuple(left_out), (*notes, *predicted.doubts)
@@ -269,7 +275,7 @@ def calibrate(
         notes = (*one.notes, f"lead, stray and offsets shared with {others}") if others else one.notes
         calibration = Calibration(
             one.specimen, one.design.name, one.design.id(), one.model, posterior, most, held[0] if held else None,
-            one.rows, tuple(gain(one.model, one.data, posterior.at).tolist()), notes,
+            one.rows, tuple(gain(one.model, one.data, posterior.at).tolist()) if one.recorded else (), notes,
         )  # fmt: skip
         made.append(Made(calibration, one.data, held[1] if held else None))
     return made

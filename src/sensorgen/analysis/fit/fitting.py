@@ -86,7 +86,7 @@ def fit(
     step("errors")
     errors = [
         *_reading_errors({specimen for specimen, _ in readings} & kept_back, found, values),
-        *_rest_errors([one for one, _ in measured if one.specimen in kept_back], found, values),
+        *_rest_errors([one for one, _ in measured if one.recorded and one.specimen in kept_back], found, values),
     ]
     return Fit(
         iteration, specimens, seed, tuple(values), tuple(untold), tuple(errors), len(names) - len(kept_back),
@@ -186,9 +186,9 @@ def _rest_errors(specimens: Sequence[Known], found: Comparison, values: Sequence
     after: list[float] = []
     for one in specimens:
         body = found.bodies[found.names[one.specimen]]
-        f, told = one.model.frequency_hz, one.data.rest_noise < 1
         for of, into in ((body, before), (with_values(body, values), after)):
-            into.extend(np.abs(one.data.rest - at_rest(Movable(of).model.sensor, f))[told].tolist())
+            sensor = Movable(of).model.sensor
+            into.extend(np.abs(one.data.rest - at_rest(sensor, one.model.frequency_hz)).tolist())
     return [Error("Z at rest", len(before), _rms(before), _rms(after))] if before else []
 
 

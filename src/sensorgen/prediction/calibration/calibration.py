@@ -149,11 +149,10 @@ class Calibration:
     def document(self) -> Iterator[Part]:
         """What the calibration is worth, its values, and what it could not tell."""
         p, held = self.posterior, self.held_out
-        yield (
-            f"{self.specimen}, design {self.design}: calibrated by {p.presses} known "
-            f"press{'es' * (p.presses != 1)} up to {self.force_n:.3g} N under a tip of "
-            f"{self.model.sensor.tip_m * 1e3:g} mm and its readings at rest"
-        )
+        by = f"{p.presses} known press{'es' * (p.presses != 1)} up to {self.force_n:.3g} N under a tip of "
+        by += f"{self.model.sensor.tip_m * 1e3:g} mm and its readings at rest"
+        by = by if p.presses else "its readings at rest alone"
+        yield f"{self.specimen}, design {self.design}: calibrated by {by}"
         if held:
             yield (
                 f"presses held back in turn, each a mean over a second: {held.force} of {held.presses} forces and "
