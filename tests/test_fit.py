@@ -309,12 +309,28 @@ def test_specimens_of_any_name(tmp_path, capsys):
     cli.main(["fit", "S1", "S2", "S3", "--drawn", "--log", place], standalone_mode=False)
     said = " ".join(capsys.readouterr().out.split())
     assert "S1, S2, S3: fitted to 3, 0 held back" in said
-    assert own.names() == ["fit-s1-and-2"]
-    fitted = yaml.safe_load(own.path("fit-s1-and-2").read_text("utf-8"))["materials"]
+    (source,) = own.names()
+    assert source.startswith("fit-s1-")
+    fitted = yaml.safe_load(own.path(source).read_text("utf-8"))["materials"]
     eps = fitted["x60"]["relative_permittivity"]
-    data = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}, "materials": {"dielectric": "x60@fit-s1-and-2"}}
+    data = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}, "materials": {"dielectric": f"x60@{source}"}}
     assert rest_state(drawn(make(data))).capacitance.value * 1e12 == pytest.approx(1.2 * c_pf, rel=0.02)
     assert eps["low"] < eps["value"] < eps["high"]
+    # a specimen of which one quantity is known, and one whose repeats are all but equal, take nothing away
+    few = (("--Cs", f"{1.2 * c_pf:.6g}pF@1kHz"), ("--C", f"{1.2 * c_pf:.9g}/{1.2 * c_pf * (1 + 1e-13):.16g}pF@4kHz"))
+    for name, words in zip(("S4", "S5"), few, strict=True):
+        assert not cli.main(["log", "add", name, "--design", str(file), *words, "--log", place], standalone_mode=False)
+        cli.main(["fit", name, "--drawn", "--dry-run", "--log", place], standalone_mode=False)
+    capsys.readouterr()
+    cli.main(["fit", "S1", "S2", "S3", "S4", "S5", "--drawn", "--log", place], standalone_mode=False)
+    assert len(own.names()) == 2  # other specimens, another source
+    said = " ".join(capsys.readouterr().out.split())
+    assert "relative_permittivity" in said.partition("not determined")[0]
+    assert "resistivity_ohm_m" in said.partition("not determined")[0]
+    with pytest.raises(BadInput, match="more than a number can hold"):
+        cli.main(
+            ["log", "add", "S6", "--design", str(file), "--C", "1e999pF@1kHz", "--log", place], standalone_mode=False
+        )
     with pytest.raises(BadInput, match="expected either specimens"):
         cli.main(["fit", "S1", "--iteration", "3", "--log", place], standalone_mode=False)
     with pytest.raises(BadInput, match="nobody"):

@@ -244,3 +244,18 @@ def test_meters_alone_calibrate_what_they_can(bench):
     assert more["upper"] / more["lower"] > 1.05  # however many frequencies one session has
     assert bench("log", "withdraw", "reading", "3", "--reason", "slipped").code == 0
     assert "were withdrawn or corrected" in bench("invert", "S2", "none.csv").line
+
+
+def test_readings_that_no_specimen_has_are_named(bench):
+    """A phase of the wrong sign, a capacitance in F for pF; a remark that is no reading changes nothing."""
+    assert bench("log", "specimen", "S2", "--design", "mine.yaml").code == 0
+    assert bench("log", "add", "S2", "--Z", "2.6Mohm@1kHz", "--phase", "88deg@1kHz", "--baked").code == 0
+    said = bench("calibrate", "S2", "--drawn")
+    assert said.code == 2
+    assert "left out: no capacitor" in said.line
+    assert bench("log", "add", "S2", "--C", "60F@1kHz", "--baked").code == 0
+    assert bench("log", "add", "S2", "--remark", "moved to another box").code == 0
+    found = bench("calibrate", "S2", "--drawn", "--dry-run")
+    assert found.code == 0, found.err
+    assert "2 readings of meters count, baked" in found.words
+    assert "fit no specimen of this design" in found.words

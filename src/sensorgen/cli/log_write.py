@@ -96,7 +96,7 @@ def _asked_mega(**typed: str) -> bool:
     from sensorgen.measure.log.notes import resistance
 
     found = [word for axis, words in typed.items() for word in resistance(axis, words).mega]
-    if not found or not sys.stdin.isatty():
+    if not found or not (sys.stdin and sys.stdin.isatty()):
         return False
     if not click.confirm(f"{', '.join(found)}: is m mega (a million)?", default=True, err=True):
         raise BadInput(f"{found[0]!r} is not logged; write M for mega, or 0.0011 for 1.1 milliohm")
@@ -107,7 +107,7 @@ def _measured(visa: str, axis: str | None, wires: str) -> tuple[str, str, str]:
     """Words of a meter for Y and Z, and what it calls itself; leads are moved between the two."""
     from sensorgen.measure.log.meter import Meter
 
-    if axis is None and not sys.stdin.isatty():
+    if axis is None and not (sys.stdin and sys.stdin.isatty()):
         raise BadInput("--visa without --axis needs somebody to move the leads; expected --axis y or --axis z")
     found = {"y": "", "z": ""}
     with Meter(visa) as meter:

@@ -274,6 +274,8 @@ def opened(path: Path | str, columns: Mapping[str, str] = SAME_NAMES) -> Iterato
         A file that is missing or cannot be read; a header without a column that ``columns`` names.
     """
     if path == "-":
+        if sys.stdin is None:
+            raise BadInput("the standard input is closed; expected a CSV table there, or the name of a file")
         yield Table("standard input", Waiting(sys.stdin.buffer), columns)
         return
     if Path(path).is_dir():

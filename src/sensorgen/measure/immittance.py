@@ -105,6 +105,8 @@ def parse(quantity: str, text: str) -> tuple[AcReading, ...]:
         for match in matches:
             scale = factor(quantity, match["unit"] or last)
             value, stated = (float(_decimal(match[name] or "0") * scale) for name in ("value", "pm"))
+            if not math.isfinite(value) or not math.isfinite(stated):
+                raise BadInput("more than a number can hold; expected a value as it was read")
             readings.append(AcReading(quantity, value, frequency, abs(stated)))
     return tuple(readings)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from sensorgen.analysis.calibration.meters import readings_of
 from sensorgen.analysis.calibration.pairs import known_presses, nothing_recorded
+from sensorgen.core.arrays import Real
 from sensorgen.core.document import Part
 from sensorgen.core.errors import BadInput, MissingValue, within
 from sensorgen.core.version import __version__
@@ -24,7 +25,7 @@ from sensorgen.prediction.calibration.fitting import Data, calibrated, gain, sha
 from sensorgen.prediction.calibration.inversion import Found
 from sensorgen.prediction.calibration.rest import checked
 from sensorgen.prediction.calibration.specimen import SpecimenModel, Spread
-from sensorgen.prediction.inverse.verdict import NORMAL_90
+from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import TIP_M, TONES_HZ, Query, Tip
 from sensorgen.prediction.sensor_model import SensorModel
@@ -189,13 +190,16 @@ def known(
     rows = _chosen(log, name, recordings)
     body = body_of(design)
     predicted, _ = sensor_model(body, Query(tip=Tip(bench.tip_m)))
-    meter, read = readings_of(log, name, body_of, predicted.sensor.common_resistivity_ohm_m())
+    meter, read, unfit = readings_of(log, name, body_of, predicted.sensor.common_resistivity_ohm_m())
     if rows or meter is None:
-        data, tones, left_out = known_presses(log, name, rows)
+        with within("; ".join(unfit)):
+            data, tones, left_out = known_presses(log, name, rows)
         notes = list(left_out)
     else:
         data, tones, left_out = nothing_recorded(), np.array(TONES_HZ), []
         notes = ["no recording: R, C and leak by meters alone"]
+    left_out += unfit
+    notes += unfit
     model = SpecimenModel(predicted.sensor, tones, spread_of(predicted, bench))
     _check_presses(name, model, data)
     if meter:
@@ -260,6 +264,7 @@ def calibrate(
     bench = bench or Bench()
     if len(set(specimens)) < len(specimens):
         raise BadInput(f"a specimen stands twice in {', '.join(specimens)}; expected each once")
+    _check_numbers(log, [design_of(log, specimen)[0] for specimen in specimens], recordings)
     found = []
     for specimen in specimens:
         step(specimen)
@@ -272,7 +277,8 @@ def calibrate(
         most = float(one.data.presses.force_n.max(initial=0.0)) or 6.0
         held = held_out(one.model, one.data, BEYOND * most, step)
         others = ", ".join(other.specimen for other in found if other is not one)
-        notes = (*one.notes, f"lead, stray and offsets shared with {others}") if others else one.notes
+        notes = (*one.notes, *_off(one, posterior.at))
+        notes += (f"lead, stray and offsets shared with {others}",) if others else ()
         calibration = Calibration(
             one.specimen, one.design.name, one.design.id(), one.model, posterior, most, held[0] if held else None,
             one.rows, tuple(gain(one.model, one.data, posterior.at).tolist()) if one.recorded else (), notes,
@@ -283,11 +289,24 @@ def calibrate(
 
 def _chosen(log: Log, name: str, numbers: Sequence[int]) -> list[BenchRun]:
     """Recordings of a specimen: those of these numbers, or all."""
-    runs = log.recordings(specimen=name)
-    if missing := sorted(set(numbers) - {run.number for run in runs}):
-        has = ", ".join(str(run.number) for run in runs) or "none"
-        raise BadInput(f"no recording {missing[0]} of {name}; expected one of its own: {has}")
-    return [run for run in runs if not numbers or run.number in numbers]
+    return [run for run in log.recordings(specimen=name) if not numbers or run.number in numbers]
+
+
+def _check_numbers(log: Log, names: Sequence[str], numbers: Sequence[int]) -> None:
+    """Refuse numbers of recordings that none of the specimens has."""
+    own = sorted(run.number for name in names for run in log.recordings(specimen=name))
+    if missing := sorted(set(numbers) - set(own)):
+        has = ", ".join(map(str, own)) or "none"
+        raise BadInput(f"no recording {missing[0]} of {', '.join(names)}; expected one of its own: {has}")
+
+
+def _off(one: Known, at: Real) -> tuple[str, ...]:
+    """What is to be said of readings of meters that no specimen of the design can have."""
+    meter = one.data.meter
+    off = meter.off(one.model, at) if meter else np.zeros(1)
+    if off @ off <= chi2_limit(np.array(len(off))):
+        return ()
+    return ("the readings of meters fit no specimen of this design: check their signs, units and frequencies",)
 
 
 def _check_presses(name: str, model: SpecimenModel, data: Data) -> None:
@@ -360,6 +379,7 @@ def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
     old = stored(log, name)
     if old is None:
         raise BadInput(f"{name} was never calibrated: sensorgen calibrate {name!r} first")
+    _check_numbers(log, [name], recordings)
     rows = [row for row in _chosen(log, name, recordings) if row.uid not in old.rows]
     data, tones, left_out = known_presses(log, name, rows)
     with within(name):

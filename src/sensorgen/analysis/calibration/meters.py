@@ -19,11 +19,15 @@ from sensorgen.prediction.inverse.verdict import NORMAL_90
 
 _R, _X = 0.05, 0.02  # a specimen's resistance and reactance differ by as much from session to session [-]
 _UNKNOWN = 0.01  # of abs(Z): standard uncertainty of a meter that nothing is known of
+_FINEST = 1e-6  # relative uncertainty below which no meter is
+_OF_R = ("R", "Rp", "G", "D", "Q")  # quantities that follow the resistance, where no pair makes an impedance
 _LN = 0.3  # relative uncertainty up to which a value's logarithm is taken
 
 
-def readings_of(log: Log, name: str, body_of: BodyOf, resistivity_ohm_m: float) -> tuple[Meter | None, list[Reading]]:
-    """Readings of a specimen in the state that it was last read in, baked or not; and those that count.
+def readings_of(
+    log: Log, name: str, body_of: BodyOf, resistivity_ohm_m: float
+) -> tuple[Meter | None, list[Reading], list[str]]:  # fmt: skip
+    """Readings of a specimen in the state that it was last read in, baked or not; those that count; what does not.
 
     Parameters
     ----------
@@ -36,9 +40,9 @@ def readings_of(log: Log, name: str, body_of: BodyOf, resistivity_ohm_m: float) 
     resistivity_ohm_m : float
         As predicted [ohm m].
     """
-    logged = list(log.entries(Reading, specimen=name))
+    logged = [one for one in log.entries(Reading, specimen=name) if one.value or one.y_ohm or one.z_ohm]
     if not logged:
-        return None, []
+        return None, [], []
     state = logged[-1].baked
     counted = [one for one in logged if one.baked == state]
     found = of_iteration(log, None, body_of=body_of, specimens=[name])
@@ -51,7 +55,8 @@ def readings_of(log: Log, name: str, body_of: BodyOf, resistivity_ohm_m: float) 
     if ranges:
         low, high = (float(np.mean([getattr(each, end) for each in ranges])) for end in ("low", "high"))
         ln_resistance = (low + high) / 2 - ln(resistivity_ohm_m), hypot((high - low) / 2 / NORMAL_90, _R)
-    return _meter([said for one in counted for said in _alternating(one)], ln_resistance), counted
+    left_out = list[str]()
+    return _meter([said for one in counted for said in _alternating(one, left_out)], ln_resistance), counted, left_out
 
 
 class _Said(NamedTuple):
@@ -65,30 +70,40 @@ class _Said(NamedTuple):
     by_x: float  # with the reactance's
 
 
-def _alternating(reading: Reading) -> Iterator[_Said]:
-    """AC quantities that a passive specimen can have: of a pair and more, the pair."""
+def _alternating(reading: Reading, left_out: list[str]) -> Iterator[_Said]:
+    """AC quantities that a capacitor can have: of a pair and more, the pair."""
     for f in sorted(set(reading.frequency_hz)):
         at = accuracy.at_frequency(reading, f)
         z = at.z_ohm
+        if at.impedances and z is not None and not (z.real > 0 > z.imag):
+            what = "a negative resistance" if z.real <= 0 else "no capacitor"
+            left_out.append(f"reading {reading.number} at {f:g} Hz left out: {what} (X = {z.imag:.3g} ohm)")
+            continue
         for quantity in pair(at.values) or at.values:
             value, error = vars(at.value(quantity)).values()
-            if value == 0 or (value < 0 and quantity in NEVER_NEGATIVE):
+            if not isfinite(value) or value == 0 or (value < 0 and quantity in NEVER_NEGATIVE):
                 continue
-            if z is None:
-                by_r, by_x = abs(value) * _R, 0.0
-                error = error if isfinite(error) else abs(value) * _UNKNOWN
-            else:
+            if at.impedances and z is not None:
                 ends = quantity_of(quantity, [z, z + _R * z.real, z + 1j * _X * z.imag], f)
                 by_r, by_x = (ends[1:] - ends[0]).tolist()
-                error = error if isfinite(error) else accuracy.uncertainty(_UNKNOWN, quantity, value, z)
-            yield _Said(quantity, f, value, error, by_r, by_x)
+                unknown = accuracy.uncertainty(_UNKNOWN, quantity, value, z)
+            else:
+                of_r = quantity in _OF_R
+                by_r, by_x = abs(value) * _R * of_r, abs(value) * _X * (not of_r)
+                unknown = abs(value) * _UNKNOWN
+            if at.meter is None and not at.stated.get(quantity):  # repeats alone do not say what is common to them
+                error = hypot(np.nan_to_num(error), unknown)
+            error = max(error if isfinite(error) else unknown, _FINEST * abs(value))
+            if np.isfinite([error, by_r, by_x]).all():
+                yield _Said(quantity, f, value, error, by_r, by_x)
 
 
 def _meter(said: Sequence[_Said], ln_resistance: tuple[float, float] | None) -> Meter | None:
     if not said and not ln_resistance:
         return None
     value, error, by_r, by_x = (np.array([one[k] for one in said], float) for k in range(2, 6))
-    as_ln = (value > 0) & (np.hypot(error, np.hypot(by_r, by_x)) < _LN * value)
+    magnitude = np.array([one.quantity in NEVER_NEGATIVE for one in said], bool)
+    as_ln = magnitude & (value > 0) & (np.hypot(error, np.hypot(by_r, by_x)) < _LN * value)
     unit = np.where(as_ln, np.abs(value), 1.0)
 
     def scaled(values: Real) -> Real:

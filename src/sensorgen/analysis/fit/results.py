@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from hashlib import sha256
 from math import exp
 from typing import Annotated
 
@@ -108,8 +109,9 @@ class Fit:
         """Name of the source that it makes."""
         if self.iteration is not None:
             return f"fit-{self.iteration}"
-        first, *others = (re.sub(r"[^a-z0-9.]+", "-", name.lower()).strip("-.") for name in self.names)
-        return f"fit-{first}" + (f"-and-{len(others)}" if others else "")
+        first = re.sub(r"[^a-z0-9.]+", "-", self.names[0].lower()).strip("-.")
+        which = sha256("\0".join(sorted(self.names)).encode()).hexdigest()[:6]
+        return "-".join(filter(None, ("fit", first, which)))
 
     @property
     def of(self) -> str:

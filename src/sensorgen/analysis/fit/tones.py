@@ -21,6 +21,8 @@ MODULUS = "youngs_modulus_pa"
 _SURE = 2.0  # standard errors on either side of a value
 _UNSURE = log(3.0)  # standard error of a logarithm from which on the data do not tell
 _BETWEEN, _WEIGHT = 0.1, 3  # prior of the scatter of ln of a value between prints: its size, worth so many of them
+_OPEN = 0.95  # of the prior's standard deviation, from which on nothing was learnt of the leak
+_LEAST = 1e-3  # of a parameter's variance that readings must have taken away: with less they say nothing
 _SOFTER = 1.05  # factor on a force, to see how the rise depends on it
 
 
@@ -33,7 +35,7 @@ class OfSpecimen:
     of: Movable
     resistivity: tuple[float, float]
     capacitance: tuple[float, float]
-    leak_s: tuple[float, float]
+    leak_s: tuple[float, float] | None
     stiffness: tuple[float, float] | None
 
 
@@ -58,7 +60,7 @@ def of_specimen(known: Known, print_: str, of: Movable) -> OfSpecimen:
     return OfSpecimen(
         known.specimen, print_, of, _alone(model, found, "resistance", model.spread.resistance),
         _alone(model, found, "capacitance", model.spread.capacitance),
-        (siemens, siemens * (exp(_SURE * ln) - 1) / _SURE), stiffness,
+        (siemens, siemens * (exp(_SURE * ln) - 1) / _SURE) if sd < _OPEN else None, stiffness,
     )  # fmt: skip
 
 
@@ -70,8 +72,8 @@ def _at(model: SpecimenModel, found: Posterior, name: str) -> tuple[float, float
 def _alone(model: SpecimenModel, found: Posterior, name: str, scale: float) -> tuple[float, float]:
     """What the readings say of a parameter without the prior, which is standard normal."""
     at, sd = _at(model, found, name)
-    told = 1 - sd**2
-    return (scale * at / told, scale * sd / sqrt(told)) if told > 0 else (0.0, inf)
+    known = 1 - sd**2
+    return (scale * at / known, scale * sd / sqrt(known)) if known > _LEAST else (0.0, inf)
 
 
 def _stiffness(known: Known, found: Posterior) -> tuple[float, float]:
@@ -110,24 +112,28 @@ def values(fits: Sequence[OfSpecimen]) -> list[Fitted | Untold]:
         return [Untold(PERMITTIVITY, none), Untold(MODULUS, none)]
     sensor, film = fits[0].of.model.sensor, fits[0].of.film
     electrode = fits[0].of.body.design.slot("top_electrode")[0].name
+    of_r, of_c, of_e = (
+        [fit for fit in fits if (found := getattr(fit, name)) and found[1] < _UNSURE]
+        for name in ("resistivity", "capacitance", "stiffness")
+    )
     along = [
-        (fit.resistivity[0] + log(fit.of.model.sensor.common_resistivity_ohm_m()), fit.resistivity[1]) for fit in fits
+        (fit.resistivity[0] + log(fit.of.model.sensor.common_resistivity_ohm_m()), fit.resistivity[1]) for fit in of_r
     ]
     pressed = [
-        (fit, (fit.stiffness[0] + log(t.value), fit.stiffness[1])) for fit in fits if fit.stiffness
+        (fit, (fit.stiffness[0] + log(t.value), fit.stiffness[1])) for fit in of_e if fit.stiffness
         for t in fit.of.model.values if t.material == film and t.quantity == MODULUS
     ]  # fmt: skip
-    rho = f"Re Z of {_specimens(len(fits))}: one value for both electrodes, along them"
-    law = f"by the law of compression {sensor.compression.name}; all moduli move together"
+    rho: Fitted | Untold = Untold("resistivity_ohm_m along", "no reading of a specimen depends on it")
+    if along:
+        note = f"Re Z of {_specimens(len(along))}: one value for both electrodes, along them"
+        rho = _value(electrode, "resistivity_ohm_m", _together(along, _prints(of_r)), note, len(along))
     modulus: Fitted | Untold = Untold(MODULUS, "no recording with presses whose force and position are known")
     if pressed:
         moduli = [pair for _, pair in pressed]
         together = _together(moduli, _prints([fit for fit, _ in pressed]))
+        law = f"by the law of compression {sensor.compression.name}; all moduli move together"
         modulus = _value(film, MODULUS, together, f"presses of {_specimens(len(moduli))}, {law}", len(moduli))
-    return [
-        _value(electrode, "resistivity_ohm_m", _together(along, _prints(fits)), rho, len(fits)),
-        _permittivity(fits, film), modulus, _leak(fits, film),
-    ]  # fmt: skip
+    return [rho, _permittivity(of_c, film), modulus, _leak(fits, film)]
 
 
 def _value(material: str, quantity: str, ln: tuple[float, float], note: str, count: int) -> Fitted | Untold:
@@ -168,6 +174,8 @@ def _together(
 
 
 def _permittivity(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
+    if not fits:
+        return Untold(PERMITTIVITY, "no reading of a specimen depends on it")
     found = []
     for fit in fits:
         factor, curve = fit.of.by_permittivity
@@ -190,13 +198,15 @@ def _permittivity(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
 
 def _leak(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
     """Per area, where it stands out of its error in every recording."""
-    areas = [fit.of.model.sensor.length_m * fit.of.model.sensor.width_m for fit in fits]
-    found = [(fit.leak_s[0] / a, fit.leak_s[1] / a) for fit, a in zip(fits, areas, strict=True)]
+    known = [(fit, fit.leak_s, fit.of.model.sensor) for fit in fits if fit.leak_s]
+    if not known:
+        return Untold("leak", "no reading of a specimen depends on it")
+    found = [(at / (s.length_m * s.width_m), error / (s.length_m * s.width_m)) for _, (at, error), s in known]
     if any(at < _SURE * error for at, error in found):
         most = max(at + _SURE * error for at, error in found)
         return Untold("leak", f"in {_specimens(len(found))} no more than {most:.2g} S/m2, and none of it certain")
     typical = sum(at for at, _ in found) / len(found)
-    at, error = _together(found, _prints(fits), _BETWEEN * typical)
+    at, error = _together(found, _prints([fit for fit, _, _ in known]), _BETWEEN * typical)
     if at <= _SURE * error:
         return Untold("leak", f"{_specimens(len(found))} differ too much: {at:.2g} S/m2, give or take {error:.2g}")
     return Fitted(film, FILM_LEAK, at, at - _SURE * error, at + _SURE * error,
