@@ -60,7 +60,7 @@ def rise(found):
 
 def reference_table():
     yield "## Against curves that other programs solved\n"
-    yield "| film | loads | displacement off by at most | rise of C off by at most | bounds apart by | seconds |"
+    yield "| film | loads | displacement off by at most | rise of C off by at most | relative width of C | seconds |"
     yield "|---|---|---|---|---|---|"
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
     press2d.press(tri()[1], solids(), STRESSES[:2], EPS)  # imports
@@ -229,7 +229,7 @@ def pressed_row(name, cell, materials, stresses=STRESSES):
 
 RANGE_HEAD = (
     "| cell | reached [kPa] | displacement at the first load [um] | at the last [um] | C rises by "
-    "| apex at the last [um] | bounds apart by | seconds | said |\n|---|---|---|---|---|---|---|---|---|"
+    "| apex at the last [um] | relative width of C | seconds | said |\n|---|---|---|---|---|---|---|---|---|"
 )
 
 

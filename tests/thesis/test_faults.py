@@ -233,8 +233,8 @@ PLANTED_ELSEWHERE = {
         line_ladder, "impedance", lambda sound: lambda given, n: sound(given, n, one_sided=True),
         "figure 2.3 2.4 B.4",
     ),
-    "a cell that gives way twice as much": (compressed, "answer", further, "figure 6.5 6.8 6.9 6.11 6.12"),
-    "cells that do not give way": (compressed, "answer", stiff, "claim 6.1.2a 6.1.2b 7.1.1a 7.1.1b 7.1.1c"),
+    "a cell with twice the displacement": (compressed, "answer", further, "figure 6.5 6.8 6.9 6.11 6.12"),
+    "rigid cells": (compressed, "answer", stiff, "claim 6.1.2a 6.1.2b 7.1.1a 7.1.1b 7.1.1c"),
     "a field 0.1 % too large": (fem2d, "capacitance", wider, "figure 2.8 2.9 2.10 2.11"),
     "a field that does not rise": (
         fem2d, "capacitance", lambda _: lambda *_: Interval(1e-13, 1e-13), "figure 6.7",
