@@ -164,7 +164,7 @@ class Known:
     rows : tuple of str
         Of the log.
     left_out, notes : tuple of str
-        What was left out; all that is to be said of the data.
+        What was left out; all remarks on the data.
     """
 
     specimen: str
@@ -301,7 +301,7 @@ def _check_numbers(log: Log, names: Sequence[str], numbers: Sequence[int]) -> No
 
 
 def _off(one: Known, at: Real) -> tuple[str, ...]:
-    """What is to be said of readings of meters that no specimen of the design can have."""
+    """A remark on readings of meters that no specimen of the design can have."""
     meter = one.data.meter
     off = meter.off(one.model, at) if meter else np.zeros(1)
     if off @ off <= chi2_limit(np.array(len(off))):

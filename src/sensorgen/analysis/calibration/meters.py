@@ -1,4 +1,4 @@
-"""What meters said of a specimen: resistance along an electrode, AC quantities between the electrodes."""
+"""Readings of meters for a calibration: resistance along an electrode, AC quantities between the electrodes."""
 
 from collections.abc import Iterator, Sequence
 from math import hypot, isfinite
@@ -56,10 +56,14 @@ def readings_of(
         low, high = (float(np.mean([getattr(each, end) for each in ranges])) for end in ("low", "high"))
         ln_resistance = (low + high) / 2 - ln(resistivity_ohm_m), hypot((high - low) / 2 / NORMAL_90, _R)
     left_out = list[str]()
-    return _meter([said for one in counted for said in _alternating(one, left_out)], ln_resistance), counted, left_out
+    return (
+        _meter([measured for one in counted for measured in _alternating(one, left_out)], ln_resistance),
+        counted,
+        left_out,
+    )
 
 
-class _Said(NamedTuple):
+class _Measured(NamedTuple):
     """A quantity at one frequency, and what is uncertain of it."""
 
     quantity: str
@@ -70,7 +74,7 @@ class _Said(NamedTuple):
     by_x: float  # with the reactance's
 
 
-def _alternating(reading: Reading, left_out: list[str]) -> Iterator[_Said]:
+def _alternating(reading: Reading, left_out: list[str]) -> Iterator[_Measured]:
     """AC quantities that a capacitor can have: of a pair and more, the pair."""
     for f in sorted(set(reading.frequency_hz)):
         at = accuracy.at_frequency(reading, f)
@@ -95,14 +99,14 @@ def _alternating(reading: Reading, left_out: list[str]) -> Iterator[_Said]:
                 error = hypot(np.nan_to_num(error), unknown)
             error = max(error if isfinite(error) else unknown, _FINEST * abs(value))
             if np.isfinite([error, by_r, by_x]).all():
-                yield _Said(quantity, f, value, error, by_r, by_x)
+                yield _Measured(quantity, f, value, error, by_r, by_x)
 
 
-def _meter(said: Sequence[_Said], ln_resistance: tuple[float, float] | None) -> Meter | None:
-    if not said and not ln_resistance:
+def _meter(measured: Sequence[_Measured], ln_resistance: tuple[float, float] | None) -> Meter | None:
+    if not measured and not ln_resistance:
         return None
-    value, error, by_r, by_x = (np.array([one[k] for one in said], float) for k in range(2, 6))
-    magnitude = np.array([one.quantity in NEVER_NEGATIVE for one in said], bool)
+    value, error, by_r, by_x = (np.array([one[k] for one in measured], float) for k in range(2, 6))
+    magnitude = np.array([one.quantity in NEVER_NEGATIVE for one in measured], bool)
     as_ln = magnitude & (value > 0) & (np.hypot(error, np.hypot(by_r, by_x)) < _LN * value)
     unit = np.where(as_ln, np.abs(value), 1.0)
 
@@ -110,9 +114,9 @@ def _meter(said: Sequence[_Said], ln_resistance: tuple[float, float] | None) -> 
         return np.where(as_ln, np.log(np.where(as_ln, np.maximum(values, 1e-300), 1.0)), values)
 
     def observed(z: Complex) -> Real:
-        columns = [quantity_of(one.quantity, z[..., k], one.frequency_hz) for k, one in enumerate(said)]
+        columns = [quantity_of(one.quantity, z[..., k], one.frequency_hz) for k, one in enumerate(measured)]
         return scaled(np.stack(columns, -1)) if columns else np.empty((*z.shape[:-1], 0))
 
     covariance = np.diag((error / unit) ** 2) + sum(np.outer(by, by) for by in (by_r / unit, by_x / unit))
     root = np.linalg.inv(np.linalg.cholesky(covariance))
-    return Meter(np.array([one.frequency_hz for one in said]), observed, scaled(value), root, ln_resistance)
+    return Meter(np.array([one.frequency_hz for one in measured]), observed, scaled(value), root, ln_resistance)

@@ -1,4 +1,4 @@
-"""Resistivity, permittivity, leak and modulus from what the bench and LCR meters said of specimens.
+"""Resistivity, permittivity, leak and modulus from recordings and LCR meters' readings of specimens.
 
 Each specimen is calibrated (:mod:`sensorgen.prediction.calibration`); what its readings say beyond the prior counts.
 """
@@ -82,14 +82,14 @@ def _stiffness(known: Known, found: Posterior) -> tuple[float, float]:
     weights = model.law_weights()
     prior = np.linalg.inv(weights @ weights.T)
     posterior = np.linalg.inv(weights @ found.covariance @ weights.T)
-    told, pull = posterior - prior, posterior @ (weights @ found.at)  # of the readings alone
+    by_readings, pull = posterior - prior, posterior @ (weights @ found.at)  # of the readings alone
     common = weights[:, model.names.index("rise")]
     shape = np.linalg.inv(weights @ weights.T - np.outer(common, common))
-    through = shape @ np.linalg.inv(told + shape)
+    through = shape @ np.linalg.inv(by_readings + shape)
     slope = -_slopes(model)  # a film that is stiffer by a factor answers as to a weaker press
     in_range = np.array(FORCES_N) <= sensor.width_m * sensor.tip_m * model.most_pa
     slope = np.where(in_range, slope, 0.0)
-    information = float(slope @ through @ told @ slope)
+    information = float(slope @ through @ by_readings @ slope)
     return (float(slope @ through @ pull) / information, 1 / sqrt(information)) if information > 0 else (0.0, inf)
 
 

@@ -23,7 +23,7 @@ _LN_LOOSE = 3.0  # the same where presses tell: tighter, a specimen that never w
 
 @dataclass(frozen=True, eq=False)
 class Meter:
-    """What meters said of the specimen apart from the bench, with nothing on it.
+    """Readings of meters, apart from the bench, with nothing on the sensor.
 
     Attributes
     ----------
@@ -47,10 +47,10 @@ class Meter:
 
     def off(self, model: SpecimenModel, at: Real) -> Real:
         """Readings less what the parameters make of them, in standard deviations, (..., k + 1)."""
-        said = self.observed(np.exp(model.rest(at, self.frequency_hz)))
+        expected = self.observed(np.exp(model.rest(at, self.frequency_hz)))
         ln_r, sd = self.ln_resistance or (0.0, np.inf)
         resistance = (ln_r - model.spread.resistance * at[..., model.names.index("resistance")]) / sd
-        return np.concatenate([(self.value - said) @ self.root.T, resistance[..., None]], -1)
+        return np.concatenate([(self.value - expected) @ self.root.T, resistance[..., None]], -1)
 
     def slopes(self, model: SpecimenModel, at: Real) -> Real:
         """Derivatives of what is made of them by the parameters, (k + 1, p)."""
