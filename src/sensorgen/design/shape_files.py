@@ -150,7 +150,11 @@ def _foreign(name: str, text: str) -> Shape:
 def _adapter() -> Any:
     from pydantic import TypeAdapter
 
-    return TypeAdapter(Scene)
+    from sensorgen.scene import polyhedra, revolved, scene
+
+    made = TypeAdapter(Scene)
+    made.rebuild(_types_namespace=vars(scene) | vars(polyhedra) | vars(revolved))
+    return made
 
 
 def _fields(name: str, said: Mapping[str, Any]) -> list[tuple[str, type, Any]]:
@@ -211,7 +215,7 @@ def _check_body(where: str, body: Body, size_mm: tuple[float, float, float], nam
         raise BadInput(f"{where}: terminal {body.terminal[:40]!r}; expected top, middle, bottom, floating or ''")
     if not body.material or body.material not in dataclasses.asdict(fill).values():
         raise BadInput(f"{where}: material {body.material[:40]!r} is none of the design's; take it from fill")
-    for piece in body.prisms:
+    for piece in body.pieces:
         for axis, size in zip("xyz", size_mm, strict=True):
             low, high = piece.span(axis)
             if not -_OUTSIDE_MM <= low < high <= size + _OUTSIDE_MM:
