@@ -202,6 +202,10 @@ class Revolved:
         halves = _beside_axis(self.outline, self.bulges, rounded(abs(at_mm - away)))
         return [_moved(outline, along, 0.0) for outline in halves]
 
+    def sides(self) -> list[tuple[Point, Point, Point | None]]:
+        """Start and end of each side of the profile, and a point between them of each arc [mm]."""
+        return [(e.start, e.end, e.middle() if e.centre else None) for e in self._edges()]
+
     def profile(self, chord_mm: float) -> list[Point]:
         """Corners of the profile, with those of chords at most ``chord_mm`` from its arcs [mm]."""
         found = []

@@ -49,7 +49,9 @@ def faults(scene: Scene, meshes: Mapping[str, Mesh]) -> list[tuple[str, str]]:
             found.append((body.name, "shells are welded along an edge: programs that read 3MF refuse that"))
         elif abs(got - exact) > _rounding_mm3(body, solids[body.name]):
             found.append((body.name, f"encloses {got:.9g} mm3, not {exact:.9g} mm3"))
-        elif (twice := _self_overlap_mm3(solids[body.name])) > OVERLAP_MM * solids[body.name].surface_area():
+        elif (twice := _self_overlap_mm3(solids[body.name])) > (OVERLAP_MM + _off_mm(body)) * solids[
+            body.name
+        ].surface_area():
             found.append((body.name, f"overlaps itself by {twice:.3g} mm3"))
         elif not np.allclose(
             solids[body.name].bounding_box(), _box_mm(body), rtol=0.0, atol=OVERLAP_MM + _off_mm(body)
@@ -57,7 +59,7 @@ def faults(scene: Scene, meshes: Mapping[str, Mesh]) -> list[tuple[str, str]]:
             found.append((body.name, "is not where it is drawn"))
     if found or _are_apart(scene):
         return found
-    return _overlaps(solids)
+    return _overlaps(solids, {body.name: _off_mm(body) for body in scene.bodies})
 
 
 def _box_mm(body: Body) -> list[float]:
@@ -101,14 +103,15 @@ def _self_overlap_mm3(solid: "manifold3d.Manifold") -> float:
     return float(solid.volume() - united.volume())
 
 
-def _overlaps(solids: Mapping[str, "manifold3d.Manifold"]) -> list[tuple[str, str]]:
+def _overlaps(solids: Mapping[str, "manifold3d.Manifold"], off_mm: Mapping[str, float]) -> list[tuple[str, str]]:
     found = []
     for a, b in combinations(solids, 2):
         one, other = solids[a], solids[b]
         boxes = np.array([one.bounding_box(), other.bounding_box()])
         if (boxes[:, 3:].min(axis=0) - boxes[:, :3].max(axis=0) > OVERLAP_MM).all():  # they share more than a face
             volume = (one ^ other).volume()
-            if volume > OVERLAP_MM * min(one.surface_area(), other.surface_area()):
+            depth = OVERLAP_MM + off_mm[a] + off_mm[b]
+            if volume > depth * min(one.surface_area(), other.surface_area()):
                 found.append((f"{a} / {b}", f"overlap by {volume:.3g} mm3"))
     return found
 
