@@ -12,7 +12,7 @@ from sensorgen.scene.scene import Body, Envelope, Fill, Piece, Prism, Scene, box
 class ArrayParams(Envelope):
     """Parameters of every such array."""
 
-    period_mm: float = field(default=2.0, metadata={"help": "Period of the array, both ways.", "range": (0.1, 100.0)})
+    period_mm: float = field(default=1.25, metadata={"help": "Period of the array, both ways.", "range": (0.1, 100.0)})
     height_mm: float = field(default=0.4, metadata={"help": "Height of a structure.", "range": (0.01, 10.0)})
     dielectric_mm: float = field(
         default=0.2, metadata={"help": "Thickness of the film under the tips.", "range": (0.0, 10.0)}
@@ -31,13 +31,13 @@ class ArrayParams(Envelope):
         """Refuse structures that would run into each other, or that do not fit the sensor once."""
         if width_mm > self.period_mm:
             raise OutOfRange(
-                f"a structure {width_mm:g} mm wide does not fit period_mm {self.period_mm:g}: expected at most the period"
+                f"a structure {width_mm:g} mm wide does not fit period_mm {self.period_mm:g}: expected at most that"
             )
         least = min(self.length_mm, self.width_mm)
         if least < self.period_mm:
             raise OutOfRange(
-                f"no whole period of {self.period_mm:g} mm fits a sensor {self.length_mm:g} x {self.width_mm:g} mm: use "
-                "a shorter period or a larger sensor"
+                f"no whole period of {self.period_mm:g} mm fits a sensor {self.length_mm:g} x {self.width_mm:g} mm: "
+                "use a shorter period or a larger sensor"
             )
 
 

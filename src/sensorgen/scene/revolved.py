@@ -21,7 +21,7 @@ from sensorgen.scene.scene import (
     without_straight,
 )
 
-CHORD_MM = 1e-4  # largest distance of a round surface from the chords of its cuts and meshes
+CHORD_MM = 1e-3  # largest distance of a round surface from the chords of its cuts and meshes
 _ARC = pi / 12  # longest arc that a stretched one is made of
 
 

@@ -23,7 +23,7 @@ class Params(ArrayParams):
     """Parameters of the bumps."""
 
     base_mm: float = field(
-        default=1.4, metadata={"help": "Diameter of a bump at the top electrode.", "range": (0.02, 100.0)}
+        default=1.0, metadata={"help": "Diameter of a bump at the top electrode.", "range": (0.02, 100.0)}
     )
 
     def __post_init__(self) -> None:

@@ -19,7 +19,7 @@ from sensorgen.scene.scene import Fill, Piece, Scene, box
 class Params(ArrayParams):
     """Parameters of the pillars."""
 
-    side_mm: float = field(default=1.0, metadata={"help": "Side of a pillar.", "range": (0.02, 100.0)})
+    side_mm: float = field(default=0.8, metadata={"help": "Side of a pillar.", "range": (0.02, 100.0)})
 
     def __post_init__(self) -> None:
         """Refuse pillars that would run into each other."""
