@@ -1,7 +1,6 @@
-"""Curved and slanted bodies against spheres in closed form, the solvers of sections and boxes, and a cone in its plane."""
+"""Curved and slanted bodies against spheres in closed form, other solvers, and a cone in its plane."""
 
 import importlib.util
-from dataclasses import replace
 from math import exp, pi, sinh, sqrt, tan
 
 import numpy as np
@@ -9,17 +8,14 @@ import pytest
 
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.models import fem2d, fem3d
-from sensorgen.scene.polyhedra import Loft
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Body, Prism, Scene, box
-from sensorgen.solvers.electrostatics.bounds import Unsolved, whole
+from sensorgen.solvers.electrostatics.bounds import whole
 
 if importlib.util.find_spec("ngsolve") is None:
     pytest.skip("NGSolve is not installed", allow_module_level=True)
 
-from sensorgen.solvers.electrostatics import round_bodies
 from sensorgen.solvers.electrostatics.round_bodies import Cell, bounds
-from sensorgen.solvers.electrostatics.round_mesh import mesh_of
 
 QUARTER = tan(pi / 8)  # bulge of a quarter of a circle
 EPS_MM = EPS0_F_PER_M * M_PER_MM

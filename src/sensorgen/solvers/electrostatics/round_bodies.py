@@ -30,11 +30,11 @@ class Level(NamedTuple):
 
 
 LEVELS = (
-    Level(2, 1, 3e-2, 6e-3),
-    Level(3, 1, 1.5e-2, 8e-4),
-    Level(4, 2, 8e-3, 2e-4),
-    Level(5, 3, 4e-3, 4e-5),
-    Level(6, 4, 2e-3, 4e-6),
+    Level(2, 2, 1e-2, 1.5e-2),
+    Level(3, 2, 4e-3, 1.5e-3),
+    Level(4, 2, 2e-3, 4.5e-4),
+    Level(5, 3, 1e-3, 6e-5),
+    Level(6, 4, 5e-4, 1e-5),
 )
 
 
