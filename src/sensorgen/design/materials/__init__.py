@@ -149,6 +149,12 @@ def quantities() -> list[str]:
     return sorted({quantity for name in names() for quantity in load(name).properties} | {FILM_LEAK})
 
 
+@cache
+def print_quantities() -> list[str]:
+    """Names of all quantities of printing."""
+    return sorted({quantity for name in names() for quantity in load(name).print})
+
+
 def check_own(name: str, values: Mapping[str, float], texts: Texts = NO_TEXTS) -> None:
     """Refuse values of the user's own that no material can have; ``texts`` as of :func:`load`.
 
@@ -222,7 +228,7 @@ def own_source(source: str, text: str | None = None, texts: Texts = NO_TEXTS) ->
 
             file, text = str(own.path(source)), own.text(source)
         made = checked(Own, yamlfile.parse(text, file))
-        if source in _shipped_citations():
+        if source in shipped_citations():
             raise BadInput(f"{source} is the name of a source that ships with sensorgen; expected another name")
         for name, values in made.materials.items():
             _check_values(name, {key: value.value for key, value in values.items()}, texts)
@@ -282,7 +288,7 @@ def parse(name: str, text: str) -> Material:
 
 def citations() -> dict[str, str]:
     """What each source's name stands for, those of the user's own too."""
-    return _shipped_citations() | {name: own_source(name).about for name in packs.source_names()}
+    return shipped_citations() | {name: own_source(name).about for name in packs.source_names()}
 
 
 def cited(texts: Texts) -> dict[str, str]:
@@ -293,7 +299,8 @@ def cited(texts: Texts) -> dict[str, str]:
 
 
 @cache
-def _shipped_citations() -> dict[str, str]:
+def shipped_citations() -> dict[str, str]:
+    """What each source's name stands for, of the materials that ship."""
     text = (resources.files(__name__) / "sources.yaml").read_text("utf-8")
     data = yamlfile.parse(text, "sources.yaml")
     theses = {str(name): f"{data['thesis']}: {where}" for name, where in data["sources"].items()}
