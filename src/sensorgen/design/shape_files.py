@@ -86,14 +86,15 @@ def trust(name: str, text: str) -> Path:
 
 @lru_cache(maxsize=32)
 def _trusted(name: str, text: str) -> Shape:
-    module = _in_this_process(name, lambda: shape_process.module_of(f"sensorgen_shape_{digest(text)[:16]}", text))
+    module = in_this_process(name, lambda: shape_process.module_of(f"sensorgen_shape_{digest(text)[:16]}", text))
     _fields(name, shape_process.described(module))
     made = module.scene
-    module.scene = lambda p, fill: _checked(name, _in_this_process(name, lambda: made(p, fill)), fill)
+    module.scene = lambda p, fill: _checked(name, in_this_process(name, lambda: made(p, fill)), fill)
     return cast(Shape, module)
 
 
-def _in_this_process(name: str, work: Callable[[], Any]) -> Any:
+def in_this_process(name: str, work: Callable[[], Any]) -> Any:
+    """Result of a shape file's code; raises BadInput with the file's line for whatever goes wrong in it."""
     try:
         return work()
     except SensorgenError:
@@ -117,10 +118,8 @@ class _Foreign:
         self.scene = lru_cache(maxsize=256)(self._scene)
 
     def _cells(self, p: Envelope) -> float:
-        cells = self._ask({"parameters": dataclasses.asdict(p)})
-        if not isinstance(cells, (int, float)) or isinstance(cells, bool) or not cells > 0:
-            raise BadInput(f"{self._name}.py: cells() is {cells!r:.60}; expected a number above 0")
-        return float(cells)
+        cells: float = self._ask({"parameters": dataclasses.asdict(p)})  # checked where it is used
+        return cells
 
     def _scene(self, p: Envelope, fill: Fill) -> Scene:
         data = self._ask({"parameters": dataclasses.asdict(p), "fill": dataclasses.asdict(fill)})
@@ -245,7 +244,7 @@ class _Process:
             pipe.write(f"{json.dumps(question)}\n".encode())
             pipe.flush()
         try:
-            line = self._lines.get(timeout=10 + 6 * SECONDS)
+            line = self._lines.get(timeout=5 + 3 * SECONDS)
         except queue.Empty:
             line = b""
         try:
@@ -290,13 +289,14 @@ def _process(name: str, text: str) -> _Process:
         if not _RUNNING:
             import atexit
 
-            atexit.register(_close_all)
+            atexit.register(close)
         made = _Process(name, text)
         _RUNNING[key] = made
     return _RUNNING[key]
 
 
-def _close_all() -> None:
+def close() -> None:
+    """End the processes of all shape files; one that is needed again starts again."""
     for each in list(_RUNNING.values()):
         each.close()
 
