@@ -167,8 +167,8 @@ def check_own(name: str, values: Mapping[str, float], texts: Texts = NO_TEXTS) -
     """
     load(name, texts=texts)
     for quantity, value in values.items():
-        if quantity not in quantities():
-            raise UnknownName(f"quantity of {name}", quantity, quantities())
+        if quantity not in (known := sorted({*quantities(), *print_quantities()})):
+            raise UnknownName(f"quantity of {name}", quantity, known)
         low, high = _RANGES.get(quantity, (0.0, inf))
         if not low <= value <= high or isinf(value) or (value == 0 and quantity not in _RANGES):
             raise OutOfRange(f"{quantity} of {name} is {value:g}; expected {_said(low, high, 'a number above 0')}")
