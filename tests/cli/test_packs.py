@@ -364,3 +364,13 @@ def test_own_sources_of_fits_are_in_packs_too(here):
     assert found.own["sources"]["bars-6"] == text
     assert found.material("etpu").value("resistivity_ohm_m", "bars-6").value == 0.3
     assert materials.cited(found.own) == {"bars-6": "bars of June"}
+
+
+def test_the_commands_of_the_page(run, here):
+    """In one folder, one after the other; the design of the page too."""
+    page = (Path(__file__).parents[2] / "docs" / "packs.md").read_text("utf-8")
+    for line in re.search(r"```sh\n(.*?)```", page, re.DOTALL)[1].splitlines():
+        assert run(*line.partition("#")[0].split()[1:]).code == 0
+    put(here, "printer", "mine").rename(here / "lab-printer.yaml")
+    (here / "design.yaml").write_text(re.search(r"```yaml\n(.*?)```", page, re.DOTALL)[1])
+    assert run("check", "design.yaml").code == 0

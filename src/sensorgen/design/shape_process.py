@@ -123,7 +123,7 @@ _LATE = [0]  # seconds since the time of a question was over
 
 
 def _stop(_: int, __: FrameType | None) -> None:
-    """Obey the system's signal: stop the file's code, or, where that goes on all the same, this process."""
+    """Obey the system's signal: stop the file's code, or, where that goes on nevertheless, this process."""
     _LATE[0] += 1
     if _LATE[0] > 1:
         os._exit(1)
