@@ -158,6 +158,8 @@ WRONG = [
     ("box(*whole, low, film)", "box(*whole, low, 1e9)", "body 'film': .* along z; expected within 0 to"),
     ("p.width_mm, top + p.isolation_mm))", "p.width_mm, float('nan')))", "ValueError|three lengths above 0"),
     ("Scene(bodies, ", "Scene((), ", "the scene has no bodies"),
+    ("class Params(Envelope):", "class Params(Envelope, metaclass=print):", "TypeError|AttributeError|no dataclass"),
+    ("@dataclass(frozen=True)", "@staticmethod", "AttributeError|TypeError|no dataclass|has no"),
     ("return self.length_mm / self.period_mm", "return -1", "cells.. is -1; expected a number above 0"),
     ("return self.length_mm / self.period_mm", "return 'many'", "cells.. is 'many'; expected a number above 0"),
     ("return self.length_mm / self.period_mm", "return 1e30", "1e.30 cells of the pattern"),

@@ -61,8 +61,8 @@ def fault(error: BaseException, file: str) -> str:
         return f"{where}: needs more memory than a shape may have"
     if isinstance(error, TooLong):
         return f"{where}: still running when its time was over"
-    said = error.msg if isinstance(error, SyntaxError) else str(error)
-    return f"{where}: {type(error).__name__}: {' '.join(said.split())[:300]}"
+    message = error.msg if isinstance(error, SyntaxError) else str(error)
+    return f"{where}: {type(error).__name__}: {' '.join(message.split())[:300]}"
 
 
 def _answer(module: ModuleType, question: Mapping[str, Any]) -> Any:
@@ -152,7 +152,7 @@ def main() -> None:
     _limit(first["memory_bytes"])
     sys.addaudithook(_refuse)
 
-    def told(work: Callable[[], Any]) -> Any:
+    def reply(work: Callable[[], Any]) -> Any:
         try:
             try:
                 _allow(first["seconds"])
@@ -175,11 +175,11 @@ def main() -> None:
         module.append(module_of(first["name"], first["text"]))
         return described(module[0])
 
-    if told(begin) is None:
+    if reply(begin) is None:
         return
     for line in source:
         question = json.loads(line)
-        told(partial(_answer, module[0], question))
+        reply(partial(_answer, module[0], question))
 
 
 if __name__ == "__main__":

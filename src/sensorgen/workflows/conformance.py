@@ -77,10 +77,10 @@ def chosen(word: str) -> list[File]:
             raise BadInput(f"{word}: expected a file in a folder of its kind ({folders}), named by small letters")
         return [File(kind, path.stem, packs.beside(path.parent.parent))]
     pack = packs.beside(path) if path.is_dir() else _named(word)
-    found = [File(kind, name, pack) for kind in packs.SINGULAR for name in pack.names(kind)]
-    if not found:
+    files = [File(kind, name, pack) for kind in packs.SINGULAR for name in pack.names(kind)]
+    if not files:
         raise BadInput(f"{word}: no files of a pack; expected folders as {', '.join(packs.SINGULAR)}")
-    return found
+    return files
 
 
 def _named(word: str) -> Pack:
@@ -92,22 +92,24 @@ def _named(word: str) -> Pack:
 
 def conformance(word: str, step: Step = lambda _: None) -> PackReport:
     """Test the files of a pack; ``word`` as of :func:`chosen`, ``step`` gets the name of each file."""
-    files, found = chosen(word), list[Finding]()
+    files, findings = chosen(word), list[Finding]()
     try:
         packs.check_requires(files[0].pack)
     except SensorgenError as error:
-        found.append(_finding("requires", packs.MANIFEST, str(error), "install it, or correct 'requires'"))
+        findings.append(_finding("requires", packs.MANIFEST, str(error), "install it, or correct 'requires'"))
     for file in files:
         step(file.name)
         where = f"{file.kind}/{file.path.name}"
         try:
             if file.pack.where != "shipped" and file.name in packs.shipped_names(file.kind):
-                found.append(_finding("name", where, f"a {packs.SINGULAR[file.kind]} of that name ships", "rename it"))
+                findings.append(
+                    _finding("name", where, f"a {packs.SINGULAR[file.kind]} of that name ships", "rename it")
+                )
                 continue
-            found += [_finding(rule, where, *words) for rule, *words in _TESTS[file.kind](file)]
+            findings += [_finding(rule, where, *words) for rule, *words in _TESTS[file.kind](file)]
         except SensorgenError as error:
-            found.append(_finding("read", where, str(error), "correct the file"))
-    return PackReport(word, len(files), counts(found), tuple(found))
+            findings.append(_finding("read", where, str(error), "correct the file"))
+    return PackReport(word, len(files), counts(findings), tuple(findings))
 
 
 def _finding(rule: str, where: str, message: str, advice: str) -> Finding:

@@ -221,20 +221,26 @@ def own_source(source: str, text: str | None = None, texts: Texts = NO_TEXTS) ->
     BadInput
         Its file is damaged, or has the name of a source that ships.
     """
-    file = f"{source}.yaml"
+    made = _own(source, text)
     try:
-        if text is None:
-            from sensorgen.design.materials import own
-
-            file, text = str(own.path(source)), own.text(source)
-        made = checked(Own, yamlfile.parse(text, file))
         if source in shipped_citations():
             raise BadInput(f"{source} is the name of a source that ships with sensorgen; expected another name")
         for name, values in made.materials.items():
             _check_values(name, {key: value.value for key, value in values.items()}, texts)
     except (BadInput, UnknownName, OutOfRange) as error:
-        raise error if file in str(error) else error.within(file) from None
+        raise error.within(f"{source}.yaml") from None
     return made
+
+
+def _own(source: str, text: str | None) -> Own:
+    """A source of the user's own, its values not checked yet."""
+    from sensorgen.design.materials import own
+
+    file = f"{source}.yaml" if text is not None else str(own.path(source))
+    try:
+        return checked(Own, yamlfile.parse(own.text(source) if text is None else text, file))
+    except BadInput as error:
+        raise error if file in str(error) else error.within(file) from None
 
 
 def _check_values(name: str, values: Mapping[str, float], texts: Texts) -> None:
@@ -288,14 +294,14 @@ def parse(name: str, text: str) -> Material:
 
 def citations() -> dict[str, str]:
     """What each source's name stands for, those of the user's own too."""
-    return shipped_citations() | {name: own_source(name).about for name in packs.source_names()}
+    return shipped_citations() | {name: _own(name, None).about for name in packs.source_names()}
 
 
 def cited(texts: Texts) -> dict[str, str]:
     """What the sources of a design's own files stand for."""
     own_materials = (parse(name, text) for name, text in texts.get("materials", {}).items())
     said = {key: value for material in own_materials for key, value in material.citations.items()}
-    return said | {name: own_source(name, text, texts).about for name, text in texts.get("sources", {}).items()}
+    return said | {name: _own(name, text).about for name, text in texts.get("sources", {}).items()}
 
 
 @cache
