@@ -40,7 +40,7 @@ def why_not_applicable(scene: Scene) -> str | None:
     if find_spec("ngsolve") is None:
         return "NGSolve is not installed: pip install 'sensorgen[fem]'"
     try:
-        _cell(scene)
+        cell(scene)
     except ValueError as error:
         return str(error)
     return None
@@ -102,12 +102,10 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
 
 def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[Step]:
     """The meshes that :func:`capacitance` goes through, until the interval is narrow enough."""
-    cell, x, y = _cell(scene)
-    values = [float(permittivity[name]) for name in cell.materials]
+    own, x, y = cell(scene)
+    values = [float(permittivity[name]) for name in own.materials]
     shares = np.outer(x.shares, y.shares)
-    plan = Cell(
-        cell.low_mm, cell.high_mm, cell.pieces, len(_ENDS), values, (x.places_mm[1:-1], y.places_mm[1:-1]), shares
-    )
+    plan = Cell(own.low_mm, own.high_mm, own.pieces, len(_ENDS), values, (x.places_mm[1:-1], y.places_mm[1:-1]), shares)
     reached = False
     try:
         for level, elements, found in bounds(plan, width):
@@ -122,7 +120,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
 
 
 @dataclass(frozen=True)
-class _Window:
+class Window:
     """Pieces between the mirrors of a scene, as of :class:`Cell`, and the materials of its dielectrics."""
 
     low_mm: tuple[float, float, float]
@@ -132,7 +130,7 @@ class _Window:
 
 
 @lru_cache(maxsize=8)
-def _cell(scene: Scene) -> tuple[_Window, Repeat, Repeat]:
+def cell(scene: Scene) -> tuple[Window, Repeat, Repeat]:
     """The cell of a scene, and how it repeats along x and y.
 
     Raises
@@ -170,4 +168,4 @@ def _cell(scene: Scene) -> tuple[_Window, Repeat, Repeat]:
         _ENDS.index(body.terminal) if body.terminal else len(_ENDS) + materials.index(body.material) for body, _ in near
     ]
     pieces = tuple((piece, kind) for (_, piece), kind in zip(near, kinds, strict=True))
-    return _Window(low, high, pieces, materials), x, y
+    return Window(low, high, pieces, materials), x, y

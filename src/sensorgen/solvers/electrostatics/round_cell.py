@@ -80,7 +80,7 @@ class Cell:
         for spans, piece, kind in self.boxes():
             near = ((p > spans[:, 0]) & (p < spans[:, 1])).all(1)
             if kind < self.conductors and near.any():
-                found[near] |= _inside(piece, p[near])
+                found[near] |= inside(piece, p[near])
         return np.asarray(found)
 
     def sizes(self, along: Real, times: float, longest_mm: float) -> list[Sized]:
@@ -224,7 +224,7 @@ def touches(cell: Cell) -> list[Touch]:
     return found
 
 
-def _inside(piece: Piece, places_mm: Real) -> Mask:
+def inside(piece: Piece, places_mm: Real) -> Mask:
     """Whether places (n, 3) lie in a piece [mm]."""
     x, y, z = places_mm.T
     if isinstance(piece, Prism):

@@ -191,7 +191,7 @@ def _solids(cell: Cell, cusps: Sequence[tuple[Touch, float]]) -> list[tuple[str,
     box = occ.Box(cell.low_mm, cell.high_mm)
     pieces: dict[int, list[Any]] = {}
     for _, piece, kind in cell.boxes():
-        pieces.setdefault(kind, []).append(_solid(piece) * box)
+        pieces.setdefault(kind, []).append(solid(piece) * box)
     filled = {kind: occ.Fuse(own) if len(own) > 1 else own[0] for kind, own in pieces.items()}
     rest = box
     for shape in filled.values():
@@ -215,7 +215,7 @@ def _solids(cell: Cell, cusps: Sequence[tuple[Touch, float]]) -> list[tuple[str,
     return named
 
 
-def _solid(piece: Piece) -> Any:
+def solid(piece: Piece) -> Any:
     """A piece for the CAD kernel."""
     import netgen.occ as occ
 
