@@ -39,7 +39,7 @@ LEVELS = (
 
 
 def bounds(cell: Cell, width: float) -> Iterator[tuple[Level, int, Energies]]:
-    """Both bounds over eps0 [mm] on finer and finer meshes, each with its number of elements, until near enough.
+    """Both bounds over eps0 [mm] on finer and finer meshes, each with its number of elements, until within tolerance.
 
     Parameters
     ----------

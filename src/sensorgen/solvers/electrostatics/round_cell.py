@@ -84,7 +84,7 @@ class Cell:
         return np.asarray(found)
 
     def sizes(self, along: Real, times: float, longest_mm: float) -> list[Sized]:
-        """Places on round faces and on some edges (n, 3), by how near bodies are that the piece does not touch.
+        """Places on round faces and on some edges (n, 3), by the distance of bodies that the piece does not touch.
 
         Parameters
         ----------
