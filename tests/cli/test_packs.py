@@ -1,6 +1,7 @@
 """Packs as a new user has them: own files beside a design, in a folder of packs, and from an installed package."""
 
 import json
+import pickle
 import re
 import shutil
 import sys
@@ -232,6 +233,14 @@ def test_a_record_of_a_design_does_not_need_its_files(here):
     assert again.drawn == before.drawn
     with pytest.raises(UnknownName, match="unknown shape 'zig'"):
         made()
+
+
+def test_a_design_goes_to_another_process(here):
+    put(here, "material", "eel"), put(here, "shape", "zig"), put(here, "printer", "mine")
+    before = made()
+    again = pickle.loads(pickle.dumps(before))
+    assert again == made()
+    assert (again.id(), again.drawn) == (before.id(), before.drawn)
 
 
 def test_designs_of_a_batch_have_the_files_beside_them(here):

@@ -121,6 +121,12 @@ class Design(Strict):
             )
         return name
 
+    def __getstate__(self) -> dict[Any, Any]:
+        """State without derived values: classes of shape files exist in this process only."""
+        state = super().__getstate__()
+        kept = {key: value for key, value in state["__dict__"].items() if key in type(self).model_fields}
+        return state | {"__dict__": kept}
+
     @cached_property
     def params(self) -> Envelope:
         """The shape's parameters, checked and complete."""
