@@ -12,6 +12,7 @@ import pytest
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.design import design, materials, packs, shape_files
+from sensorgen.measure import accuracy
 from sensorgen.workflows.batch import plan as plans
 
 TEMPLATES = Path(packs.__file__).parent / "templates"
@@ -168,6 +169,26 @@ def test_damaged_entry_points(run, monkeypatch, tmp_path_factory, value, name, e
     assert "'lab-pack'" in said.line
     assert expected in said.line
     assert run("check", "reference").code == 0  # nothing of it is needed
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "expected"),
+    [
+        ("entry_points.txt", "[sensorgen.packs]\nno sign of what it is\n", "cannot be read|names no folder"),
+        ("entry_points.txt", "[sensorgen.packs]\n= lab_pack\n", "names no folder"),
+        ("METADATA", None, ""), ("METADATA", "\x00\n", ""),
+    ],
+)  # fmt: skip
+def test_a_damaged_package(run, monkeypatch, tmp_path_factory, file, text, expected):
+    site = tmp_path_factory.mktemp("site")
+    install(site, monkeypatch)
+    path = site / "lab_pack-2.1.dist-info" / file
+    path.unlink()
+    if text is not None:
+        path.write_text(text)
+    said = run("list", "materials")
+    assert said.code == (2 if expected else 0)
+    assert re.search(expected, said.line if expected else "")
 
 
 def test_what_is_nearer_goes_before_and_what_ships_cannot_be_hidden(here):
@@ -358,6 +379,26 @@ def test_planted_faults_of_instruments(run, old, new, rule):
 def test_packs_that_ship_have_no_findings(run):
     for name in ("thesis", "filaments"):
         assert run("pack", "test", name).out.endswith("no findings\n")
+
+
+def test_an_own_dielectric(run, unpressed):
+    put(Path(), "material", "gel", ("conductor: true", "conductor: false"))
+    taken = ["--material", "dielectric=gel", "--material", "film=gel", "--tool", "gel=1"]
+    said = run("predict", "tri", *taken, "--drawn", "--json")
+    assert (said.code, said.err) == (0, "")
+    values = {(v["material"], v["quantity"]): v for v in json.loads(said.out)["values"]}
+    assert values["gel", "relative_permittivity"]["value"] == 5.0
+
+
+def test_an_instrument_beside_the_readings(here):
+    (here / "instruments").mkdir()
+    text = (TEMPLATES / "instrument.yaml").read_text("utf-8").replace("NAME", "LCR-7")
+    (here / "instruments" / "lcr-7.yaml").write_text(text)
+    accuracy._all.cache_clear()
+    try:
+        assert accuracy.find("LCR-7").dc_ohm(50.0, 4) == pytest.approx((50 * 1e-4 + 100 * 4e-5) / 3**0.5)
+    finally:
+        accuracy._all.cache_clear()
 
 
 def test_both_electrodes_by_one_word():
