@@ -136,6 +136,9 @@ def test_where_each_comes_from(run, here, monkeypatch, tmp_path_factory):
     assert found["eel"] == (here.name, "beside the design", "")
     assert found["lab-ink"] == ("lab", "installed", "2.1")
     assert found["x60"][:2] == ("thesis", "shipped")
+    assert found["ninjatek-eel"][:2] == ("filaments", "shipped")
+    printers = json.loads(run("list", "printers", "--json").out)
+    assert {name: printers[name]["pack"] for name in printers} == {"diabase-h5": "thesis", "prusa-xl5": "others"}
     shapes = json.loads(run("list", "shapes", "--json").out)
     assert (shapes["zig"]["pack"], shapes["zig"]["where"]) == ("mine", "own")
     assert shapes["zig"]["file"] == str(packs.place() / "mine" / "shapes" / "zig.py")
@@ -377,7 +380,7 @@ def test_planted_faults_of_instruments(run, old, new, rule):
 
 
 def test_packs_that_ship_have_no_findings(run):
-    for name in ("thesis", "filaments"):
+    for name in ("thesis", "filaments", "others"):
         assert run("pack", "test", name).out.endswith("no findings\n")
 
 
