@@ -63,8 +63,9 @@ def test_from_an_empty_folder_to_files_for_a_print(run, unpressed):
     assert run("check", "my.yaml").code == 0
     said = run("predict", "my.yaml", "--json")
     values = {(v["material"], v["quantity"]): v for v in json.loads(said.out)["values"]}
-    assert values["eel", "resistivity_ohm_m"]["source"] == "data-sheet"
+    assert values["eel", "resistivity_ohm_m"]["source"] == "eel-sheet"
     assert run("build", "my.yaml", "--no-cad").code == 0
+    assert materials.citations()["eel-sheet"].startswith("example numbers")
     assert {"my.prusa.3mf", "prediction.json", "design.json"} <= {file.name for file in Path("out/my").iterdir()}
     assert "eel" in Path("out/my/design.json").read_text()
 
@@ -332,12 +333,12 @@ def test_trust_is_of_a_content(run, here):
 
 
 PLANTED = [
-    ("material", "source: data-sheet, default: true, low: 210.0", "source: web, default: true, low: 210.0",
+    ("material", "source: it-sheet, default: true, low: 210.0", "source: web, default: true, low: 210.0",
      "source: nozzle_temperature_c: source 'web' is not explained"),
     ("material", "youngs_modulus_pa:", "youngs_modulus_mpa:", "quantity: unknown quantity 'youngs_modulus_mpa'"),
-    ("material", "value: 5.0, source: data-sheet, default: true", "value: 5.0, source: data-sheet",
+    ("material", "value: 5.0, source: it-sheet, default: true", "value: 5.0, source: it-sheet",
      "default: relative_permittivity has no default value"),
-    ("material", "value: 0.1,", "value: -0.1,", "read: .*resistivity_ohm_m of data-sheet is -0.1"),
+    ("material", "value: 0.1,", "value: -0.1,", "read: .*resistivity_ohm_m of it-sheet is -0.1"),
     ("shape", "box(*whole, low, film)", "box(*whole, low, film + 0.01)", "scene: .*overlap by"),
     ("shape", '"bottom"),', '""),', "terminals: terminals are"),
     ("shape", "min(x + half, p.length_mm)", "min(x + half, p.length_mm) - 0.1", "support: .*are left empty"),
