@@ -276,6 +276,16 @@ def test_designs_of_a_batch_have_the_files_beside_them(here):
     assert plan.made(plan.designs[0], here).used()["eel"] == ""
 
 
+@pytest.mark.parametrize(
+    "own", ["{shapes: {zig: 5}}", "{shapes: [zig]}", "5", "{forms: {zig: a}}", "{shapes: {zig: ''}}"]
+)
+def test_what_a_design_brings_is_checked(run, own):
+    Path("d.yaml").write_text(f"shape: zig\nown: {own}\n")
+    said = run("check", "d.yaml")
+    assert said.code == 2
+    assert said.line
+
+
 def test_a_design_cannot_bring_a_material_by_the_name_of_one_that_ships(here):
     text = put(here, "material", "eel").read_text()
     with pytest.raises(BadInput, match="a material 'x60' ships with sensorgen"):
