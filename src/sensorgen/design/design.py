@@ -18,8 +18,8 @@ from sensorgen.core import plugins as registry
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding
 from sensorgen.core.records import Strict, checked, shown
+from sensorgen.design import imported, shapes
 from sensorgen.design import materials as material_files
-from sensorgen.design import shapes
 from sensorgen.design.materials import own
 from sensorgen.design.printer import Pattern, Printer, Quality, load_printer, load_quality
 from sensorgen.design.profile import Profile, with_own
@@ -105,6 +105,10 @@ class Design(Strict):
     )
     profile: Profile = Profile()
     waivers: tuple[Waiver, ...] = Field(default=(), strict=False)  # YAML has lists only
+    geometry: str | None = Field(
+        default=None, description="File of the bodies of an imported sensor, relative to the design's own file."
+    )
+    bodies: dict[str, imported.Filled] = Field(default={}, description="Imported body to material and terminal.")
 
     @field_validator("name")
     @classmethod
@@ -119,7 +123,7 @@ class Design(Strict):
     @cached_property
     def params(self) -> Envelope:
         """The shape's parameters, checked and complete."""
-        return parameters(self.shape, self.parameters)
+        return imported.params(self.geometry) if self.geometry else parameters(self.shape, self.parameters)
 
     @cached_property
     def machine(self) -> Printer:
@@ -134,9 +138,13 @@ class Design(Strict):
 
     def material(self, name: str) -> material_files.Material:
         """A material by name, with the values that this design sets itself."""
-        slots = ((getattr(self.materials, part) or "").partition("@") for part in Slots.model_fields)
+        slots = (slot.partition("@") for slot in self._filled())
         sources = sorted({source for material, _, source in slots if material == name and source})
         return material_files.load(name, sources).with_values(self.material_values.get(name, {}))
+
+    def _filled(self) -> list[str]:
+        """Material, with source, of every part that has one, or of every imported body."""
+        return [body.material for body in self.bodies.values()] or [slot for _, slot in self.materials if slot]
 
     def conducts(self, name: str) -> bool:
         """Whether a material does."""
@@ -151,16 +159,16 @@ class Design(Strict):
         """Materials of the scene's bodies with their source; the first slot that names one decides."""
         here = {body.material for body in self.drawn.bodies}
         found: dict[str, str] = {}
-        for part in Slots.model_fields:
-            if getattr(self.materials, part):
-                material, source = self.slot(part)
-                if material.name in here:
-                    found[material.name] = found.get(material.name) or source
+        for name, _, source in (slot.partition("@") for slot in self._filled()):
+            if name in here:
+                found[name] = found.get(name) or source
         return found
 
     @cached_property
     def drawn(self) -> Scene:
         """The sensor as it is meant to be, bottom electrode down."""
+        if self.geometry:
+            return imported.scene(self.geometry, self.bodies)
         names = {part: (value or "").partition("@")[0] for part, value in self.materials.model_dump().items()}
         scene: Scene = shape(self.shape).scene(self.params, Fill(**names))
         return scene
@@ -206,7 +214,8 @@ class Design(Strict):
 
     def _plain(self) -> set[str]:
         """Parts that have come later and are not used: without them the identities of older designs last."""
-        return set() if self.profile != Profile() else {"profile"}
+        usual = {"profile": Profile(), "geometry": None, "bodies": {}}
+        return {key for key, value in usual.items() if getattr(self, key) == value}
 
     @property
     def walls(self) -> str:
@@ -259,7 +268,8 @@ def shape(name: str) -> ModuleType:
 
 def fields(shape_name: str) -> dict[str, dataclasses.Field[Any]]:
     """The parameters of a shape, by name."""
-    return {f.name: f for f in dataclasses.fields(shape(shape_name).Params)}
+    params = imported.Params if shape_name == imported.SHAPE else shape(shape_name).Params
+    return {f.name: f for f in dataclasses.fields(params)}
 
 
 def parameters(shape_name: str, given: Mapping[str, float | str]) -> Envelope:
@@ -323,11 +333,29 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
     try:
         if isinstance(data, Mapping) and "shape" not in data:
             raise BadInput(f"shape is missing; expected {', '.join(registry.names(shapes))}")
-        design = checked(Design, with_own(dict(data), Path(where).parent) if isinstance(data, Mapping) else data)
+        design = checked(Design, _with_files(dict(data), Path(where).parent) if isinstance(data, Mapping) else data)
+        if design.shape == imported.SHAPE or design.geometry or design.bodies:
+            design = _imported(design)
         _check_names(design)
     except SensorgenError as error:
         raise error.within(where) from None
     return design if design.name else design.model_copy(update={"name": name_of(design)})
+
+
+def _with_files(data: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """A design's data with the content of its files in place of their names."""
+    return imported.with_geometry(with_own(data, folder), folder)
+
+
+def _imported(design: Design) -> Design:
+    """An imported design, its map checked, with the materials of its parts."""
+    if design.shape != imported.SHAPE:
+        raise BadInput(f"geometry, bodies: {design.shape} is drawn from parameters; expected shape: {imported.SHAPE}")
+    imported.check(design.geometry, design.bodies, design.parameters)
+    conductors = {name for slot in design._filled() if design.conducts(name := slot.partition("@")[0])}
+    parts = imported.slots(design.geometry or "", design.bodies, conductors)
+    given = design.materials.model_dump(include=design.materials.model_fields_set)
+    return design.model_copy(update={"materials": Slots(**{**parts, **given}), "parameters": {}})
 
 
 def of_resolved(name: str, data: Mapping[str, Any]) -> Design:
