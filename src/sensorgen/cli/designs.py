@@ -49,7 +49,7 @@ class DesignGroup(click.Group):
 
         base = {"name": Path(name).stem} | yamlfile.read(Path(name))
         try:
-            module = registry.load(shapes, base["shape"]) if isinstance(base.get("shape"), str) else None
+            module = registry.load(shapes, base["shape"]) if _is_drawn(base) else None
         except UnknownName as error:
             raise error.within(name) from None
         return self._command(name, module, base)
@@ -104,6 +104,11 @@ def _about(module: ModuleType | None) -> str:
 
 def _is_file(word: str) -> bool:
     return word.endswith((".yaml", ".yml")) or "/" in word
+
+
+def _is_drawn(base: Data) -> bool:
+    """Whether a design's shape has parameters: those of an imported one are in its bodies."""
+    return isinstance(base.get("shape"), str) and base["shape"] != "imported"
 
 
 def option_of(field: str) -> str:
@@ -199,9 +204,7 @@ def _design(base: Data, given: Data, word: str) -> "Design":
 def _changes(base: Data, given: Data) -> Data:
     """The options that were given, as the part of a design file that they stand for."""
     known = (
-        {f.name for f in dataclasses.fields(registry.load(shapes, base["shape"]).Params)}
-        if isinstance(base.get("shape"), str)
-        else set()
+        {f.name for f in dataclasses.fields(registry.load(shapes, base["shape"]).Params)} if _is_drawn(base) else set()
     )
     parameters = {k: given[k] for k in known if given.get(k) is not None}
     parameters |= _size(given["size"]) if given["size"] is not None else {}

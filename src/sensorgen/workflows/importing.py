@@ -287,8 +287,8 @@ def _sizes(bodies: Sequence[ReadBody]) -> list[Finding]:
     ]  # fmt: skip
     hint = f"its numbers may be in {' or '.join(dict.fromkeys(fits))}" if fits else "look at its unit"
     return [
-        Finding("11-size", "error", "sensor", f"it is {shown} mm; expected 1 to 1000 mm along x and y, from 0.05 mm "
-                "in z", f"{hint}: export it in mm, or give --unit for STL and 3MF", place_mm=tuple(low.round(6).tolist()))
+        Finding("11-size", "error", "sensor", f"it is {shown} mm; expected 1 to 1000 mm in x and y, from 0.05 in z",
+                f"{hint}: export it in mm, or give --unit for STL and 3MF", place_mm=tuple(low.round(6).tolist()))
     ]  # fmt: skip
 
 
