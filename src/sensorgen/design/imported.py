@@ -10,7 +10,7 @@ import json
 import re
 import zlib
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -25,6 +25,8 @@ from sensorgen.scene.pieces import Piece, Prism
 from sensorgen.scene.polyhedra import Loft, Polyhedron
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Body, Envelope, Scene
+from sensorgen.scene.sections import sections
+from sensorgen.scene.unit_cell import cell
 
 SHAPE = "imported"
 MOST_BYTES = 200_000_000  # of a file of bodies
@@ -42,7 +44,9 @@ class Filled(Strict):
 
 @dataclass(frozen=True)
 class Params(Envelope):
-    """Size of an imported sensor: that of its bodies, never given."""
+    """Size of an imported sensor, and the period of its pattern: those of its bodies, never given."""
+
+    period_mm: float | None = field(default=None, metadata={"help": "Period of the pattern.", "range": (0.0, 1000.0)})
 
 
 @dataclass(frozen=True)
@@ -144,10 +148,20 @@ def _frozen(value: Any) -> Any:
     return tuple(map(_frozen, value)) if isinstance(value, list) else value
 
 
+@lru_cache(maxsize=8)
 def params(geometry: str) -> Params:
-    """Size of an imported sensor."""
-    length, width, _ = bodies(geometry).size_mm
-    return Params(length, width)
+    """Size of an imported sensor, and the period of its pattern where one cross-section repeats."""
+    found = bodies(geometry)
+    length, width, height = found.size_mm
+    made = Scene(tuple(Body(name, name, own) for name, own in found.pieces.items()), found.size_mm)
+    try:
+        (section,) = sections(made)
+        piece = cell(section, height)
+    except ValueError:  # several cross-sections, none that is constant, or bodies that overlap
+        return Params(length, width)
+    period = 2 * (piece.slices[-1].right_mm - piece.slices[0].left_mm)
+    along = length if section.across == "x" else width
+    return Params(length, width, period_mm=round(period, 9) if period <= along / 2 else None)
 
 
 def scene(geometry: str, filled: Mapping[str, Filled]) -> Scene:
