@@ -10,11 +10,9 @@ import shapely
 
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.geometry import meshes, validity
-from sensorgen.scene.outlines import area_mm2, rectangle
-from sensorgen.scene.pieces import Prism, box, content
 from sensorgen.scene.polyhedra import Loft, Polyhedron
 from sensorgen.scene.revolved import CHORD_MM, Revolved
-from sensorgen.scene.scene import Body, Scene
+from sensorgen.scene.scene import Body, Prism, Scene, area_mm2, box, content, rectangle
 
 QUARTER = tan(pi / 8)  # bulge of a quarter of a circle
 HEMISPHERE = Revolved(1.0, 2.0, ((0, 0), (0.5, 0), (0, 0.5)), (0, QUARTER, 0))

@@ -19,8 +19,7 @@ from sensorgen.design.design import Design
 from sensorgen.design.walls import WALLS
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.layers import LayerRegions, drawn, scene_of
-from sensorgen.scene.pieces import seen_from_above
-from sensorgen.scene.scene import FLOATING, Body, Point, Scene
+from sensorgen.scene.scene import FLOATING, Body, Point, Scene, seen_from_above
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.beads import Beads

@@ -17,8 +17,7 @@ from sensorgen.core import cache as cached
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
-from sensorgen.scene.pieces import content
-from sensorgen.scene.scene import Scene, area_mm2
+from sensorgen.scene.scene import Scene, area_mm2, content
 from sensorgen.scene.sections import ROUNDING_MM, Section, square_to
 from sensorgen.scene.unit_cell import Band, Cell, Slice, cell
 

@@ -20,10 +20,9 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import Region, parts
-from sensorgen.scene.pieces import seen_from_above
 from sensorgen.scene.raster import raster
 from sensorgen.scene.repetition import Repeat, repeat
-from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene
+from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene, seen_from_above
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.enclosed import enclosing
 from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, Layers, Mesh, solved

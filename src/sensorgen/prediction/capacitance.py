@@ -18,8 +18,7 @@ from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.models import capacitance_models
 from sensorgen.prediction.cost_model import expected
 from sensorgen.prediction.plan import Candidate
-from sensorgen.scene.pieces import content
-from sensorgen.scene.scene import FLOATING, Scene
+from sensorgen.scene.scene import FLOATING, Scene, content
 from sensorgen.scene.sections import overlap, sections
 
 PLANE, SPATIAL = 1e-3, 1e-2  # relative width of a capacitance's bounds where none is asked for: a cross-section, 3D

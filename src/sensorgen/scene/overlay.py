@@ -13,8 +13,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-from sensorgen.scene.pieces import Piece, Prism, seen_from_above
-from sensorgen.scene.scene import Body, Point, Scene
+from sensorgen.scene.scene import Body, Piece, Point, Prism, Scene, seen_from_above
 from sensorgen.scene.sections import ROUNDING_MM, Column, Layer, alike, columns, sections
 
 

@@ -6,7 +6,9 @@ from functools import lru_cache
 from math import hypot, inf, isfinite
 
 from sensorgen.core.errors import BadInput
-from sensorgen.scene.outlines import (
+from sensorgen.scene.scene import (
+    AXES,
+    PLANE,
     SLIVER_MM,
     Outline,
     Place,
@@ -17,8 +19,6 @@ from sensorgen.scene.outlines import (
     rounded,
     without_straight,
 )
-
-_PLANE = {0: (1, 2), 1: (0, 2), 2: (0, 1)}  # the axes of an outline in a cut square to each axis, by number
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Polyhedron:
     def span(self, axis: str) -> Point:
         """Lowest and highest coordinate along an axis [mm]."""
         used = {number for triangle in self.triangles for number in triangle}
-        values = [self.vertices[number]["xyz".index(axis)] for number in used]
+        values = [self.vertices[number][AXES.index(axis)] for number in used]
         return min(values), max(values)
 
     def volume_mm3(self, low_mm: float = -inf, high_mm: float = inf) -> float:
@@ -91,9 +91,13 @@ class Polyhedron:
 
     def is_box(self) -> bool:
         """Whether its six faces are square to the axes."""
-        sides = [high - low for low, high in map(self.span, "xyz")]
+        sides = [high - low for low, high in map(self.span, AXES)]
         whole = sides[0] * sides[1] * sides[2]
         return whole > 0 and abs(self.volume_mm3() - whole) < 1e-12 * whole
+
+    def is_round(self) -> bool:
+        """Whether it has curved faces, of which cuts and meshes have the chords."""
+        return False
 
     def is_constant(self, axis: str) -> bool:  # noqa: ARG002
         """Whether all its cuts square to an axis are the same."""
@@ -105,8 +109,8 @@ class Polyhedron:
 
     def cut(self, axis: str, at_mm: float) -> list[Outline]:
         """Outlines in which the plane ``axis = at_mm`` cuts it, in ``PLANE[axis]`` [mm]; those with holes in parts."""
-        across = "xyz".index(axis)
-        first, second = _PLANE[across]
+        across = AXES.index(axis)
+        first, second = (AXES.index(other) for other in PLANE[axis])
         below = [vertex[across] <= at_mm for vertex in self.vertices]
         after: dict[tuple[int, int], tuple[int, int]] = {}
         for triangle in self.triangles:
@@ -224,7 +228,7 @@ class Loft:
         """Lowest and highest coordinate along an axis [mm]."""
         if axis == "z":
             return self.bottom_mm, self.top_mm
-        values = [p["xyz".index(axis)] for p in (*self.lower, *self.upper)]
+        values = [p[AXES.index(axis)] for p in (*self.lower, *self.upper)]
         return min(values), max(values)
 
     def volume_mm3(self, low_mm: float = -inf, high_mm: float = inf) -> float:
@@ -238,6 +242,10 @@ class Loft:
     def is_box(self) -> bool:
         """Whether its six faces are square to the axes."""
         return self.lower == self.upper and is_rectangle(self.lower)
+
+    def is_round(self) -> bool:
+        """Whether it has curved faces, of which cuts and meshes have the chords."""
+        return False
 
     def is_constant(self, axis: str) -> bool:
         """Whether all its cuts square to an axis are the same."""

@@ -8,7 +8,8 @@ from math import acos, atan, atan2, ceil, cos, hypot, inf, isfinite, pi, sin, sq
 from typing import NamedTuple
 
 from sensorgen.core.errors import BadInput
-from sensorgen.scene.outlines import (
+from sensorgen.scene.scene import (
+    AXES,
     SLIVER_MM,
     Outline,
     Place,
@@ -157,7 +158,7 @@ class Revolved:
         if axis == "z":
             heights = [z for edge in self._edges() for _, z in (edge.start, edge.end)]
             return min(heights), max(heights)
-        at, radius = (self.x_mm, self.y_mm)["xy".index(axis)], max(edge.start[0] for edge in self._edges())
+        at, radius = (self.x_mm, self.y_mm)[AXES.index(axis)], max(edge.start[0] for edge in self._edges())
         return at - radius, at + radius
 
     def volume_mm3(self, low_mm: float = -inf, high_mm: float = inf) -> float:
@@ -175,6 +176,10 @@ class Revolved:
     def is_box(self) -> bool:
         """Whether its six faces are square to the axes: never."""
         return False
+
+    def is_round(self) -> bool:
+        """Whether it has curved faces, of which cuts and meshes have the chords."""
+        return True
 
     def is_constant(self, axis: str) -> bool:  # noqa: ARG002
         """Whether all its cuts square to an axis are the same: never, as cuts are polygons and it is round."""

@@ -4,19 +4,138 @@ Plain data without a CAD kernel. Drawing, checks, meshes, solids and models all 
 disagree about the sensor. x runs along the sensor, y across it, z up; the corner is at 0, 0, 0.
 """
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, fields, replace
+from math import inf, isfinite
+from typing import TYPE_CHECKING, TypeAlias
 
-from sensorgen.scene.outlines import SLIVER_MM, Outline, Point, area_mm2, clipped, rectangle, rounded
-from sensorgen.scene.pieces import AXES, PLANE, Piece, Prism, box
-from sensorgen.scene.polyhedra import Loft, Polyhedron
-from sensorgen.scene.revolved import Revolved
+from sensorgen.core.errors import BadInput
 
-__all__ = [
-    "AXES", "FLOATING", "PLANE", "SLIVER_MM", "Body", "Envelope", "Fill", "Loft", "Outline", "Piece", "Point",
-    "Polyhedron", "Prism", "Revolved", "Scene", "area_mm2", "box", "clipped", "rectangle", "rounded",
-]  # fmt: skip
+if TYPE_CHECKING:
+    from sensorgen.scene.polyhedra import Loft, Polyhedron
+    from sensorgen.scene.revolved import Revolved
 
+Point = tuple[float, float]
+Place = tuple[float, float, float]
+Outline = tuple[Point, ...]
+Piece: TypeAlias = "Prism | Revolved | Loft | Polyhedron"
+
+AXES = "xyz"
+PLANE = {"x": ("y", "z"), "y": ("x", "z"), "z": ("x", "y")}  # the two axes of an outline, by the axis square to it
+SLIVER_MM = 1e-6  # a nanometre: narrower pieces are rounding, not geometry, and the CAD kernel refuses them from 1e-7
 FLOATING = "floating"  # terminal of a conductor that no contact reaches
+_SHOWN = 5  # corners of an outline that an error shows
+
+
+@dataclass(frozen=True)
+class Prism:
+    """An outline extruded along one axis.
+
+    Attributes
+    ----------
+    axis : str
+        "x", "y" or "z".
+    outline : tuple of (float, float)
+        Corners in the plane ``PLANE[axis]`` [mm]; given either way round, kept counter-clockwise.
+    start_mm, end_mm : float
+        Where the extrusion starts and ends on its axis [mm].
+
+    Raises
+    ------
+    BadInput
+        The outline is open, or encloses nothing.
+    """
+
+    axis: str
+    outline: Outline
+    start_mm: float
+    end_mm: float
+
+    def __post_init__(self) -> None:
+        """Refuse outlines that no body can have, and turn those that run clockwise."""
+        reason = fault(self.outline)
+        if reason:
+            given = described(self.outline)
+            raise BadInput(f"an outline {reason}: {given}; expected at least three corners around an area, each once")
+        if area_mm2(self.outline) < 0:
+            object.__setattr__(self, "outline", self.outline[::-1])
+
+    def span(self, axis: str) -> Point:
+        """Lowest and highest coordinate along an axis [mm]."""
+        if axis == self.axis:
+            return self.start_mm, self.end_mm
+        values = [p[PLANE[self.axis].index(axis)] for p in self.outline]
+        return min(values), max(values)
+
+    def volume_mm3(self, low_mm: float = -inf, high_mm: float = inf) -> float:
+        """Exact volume, of all of it or between two heights [mm3]."""
+        if self.axis == "z":
+            return area_mm2(self.outline) * max(min(self.end_mm, high_mm) - max(self.start_mm, low_mm), 0.0)
+        u0 = self.outline[0][0]
+        area = 0.0
+        for (ua, va), (ub, vb) in zip(self.outline, self.outline[1:] + self.outline[:1], strict=True):
+            low, high = (min(max(v, low_mm), high_mm) for v in (va, vb))
+            if low != high:
+                middle = ((low + high) / 2 - va) / (vb - va)
+                area += (ua + middle * (ub - ua) - u0) * (high - low)
+        return area * (self.end_mm - self.start_mm)
+
+    def is_box(self) -> bool:
+        """Whether its six faces are square to the axes."""
+        return is_rectangle(self.outline)
+
+    def is_round(self) -> bool:
+        """Whether it has curved faces, of which cuts and meshes have the chords."""
+        return False
+
+    def is_constant(self, axis: str) -> bool:
+        """Whether all its cuts square to an axis are the same."""
+        return self.axis == axis or self.is_box()
+
+    def levels_mm(self) -> set[float]:
+        """Heights of its level faces and edges [mm]."""
+        return {self.start_mm, self.end_mm} if self.axis == "z" else {round(z, 9) for _, z in self.outline}
+
+    def cut(self, axis: str, at_mm: float) -> list[Outline]:
+        """Outlines in which the plane ``axis = at_mm`` cuts it, in ``PLANE[axis]`` [mm].
+
+        Of two prisms that share a face in that plane it cuts the one behind the face, so that no place is lost.
+
+        >>> box(0, 4, 0, 2, 0, 1).cut("x", 1.0)
+        [((0, 0), (2, 0), (2, 1), (0, 1))]
+        """
+        if axis == self.axis:
+            return [self.outline] if self.start_mm <= at_mm < self.end_mm else []
+        here = PLANE[self.axis].index(axis)
+        # Intervals in which the plane runs inside the outline
+        points = [(p[here], p[1 - here]) for p in self.outline]
+        edges = zip(points, points[1:] + points[:1], strict=True)
+        heights = sorted(
+            a[1] if a[1] == b[1] else a[1] + (at_mm - a[0]) / (b[0] - a[0]) * (b[1] - a[1])
+            for a, b in edges
+            if (a[0] <= at_mm) != (b[0] <= at_mm)
+        )
+        runs = list(zip(heights[::2], heights[1::2], strict=True))
+        if PLANE[axis].index(self.axis) == 0:
+            return [rectangle(self.start_mm, self.end_mm, low, high) for low, high in runs]
+        return [rectangle(low, high, self.start_mm, self.end_mm) for low, high in runs]
+
+    def turned_over(self, size_mm: Place) -> "Prism":
+        """It in a box of some size that is turned by half a turn about x."""
+        _, width, height = (rounded(s) for s in size_mm)
+        if self.axis == "x":
+            return replace(self, outline=tuple((rounded(width - y), rounded(height - z)) for y, z in self.outline))
+        size, extent = (height, width) if self.axis == "y" else (width, height)
+        outline = tuple((x, rounded(size - v)) for x, v in reversed(self.outline))
+        start, end = rounded(extent - self.end_mm), rounded(extent - self.start_mm)
+        return replace(self, outline=outline, start_mm=start, end_mm=end)
+
+    def stretched(self, factor: float) -> "Prism":
+        """It scaled in x and y."""
+        first, second = (1.0 if axis == "z" else factor for axis in PLANE[self.axis])
+        along = 1.0 if self.axis == "z" else factor
+        outline = tuple((rounded(u * first), rounded(v * second)) for u, v in self.outline)
+        return replace(self, outline=outline, start_mm=self.start_mm * along, end_mm=self.end_mm * along)
 
 
 @dataclass(frozen=True)
@@ -117,3 +236,106 @@ class Envelope:
     def cells(self) -> float:
         """How many cells of a repeating pattern the sensor holds; 1 without a pattern [-]."""
         return 1.0
+
+
+def seen_from_above(piece: Piece) -> Outline:
+    """Outline of an upright prism, or of a box, in (x, y) [mm].
+
+    Raises
+    ------
+    ValueError
+        It is neither: its outline changes with height.
+    """
+    if isinstance(piece, Prism) and piece.axis == "z":
+        return piece.outline
+    if not piece.is_box():
+        raise ValueError("its outline changes with height")
+    return rectangle(*piece.span("x"), *piece.span("y"))
+
+
+def content(piece: Piece) -> list[object]:
+    """Everything that a piece is, as plain data; of pieces of two kinds never the same."""
+    return [getattr(piece, own.name) for own in fields(piece)]
+
+
+def box(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float) -> Prism:
+    """Box between two corners, rounded [mm]."""
+    x0, x1, y0, y1, z0, z1 = (rounded(value) for value in (x0, x1, y0, y1, z0, z1))
+    return Prism("z", rectangle(x0, x1, y0, y1), z0, z1)
+
+
+def rectangle(a0: float, a1: float, b0: float, b1: float) -> Outline:
+    """Rectangle from (a0, b0) to (a1, b1), counter-clockwise [mm]."""
+    return ((a0, b0), (a1, b0), (a1, b1), (a0, b1))
+
+
+def is_rectangle(outline: Outline) -> bool:
+    """Whether it is a rectangle along the axes."""
+    low, high = (tuple(map(end, zip(*outline, strict=True))) for end in (min, max))
+    corners = {low, high, (low[0], high[1]), (high[0], low[1])}
+    return len(outline) == 4 == len(corners) and set(outline) == corners and area_mm2(outline) != 0
+
+
+def rounded(value_mm: float) -> float:
+    """Round away what sums leave behind, so that faces that meet have equal coordinates [mm]."""
+    return round(value_mm, 12)
+
+
+def area_mm2(outline: Iterable[Point]) -> float:
+    """Signed area of an outline, positive when counter-clockwise [mm2]."""
+    points = tuple(outline)
+    u0, v0 = points[0]
+    turn = zip(points, points[1:] + points[:1], strict=True)
+    return sum((a[0] - u0) * (b[1] - v0) - (b[0] - u0) * (a[1] - v0) for a, b in turn) / 2.0
+
+
+def fault(outline: Outline, area: float | None = None) -> str:
+    """Why corners are no outline, of an area that their edges may curve [mm2], or ""."""
+    if len(outline) < (3 if area is None else 2):
+        return f"of {len(outline)} corners is open"
+    if any(a == b for a, b in zip(outline, outline[1:] + outline[:1], strict=True)):
+        return "has the same corner twice in a row"
+    area = area_mm2(outline) if area is None else area
+    if not isfinite(area):
+        return "has a corner that is nowhere"
+    return "encloses nothing" if abs(area) < SLIVER_MM**2 else ""
+
+
+def described(outline: Outline) -> str:
+    """The first corners of an outline, for an error."""
+    some = ", ".join(f"({u:.6g}, {v:.6g})" for u, v in outline[:_SHOWN])
+    return some + (", ..." if len(outline) > _SHOWN else "") or "none"
+
+
+def clipped(outline: Iterable[Point], end_mm: float) -> Outline:
+    """The part of an outline with first coordinate between 0 and ``end_mm`` [mm], exactly.
+
+    For outlines that every vertical line meets in one piece; empty where less than a sliver is left.
+    Coordinates are rounded, so that neighbours reached by different sums stay neighbours.
+
+    >>> clipped([(0, 0), (2, 0), (2, 1), (0, 1)], 1.5)
+    ((0, 0), (1.5, 0.0), (1.5, 1.0), (0, 1))
+    """
+    points = [(rounded(u), rounded(v)) for u, v in outline]
+    for sign, limit in ((-1.0, 0.0), (1.0, end_mm)):
+        kept: list[Point] = []  # on the near side of a vertical line (Sutherland and Hodgman, 1974)
+        for a, b in zip(points[-1:] + points[:-1], points, strict=True):
+            a_in, b_in = sign * (a[0] - limit) <= 0, sign * (b[0] - limit) <= 0
+            if a_in != b_in:
+                share = (limit - a[0]) / (b[0] - a[0])
+                kept.append((limit, round(a[1] + share * (b[1] - a[1]), 12)))
+            kept += [b] if b_in else []
+        points = kept
+    distinct = tuple(p for k, p in enumerate(points) if p != points[k - 1])
+    width = max((p[0] for p in distinct), default=0.0) - min((p[0] for p in distinct), default=0.0)
+    return distinct if len(distinct) > 2 and width > SLIVER_MM else ()
+
+
+def without_straight(loop: Sequence[Point]) -> Outline:
+    """An outline without the corners at which it goes straight on."""
+    kept: list[Point] = []
+    for k, b in enumerate(loop):
+        a, c = kept[-1] if kept else loop[k - 1], loop[(k + 1) % len(loop)]
+        if b != a and (b == c or abs((b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])) > SLIVER_MM**2):
+            kept.append(b)
+    return tuple(kept)

@@ -4,15 +4,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import acos, ceil, pi, sin, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Mask, Real, Whole
-from sensorgen.scene.pieces import PLANE, Piece, Prism
-from sensorgen.scene.polyhedra import Loft
-from sensorgen.scene.revolved import Revolved
-from sensorgen.scene.scene import Body, Outline
+from sensorgen.scene.scene import PLANE, Body, Outline, Piece, Prism
+
+if TYPE_CHECKING:
+    from sensorgen.scene.revolved import Revolved
 
 CHORD_MM = 0.005  # of a round body, from the middle of its triangles: less than half of what slicers resolve
 
@@ -55,13 +56,16 @@ def mesh(body: Body) -> Mesh:
 def _of_piece(piece: Piece) -> Mesh:
     if isinstance(piece, Prism):
         return _prism(piece)
+    from sensorgen.scene.polyhedra import Loft
+    from sensorgen.scene.revolved import Revolved
+
     if isinstance(piece, Revolved):
         return _revolved(piece)
     flat = piece.polyhedron() if isinstance(piece, Loft) else piece
     return Mesh(np.array(flat.vertices), np.array(flat.triangles, np.int32))
 
 
-def _revolved(piece: Revolved) -> Mesh:
+def _revolved(piece: "Revolved") -> Mesh:
     """Rings of the corners of its profile, as many to each, and one corner for a ring on the axis."""
     profile = np.array(piece.profile(CHORD_MM / 4))
     n = 4 * max(ceil(pi / 4 / acos(max(1 - CHORD_MM / profile[:, 0].max(), 0.0))), 2)

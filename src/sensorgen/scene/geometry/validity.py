@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sensorgen.scene.geometry.meshes import CHORD_MM, Mesh
-from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import AXES, Body, Scene
 from sensorgen.scene.sections import overlap, sections
 
@@ -74,7 +73,7 @@ def _rounding_mm3(body: Body, solid: "manifold3d.Manifold") -> float:
 
 def _off_mm(body: Body) -> float:
     """How far a mesh may be from the surface [mm]."""
-    return CHORD_MM if any(isinstance(p, Revolved) for p in body.pieces) else 0.0
+    return CHORD_MM if any(p.is_round() for p in body.pieces) else 0.0
 
 
 def _are_apart(scene: Scene) -> bool:
