@@ -39,21 +39,21 @@ def command(
 
     if not 1e-4 <= chord <= 1.0:
         raise BadInput(f"--chord {chord:g}: expected 0.0001 to 1 mm")
-    listing = importing.read([Path(file) for file in files], unit, chord)
+    assembly = importing.read([Path(file) for file in files], unit, chord)
     name = name or Path(files[0]).stem
-    if listing.errors:
+    if assembly.errors:
         drawing = Path(out) / f"{name}-faults.svg"
-        store.replace(drawing, importing.picture(listing).encode())
-        render.deliver(listing)
-        first = listing.errors[0]
+        store.replace(drawing, importing.picture(assembly).encode())
+        render.deliver(importing.Listing.of(assembly))
+        first = assembly.errors[0]
         raise BadInput(f"{first.body}: {first.text}; nothing was imported, {drawing} shows where")
     if only_list or not maps:
-        render.deliver(listing)
+        render.deliver(importing.Listing.of(assembly))
         return 0
-    filled, tools = importing.assigned(listing, maps, terminals)
+    filled, tools = importing.assigned(assembly, maps, terminals)
     more = {key: value for key, value in (("printer", printer), ("quality", quality)) if value}
     made = importing.write(
-        listing, filled, tools, name=name, folder=Path(out), more=more, replace_existing=force
+        assembly, filled, tools, name=name, folder=Path(out), more=more, replace_existing=force
     )  # fmt: skip
     render.deliver(made)
     return 0

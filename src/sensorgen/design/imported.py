@@ -21,10 +21,9 @@ from pydantic import Field
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.core.files import reading
 from sensorgen.core.records import Strict
-from sensorgen.scene.pieces import Piece, Prism
 from sensorgen.scene.polyhedra import Loft, Polyhedron
 from sensorgen.scene.revolved import Revolved
-from sensorgen.scene.scene import Body, Envelope, Scene
+from sensorgen.scene.scene import Body, Envelope, Piece, Prism, Scene
 from sensorgen.scene.sections import sections
 from sensorgen.scene.unit_cell import cell
 

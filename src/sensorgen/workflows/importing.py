@@ -1,12 +1,14 @@
 """Sensors from other CAD programs: read, repaired or refused, mapped to materials, written as a design."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
+from functools import cache
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import yaml
@@ -18,7 +20,7 @@ from sensorgen.core.findings import Finding, listed
 from sensorgen.design import design as designs
 from sensorgen.design import imported
 from sensorgen.design import materials as material_files
-from sensorgen.scene.geometry import mesh_files, surfaces
+from sensorgen.scene.geometry import cad, mesh_files, surfaces
 from sensorgen.scene.geometry.mesh_files import FileBody
 from sensorgen.scene.geometry.meshes import Mesh
 
@@ -71,7 +73,7 @@ class ReadBody:
 
 
 @dataclass(frozen=True)
-class Listing:
+class Assembly:
     """Bodies of files, before they are mapped.
 
     Attributes
@@ -82,43 +84,70 @@ class Listing:
         All of them.
     findings : tuple of Finding
         Why they cannot be a sensor, and what was repaired.
-    map : mapping of str to str
-        Suggested material of each body; "" where nothing suggests one.
     """
 
     source: str
     bodies: tuple[ReadBody, ...]
     findings: tuple[Finding, ...]
-    map: Mapping[str, str]
 
     @property
     def errors(self) -> list[Finding]:
         """Findings for which nothing is imported."""
         return [finding for finding in self.findings if finding.severity == "error"]
 
+
+@dataclass(frozen=True)
+class ListedBody:
+    """A body of a file, as ``--list`` shows it."""
+
+    name: Annotated[str, Column("body")]
+    volume_mm3: Annotated[float, Column("volume", "mm3")]
+    x_mm: Annotated[str, Column("x", "mm", right=True)]
+    y_mm: Annotated[str, Column("y", "mm", right=True)]
+    z_mm: Annotated[str, Column("z", "mm", right=True)]
+    colour: Annotated[str, Column("colour")]
+    faces: Annotated[str, Column("faces")]
+    material: Annotated[str, Column("material")]
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Bodies of files, what was repaired or is wrong, and a map to start from.
+
+    Attributes
+    ----------
+    source : str
+        Names of the files.
+    bodies : tuple of ListedBody
+        All of them, with a suggested material; "?" where nothing suggests one.
+    findings : tuple of Finding
+        As of :class:`Assembly`.
+    """
+
+    source: str
+    bodies: tuple[ListedBody, ...]
+    findings: tuple[Finding, ...]
+
+    @classmethod
+    def of(cls, assembly: Assembly) -> "Listing":
+        """The listing of an assembly."""
+        rows = []
+        for body in assembly.bodies:
+            x, y, z = (f"{low:g} to {high:g}" for low, high in (body.box_mm.round(6) + 0.0).T.tolist())
+            chord = body.given.chord_mm
+            faces = f"curved, met to {chord:g} mm" if chord else "flat"
+            material = _suggested(body.name, body.given.colour) or "?"
+            rows.append(ListedBody(body.name, body.volume_mm3(), x, y, z, body.given.colour, faces, material))
+        return cls(assembly.source, tuple(rows), assembly.findings)
+
     def document(self) -> Iterator[Part]:
-        """The bodies, what was repaired or is wrong, and a map to start from."""
-        columns = (
-            Column("body"), Column("volume", "mm3"), Column("x", "mm", right=True), Column("y", "mm", right=True),
-            Column("z", "mm", right=True), Column("colour"), Column("faces"), Column("material"),
-        )  # fmt: skip
-        rows = tuple(
-            (
-                body.name,
-                body.volume_mm3(),
-                *(f"{low:g} to {high:g}" for low, high in body.box_mm.round(6).T.tolist()),
-                body.given.colour,
-                f"curved, met to {body.given.chord_mm:g} mm" if body.given.chord_mm else "flat",
-                self.map[body.name] or "?",
-            )
-            for body in self.bodies
-        )
-        yield Table("bodies", "", columns, rows)
+        """All of it."""
+        yield Table.of("bodies", "", self.bodies)
         if self.findings:
             yield ""
             yield from listed(self.findings)
         yield ""
-        words = " ".join(f"--map {name}={material or 'MATERIAL'}" for name, material in self.map.items())
+        words = " ".join(f"--map {body.name}={body.material.replace('?', 'MATERIAL')}" for body in self.bodies)
         yield f"To import it: sensorgen import {self.source} {words}"
 
 
@@ -172,7 +201,7 @@ class Imported:
             yield from listed(self.repairs)
 
 
-def read(paths: Sequence[Path], unit: str = "", chord_mm: float = CHORD_MM) -> Listing:
+def read(paths: Sequence[Path], unit: str = "", chord_mm: float = CHORD_MM) -> Assembly:
     """Read bodies from files, repair them, and look what is wrong with them.
 
     Parameters
@@ -192,8 +221,10 @@ def read(paths: Sequence[Path], unit: str = "", chord_mm: float = CHORD_MM) -> L
         The CAD process ended.
     """
     given: list[FileBody] = []
-    for path in paths:
-        given += _file(path, unit, chord_mm)
+    with ExitStack() as stack:
+        process = cache(lambda: stack.enter_context(cad.CadProcess()))
+        for path in paths:
+            given += _file(path, unit, lambda path: process().read_step(path, chord_mm))
     names = _names([body.name for body in given])
     findings, bodies = [], []
     for name, raw in zip(names, given, strict=True):
@@ -205,10 +236,10 @@ def read(paths: Sequence[Path], unit: str = "", chord_mm: float = CHORD_MM) -> L
         bodies, own = _apart(bodies)
         findings += own
     source = " ".join(path.name for path in paths)
-    return Listing(source, tuple(bodies), tuple(findings), {b.name: _suggested(b.name, b.given.colour) for b in bodies})
+    return Assembly(source, tuple(bodies), tuple(findings))
 
 
-def _file(path: Path, unit: str, chord_mm: float) -> list[FileBody]:
+def _file(path: Path, unit: str, read_step: Callable[[Path], list[FileBody]]) -> list[FileBody]:
     kind = path.suffix.lower()
     if kind not in _FORMATS:
         raise BadInput(f"{path}: expected a file in {', '.join(_FORMATS)}; export the sensor as STEP")
@@ -221,10 +252,7 @@ def _file(path: Path, unit: str, chord_mm: float) -> list[FileBody]:
         return [part for solid in mesh_files.read_stl(path, unit) for part in _separate(solid)]
     if unit:
         raise BadInput(f"{path}: --unit {unit} beside a STEP file, which states its unit; expected it without --unit")
-    from sensorgen.scene.geometry.cad import CadProcess
-
-    with CadProcess() as cad:
-        return cad.read_step(path, chord_mm)
+    return read_step(path)
 
 
 def _separate(solid: FileBody) -> list[FileBody]:
@@ -334,22 +362,22 @@ def _suggested(name: str, colour: str) -> str:
     return next(iter((*named, *painted, *by_role)), "")
 
 
-def picture(listing: Listing) -> str:
+def picture(assembly: Assembly) -> str:
     """The places of the errors in three views, as SVG."""
     from sensorgen.scene.drawing import places
 
-    meshes = {b.name: Mesh(b.given.vertices_mm, b.given.triangles.astype(np.int32)) for b in listing.bodies}
-    return places.svg(meshes, [(f.place_mm, f"{f.body}: {f.message}") for f in listing.errors if f.place_mm])
+    meshes = {b.name: Mesh(b.given.vertices_mm, b.given.triangles.astype(np.int32)) for b in assembly.bodies}
+    return places.svg(meshes, [(f.place_mm, f"{f.body}: {f.message}") for f in assembly.errors if f.place_mm])
 
 
 def assigned(
-    listing: Listing, maps: Sequence[str], terminals: Sequence[str]
+    assembly: Assembly, maps: Sequence[str], terminals: Sequence[str]
 ) -> tuple[dict[str, imported.Filled], dict[str, int]]:
     """Material and terminal of each body, and the tools, from what a user has typed.
 
     Parameters
     ----------
-    listing : Listing
+    assembly : Assembly
         The bodies.
     maps : sequence of str
         ``BODY=MATERIAL[@SOURCE][@TOOL]`` each; ``*`` in BODY stands for anything.
@@ -365,25 +393,28 @@ def assigned(
     MissingValue
         A body has no material.
     """
-    names = [body.name for body in listing.bodies]
-    materials: dict[str, str] = {}
-    tools: dict[str, int] = {}
+    names = [body.name for body in assembly.bodies]
+    chosen: dict[str, tuple[str, str]] = {}  # of each body, material with source, and tool; the last word counts
     for pattern, value in _pairs(maps, "--map BODY=MATERIAL@TOOL"):
         parts = _MATERIAL.fullmatch(value)
         if not parts:
             raise BadInput(f"--map {pattern}={value}: expected BODY=MATERIAL@TOOL, as base=etpu@1")
         material, tool = parts["material"], parts["tool"]
         material_files.load(material)  # raises UnknownName with the nearest
-        if tool and tools.setdefault(material, int(tool)) != int(tool):
+        for name in _matching(pattern, names):
+            chosen[name] = (material + (f"@{parts['source']}" if parts["source"] else ""), tool or "")
+    tools: dict[str, int] = {}
+    for material, tool in ((slot.partition("@")[0], tool) for slot, tool in chosen.values() if tool):
+        if tools.setdefault(material, int(tool)) != int(tool):
             raise BadInput(
                 f"--map: {material} is on tools {tools[material]} and {tool}; expected one tool for a material"
             )
-        for name in _matching(pattern, names):
-            materials[name] = material + (f"@{parts['source']}" if parts["source"] else "")
+    materials = {name: slot for name, (slot, _) in chosen.items()}
     if missing := [name for name in names if name not in materials]:
-        words = " ".join(f"--map {name}={listing.map[name] or 'MATERIAL'}" for name in missing)
+        colours = {body.name: body.given.colour for body in assembly.bodies}
+        words = " ".join(f"--map {name}={_suggested(name, colours[name]) or 'MATERIAL'}" for name in missing)
         raise MissingValue(f"no material for {', '.join(missing)}: give {words}")
-    ends = _terminals(listing, {n for n in names if material_files.load(materials[n].partition("@")[0]).conductor})
+    ends = _terminals(assembly, {n for n in names if material_files.load(materials[n].partition("@")[0]).conductor})
     for pattern, value in _pairs(terminals, "--terminal BODY=TERMINAL"):
         if value not in ("top", "middle", "bottom", "none"):
             raise UnknownName("terminal", value, ("top", "middle", "bottom", "none"))
@@ -406,9 +437,9 @@ def _matching(pattern: str, names: Sequence[str]) -> list[str]:
     return found
 
 
-def _terminals(listing: Listing, conductors: set[str]) -> dict[str, str]:
+def _terminals(assembly: Assembly, conductors: set[str]) -> dict[str, str]:
     """Terminals by height: conductors that touch are one electrode; the lowest is the bottom, the highest the top."""
-    bodies = [body for body in listing.bodies if body.name in conductors]
+    bodies = [body for body in assembly.bodies if body.name in conductors]
     solids = {body.name: body.solid() for body in bodies}
     groups = {body.name: {body.name} for body in bodies}
     for a, b in combinations(groups, 2):
@@ -430,7 +461,7 @@ def _terminals(listing: Listing, conductors: set[str]) -> dict[str, str]:
 
 
 def write(
-    listing: Listing,
+    assembly: Assembly,
     filled: Mapping[str, imported.Filled],
     tools: Mapping[str, int],
     *,
@@ -443,7 +474,7 @@ def write(
 
     Parameters
     ----------
-    listing : Listing
+    assembly : Assembly
         Bodies without errors.
     filled, tools : mapping
         As of :func:`assigned`.
@@ -464,16 +495,16 @@ def write(
     from sensorgen.models import capacitance_models
     from sensorgen.scene.geometry.recognition import pieces
 
-    low = np.array([body.box_mm[0] for body in listing.bodies]).min(0)
-    high = np.array([body.box_mm[1] for body in listing.bodies]).max(0)
-    by_height = sorted(listing.bodies, key=lambda body: body.box_mm[:, 2].tolist())
+    low = np.array([body.box_mm[0] for body in assembly.bodies]).min(0)
+    high = np.array([body.box_mm[1] for body in assembly.bodies]).max(0)
+    by_height = sorted(assembly.bodies, key=lambda body: body.box_mm[::-1, 2].tolist())
     found = {
         b.name: pieces([Mesh(s.vertices_mm - low, s.triangles) for s in b.shells], b.given.rounding_mm)
         for b in by_height
     }
     length, width, height = (high - low).round(9).tolist()
-    chord = max(body.given.chord_mm for body in listing.bodies)
-    content = imported.text(imported.Bodies(found, (length, width, height), chord, listing.source))
+    chord = max(body.given.chord_mm for body in assembly.bodies)
+    content = imported.text(imported.Bodies(found, (length, width, height), chord, assembly.source))
     data = {
         "name": name, "shape": imported.SHAPE, **more,
         "bodies": {n: filled[n].model_dump(exclude_defaults=True) for n in found}, "tools": dict(tools),
@@ -482,14 +513,14 @@ def write(
     path, beside = folder / f"{design.name}.yaml", folder / imported.file_name(design.name, content)
     if path.exists() and not replace_existing:
         raise BadInput(f"{path} exists; expected --force to replace it, or another --name")
-    head = f"# imported from {listing.source}; bodies are changed in CAD, then: sensorgen import\n"
+    head = f"# imported from {assembly.source}; bodies are changed in CAD, then: sensorgen import\n"
     text = head + yaml.safe_dump({**data, "geometry": beside.name}, sort_keys=False, allow_unicode=True)
     files.replace(beside, content.encode())
     files.replace(path, text.encode())
     return Imported(
         str(path), str(beside), (length, width, height), tuple((-low.round(9) + 0.0).tolist()),
         {n: _words(design, n, own) for n, own in found.items()},
-        tuple(f for f in listing.findings if f.severity != "error"),
+        tuple(f for f in assembly.findings if f.severity != "error"),
         {key: model.why_not_applicable(design.in_use) or "" for key, model in capacitance_models().items()},
     )  # fmt: skip
 

@@ -13,8 +13,8 @@ from sensorgen.core.arrays import Real
 from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.geometry.surfaces import joined
 from sensorgen.scene.layers import outlines
-from sensorgen.scene.outlines import Outline
-from sensorgen.scene.pieces import AXES, PLANE, Piece, Polyhedron, Prism, box
+from sensorgen.scene.polyhedra import Polyhedron
+from sensorgen.scene.scene import AXES, PLANE, Outline, Piece, Prism, box
 
 _GRID_MM = 1e-9  # to which coordinates are rounded: far below SLIVER_MM
 _VOLUME_RATIO = 1e-6  # by which prisms may differ from the surface that they replace
@@ -84,7 +84,7 @@ def _prisms(mesh: Mesh, axis: str, near_mm: float) -> tuple[Prism, ...]:
         faces[place, looks_up].append(number)
     for n, low in enumerate(levels[:-1]):
         added, gone = (_region(mesh, faces[n, up], plane, near_mm) for up in (False, True))
-        region = shapely.union(shapely.difference(region, gone, _GRID_MM), added, _GRID_MM)
+        region = shapely.union(shapely.difference(region, gone, grid_size=_GRID_MM), added, grid_size=_GRID_MM)
         now: dict[Outline, float] = {}
         for outline in outlines(region):
             now[outline] = growing.pop(outline, low)

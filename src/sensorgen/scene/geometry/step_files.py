@@ -39,9 +39,14 @@ def read_step(path: Path, chord_mm: float) -> "list[FileBody]":
         raise BadInput(f"{path}: no STEP: it does not begin with ISO-10303-21; export it again, as AP214 or AP242")
     try:
         root = import_step(path)
-    except Exception as error:  # whatever the kernel throws
-        raise BadInput(f"{path}: the CAD kernel cannot read it: {error or type(error).__name__}") from error
-    bodies = [body for leaf, name, colour in _leaves(root, "", None) for body in [_body(leaf, name, colour, chord_mm)]]
+        bodies = [_body(leaf, name, colour, chord_mm) for leaf, name, colour in _leaves(root, "", None)]
+    except BadInput as error:
+        raise error.within(str(path)) from None
+    except Exception as error:  # whatever the kernel throws, also where there is nothing
+        reason = f" ({error})" if str(error) else ""
+        raise BadInput(
+            f"{path}: no solids that the CAD kernel can read{reason}; export solids, as AP214 or AP242"
+        ) from error
     solid = [body for body in bodies if len(body.triangles)]
     if not solid:
         raise BadInput(f"{path}: no solids in it; export solids, not sketches or wires")
@@ -84,8 +89,8 @@ def _body(shape: Any, name: str, colour: Any, chord_mm: float) -> "FileBody":
                 continue
             x, y, z = tuple(face.center())
             raise BadInput(
-                f"{name or 'a body'}: its curved face near x {x:.6g}, y {y:.6g}, z {z:.6g} mm cannot be met by triangles: "
-                "it crosses itself; draw it anew in CAD"
+                f"{name or 'a body'}: its curved face near x {x:.6g}, y {y:.6g}, z {z:.6g} mm cannot be met by "
+                "triangles: it crosses itself; draw it anew in CAD"
             )
         backwards = face.wrapped.Orientation() == TopAbs_Orientation.TopAbs_REVERSED
         to, first = place.Transformation(), len(points)
