@@ -50,7 +50,7 @@ def command(
     if only_list or not maps:
         render.deliver(importing.Listing.of(assembly))
         return 0
-    filled, tools = importing.assigned(assembly, maps, terminals)
+    filled, tools = importing.assigned(assembly, maps, terminals, Path(out))
     more = {key: value for key, value in (("printer", printer), ("quality", quality)) if value}
     made = importing.write(
         assembly, filled, tools, name=name, folder=Path(out), more=more, replace_existing=force

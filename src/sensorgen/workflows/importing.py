@@ -18,7 +18,7 @@ from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import BadInput, MissingValue, UnknownName
 from sensorgen.core.findings import Finding, listed
 from sensorgen.design import design as designs
-from sensorgen.design import imported
+from sensorgen.design import imported, packs
 from sensorgen.design import materials as material_files
 from sensorgen.scene.geometry import cad, mesh_files, surfaces
 from sensorgen.scene.geometry.mesh_files import FileBody
@@ -371,7 +371,7 @@ def picture(assembly: Assembly) -> str:
 
 
 def assigned(
-    assembly: Assembly, maps: Sequence[str], terminals: Sequence[str]
+    assembly: Assembly, maps: Sequence[str], terminals: Sequence[str], folder: Path
 ) -> tuple[dict[str, imported.Filled], dict[str, int]]:
     """Material and terminal of each body, and the tools, from what a user has typed.
 
@@ -383,6 +383,8 @@ def assigned(
         ``BODY=MATERIAL[@SOURCE][@TOOL]`` each; ``*`` in BODY stands for anything.
     terminals : sequence of str
         ``BODY=TERMINAL`` each: top, middle, bottom or none.
+    folder : Path
+        Of the design, whose packs may have its materials.
 
     Raises
     ------
@@ -394,13 +396,14 @@ def assigned(
         A body has no material.
     """
     names = [body.name for body in assembly.bodies]
+    known: dict[str, bool] = {}  # whether each material conducts
     chosen: dict[str, tuple[str, str]] = {}  # of each body, material with source, and tool; the last word counts
     for pattern, value in _pairs(maps, "--map BODY=MATERIAL@TOOL"):
         parts = _MATERIAL.fullmatch(value)
         if not parts:
             raise BadInput(f"--map {pattern}={value}: expected BODY=MATERIAL@TOOL, as base=etpu@1")
         material, tool = parts["material"], parts["tool"]
-        material_files.load(material)  # raises UnknownName with the nearest
+        known[material] = _material(material, folder).conductor
         for name in _matching(pattern, names):
             chosen[name] = (material + (f"@{parts['source']}" if parts["source"] else ""), tool or "")
     tools: dict[str, int] = {}
@@ -414,13 +417,19 @@ def assigned(
         colours = {body.name: body.given.colour for body in assembly.bodies}
         words = " ".join(f"--map {name}={_suggested(name, colours[name]) or 'MATERIAL'}" for name in missing)
         raise MissingValue(f"no material for {', '.join(missing)}: give {words}")
-    ends = _terminals(assembly, {n for n in names if material_files.load(materials[n].partition("@")[0]).conductor})
+    ends = _terminals(assembly, {n for n in names if known[materials[n].partition("@")[0]]})
     for pattern, value in _pairs(terminals, "--terminal BODY=TERMINAL"):
         if value not in ("top", "middle", "bottom", "none"):
             raise UnknownName("terminal", value, ("top", "middle", "bottom", "none"))
         ends |= dict.fromkeys(_matching(pattern, names), "" if value == "none" else value)
     filled = {n: imported.Filled.model_validate({"material": materials[n], "terminal": ends.get(n, "")}) for n in names}
     return filled, tools
+
+
+def _material(name: str, folder: Path) -> material_files.Material:
+    """A material that ships, or of the packs beside a design and of the user's."""
+    texts = packs.with_files({"tools": {name: 0}}, folder).get("own", {})
+    return material_files.load(name, (), texts)
 
 
 def _pairs(words: Sequence[str], form: str) -> list[tuple[str, str]]:
@@ -509,8 +518,8 @@ def write(
         "name": name, "shape": imported.SHAPE, **more,
         "bodies": {n: filled[n].model_dump(exclude_defaults=True) for n in found}, "tools": dict(tools),
     }  # fmt: skip
-    design = designs.make({**data, "geometry": imported.packed(content)})
-    path, beside = folder / f"{design.name}.yaml", folder / imported.file_name(design.name, content)
+    path, beside = folder / f"{name}.yaml", folder / imported.file_name(name, content)
+    design = designs.make({**data, "geometry": imported.packed(content)}, str(path))
     if path.exists() and not replace_existing:
         raise BadInput(f"{path} exists; expected --force to replace it, or another --name")
     head = f"# imported from {assembly.source}; bodies are changed in CAD, then: sensorgen import\n"
