@@ -216,7 +216,7 @@ def slots(geometry: str, filled: Mapping[str, Filled], conducts: Iterable[str]) 
     conductors = set(conducts)
     volume = {name: sum(piece.volume_mm3() for piece in own) for name, own in bodies(geometry).pieces.items()}
     largest = sorted(filled, key=lambda name: volume[name])
-    found = {}
+    found: dict[str, str] = {}
     for name in largest:
         one = filled[name]
         if one.material.partition("@")[0] not in conductors:

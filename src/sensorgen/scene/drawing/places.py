@@ -72,4 +72,4 @@ def _sharp(mesh: Mesh) -> Real:
     count = np.diff(np.append(first, len(order)))
     one, other = order[first] // 3, order[(first + 1).clip(max=len(order) - 1)] // 3
     smooth = (count == 2) & (np.einsum("ij,ij->i", normal[one], normal[other]) > _SHARP)
-    return mesh.vertices_mm[sides[order[first[~smooth]]]]
+    return np.asarray(mesh.vertices_mm[sides[order[first[~smooth]]]])

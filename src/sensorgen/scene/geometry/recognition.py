@@ -78,7 +78,8 @@ def _prisms(mesh: Mesh, axis: str, near_mm: float) -> tuple[Prism, ...]:
     starts = heights[np.append(True, np.diff(heights) > 4 * near_mm)]
     at = np.searchsorted(starts + 4 * near_mm, corners[caps, :, k].mean(1))
     levels = [_rounded(float(value)) for value in starts]
-    region, growing, found = shapely.Polygon(), {}, []
+    region, found = shapely.Polygon(), []
+    growing: dict[Outline, float] = {}
     faces = defaultdict(list)
     for number, place, looks_up in zip(caps.tolist(), at.tolist(), (normal[caps] > 0).tolist(), strict=True):
         faces[place, looks_up].append(number)

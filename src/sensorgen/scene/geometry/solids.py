@@ -225,11 +225,12 @@ def main() -> None:
         gc.enable()
         for name, arguments in _jobs(sys.stdin.buffer):
             try:
-                answer: object = {"write_step": write_step, "read_step": read_step}[name](*arguments)
+                answer: object = write_step(*arguments) if name == "write_step" else read_step(*arguments)
             except SensorgenError as error:
                 answer = error
             except Exception as error:  # the process lives on, and the user learns of it
-                answer = CadFailed(f"the CAD process failed in {name}: {type(error).__name__}: {error}")
+                what = arguments[2] if name == "write_step" else arguments[0].name
+                answer = CadFailed(f"the CAD process failed on {what!r}: {type(error).__name__}: {error}")
             pickle.dump(answer, answers)
             answers.flush()
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Real, Whole
 from sensorgen.scene.geometry.meshes import Mesh
+from sensorgen.scene.scene import Place
 
 if TYPE_CHECKING:
     import manifold3d
@@ -38,7 +39,7 @@ class Fault:
 
     message: str
     advice: str
-    place_mm: tuple[float, float, float]
+    place_mm: Place
 
 
 @dataclass(frozen=True)
@@ -96,6 +97,11 @@ def closed(vertices_mm: Real, triangles: Whole, weld_mm: float = WELD_MM) -> Clo
     shells, inverted, faults = _outwards(_shells(points, faces, mates))
     repairs += [f"{inverted} surfaces that were inside out turned"] if inverted else []
     return Closed(tuple(shells) if not faults else (), tuple(repairs), tuple(faults))
+
+
+def _place(point: Real) -> Place:
+    x, y, z = point.round(6).tolist()
+    return x, y, z
 
 
 def _welded(points: Real, faces: Whole, near_mm: float) -> tuple[Real, Whole]:
@@ -190,7 +196,7 @@ def _filled(points: Real, faces: Whole) -> tuple[Whole, list[str], list[Fault]]:
                 del after[loop[-2]]
         ring = np.array(loop[:-1] if loop[-1] == start else loop)
         cap = _cap(points[ring]) if loop[-1] == start and len(ring) > 2 else None
-        place = tuple(float(v) for v in points[ring].mean(0).round(6))
+        place = _place(points[ring].mean(0))
         if cap is None:
             message = f"it is open: a gap with an edge of {len(ring)} sides that is not flat"
             faults.append(Fault(message, "close the gap in CAD, or join the faces into a solid", place))
@@ -245,7 +251,7 @@ def _mates(points: Real, faces: Whole) -> tuple[Whole, list[Fault]]:
             mates[a], mates[b] = b, a
     faults = []
     if bad:
-        place = tuple(float(v) for v in points[edges[bad[0]]].mean(0).round(6))
+        place = _place(points[edges[bad[0]]].mean(0))
         many = f" and {len(bad) - 1} others" if len(bad) > 1 else ""
         message = f"no outside can be given to its faces: one edge{many} has faces that look to different sides"
         faults.append(Fault(message, "remove faces inside the body, and export a solid", place))
@@ -296,17 +302,18 @@ def _shells(points: Real, faces: Whole, mates: Whole) -> list[Mesh]:
 
 def _outwards(shells: Sequence[Mesh]) -> tuple[list[Mesh], int, list[Fault]]:
     """Shells with their outside out; one inside another that is inside out is a cavity. And how many were turned."""
-    outer, inner, faults, turned = [], [], [], 0
+    outer: list[Mesh] = []
+    inner: list[Mesh] = []
+    faults, turned = [], 0
     for shell in shells:
         low, high = shell.vertices_mm.min(0), shell.vertices_mm.max(0)
         corners = shell.vertices_mm[shell.triangles]
         area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
         volume = shell.volume_mm3()
         if abs(volume) <= _NOTHING * area * np.linalg.norm(high - low):
-            middle = (low + high) / 2
             faults.append(
                 Fault("it encloses nothing: a sheet without thickness", "give it a thickness in CAD, or leave it out",
-                      (float(middle[0]), float(middle[1]), float(middle[2])))
+                      _place((low + high) / 2))
             )  # fmt: skip
         (outer if volume > 0 else inner).append(shell)
     cavities = []
@@ -323,7 +330,7 @@ def _outwards(shells: Sequence[Mesh]) -> tuple[list[Mesh], int, list[Fault]]:
     return [*outer, *cavities], turned, faults
 
 
-def crossing(mesh: Mesh) -> tuple[float, float, float] | None:
+def crossing(mesh: Mesh) -> Place | None:
     """A place where faces of a surface pass through each other; None where none do [mm].
 
     Faces that share a corner are not compared.
@@ -343,8 +350,7 @@ def crossing(mesh: Mesh) -> tuple[float, float, float] | None:
             start, end = corners[a, k], corners[a, (k + 1) % 3]
             hit = _pierced(start, end, corners[b])
             if hit is not None:
-                x, y, z = hit.tolist()
-                return round(x, 6), round(y, 6), round(z, 6)
+                return _place(hit)
     return None
 
 
