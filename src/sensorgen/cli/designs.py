@@ -193,6 +193,7 @@ def _design_options() -> list[click.Parameter]:
             "--infill", "[MATERIAL=]PERCENT", "Infill of a material; of the dielectric if none is named.", multiple=True
         ),
         option("--infill-pattern", "[MATERIAL=]PATTERN", "Pattern of the infill: rectilinear, grid ...", multiple=True),
+        option("--border", "FILE", "Outline of the sensor in plan, an SVG or DXF file; its size is the sensor's."),
         option("--shrinkage", "SHARE", "Shrinkage in the plane to print against, as in 0.2.", type=Share()),
         option(
             "--set settings", "KEY=VALUE",
@@ -245,6 +246,8 @@ def _changes(base: Data, given: Data) -> Data:
             k: given[k] for k in ("orientation", "printer", "quality", "nozzle_mm", "shrinkage") if given[k] is not None
         },
     }
+    if given["border"] is not None:
+        changes["border"] = str(Path(given["border"]).absolute())
     for key, value in pairs(given["settings"], "--set"):
         changes = merged(changes, setting(key, value, known))
     return {k: v for k, v in changes.items() if v != {}}

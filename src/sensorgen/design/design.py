@@ -17,7 +17,7 @@ from sensorgen.core import plugins as registry
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding
 from sensorgen.core.records import Strict, checked, shown
-from sensorgen.design import imported, packs, shapes
+from sensorgen.design import borders, imported, packs, shapes
 from sensorgen.design import materials as material_files
 from sensorgen.design.packs import Kind
 from sensorgen.design.printer import Pattern, Printer, Quality, load_printer, load_quality
@@ -114,6 +114,9 @@ class Design(Strict):
         default=None, description="File of the bodies of an imported sensor, relative to the design's own file."
     )
     bodies: dict[str, imported.Filled] = Field(default={}, description="Imported body to material and terminal.")
+    border: str | None = Field(
+        default=None, description="SVG or DXF file of the sensor's outline in plan, relative to the design's own file."
+    )
 
     @field_validator("name")
     @classmethod
@@ -187,7 +190,13 @@ class Design(Strict):
         if self.geometry:
             return imported.scene(self.geometry, self.bodies)
         names = {part: (value or "").partition("@")[0] for part, value in self.materials.model_dump().items()}
-        return self.form.scene(self.params, Fill(**names))
+        scene = self.form.scene(self.params, Fill(**names))
+        return borders.cut(scene, self.border) if self.border else scene
+
+    @cached_property
+    def unbordered(self) -> "Design":
+        """The design without its border: a rectangle of the same length and width."""
+        return checked(Design, self.model_dump(exclude={"border"})) if self.border else self
 
     @cached_property
     def in_use(self) -> Scene:
@@ -239,7 +248,7 @@ class Design(Strict):
 
     def _plain(self) -> set[str]:
         """Parts that have come later and are not used: without them the identities of older designs last."""
-        usual = {"profile": Profile(), "own": {}, "geometry": None, "bodies": {}}
+        usual = {"profile": Profile(), "own": {}, "geometry": None, "bodies": {}, "border": None}
         return {key for key, value in usual.items() if getattr(self, key) == value}
 
     @property
@@ -387,7 +396,7 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
 
 def with_own_files(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     """A design's data with the content of all files in place of their names, relative to a folder."""
-    return imported.with_geometry(packs.with_files(with_own(data, folder), folder), folder)
+    return borders.with_border(imported.with_geometry(packs.with_files(with_own(data, folder), folder), folder), folder)
 
 
 def _imported(design: Design) -> Design:
@@ -514,7 +523,8 @@ def name_of(design: Design) -> str:
         parts.append("" if given == usual else _plain(Path(given).stem))
     if design.orientation != default.orientation:
         parts.append("upside-down")
-    said_if_set = ({"material_values"} if design.material_values else set()) | ({"profile"} - design._plain())
+    said_if_set = {key for key in ("material_values", "border") if getattr(design, key)}
+    said_if_set |= {"profile"} - design._plain()
     others = design.model_dump(include={"materials", "nozzle_mm", "tools", "infill", "shrinkage"} | said_if_set)
     if others != default.model_dump(include=set(others)):
         parts.append(_digest(others))

@@ -21,17 +21,20 @@ from pydantic import Field
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.core.files import reading
 from sensorgen.core.records import Strict
-from sensorgen.scene.polyhedra import Loft, Polyhedron
-from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Body, Envelope, Piece, Prism, Scene
 from sensorgen.scene.sections import sections
-from sensorgen.scene.unit_cell import cell
 
 SHAPE = "imported"
 MOST_BYTES = 200_000_000  # of a file of bodies
 _START = "data:application/zlib;base64,"
-_KINDS: dict[str, type[Piece]] = {"prism": Prism, "revolved": Revolved, "loft": Loft, "polyhedron": Polyhedron}
 _HASHED = re.compile(r"-([0-9a-f]{8})\.bodies\.json")
+
+
+def _kinds() -> "dict[str, type[Piece]]":
+    from sensorgen.scene.polyhedra import Loft, Polyhedron
+    from sensorgen.scene.revolved import Revolved
+
+    return {"prism": Prism, "revolved": Revolved, "loft": Loft, "polyhedron": Polyhedron}
 
 
 class Filled(Strict):
@@ -72,7 +75,7 @@ class Bodies:
 
 def text(bodies: Bodies) -> str:
     """Bodies as the text of a file."""
-    kinds = {kind: name for name, kind in _KINDS.items()}
+    kinds = {kind: name for name, kind in _kinds().items()}
     data = {
         "source": bodies.source,
         "chord_mm": bodies.chord_mm,
@@ -140,7 +143,7 @@ def bodies(geometry: str) -> Bodies:
 
 
 def _piece(data: Mapping[str, Any]) -> Piece:
-    return _KINDS[data["kind"]](**{key: _frozen(value) for key, value in data.items() if key != "kind"})
+    return _kinds()[data["kind"]](**{key: _frozen(value) for key, value in data.items() if key != "kind"})
 
 
 def _frozen(value: Any) -> Any:
@@ -150,6 +153,8 @@ def _frozen(value: Any) -> Any:
 @lru_cache(maxsize=8)
 def params(geometry: str) -> Params:
     """Size of an imported sensor, and the period of its pattern where one cross-section repeats."""
+    from sensorgen.scene.unit_cell import cell
+
     found = bodies(geometry)
     length, width, height = found.size_mm
     made = Scene(tuple(Body(name, name, own) for name, own in found.pieces.items()), found.size_mm)
