@@ -136,7 +136,7 @@ def _refuse_entities(path: Path) -> None:
     """Refuse XML that defines entities; a document type that only names SVG's own is harmless."""
     parser = expat.ParserCreate()
 
-    def refuse(*_: object) -> None:
+    def refuse(*_: object) -> int:
         raise BadInput(f"{path}: it defines entities of its own, which no outline needs: it is refused")
 
     parser.EntityDeclHandler = refuse

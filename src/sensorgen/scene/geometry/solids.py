@@ -22,7 +22,7 @@ import os
 import pickle
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -225,7 +225,8 @@ def main() -> None:
         gc.enable()
         for name, arguments in _jobs(sys.stdin.buffer):
             try:
-                answer: object = write_step(*arguments) if name == "write_step" else read_step(*arguments)
+                work: Callable[..., object] = write_step if name == "write_step" else read_step
+                answer = work(*arguments)
             except SensorgenError as error:
                 answer = error
             except Exception as error:  # the process lives on, and the user learns of it
