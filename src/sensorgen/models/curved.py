@@ -105,7 +105,15 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     own, x, y = cell(scene)
     values = [float(permittivity[name]) for name in own.materials]
     shares = np.outer(x.shares, y.shares)
-    plan = Cell(own.low_mm, own.high_mm, own.pieces, len(_ENDS), values, (x.places_mm[1:-1], y.places_mm[1:-1]), shares)
+    plan = Cell(
+        own.low_mm,
+        own.high_mm,
+        own.pieces,
+        len(_ENDS),
+        values,
+        (x.places_mm[1:-1].tolist(), y.places_mm[1:-1].tolist()),
+        shares,
+    )
     reached = False
     try:
         for level, elements, found in bounds(plan, width):
@@ -136,7 +144,7 @@ def cell(scene: Scene) -> tuple[Window, Repeat, Repeat]:
     Raises
     ------
     ValueError
-        An electrode is missing, or the cell has too many bodies.
+        An electrode is missing, the pattern has no mirrors, or the cell has too many bodies.
     """
     spans = {end: [p.span("z") for b in scene.bodies if b.terminal == end for p in b.pieces] for end in _ENDS}
     if missing := [end for end in _ENDS if not spans[end]]:
@@ -145,20 +153,22 @@ def cell(scene: Scene) -> tuple[Window, Repeat, Repeat]:
         {z for body in scene.bodies for piece in body.pieces for z in (*piece.levels_mm(), *piece.span("z"))}
     )
     looks = []
-    for low, high in pairwise(levels):
-        for share in _CUTS if high - low > SLIVER_MM else ():
-            z, outlines = low + share * (high - low), dict[tuple[str, str], list[shapely.Polygon]]()
+    for bottom, top in pairwise(levels):
+        for share in _CUTS if top - bottom > SLIVER_MM else ():
+            z, outlines = bottom + share * (top - bottom), dict[tuple[str, str], list[shapely.Polygon]]()
             for body in scene.bodies:
                 cut = [shapely.Polygon(outline) for piece in body.pieces for outline in piece.cut("z", z)]
                 outlines.setdefault((body.material, body.terminal), []).extend(cut)
             looks += [shapely.union_all(own) for own in outlines.values() if own]
     x, y = (repeat(looks, scene.size_mm[:2], axis) for axis in (0, 1))
+    if x.shifts or y.shifts:
+        raise ValueError("the pattern repeats by shifts, not by mirrors")
     low = (x.low_mm, y.low_mm, min(z for z, _ in spans["bottom"]))
     high = (x.high_mm, y.high_mm, max(z for _, z in spans["top"]))
     near = [
         (body, piece) for body in scene.bodies for piece in body.pieces
-        if all(piece.span(axis)[0] < top - SLIVER_MM and piece.span(axis)[1] > bottom + SLIVER_MM
-               for axis, bottom, top in zip("xyz", low, high, strict=True))
+        if all(piece.span(axis)[0] < end - SLIVER_MM and piece.span(axis)[1] > start + SLIVER_MM
+               for axis, start, end in zip("xyz", low, high, strict=True))
     ]  # fmt: skip
     if len(near) > _MOST:
         raise ValueError(f"its cell has {len(near)} bodies; at most {_MOST} are solved")

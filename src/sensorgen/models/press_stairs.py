@@ -48,11 +48,9 @@ def why_not_applicable(scene: Scene) -> str | None:
     if all(piece.is_constant("z") for body in scene.bodies for piece in body.pieces):
         return "its bodies are upright prisms"
     try:
-        _, x, y = curved.cell(scene)
+        curved.cell(scene)
     except ValueError as error:
         return str(error)
-    if x.shifts or y.shifts:
-        return "the pattern repeats by shifts, not by mirrors"
     return None
 
 
@@ -137,8 +135,8 @@ def _planes(pieces: Sequence[Piece], axis: str, low: float, high: float, columns
         sides = list(pairwise(places))
         steep = [_STEEP if any(a < (u + v) / 2 < b for a, b in flanks) else 1.0 for u, v in sides]
         off = [min((max(a - t, t - b, 0.0) for t in poles), default=1.0) for a, b in sides]
-        near = [1.0 + _POLE / (1.0 + d / (high - low) / _FAR) if poles else 1.0 for d in off]
-        widest = int(np.argmax(np.diff(places) * steep * near))
+        close = [1.0 + _POLE / (1.0 + d / (high - low) / _FAR) if poles else 1.0 for d in off]
+        widest = int(np.argmax(np.diff(places) * steep * close))
         places.insert(widest + 1, sum(sides[widest]) / 2)
     return places
 

@@ -207,7 +207,9 @@ def touches(cell: Cell) -> list[Touch]:
     """All places in a cell where a dome meets a level face."""
     found = []
     for own, piece, kind in cell.boxes():
-        arcs = [edge for edge in profile(piece) if edge.bulge] if isinstance(piece, Revolved) else []
+        if not isinstance(piece, Revolved):
+            continue
+        arcs = [edge for edge in profile(piece) if edge.bulge]
         poles = [(edge.circle(), z) for edge in arcs for r, z in (edge.start, edge.end) if r < SAME_MM]
         for (centre, radius), z in poles:
             upwards, middle = z < centre[1], own[:2].mean(1)

@@ -223,8 +223,8 @@ def solid(piece: Piece) -> Any:
         return _revolved(piece)
     if isinstance(piece, Prism):
         at, way = piece.start_mm, [(piece.end_mm - piece.start_mm) * (piece.axis == axis) for axis in "xyz"]
-        first = {"x": lambda u, v: (at, u, v), "y": lambda u, v: (u, at, v), "z": lambda u, v: (u, v, at)}[piece.axis]
-        return occ.Prism(_flat([first(u, v) for u, v in piece.outline]), occ.Vec(*way))
+        corners = [{"x": (at, u, v), "y": (u, at, v), "z": (u, v, at)}[piece.axis] for u, v in piece.outline]
+        return occ.Prism(_flat(corners), occ.Vec(*way))
     whole = piece.polyhedron() if isinstance(piece, Loft) else piece
     faces = [_flat([whole.vertices[k] for k in triangle]) for triangle in whole.triangles]
     return occ.Solid(occ.Sew(faces)).UnifySameDomain()
