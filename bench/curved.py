@@ -105,7 +105,6 @@ def rows() -> Iterator[str]:
         yield row(name, 0.05, metal=True)
     yield row("bump", 0.05, metal=False)
     yield row("bump", 0.0, metal=True)
-    yield row("cone", 0.0, metal=True)
 
 
 def row(name: str, gap: float, *, metal: bool) -> str:
