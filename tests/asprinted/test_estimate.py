@@ -250,6 +250,15 @@ def test_the_range_of_a_sparse_film_holds_the_real_one(printed, walls):
     assert found[0] == pytest.approx(wanted, rel=0.05)
 
 
+@pytest.mark.parametrize("film_mm", [0.13, 0.15, 0.2])
+def test_the_cell_of_a_print_is_one_period(film_mm):
+    """With a film of 0.15 mm the plane of the apexes is at mid-height of a layer, whose strips all but touch."""
+    variant = design.make({"shape": "tri", "parameters": {"length_mm": 80, "period_mm": 3, "dielectric_mm": film_mm}})
+    cells = estimated(variant).cells
+    assert {scene.size_mm[0] for scene in cells.scenes.values()} == {3.0}
+    assert cells.count == pytest.approx(80 / 3)
+
+
 def test_a_sparse_part_has_its_walls_and_its_share():
     body = Body("plate", "x60", (box(0, 20, 0, 20, 0, 0.1), box(0, 20, 0, 20, 0.1, 0.2)))
     scene, laid = Scene((body,), (20.0, 20.0, 0.2)), {"x60": Lines(0.5, 1.0, 0.4)}
