@@ -221,11 +221,17 @@ class Design(Strict):
             stuff[name] = self.material(name).model_dump(exclude=_LIMITS) | {"source": source}
         return {
             **self.model_dump(exclude={"name", "parameters", "printer", "quality", "waivers"} | self._plain()),
-            "parameters": dataclasses.asdict(self.params),
+            "parameters": self._decisive_parameters(),
             "materials_values": stuff,
             "printer_values": self.machine.model_dump(exclude=_LIMITS),
             "quality_values": self.layers.model_dump(),
         }
+
+    def _decisive_parameters(self) -> dict[str, Any]:
+        """All parameters but those that their shape got later and that are not used: older designs stay the same."""
+        unused = {f.name for f in dataclasses.fields(self.params)
+                  if f.metadata.get("later") and getattr(self.params, f.name) == f.default}  # fmt: skip
+        return {name: value for name, value in dataclasses.asdict(self.params).items() if name not in unused}
 
     def _plain(self) -> set[str]:
         """Parts that have come later and are not used: without them the identities of older designs last."""

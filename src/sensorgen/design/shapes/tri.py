@@ -36,6 +36,11 @@ class Params(Envelope):
         default="x",
         metadata={"help": "Axis along which the pattern repeats (x: triX, y: triY).", "choices": ("x", "y")},
     )
+    blunt_mm: float = field(
+        default=0.0,
+        metadata={"help": "Width of the hanging triangles' flat tips; 0 for sharp ones.", "range": (0.0, 50.0),
+                  "later": True},
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         """Refuse triangles that would run into each other."""
@@ -43,6 +48,10 @@ class Params(Envelope):
             raise OutOfRange(
                 f"lower_height_mm {self.lower_height_mm:g} must stay below hang_height_mm "
                 f"{self.hang_height_mm:g}: the triangles would run into each other"
+            )
+        if self.blunt_mm >= self.period_mm / 2:
+            raise OutOfRange(
+                f"blunt_mm {self.blunt_mm:g} leaves no flanks; expected less than half of period_mm {self.period_mm:g}"
             )
 
     def cells(self) -> float:
@@ -84,7 +93,7 @@ class _Frame:
         self.peak = self.film + p.lower_height_mm
         self.roof = self.film + p.hang_height_mm
         self.top = self.roof + p.electrode_mm
-        self.quarter = p.period_mm / 4
+        self.quarter, self.blunt = p.period_mm / 4, p.blunt_mm / 2
         self.end, self.depth = (p.length_mm, p.width_mm) if p.along == "x" else (p.width_mm, p.length_mm)
         self.axis = "y" if p.along == "x" else "x"
         # Hanging apexes, first a cog's, then in turn; enough of them to go beyond the end.
@@ -99,8 +108,9 @@ class _Frame:
         return rectangle(0.0, self.end, z0, z1)
 
     def triangle(self, apex: float) -> list[Point]:
-        """A hanging triangle."""
-        return [(apex - self.quarter, self.roof), (apex, self.film), (apex + self.quarter, self.roof)]
+        """A hanging triangle, from left to right."""
+        tips = [(apex - self.blunt, self.film), (apex + self.blunt, self.film)] if self.blunt else [(apex, self.film)]
+        return [(apex - self.quarter, self.roof), *tips, (apex + self.quarter, self.roof)]
 
     def hanging(self) -> list[list[Point]]:
         return [self.triangle(apex) for apex in self.apexes[1::2]]
@@ -113,14 +123,18 @@ class _Frame:
 
     def feet(self) -> list[list[Point]]:
         """Triangles on the film, each to the left of a hanging apex."""
-        q = self.quarter
-        return [[(a - 2 * q, self.film), (a, self.film), (a - q, self.peak)] for a in self.apexes]
+        q, t = self.quarter, self.blunt
+        return [[(a - 2 * q + t, self.film), (a - t, self.film), (a - q, self.peak)] for a in self.apexes]
 
     def film_with_feet(self) -> list[Point]:
-        teeth = [point for a in reversed(self.apexes) for point in ((a + self.quarter, self.peak), (a, self.film))]
+        q, t = self.quarter, self.blunt
+        valleys = ([(a + t, self.film), (a - t, self.film)] if t else [(a, self.film)] for a in reversed(self.apexes))
+        peaks = ((a + q, self.peak) for a in reversed(self.apexes))
+        teeth = [point for peak, valley in zip(peaks, valleys, strict=True) for point in (peak, *valley)]
         return [(0.0, self.low), (teeth[0][0], self.low), *teeth, (self.apexes[0] - self.quarter, self.peak)]
 
     def air(self) -> list[list[Point]]:
         """What is left open above each foot."""
-        q = self.quarter
-        return [[(a - 2 * q, self.film), (a - q, self.peak), (a, self.film), (a - q, self.roof)] for a in self.apexes]
+        q, t = self.quarter, self.blunt
+        return [[(a - 2 * q + t, self.film), (a - q, self.peak), (a - t, self.film), (a - q, self.roof)]
+                for a in self.apexes]  # fmt: skip
