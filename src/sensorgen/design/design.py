@@ -338,7 +338,8 @@ def _checked(field: dataclasses.Field[Any], value: float | str) -> float | str:
     low, high = field.metadata["range"]
     if isinstance(value, str) or not math.isfinite(value) or not low <= value <= high:
         shown = repr(value) if isinstance(value, str) else f"{value:g}"
-        raise OutOfRange(f"{field.name} is {shown}; expected a number from {low:g} to {high:g} mm")
+        unit = "degrees" if field.name.endswith("_deg") else "mm"
+        raise OutOfRange(f"{field.name} is {shown}; expected a number from {low:g} to {high:g} {unit}")
     return float(value)
 
 

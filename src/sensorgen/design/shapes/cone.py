@@ -25,22 +25,20 @@ class Params(ArrayParams):
     root_mm: float = field(
         default=1.0, metadata={"help": "Diameter of a cone at the top electrode.", "range": (0.02, 100.0)}
     )
-    blunt_mm: float = field(
+    tip_mm: float = field(
         default=0.5, metadata={"help": "Diameter of its blunt tip; 0 for a sharp one.", "range": (0.0, 100.0)}
     )
 
     def __post_init__(self) -> None:
         """Refuse cones that would run into each other, or that grow towards the tip."""
         self.refuse_wider(self.root_mm)
-        if self.blunt_mm > self.root_mm:
-            raise OutOfRange(
-                f"blunt_mm {self.blunt_mm:g} is wider than root_mm {self.root_mm:g}: expected at most that"
-            )
+        if self.tip_mm > self.root_mm:
+            raise OutOfRange(f"tip_mm {self.tip_mm:g} is wider than root_mm {self.root_mm:g}: expected at most that")
 
 
 def scene(p: Params, fill: Fill) -> Scene:
     """Bodies of the array of cones."""
-    tip, base = p.blunt_mm / 2, p.root_mm / 2
+    tip, base = p.tip_mm / 2, p.root_mm / 2
 
     def cone(x: float, y: float, z: float) -> list[Piece]:
         roof = rounded(z + p.height_mm)

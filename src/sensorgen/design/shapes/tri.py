@@ -36,7 +36,7 @@ class Params(Envelope):
         default="x",
         metadata={"help": "Axis along which the pattern repeats (x: triX, y: triY).", "choices": ("x", "y")},
     )
-    blunt_mm: float = field(
+    tip_mm: float = field(
         default=0.0,
         metadata={"help": "Width of the hanging triangles' flat tips; 0 for sharp ones.", "range": (0.0, 50.0),
                   "later": True},
@@ -49,9 +49,9 @@ class Params(Envelope):
                 f"lower_height_mm {self.lower_height_mm:g} must stay below hang_height_mm "
                 f"{self.hang_height_mm:g}: the triangles would run into each other"
             )
-        if self.blunt_mm >= self.period_mm / 2:
+        if self.tip_mm >= self.period_mm / 2:
             raise OutOfRange(
-                f"blunt_mm {self.blunt_mm:g} leaves no flanks; expected less than half of period_mm {self.period_mm:g}"
+                f"tip_mm {self.tip_mm:g} leaves no flanks; expected less than half of period_mm {self.period_mm:g}"
             )
 
     def cells(self) -> float:
@@ -93,7 +93,7 @@ class _Frame:
         self.peak = self.film + p.lower_height_mm
         self.roof = self.film + p.hang_height_mm
         self.top = self.roof + p.electrode_mm
-        self.quarter, self.blunt = p.period_mm / 4, p.blunt_mm / 2
+        self.quarter, self.blunt = p.period_mm / 4, p.tip_mm / 2
         self.end, self.depth = (p.length_mm, p.width_mm) if p.along == "x" else (p.width_mm, p.length_mm)
         self.axis = "y" if p.along == "x" else "x"
         # Hanging apexes, first a cog's, then in turn; enough of them to go beyond the end.
