@@ -46,7 +46,8 @@ def _one_cell(design: Design) -> "tuple[Scene, float]":
     Other patterns are whole: models of prisms find the cell, and what the sensor's ends cut off.
     """
     scene, params = design.in_use, design.params
-    if not isinstance(params, ArrayParams) or all(isinstance(p, Prism) for b in scene.bodies for p in b.pieces):
+    pieces = (p for b in scene.bodies for p in b.pieces)
+    if not isinstance(params, ArrayParams) or all(isinstance(p, Prism) for p in pieces):
         return scene, 1.0
     one = replace(params, length_mm=params.period_mm, width_mm=params.period_mm)
     cell = make(design.model_dump(exclude_defaults=True, mode="json") | {"parameters": asdict(one)})
