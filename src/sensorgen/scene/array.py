@@ -41,8 +41,7 @@ def array_scene(
     structure: Callable[[float, float, float], Sequence[Piece]],
     around: Callable[[float, float, float], Sequence[Piece]],
 ) -> Scene:
-    """Bodies of an array of whole cells, in the middle of the sensor;
-    none where it is shorter than a period.
+    """Bodies of an array of whole cells in the middle of the sensor; of no cell in one shorter than a period.
 
     Parameters
     ----------
