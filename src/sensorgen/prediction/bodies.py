@@ -15,7 +15,6 @@ from sensorgen.design.body import DRAWN, Body, Cells, Film
 from sensorgen.design.design import Design, make
 from sensorgen.design.walls import WALLS
 from sensorgen.design.walls import rules as wall_rules
-from sensorgen.scene.array import ArrayParams
 from sensorgen.scene.scene import Prism
 
 if TYPE_CHECKING:
@@ -46,8 +45,11 @@ def _one_cell(design: Design) -> "tuple[Scene, float]":
     Other patterns are whole: models of prisms find the cell, and what the sensor's ends cut off.
     """
     scene, params = design.in_use, design.params
-    pieces = (p for b in scene.bodies for p in b.pieces)
-    if not isinstance(params, ArrayParams) or all(isinstance(p, Prism) for p in pieces):
+    if all(isinstance(p, Prism) for b in scene.bodies for p in b.pieces):
+        return scene, 1.0
+    from sensorgen.scene.array import ArrayParams
+
+    if not isinstance(params, ArrayParams):
         return scene, 1.0
     one = replace(params, length_mm=params.period_mm, width_mm=params.period_mm)
     cell = make(design.model_dump(exclude_defaults=True, mode="json") | {"parameters": asdict(one)})
