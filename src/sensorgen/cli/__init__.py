@@ -20,6 +20,7 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
         "check": "Check a design against nozzle, layers and bed.",
         "slice": "Write printer-ready G-code, by a real slicer.",
         "gcode": "Check G-code before the printer does.",
+        "show": "Show a design as one page: 3D, section, layers, numbers.",
         "draw": "Draw the cross-section, its layers and findings, as SVG.",
     },
     "Predict": {

@@ -11,11 +11,16 @@ def shades(colour: str, number: int) -> tuple[str, str]:
     >>> shades("#303436", 0)
     ('#303436', '#666a6c')
     """
-    red = _rgb(colour)
-    towards = 255.0 if luminance(red) < 0.4 else 0.0
+    own = _rgb(colour)
+    light, dark = _clear(own, LIGHT, 0.0), _clear(own, DARK, 255.0)
+    towards = 255.0 if luminance(own) < 0.4 else 0.0
+    return _hex(_moved(light, towards, number)), _hex(_moved(dark, towards, number))
+
+
+def _moved(colour: tuple[float, ...], end: float, number: int) -> tuple[float, ...]:
+    """The shade of the ``number``-th body."""
     share = min(_APART * number, 0.6)
-    own = tuple(v + (towards - v) * share for v in red)
-    return _hex(_clear(own, LIGHT, 0.0)), _hex(_clear(own, DARK, 255.0))
+    return tuple(v + (end - v) * share for v in colour)
 
 
 def _clear(colour: tuple[float, ...], ground: str, end: float) -> tuple[float, ...]:

@@ -96,8 +96,9 @@ function solidPainter(canvas) {
       gl.bindVertexArray(array);
       gl.uniform1f(named.lift, shell.lift);
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, faces);
-      // Inner sides are seen only where the plane has opened a body: flat in its colour they are the cut face
-      for (const [side, lit, nearer] of [[gl.BACK, 1, 1], [gl.FRONT, 0, 0.5]]) {
+      // Inner sides are seen only where the plane has opened a body: flat in its colour, before all else at their
+      // depth, they are the cut face
+      for (const [side, lit, nearer] of [[gl.BACK, 1, 1], [gl.FRONT, 0, -1]]) {
         gl.cullFace(side);
         gl.polygonOffset(nearer, nearer);
         gl.uniform1i(named.lit, lit);

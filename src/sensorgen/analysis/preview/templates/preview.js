@@ -198,8 +198,8 @@ function plan(data) {
     look([box[0] - (e.clientX - held[0]) / per, box[1] - (e.clientY - held[1]) / per, box[2], box[3]]);
     held = [e.clientX, e.clientY];
   });
-  start(0);
   show(data.first);
+  start(data.layers[data.first]?.marks[0]?.[0] || 0);
 }
 
 function theme(redraw) {
