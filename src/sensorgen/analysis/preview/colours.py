@@ -9,7 +9,7 @@ def shades(colour: str, number: int) -> tuple[str, str]:
     """A material's colour for its ``number``-th body, on a light and on a dark ground.
 
     >>> shades("#303436", 0)
-    ('#303436', '#666a6c')
+    ('#303436', '#66696a')
     """
     own = _rgb(colour)
     light, dark = _clear(own, LIGHT, 0.0), _clear(own, DARK, 255.0)

@@ -55,4 +55,6 @@ def _map(known: Identifiability, quantity: str, sigma: Rows, need: float, useles
     ends = (f"{min(of.position_m) * 1e3:g}", f"{max(of.position_m) * 1e3:g} mm", f"{min(of.force_n):g}",
             f"{max(of.force_n):g} N")  # fmt: skip
     rows = len(of.force_n) - (0.0 in of.force_n)
-    return ErrorMapShown(f"error of {quantity}", f"{words(need)} or better", len(of.position_m), rows, tuple(cells), ends)
+    return ErrorMapShown(
+        f"error of {quantity}", f"{words(need)} or better", len(of.position_m), rows, tuple(cells), ends
+    )

@@ -71,6 +71,10 @@ def _cut(body: "object", axis: str, at_mm: float) -> Iterator[Outline]:
 
 def _paths(outlines: dict[str, list[Outline]], names: Sequence[str], height_mm: float) -> Iterable[tuple[int, str]]:
     for name, each in outlines.items():
-        yield names.index(name), "".join(
-            "M" + "L".join(f"{round(u, 4):g} {round(height_mm - z, 4):g}" for u, z in outline) + "Z" for outline in each
+        yield (
+            names.index(name),
+            "".join(
+                "M" + "L".join(f"{round(u, 4):g} {round(height_mm - z, 4):g}" for u, z in outline) + "Z"
+                for outline in each
+            ),
         )
