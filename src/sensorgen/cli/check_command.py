@@ -23,15 +23,13 @@ def _work(design: "Design", *, strict: bool, budget: float, apply_change: int | 
 
     with show.progress((*STEPS, *decision.STEPS)) as step:
         held = review(design, step)
-        decided = decision.decision(design, held, budget, step)
+        decided = decision.decision(design, held, budget, predict=budget > 0, step=step)
     render.deliver(decided)
     advice_options.applied(design, decided.advice, apply_change)
     return 1 if held.errors(strict) or decided.verdict == "CHANGE" else 0
 
 
 command = DesignGroup(
-    _work,
-    OWN,
-    name="check",
-    help="Decide whether to print: check against nozzle, layers and bed, predict, and try changes.",
-)
+    _work, OWN, name="check",
+    help="Decide whether to print a design: check it against nozzle, layers and bed, predict it, and try changes.",
+)  # fmt: skip

@@ -76,9 +76,8 @@ def _added(text: str, node: yaml.MappingNode, path: Sequence[str], value: Value)
     while isinstance(last, yaml.CollectionNode) and not last.flow_style and last.value:
         entry = last.value[-1]  # the marks of a block end after comments that follow it
         last = entry[1] if isinstance(entry, tuple) else entry
-    at = text.find(
-        "\n", last.end_mark.index if not text[: last.end_mark.index].endswith("\n") else last.end_mark.index - 1
-    )
+    end = last.end_mark.index
+    at = text.find("\n", end - 1 if text[:end].endswith("\n") else end)
     before, after = (text + newline, "") if at < 0 else (text[: at + 1], text[at + 1 :])
     lines = [f"{' ' * (indent + 2 * k)}{key}:" for k, key in enumerate(path)]
     lines[-1] += f" {_scalar(value)}"

@@ -249,8 +249,7 @@ class _Search:
             return self.design.walls
         if key == ("nozzle_mm",):
             return self.design.machine.nozzle_mm
-        value = self.design.materials.support if key[0] == "materials" else getattr(self.design, key[0])
-        return value
+        return self.design.materials.support if key[0] == "materials" else getattr(self.design, key[0])
 
     @property
     def advice(self) -> Advice:

@@ -5,13 +5,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
-from typing import TYPE_CHECKING, ClassVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from sensorgen.checks.review import CheckReport, Review
 from sensorgen.core import cache as answers
 from sensorgen.core.document import Part
 from sensorgen.core.errors import SensorgenError
-from sensorgen.core.findings import Finding, Refused, Verdict, counted, counts, grouped, listed, verdict
+from sensorgen.core.findings import Refused, Verdict, counted, counts, grouped, listed, verdict
 from sensorgen.design.design import Design
 from sensorgen.workflows import decisive
 from sensorgen.workflows.advice import Advice, advise
@@ -83,7 +84,15 @@ class RefusedBuild(Refused):
             yield from self.advice.document()
 
 
-def decision(design: Design, held: Review, budget_s: float, step: Step = lambda _: None) -> Decision:
+def decision(
+    design: Design,
+    held: Review,
+    budget_s: float,
+    *,
+    predict: bool = True,
+    folder: Path | None = None,
+    step: Step = lambda _: None,
+) -> Decision:
     """What follows from the findings about a design.
 
     Parameters
@@ -93,15 +102,19 @@ def decision(design: Design, held: Review, budget_s: float, step: Step = lambda 
     held : Review
         Its findings.
     budget_s : float
-        Processor time for trying changes; 0 for the findings alone, without a prediction [s].
+        Processor time for trying changes; at 0, advice that is stored is given [s].
+    predict : bool
+        Also predict drawing and print, without which no change is tried.
+    folder : Path, optional
+        With the design's files, as of :func:`sensorgen.workflows.trial.trial`.
     step : callable
         Called with the next step, for a progress display.
     """
     findings, made, reason, advice = tuple(held.findings), None, "", None
-    if budget_s > 0 and held.meshes:
+    if predict and held.meshes:
         step("prediction")
         try:
-            made = trial(design)
+            made = trial(design, folder=folder)
         except SensorgenError as error:
             reason = str(error)
     if made:
@@ -115,21 +128,24 @@ def decision(design: Design, held: Review, budget_s: float, step: Step = lambda 
 
 
 def advised(design: Design, made: Trial, budget_s: float, step: Step = lambda _: None) -> Advice | None:
-    """Changes of a design with findings, tried now or before; None where nothing is to be changed."""
-    if budget_s <= 0 or made.verdict == "PRINT":
+    """Changes of a design with findings, tried now or before; None where nothing is to be changed, or nothing known."""
+    if made.verdict == "PRINT":
         return None
     digest = sha256(json.dumps(_adapter(Trial).dump_python(made, mode="json"), sort_keys=True).encode()).hexdigest()
-    question = {"advice": _VERSION, "design": design.id(), "trial": digest, "budget_s": budget_s}
-
-    def work() -> answers.JSON:
-        return _adapter(Advice).dump_python(advise(design, made, budget_s, step), mode="json")
-
-    stored = answers.answer(question, work)
-    return _adapter(Advice).validate_json(json.dumps(stored))
+    question = {"advice": _VERSION, "design": design.id(), "trial": digest}
+    stored = answers.known(question)
+    known: Advice | None = _adapter(Advice).validate_json(json.dumps(stored)) if stored else None
+    if known and (known.complete or known.budget_s >= budget_s):
+        return known
+    if budget_s <= 0:
+        return None
+    advice = advise(design, made, budget_s, step)
+    answers.keep(question, _adapter(Advice).dump_python(advice, mode="json"))
+    return advice
 
 
 @cache
-def _adapter(kind: type) -> "TypeAdapter[Finding]":
+def _adapter(kind: type) -> "TypeAdapter[Any]":
     from pydantic import TypeAdapter
 
     return TypeAdapter(kind)

@@ -28,7 +28,7 @@ MOVES = {
     "6": ("wider", "nozzle"),
     "7": ("wider", "height", "walls", "quality", "nozzle"),
     "8": ("shorter",),
-    "9": ("orientation", "narrower", "height", "whole", "support"),
+    "9": ("orientation", "narrower", "whole", "support"),
     "10": ("film", "quality"),
 }
 PERIODS = 6  # that a short sensor has
@@ -114,11 +114,13 @@ def _heights(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
 
 
 def _widths(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
-    """The nearest whole number of lines above, or below, each width."""
+    """The nearest whole number of lines above, or of half lines below, each width: air may be narrower than a line."""
     for name, value, vertical in _lengths(design):
         if not vertical:
-            low, high = _beside(name, value, design.machine.line_mm())
-            yield high if kind == "wider" else low
+            line = design.machine.line_mm()
+            found = _beside(name, value, line)[1] if kind == "wider" else _beside(name, value, line / 2)[0]
+            if (found[1] > value) == (kind == "wider"):
+                yield found
 
 
 def _sides(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
@@ -133,11 +135,13 @@ def _sides(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
 
 
 _PARAMETERS = {
-    "film": _heights, "grid": _heights, "height": _heights, "wider": _widths, "narrower": _widths, "shorter": _sides, "whole": _sides,
+    "film": _heights, "grid": _heights, "height": _heights,
+    "wider": _widths, "narrower": _widths,
+    "shorter": _sides, "whole": _sides,
 }  # fmt: skip
 
 
-def _beside(name: str, value: float, step: float) -> list[tuple[Key, Value]]:
+def _beside(name: str, value: float, step: float) -> list[tuple[Key, float]]:
     """The multiples of a step below and above a value; at least one step."""
     low, high = (ceil(value / step - _EPS) - 1) * step, (floor(value / step + _EPS) + 1) * step
     return [(("parameters", name), round(max(each, step), 6)) for each in (low, high)]
