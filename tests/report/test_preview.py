@@ -17,7 +17,8 @@ from sensorgen.workflows.preview import page_of
 HOSTILE = "</script><img src=x onerror=alert(1)> & 'quoted'"
 TRI = {"shape": "tri", "parameters": {"dielectric_mm": 0.2, "length_mm": 12.0}}
 PIXELS = """(() => { const c = document.getElementById('model'), gl = c.getContext('webgl2');
-  const p = new Uint8Array(4 * c.width * c.height); gl.readPixels(0, 0, c.width, c.height, gl.RGBA, gl.UNSIGNED_BYTE, p);
+  const p = new Uint8Array(4 * c.width * c.height);
+  gl.readPixels(0, 0, c.width, c.height, gl.RGBA, gl.UNSIGNED_BYTE, p);
   const seen = new Map(); for (let k = 0; k < p.length; k += 4) { const n = p[k] << 16 | p[k + 1] << 8 | p[k + 2];
   seen.set(n, (seen.get(n) || 0) + 1); } return [...seen].sort((a, b) => b[1] - a[1]).slice(0, 12); })()"""
 FRAME = "new Promise(r => requestAnimationFrame(() => requestAnimationFrame(r)))"
