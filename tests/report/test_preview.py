@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from browser import Page
 
-from sensorgen.analysis.preview import colours, section, shells
+from sensorgen.analysis.preview import geometry, shades
 from sensorgen.design.design import make
 from sensorgen.scene.geometry.meshes import mesh
 from sensorgen.workflows.preview import page_of
@@ -81,7 +81,7 @@ def test_electrodes_are_seen_on_a_dark_ground(browser, made):
     assert browser.run("document.documentElement.dataset.theme") == "dark"
     shown, ground = (browser.run(colour.format(name)) for name in ("--c0", "--ground"))
     rgb = [[int(c[k : k + 2], 16) for k in (1, 3, 5)] for c in (shown, ground)]
-    assert colours.contrast(*rgb) > 3
+    assert shades.contrast(*rgb) > 3
 
 
 def test_the_section_plane_removes_what_is_before_it(browser, made):
@@ -157,7 +157,7 @@ def test_the_packed_shells_are_the_meshes():
     """Unpacked by the format's description: every vertex to a micrometre, every triangle, volumes to the rounding."""
     scene = make(TRI).printed
     names = [body.name for body in scene.bodies]
-    block = gzip.decompress(shells.packed({}, {"drawn": scene}, names))
+    block = gzip.decompress(geometry.packed({}, {"drawn": scene}, names))
     size = int.from_bytes(block[:4], "little")
     counts = json.loads(block[4 : 4 + size])["counts"]["drawn"]
     rest = np.frombuffer(block[4 + size :], "<i4")
@@ -176,14 +176,16 @@ def test_the_packed_shells_are_the_meshes():
 
 def test_edges_of_a_box_are_twelve():
     scene = make({"shape": "reference"}).printed
-    ends = shells.edges(mesh(scene.bodies[0]))
+    ends = geometry.edges(mesh(scene.bodies[0]))
     assert len({tuple(pair) for pair in ends.tolist()}) == len(ends) == 12
 
 
 def test_sections_have_the_area_of_the_drawing():
     """Of the plate, which is a stack of rectangles: widths times thicknesses."""
     design = make({"shape": "reference"})
-    (figure,) = section.figures(design.printed, design.printed, ["bottom_electrode", "dielectric", "top_electrode"], [])
+    (figure,) = geometry.figures(
+        design.printed, design.printed, ["bottom_electrode", "dielectric", "top_electrode"], []
+    )
     end = float(re.search(r"to ([\d.]+) of", figure.caption)[1])
     areas = []
     for _, d in figure.drawn:
@@ -200,14 +202,14 @@ def _area(xy):
 @pytest.mark.parametrize("colour", ["#000000", "#ffffff", "#303436", "#f2c14e", "#14171b"])
 @pytest.mark.parametrize("number", [0, 1, 2])
 def test_no_body_is_lost_on_its_ground(colour, number):
-    for shade, ground in zip(colours.shades(colour, number), (colours.LIGHT, colours.DARK), strict=True):
+    for shade, ground in zip(shades.shades(colour, number), (shades.LIGHT, shades.DARK), strict=True):
         rgb = [[int(c[k : k + 2], 16) for k in (1, 3, 5)] for c in (shade, ground)]
-        assert colours.contrast(*rgb) >= (1.2 if number else 1.49)
+        assert shades.contrast(*rgb) >= (1.2 if number else 1.49)
 
 
 def test_a_design_of_thousands_of_boxes_stays_small():
     scene = make({"shape": "rect", "parameters": {"length_mm": 200.0, "width_mm": 60.0}}).printed
     names = [body.name for body in scene.bodies]
-    data = shells.packed({}, {"drawn": scene, "printed": scene}, names)
+    data = geometry.packed({}, {"drawn": scene, "printed": scene}, names)
     assert sum(len(mesh(b).triangles) for b in scene.bodies) > 90_000
     assert len(base64.b64encode(data)) < 200_000

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, advice_options, body_options, log_words, render, show
+from sensorgen.cli import FOUND_ERRORS, body_options, render, settings, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.core.errors import Unprintable
 
@@ -20,7 +20,7 @@ OWN: list[click.Parameter] = [
     body_options.compensate_option(),
     click.Option(["--verify"], is_flag=True, help="Write nothing: compare the folder with its record and the log."),
     click.Option(["--details"], is_flag=True, help="Print all findings and the whole prediction."),
-    *advice_options.options(),
+    *settings.advice_options(),
     *render.options("json", "markdown"),
 ]
 
@@ -54,7 +54,7 @@ def _work(
         _refuse(design, error, budget, apply_change)
         raise
     render.deliver(DetailedBuild(**vars(built)) if details else built)
-    advice_options.applied(design, built.advice, apply_change)
+    settings.applied(design, built.advice, apply_change)
     return 1 if lost(built.findings) and not force else 0
 
 
@@ -66,10 +66,11 @@ def _refuse(design: "Design", error: Unprintable, budget: float, apply_change: i
     with show.progress(STEPS) as step:
         advice = decision(design, review(design), budget, predict=budget > 0, step=step).advice
     render.deliver(RefusedBuild(design.name, tuple(error.findings), len(error.stopping), advice=advice))
-    advice_options.applied(design, advice, apply_change)
+    settings.applied(design, advice, apply_change)
 
 
 def _verify(design: "Design", folder: Path) -> int:
+    from sensorgen.cli import log_words
     from sensorgen.workflows.sealed import build_differences
 
     with log_words.existing(None) as log:

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import advice_options, render, show
+from sensorgen.cli import render, settings, show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 OWN: list[click.Parameter] = [
     click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
-    *advice_options.options(),
+    *settings.advice_options(),
     *render.options(),
 ]
 
@@ -25,7 +25,7 @@ def _work(design: "Design", *, strict: bool, budget: float, apply_change: int | 
         held = review(design, step)
         decided = decision.decision(design, held, budget, predict=budget > 0, step=step)
     render.deliver(decided)
-    advice_options.applied(design, decided.advice, apply_change)
+    settings.applied(design, decided.advice, apply_change)
     return 1 if held.errors(strict) or decided.verdict == "CHANGE" else 0
 
 

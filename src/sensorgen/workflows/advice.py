@@ -5,15 +5,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from heapq import heappop, heappush
-from typing import ClassVar
 
 from sensorgen.checks.review import review
-from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import SensorgenError
-from sensorgen.core.findings import Finding, grouped
+from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
 from sensorgen.workflows import moves
-from sensorgen.workflows.decisive import grade, words_of
+from sensorgen.workflows.decision import Advice, Change, TriedChange, finding_counts, grade
 from sensorgen.workflows.moves import Changes, Key, Value
 from sensorgen.workflows.trial import Trial, trial
 
@@ -23,104 +21,6 @@ MOST_CHECKED, MOST_PREDICTED = 400, 8
 FARTHEST = 1.2  # distance of a change, as of moves.distance: at most by a factor of 3.3 in all [-]
 NOT_TRIED = "other materials, shapes, real slicers; sensorgen optimise looks for the best design"
 Step = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class Change:
-    """One value that changes.
-
-    Attributes
-    ----------
-    key : str
-        In the design file, as ``parameters.period_mm``.
-    before, after : float or str
-        In the unit that the key ends in.
-    """
-
-    key: str
-    before: Value | None
-    after: Value
-
-    def words(self) -> str:
-        """Key, before and after."""
-        name = self.key.rpartition(".")[2]
-        before, after = (f"{v:g}" if isinstance(v, float) else v or "none" for v in (self.before, self.after))
-        return f"{name} {before} -> {after}"
-
-
-@dataclass(frozen=True)
-class TriedChange:
-    """A change of the design that was checked and predicted.
-
-    Attributes
-    ----------
-    changes : tuple of Change
-        What differs from the design.
-    distance : float
-        How far: sum of abs(ln(after / before)), with a constant for each choice [-].
-    trial : Trial
-        The changed design.
-    """
-
-    changes: tuple[Change, ...]
-    distance: float
-    trial: Trial
-
-    def counts(self) -> tuple[int, int]:
-        """Errors and warnings that are left, each sentence once."""
-        return _counts(self.trial.findings)
-
-    def words(self) -> str:
-        """Changes, findings and numbers in one line."""
-        errors, warnings = self.counts()
-        numbers = words_of(self.trial)
-        changes = ", ".join(change.words() for change in self.changes)
-        left = f"{errors} error{'s' * (errors != 1)}, {warnings} warning{'s' * (warnings != 1)}"
-        return f"{changes}: {left}; {numbers}"
-
-
-@dataclass(frozen=True)
-class Advice:
-    """What was tried to remove the findings of a design.
-
-    Attributes
-    ----------
-    tried : tuple of TriedChange
-        The nearest first.
-    checked, predicted : int
-        How many designs were checked, and how many of them predicted too.
-    seconds, budget_s : float
-        Processor time that it took, and what it may take [s].
-    complete : bool
-        Whether all changes up to the distance ``farthest`` were checked.
-    farthest : float
-        Up to which distance changes were tried [-].
-    not_tried : str
-        What was left out.
-    """
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
-
-    tried: tuple[TriedChange, ...]
-    checked: int
-    predicted: int
-    seconds: float
-    budget_s: float
-    complete: bool
-    farthest: float
-    not_tried: str
-
-    def document(self) -> Iterator[Part]:
-        """The changes, the nearest first, and what was tried."""
-        effort = f"{self.checked} designs checked, {self.predicted} predicted"
-        if self.tried:
-            rows = ((f"{k}.", one.words()) for k, one in enumerate(self.tried, 1))
-            yield "changes that were tried, the smallest first:"
-            yield Facts(tuple(rows))
-        else:
-            yield "no change was found that removes findings and keeps what the sensor senses"
-        limit = "" if self.complete else f"; ended by the budget of {self.budget_s:g} s (--budget)"
-        yield f"({effort}{limit}; not tried: {self.not_tried})"
 
 
 def advise(design: Design, now: Trial, budget_s: float = BUDGET_S, step: Step = lambda _: None) -> Advice:
@@ -169,7 +69,7 @@ class _Search:
             findings = self._reviewed(changes) if changes else self.now.findings
             if findings is None:
                 continue
-            left = _counts(findings)
+            left = finding_counts(findings)
             if changes and self._improves(left, changes) and self._is_kept(changes):
                 continue  # a further step on the same way changes more
             if left >= least and changes and moves.is_choice(list(changes)[-1]):
@@ -210,7 +110,7 @@ class _Search:
 
         Of changes that leave as many warnings the nearest ``SHOWN`` count, of those of the same values the nearest.
         """
-        before = _counts(self.now.findings)
+        before = finding_counts(self.now.findings)
         if left[0] or left >= before:
             return False
         keys = {".".join(key) for key in changes}
@@ -259,9 +159,3 @@ class _Search:
             round(time.process_time() - self.start_s, 2), self.budget_s, self.complete,
             FARTHEST if self.complete else self.reached, NOT_TRIED,
         )  # fmt: skip
-
-
-def _counts(findings: Sequence[Finding]) -> tuple[int, int]:
-    """Errors and warnings, each sentence once."""
-    heads = [f.severity for f in grouped(findings)]
-    return heads.count("error"), heads.count("warning")

@@ -29,10 +29,9 @@ from sensorgen.export.threemf.part import parts_of
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless, to_json
-from sensorgen.workflows import compensation, decisive, preview, sealed
-from sensorgen.workflows.advice import Advice
+from sensorgen.workflows import compensation, decision, sealed
 from sensorgen.workflows.compensation import Change
-from sensorgen.workflows.decision import Decision, decision
+from sensorgen.workflows.decision import Advice, Decision
 from sensorgen.workflows.trial import Trial
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
@@ -84,7 +83,7 @@ class Built:
     def document(self) -> Iterator[Part]:
         """Verdict, quantities drawn beside printed, and the three findings that matter most."""
         yield from self._head()
-        yield from decisive.table(self.trial) if self.trial else self.prediction.summary()
+        yield from decision.table(self.trial) if self.trial else self.prediction.summary()
         if shown := most_severe(self.findings, 3):
             yield ""
             yield from listed(shown)
@@ -169,7 +168,7 @@ def build(
         job = kernel.submit(design.printed, _colours(design), design.name, step_file) if kernel else None
         step("prediction")
         predicted = evaluate(bodies.default_body(design, folder))
-        decided = decision(design, held, budget_s, folder=folder, step=step)
+        decided = decision.decision(design, held, budget_s, folder=folder, step=step)
         for name, content in _files(design, held, predicted, decided, step):
             store.write(stage, {name: content})
         if job:
@@ -209,7 +208,7 @@ def _files(
     step("drawing")
     printed = estimate(design)
     yield f"{name}.svg", draw(design, held, printed.scene, printed.provenance).encode()
-    yield f"{name}.html", preview.page(printed, held, predicted, decided).encode()
+    yield f"{name}.html", decided.page(printed, held, predicted).encode()
     yield "check.json", document.to_json(report(design, held)).encode()
     yield "prediction.json", json_bytes(json.loads(to_json(predicted)))
     yield "design.json", json_bytes(design.model_dump(mode="json"))

@@ -2,15 +2,13 @@
 
 from pathlib import Path
 
-from sensorgen.analysis import preview
-from sensorgen.asprinted.printed import Printed, body
+from sensorgen.asprinted.printed import body
 from sensorgen.checks.review import STEPS as CHECKS
-from sensorgen.checks.review import Review, Step, review
+from sensorgen.checks.review import Step, review
 from sensorgen.design.design import Design
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.results import Prediction
-from sensorgen.workflows.decision import Decision, decision
+from sensorgen.workflows.decision import decision
 
 STEPS = (*CHECKS, "prediction", "page", "done")
 
@@ -36,10 +34,4 @@ def page_of(design: Design, *, folder: Path | None = None, step: Step = lambda _
     decided = decision(design, held, 0.0, folder=folder, step=step)
     predicted = evaluate(bodies.default_body(design, folder))
     step("page")
-    return page(body(design), held, predicted, decided)
-
-
-def page(printed: Printed, held: Review, predicted: Prediction, decided: Decision) -> str:
-    """The page of what is known of a design."""
-    advice = decided.advice.document() if decided.advice else ()
-    return preview.page(printed, held, predicted, decided.verdict, decided.numbers(), advice)
+    return decided.page(body(design), held, predicted)

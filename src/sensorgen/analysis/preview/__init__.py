@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from sensorgen.analysis.plots.layers import path
-from sensorgen.analysis.plots.pages import render
-from sensorgen.analysis.preview import colours, errormaps, section, shells
+from sensorgen.analysis.plots.pages import path, render
+from sensorgen.analysis.preview import geometry, shades
 from sensorgen.asprinted.printed import Printed
 from sensorgen.checks.review import Review, draw
 from sensorgen.core import document
@@ -64,7 +63,7 @@ def page(
     shown = tuple(_bodies(printed))
     listed = [_placed(f, printed) for f in grouped(held.findings)]
     names = [body.name for body in scene.bodies]
-    data = shells.packed(
+    data = geometry.packed(
         {
             "size": scene.size_mm,
             "layers": list(_layers(printed, names, listed)),
@@ -78,10 +77,10 @@ def page(
         "sensorgen.analysis.preview", "preview.html", title=design.name, verdict=verdict, bodies=shown,
         provenance=printed.provenance, printer=f"{design.machine.name}, {design.layers.name}",
         size=" × ".join(f"{side:g}" for side in scene.size_mm), layers=len(printed.first),
-        sections=section.figures(scene, printed.scene, names, design.layers.boundaries_mm(scene.size_mm[2])),
+        sections=geometry.figures(scene, printed.scene, names, design.layers.boundaries_mm(scene.size_mm[2])),
         sheet=base64.b64encode(sheet.encode()).decode(), data=base64.b64encode(data).decode(),
         numbers=_html(numbers), advice=_html(advice), listed=listed, severities=SEVERITIES,
-        known=predicted.identifiability, maps=errormaps.maps(predicted.identifiability),
+        known=predicted.identifiability, maps=shades.maps(predicted.identifiability),
         reason=predicted.reason, assumptions=predicted.assumptions,
     )  # fmt: skip
 
@@ -96,7 +95,7 @@ def _bodies(printed: Printed) -> Iterator[BodyShown]:
     before: list[str] = []
     for body in printed.design.printed.bodies:
         material = materials.load(body.material)
-        light, dark = colours.shades(material.colour, before.count(body.material))
+        light, dark = shades.shades(material.colour, before.count(body.material))
         before.append(body.material)
         yield BodyShown(
             body.name.replace("_", " "), material.title, printed.design.tool(body.material), light, dark

@@ -12,6 +12,8 @@ from sensorgen.core.units import si
 
 Rows = tuple[tuple[float | None, ...], ...]
 Real = float | NDArray[np.float64]
+FORCE_SHARE = 0.1  # force is sensed where its standard error is a tenth of it
+GUESS = 12**-0.5  # standard deviation of a uniform distribution, relative to its range [-]
 SHOWN = 7  # frequencies; of more, those with most information on position
 
 
