@@ -10,9 +10,10 @@ from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding, grouped
 from sensorgen.design.design import load, make
+from sensorgen.prediction.results import resolved
 from sensorgen.workflows import moves
 from sensorgen.workflows.advice import advise
-from sensorgen.workflows.decision import advised, decision, resolved
+from sensorgen.workflows.decision import advised, decision
 from sensorgen.workflows.trial import trial
 
 OFF_GRID = """# my plate

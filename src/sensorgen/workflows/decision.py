@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -16,6 +16,7 @@ from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Finding, Refused, Verdict, counted, counts, grouped, listed, verdict
 from sensorgen.design.design import Design
 from sensorgen.prediction.identifiability.results import FORCE_SHARE, GUESS
+from sensorgen.prediction.results import resolved
 from sensorgen.workflows.trial import Numbers, Trial, trial
 
 if TYPE_CHECKING:
@@ -273,21 +274,6 @@ def grade(tried: Trial) -> tuple[int, int]:
 
 def _grade(error: Bounds | None, good: float, useless: float) -> int:
     return 0 if error is None or not error.value < useless else 2 if error.value <= good else 1
-
-
-def resolved(error: Bounds | None, most: float, cannot: str) -> str:
-    """A standard error in words; where it is that of a reading without information, what the sensor cannot do.
-
-    >>> resolved(Bounds.of(8580.0, "m"), 0.1, "cannot locate"), resolved(Bounds.of(0.2, "N"), 6.0, "cannot sense")
-    ('cannot locate', '200 mN')
-    """
-    if error is None:
-        return "–"
-    if not error.value < GUESS * most:
-        return cannot
-    if error.upper > most:
-        error = replace(error, upper=most, open="upper")
-    return error.words()
 
 
 def table(tried: Trial) -> Iterator[Part]:

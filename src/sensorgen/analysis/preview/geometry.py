@@ -124,4 +124,5 @@ def edges(shell: Mesh) -> Whole:
     pair = key[first] == key[second]
     first, second = first[pair], second[pair]
     sharp = np.einsum("ij,ij->i", normal[first // 3], normal[second // 3]) < _FLAT
-    return sides[first[sharp]]
+    ends: Whole = sides[first[sharp]]
+    return ends
