@@ -11,7 +11,7 @@ from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
 from sensorgen.workflows import moves
-from sensorgen.workflows.decision import Advice, Change, TriedChange, finding_counts, grade
+from sensorgen.workflows.decision import Advice, Change, TriedChange, finding_counts, grade, words_of
 from sensorgen.workflows.moves import Changes, Key, Value
 from sensorgen.workflows.trial import Trial, trial
 
@@ -155,7 +155,8 @@ class _Search:
     def advice(self) -> Advice:
         """What came of it."""
         return Advice(
-            tuple(sorted(self.kept, key=lambda one: (one.distance, one.counts()))), self.checked, self.predicted,
+            tuple(sorted(self.kept, key=lambda one: (one.distance, one.counts()))), words_of(self.now),
+            self.checked, self.predicted,
             round(time.process_time() - self.start_s, 2), self.budget_s, self.complete,
             FARTHEST if self.complete else self.reached, NOT_TRIED,
         )  # fmt: skip

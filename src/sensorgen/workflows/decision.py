@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
     from sensorgen.prediction.results import Prediction
 
-_VERSION = 1  # of the search for changes: stored advice of another one is not read
+_VERSION = 2  # of the search for changes: stored advice of another one is not read
 STEPS = ("prediction", "changes", "done")
 Step = Callable[[str], None]
 
@@ -92,6 +92,8 @@ class Advice:
     ----------
     tried : tuple of TriedChange
         The nearest first.
+    now : str
+        Numbers of the design itself, in words.
     checked, predicted : int
         How many designs were checked, and how many of them predicted too.
     seconds, budget_s : float
@@ -107,6 +109,7 @@ class Advice:
     __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
 
     tried: tuple[TriedChange, ...]
+    now: str
     checked: int
     predicted: int
     seconds: float
@@ -120,7 +123,7 @@ class Advice:
         effort = f"{self.checked} designs checked, {self.predicted} predicted"
         if self.tried:
             rows = ((f"{k}.", one.words()) for k, one in enumerate(self.tried, 1))
-            yield "changes that were tried, the smallest first:"
+            yield f"changes that were tried, the smallest first (now {self.now}):"
             yield Facts(tuple(rows))
         else:
             yield "no change was found that removes findings and keeps what the sensor senses"
