@@ -85,7 +85,7 @@ class Sweep(Generic[Result]):
 def sweep(
     key: str, points: Sequence[tuple[Value, Body]], work: Callable[[Body], Result],
     failed: Callable[[Body, str], Result], *, refused: tuple[type[SensorgenError], ...], keep: bool = True,
-    jobs: int = 1, done: Callable[[], None] = lambda: None,
+    jobs: int = 1, cluster: str = "", done: Callable[[], None] = lambda: None,
 ) -> Sweep[Result]:  # fmt: skip
     """The same work for each body, those whose answer is not cached in several processes.
 
@@ -105,13 +105,16 @@ def sweep(
         Read the cache and store new answers.
     jobs : int
         How many processes at once, 1 or more.
+    cluster : str
+        Of Dask, in place of processes, as of :func:`sensorgen.core.parallel.in_parallel`.
     done : callable
         Called after each point.
 
     Raises
     ------
     SensorgenError
-        Not in ``refused``; a process that ended before its answer, as when the memory is full.
+        Not in ``refused``; a cluster that cannot be reached. A point that ends its process, as when the memory is full,
+        has that as its reason.
     """
     attempt = partial(said, work, refused=refused)
     found: dict[int, Result | str] = {}
@@ -121,7 +124,9 @@ def sweep(
             found[k] = known
             done()
     missing = [k for k in range(len(points)) if k not in found]
-    for n, (result, entries) in in_parallel(_apart, [(attempt, points[k][1]) for k in missing], jobs):
+    for n, (result, entries) in in_parallel(
+        _apart, [(attempt, points[k][1]) for k in missing], jobs, cluster=cluster, lost=lambda _, reason: (reason, [])
+    ):
         for entry in entries if keep else ():  # this process alone writes: the others may be ended at any moment
             cached.keep(*entry)
         found[missing[n]] = result
