@@ -29,8 +29,8 @@ def drawn(design: Design) -> Body:
 
 def _drawn_cells(design: Design) -> Cells:
     period, scene = getattr(design.params, "period_mm", None), design.in_use
-    prisms = [b.terminal for b in scene.bodies if b.terminal or design.conducts(b.material) for _ in b.prisms]
-    if "" in prisms or len(set(prisms)) < len(prisms):  # else each electrode is one piece
+    conducting = [b.terminal for b in scene.bodies if b.terminal or design.conducts(b.material) for _ in b.pieces]
+    if "" in conducting or len(set(conducting)) < len(conducting):  # else each electrode is one piece
         from sensorgen.scene.connections import connected_scene
 
         scene = connected_scene(scene, design.conducts)
