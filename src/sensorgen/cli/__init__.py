@@ -17,6 +17,7 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
     "Design": {
         "build": "Write all that a print needs: 3MF, STEP, profiles, drawing.",
         "batch": "Put several sensors on one plate, with a record.",
+        "optimise": "Find the best printable designs for a target.",
         "check": "Check a design against nozzle, layers and bed.",
         "slice": "Write printer-ready G-code, by a real slicer.",
         "gcode": "Check G-code before the printer does.",
@@ -39,7 +40,7 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
     },
     "Reference": {
         "list": "List shapes, materials, printers, qualities, models or sources.",
-        "schema": "Print the JSON schema of a design file or of prediction.json.",
+        "schema": "Print the JSON schema of a design, a target or prediction.json.",
         "completion": "Print the completion script for a shell.",
     },
     "For developers": {

@@ -14,6 +14,7 @@ from sensorgen.core.leash import end_with_parent
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
+    from contextlib import AbstractContextManager
 
 CHUNK_S = 1.0  # sending work to a process takes a millisecond, to another computer ten
 _SAFE = "PYTHONSAFEPATH"
@@ -57,7 +58,7 @@ def in_parallel(
         return
     from concurrent.futures import FIRST_COMPLETED, wait
 
-    with _on_cluster(cluster) if cluster else _processes(jobs) as lanes:
+    with _lanes(jobs, cluster) as lanes:
         todo, again, free = deque(range(len(inputs))), deque[_Chunk](), list(lanes)
         running: dict[Future[tuple[float, list[Result]]], tuple[_Lane, _Chunk]] = {}
         spent, done = 0.0, 0
@@ -85,6 +86,56 @@ def in_parallel(
                     continue
                 spent, done = spent + seconds, done + len(results)
                 yield from zip(chunk.numbers, results, strict=True)
+
+
+def remembered(
+    work: Work[Result], inputs: Sequence[tuple[Any, ...]], jobs: int, *, cluster: str = "", keep: bool = True,
+    lost: Lost[Result] | None = None,
+) -> Iterator[tuple[int, Result]]:  # fmt: skip
+    """The same, of works that ask :mod:`sensorgen.core.cache`: those it has all answers to first, and in this process.
+
+    What the others have worked out is stored as it comes: work that is stopped goes on where it was.
+
+    Parameters
+    ----------
+    work, inputs, jobs, cluster, lost
+        As of :func:`in_parallel`.
+    keep : bool
+        Read the cache and store new answers.
+    """
+    from sensorgen.core import cache
+
+    missing = []
+    for k, each in enumerate(inputs):
+        if not keep:
+            missing.append(k)
+            continue
+        try:
+            with cache.only_known():
+                known = work(*each)
+        except cache.Unknown:
+            missing.append(k)
+            continue
+        yield k, known
+    apart = [(work, *inputs[k]) for k in missing]
+
+    def lost_apart(n: int, reason: str) -> tuple[Result, list[tuple[Any, Any]]]:
+        if lost is None:
+            raise SensorgenError(reason)
+        return lost(missing[n], reason), []
+
+    for n, (result, entries) in in_parallel(_apart, apart, jobs, cluster=cluster, lost=lost_apart):
+        for entry in entries if keep else ():  # this process alone writes: the others may be ended at any moment
+            cache.keep(*entry)
+        yield missing[n], result
+
+
+def _apart(work: Work[Result], *given: Any) -> tuple[Result, list[tuple[Any, Any]]]:
+    """The result of a work, and what is to be kept of it."""
+    from sensorgen.core import cache
+
+    with cache.held_back() as entries:
+        return work(*given), entries
 
 
 @dataclass(frozen=True)
@@ -166,7 +217,7 @@ class _Process:
     def __init__(self) -> None:
         from concurrent.futures.process import BrokenProcessPool
 
-        self.deadly = (BrokenProcessPool,)
+        self.deadly: tuple[type[BaseException], ...] = (BrokenProcessPool,)
         self.executor = self._made()
 
     def _made(self) -> "Executor":
@@ -192,8 +243,12 @@ class _Process:
         """A process that has died says so itself."""
 
 
+def _lanes(jobs: int, cluster: str) -> "AbstractContextManager[Sequence[_Lane]]":
+    return _on_cluster(cluster) if cluster else _processes(jobs)
+
+
 @contextmanager
-def _processes(jobs: int) -> Iterator[list[_Process]]:
+def _processes(jobs: int) -> Iterator[Sequence[_Lane]]:
     """Processes of this computer, ended at once if anything goes wrong."""
     import multiprocessing
 
@@ -234,11 +289,12 @@ class _Cluster:
         from distributed.scheduler import KilledWorker
 
         self.client, self.address, self.executor = client, address, client.get_executor(pure=False)
-        self.deadly = (KilledWorker,)
+        self.deadly: tuple[type[BaseException], ...] = (KilledWorker,)
 
     def submit(self, work: Work[Result], inputs: Sequence[tuple[Any, ...]]) -> "Future[tuple[float, list[Result]]]":
         """Begin a chunk."""
-        return self.executor.submit(_chunk, work, inputs)
+        future: Future[tuple[float, list[Result]]] = self.executor.submit(_chunk, work, inputs)
+        return future
 
     def renew(self) -> None:
         """The cluster replaces its workers itself."""
@@ -255,7 +311,7 @@ def gone(address: str) -> SensorgenError:
 
 
 @contextmanager
-def _on_cluster(address: str) -> Iterator[list[_Cluster]]:
+def _on_cluster(address: str) -> Iterator[Sequence[_Lane]]:
     """Places of a Dask cluster: two chunks for each of its threads."""
     import importlib.util
     from concurrent.futures import CancelledError

@@ -179,8 +179,9 @@ def _shown(name: str, value: Bounds | float | None) -> str:
 
 
 def trial(
-    design: Design, query: Query = DEFAULT, *, folder: Path | None = None, slicer: str = "", keep: bool = True
-) -> Trial:
+    design: Design, query: Query = DEFAULT, *, folder: Path | None = None, slicer: str = "", keep: bool = True,
+    drawn: bool = True,
+) -> Trial:  # fmt: skip
     """Check a design, and predict its drawing and its print.
 
     Parameters
@@ -195,6 +196,8 @@ def trial(
         Slice now, by ``prusa`` or ``cura``; "" for what ``folder`` has.
     keep : bool
         Read stored predictions and store new ones.
+    drawn : bool
+        Predict the drawing, too.
 
     Raises
     ------
@@ -209,17 +212,18 @@ def trial(
     """
     walls = rule(slicer, design.walls) if slicer in SLICERS else ""
     held = review(design, walls=walls)
+    path: Toolpath | None
     if slicer:
         body, path, of_print = _sliced(design, slicer)
         found = [*held.sliced().findings, *of_print]
     else:
         (body, path), found = _at_hand(design, folder), held.findings
-    predicted = evaluate(body, query, keep=keep)
+    predicted = evaluate(body, query, keep=keep, beside=drawn)
     findings = tuple(f for f in with_print(found, predicted) if not f.waiver)
-    drawn, printed = predicted.drawn or predicted, predicted
     return Trial(
-        design.name, design.id(), body.provenance, printed.status, printed.reason, verdict(findings), findings,
-        printed.force_n, printed.position_m, Numbers.of(drawn), Numbers.of(printed), printed.doubts, path,
+        design.name, design.id(), body.provenance, predicted.status, predicted.reason, verdict(findings), findings,
+        predicted.force_n, predicted.position_m, Numbers.of(predicted.drawn) if predicted.drawn else Numbers(),
+        Numbers.of(predicted), predicted.doubts, path,
     )  # fmt: skip
 
 
