@@ -61,7 +61,7 @@ def test_works_that_are_stopped_go_on_where_they_were(tmp_path, monkeypatch):
 
 def test_a_cluster_that_does_not_answer_is_one_line(monkeypatch):
     monkeypatch.setattr(parallel, "_CONNECT_S", 0.2)
-    with pytest.raises(SensorgenError, match="no Dask scheduler at 'tcp://127.0.0.1:9'") as error:
+    with pytest.raises(SensorgenError, match=r"no Dask scheduler at 'tcp://127.0.0.1:9'") as error:
         list(in_parallel(divmod, [(7, 2)], 1, cluster="tcp://127.0.0.1:9"))
     assert "\n" not in str(error.value)
 
