@@ -35,7 +35,7 @@ def optimise(
         A target that is none, or an empty or too large space; a cluster that goes away.
     """
     target, name = load(path), path.stem
-    found = search(target, candidates(target), workers, keep=keep, progress=progress)
+    found = search(target, candidates(target, path.parent), workers, keep=keep, progress=progress)
     chosen: tuple[Recommended, ...] = ()
     if built and found.front:
         chosen = recommended(

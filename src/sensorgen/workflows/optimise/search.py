@@ -132,8 +132,8 @@ class Searched:
         """Constraints, how many designs violate each, and how many violate nothing else."""
         every, alone = Counter[str](), Counter[str]()
         for row in self.rows:
-            every.update(row.violated)
-            alone.update(row.violated if len(row.violated) == 1 else ())
+            every.update(list(row.violated))
+            alone.update(list(row.violated) if len(row.violated) == 1 else ())
         return [
             (name, count, alone[name]) for name, count in sorted(every.items(), key=lambda i: (-alone[i[0]], -i[1]))
         ]

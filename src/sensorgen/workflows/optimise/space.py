@@ -4,10 +4,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from itertools import product
 from math import ceil, floor, prod
+from pathlib import Path
 from typing import Any
 
 from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
-from sensorgen.design.design import Design, fields, make
+from sensorgen.design.design import Design, make, with_own_files
 from sensorgen.workflows.compensation import levels
 from sensorgen.workflows.optimise.target import Range, Target
 
@@ -36,8 +37,15 @@ class Candidate:
     reason: str = ""
 
 
-def candidates(target: Target) -> list[Candidate]:
+def candidates(target: Target, folder: Path = Path()) -> list[Candidate]:
     """Every design of a target.
+
+    Parameters
+    ----------
+    target : Target
+        Its base design and the values that it takes.
+    folder : Path
+        Of the target's file, from which files of materials, printers and shapes are seen.
 
     Raises
     ------
@@ -47,8 +55,8 @@ def candidates(target: Target) -> list[Candidate]:
         No design at all, or more than ``MOST``.
     """
     base = dict(target.design) if isinstance(target.design, Mapping) else {}
-    shape = make({k: v for k, v in base.items() if k != "name"}).shape
-    known = fields(shape)
+    base = with_own_files({k: v for k, v in base.items() if k != "name"}, folder)
+    known = asdict(make(base).params)
     for key in target.parameters:
         if key not in known and key.partition(".")[0] not in Design.model_fields:
             raise UnknownName(
@@ -59,7 +67,7 @@ def candidates(target: Target) -> list[Candidate]:
     # the grid of a length follows from quality, printer and nozzle: those are chosen first
     outer = {k: v for k, v in target.parameters.items() if k not in known}
     inner = {k: v for k, v in target.parameters.items() if k in known}
-    spaces = [(chosen, {k: _values(k, v, _with(base, known, chosen)) for k, v in inner.items()})
+    spaces = [(chosen, {k: _values(k, v, with_own_files(_with(base, known, chosen), folder)) for k, v in inner.items()})
               for chosen in _combinations({k: _listed(v) for k, v in outer.items()})]  # fmt: skip
     size = sum(prod(len(values) for values in space.values()) for _, space in spaces)
     if size > MOST:
@@ -76,7 +84,9 @@ def candidates(target: Target) -> list[Candidate]:
         raise BadInput(
             f"no printable value of {', '.join(empty)} in its range: expected a whole layer or half line in it"
         )
-    return [_candidate(base, known, chosen | inside) for chosen, space in spaces for inside in _combinations(space)]
+    return [
+        _candidate(base, known, chosen | inside, folder) for chosen, space in spaces for inside in _combinations(space)
+    ]
 
 
 def _combinations(space: Mapping[str, list[Value]]) -> Iterator[dict[str, Value]]:
@@ -84,9 +94,9 @@ def _combinations(space: Mapping[str, list[Value]]) -> Iterator[dict[str, Value]
         yield dict(zip(space, values, strict=True))
 
 
-def _candidate(base: Data, known: Mapping[str, Any], values: dict[str, Value]) -> Candidate:
+def _candidate(base: Data, known: Mapping[str, Any], values: dict[str, Value], folder: Path) -> Candidate:
     try:
-        return Candidate(values, make(_with(base, known, values)))
+        return Candidate(values, make(with_own_files(_with(base, known, values), folder)))
     except SensorgenError as error:
         return Candidate(values, None, str(error))
 
@@ -109,8 +119,7 @@ def _listed(given: Range | list[Value]) -> list[Value]:
     if isinstance(given, list):
         return list(dict.fromkeys(given))
     step = given.step or 1.0
-    count = floor((given.to - given.first) / step + _NEAR) + 1
-    return [round(given.first + k * step, 9) for k in range(min(count, 10 * MOST))]
+    return _steps(given.first, step, floor((given.to - given.first) / step + _NEAR) + 1)
 
 
 def _values(key: str, given: Range | list[Value], data: Data) -> list[Value]:
@@ -119,7 +128,15 @@ def _values(key: str, given: Range | list[Value], data: Data) -> list[Value]:
         return _listed(given)
     step = grid_mm(make(data), key)
     low, high = ceil(given.first / step - _NEAR), floor(given.to / step + _NEAR)
-    return [round(k * step, 9) for k in range(low, min(high, low + 10 * MOST) + 1)]
+    return _steps(low * step, step, high - low + 1)
+
+
+def _steps(first: float, step: float, count: int) -> list[Value]:
+    if count > MOST:
+        raise BadInput(
+            f"{count:.3g} values from {first:g} in steps of {step:g}; expected at most {MOST} designs in all"
+        )
+    return [round(first + k * step, 9) for k in range(count)]
 
 
 def grid_mm(design: Design, key: str) -> float:

@@ -12,6 +12,7 @@ from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
 from sensorgen.core.records import Strict, checked
 from sensorgen.core.units import M_PER_MM
+from sensorgen.design.design import with_own_files
 from sensorgen.export.slicers import SLICERS
 from sensorgen.prediction.query import DEFAULT, FORCE_N, NOISE, TIP_M, Query, Tip
 from sensorgen.workflows.trial import Numbers, Toolpath, Trial
@@ -201,7 +202,7 @@ def load(path: Path) -> Target:
         target = checked(Target, yamlfile.read(path))
         if isinstance(target.design, str):
             file = path.parent / target.design
-            data = {key: value for key, value in yamlfile.read(file).items() if key != "name"}
+            data = with_own_files({k: v for k, v in yamlfile.read(file).items() if k != "name"}, file.parent)
             target = target.model_copy(update={"design": data})
     except SensorgenError as error:
         raise error.within(str(path)) from None
