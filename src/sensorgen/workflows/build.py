@@ -32,7 +32,6 @@ from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless, to_json
 from sensorgen.workflows import compensation, sealed
 from sensorgen.workflows.compensation import Change
-from sensorgen.workflows.trial import with_print
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
 LIBRARIES = ("build123d", "cadquery-ocp", "manifold3d", "numpy", "pydantic", "PyYAML", "click")
@@ -164,7 +163,7 @@ def build(
         store.publish(stage, folder)
         replaced += sealed.set_aside(folder, design)
         step("done")
-    findings = with_print(held.findings, predicted)
+    findings = predicted.with_short(held.findings)
     return Built(
         design.name, folder, tuple(sorted([*store.listed(folder), store.MANIFEST])),
         verdict(findings), findings, timeless(predicted), tuple(compensated), replaced,
