@@ -1,4 +1,4 @@
-"""What is known of one design, the least expensive first: design rules, bounds at rest, a coarse mesh, everything."""
+"""Knowledge of one design, the least expensive first: design rules, bounds at rest, a coarse mesh, everything."""
 
 import json
 from dataclasses import asdict, dataclass

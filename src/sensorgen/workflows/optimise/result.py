@@ -189,7 +189,7 @@ class Optimised(Displayed):
         )
 
     def proof(self) -> str:
-        """What is known of the space, in words."""
+        """How good the front is, in words."""
         if not self.front:
             return f"{self.name}: none of {self.size} designs meets the target ({self.evaluated} evaluated)"
         coarse = ""
