@@ -1,7 +1,7 @@
 """The best printed sensor of triangles, and how fast a space is searched: writes bench/results/optimise.md.
 
-CPU time counts, of this process and its workers: the machine may be busy. ``python bench/optimise.py front`` searches the
-space of designs/best-tri.yaml; ``engine`` compares one process, two, and Dask with two workers on plates of different films.
+CPU time counts, of this process and its workers: the machine may be busy. ``python bench/optimise.py front`` searches
+the space of bench/best-tri.yaml; ``engine`` compares one process, two, and Dask with two workers on equal works.
 """
 
 import os
@@ -13,7 +13,7 @@ from sensorgen.workflows.optimise.search import Workers, search
 from sensorgen.workflows.optimise.space import candidates
 from sensorgen.workflows.optimise.target import load
 
-TARGET = Path(__file__).parents[1] / "designs" / "best-tri.yaml"
+TARGET = Path(__file__).parent / "best-tri.yaml"
 
 
 def cpu_s():
@@ -48,7 +48,7 @@ def engine():
 
     from sensorgen.core.parallel import in_parallel
 
-    works = [(4_000_000,)] * 24
+    works = [(3_000_000,)] * 24
 
     def wall(jobs, cluster=""):
         begun, busy = time.perf_counter(), os.getloadavg()[0]

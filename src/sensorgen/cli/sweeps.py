@@ -19,12 +19,12 @@ def options() -> list[click.Parameter]:
     ]  # fmt: skip
 
 
-def workers() -> list[click.Parameter]:
+def workers(usual: str = "one for each core") -> list[click.Parameter]:
     """``--jobs`` and ``--cluster``."""
     return [
         click.Option(
             ["--jobs"], type=click.IntRange(1, 64), default=None, metavar="N",
-            help="Processes at once; one for each core if not given.",
+            help=f"Processes at once; {usual} if not given.",
         ),
         click.Option(
             ["--cluster"], metavar="ADDRESS", default="",
