@@ -85,7 +85,7 @@ def _period(
             (Band(look.tobytes().hex(), "", (0.0, 0.0), (1.0, 1.0)),) for look in looks.T.reshape(len(middles), -1)
         ]
         strips = [Slice(a, b, band) for (a, b), band in zip(pairwise(places.tolist()), bands, strict=True)]
-        piece = mirrored(strips).slices
+        piece = mirrored(tuple(strips)).slices
         low, width, shifts = piece[0].left_mm, piece[-1].right_mm - piece[0].left_mm, False
     else:
         found = repeat([region for layer in patterned for region in layer.regions.values()], size_mm, axis)
