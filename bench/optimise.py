@@ -50,15 +50,17 @@ def engine():
 
     works = [(3_000_000,)] * 24
 
-    def wall(jobs, cluster=""):
-        begun, busy = time.perf_counter(), os.getloadavg()[0]
+    def spent(jobs, cluster=""):
+        wall, cpu = time.perf_counter(), cpu_s()
         list(in_parallel(work, works, jobs, cluster=cluster))
-        return time.perf_counter() - begun, busy
+        return time.perf_counter() - wall, cpu_s() - cpu
 
-    yield "one process: {:.1f} s (load {:.1f})".format(*wall(1))
-    yield "two processes: {:.1f} s (load {:.1f})".format(*wall(2))
+    yield "one process: {:.1f} s of wall, {:.1f} s of CPU".format(*spent(1))
+    yield "two processes: {:.1f} s of wall, {:.1f} s of CPU".format(*spent(2))
+    cpu = cpu_s()
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        yield "Dask, two workers: {:.1f} s (load {:.1f})".format(*wall(2, cluster.scheduler_address))
+        yield f"Dask, two workers: {spent(2, cluster.scheduler_address)[0]:.1f} s of wall"
+    yield f"with starting and ending them {cpu_s() - cpu:.1f} s of CPU; load {os.getloadavg()[0]:.1f}"
 
 
 if __name__ == "__main__":

@@ -79,3 +79,17 @@ def test_a_dask_cluster_gives_the_same(tmp_path):
         }
         with pytest.raises(ZeroDivisionError):
             dict(in_parallel(divmod, [(1, 0)], 1, cluster=cluster.scheduler_address))
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_that_goes_away_is_one_line(monkeypatch):
+    """Works that are not sent yet can have no result; those that have come are kept."""
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(parallel, "_CONNECT_S", 1.0)
+    cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None)
+    results = in_parallel(divmod, [(k, 3) for k in range(400)], 1, cluster=cluster.scheduler_address)
+    number, found = next(results)
+    assert found == divmod(number, 3)
+    cluster.close()
+    with pytest.raises(SensorgenError, match="no longer answers; results so far are kept"):
+        list(results)

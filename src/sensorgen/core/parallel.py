@@ -314,6 +314,7 @@ def gone(address: str) -> SensorgenError:
 def _on_cluster(address: str) -> Iterator[Sequence[_Lane]]:
     """Places of a Dask cluster: two chunks for each of its threads."""
     import importlib.util
+    import logging
     from concurrent.futures import CancelledError
     from pathlib import Path
 
@@ -321,9 +322,10 @@ def _on_cluster(address: str) -> Iterator[Sequence[_Lane]]:
         raise NotInstalled("--cluster needs Dask distributed: pip install 'sensorgen[cluster]'")
     from distributed import Client
 
-    file = Path(address)
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is said once, by us
+    where = {"scheduler_file": address} if Path(address).is_file() else {"address": address}
     try:
-        client = Client(scheduler_file=address) if file.is_file() else Client(address, timeout=_CONNECT_S)
+        client = Client(**where, timeout=_CONNECT_S)
     except (OSError, ValueError, TimeoutError) as error:
         raise SensorgenError(
             f"no Dask scheduler at {address!r} ({str(error).splitlines()[0]:.80}); expected its address, as "
