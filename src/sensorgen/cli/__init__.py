@@ -16,6 +16,7 @@ from sensorgen.core.version import __version__
 SECTIONS = {  # what each command is for, here so that --help imports none of them
     "Design": {
         "build": "Write all that a print needs: 3MF, STEP, profiles, drawing.",
+        "import": "Import bodies from STEP, 3MF or STL as a design.",
         "batch": "Put several sensors on one plate, with a record.",
         "optimise": "Find the best printable designs for a target.",
         "check": "Check a design against nozzle, layers and bed.",
