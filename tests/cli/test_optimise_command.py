@@ -1,6 +1,7 @@
 """``sensorgen optimise``: the front against a plain loop, a planted optimum, doubts, limits, bad targets."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -170,6 +171,13 @@ def test_a_huge_space_is_refused_with_its_size():
     }
     with pytest.raises(BadInput, match=rf"9.73e\+08 designs; expected at most {MOST}"):
         candidates(target(parameters=parameters))
+
+
+def test_the_example_of_the_page_is_a_target(tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "optimise.md").read_text()
+    (tmp_path / "sensor.yaml").write_text(page.partition("```yaml\n")[2].partition("```")[0])
+    assert load(tmp_path / "sensor.yaml").query().force_n == 6.0
+    assert load(Path(__file__).parents[2] / "bench" / "best-tri.yaml").refuse_warnings == ("2-film",)
 
 
 def test_the_best_are_built_and_the_page_needs_nothing_else(tmp_path, run):
