@@ -14,7 +14,7 @@ LINES = 30  # of the first screen
 PICTURES = {"trix-d0.2": ["tri", "--drawn"]}
 PAGES = (
     [], ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["show"], ["draw"],
-    ["slice"], ["slice", "tri"], ["import"], ["gcode"], ["gcode", "check"], ["gcode", "drags"],
+    ["optimise"], ["slice"], ["slice", "tri"], ["import"], ["gcode"], ["gcode", "check"], ["gcode", "drags"],
     ["gcode", "pinholes"], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
     ["predict"], ["predict", "tri"], ["cell"], ["cell", "tri"], ["chart"], ["chart", "tri"],
     ["compress"], ["compress", "tri"],
