@@ -123,7 +123,7 @@ def draw_walls():
     figure, panels = plt.subplots(len(scenes), 1, figsize=(3.6, 9.2), layout="constrained")
     for axes, (name, (scene, start)) in zip(panels, scenes.items(), strict=True):
         for each in scene.bodies:
-            for prism in each.prisms:
+            for prism in each.pieces:
                 for outline in prism.cut("y", scene.size_mm[1] / 2):
                     x, z = np.array(outline).T
                     axes.fill(x - start, z, color=COLOURS[each.material], lw=0.3, ec="white")

@@ -63,7 +63,7 @@ def _mesh(design: Design, mesh_mm: float) -> tuple[Any, list[str], tuple[float, 
     cell = (start, start, 0.0), (start + half, start + half, scene.size_mm[2])
     parts, air = [], Box(Pnt(*cell[0]), Pnt(*cell[1]))
     for body in scene.bodies:
-        for prism in body.prisms:
+        for prism in body.pieces:
             spans = [prism.span(axis) for axis in "xyz"]
             low = [max(span[0], edge) for span, edge in zip(spans, cell[0], strict=True)]
             high = [min(span[1], edge) for span, edge in zip(spans, cell[1], strict=True)]

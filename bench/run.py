@@ -148,7 +148,7 @@ def against_union() -> list[dict[str, object]]:
     body = rect.scene(rect.Params(length_mm=40, width_mm=40), Fill()).body("top_electrode_with_cogs")
 
     def union() -> "manifold3d.Manifold":
-        boxes = [solid(p) for p in body.prisms]
+        boxes = [solid(p) for p in body.pieces]
         made = manifold3d.Manifold.batch_boolean(boxes, manifold3d.OpType.Add)
         made.to_mesh64()  # it works only when asked
         return made

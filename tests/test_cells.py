@@ -39,7 +39,7 @@ def drawn(scene: Scene) -> dict[str, float]:
     """Areas of the outlines themselves, 1 mm deep, air being the rest [mm2]."""
     total = {"air": scene.size_mm[0] * scene.size_mm[2]}
     for body in scene.bodies:
-        area = sum(abs(_shoelace(outline)) for part in body.prisms for outline in part.cut("y", 0.5))
+        area = sum(abs(_shoelace(outline)) for part in body.pieces for outline in part.cut("y", 0.5))
         total[body.terminal or body.material] = total.get(body.terminal or body.material, 0.0) + area
         total["air"] -= area
     return total

@@ -88,7 +88,7 @@ def test_an_electrode_that_is_not_printed_through_is_refused():
     scene = body.cells.first()
     top = scene.body("top_electrode_with_cogs")
     teeth = [box(k, k + (0.9 if k < 9 else 1.0), 0, 10, 0.5, 1.0) for k in range(10)]
-    cut = replace(top, prisms=tuple(teeth))
+    cut = replace(top, pieces=tuple(teeth))
     broken = Scene((*(b for b in scene.bodies if b is not top), cut), scene.size_mm)
     cells = Cells({"": broken}, 1.0, 2.0, lambda: {"": 0.2})
     with pytest.raises(OutOfRange, match=r"does not conduct along x: nothing of it lies at x = 0\.95 mm"):

@@ -133,7 +133,7 @@ def moved(scene, by_mm):
     heights = [0.0, 0.3, 0.6, 2.0], [0.0, 0.3, 0.6 + by_mm, 2.0 + by_mm]
     bodies = []
     for body in scene.bodies:
-        ends = [[round(float(np.interp(z, *heights)), 9) for z in (p.start_mm, p.end_mm)] for p in body.prisms]
-        prisms = [replace(p, start_mm=a, end_mm=b) for p, (a, b) in zip(body.prisms, ends, strict=True)]
-        bodies.append(replace(body, prisms=tuple(prisms)))
+        ends = [[round(float(np.interp(z, *heights)), 9) for z in (p.start_mm, p.end_mm)] for p in body.pieces]
+        prisms = [replace(p, start_mm=a, end_mm=b) for p, (a, b) in zip(body.pieces, ends, strict=True)]
+        bodies.append(replace(body, pieces=tuple(prisms)))
     return replace(scene, bodies=tuple(bodies), size_mm=(*scene.size_mm[:2], scene.size_mm[2] + by_mm))

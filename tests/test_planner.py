@@ -194,7 +194,7 @@ def test_what_makes_a_question_another_one(fake):
     ladder(fake)
     capacitance(PLATE, EPS, 1e-4)
     thicker = replace(PLATE, size_mm=(10, 1, 1.3))
-    body = replace(PLATE.bodies[1], prisms=(box(0, 10, 0, 1, 0.3, 0.9 + 1e-9),))
+    body = replace(PLATE.bodies[1], pieces=(box(0, 10, 0, 1, 0.3, 0.9 + 1e-9),))
     moved = replace(PLATE, bodies=(PLATE.bodies[0], body, PLATE.bodies[2]))
     swapped = replace(PLATE, bodies=(*PLATE.bodies[:2], replace(PLATE.bodies[2], terminal="")))
     others = [

@@ -134,7 +134,10 @@ WEDGE = Prism("y", ((0.0, 0.3), (1.0, 0.3), (0.5, 0.8)), 0.0, 3.0)
         ([upright("a", regular(8, 1.0), 0.3, 1.0), upright("b", regular(8, 0.5), 0.9, 1.2)], "a and b at z = 0.9"),
         ([Body("a", "x60", tuple(Prism("z", regular(5, 0.5, (x, 1.0)), 0.3, 1.0) for x in (1.0, 1.5)))], "a and a"),
         ([upright("a", ((0, 0), (3, 0), (1, 1), (3, 1.5)), 0.3, 1.0)], "a crosses itself: Self-intersection"),
-        ([upright("a", regular(8, 1.0), 0.3, 1.0), Body("wedge", "x60", (WEDGE,))], "wedge is slanted in elevation"),
+        (
+            [upright("a", regular(8, 1.0), 0.3, 1.0), Body("wedge", "x60", (WEDGE,))],
+            "wedge is slanted or curved",
+        ),
     ],
 )
 def test_what_has_no_plan_is_refused(bodies, said):

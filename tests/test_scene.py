@@ -108,7 +108,7 @@ def test_upside_down_twice_is_as_drawn(shape):
 def test_half_a_turn_about_x_keeps_x_and_turns_y_and_z(axis):
     """A skew triangle, by its corners: no mirror image."""
     prism = Prism(axis, ((0.0, 0.0), (2.0, 0.0), (0.5, 1.0)), 3.0, 3.5)
-    (turned,) = Scene((Body("skew", "x60", (prism,)),), (9.0, 8.0, 7.0)).turned_over().bodies[0].prisms
+    (turned,) = Scene((Body("skew", "x60", (prism,)),), (9.0, 8.0, 7.0)).turned_over().bodies[0].pieces
 
     def corners(p: Prism) -> set[tuple[float, ...]]:
         places = (
@@ -122,22 +122,22 @@ def test_half_a_turn_about_x_keeps_x_and_turns_y_and_z(axis):
 
 def test_upside_down_the_top_electrode_lies_on_the_bed():
     scene = tri.scene(tri.Params(length_mm=7.13, width_mm=3.3), Fill()).turned_over()
-    (comb,) = scene.body("top_electrode_with_cogs").prisms
+    (comb,) = scene.body("top_electrode_with_cogs").pieces
     assert comb.span("z") == (0.0, 0.8)  # 0.3 plate and 0.5 cog
     assert comb.span("x") == (0.0, 7.13)
-    assert all(area_mm2(p.outline) > 0 for body in scene.bodies for p in body.prisms)
+    assert all(area_mm2(p.outline) > 0 for body in scene.bodies for p in body.pieces)
 
 
 def test_triy_is_trix_with_length_and_width_exchanged():
     along_x = tri.scene(tri.Params(length_mm=7.13, width_mm=3.3, along="x"), SUPPORTED)
     along_y = tri.scene(tri.Params(length_mm=3.3, width_mm=7.13, along="y"), SUPPORTED)
     for a, b in zip(along_x.bodies, along_y.bodies, strict=True):
-        assert [replace(p, axis="x") for p in a.prisms] == list(b.prisms)
+        assert [replace(p, axis="x") for p in a.pieces] == list(b.pieces)
 
 
 def test_sqyx_is_sqxy_with_length_and_width_exchanged():
     def boxes(scene: Scene, first: str, second: str) -> list[set]:
-        return [{(p.span(first), p.span(second), p.span("z")) for p in body.prisms} for body in scene.bodies]
+        return [{(p.span(first), p.span(second), p.span("z")) for p in body.pieces} for body in scene.bodies]
 
     xy = rect.scene(rect.Params(length_mm=7.13, width_mm=3.3, along="xy"), SUPPORTED)
     yx = rect.scene(rect.Params(length_mm=3.3, width_mm=7.13, along="yx"), SUPPORTED)

@@ -91,7 +91,7 @@ def test_a_section_that_repeats_shows_the_prisms_of_its_own_place():
     for section in sections(scene):
         here = {(body.name, outline) for body, outline in section.regions}
         normal = "yx"["xy".index(section.across)]
-        expected = {(body.name, o) for body in scene.bodies for p in body.prisms for o in p.cut(normal, section.at_mm)}
+        expected = {(body.name, o) for body in scene.bodies for p in body.pieces for o in p.cut(normal, section.at_mm)}
         assert here == expected
 
 

@@ -72,7 +72,7 @@ def test_heights_become_whole_layers():
     assert found["hang_height_mm"] == (0.5, 0.48)
     assert "lower_height_mm" not in found  # 0.24 is four layers
     assert "period_mm" not in found
-    levels = {round(z, 6) for b in made.drawn.bodies for p in b.prisms for z in p.span("z")}
+    levels = {round(z, 6) for b in made.drawn.bodies for p in b.pieces for z in p.span("z")}
     assert all(abs(z / 0.06 - round(z / 0.06)) < 1e-6 for z in levels)
 
 

@@ -57,7 +57,7 @@ def estimate(scene, printer, quality, walls="arachne"):
 def half_widths(scene):
     found = []
     for z in (0.45, 0.55, 0.65, 0.75, 0.85):
-        boxes = [o for p in scene.body(COG).prisms for o in p.cut("z", z)]
+        boxes = [o for p in scene.body(COG).pieces for o in p.cut("z", z)]
         found.append(sum(area_mm2(o) for o in boxes) / scene.size_mm[1] / 2)
     return found
 
@@ -83,7 +83,7 @@ def test_a_strip_of_cura_keeps_the_side_that_lies_nearer_the_middle_of_the_bed()
     """Sides of the cog that hangs at 2.5 and 6.5 mm of 10, from 0.25 to 0.75 mm of its period, as sliced for real."""
     d = tri(dielectric_mm=0.2, length_mm=10.0, width_mm=10.0)
     made = estimate(d.printed, d.machine, d.layers, "cura-gaps")
-    sides = {tuple(round(v, 3) for v in p.span("x")) for p in made.body(COG).prisms if p.span("z") == (0.7, 0.8)}
+    sides = {tuple(round(v, 3) for v in p.span("x")) for p in made.body(COG).pieces if p.span("z") == (0.7, 0.8)}
     assert {(2.31, 2.75), (6.25, 6.69)} <= sides
 
 
@@ -98,7 +98,7 @@ def test_strips_across_strips_keep_their_place_and_lose_a_rounding():
     scene, plan = one_period(d, "arachne")
     assert (plan.x_mm, plan.y_mm) == ((3.35, 5.35), (3.35, 5.35))
     lower, upper = (
-        {round(o[1][k] - o[0][k], 4) for p in scene.body(COG).prisms for o in p.cut("z", z)}
+        {round(o[1][k] - o[0][k], 4) for p in scene.body(COG).pieces for o in p.cut("z", z)}
         for k, z in ((0, 0.55), (0, 0.85))
     )
     assert lower == {0.6785}  # 0.7 less 0.1 (1 - pi / 4): along x the lower strips are cut
@@ -118,7 +118,7 @@ def test_a_plate_comes_out_as_drawn():
 def test_heights_are_whole_layers(quality, film, height):
     d = tri(quality)
     made = estimate(d.printed, d.machine, d.layers, "cura-gaps")
-    film_top = min(p.end_mm for p in made.body("film_and_lower").prisms if p.span("x")[1] == 12.0)
+    film_top = min(p.end_mm for p in made.body("film_and_lower").pieces if p.span("x")[1] == 12.0)
     assert film_top - 0.3 == pytest.approx(film, abs=1e-9)
     assert made.size_mm[2] == pytest.approx(height, abs=1e-9)
 
@@ -133,7 +133,7 @@ def test_where_bodies_swell_into_each_other_the_electrode_keeps_the_place():
     )
     d = tri()
     made = estimate(scene, d.machine, d.layers, "arachne")
-    (wire,), (rib,) = made.body("wire").prisms, made.body("rib").prisms
+    (wire,), (rib,) = made.body("wire").pieces, made.body("rib").pieces
     assert wire.span("x") == pytest.approx((4.13, 4.47))
     assert rib.span("x") == pytest.approx((3.93, 4.13))
 
@@ -164,7 +164,7 @@ def test_a_strip_in_any_direction_is_as_wide_as_its_walls_print_it(walls, width,
 def test_strips_both_ways_in_a_layer_are_boxes():
     crossed = Scene((Body("plate", "x60", (box(0, 2, 0, 5, 0, 0.1), box(2, 5, 0, 2, 0, 0.1))),), (5.0, 5.0, 0.1))
     made = estimate(crossed, tri().machine, tri().layers, "cura-gaps")
-    assert all(p.is_box() for p in made.body("plate").prisms)
+    assert all(p.is_box() for p in made.body("plate").pieces)
     assert made.body("plate").volume_mm3() == pytest.approx(1.6, rel=1e-12)
 
 
@@ -172,7 +172,7 @@ def test_an_outline_with_a_hole_keeps_its_hole():
     ring = Scene((Body("plate", "x60", tuple(box(*s, 0, 0.1) for s in RING)),), (5.0, 5.0, 0.1))
     made = estimate(ring, tri().machine, tri().layers, "cura-gaps")
     assert made.body("plate").volume_mm3() == pytest.approx(0.8, rel=1e-12)
-    assert all(p.is_box() for p in made.body("plate").prisms)
+    assert all(p.is_box() for p in made.body("plate").pieces)
 
 
 def test_an_unknown_way_of_walls():
@@ -223,7 +223,7 @@ def test_a_layer_that_is_lost_parts_what_is_above_from_what_is_below():
     found = scene_of(
         [strips(0.0, 0.1, (0.5, 1.0)), LayerRegions(0.1, 0.2, {}, "y"), strips(0.2, 0.3, (0.5, 1.0))], like
     )
-    assert sorted(p.span("z") for p in found.body("a").prisms) == [(0.0, 0.1), (0.2, 0.3)]
+    assert sorted(p.span("z") for p in found.body("a").pieces) == [(0.0, 0.1), (0.2, 0.3)]
 
 
 TIE = {"electrode_mm": 0.25, "dielectric_mm": 0.2, "length_mm": 12.0, "width_mm": 10.0}
@@ -248,6 +248,15 @@ def test_the_range_of_a_sparse_film_holds_the_real_one(printed, walls):
     found = [fem2d.capacitance(scene, EPS, 1e-2).middle() for scene in guesses]
     assert min(found) < wanted < max(found)
     assert found[0] == pytest.approx(wanted, rel=0.05)
+
+
+@pytest.mark.parametrize("film_mm", [0.13, 0.15, 0.2])
+def test_the_cell_of_a_print_is_one_period(film_mm):
+    """With a film of 0.15 mm the plane of the apexes is at mid-height of a layer, whose strips all but touch."""
+    variant = design.make({"shape": "tri", "parameters": {"length_mm": 80, "period_mm": 3, "dielectric_mm": film_mm}})
+    cells = estimated(variant).cells
+    assert {scene.size_mm[0] for scene in cells.scenes.values()} == {3.0}
+    assert cells.count == pytest.approx(80 / 3)
 
 
 def test_a_sparse_part_has_its_walls_and_its_share():

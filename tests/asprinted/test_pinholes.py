@@ -85,7 +85,7 @@ def printed(layers=2):
     design = make({"shape": "rect", "parameters": {"length_mm": 12.0, "width_mm": 12.0, "dielectric_mm": 0.1 * layers}})
     found = ["M83"]
     for k, z in enumerate(design.layers.boundaries_mm(design.printed.size_mm[2])[1:]):
-        here = [b for b in design.printed.bodies if any(p.span("z")[0] < z - 0.05 < p.span("z")[1] for p in b.prisms)]
+        here = [b for b in design.printed.bodies if any(p.span("z")[0] < z - 0.05 < p.span("z")[1] for p in b.pieces)]
         for body in here:
             found += [f"T{design.tool(body.material)}", f"G1 Z{z}"]
             for at in np.arange(-5.8, 5.9, 0.4).tolist():

@@ -130,7 +130,7 @@ def test_a_print_is_the_same_scene_in_every_process():
     """Else no answer about it would be found again: boxes of a layer from left to right, layers from below."""
     scene = body(small()).cell.scene
     for each in scene.bodies:
-        places = [(prism.span("z")[0], prism.span("x")[0]) for prism in each.prisms]
+        places = [(prism.span("z")[0], prism.span("x")[0]) for prism in each.pieces]
         assert places == sorted(places)
 
 

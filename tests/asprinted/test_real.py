@@ -113,7 +113,7 @@ def test_the_estimate_comes_near_the_real_slicers(printed, walls, within):
 def test_crossed_strips(printed, walls, slicer):
     _, made = printed(walls, small("rect"))
     scene, cells = made.cell.scene, made.cell.count
-    wide = sum(abs(area_mm2(o)) for p in scene.body(COG).prisms for o in p.cut("z", 0.55)) / 2.0
+    wide = sum(abs(area_mm2(o)) for p in scene.body(COG).pieces for o in p.cut("z", 0.55)) / 2.0
     assert wide == pytest.approx(REFERENCE["crossed_strip_mm"][slicer], abs=0.003)
     found = fem3d.capacitance(scene, EPS, 1e-2).middle() * 1e12
     assert found == pytest.approx(REFERENCE["crossed_cell_pf"][slicer], rel=0.02)

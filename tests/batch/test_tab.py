@@ -19,7 +19,7 @@ def raised(sensor, name):
     dot = tab.dot_mm(sensor)
     length, _ = tab.size_mm(sensor, name)
     x0 = sensor.printed.size_mm[0]
-    letters = body.prisms[1:]
+    letters = body.pieces[1:]
     top = max(p.span("y")[1] for p in letters)
     rows = round((top - min(p.span("y")[0] for p in letters)) / dot)
     picture = np.zeros((rows, round(length / dot)), bool)
@@ -55,7 +55,7 @@ def test_what_is_written_can_be_read():
 @pytest.mark.parametrize(("nozzle", "line"), [(0.4, 0.44), (0.25, 0.275), (0.6, 0.66)])
 def test_strokes_are_wider_than_a_line(nozzle, line):
     sensor = design.make({"shape": "tri", "nozzle_mm": nozzle, "parameters": {"width_mm": 20}})
-    letters = tab.bodies(sensor, NAME)[0].prisms[1:]
+    letters = tab.bodies(sensor, NAME)[0].pieces[1:]
     for p in letters:
         assert min(p.span("x")[1] - p.span("x")[0], p.span("y")[1] - p.span("y")[0]) >= 1.05 * line
 
@@ -67,7 +67,7 @@ def test_the_tab_touches_the_far_end_and_lies_on_the_bed(shape, orientation):
     (body,) = tab.bodies(sensor, NAME)
     length, width = tab.size_mm(sensor, NAME)
     x0, deep, _ = sensor.printed.size_mm
-    spans = {axis: [p.span(axis) for p in body.prisms] for axis in "xyz"}
+    spans = {axis: [p.span(axis) for p in body.pieces] for axis in "xyz"}
     assert min(a for a, _ in spans["x"]) == x0
     assert max(b for _, b in spans["x"]) == pytest.approx(x0 + length)
     assert (min(a for a, _ in spans["y"]), max(b for _, b in spans["y"])) == (0.0, deep)

@@ -49,7 +49,7 @@ def sensor() -> Callable[..., Scene]:
             Body("high", "etpu", plate(roof, roof + 0.3), "top"),
             *bodies,
         ]
-        height = max(prism.span("z")[1] for body in stack for prism in body.prisms)
+        height = max(prism.span("z")[1] for body in stack for prism in body.pieces)
         return Scene(tuple(stack), (WIDE, WIDE, height))
 
     return make

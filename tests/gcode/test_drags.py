@@ -232,7 +232,7 @@ def test_insulation_left_by_a_strand_on_a_plate():
     lines = ["M83", "G90"]
     for z in design.layers.boundaries_mm(height)[1:]:
         body = next(
-            b for b in design.printed.bodies if any(p.span("z")[0] < z - 0.01 < p.span("z")[1] for p in b.prisms)
+            b for b in design.printed.bodies if any(p.span("z")[0] < z - 0.01 < p.span("z")[1] for p in b.pieces)
         )
         lines += [f"T{tools[body.material]}", f"G1 Z{z}"]
         for k in range(24):

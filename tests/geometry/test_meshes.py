@@ -101,7 +101,7 @@ def test_all_ways_of_eight_cubes_around_a_point_are_solids():
         body = cubes(*(c for k, c in enumerate(corners) if pattern >> k & 1))
         made = mesh(body)
         assert solid(made).status() == manifold3d.Error.NoError, pattern
-        assert made.volume_mm3() == pytest.approx(len(body.prisms), rel=1e-12), pattern
+        assert made.volume_mm3() == pytest.approx(len(body.pieces), rel=1e-12), pattern
         edges = np.sort(made.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         assert set(np.unique(edges, axis=0, return_counts=True)[1]) == {2}, pattern
 

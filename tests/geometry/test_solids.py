@@ -69,7 +69,7 @@ def in_space(axis: str, u: float, v: float, w: float) -> tuple[float, float, flo
 def centre(body: Body) -> tuple[float, ...]:
     """Centre of mass from the corners of the outlines, written out by axis [mm]."""
     total, sums = 0.0, [0.0, 0.0, 0.0]
-    for prism in body.prisms:
+    for prism in body.pieces:
         points = prism.outline
         area = cu = cv = 0.0
         for (u0, v0), (u1, v1) in zip(points, points[1:] + points[:1], strict=True):
@@ -84,8 +84,8 @@ def centre(body: Body) -> tuple[float, ...]:
 
 def spans(body: Body) -> list[float]:
     """Lowest x, y, z and highest x, y, z [mm]."""
-    low = [min(p.span(axis)[0] for p in body.prisms) for axis in "xyz"]
-    return low + [max(p.span(axis)[1] for p in body.prisms) for axis in "xyz"]
+    low = [min(p.span(axis)[0] for p in body.pieces) for axis in "xyz"]
+    return low + [max(p.span(axis)[1] for p in body.pieces) for axis in "xyz"]
 
 
 def box_of(shape: Any) -> list[float]:
@@ -103,7 +103,7 @@ def middle_of(shape: Any) -> tuple[float, ...]:
 def faults(body: Body, shape: Any) -> list[str]:
     """What differs between a body and its CAD shape."""
     pieces = shape.solids()
-    wrong = [f"{len(pieces)} solids"] if len(pieces) != len(body.prisms) else []
+    wrong = [f"{len(pieces)} solids"] if len(pieces) != len(body.pieces) else []
     wrong += ["invalid"] if not all(piece.is_valid for piece in pieces) else []
     wrong += ["volume"] if sum(p.volume for p in pieces) != pytest.approx(body.volume_mm3(), rel=1e-9) else []
     wrong += ["box"] if box_of(shape) != pytest.approx(spans(body), abs=1e-6) else []

@@ -361,7 +361,7 @@ def interlocked() -> Scene:
         (interlocked(), "reach into each other"),
         (
             plates(RIDGE, Body("wedge", "x60", (Prism("z", ((0, 0), (1, 0), (0, 1)), 0.9, 1.0),))),
-            "slanted in elevation",
+            "slanted or curved in elevation",
         ),
     ],
 )

@@ -195,7 +195,7 @@ def test_bricks_and_triangles_agree(channels):
         parts += [box(k + 0.3, k + 0.7, 0, 1, 0.0, 0.3)]
     scene = metal(*(parts if channels else [parts[0], *parts[3::4], *parts[5::4]]), size_mm=(10.0, 1.0, 0.8))
     flat = ratio(scene, width=1e-5)
-    alone = Scene((Body("electrode", "electrode", scene.bodies[0].prisms),), scene.size_mm)
+    alone = Scene((Body("electrode", "electrode", scene.bodies[0].pieces),), scene.size_mm)
     (*_, deep) = conduction._in_space(alone, "x", 1e-3)
     plate = 10 / 0.3
     assert flat.width() < 1e-5

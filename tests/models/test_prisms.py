@@ -150,7 +150,7 @@ def test_a_loose_piece_that_touches_an_electrode_is_that_electrode(at):
     piece = (Prism("z", ((x, y), (x + 0.5, y), (x + 0.5, y + 0.5), (x, y + 0.5)), 0.5, 0.6),)
     loose, joined = (Body("piece", "etpu", piece, terminal) for terminal in (FLOATING, "top"))
     if at == (1.0, 1.0):
-        loose, joined = (replace(b, prisms=(replace(piece[0], start_mm=0.25, end_mm=0.3),)) for b in (loose, joined))
+        loose, joined = (replace(b, pieces=(replace(piece[0], start_mm=0.25, end_mm=0.3),)) for b in (loose, joined))
         film = Body("film", "x60", (box(0, 3, 0, 3, 0.2, 0.25),))
         scenes = [sensor([square], more=(b,)) for b in (loose, joined)]
         scenes = [replace(s, bodies=tuple(film if b.name == "film" else b for b in s.bodies)) for s in scenes]
@@ -165,9 +165,9 @@ def test_what_is_no_layers_of_polygons_is_said():
     assert "touch" in str(prisms.why_not_applicable(sensor([], more=(
         Body("pin", "etpu", (box(1, 2, 1, 2, 0.3, 0.7),), "bottom"),))))  # fmt: skip
     wedge = Body("wedge", "x60", (Prism("y", ((0.0, 0.3), (0.2, 0.3), (0.1, 0.6)), 0.0, 3.0),))
-    assert "slanted in elevation" in str(prisms.why_not_applicable(sensor([], more=(wedge,))))
+    assert "slanted or curved in elevation" in str(prisms.why_not_applicable(sensor([], more=(wedge,))))
     lower = sensor([])
-    half = replace(lower, bodies=(replace(lower.bodies[0], prisms=(box(0, 1, 0, 3, 0, 0.2),)), *lower.bodies[1:]))
+    half = replace(lower, bodies=(replace(lower.bodies[0], pieces=(box(0, 1, 0, 3, 0, 0.2),)), *lower.bodies[1:]))
     assert "does not cover" in str(prisms.why_not_applicable(half))
 
 

@@ -23,7 +23,7 @@ def test_its_volumes_are_length_times_width_times_thickness():
 
 
 def test_its_electrodes_lie_in_order():
-    electrodes = [(b.terminal, b.prisms[0].span("z")) for b in scene().bodies if b.terminal]
+    electrodes = [(b.terminal, b.pieces[0].span("z")) for b in scene().bodies if b.terminal]
     assert [terminal for terminal, _ in electrodes] == ["bottom", "middle", "top"]
     assert [z for _, z in electrodes] == [pytest.approx(z) for z in [(0.0, 0.3), (0.9, 1.2), (1.8, 2.1)]]
 

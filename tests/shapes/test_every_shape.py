@@ -72,7 +72,7 @@ def test_it_imports_the_scene_and_the_standard_library_only(name):
         "sensorgen.core.errors",
         "sensorgen.core.version",
         "sensorgen.scene",
-        "sensorgen.scene.scene",
+        *(f"sensorgen.scene.{part}" for part in ("polyhedra", "revolved", "scene")),
         "sensorgen.design",
         "sensorgen.design.shapes",
         f"sensorgen.design.shapes.{name}",
@@ -100,7 +100,7 @@ def test_its_bodies_are_closed_and_apart(shape, fill, orientation):
 
 def test_its_outlines_turn_left_and_stay_in_the_envelope(shape):
     scene = small(shape)
-    for prism in (p for body in scene.bodies for p in body.prisms):
+    for prism in (p for body in scene.bodies for p in body.pieces):
         assert area_mm2(prism.outline) > 0
         for axis, size in zip("xyz", scene.size_mm, strict=True):
             low, high = prism.span(axis)

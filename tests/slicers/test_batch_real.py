@@ -126,7 +126,7 @@ def test_every_specimen_is_printed_whole_with_both_tools_and_its_tab(small, slic
         end = centre - length_mm / 2 + 12
         above = rows & (lines.start_mm[:, 0] > end + LINE_MM) & (lines.end_mm[:, 2] > tab.PLATE_MM + 0.05)
         assert (lines.tool[above] == 4).all()
-        letters = sum(p.volume_mm3() for p in label.prisms[1:])
+        letters = sum(p.volume_mm3() for p in label.pieces[1:])
         assert volumes(lines, above)[4] == pytest.approx(letters, rel=0.35), name
 
 

@@ -7,7 +7,7 @@ nozzle's height decides, not the volume: a nozzle too low presses what has no ro
 
 from dataclasses import replace
 
-from sensorgen.scene.scene import PLANE, Point, Prism, Scene, rounded
+from sensorgen.scene.scene import Piece, Point, Prism, Scene, rounded
 
 
 def span_mm(scene: Scene) -> Point | None:
@@ -20,7 +20,7 @@ def span_mm(scene: Scene) -> Point | None:
     >>> span_mm(Scene(tuple(plates), (1.0, 1.0, 0.8)))
     (0.3, 0.5)
     """
-    ends = {t: [p.span("z") for b in scene.bodies if b.terminal == t for p in b.prisms] for t in ("bottom", "top")}
+    ends = {t: [p.span("z") for b in scene.bodies if b.terminal == t for p in b.pieces] for t in ("bottom", "top")}
     if not all(ends.values()):
         return None
     low, high = max(z for _, z in ends["bottom"]), min(z for z, _ in ends["top"])
@@ -41,12 +41,12 @@ def thicker(scene: Scene, more_mm: float) -> Scene | None:
     def moved(z: float) -> float:
         return rounded(z + more_mm if z >= high else low + (z - low) * factor if z > low else z)
 
-    def changed(prism: Prism) -> Prism:
-        if prism.axis == "z":
-            return replace(prism, start_mm=moved(prism.start_mm), end_mm=moved(prism.end_mm))
-        up = PLANE[prism.axis].index("z")
-        outline = tuple((u, moved(v)) if up == 1 else (moved(u), v) for u, v in prism.outline)
-        return replace(prism, outline=outline)
+    def changed(piece: Piece) -> Prism:
+        if not isinstance(piece, Prism):
+            raise TypeError("a print is made of prisms")
+        if piece.axis == "z":
+            return replace(piece, start_mm=moved(piece.start_mm), end_mm=moved(piece.end_mm))
+        return replace(piece, outline=tuple((u, moved(v)) for u, v in piece.outline))
 
-    bodies = tuple(replace(b, prisms=tuple(changed(p) for p in b.prisms)) for b in scene.bodies)
+    bodies = tuple(replace(b, pieces=tuple(changed(p) for p in b.pieces)) for b in scene.bodies)
     return replace(scene, bodies=bodies, size_mm=(*scene.size_mm[:2], moved(scene.size_mm[2])))

@@ -19,7 +19,7 @@ from sensorgen.design.design import Design
 from sensorgen.design.walls import WALLS
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.layers import LayerRegions, drawn, scene_of
-from sensorgen.scene.scene import FLOATING, Body, Point, Scene, rectangle
+from sensorgen.scene.scene import FLOATING, Body, Point, Scene, seen_from_above
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.beads import Beads
@@ -233,9 +233,8 @@ def cell(design: Design, layers: Sequence[LayerRegions], bodies: Sequence[Body],
 def gap_mm(scene: Scene) -> float:
     """Smallest distance of two electrodes in a scene of upright prisms; infinite where there are no two [mm]."""
     plans, spans = defaultdict[str, list[shapely.Polygon]](list), defaultdict[str, list[Point]](list)
-    for end, p in ((b.terminal, p) for b in scene.bodies if b.terminal not in ("", FLOATING) for p in b.prisms):
-        plan = p.outline if p.axis == "z" else rectangle(*p.span("x"), *p.span("y"))
-        plans[end].append(shapely.Polygon(plan))
+    for end, p in ((b.terminal, p) for b in scene.bodies if b.terminal not in ("", FLOATING) for p in b.pieces):
+        plans[end].append(shapely.Polygon(seen_from_above(p)))
         spans[end].append(p.span("z"))
     apart = [np.inf]
     for one, other in combinations(plans, 2):

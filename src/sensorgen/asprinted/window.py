@@ -15,7 +15,7 @@ from shapely.affinity import translate
 from sensorgen.core.arrays import Real
 from sensorgen.scene.layers import LayerRegions, Region, cleaned, parts
 from sensorgen.scene.repetition import repeat
-from sensorgen.scene.scene import SLIVER_MM, Point, Scene
+from sensorgen.scene.scene import SLIVER_MM, Point, Scene, rounded
 from sensorgen.scene.unit_cell import Band, Slice, mirrored
 
 ROUNDED_MM = 2e-3  # edges nearer than this are one: G-code has three decimals
@@ -39,7 +39,7 @@ class Window:
 
     def sides_mm(self) -> Point:
         """Its lengths along x and y [mm]."""
-        return self.x_mm[1] - self.x_mm[0], self.y_mm[1] - self.y_mm[0]
+        return rounded(self.x_mm[1] - self.x_mm[0]), rounded(self.y_mm[1] - self.y_mm[0])
 
     def area_mm2(self) -> float:
         """Its area [mm2]."""
@@ -75,7 +75,9 @@ def _period(
         # The pattern of strips as slices of one level band each, named by all that stands there
         regions = list({region for layer in patterned for region in layer.regions.values()})
         places = np.unique(np.append(shapely.get_coordinates(regions)[:, axis], [0.0, end]))
-        places = places[np.append(True, np.diff(places) > SLIVER_MM)]
+        # A face sampled just below leaves slivers: their middle is where the drawing's mirrors see the edge.
+        groups = np.split(places, np.flatnonzero(np.diff(places) > SLIVER_MM) + 1)
+        places = np.array([0.0, *(group.mean() for group in groups[1:-1]), end])
         middles = (places[:-1] + places[1:]) / 2
         x, y = (middles, wide / 2) if axis == 0 else (wide / 2, middles)
         looks = np.array([shapely.contains_xy(region, x, y) for region in regions], dtype=bool)

@@ -17,11 +17,11 @@ def check(slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> 
 
     Of three electrodes or more, plates separate neighbours: there the distance is that of their faces.
     """
-    bodies = sorted((b for b in slices.scene.bodies if b.terminal), key=lambda b: min(p.span("z")[0] for p in b.prisms))
+    bodies = sorted((b for b in slices.scene.bodies if b.terminal), key=lambda b: min(p.span("z")[0] for p in b.pieces))
     pairs = [pair for pair in pairwise(bodies) if pair[0].terminal != pair[1].terminal]
     for low, high in pairs:
-        top = max(p.span("z")[1] for p in low.prisms)
-        apart = gap_mm if len(pairs) == 1 else round(min(p.span("z")[0] for p in high.prisms) - top, 9)
+        top = max(p.span("z")[1] for p in low.pieces)
+        apart = gap_mm if len(pairs) == 1 else round(min(p.span("z")[0] for p in high.pieces) - top, 9)
         film = list(_film((low, high), (0.0, 0.0, top), slices, quality.layer_mm, apart))
         yield from film
         if not any(f.severity == "error" for f in film):

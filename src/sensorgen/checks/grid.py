@@ -36,7 +36,7 @@ def _faces(body: Body, layers: Layers) -> Iterator[Finding]:
 
 
 def _samples(body: Body, layers: Layers) -> Iterator[Finding]:
-    spans = {p.span("z"): p for p in body.prisms}
+    spans = {p.span("z"): p for p in body.pieces}
     lost = [span for span in spans if not any(_within(mid, span) for mid in layers.mids_mm)]
     for low, high in lost:
         yield Finding(
@@ -44,7 +44,7 @@ def _samples(body: Body, layers: Layers) -> Iterator[Finding]:
             f"{low:g} to {high:g} mm ({high - low:g} mm) lies between the slicer's sampling planes and is not printed",
             "make it a layer thick, or move it onto the layer grid",
             round(high - low, 9), layers.boundaries_mm[1] / 2, place_mm=_place(body, (low + high) / 2),
-            count=sum(p.span("z") == (low, high) for p in body.prisms),
+            count=sum(p.span("z") == (low, high) for p in body.pieces),
         )  # fmt: skip
     for number, ((low, high), mid) in enumerate(zip(pairwise(layers.boundaries_mm), layers.mids_mm, strict=True)):
         here = [s for s in spans if s not in lost and min(s[1], high) - max(s[0], low) > TOUCH_MM]
@@ -66,5 +66,5 @@ def _within(z_mm: float, span: tuple[float, float]) -> bool:
 
 def _place(body: Body, z_mm: float) -> tuple[float, float, float]:
     """A place of the body at or next to a height [mm]."""
-    prism = min(body.prisms, key=lambda p: max(p.span("z")[0] - z_mm, z_mm - p.span("z")[1], 0.0))
-    return (prism.span("x")[0], prism.span("y")[0], round(z_mm, 9))
+    piece = min(body.pieces, key=lambda p: max(p.span("z")[0] - z_mm, z_mm - p.span("z")[1], 0.0))
+    return (piece.span("x")[0], piece.span("y")[0], round(z_mm, 9))

@@ -116,19 +116,15 @@ def rows(
 
 def _drawn_mm3(body: Body, boundaries_mm: Sequence[float]) -> list[float]:
     """Volume of a body between neighbouring boundaries, exact [mm3]."""
-    bottom, top = np.array([p.span("z") for p in body.prisms]).T
-    volume = np.array([p.volume_mm3() for p in body.prisms])
-    lying = [p for p in body.prisms if p.axis != "z"]
-    slanted = np.array([p.axis != "z" for p in body.prisms])
-    outlines = np.array([shapely.Polygon(p.outline) for p in lying], dtype=object)
-    depth = np.array([p.end_mm - p.start_mm for p in lying])
-    left, right = shapely.bounds(outlines)[:, 0].min(initial=0.0), shapely.bounds(outlines)[:, 2].max(initial=0.0)
+    bottom, top = np.array([p.span("z") for p in body.pieces]).T
+    volume = np.array([p.volume_mm3() for p in body.pieces])
+    upright = np.array([p.is_constant("z") for p in body.pieces])
     found = []
     for low, high in pairwise(boundaries_mm):
         share = (np.minimum(top, high) - np.maximum(bottom, low)).clip(0) / (top - bottom)
-        cut = slanted & (share > 0) & (share < 1)
-        clipped = shapely.clip_by_rect(outlines[cut[slanted]], left - 1.0, low, right + 1.0, high)
-        found.append(float((volume * share)[~cut].sum() + (shapely.area(clipped) * depth[cut[slanted]]).sum()))
+        cut = ~upright & (share > 0) & (share < 1)
+        parts_mm3 = (body.pieces[k].volume_mm3(low, high) for k in np.flatnonzero(cut).tolist())
+        found.append(float((volume * share)[~cut].sum()) + sum(parts_mm3))
     return found
 
 

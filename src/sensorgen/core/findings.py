@@ -2,10 +2,12 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from sensorgen.core.document import Column, Facts, Part, Table
 
 SEVERITIES = ("error", "warning", "info")
+Verdict = Literal["PRINT", "PRINT WITH WARNINGS", "CHANGE"]
 
 
 @dataclass(frozen=True)
@@ -128,6 +130,16 @@ def counts(found: Sequence[Finding]) -> dict[str, int]:
     """How many findings there are of each severity, and how many are waived [-]."""
     heads = ["waived" if f.waiver else f.severity for f in found]
     return {head: heads.count(head) for head in (*SEVERITIES, "waived")}
+
+
+def verdict(found: Sequence[Finding]) -> Verdict:
+    """CHANGE where a finding is an error, PRINT WITH WARNINGS, or PRINT; waived findings do not count.
+
+    >>> verdict([Finding("2-film", "warning", "film", "a single layer", "print two")])
+    'PRINT WITH WARNINGS'
+    """
+    number = counts(found)
+    return "CHANGE" if number["error"] else "PRINT WITH WARNINGS" if number["warning"] else "PRINT"
 
 
 def counted(counts: Mapping[str, int]) -> str:

@@ -52,7 +52,7 @@ class Placed:
         """Middle of the sensor alone, without what is printed with it [mm]."""
         found = []
         for axis, size, place in zip("xy", self.design.printed.size_mm, self.centre_mm, strict=False):
-            spans = [prism.span(axis) for body in self.extra for prism in body.prisms] or [(0.0, 0.0)]
+            spans = [piece.span(axis) for body in self.extra for piece in body.pieces] or [(0.0, 0.0)]
             low, high = min(0.0, *(start for start, _ in spans)), max(size, *(end for _, end in spans))
             found.append(place + size / 2 - (low + high) / 2)
         return found[0], found[1]

@@ -17,7 +17,7 @@ from sensorgen.core import cache as cached
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
-from sensorgen.scene.scene import Scene, area_mm2
+from sensorgen.scene.scene import Scene, area_mm2, content
 from sensorgen.scene.sections import ROUNDING_MM, Section, square_to
 from sensorgen.scene.unit_cell import Band, Cell, Slice, cell
 
@@ -88,7 +88,7 @@ def electrode_resistance(
     alone = Scene(bodies, scene.size_mm)
     if not alone.bodies:
         raise OutOfRange(f"no {terminal} electrode in this scene: its resistance is not defined")
-    spans = np.array([p.span(axis) for b in alone.bodies for p in b.prisms])
+    spans = np.array([p.span(axis) for b in alone.bodies for p in b.pieces])
     low, high, end = spans[:, 0].min(), spans[:, 1].max(), alone.size_mm["xyz".index(axis)]
     if low > ROUNDING_MM or high < end - ROUNDING_MM:
         raise OutOfRange(
@@ -112,11 +112,11 @@ def _per_resistivity(alone: Scene, axis: str, width: float) -> Interval:
     along = square_to(alone, "y" if axis == "x" else "x")
     if len(along) == 1:
         return _best(_in_plane(alone, along[0], width), simple)
-    if all(p.is_box() for b in alone.bodies for p in b.prisms):
+    if all(p.is_box() for b in alone.bodies for p in b.pieces):
         # Kept on disk: a cell of boxes takes a third of a second.
-        look = [(p.axis, p.outline, p.start_mm, p.end_mm) for b in alone.bodies for p in b.prisms]
-        content = sha256(dumps([look, alone.size_mm]).encode()).hexdigest()
-        question = {"what": "conduction", "scene": content, "axis": axis, "width": width}
+        look = [content(p) for b in alone.bodies for p in b.pieces]
+        key = sha256(dumps([look, alone.size_mm]).encode()).hexdigest()
+        question = {"what": "conduction", "scene": key, "axis": axis, "width": width}
         found = cached.known(question)
         if found is None:
             found = [(step.lower, step.upper) for step in _in_space(alone, axis, width)]
@@ -124,7 +124,7 @@ def _per_resistivity(alone: Scene, axis: str, width: float) -> Interval:
         simple = _best((Interval(*ends) for ends in found), simple)
     if simple.upper == np.inf:
         raise _interrupted(
-            alone, axis, "no prism of it runs unchanged from end to end; expected a plate under the cogs"
+            alone, axis, "no piece of it runs unchanged from end to end; expected a plate under the cogs"
         )
     return simple
 
@@ -147,13 +147,11 @@ def _area_mm2(section: Section) -> float:
 def _simple(alone: Scene, axis: str, square: list[Section]) -> Interval:
     """Rayleigh's bounds: perfect conductors in planes square to the axis, insulators around what runs through."""
     length = alone.size_mm["xyz".index(axis)]
-    prisms = [p for b in alone.bodies for p in b.prisms]
+    pieces = [p for b in alone.bodies for p in b.pieces]
     through = [
-        p.volume_mm3()
-        for p in prisms
-        if (p.axis == axis or p.is_box()) and np.ptp(p.span(axis)) > length - 2 * ROUNDING_MM
+        p.volume_mm3() for p in pieces if p.is_constant(axis) and np.ptp(p.span(axis)) > length - 2 * ROUNDING_MM
     ]
-    volume = sum(p.volume_mm3() for p in prisms)
+    volume = sum(p.volume_mm3() for p in pieces)
     lower = sum(s.depth_mm / _area_mm2(s) for s in square) if square else length**2 / volume
     return Interval(lower, length**2 / sum(through) if through else np.inf)
 

@@ -22,7 +22,7 @@ from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import Region, parts
 from sensorgen.scene.raster import raster
 from sensorgen.scene.repetition import Repeat, repeat
-from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Prism, Scene, rectangle
+from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene, seen_from_above
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.enclosed import enclosing
 from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, Layers, Mesh, solved
@@ -213,22 +213,22 @@ class _Cell:
 @lru_cache(maxsize=8)
 def _cell(scene: Scene) -> _Cell:
     """The cell of a scene; raises ValueError where it is none of upright prisms between two electrodes."""
-    slanted = next((b for b in scene.bodies for p in b.prisms if p.axis != "z" and not p.is_box()), None)
+    slanted = next((b for b in scene.bodies for p in b.pieces if not p.is_constant("z")), None)
     if slanted:
-        raise ValueError(f"{slanted.name} is slanted in elevation: its layers are no prisms")
-    levels = np.unique(np.array([z for b in scene.bodies for p in b.prisms for z in p.span("z")]).round(9))
+        raise ValueError(f"{slanted.name} is slanted or curved in elevation: its layers are no prisms")
+    levels = np.unique(np.array([z for b in scene.bodies for p in b.pieces for z in p.span("z")]).round(9))
     levels = levels[np.append(True, np.diff(levels) > SLIVER_MM)]
     slabs = []
     for low, high in pairwise(levels.tolist()):
         middle = (low + high) / 2
         outlines: dict[Body, list[shapely.Polygon]] = defaultdict(list)
         for body in scene.bodies:
-            for p in body.prisms:
+            for p in body.pieces:
                 if p.span("z")[0] < middle < p.span("z")[1]:
-                    outlines[body].append(shapely.Polygon(_plan(p)))
+                    outlines[body].append(shapely.Polygon(seen_from_above(p)))
         slabs.append((low, high, {body: shapely.union_all(own) for body, own in outlines.items()}))
     patterned = [region for *_, own in slabs for region in own.values()]
-    if any(scene.repeats) or not all(p.is_box() for body in scene.bodies for p in body.prisms):
+    if any(scene.repeats) or not all(p.is_box() for body in scene.bodies for p in body.pieces):
         x, y = (
             Repeat.of(0.0, scene.size_mm[axis], True, scene.size_mm[axis])
             if scene.repeats[axis]
@@ -312,7 +312,3 @@ def _gap_mm(regions: Sequence[dict[int, Region]], heights_mm: Sequence[float], c
             for kind in (k for k in other if k < conductors and k != end):
                 found = min(found, float(np.hypot(shapely.distance(one[end], other[kind]), apart)))
     return found
-
-
-def _plan(prism: Prism) -> Sequence[tuple[float, float]]:
-    return prism.outline if prism.axis == "z" else rectangle(*prism.span("x"), *prism.span("y"))

@@ -29,8 +29,8 @@ def drawn(design: Design) -> Body:
 
 def _drawn_cells(design: Design) -> Cells:
     period, scene = getattr(design.params, "period_mm", None), design.in_use
-    prisms = [b.terminal for b in scene.bodies if b.terminal or design.conducts(b.material) for _ in b.prisms]
-    if "" in prisms or len(set(prisms)) < len(prisms):  # else each electrode is one piece
+    conducting = [b.terminal for b in scene.bodies if b.terminal or design.conducts(b.material) for _ in b.pieces]
+    if "" in conducting or len(set(conducting)) < len(conducting):  # else each electrode is one piece
         from sensorgen.scene.connections import connected_scene
 
         scene = connected_scene(scene, design.conducts)
@@ -134,25 +134,27 @@ def default_body(design: Design, folder: Path | None = None) -> Body:
     folder : Path, optional
         With the design's files; ``out/NAME`` in the working folder if not given.
     """
+    path = toolpath(design, folder)
+    if path is None:
+        return estimated(design)
+    made = json.loads(path.with_name(f"{path.name}.json").read_text("utf-8"))
+    source = f"{made['slicer']['name']} {made['slicer']['version']}"
+    return sliced(design, partial(_read, design, path, source), f"{source}, {path.name}", path.read_bytes())
+
+
+def toolpath(design: Design, folder: Path | None = None) -> Path | None:
+    """The sliced file of this very design in a folder, or None; its record is beside it, ``.json`` at its end."""
     folder = folder or OUT / design.name
     for note in sorted(folder.glob("*.gcode.json")) if folder.is_dir() else ():
-        found = _toolpath(design, note)
-        if found:
-            return found
-    return estimated(design)
-
-
-def _toolpath(design: Design, note: Path) -> Body | None:
-    """The print by a sliced file of this very design, or None."""
-    path = note.with_suffix("")
-    try:
-        made = json.loads(note.read_text("utf-8"))
-        content = path.read_bytes()
-        same = made["design"] == design.id() and made["sha256"] == sha256(content).hexdigest()
-        source = f"{made['slicer']['name']} {made['slicer']['version']}"
-    except (OSError, ValueError, KeyError, TypeError):  # no file of ours
-        return None
-    return sliced(design, partial(_read, design, path, source), f"{source}, {path.name}", content) if same else None
+        path = note.with_suffix("")
+        try:
+            made = json.loads(note.read_text("utf-8"))
+            named = all(isinstance(made["slicer"][key], str) for key in ("name", "version"))
+            if named and made["design"] == design.id() and made["sha256"] == sha256(path.read_bytes()).hexdigest():
+                return path
+        except (OSError, ValueError, KeyError, TypeError):  # no file of ours
+            continue
+    return None
 
 
 def _read(design: Design, path: Path, source: str) -> "Printed":

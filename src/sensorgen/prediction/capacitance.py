@@ -18,7 +18,7 @@ from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.models import capacitance_models
 from sensorgen.prediction.cost_model import expected
 from sensorgen.prediction.plan import Candidate
-from sensorgen.scene.scene import FLOATING, Scene
+from sensorgen.scene.scene import FLOATING, Scene, content
 from sensorgen.scene.sections import overlap, sections
 
 PLANE, SPATIAL = 1e-3, 1e-2  # relative width of a capacitance's bounds where none is asked for: a cross-section, 3D
@@ -275,10 +275,7 @@ def _timed(
 
 def _question(scene: Scene, permittivity: Mapping[str, complex], width: float, model: str) -> dict[str, Any]:
     """Everything that decides an answer: the scene's content, materials, and what is wanted."""
-    look = [
-        (body.name, body.material, body.terminal, [(p.axis, p.outline, p.start_mm, p.end_mm) for p in body.prisms])
-        for body in scene.bodies
-    ]
+    look = [(body.name, body.material, body.terminal, [content(p) for p in body.pieces]) for body in scene.bodies]
     return {
         "what": "capacitance",
         "scene": sha256(dumps([look, scene.size_mm]).encode()).hexdigest(),

@@ -40,7 +40,7 @@ def _springs(design: Design, piece: Piece, stress_pa: Sequence[float]) -> Closed
     scene, why = piece.scene, press2d.why_not_applicable(piece.scene)
     solids = elastic(design, scene)
     moduli = {n: s.youngs_modulus_pa / (1.0 if why else 1 - s.poisson_ratio**2) for n, s in solids.items()}
-    boxes = all(prism.is_box() for body in scene.bodies for prism in body.prisms)
+    boxes = all(p.is_box() for body in scene.bodies for p in body.pieces)
     said = (
         "at most this, at small strain under a stiff plate"
         if boxes

@@ -320,6 +320,6 @@ def elastic(design: Design, scene: Scene) -> "dict[str, Elastic]":
 def gap_m(scene: Scene) -> float:
     """Distance between the electrodes' plates, without their teeth [m]."""
     spans = {
-        end: [p.span("z") for b in scene.bodies if b.terminal == end for p in b.prisms] for end in ("top", "bottom")
+        end: [p.span("z") for b in scene.bodies if b.terminal == end for p in b.pieces] for end in ("top", "bottom")
     }
     return (max(low for low, _ in spans["top"]) - min(high for _, high in spans["bottom"])) * M_PER_MM

@@ -55,7 +55,7 @@ def prediction(body: Body, query: Query) -> Prediction:
             found = replace(found, resistance=electrode_resistance(body))
         return replace(found, status="short" if touches else "not predicted", reason=str(error))
     values, doubts = (model.values, model.doubts) if model else (rest.values, rest.doubts)
-    found = replace(found, plan=plan, values=values, assumptions=(*_assumptions(body, model), *doubts))
+    found = replace(found, plan=plan, values=values, assumptions=tuple(_assumptions(body, model)), doubts=doubts)
     return _at_load(found, model, load, query) if model else found
 
 
@@ -146,8 +146,10 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
         others: Otherwise = ([None], [None])
         if law.bounded:
             others = list(_printed_otherwise(model, load, query)), list(_other_films(model, load, query))
+        beyond = law.compression.doubt(float(model.sensor.stress_pa(load.force_n, load.position_m)))
         found = replace(
-            found, identifiability=made, sensitivity=_sensitivity(model, load, others),
+            found, identifiability=made, sensitivity=_sensitivity(model, load, query, others),
+            doubts=(*found.doubts, *([beyond] if beyond else ())),
             budget=error_budget(model, query.load(model.body.design), query.accuracy, *others),
         )  # fmt: skip
         return _resolution(found, model, load, query, others)
@@ -200,13 +202,14 @@ def _end(found: list[tuple[float, Body, RestState]], *, least: bool) -> tuple[fl
     return next(pick for pick in found if abs(pick[0] / value - 1) < _SAME)
 
 
-def _sensitivity(model: SensorModel, load: Load, others: Otherwise) -> Bounds:
-    """(C(p) / C(0) - 1) / p, with p the pressure of the reference load [1/kPa]."""
-    pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
+def _sensitivity(model: SensorModel, load: Load, query: Query, others: Otherwise) -> Bounds:
+    """(C(p) / C(q) - 1) / (p - q); of the reference load from rest unless the query has pressures [1/kPa]."""
+    usual = 0.0, float(model.sensor.stress_pa(load.force_n, load.position_m))
+    low_pa, high_pa = (_PA_PER_KPA * p for p in query.range_kpa) if query.range_kpa else usual
 
     def of(law: Compression) -> float:
-        strain = float(law.capacitive_strain(np.asarray(pressure_pa))[0])
-        return strain / (1 - strain) / pressure_pa * _PA_PER_KPA
+        low, high = law.capacitive_strain(np.array([low_pa, high_pa]))[0].tolist()
+        return float(((1 - low) / (1 - high) - 1) / (high_pa - low_pa) * _PA_PER_KPA)
 
     value, moduli = of(model.law.compression), _moduli(model)
     by_print = [_range([value, *(of(s.compression) if s else nan for s in sensors)]) for sensors in others]

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 
@@ -61,6 +62,8 @@ class Query:
         Of abs(Z), relative [-]; if None, the default of :mod:`sensorgen.prediction.planning`.
     noise : float
         Standard deviation of Re Z and of Im Z, each, relative to abs(Z) [-].
+    range_kpa : tuple of (float, float) or None
+        Pressures between which the sensitivity is stated [kPa]; from rest to the reference load if not given.
     """
 
     frequency_hz: tuple[float, ...] = TONES_HZ
@@ -70,6 +73,13 @@ class Query:
     law: str = ""
     accuracy: float | None = None
     noise: float = NOISE
+    range_kpa: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse pressures that do not rise."""
+        if self.range_kpa and not 0 <= self.range_kpa[0] < self.range_kpa[1]:
+            low, high = self.range_kpa
+            raise OutOfRange(f"sensitivity from {low:g} to {high:g} kPa; expected pressures that rise from 0 or more")
 
     def load(self, design: Design) -> Load:
         """The reference load."""

@@ -194,7 +194,9 @@ class Prediction(Displayed):
     values : tuple of MaterialValue
         Material values that it rests on.
     assumptions : tuple of str
-        What is taken for granted, and what is doubtful.
+        What is taken for granted.
+    doubts : tuple of str
+        Why numbers under load, or the choice of the cell, may be wrong by more than their ranges say.
     drawn : Prediction or None
         The drawing's, beside that of a print.
     """
@@ -222,6 +224,7 @@ class Prediction(Displayed):
     plan: Plan | None = None
     values: tuple[MaterialValue, ...] = ()
     assumptions: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
     drawn: "Prediction | None" = None
 
     def summary(self) -> Iterator[Part]:
@@ -272,6 +275,7 @@ class Prediction(Displayed):
         yield from self.judgement()
         yield ""
         yield from (f"assumed: {assumption}" for assumption in self.assumptions)
+        yield from (f"doubtful: {doubt}" for doubt in self.doubts)
 
     def explained(self) -> Iterator[Part]:
         """Which models were used, their cost and error."""

@@ -12,7 +12,7 @@ import shapely
 
 from sensorgen.core.arrays import Real, Whole
 from sensorgen.scene.layers import LayerRegions, parts
-from sensorgen.scene.scene import FLOATING, PLANE, SLIVER_MM, Body, Prism, Scene, rectangle
+from sensorgen.scene.scene import FLOATING, PLANE, SLIVER_MM, Body, Outline, Piece, Prism, Scene, rectangle
 
 Conducts = Callable[[str], bool]  # whether a material, by its name, does
 
@@ -179,29 +179,29 @@ def _shorts(pieces: _Pieces, pairs: Sequence[tuple[int, int]]) -> Iterator[Short
 def connected_scene(scene: Scene, conducts: Conducts) -> Scene:
     """A scene of which every conductor has the terminal that it touches; itself where nothing changes.
 
-    Prisms along different axes, neither of them a box, are left as they are.
+    Pieces that are no prisms of one axis are left as they are.
     """
-    prisms = [(b, p) for b in scene.bodies if b.terminal or conducts(b.material) for p in b.prisms]
-    axis = next((n for n in "zyx" if all(p.axis == n or p.is_box() for _, p in prisms)), None)
-    if axis is None or not prisms:
+    pieces = [(b, p) for b in scene.bodies if b.terminal or conducts(b.material) for p in b.pieces]
+    axis = next((n for n in "zyx" if all(p.is_constant(n) for _, p in pieces)), None)
+    if axis is None or not pieces:
         return scene
-    outlines = np.array([shapely.Polygon(_outline(p, axis)) for _, p in prisms])
-    spans = np.array([p.span(axis) for _, p in prisms])
-    terminals, *_ = _Pieces([b for b, _ in prisms], outlines, spans).terminals()
-    if all(body.terminal == terminal for (body, _), terminal in zip(prisms, terminals, strict=True)):
+    outlines = np.array([shapely.Polygon(_outline(p, axis)) for _, p in pieces])
+    spans = np.array([p.span(axis) for _, p in pieces])
+    terminals, *_ = _Pieces([b for b, _ in pieces], outlines, spans).terminals()
+    if all(body.terminal == terminal for (body, _), terminal in zip(pieces, terminals, strict=True)):
         return scene
-    made: dict[str, tuple[Body, list[Prism]]] = {}
+    made: dict[str, tuple[Body, list[Piece]]] = {}
     given = iter(terminals)
     for body in scene.bodies:
-        for prism in body.prisms:
+        for piece in body.pieces:
             own = _as(body, next(given)) if body.terminal or conducts(body.material) else body
-            made.setdefault(own.name, (own, []))[1].append(prism)
-    return replace(scene, bodies=tuple(replace(body, prisms=tuple(own)) for body, own in made.values()))
+            made.setdefault(own.name, (own, []))[1].append(piece)
+    return replace(scene, bodies=tuple(replace(body, pieces=tuple(own)) for body, own in made.values()))
 
 
-def _outline(prism: Prism, axis: str) -> Sequence[tuple[float, float]]:
+def _outline(piece: Piece, axis: str) -> Outline:
     """A prism seen along an axis."""
-    if prism.axis == axis:
-        return prism.outline
+    if isinstance(piece, Prism) and piece.axis == axis:
+        return piece.outline
     first, second = PLANE[axis]
-    return rectangle(*prism.span(first), *prism.span(second))
+    return rectangle(*piece.span(first), *piece.span(second))

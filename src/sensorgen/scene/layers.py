@@ -135,12 +135,12 @@ def _drawn(scene: Scene, boundaries_mm: tuple[float, ...]) -> tuple[LayerRegions
 
 def faces_mm(body: Body) -> set[float]:
     """Heights of a body's horizontal faces and edges [mm]."""
-    return {z for p in body.prisms for z in (p.span("z") if p.axis == "z" else (round(z, 9) for _, z in p.outline))}
+    return {z for p in body.pieces for z in p.levels_mm()}
 
 
 def region_at(body: Body, z_mm: float) -> Region:
     """Region of a body at a height."""
-    return _united(frozenset(o for p in body.prisms for o in p.cut("z", z_mm)))
+    return _united(frozenset(o for p in body.pieces for o in p.cut("z", z_mm)))
 
 
 @lru_cache(maxsize=64)
@@ -170,7 +170,7 @@ def scene_of(layers: Sequence[LayerRegions], like: Scene) -> Scene:
     bodies = []
     for body in like.bodies:
         growing: dict[Outline, tuple[float, float]] = {}
-        found = []
+        found: list[Prism] = []
         for layer in layers:
             for outline in outlines(layer.region(body.name)):
                 bottom, top = growing.get(outline, (layer.bottom_mm, layer.bottom_mm))
@@ -179,7 +179,8 @@ def scene_of(layers: Sequence[LayerRegions], like: Scene) -> Scene:
                     bottom = layer.bottom_mm
                 growing[outline] = (bottom, layer.top_mm)
         found += [_prism(outline, *span) for outline, span in growing.items()]
-        bodies.append(replace(body, prisms=tuple(sorted(found, key=lambda p: (p.start_mm, p.outline)))))
+        found.sort(key=lambda p: (p.start_mm, p.outline))
+        bodies.append(replace(body, pieces=tuple(found)))
     size = (*like.size_mm[:2], layers[-1].top_mm if layers else 0.0)
     return replace(like, bodies=tuple(bodies), size_mm=size)
 

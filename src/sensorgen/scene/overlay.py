@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-from sensorgen.scene.scene import Body, Point, Prism, Scene, rectangle
+from sensorgen.scene.scene import Body, Piece, Point, Prism, Scene, seen_from_above
 from sensorgen.scene.sections import ROUNDING_MM, Column, Layer, alike, columns, sections
 
 
@@ -47,7 +47,8 @@ def parts(scene: Scene) -> list[Part]:
     ValueError
         Outlines overlap in plan, or are slanted both in plan and in elevation.
     """
-    if all(p.axis != "z" or p.is_box() for body in scene.bodies for p in body.prisms):
+    every = [p for body in scene.bodies for p in body.pieces]
+    if all((isinstance(p, Prism) and p.axis != "z") or p.is_box() for p in every):
         return [Part(s.depth_mm, tuple(columns(s)), tuple(alike(s))) for s in sections(scene)]
     found = _patches(scene)
     return [Part(1.0, found, tuple(range(len(found))), in_plan=True)]
@@ -56,20 +57,20 @@ def parts(scene: Scene) -> list[Part]:
 @lru_cache(maxsize=8)
 def _patches(scene: Scene) -> tuple[Column, ...]:
     """Pieces of the plan over which the same layers lie, those of one look as one."""
-    prisms = [(body, p) for body in scene.bodies for p in body.prisms]
-    slanted = next((body for body, p in prisms if p.axis != "z" and not p.is_box()), None)
+    pieces = [(body, p) for body in scene.bodies for p in body.pieces]
+    slanted = next((body for body, p in pieces if not p.is_constant("z")), None)
     if slanted:
-        raise ValueError(f"{slanted.name} is slanted in elevation, other bodies in plan: no column has constant layers")
+        raise ValueError(f"{slanted.name} is slanted or curved in elevation: no column has constant layers")
     numbers: dict[tuple[str, Point], int] = {}
-    kinds = [numbers.setdefault((body.name, p.span("z")), len(numbers)) for body, p in prisms]
-    first = {kind: prisms[k] for k, kind in reversed(list(enumerate(kinds)))}
-    plans = np.array([_plan(body, p) for body, p in prisms])
+    kinds = [numbers.setdefault((body.name, p.span("z")), len(numbers)) for body, p in pieces]
+    first = {kind: pieces[k] for k, kind in reversed(list(enumerate(kinds)))}
+    plans = np.array([_plan(body, p) for body, p in pieces])
     edges = shapely.boundary([*plans, shapely.box(0.0, 0.0, *scene.size_mm[:2])])
     faces = shapely.get_parts(shapely.polygonize([shapely.union_all(edges)]))
     places = shapely.point_on_surface(faces)
     over: list[list[int]] = [[] for _ in faces]
-    for face, prism in shapely.STRtree(plans).query(places, predicate="within").T.tolist():
-        over[face].append(prism)
+    for face, piece in shapely.STRtree(plans).query(places, predicate="within").T.tolist():
+        over[face].append(piece)
     areas: dict[tuple[int, ...], float] = defaultdict(float)
     for here, area in zip(over, shapely.area(faces).tolist(), strict=True):
         areas[tuple(sorted(kinds[k] for k in here))] += area
@@ -77,16 +78,16 @@ def _patches(scene: Scene) -> tuple[Column, ...]:
     return tuple(Column(0.0, area, _layers([first[kind] for kind in look])) for look, area in looks)
 
 
-def _plan(body: Body, prism: Prism) -> shapely.Polygon:
-    """A prism seen from above."""
-    plan = shapely.Polygon(prism.outline if prism.axis == "z" else rectangle(*prism.span("x"), *prism.span("y")))
+def _plan(body: Body, piece: Piece) -> shapely.Polygon:
+    """An upright prism seen from above."""
+    plan = shapely.Polygon(seen_from_above(piece))
     if not plan.is_valid:
         raise ValueError(f"an outline of {body.name} crosses itself: {shapely.is_valid_reason(plan)} mm")
     return plan
 
 
-def _layers(found: Sequence[tuple[Body, Prism]]) -> tuple[Layer, ...]:
-    """Prisms over one place as layers, from bottom to top."""
+def _layers(found: Sequence[tuple[Body, Piece]]) -> tuple[Layer, ...]:
+    """Pieces over one place as layers, from bottom to top."""
     spans = sorted(((*p.span("z"), body) for body, p in found), key=lambda span: span[:2])
     for (_, top, lower), (bottom, _, upper) in pairwise(spans):
         if bottom < top - ROUNDING_MM:

@@ -55,18 +55,18 @@ def raster(
     Raises
     ------
     ValueError
-        A prism is no box, or bodies overlap.
+        A piece is no box, or bodies overlap.
     """
-    prisms = [(body, p) for body in scene.bodies for p in body.prisms]
-    if not all(p.is_box() for _, p in prisms):
+    pieces = [(body, p) for body in scene.bodies for p in body.pieces]
+    if not all(p.is_box() for _, p in pieces):
         raise ValueError("not all of it is boxes")
     planes: list[Real] = []
     for axis, outer in zip("xyz", outer_mm, strict=True):
-        edges = np.unique(np.array([*outer, *(x for _, p in prisms for x in p.span(axis))]))
+        edges = np.unique(np.array([*outer, *(x for _, p in pieces for x in p.span(axis))]))
         planes.append(edges[np.diff(edges, prepend=-np.inf) > ROUNDING_MM])
     fill = np.full([len(p) - 1 for p in planes], -1)
-    for body, prism in prisms:
-        ends = [np.searchsorted(p, np.array(prism.span(a)) - ROUNDING_MM) for a, p in zip("xyz", planes, strict=True)]
+    for body, piece in pieces:
+        ends = [np.searchsorted(p, np.array(piece.span(a)) - ROUNDING_MM) for a, p in zip("xyz", planes, strict=True)]
         here = tuple(slice(*end) for end in ends)
         if (fill[here] >= 0).any():
             raise ValueError(f"{body.name} overlaps its neighbour")

@@ -4,20 +4,27 @@ Plain data without a CAD kernel. Drawing, checks, meshes, solids and models all 
 disagree about the sensor. x runs along the sensor, y across it, z up; the corner is at 0, 0, 0.
 """
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
-from math import isfinite
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, fields, replace
+from math import inf, isfinite
+from typing import TYPE_CHECKING, TypeAlias
 
 from sensorgen.core.errors import BadInput
 
+if TYPE_CHECKING:
+    from sensorgen.scene.polyhedra import Loft, Polyhedron
+    from sensorgen.scene.revolved import Revolved
+
 Point = tuple[float, float]
+Place = tuple[float, float, float]
 Outline = tuple[Point, ...]
+Piece: TypeAlias = "Prism | Revolved | Loft | Polyhedron"
 
 AXES = "xyz"
-PLANE = {"x": ("y", "z"), "y": ("x", "z"), "z": ("x", "y")}  # the two axes of an outline, by prism axis
+PLANE = {"x": ("y", "z"), "y": ("x", "z"), "z": ("x", "y")}  # the two axes of an outline, by the axis square to it
 SLIVER_MM = 1e-6  # a nanometre: narrower pieces are rounding, not geometry, and the CAD kernel refuses them from 1e-7
 FLOATING = "floating"  # terminal of a conductor that no contact reaches
-_TOLD = 5  # corners of an outline that an error shows
+_SHOWN = 5  # corners of an outline that an error shows
 
 
 @dataclass(frozen=True)
@@ -46,11 +53,10 @@ class Prism:
 
     def __post_init__(self) -> None:
         """Refuse outlines that no body can have, and turn those that run clockwise."""
-        reason = _no_outline(self.outline)
+        reason = fault(self.outline)
         if reason:
-            some = ", ".join(f"({u:.6g}, {v:.6g})" for u, v in self.outline[:_TOLD])
-            told = some + (", ..." if len(self.outline) > _TOLD else "") or "none"
-            raise BadInput(f"an outline {reason}: {told}; expected at least three corners around an area, each once")
+            given = described(self.outline)
+            raise BadInput(f"an outline {reason}: {given}; expected at least three corners around an area, each once")
         if area_mm2(self.outline) < 0:
             object.__setattr__(self, "outline", self.outline[::-1])
 
@@ -61,15 +67,34 @@ class Prism:
         values = [p[PLANE[self.axis].index(axis)] for p in self.outline]
         return min(values), max(values)
 
-    def volume_mm3(self) -> float:
-        """Exact volume [mm3]."""
-        return area_mm2(self.outline) * (self.end_mm - self.start_mm)
+    def volume_mm3(self, low_mm: float = -inf, high_mm: float = inf) -> float:
+        """Exact volume, of all of it or between two heights [mm3]."""
+        if self.axis == "z":
+            return area_mm2(self.outline) * max(min(self.end_mm, high_mm) - max(self.start_mm, low_mm), 0.0)
+        u0 = self.outline[0][0]
+        area = 0.0
+        for (ua, va), (ub, vb) in zip(self.outline, self.outline[1:] + self.outline[:1], strict=True):
+            low, high = (min(max(v, low_mm), high_mm) for v in (va, vb))
+            if low != high:
+                middle = ((low + high) / 2 - va) / (vb - va)
+                area += (ua + middle * (ub - ua) - u0) * (high - low)
+        return area * (self.end_mm - self.start_mm)
 
     def is_box(self) -> bool:
         """Whether its six faces are square to the axes."""
-        (a0, a1), (b0, b1) = (self.span(axis) for axis in PLANE[self.axis])
-        corners = {(a0, b0), (a1, b0), (a1, b1), (a0, b1)}
-        return len(self.outline) == 4 and set(self.outline) == corners and area_mm2(self.outline) != 0
+        return is_rectangle(self.outline)
+
+    def is_round(self) -> bool:
+        """Whether it has curved faces, of which cuts and meshes have the chords."""
+        return False
+
+    def is_constant(self, axis: str) -> bool:
+        """Whether all its cuts square to an axis are the same."""
+        return self.axis == axis or self.is_box()
+
+    def levels_mm(self) -> set[float]:
+        """Heights of its level faces and edges [mm]."""
+        return {self.start_mm, self.end_mm} if self.axis == "z" else {round(z, 9) for _, z in self.outline}
 
     def cut(self, axis: str, at_mm: float) -> list[Outline]:
         """Outlines in which the plane ``axis = at_mm`` cuts it, in ``PLANE[axis]`` [mm].
@@ -95,6 +120,23 @@ class Prism:
             return [rectangle(self.start_mm, self.end_mm, low, high) for low, high in runs]
         return [rectangle(low, high, self.start_mm, self.end_mm) for low, high in runs]
 
+    def turned_over(self, size_mm: Place) -> "Prism":
+        """It in a box of some size that is turned by half a turn about x."""
+        _, width, height = (rounded(s) for s in size_mm)
+        if self.axis == "x":
+            return replace(self, outline=tuple((rounded(width - y), rounded(height - z)) for y, z in self.outline))
+        size, extent = (height, width) if self.axis == "y" else (width, height)
+        outline = tuple((x, rounded(size - v)) for x, v in reversed(self.outline))
+        start, end = rounded(extent - self.end_mm), rounded(extent - self.start_mm)
+        return replace(self, outline=outline, start_mm=start, end_mm=end)
+
+    def stretched(self, factor: float) -> "Prism":
+        """It scaled in x and y."""
+        first, second = (1.0 if axis == "z" else factor for axis in PLANE[self.axis])
+        along = 1.0 if self.axis == "z" else factor
+        outline = tuple((rounded(u * first), rounded(v * second)) for u, v in self.outline)
+        return replace(self, outline=outline, start_mm=self.start_mm * along, end_mm=self.end_mm * along)
+
 
 @dataclass(frozen=True)
 class Body:
@@ -106,8 +148,8 @@ class Body:
         Its role, as in ``bottom_electrode``.
     material : str
         Name of its material.
-    prisms : tuple of Prism
-        They do not overlap. Boxes that share a face are one solid; other prisms touch at most along edges.
+    pieces : tuple of Piece
+        They do not overlap. Boxes that share a face are one solid; other pieces touch at most along edges.
     terminal : str
         "top", "middle" or "bottom" where it is connected to an electrode's contact, ``FLOATING`` for a conductor that
         is connected to none, else "".
@@ -115,7 +157,7 @@ class Body:
 
     name: str
     material: str
-    prisms: tuple[Prism, ...] = field(repr=False)
+    pieces: tuple[Piece, ...] = field(repr=False)
     terminal: str = ""
 
     def is_support(self) -> bool:
@@ -124,7 +166,7 @@ class Body:
 
     def volume_mm3(self) -> float:
         """Exact volume [mm3]."""
-        return sum(p.volume_mm3() for p in self.prisms)
+        return sum(p.volume_mm3() for p in self.pieces)
 
 
 @dataclass(frozen=True)
@@ -134,7 +176,7 @@ class Scene:
     Attributes
     ----------
     bodies : tuple of Body
-        From bottom to top; those that no prism fills, as in a sensor shorter than its pattern, are left out.
+        From bottom to top; those that no piece fills, as in a sensor shorter than its pattern, are left out.
     size_mm : (float, float, float)
         Edges of the enclosing box, whose corner is the origin [mm].
     repeats : (bool, bool)
@@ -147,7 +189,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Leave out empty bodies."""
-        object.__setattr__(self, "bodies", tuple(b for b in self.bodies if b.prisms))
+        object.__setattr__(self, "bodies", tuple(b for b in self.bodies if b.pieces))
 
     def body(self, name: str) -> Body:
         """The body of that name; raises KeyError where there is none."""
@@ -155,16 +197,14 @@ class Scene:
 
     def turned_over(self) -> "Scene":
         """The scene turned by half a turn about x, to be printed upside down."""
-        return self._mapped(lambda prism: _turned(prism, self.size_mm), self.size_mm)
+        bodies = (replace(b, pieces=tuple(p.turned_over(self.size_mm) for p in b.pieces)) for b in self.bodies)
+        return replace(self, bodies=tuple(bodies))
 
     def stretched(self, factor: float) -> "Scene":
         """The scene scaled by ``factor`` [-] in x and y."""
         length, width, height = self.size_mm
-        return self._mapped(lambda prism: _stretched(prism, factor), (length * factor, width * factor, height))
-
-    def _mapped(self, change: Callable[[Prism], Prism], size_mm: tuple[float, float, float]) -> "Scene":
-        bodies = tuple(replace(b, prisms=tuple(change(p) for p in b.prisms)) for b in self.bodies)
-        return replace(self, bodies=bodies, size_mm=size_mm)
+        bodies = (replace(b, pieces=tuple(p.stretched(factor) for p in b.pieces)) for b in self.bodies)
+        return replace(self, bodies=tuple(bodies), size_mm=(length * factor, width * factor, height))
 
 
 @dataclass(frozen=True)
@@ -198,20 +238,47 @@ class Envelope:
         return 1.0
 
 
-def rectangle(a0: float, a1: float, b0: float, b1: float) -> Outline:
-    """Rectangle from (a0, b0) to (a1, b1), counter-clockwise [mm]."""
-    return ((a0, b0), (a1, b0), (a1, b1), (a0, b1))
+def seen_from_above(piece: Piece) -> Outline:
+    """Outline of an upright prism, or of a box, in (x, y) [mm].
+
+    Raises
+    ------
+    ValueError
+        It is neither: its outline changes with height.
+    """
+    if isinstance(piece, Prism) and piece.axis == "z":
+        return piece.outline
+    if not piece.is_box():
+        raise ValueError("its outline changes with height")
+    return rectangle(*piece.span("x"), *piece.span("y"))
 
 
-def rounded(value_mm: float) -> float:
-    """Round away what sums leave behind, so that faces that meet have equal coordinates [mm]."""
-    return round(value_mm, 12)
+def content(piece: Piece) -> list[object]:
+    """Everything that a piece is, as plain data; of pieces of two kinds never the same."""
+    return [getattr(piece, own.name) for own in fields(piece)]
 
 
 def box(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float) -> Prism:
     """Box between two corners, rounded [mm]."""
     x0, x1, y0, y1, z0, z1 = (rounded(value) for value in (x0, x1, y0, y1, z0, z1))
     return Prism("z", rectangle(x0, x1, y0, y1), z0, z1)
+
+
+def rectangle(a0: float, a1: float, b0: float, b1: float) -> Outline:
+    """Rectangle from (a0, b0) to (a1, b1), counter-clockwise [mm]."""
+    return ((a0, b0), (a1, b0), (a1, b1), (a0, b1))
+
+
+def is_rectangle(outline: Outline) -> bool:
+    """Whether it is a rectangle along the axes."""
+    low, high = (tuple(map(end, zip(*outline, strict=True))) for end in (min, max))
+    corners = {low, high, (low[0], high[1]), (high[0], low[1])}
+    return len(outline) == 4 == len(corners) and set(outline) == corners and area_mm2(outline) != 0
+
+
+def rounded(value_mm: float) -> float:
+    """Round away what sums leave behind, so that faces that meet have equal coordinates [mm]."""
+    return round(value_mm, 12)
 
 
 def area_mm2(outline: Iterable[Point]) -> float:
@@ -222,16 +289,22 @@ def area_mm2(outline: Iterable[Point]) -> float:
     return sum((a[0] - u0) * (b[1] - v0) - (b[0] - u0) * (a[1] - v0) for a, b in turn) / 2.0
 
 
-def _no_outline(outline: Outline) -> str:
-    """Why corners are no outline, or ""."""
-    if len(outline) < 3:
+def fault(outline: Outline, area: float | None = None) -> str:
+    """Why corners are no outline, of an area that their edges may curve [mm2], or ""."""
+    if len(outline) < (3 if area is None else 2):
         return f"of {len(outline)} corners is open"
     if any(a == b for a, b in zip(outline, outline[1:] + outline[:1], strict=True)):
         return "has the same corner twice in a row"
-    area = area_mm2(outline)
+    area = area_mm2(outline) if area is None else area
     if not isfinite(area):
         return "has a corner that is nowhere"
     return "encloses nothing" if abs(area) < SLIVER_MM**2 else ""
+
+
+def described(outline: Outline) -> str:
+    """The first corners of an outline, for an error."""
+    some = ", ".join(f"({u:.6g}, {v:.6g})" for u, v in outline[:_SHOWN])
+    return some + (", ..." if len(outline) > _SHOWN else "") or "none"
 
 
 def clipped(outline: Iterable[Point], end_mm: float) -> Outline:
@@ -258,21 +331,11 @@ def clipped(outline: Iterable[Point], end_mm: float) -> Outline:
     return distinct if len(distinct) > 2 and width > SLIVER_MM else ()
 
 
-def _turned(prism: Prism, size_mm: tuple[float, float, float]) -> Prism:
-    _, width, height = (round(s, 12) for s in size_mm)
-
-    def back(value: float, size: float) -> float:
-        return round(size - value, 12)
-
-    if prism.axis == "x":
-        return replace(prism, outline=tuple((back(y, width), back(z, height)) for y, z in prism.outline))
-    size, extent = (height, width) if prism.axis == "y" else (width, height)
-    outline = tuple((x, back(v, size)) for x, v in reversed(prism.outline))
-    return replace(prism, outline=outline, start_mm=back(prism.end_mm, extent), end_mm=back(prism.start_mm, extent))
-
-
-def _stretched(prism: Prism, factor: float) -> Prism:
-    first, second = (1.0 if axis == "z" else factor for axis in PLANE[prism.axis])
-    along = 1.0 if prism.axis == "z" else factor
-    outline = tuple((round(u * first, 12), round(v * second, 12)) for u, v in prism.outline)
-    return replace(prism, outline=outline, start_mm=prism.start_mm * along, end_mm=prism.end_mm * along)
+def without_straight(loop: Sequence[Point]) -> Outline:
+    """An outline without the corners at which it goes straight on."""
+    kept: list[Point] = []
+    for k, b in enumerate(loop):
+        a, c = kept[-1] if kept else loop[k - 1], loop[(k + 1) % len(loop)]
+        if b != a and (b == c or abs((b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])) > SLIVER_MM**2):
+            kept.append(b)
+    return tuple(kept)

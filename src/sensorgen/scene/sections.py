@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
-from sensorgen.scene.scene import PLANE, Body, Outline, Point, Prism, Scene, rounded
+from sensorgen.scene.scene import PLANE, Body, Outline, Piece, Point, Prism, Scene, rounded
 
 ROUNDING_MM = 1e-9  # edges nearer than this are one edge, reached by different sums
 
@@ -40,7 +40,8 @@ def sections(scene: Scene) -> list[Section]:
     Raises
     ------
     ValueError
-        Some outline is slanted in plan, or slants run both ways: no vertical cut is constant over a depth.
+        Some outline is slanted in plan, or slants run both ways, or a body is no prism: no vertical cut is constant
+        over a depth.
     """
     return list(_fewest(scene))
 
@@ -54,17 +55,17 @@ def _fewest(scene: Scene) -> list[Section]:
 
 
 def square_to(scene: Scene, normal: str) -> list[Section]:
-    """The distinct cross-sections of a scene square to "x" or "y"; none where some prism changes along that axis."""
+    """The distinct cross-sections of a scene square to "x" or "y"; none where some piece changes along that axis."""
     return _sections(scene, normal) if _is_constant(scene, normal) else []
 
 
 def _is_constant(scene: Scene, normal: str) -> bool:
-    return all(p.axis == normal or p.is_box() for b in scene.bodies for p in b.prisms)
+    return all(p.is_constant(normal) for b in scene.bodies for p in b.pieces)
 
 
 def _sections(scene: Scene, normal: str) -> list[Section]:
     across = "x" if normal == "y" else "y"
-    spans = [(p.span(normal), body, p) for body in scene.bodies for p in body.prisms]
+    spans = [(p.span(normal), body, p) for body in scene.bodies for p in body.pieces]
     cuts = sorted({edge for span, _, _ in spans for edge in span})
     slabs: list[list[int]] = [[] for _ in cuts[1:]]
     for index, ((low, high), _, _) in enumerate(spans):
@@ -83,11 +84,11 @@ def _sections(scene: Scene, normal: str) -> list[Section]:
     ]
 
 
-def _seen(prism: Prism, normal: str) -> tuple[Point, ...]:
-    """What of a prism a section square to ``normal`` shows: the same for every place inside it."""
-    if prism.axis == normal:
-        return prism.outline
-    return tuple(prism.span(axis) for axis in PLANE[normal])
+def _seen(piece: Piece, normal: str) -> tuple[Point, ...]:
+    """What of a piece a section square to ``normal`` shows: the same for every place inside it."""
+    if isinstance(piece, Prism) and piece.axis == normal:
+        return piece.outline
+    return tuple(piece.span(axis) for axis in PLANE[normal])
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.document import Part
 from sensorgen.core.errors import Unprintable
-from sensorgen.core.findings import Finding, counted, counts, listed, most_severe
+from sensorgen.core.findings import Finding, counted, counts, listed, most_severe, verdict
 from sensorgen.core.version import __version__
 from sensorgen.design import materials, printer
 from sensorgen.design.design import Design
@@ -32,6 +32,7 @@ from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless, to_json
 from sensorgen.workflows import compensation, sealed
 from sensorgen.workflows.compensation import Change
+from sensorgen.workflows.trial import with_print
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
 LIBRARIES = ("build123d", "cadquery-ocp", "manifold3d", "numpy", "pydantic", "PyYAML", "click")
@@ -163,11 +164,10 @@ def build(
         store.publish(stage, folder)
         replaced += sealed.set_aside(folder, design)
         step("done")
-    number = held.counts()
+    findings = with_print(held.findings, predicted)
     return Built(
         design.name, folder, tuple(sorted([*store.listed(folder), store.MANIFEST])),
-        "CHANGE" if number["error"] else "PRINT WITH WARNINGS" if number["warning"] else "PRINT",
-        tuple(held.findings), timeless(predicted), tuple(compensated), replaced,
+        verdict(findings), findings, timeless(predicted), tuple(compensated), replaced,
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import OutOfRange, SensorgenError
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design, fields, make, name_of
+from sensorgen.scene.layers import faces_mm
 from sensorgen.scene.scene import SLIVER_MM, Envelope
 
 BAKE = 0.2  # what the bake takes off in the plane (thesis 6.2)
@@ -459,8 +460,7 @@ def _steps(design: Design) -> Iterator[tuple[str, float, str]]:
 
 def _levels(design: Design) -> set[float]:
     """Heights of all faces and corners [mm]."""
-    prisms = (p for b in design.drawn.bodies for p in b.prisms)
-    return {round(z, 6) for p in prisms for z in (p.span("z") if p.axis == "z" else (z for _, z in p.outline))}
+    return {round(z, 6) for body in design.drawn.bodies for z in faces_mm(body)}
 
 
 def _share(design: Design) -> float:

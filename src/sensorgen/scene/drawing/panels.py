@@ -156,7 +156,7 @@ def outlined(panel: Panel, printed: Scene) -> Iterator[str]:
     """Outlines of the printed bodies where a view cuts them, one path for each body."""
     view = panel.view
     for body in printed.bodies:
-        seen = (outline for p in body.prisms for outline in p.cut(view.normal, view.section.at_mm))
+        seen = (outline for p in body.pieces for outline in p.cut(view.normal, view.section.at_mm))
         path = "".join(panel.frame.outline(part) for o in seen if (part := clipped(o, view.end_mm)))
         if path:
             yield element("path", "halo-line", "", d=path) + element("path", "printed", "", d=path, data_body=body.name)

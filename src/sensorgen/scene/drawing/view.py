@@ -76,7 +76,7 @@ def views(scene: Scene) -> list[View]:
 def _view(scene: Scene, across: str) -> View:
     """The section in which most of the terminals is seen: through the conductor strips, not beside them."""
     normal = "y" if across == "x" else "x"
-    spans = [(p.span(normal), body, p) for body in scene.bodies for p in body.prisms]
+    spans = [(p.span(normal), body, p) for body in scene.bodies for p in body.pieces]
     edges = sorted({edge for span, _, _ in spans for edge in span})
     # Through the first stretches in which the sensor keeps one look.
     stretches = [(low, high) for low, high in pairwise(edges) if high - low > SLIVER_MM]

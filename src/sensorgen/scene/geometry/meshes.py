@@ -1,13 +1,21 @@
 """Triangle meshes straight from the scene, in double precision, without a CAD kernel."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from math import acos, ceil, pi, sin, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.core.arrays import Mask, Whole
-from sensorgen.scene.scene import PLANE, Body, Outline, Prism
+from sensorgen.core.arrays import Mask, Real, Whole
+from sensorgen.scene.scene import PLANE, Body, Outline, Piece, Prism
+
+if TYPE_CHECKING:
+    from sensorgen.scene.revolved import Revolved
+
+CHORD_MM = 0.005  # of a round body, from the middle of its triangles: less than half of what slicers resolve
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,14 +43,46 @@ class Mesh:
 
 
 def mesh(body: Body) -> Mesh:
-    """Mesh a body: boxes that share faces become one shell, other prisms one shell each.
+    """Mesh a body: boxes that share faces become one shell, other pieces one shell each.
 
     Shells that touch along an edge or at a corner keep vertices of their own, so that every edge
     belongs to two triangles.
     """
-    if all(p.is_box() for p in body.prisms):
-        return _grid(body.prisms)
-    return _joined([_prism(p) for p in body.prisms])
+    if all(p.is_box() for p in body.pieces):
+        return _grid(body.pieces)
+    return _joined([_of_piece(p) for p in body.pieces])
+
+
+def _of_piece(piece: Piece) -> Mesh:
+    if isinstance(piece, Prism):
+        return _prism(piece)
+    from sensorgen.scene.polyhedra import Loft
+    from sensorgen.scene.revolved import Revolved
+
+    if isinstance(piece, Revolved):
+        return _revolved(piece)
+    flat = piece.polyhedron() if isinstance(piece, Loft) else piece
+    return Mesh(np.array(flat.vertices), np.array(flat.triangles, np.int32))
+
+
+def _revolved(piece: "Revolved") -> Mesh:
+    """Rings of the corners of its profile, as many to each, and one corner for a ring on the axis."""
+    profile = np.array(piece.profile(CHORD_MM / 4))
+    n = 4 * max(ceil(pi / 4 / acos(max(1 - CHORD_MM / profile[:, 0].max(), 0.0))), 2)
+    turns = 2 * pi * np.arange(n) / n
+    wider = sqrt(2 * pi / n / sin(2 * pi / n))  # polygons of the circles' areas
+    rings: list[Real] = []
+    numbers = []
+    for radius, z in profile.tolist():
+        first, around = sum(len(ring) for ring in rings), turns if radius > 0 else turns[:1]
+        places = np.stack([np.cos(around), np.sin(around)], 1) * radius * wider + (piece.x_mm, piece.y_mm)
+        rings.append(np.column_stack([places, np.full(len(around), z)]))
+        numbers.append(first + np.arange(n) % len(around))
+    here, there = np.array(numbers), np.roll(numbers, -1, axis=0)
+    quads = [ring.ravel() for ring in (here, np.roll(here, -1, 1), np.roll(there, -1, 1), there)]
+    triangles = np.concatenate([np.stack([quads[k] for k in way], 1) for way in ((0, 1, 2), (0, 2, 3))])
+    a, b, c = triangles.T
+    return Mesh(np.concatenate(rings), triangles[(a != b) & (b != c) & (c != a)].astype(np.int32))
 
 
 def _joined(parts: list[Mesh]) -> Mesh:
@@ -79,11 +119,11 @@ def _cap(outline: Outline) -> Whole:
     return np.asarray(manifold3d.triangulate([np.array(outline)]), np.int64)
 
 
-def _grid(prisms: tuple[Prism, ...]) -> Mesh:
+def _grid(boxes: Sequence[Piece]) -> Mesh:
     """Outer faces of boxes, on the grid of all their coordinates."""
-    lines = [np.unique([edge for p in prisms for edge in p.span(axis)]) for axis in "xyz"]
+    lines = [np.unique([edge for p in boxes for edge in p.span(axis)]) for axis in "xyz"]
     filled = np.zeros([len(line) - 1 for line in lines], bool)
-    for p in prisms:
+    for p in boxes:
         ends = (np.searchsorted(line, p.span(axis)) for line, axis in zip(lines, "xyz", strict=True))
         filled[tuple(slice(low, high) for low, high in ends)] = True
     # Which of the eight cells around each grid point are filled, as bits x + 2 y + 4 z

@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from sensorgen.core.errors import CadFailed, SensorgenError, Unwritable
 from sensorgen.core.leash import end_with_parent
-from sensorgen.scene.scene import AXES, PLANE, Body, Point, Prism, Scene
+from sensorgen.scene.scene import AXES, PLANE, Body, Piece, Point, Prism, Scene
 
 if TYPE_CHECKING:
     from build123d import Compound, Solid
@@ -43,7 +43,7 @@ _ENTITY = re.compile(rb"#(\d+) = (.*?);\n", re.DOTALL)
 _REFERENCE = re.compile(rb"#(\d+)")
 
 
-def solid(prism: Prism) -> "Solid":
+def solid(prism: Piece) -> "Solid":
     """The prism as a CAD solid in its place [mm].
 
     For axis y the plane (x, z) is left-handed, so the face of an outline looks against its extrusion. The kernel turns
@@ -56,6 +56,8 @@ def solid(prism: Prism) -> "Solid":
     """
     from build123d import Face, Solid, Wire
 
+    if not isinstance(prism, Prism):
+        raise CadFailed(f"no CAD solid of a {type(prism).__name__} yet")
     way = [0.0, 0.0, 0.0]
     way[AXES.index(prism.axis)] = prism.end_mm - prism.start_mm
     try:
@@ -85,11 +87,11 @@ def part(body: Body) -> "Solid | Compound":
     from build123d import Compound
 
     solids = []
-    for number, prism in enumerate(body.prisms, 1):
+    for number, prism in enumerate(body.pieces, 1):
         try:
             solids.append(solid(prism))
         except CadFailed as error:
-            place = f"prism {number} of {len(body.prisms)}"
+            place = f"prism {number} of {len(body.pieces)}"
             raise CadFailed(f"the CAD kernel cannot make {body.name} ({body.material}), {place}, {error}") from error
     made = solids[0] if len(solids) == 1 else Compound(solids)
     made.label = body.name

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sensorgen.scene.geometry.meshes import Mesh
+from sensorgen.scene.geometry.meshes import CHORD_MM, Mesh
 from sensorgen.scene.scene import AXES, Body, Scene
 from sensorgen.scene.sections import overlap, sections
 
@@ -47,11 +47,13 @@ def faults(scene: Scene, meshes: Mapping[str, Mesh]) -> list[tuple[str, str]]:
             found.append((body.name, f"not a closed oriented surface ({solids[body.name].status().name})"))
         elif not _two_manifold(meshes[body.name]):
             found.append((body.name, "shells are welded along an edge: programs that read 3MF refuse that"))
-        elif abs(got - exact) > 1e-9 * exact:
+        elif abs(got - exact) > _rounding_mm3(body, solids[body.name]):
             found.append((body.name, f"encloses {got:.9g} mm3, not {exact:.9g} mm3"))
         elif (twice := _self_overlap_mm3(solids[body.name])) > OVERLAP_MM * solids[body.name].surface_area():
             found.append((body.name, f"overlaps itself by {twice:.3g} mm3"))
-        elif not np.allclose(solids[body.name].bounding_box(), _box_mm(body), rtol=0.0, atol=OVERLAP_MM):
+        elif not np.allclose(
+            solids[body.name].bounding_box(), _box_mm(body), rtol=0.0, atol=OVERLAP_MM + _off_mm(body)
+        ):
             found.append((body.name, "is not where it is drawn"))
     if found or _are_apart(scene):
         return found
@@ -60,8 +62,18 @@ def faults(scene: Scene, meshes: Mapping[str, Mesh]) -> list[tuple[str, str]]:
 
 def _box_mm(body: Body) -> list[float]:
     """Enclosing box: the lowest x, y and z, then the highest [mm]."""
-    spans = np.array([[p.span(axis) for axis in AXES] for p in body.prisms])
+    spans = np.array([[p.span(axis) for axis in AXES] for p in body.pieces])
     return [*spans[..., 0].min(axis=0), *spans[..., 1].max(axis=0)]
+
+
+def _rounding_mm3(body: Body, solid: "manifold3d.Manifold") -> float:
+    """How far the volume of a mesh may be from the exact one: rounding, and chords in place of arcs [mm3]."""
+    return 1e-9 * body.volume_mm3() + _off_mm(body) * float(solid.surface_area())
+
+
+def _off_mm(body: Body) -> float:
+    """How far a mesh may be from the surface [mm]."""
+    return CHORD_MM if any(p.is_round() for p in body.pieces) else 0.0
 
 
 def _are_apart(scene: Scene) -> bool:

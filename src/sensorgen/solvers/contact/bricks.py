@@ -54,12 +54,12 @@ def bricks_of(scene: Scene) -> Bricks:
     Raises
     ------
     BadInput
-        A prism is no box, or bodies overlap.
+        A piece is no box, or bodies overlap.
     """
-    prisms = [(body, p) for body in scene.bodies for p in body.prisms]
-    if not all(p.is_box() for _, p in prisms):
-        raise BadInput("pressing in 3D needs a scene of boxes: not all of its prisms are")
-    regions = [Region(AIR, ""), *dict.fromkeys(Region(body.material, body.terminal) for body, _ in prisms)]
+    pieces = [(body, p) for body in scene.bodies for p in body.pieces]
+    if not all(p.is_box() for _, p in pieces):
+        raise BadInput("pressing in 3D needs a scene of boxes: not all of its bodies are")
+    regions = [Region(AIR, ""), *dict.fromkeys(Region(body.material, body.terminal) for body, _ in pieces)]
     try:
         found = raster(scene, lambda body: regions.index(Region(body.material, body.terminal)), 0, ((), (), ()), False)
     except ValueError as error:

@@ -86,7 +86,7 @@ _UNDER = {
 
 def _height_mm(body: str, x_mm: float, *, lowest: bool) -> float:
     """Height of a body's lower or upper face over the film in the cross-section of our scene [mm]."""
-    cuts = (outline for prism in _DESIGN.in_use.body(body).prisms for outline in prism.cut("x", x_mm))
+    cuts = (outline for prism in _DESIGN.in_use.body(body).pieces for outline in prism.cut("x", x_mm))
     z = [height for outline in cuts for _, height in outline]
     return (min(z) if lowest else max(z)) - _CELL.electrode_mm - FILM_MM
 

@@ -1,0 +1,354 @@
+"""Bodies of revolution about an upright axis, of straight edges and arcs: exact volume, cuts as polygons."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+from math import acos, atan, atan2, ceil, cos, hypot, inf, isfinite, pi, sin, sqrt, tan
+from typing import NamedTuple
+
+from sensorgen.core.errors import BadInput
+from sensorgen.scene.scene import (
+    AXES,
+    SLIVER_MM,
+    Outline,
+    Place,
+    Point,
+    area_mm2,
+    described,
+    fault,
+    rounded,
+    without_straight,
+)
+
+CHORD_MM = 1e-4  # largest distance of a round surface from the chords of its cuts and meshes
+_ARC = pi / 12  # longest arc that a stretched one is made of
+
+
+class _Edge(NamedTuple):
+    """A straight edge of a profile, or an arc on which radius and height each only rise or only fall [mm]."""
+
+    start: Point
+    end: Point
+    centre: Point | None = None
+
+    def at_height(self, z_mm: float) -> float:
+        """Radius at a height between its ends."""
+        (ra, za), (rb, zb) = self.start, self.end
+        if self.centre is None:
+            return ra if za == zb else ra + (z_mm - za) / (zb - za) * (rb - ra)
+        rc, zc = self.centre
+        return rc + _leg(self.start, self.centre, z_mm - zc) * (1.0 if ra + rb > 2 * rc else -1.0)
+
+    def at_radius(self, r_mm: float) -> float:
+        """Height at a radius between its ends."""
+        (ra, za), (rb, zb) = self.start, self.end
+        if self.centre is None:
+            return za if ra == rb else za + (r_mm - ra) / (rb - ra) * (zb - za)
+        rc, zc = self.centre
+        return zc + _leg(self.start, self.centre, r_mm - rc) * (1.0 if za + zb > 2 * zc else -1.0)
+
+    def middle(self) -> Point:
+        """Point half-way along it."""
+        (ra, za), (rb, zb) = self.start, self.end
+        if self.centre is None:
+            return (ra + rb) / 2, (za + zb) / 2
+        rc, zc = self.centre
+        across, up = (ra + rb) / 2 - rc, (za + zb) / 2 - zc
+        scale = hypot(ra - rc, za - zc) / hypot(across, up)
+        return rc + across * scale, zc + up * scale
+
+    def halves(self) -> tuple["_Edge", "_Edge"]:
+        """It in two."""
+        middle = self.middle()
+        return _Edge(self.start, middle, self.centre), _Edge(middle, self.end, self.centre)
+
+    def volume_mm3(self) -> float:
+        """Of what it encloses with the axis of revolution, negative downwards: pi times the integral of r2 dz."""
+        (ra, za), (rb, zb) = self.start, self.end
+        if self.centre is None:
+            return pi * (zb - za) * (ra * ra + ra * rb + rb * rb) / 3
+        rc, zc = self.centre
+        radius = hypot(ra - rc, za - zc)
+        first, last = atan2(za - zc, ra - rc), atan2(zb - zc, rb - rc)
+        turn = (last - first + pi) % (2 * pi) - pi
+        first, last = first, first + turn
+        # (rc + radius cos t)^2 radius cos t, term by term
+        linear = sin(last) - sin(first)
+        square = turn / 2 + (sin(2 * last) - sin(2 * first)) / 4
+        cube = linear - (sin(last) ** 3 - sin(first) ** 3) / 3
+        return pi * radius * (rc * rc * linear + 2 * rc * radius * square + radius * radius * cube)
+
+
+def _leg(on: Point, centre: Point, other: float) -> float:
+    """Leg of the right triangle over a circle's radius, given the other one."""
+    radius = hypot(on[0] - centre[0], on[1] - centre[1])
+    return sqrt(max((radius - other) * (radius + other), 0.0))
+
+
+@lru_cache(maxsize=64)
+def _edges(outline: Outline, bulges: tuple[float, ...]) -> tuple[_Edge, ...]:
+    """Edges of a profile, arcs cut where they are level or upright."""
+    found = []
+    for a, b, bulge in zip(outline, outline[1:] + outline[:1], bulges, strict=True):
+        if bulge == 0:
+            found.append(_Edge(a, b))
+            continue
+        du, dv, lift = b[0] - a[0], b[1] - a[1], (1 - bulge * bulge) / (4 * bulge)
+        centre = ((a[0] + b[0]) / 2 - dv * lift, (a[1] + b[1]) / 2 + du * lift)
+        radius, first = hypot(a[0] - centre[0], a[1] - centre[1]), atan2(a[1] - centre[1], a[0] - centre[0])
+        turn = 4 * atan(bulge)
+        low, high = sorted((first, first + turn))
+        quarters = range(ceil(low / (pi / 2) + 1e-9), ceil(high / (pi / 2) - 1e-9))
+        way = {0: (1.0, 0.0), 1: (0.0, 1.0), 2: (-1.0, 0.0), 3: (0.0, -1.0)}
+        stops = [tuple(c + radius * w for c, w in zip(centre, way[k % 4], strict=True)) for k in quarters]
+        places = [a, *((u, v) for u, v in (stops if turn > 0 else stops[::-1])), b]
+        found += [_Edge(start, end, centre) for start, end in pairwise(places)]
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class Revolved:
+    """A profile turned about an upright axis: a bump, a cone, a round pillar, a ring.
+
+    Attributes
+    ----------
+    x_mm, y_mm : float
+        Where the axis stands [mm].
+    outline : tuple of (float, float)
+        Corners of the profile, distance from the axis and height [mm]; given either way round, kept counter-clockwise.
+    bulges : tuple of float
+        Of the edge from each corner to the next: tangent of a quarter of its arc's angle, as in DXF; positive to the
+        right of the edge, 0 for a straight edge, at most 1, half a circle. All straight if not given.
+
+    Raises
+    ------
+    BadInput
+        The profile is open, encloses nothing, lies beyond the axis, or has no bulge for each corner.
+    """
+
+    x_mm: float
+    y_mm: float
+    outline: Outline
+    bulges: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse profiles that no body can have, and turn those that run clockwise."""
+        bulges = self.bulges or (0.0,) * len(self.outline)
+        object.__setattr__(self, "bulges", bulges)
+        reason = ""
+        if len(bulges) != len(self.outline):
+            reason = f"has {len(bulges)} bulges; expected one for each of its {len(self.outline)} corners"
+        elif not all(abs(bulge) <= 1 for bulge in bulges):
+            reason = "has a bulge that is no number from -1 to 1; expected two arcs in place of more than half a circle"
+        elif not (isfinite(self.x_mm) and isfinite(self.y_mm)):
+            reason = "turns about an axis that is nowhere"
+        else:
+            reason = fault(self.outline, self._area_mm2())
+        if not reason and (low := min(r for e in self._edges() for r, _ in (e.start, e.end))) < 0:
+            reason = f"lies beyond the axis that it turns about, at a radius of {low:.6g} mm"
+        if reason:
+            raise BadInput(f"a profile of revolution {reason}: {described(self.outline)}")
+        if self._area_mm2() < 0:
+            object.__setattr__(self, "outline", self.outline[::-1])
+            object.__setattr__(self, "bulges", tuple(-bulge for bulge in (*bulges[-2::-1], bulges[-1])))
+
+    def span(self, axis: str) -> Point:
+        """Lowest and highest coordinate along an axis [mm]."""
+        if axis == "z":
+            heights = [z for edge in self._edges() for _, z in (edge.start, edge.end)]
+            return min(heights), max(heights)
+        at, radius = (self.x_mm, self.y_mm)[AXES.index(axis)], max(edge.start[0] for edge in self._edges())
+        return at - radius, at + radius
+
+    def volume_mm3(self, low_mm: float = -inf, high_mm: float = inf) -> float:
+        """Exact volume, of all of it or between two heights [mm3]."""
+        found = []
+        for edge in self._edges():
+            (_, za), (_, zb) = edge.start, edge.end
+            ends = [min(max(z, low_mm), high_mm) for z in (za, zb)]
+            if ends[0] != ends[1]:
+                a, b = ((edge.at_height(z), z) if z != given[1] else given
+                        for z, given in zip(ends, (edge.start, edge.end), strict=True))  # fmt: skip
+                found.append(_Edge(a, b, edge.centre).volume_mm3())
+        return sum(found)
+
+    def is_box(self) -> bool:
+        """Whether its six faces are square to the axes: never."""
+        return False
+
+    def is_round(self) -> bool:
+        """Whether it has curved faces, of which cuts and meshes have the chords."""
+        return True
+
+    def is_constant(self, axis: str) -> bool:  # noqa: ARG002
+        """Whether all its cuts square to an axis are the same: never, as cuts are polygons and it is round."""
+        return False
+
+    def levels_mm(self) -> set[float]:
+        """Heights of its level faces, edges and ends [mm]."""
+        return {round(z, 9) for z in (*self.span("z"), *(z for _, z in self.outline))}
+
+    def cut(self, axis: str, at_mm: float) -> list[Outline]:
+        """Outlines in which the plane ``axis = at_mm`` cuts it, in ``PLANE[axis]``, to ``CHORD_MM`` [mm].
+
+        A ring is cut in halves, as outlines have no holes.
+        """
+        if axis == "z":
+            rings = self._radii(at_mm)
+            return [_moved(o, self.x_mm, self.y_mm) for ring in zip(rings[::2], rings[1::2], strict=True)
+                    for o in _ring(*ring)]  # fmt: skip
+        away, along = (self.x_mm, self.y_mm) if axis == "x" else (self.y_mm, self.x_mm)
+        halves = _beside_axis(self.outline, self.bulges, rounded(abs(at_mm - away)))
+        return [_moved(outline, along, 0.0) for outline in halves]
+
+    def profile(self, chord_mm: float) -> list[Point]:
+        """Corners of the profile, with those of chords at most ``chord_mm`` from its arcs [mm]."""
+        found = []
+        for edge in self._edges():
+            short = [edge]
+            while edge.centre and _off_chord(short[0].middle(), short[0].start, short[0].end) > chord_mm:
+                short = [half for whole in short for half in whole.halves()]
+            found += [part.start for part in short]
+        return found
+
+    def turned_over(self, size_mm: Place) -> "Revolved":
+        """It in a box of some size that is turned by half a turn about x."""
+        outline = tuple((r, rounded(size_mm[2] - z)) for r, z in self.outline)
+        return Revolved(self.x_mm, rounded(size_mm[1] - self.y_mm), outline, tuple(-bulge for bulge in self.bulges))
+
+    def stretched(self, factor: float) -> "Revolved":
+        """It scaled in x and y; arcs become short ones through the ellipse's points, exact to 1e-5 of the stretch."""
+        outline, bulges = [], []
+        for edge, straight in ((e, e.centre is None) for e in self._edges()):
+            short = [edge]
+            while not straight and len(short) < pi / 2 / _ARC:
+                short = [half for whole in short for half in whole.halves()]
+            for part in short:
+                a, b = ((r * factor, z) for r, z in (part.start, part.end))
+                middle = part.middle()
+                outline.append((rounded(a[0]), rounded(a[1])))
+                bulges.append(0.0 if straight else _bulge(a, (middle[0] * factor, middle[1]), b))
+        return Revolved(rounded(self.x_mm * factor), rounded(self.y_mm * factor), tuple(outline), tuple(bulges))
+
+    def _edges(self) -> tuple[_Edge, ...]:
+        return _edges(self.outline, self.bulges)
+
+    def _area_mm2(self) -> float:
+        """Signed area of the profile, arcs included."""
+        segments = 0.0
+        for a, b, bulge in zip(self.outline, self.outline[1:] + self.outline[:1], self.bulges, strict=True):
+            if bulge:
+                turn = 4 * atan(bulge)
+                radius = hypot(b[0] - a[0], b[1] - a[1]) / 2 / sin(turn / 2)
+                segments += radius * radius * (turn - sin(turn)) / 2
+        return (area_mm2(self.outline) if self.outline else 0.0) + segments
+
+    def _radii(self, z_mm: float) -> list[float]:
+        """Radii at which a level plane enters and leaves it, from the axis outwards."""
+        return sorted(e.at_height(z_mm) for e in self._edges() if (e.start[1] <= z_mm) != (e.end[1] <= z_mm))
+
+
+def _bulge(a: Point, between: Point, b: Point) -> float:
+    """Bulge of the arc from a point to another one through a third."""
+    (ua, va), (ub, vb) = ((p[0] - between[0], p[1] - between[1]) for p in (a, b))
+    return tan((pi - atan2(abs(ua * vb - ub * va), ua * ub + va * vb)) / 2) * (1.0 if ua * vb - ub * va < 0 else -1.0)
+
+
+def _moved(outline: Outline, u_mm: float, v_mm: float) -> Outline:
+    return tuple((rounded(u + u_mm), rounded(v + v_mm)) for u, v in outline)
+
+
+@lru_cache(maxsize=256)
+def _ring(inner_mm: float, outer_mm: float) -> tuple[Outline, ...]:
+    """Outlines of a disc, or of a ring in halves, about the origin; corners on the circles and on both axes."""
+    if outer_mm - inner_mm < SLIVER_MM:
+        return ()
+    if inner_mm < SLIVER_MM:
+        return (_arc(outer_mm, 4)[:-1],)
+    half = (*_arc(outer_mm, 2), *_arc(inner_mm, 2)[::-1])
+    return half, tuple((-x, -y) for x, y in half)
+
+
+def _arc(radius_mm: float, quarters: int) -> Outline:
+    """Corners on a circle about the origin, from its rightmost point on."""
+    each = max(ceil(pi / 4 / acos(max(1 - CHORD_MM / radius_mm, 0.0))), 2)
+    quarter = [(radius_mm * cos(k * pi / 2 / each), radius_mm * sin(k * pi / 2 / each)) for k in range(each)]
+    quarter[0] = (radius_mm, 0.0)
+    turns = ((1, 0, 0, 1), (0, -1, 1, 0), (-1, 0, 0, -1), (0, 1, -1, 0))
+    arcs = [(c * x + d * y, e * x + f * y) for c, d, e, f in turns[:quarters] for x, y in quarter]
+    c, d, e, f = turns[quarters % 4]
+    return (*arcs, (c * radius_mm + d * 0.0, e * radius_mm + f * 0.0))
+
+
+@lru_cache(maxsize=64)
+def _beside_axis(outline: Outline, bulges: tuple[float, ...], away_mm: float) -> tuple[Outline, ...]:
+    """Outlines of the upright cut at some distance from the axis, in (along, z), the axis at 0 [mm]."""
+    chains = _chains(_edges(outline, bulges), away_mm)
+    if len(chains) == 1 and chains[0][0][0] > 0:  # all of the profile lies further out
+        loop = chains[0]
+        return tuple(loop[:-1]), tuple((-u, z) for u, z in reversed(loop[:-1]))
+    ends = sorted((z, k, last) for k, chain in enumerate(chains) for last, (_, z) in enumerate((chain[0], chain[-1])))
+    partner = {
+        a[1:]: b[1:] for one, two in zip(ends[::2], ends[1::2], strict=True) for a, b in ((one, two), (two, one))
+    }
+    found, left = [], set(range(len(chains)))
+    while left:
+        k = first = min(left)
+        loop, passes = [], 0
+        while passes == 0 or k != first:
+            left.discard(k)
+            loop += chains[k]
+            passes += 1
+            k = partner[k, 1][0]
+        if passes == 1 and abs(loop[0][1] - loop[-1][1]) > SLIVER_MM:  # both halves share one edge: they are one
+            found.append((*loop, *((-u, z) for u, z in reversed(loop[1:-1]))))
+        else:
+            found += [tuple(loop), tuple((-u, z) for u, z in reversed(loop))]
+    smooth = map(without_straight, found)
+    return tuple(o for o in smooth if len(o) > 2 and area_mm2(o) > SLIVER_MM**2)
+
+
+def _chains(edges: Sequence[_Edge], away_mm: float) -> list[list[Point]]:
+    """Runs of a profile's edges beyond some radius, as the upright cut at that distance shows them, to ``CHORD_MM``."""
+    runs: list[list[_Edge]] = []
+    inside = False
+    start = next((k for k, e in enumerate(edges) if e.start[0] <= away_mm), 0)
+    for edge in (*edges[start:], *edges[:start]):
+        a, b, centre = edge
+        if a[0] > away_mm or b[0] > away_mm:
+            low = (away_mm, edge.at_radius(away_mm)) if min(a[0], b[0]) <= away_mm else None
+            part = _Edge(low if low and a[0] <= away_mm else a, low if low and b[0] <= away_mm else b, centre)
+            if inside:
+                runs[-1].append(part)
+            else:
+                runs.append([part])
+        inside = b[0] > away_mm
+    found = []
+    for run in runs:
+        points = [_shown(run[0].start, away_mm)]
+        for edge in run:
+            todo = [edge] if edge.centre is None else [h for half in edge.halves() for h in half.halves()]
+            todo.reverse()
+            while todo:
+                part = todo.pop()
+                a, middle, b = (_shown(p, away_mm) for p in (part.start, part.middle(), part.end))
+                if _off_chord(middle, a, b) > 0.7 * CHORD_MM:  # the middle is not where a chord is furthest off
+                    todo += part.halves()[::-1]
+                else:
+                    points.append(b)
+        found.append(points)
+    return found
+
+
+def _shown(point: Point, away_mm: float) -> Point:
+    return sqrt(max((point[0] - away_mm) * (point[0] + away_mm), 0.0)), point[1]
+
+
+def _off_chord(point: Point, a: Point, b: Point) -> float:
+    """Distance of a point from a straight line between two others."""
+    du, dv = b[0] - a[0], b[1] - a[1]
+    length = hypot(du, dv)
+    if length == 0:
+        return hypot(point[0] - a[0], point[1] - a[1])
+    return abs((point[0] - a[0]) * dv - (point[1] - a[1]) * du) / length

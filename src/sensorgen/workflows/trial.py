@@ -1,0 +1,260 @@
+"""One design tried: findings, verdict, and the numbers that decide, drawn beside printed."""
+
+import json
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import ClassVar
+
+from sensorgen.checks.review import review
+from sensorgen.core.bounds import Bounds
+from sensorgen.core.display import Displayed
+from sensorgen.core.document import Column, Part, Table
+from sensorgen.core.findings import Finding, Verdict, counted, counts, listed, most_severe, verdict
+from sensorgen.design.body import Body
+from sensorgen.design.design import Design
+from sensorgen.design.walls import rule
+from sensorgen.export import slicing
+from sensorgen.export.gcode.drags import OfTool
+from sensorgen.export.gcode.report import report
+from sensorgen.export.slicers import SLICERS
+from sensorgen.prediction import bodies
+from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.query import DEFAULT, Query
+from sensorgen.prediction.results import Prediction
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """The numbers of a body; None where one is unknown or undefined.
+
+    Attributes
+    ----------
+    gap : Bounds or None
+        Smallest distance of the electrodes [m].
+    capacitance : Bounds or None
+        Between the electrodes, at rest [F].
+    top_electrode, bottom_electrode : Bounds or None
+        Resistance end to end [ohm].
+    sensitivity : Bounds or None
+        Relative change of capacitance per pressure, over the range of the query [1/kPa].
+    force_resolution, position_resolution : Bounds or None
+        Standard errors from one reading at the reference load, of a sensor that is exactly as predicted [N], [m].
+    force_calibrated, position_calibrated : float or None
+        The same after 30 known presses of a specimen, the best value alone [N], [m].
+    force_typical, position_typical : float or None
+        Median of the standard errors over all forces and positions [N], [m].
+    """
+
+    gap: Bounds | None = None
+    capacitance: Bounds | None = None
+    top_electrode: Bounds | None = None
+    bottom_electrode: Bounds | None = None
+    sensitivity: Bounds | None = None
+    force_resolution: Bounds | None = None
+    position_resolution: Bounds | None = None
+    force_calibrated: float | None = None
+    position_calibrated: float | None = None
+    force_typical: float | None = None
+    position_typical: float | None = None
+
+    @classmethod
+    def of(cls, found: Prediction) -> "Numbers":
+        """The numbers of a prediction."""
+        known = found.identifiability
+        bench = known.calibrated if known else None
+        return cls(
+            found.gap, found.capacitance, found.resistance.get("top"), found.resistance.get("bottom"),
+            found.sensitivity, found.force_resolution, found.position_resolution,
+            bench.sigma_force_n if bench else None, bench.sigma_position_m if bench else None,
+            known.map.of_force.median if known else None, known.map.of_position.median if known else None,
+        )  # fmt: skip
+
+
+UNITS = {"force_calibrated": "N", "position_calibrated": "m", "force_typical": "N", "position_typical": "m"}
+
+
+@dataclass(frozen=True)
+class Toolpath:
+    """What a G-code file takes, and how it exposes the film to shorts.
+
+    Attributes
+    ----------
+    source : str
+        Slicer and version.
+    time_s : float
+        At the file's feeds, without acceleration, heating and tool changes: a lower bound [s].
+    exposure_mm : float
+        Way that nozzles go in contact with what another tool has printed, travelling or printing beside it [mm].
+    crossings : int
+        Travels over it, in contact or near, that are longer than 0.5 mm [-].
+    """
+
+    source: str
+    time_s: float
+    exposure_mm: float
+    crossings: int
+
+    @classmethod
+    def of(cls, source: str, time_s: float, tools: Iterable[OfTool]) -> "Toolpath":
+        """By what each tool passes over."""
+        each = tuple(tools)
+        touching = sum(tool.contact_mm + tool.rubbing_mm for tool in each)
+        return cls(source, time_s, touching, sum(tool.crossings for tool in each))
+
+
+@dataclass(frozen=True)
+class Trial(Displayed):
+    """One design tried.
+
+    Attributes
+    ----------
+    name, design : str
+        Name and identity of the design.
+    body : str
+        How it is printed, in words.
+    status, reason : str
+        As of :class:`sensorgen.prediction.results.Prediction`, of the print.
+    verdict : str
+        CHANGE where a finding is an error, PRINT WITH WARNINGS, or PRINT.
+    findings : tuple of Finding
+        Of the drawing and of the print, those left out that the design waives.
+    force_n, position_m : float
+        The reference load [N], [m].
+    drawn, printed : Numbers
+        Of the drawing, and of the print.
+    doubts : tuple of str
+        Why the print's numbers may be wrong by more than their ranges say.
+    toolpath : Toolpath or None
+        Of the G-code; None for an estimate.
+    """
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
+
+    name: str
+    design: str
+    body: str
+    status: str
+    reason: str
+    verdict: Verdict
+    findings: tuple[Finding, ...]
+    force_n: float
+    position_m: float
+    drawn: Numbers
+    printed: Numbers
+    doubts: tuple[str, ...] = ()
+    toolpath: Toolpath | None = None
+
+    def errors(self) -> tuple[Finding, ...]:
+        """Findings that are errors."""
+        return tuple(f for f in self.findings if f.severity == "error")
+
+    def document(self) -> Iterator[Part]:
+        """Verdict, numbers drawn beside printed, doubts, and the findings that matter most."""
+        yield f"{self.verdict}  {self.name}: {counted(counts(self.findings))}"
+        yield ""
+        rows = (
+            (f.name.replace("_", " "), *(_shown(f.name, getattr(n, f.name)) for n in (self.drawn, self.printed)))
+            for f in fields(Numbers)
+        )  # fmt: skip
+        yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
+        yield f"(at {self.force_n:g} N and {self.position_m * 1e3:g} mm; {self.body})"
+        if self.reason:
+            yield self.reason
+        if self.toolpath:
+            path = self.toolpath
+            yield (
+                f"print time {path.time_s / 60:.0f} min at least; nozzles touch another material over "
+                f"{path.exposure_mm:.0f} mm, {path.crossings} crossings"
+            )
+        yield from (f"doubtful: {doubt}" for doubt in self.doubts)
+        yield from listed(most_severe(self.findings, 3))
+
+
+def _shown(name: str, value: Bounds | float | None) -> str:
+    if isinstance(value, float):
+        value = Bounds.of(value, UNITS[name])
+    return value.words() if value else "–"
+
+
+def trial(
+    design: Design, query: Query = DEFAULT, *, folder: Path | None = None, slicer: str = "", keep: bool = True
+) -> Trial:
+    """Check a design, and predict its drawing and its print.
+
+    Parameters
+    ----------
+    design : Design
+        What is tried.
+    query : Query
+        Reference load, tip, frequencies, range of the sensitivity.
+    folder : Path, optional
+        With the design's files: the print is that of its G-code there, else estimated; ``out/NAME`` if not given.
+    slicer : str
+        Slice now, by ``prusa`` or ``cura``; "" for what ``folder`` has.
+    keep : bool
+        Read stored predictions and store new ones.
+
+    Raises
+    ------
+    SensorgenError
+        A name or value of the design is missing, or a query that no sensor can answer; a slicer that fails.
+
+    Examples
+    --------
+    >>> tried = trial(Design(shape="reference", name="plate"))
+    >>> tried.verdict, tried.printed.capacitance.unit
+    ('PRINT', 'F')
+    """
+    walls = rule(slicer, design.walls) if slicer in SLICERS else ""
+    held = review(design, walls=walls)
+    if slicer:
+        body, path, of_print = _sliced(design, slicer)
+        found = [*held.sliced().findings, *of_print]
+    else:
+        (body, path), found = _at_hand(design, folder), held.findings
+    predicted = evaluate(body, query, keep=keep)
+    findings = tuple(f for f in with_print(found, predicted) if not f.waiver)
+    drawn, printed = predicted.drawn or predicted, predicted
+    return Trial(
+        design.name, design.id(), body.provenance, printed.status, printed.reason, verdict(findings), findings,
+        printed.force_n, printed.position_m, Numbers.of(drawn), Numbers.of(printed), printed.doubts, path,
+    )  # fmt: skip
+
+
+def with_print(found: Sequence[Finding], predicted: Prediction) -> tuple[Finding, ...]:
+    """Findings about the drawing, and an error where its print is a short."""
+    if predicted.status != "short" or any(f.rule == "1-short" for f in found):
+        return tuple(found)
+    what = f"as {predicted.body}: {predicted.reason}"
+    advice = "widen narrow parts to a line, or draw the electrodes further apart"
+    return (Finding("1-short", "error", "sensor", what, advice, 0.0), *found)
+
+
+def _at_hand(design: Design, folder: Path | None) -> tuple[Body, Toolpath | None]:
+    """The print by the G-code in a folder, with its record; else the estimate."""
+    body, file = bodies.default_body(design, folder), bodies.toolpath(design, folder)
+    if file is None:
+        return body, None
+    made = json.loads(file.with_name(f"{file.name}.json").read_text("utf-8"))
+    try:
+        tools = [OfTool(**tool) for tool in made["lifting"]["after"]["tools"]]
+        source = f"{made['slicer']['name']} {made['slicer']['version']}"
+        return body, Toolpath.of(source, float(made["time_s"]), tools)
+    except (KeyError, TypeError, ValueError):  # of an older version
+        return body, None
+
+
+def _sliced(design: Design, slicer: str) -> tuple[Body, Toolpath, list[Finding]]:
+    """The print by a real slicer, as ``sensorgen slice`` makes it, and the findings about it."""
+    from sensorgen.asprinted.printed import body
+
+    with tempfile.TemporaryDirectory() as stage:
+        made = slicing.sliced([slicing.alone(design)], slicer, Path(stage))
+        content = made.ready.read_bytes()
+    source = f"{made.slicer} {made.version}"
+    print_ = body(design, made.lines, slicer=source)
+    time_s = report(made.lifted.motion, design.machine).time_s
+    path = Toolpath.of(source, time_s, made.lifted.lifting.after.tools)
+    return bodies.sliced(design, lambda: print_, source, content), path, [*made.findings, *print_.findings()]
