@@ -72,9 +72,7 @@ def test_the_table_of_misprints():
     text = (Path(__file__).parents[2] / "bench" / "results" / "line.md").read_text("utf-8")
     rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in text.splitlines() if row.startswith("| B.")]
     rows = [row for row in rows if ".." in row[-1]]
-    assert [(row[0], float(row[1])) for row in rows] == [
-        (p, f) for p in line_closed.PRINTED for f in TONES
-    ]
+    assert [(row[0], float(row[1])) for row in rows] == [(p, f) for p in line_closed.PRINTED for f in TONES]
     places = {"force_n": np.linspace(0, 6, 5)[:, None], "left_m": np.linspace(0, 0.09, 5)}
     for printed, hertz, *spans in rows:
         inputs = PLATE | places | {"frequency_hz": float(hertz)}

@@ -10,7 +10,7 @@ from functools import lru_cache
 from math import exp, log, pi
 
 import numpy as np
-from scipy.interpolate import RegularGridInterpolator
+from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import spsolve
 from sensorgen.analysis.characterise import catalogue
@@ -50,7 +50,7 @@ def hidden(rng, names):
         exp(rng.uniform(log(3e-5), log(5e-4))), rng.uniform(3.2, 7.5), float(np.clip(rng.normal(5e-6, 1e-5), -1.2e-5, 4e-5)),
         exp(rng.uniform(log(8e6), log(4e7))), exp(rng.uniform(log(8e5), log(1e7))),
         exp(rng.uniform(log(2e-3), log(0.1))), exp(rng.uniform(log(2e-3), log(0.1))),
-        rng.uniform(0.0, 0.1), rng.uniform(0.9, 1.0), str(rng.choice(names)),
+        rng.uniform(1e-3, 0.1), rng.uniform(0.9, 1.0), str(rng.choice(names)),
     )  # fmt: skip
 
 
@@ -60,27 +60,90 @@ SHARES, FLOWS = np.log([0.2, 0.7, 1.6, 4.0]), np.array([0.89, 0.95, 1.01])  # co
 def resistivity(truth, degrees, width_mm):
     """Of a bar of printed lines [ohm m], between networks of a few contacts and flows."""
     share = log(truth.line_contact_ohm_m2 / (truth.bulk_ohm_m * LINE_MM * 1e-3))
-    return truth.bulk_ohm_m * exp(float(_networks(degrees, width_mm)((share, truth.flow))))
+    return truth.bulk_ohm_m * exp(float(_networks(degrees, width_mm)(share, truth.flow)[0, 0]))
 
 
 @lru_cache
 def _networks(degrees, width_mm):
     values = np.log([[network_ratio(exp(s), f, degrees, width_mm) for f in FLOWS] for s in SHARES])
-    return RegularGridInterpolator((SHARES, FLOWS), values)
+    return RectBivariateSpline(SHARES, FLOWS, values, kx=3, ky=2)
 
 
 def network_ratio(share, flow, degrees, width_mm):
     """Resistivity of a bar over that of its material; None for walls and crossed layers, as profiles have them [-]."""
-    if degrees is None:
-        lines = lines_of(16.0, width_mm, LINE_MM, LAYER_MM, [45.0, 135.0])
-    else:
-        lines = lines_of(30.0, width_mm, LINE_MM, LAYER_MM, [degrees], walls=0)
-    layers = int(lines.layer.max()) + 1
+    if degrees is not None:
+        return aligned_ratio(share, flow, degrees, width_mm)
+    lines = lines_of(16.0, width_mm, LINE_MM, LAYER_MM, [45.0, 135.0])
     thin = Lines(lines.start_m, lines.end_m, lines.width_m * flow, lines.height_m, lines.layer, lines.joined)
-    outside = int(width_mm / LINE_MM) * LINE_MM if degrees == 0 else width_mm
-    area = outside * 1e-3 * LAYER_MM * 1e-3 * layers
-    end = 5e-3 if degrees is None else 10e-3
-    return traxels.resistance(thin, 1.0, share * LINE_MM * 1e-3, (-end, end), area).ratio
+    area = width_mm * 1e-3 * LAYER_MM * 1e-3 * 2
+    return traxels.resistance(thin, 1.0, share * LINE_MM * 1e-3, (-5e-3, 5e-3), area).ratio
+
+
+def aligned_ratio(share, flow, degrees, width_mm, per_line=4, corner=0.5):
+    """Resistivity of one layer of parallel lines over the material's: a grid of nodes on every line, and the turns.
+
+    Neighbouring lines are joined at alternating ends, as infill is laid to and fro; at the other end they touch over
+    ``corner`` of a line's width more than their middles are long. From bars of two lengths, so that ends do not count.
+    """
+    longer, shorter = (_bar_ohm(share, flow, degrees, width_mm, per_line, corner, pitches) for pitches in (50, 20))
+    outside = int(width_mm / LINE_MM) * LINE_MM if not degrees else width_mm
+    return (longer - shorter) * outside * LAYER_MM / (30 * LINE_MM)
+
+
+def _bar_ohm(share, flow, degrees, width_mm, per_line, corner, pitches):
+    """A layer of a bar between ends of one potential, some pitches apart."""
+    p, angle = LINE_MM, np.radians(degrees)
+    step = p / per_line
+    along, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    half = np.array([(pitches + 12) * p, width_mm]) / 2
+    inner = half - np.array([0.0, p / 2])
+    count = int(np.abs(across) @ half / p) if degrees else int(width_mm / p / 2)
+    offsets = (
+        (np.arange(2 * count + 1) - count) * p
+        if degrees
+        else (np.arange(int(width_mm / p)) - (int(width_mm / p) - 1) / 2) * p
+    )
+    nodes, where, ends = {}, [], []
+    for n, off in enumerate(offsets):
+        with np.errstate(divide="ignore"):
+            cuts = [(s * inner - off * across) / along for s in (-1, 1)]
+        lows, highs = np.minimum(*cuts), np.maximum(*cuts)
+        keep = np.abs(along) > 1e-9
+        low, high = lows[keep].max(), highs[keep].min()
+        first, last = int(np.ceil(low / step)), int(np.floor(high / step))
+        if last - first < 2 or (abs(along[1]) < 1e-9 and abs(off) > inner[1] + 1e-9):
+            continue
+        for j in range(first, last + 1):
+            nodes[n, j] = len(where)
+            where.append(off * across + j * step * along)
+        ends.append((n, first, last))
+    where = np.array(where)
+    area = p * flow * LAYER_MM  # of a line [mm2], of resistivity 1
+    rows, cols, values = [], [], []
+
+    def join(a, b, g):
+        rows.extend([a, b, a, b]), cols.extend([a, b, b, a]), values.extend([g, g, -g, -g])
+
+    contact = LAYER_MM * step / (p * (1 + share))
+    for (n, j), a in nodes.items():
+        if (n, j + 1) in nodes:
+            join(a, nodes[n, j + 1], area / step)
+        if (n + 1, j) in nodes:  # half of it at an end of what both lines have
+            inside = {(m, j + d) in nodes for m in (n, n + 1) for d in (-1, 1)} == {True}
+            join(a, nodes[n + 1, j], contact if inside else contact / 2)
+    sides = {n: (first, last) for n, first, last in ends}
+    for n, span in sides.items():
+        if n + 1 in sides and degrees:
+            k = n % 2
+            join(nodes[n, span[k]], nodes[n + 1, sides[n + 1][k]], area / p)
+            join(nodes[n, span[1 - k]], nodes[n + 1, sides[n + 1][1 - k]], contact * per_line * corner)
+    size = len(where)
+    matrix = csr_array((values, (rows, cols)), shape=(size, size)).tocsr()
+    x, reach = where[:, 0], pitches * p / 2
+    u = np.where(x > 0, 1.0, 0.0)
+    free = np.flatnonzero(np.abs(x) < reach - 1e-6)
+    u[free] = spsolve(matrix[free][:, free].tocsc(), -(matrix @ np.where(np.abs(x) < reach - 1e-6, 0.0, u))[free])
+    return 1.0 / float(u @ (matrix @ u))
 
 
 def ladder_ohm(along, through, contact, gap_mm, width_mm, height_mm):
@@ -244,9 +307,10 @@ def _true(coupon, actual, truth, rng):
     if coupon.kind == "bar":
         rho = resistivity(truth, coupon.degrees, coupon.drawn("width_mm"))
         taps = coupon.drawn("taps_mm") + rng.normal(0, 0.15)
-        return [rho * taps / (actual["width_mm"] * actual["height_mm"]) * 1e3 * fill]
+        edge = 1 + rng.uniform(-0.5, 0.5) * LINE_MM / coupon.drawn("width_mm") * (coupon.degrees == 90)
+        return [rho * taps / (actual["width_mm"] * actual["height_mm"]) * 1e3 * fill * edge]
     if coupon.kind == "ladder":
-        along = resistivity(truth, 0.0, coupon.drawn("width_mm")) * fill
+        along = resistivity(truth, coupon.degrees, coupon.drawn("width_mm")) * fill
         strips = truth.terminal_ohm_m2 * np.exp(rng.normal(0, 0.05, len(catalogue.LADDER_MM) + 1))
         return [
             ladder_ohm(along, truth.through_ohm_m, strips[k : k + 2], gap, actual["width_mm"], actual["height_mm"])
@@ -267,7 +331,8 @@ def _true(coupon, actual, truth, rng):
     e, q = getattr(truth, f"{role}_pa"), getattr(truth, f"{role}_1_2nu")
     a, h = actual["diameter_mm"] / 2, actual["height_mm"]
     area = pi * a**2 * 1e-6 * fill
-    slides = e * (1 + truth.friction * 2 * a / (3 * h))
+    rise = 2 * truth.friction * a / h  # of the pressure from rim to middle, by equilibrium of a slab
+    slides = e * 2 * (exp(rise) - rise - 1) / rise**2
     sticks = e * bonded(coupon.drawn("diameter_mm") / 2, coupon.drawn("height_mm"), q)
     pressed = [m * area / (h * 1e-3) * (1 + rng.normal(0, 0.01)) for m in (slides, sticks)]
     if role == "dielectric":

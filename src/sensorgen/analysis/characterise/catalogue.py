@@ -23,7 +23,7 @@ PAD_MM = 8.0  # of the lower electrode, for a probe
 _STRAIN = 0.04  # that the proposed load makes
 _MOST_N = 100.0  # of a usual stand
 _FILL = 0.015  # coupons of one plate differ in how well they are filled [-]
-_TAPS_MM, _WIDTH_MM, _SENSOR_MM = 40.0, 6.0, 10.0  # of bars; the last is wide as a sensor
+_TAPS_MM, _WIDTH_MM, _SENSOR_MM = 40.0, 6.0, 10.0  # between taps; width of ladders, and of bars, wide as sensors
 
 Values = Mapping[str, Real]  # of unknowns in SI, or of sizes [mm]
 
@@ -212,7 +212,7 @@ def unknowns(conductor: Material, dielectric: Material, line_mm: float) -> tuple
         Unknown("dielectric_pa", *_range(dielectric, "youngs_modulus_pa", 5e5, 5e7)),
         Unknown("conductor_1_2nu", log(0.01), 1.5),
         Unknown("dielectric_1_2nu", log(0.01), 1.5),
-        Unknown("friction", 0.1, 0.07, linear=True),  # share of a bonded face's effect that a lubricated one has
+        Unknown("friction", 0.05, 0.04, linear=True),  # coefficient of lubricated plates
     )
 
 
@@ -280,19 +280,23 @@ def _millimetres(key: str, drawn: float) -> Size:
 
 
 def _bar(material: str, degrees: float | None, height: float, line_m: float) -> Coupon:
-    length, width = _TAPS_MM, _SENSOR_MM if degrees is None else _WIDTH_MM
+    length, width = _TAPS_MM, _SENSOR_MM
 
     def expected(values: Values, sizes: Values) -> tuple[Real, ...]:
         along = values["along_ohm_m"] if degrees is not None else _crossed_ohm_m(values, line_m)
         across = across_ohm_m(values, line_m) if degrees is not None else along
         of = [sizes[key] * M_PER_MM for key in ("taps_mm", "width_mm", "height_mm")]
-        return (closed.bar_resistance(along, across, degrees or 0.0, of[0], of[1], of[2]) * sizes["fill"],)
+        if degrees == 90:
+            across = closed.to_and_fro_resistivity(along, across, line_m, of[1])
+        return (
+            closed.bar_resistance(along, across, degrees or 0.0, of[0], of[1], of[2]) * sizes["fill"] * sizes["edge"],
+        )
 
     name = f"bar-{'print' if degrees is None else f'{degrees:g}'}-{height:g}"
-    turned = {45.0: (52.0, 52.0), 90.0: (width + 4.0, 60.0)}.get(degrees or 0.0, (60.0, width + 4.0))
+    turned = {45.0: (54.0, 54.0), 90.0: (width + 4.0, 60.0)}.get(degrees or 0.0, (60.0, width + 4.0))
     return Coupon(
         name, "bar", material,
-        (_millimetres("width_mm", width), _millimetres("height_mm", height), Size("taps_mm", length, 0.2),
+        (_millimetres("width_mm", width), _millimetres("height_mm", height), Size("taps_mm", length, 0.2), Size("edge", 1.0, 0.012 if degrees else 0.005),
          Size("fill", 1.0, _FILL)),
         (Reading("resistance_ohm", "resistance", f"four-wire, between the side taps {length:g} mm apart, DC"),),
         expected, 60 * width * height + 16 * height, turned, degrees,
@@ -387,11 +391,10 @@ def _disc(material: Material, role: str, diameter: float, height: float) -> Coup
 
     def expected(values: Values, sizes: Values) -> tuple[Real, ...]:
         a, h = sizes["diameter_mm"] * M_PER_MM / 2, sizes["height_mm"] * M_PER_MM
-        of = values[f"{role}_pa"], values[f"{role}_1_2nu"], a, h
-        area = pi * a**2 / h * sizes["fill"]
+        e, area = values[f"{role}_pa"], pi * a**2 / h * sizes["fill"]
         pressed = (
-            closed.disc_modulus(*of, bonded=values["friction"]) * area,
-            closed.disc_modulus(*of) * area * sizes["bonded"],
+            closed.sliding_modulus(e, values["friction"], 2 * a, h) * area,
+            closed.bonded_modulus(e, values[f"{role}_1_2nu"], a, h) * area * sizes["bonded"],
         )
         if not conducts:
             return pressed
@@ -400,11 +403,8 @@ def _disc(material: Material, role: str, diameter: float, height: float) -> Coup
 
     centre, _ = _range(material, "youngs_modulus_pa", 1e6, 1e8)
     a, h = diameter / 2 * M_PER_MM, height * M_PER_MM
-    # Usual load, of a twentieth of its height
-    loads = [
-        min(_MOST_N, float(f"{_STRAIN * pi * a**2 * float(closed.disc_modulus(np.exp(centre), 0.01, a, h, b)):.2g}"))
-        for b in (0.0, 1.0)
-    ]
+    usual = (np.exp(centre), float(closed.bonded_modulus(np.exp(centre), 0.01, a, h)))
+    loads = [min(_MOST_N, float(f"{_STRAIN * pi * a**2 * modulus:.2g}")) for modulus in usual]
     return Coupon(
         f"disc-{material.name}-{diameter:g}x{height:g}", "disc", material.name,
         (_millimetres("diameter_mm", diameter), _millimetres("height_mm", height), Size("fill", 1.0, _FILL),

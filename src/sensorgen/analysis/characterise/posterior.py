@@ -17,7 +17,7 @@ from sensorgen.core.arrays import Mask, Real
 DEAD = 0.05  # of coupons, before anything is read
 _DECADES = 6.0  # within which the reading of a dead coupon lies
 _STEP, _STEPS = 1e-4, 40
-_STILL = 1e-3  # in standard deviations: the last step
+_STILL = 0.02  # in standard deviations: the last step
 
 
 @dataclass(frozen=True)

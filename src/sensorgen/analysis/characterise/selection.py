@@ -120,31 +120,58 @@ def select(found: Candidates, count: int, fits: Fits) -> tuple[int, ...]:
 
     Notes
     -----
-    Coupons are added while there is room, each the best one; then one is exchanged for another, removed or added, and
-    two for two, as long as that is better (Fedorov's exchange). The optimum of such steps, not proved to be the
-    largest: equal to the search through all sets on small catalogues.
+    Coupons are added while there is room, each the best one; then one is exchanged for another, removed or added, or two
+    for others of their kinds, as long as that is better (Fedorov's exchange). The optimum of such steps, not proved to
+    be the largest: equal to the search through all sets on small catalogues.
     """
-    every = range(len(found.coupons))
     chosen: tuple[int, ...] = ()
     while True:
-        best = max(_neighbours(chosen, every, count), key=lambda s: _if_fits(found, s, fits))
-        if _if_fits(found, best, fits) <= (found.worth(chosen) if chosen else -np.inf) + _GAIN:
+        least = found.worth(chosen) + _GAIN if chosen else -np.inf
+        better = next(
+            (
+                s
+                for step in (_one_step, _two_steps)
+                for s in _ranked(found, step(found, chosen, count), least)
+                if fits(s)
+            ),
+            None,
+        )
+        if better is None:
             break
-        chosen = best
+        chosen = better
     if not chosen:
         raise OutOfRange("no coupon fits on the plate within the print time; allow more hours, or a larger bed")
     return chosen
 
 
-def _if_fits(found: Candidates, chosen: tuple[int, ...], fits: Fits) -> float:
-    return found.worth(chosen) if chosen and fits(chosen) else -np.inf
+def _ranked(found: Candidates, sets: set[tuple[int, ...]], least: float) -> list[tuple[int, ...]]:
+    """Sets that are worth more than ``least``, the best first."""
+    worth = {s: found.worth(s) for s in sorted(sets) if s and all(s.count(k) <= COPIES for k in s)}
+    return sorted((s for s, value in worth.items() if value > least), key=lambda s: -worth[s])
 
 
-def _neighbours(chosen: tuple[int, ...], every: range, count: int) -> set[tuple[int, ...]]:
-    """Sets one step away: one coupon more, less, or another one; () alone where none is."""
+def _one_step(found: Candidates, chosen: tuple[int, ...], count: int) -> set[tuple[int, ...]]:
+    """One coupon more, less, or another one."""
+    every = range(len(found.coupons))
     steps = {tuple(sorted((*chosen, k))) for k in every} if len(chosen) < count else set()
-    for out in set(chosen):
+    for left in _without_one(chosen):
+        steps |= {tuple(sorted((*left, k))) for k in every} | {left}
+    return steps
+
+
+def _two_steps(found: Candidates, chosen: tuple[int, ...], _: int) -> set[tuple[int, ...]]:
+    """Two coupons for others of their kinds."""
+    kinds = [(coupon.kind, coupon.material) for coupon in found.coupons]
+    alike = {k: [j for j, kind in enumerate(kinds) if kind == kinds[k]] for k in chosen}
+    pairs = {(i, j) for n, i in enumerate(chosen) for j in chosen[n + 1 :]}
+    steps = set()
+    for i, j in pairs:
         left = list(chosen)
-        left.remove(out)
-        steps |= {tuple(sorted((*left, k))) for k in every} | {tuple(left)}
-    return {s for s in steps if all(s.count(k) <= COPIES for k in s)} or {()}
+        left.remove(i)
+        left.remove(j)
+        steps |= {tuple(sorted((*left, a, b))) for a in alike[i] for b in alike[j]}
+    return steps
+
+
+def _without_one(chosen: tuple[int, ...]) -> set[tuple[int, ...]]:
+    return {chosen[:k] + chosen[k + 1 :] for k in range(len(chosen))}
