@@ -358,3 +358,27 @@ def true_targets(truth):
         ("conductor", "youngs_modulus_pa"): truth.conductor_pa,
         ("dielectric", "youngs_modulus_pa"): truth.dielectric_pa,
     }
+
+
+def filled(text, coupons, truth, meters, rng):
+    """A blank form with the lab's readings in it."""
+    for coupon in coupons:
+        found = measured(coupon, truth, meters, rng)
+        head, mark, rest = text.partition(f"  {coupon.name}:\n")
+        fields = {s.key: s.drawn for s in found.sizes if s.measured}
+        for reading, log_value in zip(coupon.readings, found.log_values, strict=True):
+            value = exp(log_value)
+            if reading.kind == "stiffness":  # the load that is in the form; compression by bisection
+                low, high = 0.0, 0.49 * fields["height_mm"]
+                for _ in range(80):
+                    u = (low + high) / 2
+                    ratio = 1 - u / fields["height_mm"]
+                    force = value * u * 1e-3 * (ratio**-2 + 1 / ratio + 1) / 3
+                    low, high = (low, u) if force > reading.load_n else (u, high)
+                fields[f"{reading.key}_mm"] = low
+            else:
+                fields[reading.key] = value * (1e12 if reading.kind == "capacitance" else 1.0)
+        for key, value in fields.items():
+            rest = rest.replace(f"    {key}: ~", f"    {key}: {value:.8g}", 1)
+        text = head + mark + rest
+    return text
