@@ -77,8 +77,8 @@ def test_a_new_version_of_sensorgen_changes_no_id():
 def test_a_changed_value_in_a_material_changes_the_id(monkeypatch):
     before, load = tri().id(), design.material_files.load
 
-    def changed(name, sources=()):
-        found = load(name, sources)
+    def changed(name, *rest):
+        found = load(name, *rest)
         value = found.value("density_kg_m3").model_copy(update={"value": 1.0})
         return found.model_copy(update={"properties": found.properties | {"density_kg_m3": [value]}})
 
@@ -136,7 +136,11 @@ BAD = [
     ({"shape": "tri", "shrinkage": 0.9}, BadInput, "shrinkage is 0.9; expected a number below 0.9"),
     ({"shape": "tri", "nozzle_mm": "0.4"}, BadInput, "nozzle_mm is '0.4'; expected a number"),
     ({"shape": "tri", "waivers": {"rule": "5"}}, BadInput, "expected a list"),
-    ({"shape": "tri", "materials": {"film": "air"}}, MissingValue, "no tool for air: name one with --tool air=NUMBER"),
+    (
+        {"shape": "tri", "materials": {"film": "air"}},
+        MissingValue,
+        "no tool for air on diabase-h5: name one with --tool air",
+    ),
     ({"shape": "tri", "printer": "x\0.yaml"}, BadInput, "embedded null byte"),
     ({"shape": "tri", "name": "x" * 10_000}, BadInput, "cannot be a file name everywhere"),
 ]
@@ -201,6 +205,7 @@ def cogs(monkeypatch):
         return reference.scene(reference.Params(length_mm=p.length_mm, width_mm=p.width_mm), fill)
 
     plugin, known = SimpleNamespace(Params=Cogs, scene=scene), design.shape
+    monkeypatch.setitem(design.packs.shipped_names("shapes"), "cogs", design.packs.shipped()[0])
     monkeypatch.setattr(design, "shape", lambda name: plugin if name == "cogs" else known(name))
 
 

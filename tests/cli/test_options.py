@@ -104,6 +104,7 @@ nozzle_mm: 0.25
 tools: {x60: 3}
 infill: {x60: {percent: 80, pattern: grid}}
 profile: {walls: classic}
+own: {}
 orientation: upside-down
 shrinkage: 0.02
 waivers:

@@ -8,7 +8,6 @@ from sensorgen.checks import estimate
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Part, comma_separated
 from sensorgen.core.findings import Finding, counted, counts, listed, table
-from sensorgen.design import materials
 from sensorgen.design.design import Design, fields
 from sensorgen.design.tower import tower
 from sensorgen.design.walls import rule
@@ -181,7 +180,7 @@ def draw(design: Design, held: Review, printed: Scene | None = None, source: str
         f"{design.machine.name}, {design.layers.name}, printed {design.orientation}",
         *([f"green outlines: {source}"] if source else []),
     ]
-    known = {name: (materials.load(name).title, materials.load(name).colour) for name in sorted(names)}
+    known = {name: (design.material(name).title, design.material(name).colour) for name in sorted(names)}
     return drawing.svg(
         scene, design.name, design.layers.boundaries_mm(scene.size_mm[2]), held.findings, known, notes, printed
     )

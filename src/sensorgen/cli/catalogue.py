@@ -1,24 +1,39 @@
 """What there is to choose from, and what a design file may hold."""
 
 import json
-from collections.abc import Iterator
-from dataclasses import Field, asdict, dataclass
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import Field, asdict, dataclass, fields
 from typing import Any
 
 from sensorgen import models as model_files
 from sensorgen.core import plugins as registry
 from sensorgen.core.document import Facts, Part
-from sensorgen.design import design, printer
+from sensorgen.core.errors import SensorgenError
+from sensorgen.design import design, packs, printer, shape_files
 from sensorgen.design import materials as material_files
-from sensorgen.design import shapes as shape_files
+from sensorgen.design.packs import Kind
+from sensorgen.scene.scene import Envelope
 
 
 @dataclass(frozen=True)
 class Entry:
-    """What goes by a name: in one sentence, and its parameters or values, a line each."""
+    """What goes by a name: in one sentence, its parameters or values, a line each, and where it comes from."""
 
     about: str
     values: tuple[str, ...] = ()
+    pack: str = ""
+    version: str = ""
+    where: str = ""
+    file: str = ""
+
+    @property
+    def origin(self) -> str:
+        """Where it comes from, in words; "" for what ships."""
+        if self.where in ("", "shipped"):
+            return f"pack {self.pack}" if self.pack else ""
+        version = f" {self.version}" if self.version else ""
+        return f"pack {self.pack}{version}, {self.where}: {self.file}"
 
 
 @dataclass(frozen=True)
@@ -32,22 +47,43 @@ class Catalogue:
         return json.dumps({k: asdict(v) for k, v in self.entries.items()}, indent=2, ensure_ascii=False) + "\n"
 
     def document(self) -> Iterator[Part]:
-        """Each name, then its values."""
-        wide = max(map(len, self.entries))
+        """Each name and its origin, then its values."""
+        wide = max(map(len, self.entries), default=0)
         for name, entry in self.entries.items():
-            yield Facts(((f"{name:{wide}}", entry.about),))
+            about = f"{entry.about} [{entry.origin}]" if entry.origin else entry.about
+            yield Facts(((f"{name:{wide}}", about),))
             if entry.values:
                 yield Facts(tuple(("  ", value) for value in entry.values), hang=4)
 
 
+def _of_packs(kind: Kind, entry: Callable[[packs.File], Entry]) -> Catalogue:
+    """Every file of a kind by its name; one that is damaged says so, and hides no other."""
+    found: dict[str, Entry] = {}
+    for file in packs.files(kind):
+        try:
+            made = entry(file)
+        except SensorgenError as error:
+            made = Entry(f"cannot be used: {error}")
+        version = ""
+        with suppress(SensorgenError):
+            version = file.pack.version
+        origin = Entry(made.about, made.values, file.pack.name, version, file.pack.where, str(file.path))
+        found.setdefault(file.name, origin)
+    return Catalogue(dict(sorted(found.items())))
+
+
 def shapes() -> Catalogue:
     """Shapes with their parameters."""
-    return Catalogue({
-        name: Entry(
-            _first_line(design.shape(name).__doc__), tuple(f"{k}: {_said(f)}" for k, f in design.fields(name).items())
-        )
-        for name in registry.names(shape_files)
-    })  # fmt: skip
+    return _of_packs("shapes", _shape)
+
+
+def _form(file: packs.File) -> shape_files.Shape:
+    return design.shape(file.name) if file.pack.where == "shipped" else shape_files.load(file.name, file.text())
+
+
+def _shape(file: packs.File) -> Entry:
+    module = _form(file)
+    return Entry(_first_line(module.__doc__), tuple(f"{f.name}: {_said(f)}" for f in fields(module.Params)))
 
 
 def _said(field: Field[Any]) -> str:
@@ -59,8 +95,13 @@ def _said(field: Field[Any]) -> str:
 
 def materials() -> Catalogue:
     """Materials with every value of every source."""
-    found = {name: material_files.load(name, material_files.own.names()) for name in material_files.names()}
-    return Catalogue({k: Entry(f"{m.title}: {m.about}", tuple(_values(m))) for k, m in found.items()})
+    return _of_packs("materials", _material)
+
+
+def _material(file: packs.File) -> Entry:
+    texts: material_files.Texts = {} if file.pack.where == "shipped" else {"materials": {file.name: file.text()}}
+    m = material_files.load(file.name, packs.source_names(), texts)
+    return Entry(f"{m.title}: {m.about}", tuple(_values(m)))
 
 
 def _values(material: material_files.Material) -> Iterator[str]:
@@ -73,7 +114,11 @@ def _values(material: material_files.Material) -> Iterator[str]:
 
 def printers() -> Catalogue:
     """Printers with bed, tools and nozzle."""
-    return Catalogue({name: _printer(printer.load_printer(name)) for name in printer.printer_names()})
+    return _of_packs("printers", lambda file: _printer(printer.load_printer(file.name, _text(file))))
+
+
+def _text(file: packs.File) -> str | None:
+    return None if file.pack.where == "shipped" else file.text()
 
 
 def _printer(p: printer.Printer) -> Entry:
@@ -92,10 +137,38 @@ def _printer(p: printer.Printer) -> Entry:
 
 def qualities() -> Catalogue:
     """Print qualities with their layers."""
-    found = (printer.load_quality(name) for name in printer.quality_names())
-    return Catalogue({
-        q.name: Entry(q.title, (f"layers {q.layer_mm:g} mm, first {q.first_layer_mm:g} mm",)) for q in found
-    })  # fmt: skip
+    return _of_packs("qualities", lambda file: _quality(printer.load_quality(file.name, _text(file))))
+
+
+def _quality(q: printer.Quality) -> Entry:
+    return Entry(q.title, (f"layers {q.layer_mm:g} mm, first {q.first_layer_mm:g} mm",))
+
+
+def instruments() -> Catalogue:
+    """Instruments with the source of their accuracy."""
+    from sensorgen.measure import accuracy
+
+    def entry(file: packs.File) -> Entry:
+        made = accuracy.parse(file.text(), f"{file.name}.yaml")
+        return Entry(made.name, (f"source: {made.source}",))
+
+    return _of_packs("instruments", entry)
+
+
+def all_packs() -> Catalogue:
+    """Packs with the number of files of each kind."""
+    found: dict[str, Entry] = {}
+    for pack in packs.everywhere():
+        counts = {kind: len(pack.names(kind)) for kind in packs.SINGULAR}
+        holds = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
+        if holds:
+            try:
+                about, version = pack.manifest.about or holds, pack.version
+            except SensorgenError as error:
+                about, version = f"cannot be used: {error}", ""
+            name = pack.name if pack.name not in found else f"{pack.name} ({pack.where})"
+            found[name] = Entry(about, (holds,), pack.name, version, pack.where, str(pack.folder))
+    return Catalogue(found)
 
 
 def models() -> Catalogue:
@@ -116,21 +189,23 @@ def _first_line(doc: str | None) -> str:
 def schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of the design file; the parameters depend on the shape."""
     made = design.Design.model_json_schema()
-    names = registry.names(shape_files)
-    made["properties"]["shape"] |= {"enum": names}
+    shapes = {file.name: _form(file).Params for file in packs.files("shapes")}
+    made["properties"]["shape"] |= {"anyOf": [{"enum": list(shapes)}, {"pattern": r"\.py$"}]}
+    slots = made["$defs"]["Slots"]["properties"]
+    slots["electrode"] = slots["top_electrode"] | {"description": "Both electrodes.", "default": None}
     made["properties"]["parameters"] = {"type": "object"}
     made["allOf"] = [
-        {"if": {"properties": {"shape": {"const": n}}}, "then": {"properties": {"parameters": _parameters(n)}}}
-        for n in names
+        {"if": {"properties": {"shape": {"const": n}}}, "then": {"properties": {"parameters": _parameters(p)}}}
+        for n, p in shapes.items()
     ]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made, "title": "sensorgen design"}
 
 
-def _parameters(name: str) -> dict[str, Any]:
+def _parameters(params: type[Envelope]) -> dict[str, Any]:
     return {
         "type": "object",
         "additionalProperties": False,
-        "properties": {k: _property(f) for k, f in design.fields(name).items()},
+        "properties": {f.name: _property(f) for f in fields(params)},
     }
 
 

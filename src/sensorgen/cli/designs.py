@@ -13,11 +13,12 @@ from sensorgen.cli.settings import merged, pairs, setting
 from sensorgen.cli.words import Length, OneOf, Share, completed
 from sensorgen.core import plugins as registry
 from sensorgen.core import units
-from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
+from sensorgen.core.errors import BadInput, SensorgenError, within
 from sensorgen.design import shapes
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
+    from sensorgen.design.shape_files import Shape
 
 Data = dict[str, Any]
 Work = Callable[..., int]
@@ -43,16 +44,17 @@ class DesignGroup(click.Group):
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command:  # noqa: ARG002
         """The command for a shape, or for a design file."""
-        if not _is_file(name):
+        if name in registry.names(shapes):
             return self._command(name, registry.load(shapes, name), {"shape": name})
+        if name.endswith(".py") or not _is_file(name):
+            base = _of_packs({"shape": name}, Path())
+            return self._command(base["shape"], _shape_of(base), base)
         from sensorgen.core import yamlfile
 
         base = {"name": Path(name).stem} | yamlfile.read(Path(name))
-        try:
-            module = registry.load(shapes, base["shape"]) if isinstance(base.get("shape"), str) else None
-        except UnknownName as error:
-            raise error.within(name) from None
-        return self._command(name, module, base)
+        with within(name):
+            base = _of_packs(base, Path(name).parent)
+            return self._command(name, _shape_of(base), base)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -80,30 +82,56 @@ class DesignGroup(click.Group):
                 [(name, _about(registry.load(shapes, name)).partition("\n")[0]) for name in self.list_commands(ctx)]
             )
 
-    def _command(self, name: str, module: ModuleType | None, base: Data) -> click.Command:
+    def _command(self, name: str, module: "Shape | ModuleType | None", base: Data) -> click.Command:
         def run(**given: Any) -> int:
             own = {p.name: given.pop(p.name) for p in self.own if p.name in given}
             return self.work(_design(base, given, name), **own)
 
-        params = _parameter_options(module.Params) if module else []
+        others = [*_design_options(), *self.own]
+        params = _parameter_options(module.Params, {word for other in others for word in other.opts}) if module else []
         about = _about(module)
         return click.Command(
             name,
-            params=[*params, *_design_options(), *self.own],
+            params=[*params, *others],
             callback=run,
             help=about,
             short_help=about.partition("\n")[0],
         )
 
 
-def _about(module: ModuleType | None) -> str:
+def _of_packs(base: Data, folder: Path) -> Data:
+    """A design's data with its shape's file, where that does not ship."""
+    if not isinstance(base.get("shape"), str) or base["shape"] in registry.names(shapes):
+        return base
+    from sensorgen.design import packs
+
+    found = packs.with_files({key: base[key] for key in ("shape", "own") if key in base}, folder)
+    return base | found
+
+
+def _shape_of(base: Data) -> "Shape | ModuleType | None":
+    """The shape of a design's data; None where the design is to be refused later."""
+    name = base.get("shape")
+    if not isinstance(name, str):
+        return None
+    if name in registry.names(shapes):
+        return registry.load(shapes, name)
+    from sensorgen.design import shape_files
+
+    return shape_files.load(name, base["own"]["shapes"][name])
+
+
+def _about(module: "Shape | ModuleType | None") -> str:
     """What a shape's file says of it; click leaves a picture alone that follows a backspace."""
     about = (module.__doc__ or "").strip() if module else ""
     return about.replace("\n\n::\n\n", "\n\n\b\n").replace("::\n\n", ":\n\n\b\n")
 
 
 def _is_file(word: str) -> bool:
-    return word.endswith((".yaml", ".yml")) or "/" in word
+    return word.endswith((".yaml", ".yml", ".py")) or "/" in word
+
+
+_OF_SHAPE = "of_shape_"  # before names of parameters, which a command's own may equal
 
 
 def option_of(field: str) -> str:
@@ -111,13 +139,15 @@ def option_of(field: str) -> str:
     return "--" + field.removesuffix("_mm").replace("_", "-")
 
 
-def _parameter_options(params: type) -> list[click.Parameter]:
+def _parameter_options(params: type, taken: set[str]) -> list[click.Parameter]:
+    """Options for a shape's parameters; one that the command has itself is led by "shape", as ``--shape-tip``."""
     options: list[click.Parameter] = []
     for field in dataclasses.fields(params):
-        choices = field.metadata.get("choices")
+        choices, option = field.metadata.get("choices"), option_of(field.name)
+        option = f"--shape{option[1:]}" if option in taken else option
         options.append(
             click.Option(
-                [option_of(field.name), field.name],
+                [option, _OF_SHAPE + field.name],
                 type=OneOf(choices) if choices else Length(),
                 help=f"{field.metadata['help']}  [default: {_plainly(field.default)}]",
             )
@@ -173,21 +203,23 @@ def _design_options() -> list[click.Parameter]:
 
 
 def _printers() -> list[str]:
-    from sensorgen.design.printer import printer_names
+    from sensorgen.design import packs
 
-    return printer_names()
+    return packs.names("printers")
 
 
 def _qualities() -> list[str]:
-    from sensorgen.design.printer import quality_names
+    from sensorgen.design import packs
 
-    return quality_names()
+    return packs.names("qualities")
 
 
 def _design(base: Data, given: Data, word: str) -> "Design":
-    from sensorgen.design import design
+    from sensorgen.design import design, packs
 
     unnamed = {k: v for k, v in base.items() if k != "name"}
+    if isinstance(unnamed.get("materials"), dict):
+        unnamed["materials"] = packs.slots(unnamed["materials"])
     data = merged(unnamed, _changes(base, given))
     if given["name"] is not None:
         data["name"] = given["name"]
@@ -198,12 +230,8 @@ def _design(base: Data, given: Data, word: str) -> "Design":
 
 def _changes(base: Data, given: Data) -> Data:
     """The options that were given, as the part of a design file that they stand for."""
-    known = (
-        {f.name for f in dataclasses.fields(registry.load(shapes, base["shape"]).Params)}
-        if isinstance(base.get("shape"), str)
-        else set()
-    )
-    parameters = {k: given[k] for k in known if given.get(k) is not None}
+    known = {f.name for f in dataclasses.fields(shape.Params)} if (shape := _shape_of(base)) else set()
+    parameters = {k: given[_OF_SHAPE + k] for k in known if given.get(_OF_SHAPE + k) is not None}
     parameters |= _size(given["size"]) if given["size"] is not None else {}
     slots = _slots(given["material"]) | _support(given["support"])
     dielectric = _dielectric(base, slots)

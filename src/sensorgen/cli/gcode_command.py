@@ -38,7 +38,8 @@ def _check(file: str, design: str | None, printer: str | None, materials: tuple[
     loaded = {drawn.tool(name): name for name in drawn.used()} if drawn else {}
     loaded |= _loaded(materials, machine.tool_numbers)
     motion = follow(Path(file), machine.control.prime_macro)
-    found = check_motion(motion, machine, loaded, others_empty=drawn is not None)
+    texts = drawn.own if drawn else {}
+    found = check_motion(motion, machine, loaded, others_empty=drawn is not None, texts=texts)
     if drawn:
         from sensorgen.asprinted import agreement
 

@@ -5,18 +5,18 @@ import click
 from sensorgen.cli import render
 from sensorgen.cli.words import OneOf
 
-KINDS = ("shapes", "materials", "printers", "qualities", "models", "sources")
+KINDS = ("shapes", "materials", "printers", "qualities", "instruments", "packs", "models", "sources")
 
 
 def _list(kind: str) -> None:
     """List what goes by a name.
 
-    Shapes with their parameters, materials with every value and its source, printers, qualities, models, or what
-    the sources stand for.
+    Shapes with their parameters, materials with every value and its source, printers, qualities, instruments, packs,
+    models, or what the sources stand for; with the pack that each comes from.
     """
     from sensorgen.cli import catalogue
 
-    render.deliver(getattr(catalogue, kind)())
+    render.deliver((catalogue.all_packs if kind == "packs" else getattr(catalogue, kind))())
 
 
 command = click.Command(

@@ -1,5 +1,6 @@
 """``--set KEY=VALUE`` and ``--sweep KEY=VALUES``: parameters, keys of the design file, and values of materials."""
 
+import dataclasses
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core import units
@@ -51,6 +52,8 @@ def setting(key: str, value: str, parameters: set[str]) -> Data:
     if path[0] not in Design.model_fields or len(path) > 3:
         raise UnknownName("key of --set", key, parameters | set(Design.model_fields) | {"eps_x60"})
     end: Any = _parameter(value) if path[0] == "parameters" else _plain(value)
+    if path == ["materials", "electrode"]:
+        return {"materials": {"top_electrode": end, "bottom_electrode": end}}
     for part in reversed(path):
         end = {part: end}
     return dict(end)
@@ -58,14 +61,15 @@ def setting(key: str, value: str, parameters: set[str]) -> Data:
 
 def _of_material(key: str) -> list[str] | None:
     """The place of a material's value: ``eps_x60`` or ``youngs_modulus_x60``, its unit left out if one likes."""
-    from sensorgen.design import materials
+    from sensorgen.design import materials, packs
 
     word, _, name = key.rpartition("_")
     quantity = SYMBOLS.get(word) or next((q for q in materials.quantities() if f"{q}_".startswith(f"{word}_")), "")
-    if not word or not (quantity or name in materials.names()):
+    known = materials.names()
+    if not word or not (quantity or name in known):
         return None
-    if name not in materials.names():
-        raise UnknownName("material", name, materials.names())
+    if name not in known and name not in (known := packs.names("materials")):
+        raise packs.unknown("materials", name, known)
     if not quantity:
         raise UnknownName(f"quantity of {name}", word, {*SYMBOLS, *materials.quantities()})
     return ["material_values", name, quantity]
@@ -89,7 +93,7 @@ def sweep(text: str, design: "Design") -> tuple[str, list[tuple[float | str, "De
     from sensorgen.design import design as designs
 
     ((key, typed),) = pairs((text,), "--sweep")
-    fields = designs.fields(design.shape)
+    fields = {field.name: field for field in dataclasses.fields(design.form.Params)}
     same = design.model_dump(exclude={"name"})
     return key, [
         (value, designs.make(merged(same, setting(key, str(value), set(fields))), f"{key}={value}"))

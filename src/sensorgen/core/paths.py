@@ -18,6 +18,11 @@ def data(variable: str, name: str) -> Path:
     return _own(variable) or _below("XDG_DATA_HOME", ".local/share", "Application Support") / "sensorgen" / name
 
 
+def config(variable: str, name: str) -> Path:
+    """What the user writes by hand, as packs; parameters as :func:`data`."""
+    return _own(variable) or _below("XDG_CONFIG_HOME", ".config", "Application Support") / "sensorgen" / name
+
+
 def cache(variable: str) -> Path:
     """What may be deleted; parameters as :func:`data`."""
     return _own(variable) or _below("XDG_CACHE_HOME", ".cache", "Caches") / "sensorgen"

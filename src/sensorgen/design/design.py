@@ -8,8 +8,7 @@ import re
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from types import ModuleType
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from pydantic import Field, field_validator
 
@@ -19,11 +18,14 @@ from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenE
 from sensorgen.core.findings import Finding
 from sensorgen.core.records import Strict, checked, shown
 from sensorgen.design import materials as material_files
-from sensorgen.design import shapes
-from sensorgen.design.materials import own
+from sensorgen.design import packs, shapes
+from sensorgen.design.packs import Kind
 from sensorgen.design.printer import Pattern, Printer, Quality, load_printer, load_quality
 from sensorgen.design.profile import Profile, with_own
 from sensorgen.scene.scene import Envelope, Fill, Scene
+
+if TYPE_CHECKING:
+    from sensorgen.design.shape_files import Shape
 
 MAX_CELLS = 50_000  # crossed strips of 330 x 330 mm have 27 225
 MAX_LAYERS = 5_000  # 30 mm in layers of 0.06 mm have 500
@@ -105,6 +107,9 @@ class Design(Strict):
     )
     profile: Profile = Profile()
     waivers: tuple[Waiver, ...] = Field(default=(), strict=False)  # YAML has lists only
+    own: dict[Kind, dict[str, str]] = Field(
+        default={}, description="Text of each file that the design takes from packs that do not ship, by kind and name."
+    )
 
     @field_validator("name")
     @classmethod
@@ -119,24 +124,34 @@ class Design(Strict):
     @cached_property
     def params(self) -> Envelope:
         """The shape's parameters, checked and complete."""
-        return parameters(self.shape, self.parameters)
+        return parameters(self.shape, self.parameters, self._shape_text)
+
+    @property
+    def _shape_text(self) -> str | None:
+        """The shape's file, where it does not ship."""
+        return self.own.get("shapes", {}).get(self.shape)
+
+    @property
+    def form(self) -> "Shape":
+        """The shape: its parameters and its scene."""
+        return _shape(self.shape, self._shape_text)
 
     @cached_property
     def machine(self) -> Printer:
         """The printer, with this design's nozzle."""
-        found = load_printer(self.printer)
+        found = load_printer(self.printer, self.own.get("printers", {}).get(self.printer))
         return found.model_copy(update={"nozzle_mm": self.nozzle_mm}) if self.nozzle_mm else found
 
     @cached_property
     def layers(self) -> Quality:
         """The print quality."""
-        return load_quality(self.quality)
+        return load_quality(self.quality, self.own.get("qualities", {}).get(self.quality))
 
     def material(self, name: str) -> material_files.Material:
         """A material by name, with the values that this design sets itself."""
         slots = ((getattr(self.materials, part) or "").partition("@") for part in Slots.model_fields)
         sources = sorted({source for material, _, source in slots if material == name and source})
-        return material_files.load(name, sources).with_values(self.material_values.get(name, {}))
+        return material_files.load(name, sources, self.own).with_values(self.material_values.get(name, {}))
 
     def conducts(self, name: str) -> bool:
         """Whether a material does."""
@@ -162,8 +177,7 @@ class Design(Strict):
     def drawn(self) -> Scene:
         """The sensor as it is meant to be, bottom electrode down."""
         names = {part: (value or "").partition("@")[0] for part, value in self.materials.model_dump().items()}
-        scene: Scene = shape(self.shape).scene(self.params, Fill(**names))
-        return scene
+        return self.form.scene(self.params, Fill(**names))
 
     @cached_property
     def in_use(self) -> Scene:
@@ -186,10 +200,19 @@ class Design(Strict):
         """
         tools = self.machine.default_tools | self.tools
         if material not in tools:
+            taken = {tools[name] for name in self._tooled(tools)}
+            free = [tool for tool in self.machine.tool_numbers if tool not in taken]
+            advice = f"free: {', '.join(map(str, free))}" if free else "none of its tools is free"
             raise MissingValue(
-                f"no tool for {material}: name one with --tool {material}=NUMBER, or in the design's 'tools'"
+                f"no tool for {material} on {self.machine.name}: name one with --tool {material}="
+                f"{free[0] if free else 'NUMBER'}, or 'tools: {{{material}: {free[0] if free else 'NUMBER'}}}' in the "
+                f"design ({advice})"
             )
         return tools[material]
+
+    def _tooled(self, tools: Mapping[str, int]) -> set[str]:
+        """Materials in the sensor that have a tool."""
+        return {body.material for body in self.drawn.bodies} & tools.keys()
 
     def resolved(self) -> dict[str, Any]:
         """Everything that decides the sensor, with all defaults and the values of material and printer filled in."""
@@ -206,7 +229,7 @@ class Design(Strict):
 
     def _plain(self) -> set[str]:
         """Parts that have come later and are not used: without them the identities of older designs last."""
-        return set() if self.profile != Profile() else {"profile"}
+        return {key for key, usual in (("profile", Profile()), ("own", {})) if getattr(self, key) == usual}
 
     @property
     def walls(self) -> str:
@@ -215,7 +238,11 @@ class Design(Strict):
 
     def id(self) -> str:
         """Hash of all resolved parameters and material values; not of the design's name, nor of sensorgen's version."""
-        text = json.dumps(_FIRST | self.resolved(), sort_keys=True, allow_nan=True)
+        data = _FIRST | self.resolved()
+        data.pop("own", None)  # values of materials and machines are there without the words around them
+        if self._shape_text is not None:
+            data["shape_text"] = self._shape_text
+        text = json.dumps(data, sort_keys=True, allow_nan=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def waived(self, findings: list[Finding]) -> list[Finding]:
@@ -243,7 +270,8 @@ class Design(Strict):
 _FIRST = {"sensorgen": "0.1.0"}
 # What only the check of G-code reads, and how exact the printer is: neither decides a sensor.
 _LIMITS: dict[str, Any] = {
-    "control": {"commands", "longest_retraction_mm"}, "print": {"max_flow_mm3_s"}, "tool_height_error_mm": True
+    "control": {"commands", "longest_retraction_mm"}, "print": {"max_flow_mm3_s"}, "tool_height_error_mm": True,
+    "citations": True,
 }  # fmt: skip
 
 
@@ -252,17 +280,28 @@ def _covers(waiver: Waiver, finding: Finding) -> bool:
     return same_rule and waiver.body in ("", finding.body)
 
 
-def shape(name: str) -> ModuleType:
-    """The module of a shape; raises UnknownName with the nearest one."""
-    return registry.load(shapes, name)
+def shape(name: str) -> "Shape":
+    """A shape by its name; raises UnknownName with the nearest one."""
+    if name in packs.shipped_names("shapes"):
+        return cast("Shape", registry.load(shapes, name))
+    return _shape(name, packs.find("shapes", name).text())
 
 
-def fields(shape_name: str) -> dict[str, dataclasses.Field[Any]]:
+def _shape(name: str, text: str | None) -> "Shape":
+    """A shape by its name, or by the text of its file where that does not ship."""
+    if text is None:
+        return shape(name)
+    from sensorgen.design import shape_files
+
+    return shape_files.load(name, text)
+
+
+def fields(shape_name: str, text: str | None = None) -> dict[str, dataclasses.Field[Any]]:
     """The parameters of a shape, by name."""
-    return {f.name: f for f in dataclasses.fields(shape(shape_name).Params)}
+    return {f.name: f for f in dataclasses.fields(_shape(shape_name, text).Params)}
 
 
-def parameters(shape_name: str, given: Mapping[str, float | str]) -> Envelope:
+def parameters(shape_name: str, given: Mapping[str, float | str], text: str | None = None) -> Envelope:
     """Check the parameters of a shape and fill in its defaults.
 
     Raises
@@ -272,13 +311,14 @@ def parameters(shape_name: str, given: Mapping[str, float | str]) -> Envelope:
     OutOfRange
         A value is no number, or outside the range of sense.
     """
-    known = fields(shape_name)
+    known = fields(shape_name, text)
     values = {}
     for name, value in given.items():
         if name not in known:
             raise UnknownName(f"parameter of {shape_name}", name, known)
         values[name] = _checked(known[name], value)
-    params: Envelope = shape(shape_name).Params(**values)
+    kind: Any = _shape(shape_name, text).Params
+    params: Envelope = kind(**values)
     _refuse_swarms(params)
     return params
 
@@ -322,12 +362,17 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
     """Check a design given as plain data; ``where`` names its file in errors."""
     try:
         if isinstance(data, Mapping) and "shape" not in data:
-            raise BadInput(f"shape is missing; expected {', '.join(registry.names(shapes))}")
-        design = checked(Design, with_own(dict(data), Path(where).parent) if isinstance(data, Mapping) else data)
+            raise BadInput(f"shape is missing; expected {', '.join(packs.names('shapes', Path(where).parent))}")
+        design = checked(Design, with_own_files(dict(data), Path(where).parent) if isinstance(data, Mapping) else data)
         _check_names(design)
     except SensorgenError as error:
         raise error.within(where) from None
     return design if design.name else design.model_copy(update={"name": name_of(design)})
+
+
+def with_own_files(data: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """A design's data with the content of all files in place of their names, relative to a folder."""
+    return packs.with_files(with_own(data, folder), folder)
 
 
 def of_resolved(name: str, data: Mapping[str, Any]) -> Design:
@@ -339,11 +384,15 @@ def of_resolved(name: str, data: Mapping[str, Any]) -> Design:
         Not a resolved design, or one of a material, printer or quality that has other values here and now.
     """
     try:
-        names = {key: data[f"{key}_values"]["name"] for key in ("printer", "quality")}
-    except (KeyError, TypeError):
+        words = data.get("own", {})
+        names = {
+            key: next(iter(words.get(kind, ())), data[f"{key}_values"]["name"])
+            for key, kind in (("printer", "printers"), ("quality", "qualities"))
+        }
+    except (AttributeError, KeyError, TypeError):
         raise BadInput(f"{name}: not a resolved design; expected one as batch.json has it") from None
     found = make({"name": name, **{key: data[key] for key in Design.model_fields if key in data}, **names})
-    then, now = ({k: v for k, v in d.items() if k != "sensorgen"} for d in (data, found.resolved()))
+    then, now = ({k: v for k, v in d.items() if k not in ("sensorgen", "own")} for d in (data, found.resolved()))
     if then != json.loads(json.dumps(now)):
         raise BadInput(f"{name}: its materials, printer or quality have other values here than where it was recorded")
     return found
@@ -351,22 +400,23 @@ def of_resolved(name: str, data: Mapping[str, Any]) -> Design:
 
 def _check_names(design: Design) -> None:
     """Look up every name that a design uses, so that a wrong one is reported before any work."""
+    packs.check_texts(design.own)
     _ = design.params, design.machine, design.layers
     for part in Slots.model_fields:
         if getattr(design.materials, part):
             material, source = design.slot(part)
             if source and source not in material.sources():
-                raise UnknownName(f"source of {material.name}", source, material.sources() | set(own.names()))
+                raise UnknownName(f"source of {material.name}", source, material.sources() | set(packs.source_names()))
             if material.conductor != part.endswith("_electrode"):
                 kind = "conducts" if material.conductor else "does not conduct"
                 raise BadInput(f"materials.{part}: {material.name} {kind}")
     for name, values in design.material_values.items():
-        material_files.check_own(name, values)
+        material_files.check_own(name, values, design.own)
     _one_source_each(design)
     _soluble(design)
     _refuse_stacks(design)
     for name in (*design.tools, *design.infill, *design.profile.materials()):
-        material_files.load(name)
+        design.material(name)
     machine = design.machine
     for name, tool in design.tools.items():
         if tool not in machine.tool_numbers:
@@ -423,8 +473,8 @@ def name_of(design: Design) -> str:
     >>> name_of(Design(shape="rect", parameters={"along": "yx", "length_mm": 50}, quality="extrafine"))
     'sqyx-d0.2-length50-extrafine'
     """
-    params, known = design.params, fields(design.shape)
-    start = getattr(shape(design.shape), "SHORT", design.shape) + str(getattr(params, "along", ""))
+    params, known = design.params, {f.name: f for f in dataclasses.fields(design.form.Params)}
+    start = getattr(design.form, "SHORT", design.shape) + str(getattr(params, "along", ""))
     parts = [start]
     if hasattr(params, "along"):
         parts.append(f"d{params.dielectric_mm:.10g}")  # type: ignore[attr-defined]

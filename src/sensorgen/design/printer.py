@@ -3,16 +3,16 @@
 import os
 import re
 from collections.abc import Callable
-from functools import cache
-from importlib import resources
+from functools import cache, lru_cache
 from pathlib import Path
-from typing import Annotated, Literal, Self, TypeVar
+from typing import Annotated, Literal, Self, TypeVar, cast
 
 from pydantic import Field, model_validator
 
 from sensorgen.core import yamlfile
-from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.core.errors import BadInput
 from sensorgen.core.records import Strict, checked
+from sensorgen.design import packs
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Pattern = Literal["rectilinear", "grid", "concentric", "honeycomb", "triangles", "gyroid"]  # of infill
@@ -156,23 +156,22 @@ _Profile = TypeVar("_Profile", Printer, Quality)
 
 
 def folder() -> Path:
-    """Where printers, qualities and profile templates stand: inside the wheel, or beside ``src``."""
-    packed = Path(str(resources.files("sensorgen"))) / "slicer_profiles"
-    return packed if packed.is_dir() else Path(__file__).parents[3] / "slicer_profiles"
+    """Where printers, qualities and profile templates that ship are."""
+    return packs.profiles()
 
 
 def printer_names() -> list[str]:
     """Names of the printers that ship with sensorgen."""
-    return sorted(p.stem for p in (folder() / "printers").glob("*.yaml"))
+    return sorted(packs.shipped_names("printers"))
 
 
 def quality_names() -> list[str]:
     """Names of the print qualities that ship with sensorgen."""
-    return sorted(p.stem for p in (folder() / "qualities").glob("*.yaml"))
+    return sorted(packs.shipped_names("qualities"))
 
 
-def load_printer(name: str) -> Printer:
-    """Read a printer by its name, or from a YAML file.
+def load_printer(name: str, text: str | None = None) -> Printer:
+    """Read a printer by its name, from a YAML file, or from its text where a design has taken that over.
 
     Raises
     ------
@@ -180,7 +179,7 @@ def load_printer(name: str) -> Printer:
         A file that is no printer's, or that allows more than any printer that ships with sensorgen: such a file may
         have come with a design, and :data:`TRUST` is not set.
     """
-    printer = _read_printer(name)
+    printer = _loaded(Printer, "printers", name, text)
     if name not in printer_names() and not os.environ.get(TRUST) and (wider := _wider(printer)):
         raise BadInput(
             f"{name}: {wider}, more than any printer that ships with sensorgen; if the file is yours, and the printer "
@@ -189,14 +188,9 @@ def load_printer(name: str) -> Printer:
     return printer
 
 
-@cache
-def _read_printer(name: str) -> Printer:
-    return _load(Printer, "printer", name, printer_names())
-
-
 def _wider(own: Printer) -> str:
     """The first limit of hardware or G-code that is wider than all that ship; "" for none."""
-    shipped = [_read_printer(name) for name in printer_names()]
+    shipped = [_loaded(Printer, "printers", name, None) for name in printer_names()]
     for limit, of in _LIMITS.items():
         if of(own) > max(map(of, shipped)):
             return f"{limit} {abs(of(own)):g}"
@@ -207,23 +201,31 @@ def _wider(own: Printer) -> str:
     return f"commands {', '.join(more)}" if more else ""
 
 
+def load_quality(name: str, text: str | None = None) -> Quality:
+    """Read a print quality by its name, from a YAML file of the user's, or from its text."""
+    return _loaded(Quality, "qualities", name, text)
+
+
+def _loaded(kind: type[_Profile], which: Literal["printers", "qualities"], name: str, text: str | None) -> _Profile:
+    if text is None:
+        if name in packs.shipped_names(which):
+            return cast(_Profile, _shipped(kind, which, name))
+        text = yamlfile.text(Path(name)) if packs.is_path(which, name) else packs.find(which, name).text()
+    return cast(_Profile, _parsed(kind, name if packs.is_path(which, name) else f"{name}.yaml", text))
+
+
 @cache
-def load_quality(name: str) -> Quality:
-    """Read a print quality by its name, or from a YAML file of the user's."""
-    return _load(Quality, "quality", name, quality_names())
+def _shipped(kind: type[_Profile], which: Literal["printers", "qualities"], name: str) -> _Profile:
+    file = packs.File(which, name, packs.shipped_names(which)[name])
+    return cast(_Profile, _parsed(kind, str(file.path), file.text()))
 
 
-def _load(kind: type[_Profile], word: str, name: str, known: list[str]) -> _Profile:
-    own = name.endswith((".yaml", ".yml"))
-    if not own and name not in known:
-        raise UnknownName(word, name, known)
-    plural = {"printer": "printers", "quality": "qualities"}[word]
-    path = Path(name) if own else folder() / plural / f"{name}.yaml"
-    data = yamlfile.read(path)
+@lru_cache(maxsize=64)
+def _parsed(kind: type[_Profile], file: str, text: str) -> _Profile:
     try:
-        return checked(kind, {**data, "name": _safe(path.stem)})
+        return checked(kind, {**yamlfile.parse(text, file), "name": _safe(Path(file).stem)})
     except BadInput as error:
-        raise error.within(str(path)) from None
+        raise error if str(error).startswith(file) else error.within(file) from None
 
 
 def _safe(stem: str) -> str:

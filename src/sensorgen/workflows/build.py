@@ -19,7 +19,7 @@ from sensorgen.core.document import Part
 from sensorgen.core.errors import Unprintable
 from sensorgen.core.findings import Finding, counted, counts, listed, most_severe, verdict
 from sensorgen.core.version import __version__
-from sensorgen.design import materials, printer
+from sensorgen.design import printer
 from sensorgen.design.design import Design
 from sensorgen.design.tower import tower
 from sensorgen.export import threemf
@@ -233,7 +233,7 @@ def _centre_mm(design: Design, family: str) -> tuple[float, float]:
 
 
 def _colours(design: Design) -> dict[str, str]:
-    return {body.name: materials.load(body.material).colour for body in design.printed.bodies}
+    return {body.name: design.material(body.material).colour for body in design.printed.bodies}
 
 
 def _manifest(design: Design, stage: Path) -> dict[str, Any]:

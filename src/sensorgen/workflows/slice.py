@@ -158,7 +158,7 @@ def slice_design(
         content = made.ready.read_bytes()
     machine, loaded = design.machine, {design.tool(name): name for name in design.used()}
     printed = nominal(design, made.lines, f"{made.slicer} {made.version}")
-    checked = check_motion(made.lifted.motion, machine, loaded, others_empty=True).with_more(
+    checked = check_motion(made.lifted.motion, machine, loaded, others_empty=True, texts=design.own).with_more(
         agreement.check(
             design, made.lines, made.lifted.motion.changes, machine.bed_centre_mm(), alone=True, lines=printed.lines
         )

@@ -11,7 +11,6 @@ import shapely
 from sensorgen.analysis.plots.pages import render
 from sensorgen.core.arrays import Real
 from sensorgen.core.findings import SEVERITIES, Finding
-from sensorgen.design import materials
 from sensorgen.scene.layers import LayerRegions, Region, parts
 from sensorgen.scene.scene import SLIVER_MM
 
@@ -116,7 +115,7 @@ def of_print(
     """
     design, colours = printed.design, {}
     for body in design.printed.bodies:
-        material = materials.load(body.material)
+        material = design.material(body.material)
         words = f"{body.name.replace('_', ' ')}, {material.title}, tool {design.tool(body.material)}"
         colours[body.name] = (words, material.colour)
     placed = sorted((f for f in findings if f.place_mm), key=lambda f: SEVERITIES.index(f.severity))

@@ -10,7 +10,6 @@ from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, Body,
 from sensorgen.checks.review import draw, review
 from sensorgen.core.document import Column, Table
 from sensorgen.core.units import M_PER_MM
-from sensorgen.design import materials
 from sensorgen.design.design import Design
 from sensorgen.prediction.identifiability.results import Identifiability
 from sensorgen.prediction.query import FORCE_N
@@ -124,4 +123,4 @@ def _bodies(design: Design) -> Iterator[Body]:
     """The bodies of the sensor in use, as triangles."""
     for body in design.in_use.bodies:
         made = mesh(body)
-        yield Body(body.name.replace("_", " "), made.vertices_mm, made.triangles, materials.load(body.material).colour)
+        yield Body(body.name.replace("_", " "), made.vertices_mm, made.triangles, design.material(body.material).colour)

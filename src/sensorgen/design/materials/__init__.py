@@ -1,13 +1,12 @@
 """Materials: every published value under its source, because the sources disagree.
 
-A material is a YAML file beside this one; see ``etpu.yaml``. A design names a material and, if it
-likes, the source to take: ``x60`` or ``x60@thesis-4.1``. Sources of the user's own, as a fit to
-measurements, are files in a folder of theirs (:mod:`sensorgen.design.materials.own`); a design that names
-none of them never sees them, so that its identity does not depend on the reader.
+A material is a YAML file of a pack (:mod:`sensorgen.design.packs`); see ``etpu.yaml``. A design names a material and,
+optionally, the source to take: ``x60`` or ``x60@thesis-4.1``. Sources of the user's own, as a fit to measurements, are
+files of packs too; a design that names none of them never sees them, so that its identity is the same for every reader.
 """
 
 from collections.abc import Iterable, Mapping
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from math import inf, isinf
 from typing import Annotated
@@ -17,7 +16,8 @@ from pydantic import Field
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
 from sensorgen.core.records import Strict, checked
-from sensorgen.design.materials import own
+from sensorgen.design import packs
+from sensorgen.design.packs import Kind
 
 FILM_LEAK = "leak_s_per_m2"  # leak of a film per area; a matter of how it was printed: no source that ships gives one
 PIEZORESISTANCE = "piezoresistance_per_pa"  # relative rise of an electrode's resistivity with pressure: none either
@@ -69,6 +69,7 @@ class Material(Strict):
     properties: dict[str, list[Value]]
     print: dict[str, list[Value]] = Field(default={})
     drying: str = ""
+    citations: dict[str, str] = Field(default={}, description="What the names of its sources mean.")
 
     def sources(self) -> set[str]:
         """Names of all sources that this material quotes."""
@@ -133,10 +134,13 @@ class Material(Strict):
         return min(low, default=-inf), max(high, default=inf)
 
 
+Texts = Mapping[Kind, Mapping[str, str]]  # files of packs that a design has taken over, by kind and name
+NO_TEXTS: Texts = {}
+
+
 def names() -> list[str]:
     """Names of the materials that ship with sensorgen."""
-    files = resources.files(__name__).iterdir()
-    return sorted(f.name.removesuffix(".yaml") for f in files if f.name.endswith(".yaml") and f.name != "sources.yaml")
+    return sorted(packs.shipped_names("materials"))
 
 
 @cache
@@ -145,8 +149,8 @@ def quantities() -> list[str]:
     return sorted({quantity for name in names() for quantity in load(name).properties} | {FILM_LEAK})
 
 
-def check_own(name: str, values: Mapping[str, float]) -> None:
-    """Refuse values of the user's own that no material can have.
+def check_own(name: str, values: Mapping[str, float], texts: Texts = NO_TEXTS) -> None:
+    """Refuse values of the user's own that no material can have; ``texts`` as of :func:`load`.
 
     Raises
     ------
@@ -155,7 +159,7 @@ def check_own(name: str, values: Mapping[str, float]) -> None:
     OutOfRange
         A number that the quantity cannot be.
     """
-    load(name)
+    load(name, texts=texts)
     for quantity, value in values.items():
         if quantity not in quantities():
             raise UnknownName(f"quantity of {name}", quantity, quantities())
@@ -171,7 +175,7 @@ def _said(low: float, high: float, unsigned: str) -> str:
     return unsigned if low == 0 else "a finite number"
 
 
-def load(name: str, sources: Iterable[str] = ()) -> Material:
+def load(name: str, sources: Iterable[str] = (), texts: Texts = NO_TEXTS) -> Material:
     """Read a material by name.
 
     Parameters
@@ -180,75 +184,112 @@ def load(name: str, sources: Iterable[str] = ()) -> Material:
         Of the material.
     sources : iterable of str
         Sources of the user's own whose values are wanted too; others among them count for nothing.
+    texts : mapping
+        Files that go before those of packs: a design's :attr:`~sensorgen.design.design.Design.own`.
 
     Raises
     ------
     UnknownName
         No material goes by that name.
     BadInput
-        The file of such a source is damaged.
+        The file of the material, or of such a source, is damaged.
     """
-    found = _shipped(name)
+    material = _of(name, texts)
     for source in sources:
-        if source in own.names():
-            found = _extended(found, source)
-    return found
+        text = texts.get("sources", {}).get(source)
+        if text is not None or source in packs.source_names():
+            added = own_source(source, text, texts).materials.get(name, {})
+            values = {
+                quantity: [*material.properties.get(quantity, []), Value(source=source, **dict(value))]
+                for quantity, value in added.items()
+            }
+            material = material.model_copy(update={"properties": material.properties | values})
+    return material
 
 
-def _extended(material: Material, source: str) -> Material:
-    """A material with the values that a source of the user's own has of it."""
-    added = own_source(source).materials.get(material.name, {})
-    values = {
-        quantity: [*material.properties.get(quantity, []), Value(source=source, **dict(value))]
-        for quantity, value in added.items()
-    }
-    return material.model_copy(update={"properties": material.properties | values})
-
-
-def own_source(source: str) -> Own:
-    """A source of the user's own.
+def own_source(source: str, text: str | None = None, texts: Texts = NO_TEXTS) -> Own:
+    """A source of the user's own, by its text or its file; ``texts`` as of :func:`load`.
 
     Raises
     ------
     BadInput
         Its file is damaged, or has the name of a source that ships.
     """
-    path = own.path(source)
+    file = f"{source}.yaml"
     try:
-        found = checked(Own, yamlfile.read(path))
+        if text is None:
+            from sensorgen.design.materials import own
+
+            file, text = str(own.path(source)), own.text(source)
+        made = checked(Own, yamlfile.parse(text, file))
         if source in _shipped_citations():
             raise BadInput(f"{source} is the name of a source that ships with sensorgen; expected another name")
-        for name, values in found.materials.items():
-            _check_values(name, {key: value.value for key, value in values.items()})
+        for name, values in made.materials.items():
+            _check_values(name, {key: value.value for key, value in values.items()}, texts)
     except (BadInput, UnknownName, OutOfRange) as error:
-        raise error if str(path) in str(error) else error.within(str(path)) from None
-    return found
+        raise error if file in str(error) else error.within(file) from None
+    return made
 
 
-def _check_values(name: str, values: Mapping[str, float]) -> None:
+def _check_values(name: str, values: Mapping[str, float], texts: Texts) -> None:
     """Refuse values that are none; quantities may be new ones, which nothing reads."""
-    _shipped(name)
+    _of(name, texts)
     for quantity, value in values.items():
         low, high = _RANGES.get(quantity, (0.0, inf))
         if not low <= value <= high or isinf(value):
             raise OutOfRange(f"{quantity} of {name} is {value:g}; expected {_said(low, high, 'a number from 0 on')}")
 
 
+def _of(name: str, texts: Texts) -> Material:
+    """A material by the text of its file."""
+    if name in packs.shipped_names("materials"):
+        return _shipped(name)
+    text = texts.get("materials", {}).get(name)
+    return parse(name, packs.find("materials", name).text() if text is None else text)
+
+
 @cache
 def _shipped(name: str) -> Material:
-    if name not in names():
-        raise UnknownName("material", name, names())
+    return parse(name, packs.File("materials", name, packs.shipped_names("materials")[name]).text())
+
+
+@lru_cache(maxsize=256)
+def parse(name: str, text: str) -> Material:
+    """A material by the text of its file.
+
+    Raises
+    ------
+    BadInput
+        The text is damaged.
+    OutOfRange
+        A value that no material can have.
+    """
     file = f"{name}.yaml"
-    data = yamlfile.parse((resources.files(__name__) / file).read_text("utf-8"), file)
     try:
-        return checked(Material, {**data, "name": name})
+        made = checked(Material, {**yamlfile.parse(text, file), "name": name})
     except BadInput as error:
-        raise error.within(file) from None
+        raise error if str(error).startswith(file) else error.within(file) from None
+    for quantity, values in made.properties.items():
+        low, high = _RANGES.get(quantity, (0.0, inf))
+        for each in values:
+            if not low <= each.value <= high or (isinf(each.value) and each.default):
+                expected = _said(low, high, "a number from 0 on")
+                raise OutOfRange(f"{file}: {quantity} of {each.source} is {each.value:g}; expected {expected}")
+        if sum(each.default for each in values) > 1:
+            raise BadInput(f"{file}: {quantity} has two values with default: true; expected one")
+    return made
 
 
 def citations() -> dict[str, str]:
     """What each source's name stands for, those of the user's own too."""
-    return _shipped_citations() | {name: own_source(name).about for name in own.names()}
+    return _shipped_citations() | {name: own_source(name).about for name in packs.source_names()}
+
+
+def cited(texts: Texts) -> dict[str, str]:
+    """What the sources of a design's own files stand for."""
+    own_materials = (parse(name, text) for name, text in texts.get("materials", {}).items())
+    said = {key: value for material in own_materials for key, value in material.citations.items()}
+    return said | {name: own_source(name, text, texts).about for name, text in texts.get("sources", {}).items()}
 
 
 @cache
@@ -256,4 +297,5 @@ def _shipped_citations() -> dict[str, str]:
     text = (resources.files(__name__) / "sources.yaml").read_text("utf-8")
     data = yamlfile.parse(text, "sources.yaml")
     theses = {str(name): f"{data['thesis']}: {where}" for name, where in data["sources"].items()}
-    return theses | {str(name): str(what) for name, what in data["others"].items()}
+    more = {key: said for name in names() for key, said in _shipped(name).citations.items()}
+    return more | theses | {str(name): str(what) for name, what in data["others"].items()}

@@ -102,10 +102,16 @@ def check(
 
 
 def check_motion(
-    motion: Motion, machine: Printer, loaded: Mapping[int, str] | None = None, *, others_empty: bool = False
+    motion: Motion,
+    machine: Printer,
+    loaded: Mapping[int, str] | None = None,
+    *,
+    others_empty: bool = False,
+    texts: materials.Texts = materials.NO_TEXTS,
 ) -> Checked:
-    """Check a file that was followed; see :func:`check`."""
-    loads = {tool: name for tool, name in (loaded or {}).items() if name in materials.names()}
+    """Check a file that was followed; see :func:`check`, and for ``texts`` :func:`sensorgen.design.materials.load`."""
+    known = {*materials.names(), *texts.get("materials", ())}
+    loads = {tool: materials.load(name, texts=texts) for tool, name in (loaded or {}).items() if name in known}
     found = [*limits.check(motion, machine), *commands.check(motion, machine, loads)]
     found += limits.check_loaded(motion, machine, loads, others_empty=others_empty)
-    return Checked(**vars(report(motion, machine, dict(loaded or {}))), findings=merged(found))
+    return Checked(**vars(report(motion, machine, dict(loaded or {}), texts)), findings=merged(found))

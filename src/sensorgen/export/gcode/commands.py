@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.design.materials import Material
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import allowed
 from sensorgen.export.gcode.found import Findings, Found
@@ -17,7 +18,7 @@ AXES = "XYZ"
 PAUSES = ("M25", "M226", "M600", "M601")
 
 
-def check(motion: Motion, machine: Printer, loaded: Mapping[int, str]) -> Findings:
+def check(motion: Motion, machine: Printer, loaded: Mapping[int, Material]) -> Findings:
     """Findings of all rules on commands, and on what is printed between them.
 
     Parameters
@@ -26,8 +27,8 @@ def check(motion: Motion, machine: Printer, loaded: Mapping[int, str]) -> Findin
         The file.
     machine : Printer
         Who is to print it.
-    loaded : mapping of int to str
-        Material of each tool, as far as it is known.
+    loaded : mapping of int to Material
+        Of each tool, as far as it is known.
     """
     simulation = _Simulation(motion, machine, loaded)
     for event in motion.events:
@@ -41,7 +42,7 @@ def check(motion: Motion, machine: Printer, loaded: Mapping[int, str]) -> Findin
 class _Simulation:
     """The machine between two moves."""
 
-    def __init__(self, motion: Motion, machine: Printer, loaded: Mapping[int, str]) -> None:
+    def __init__(self, motion: Motion, machine: Printer, loaded: Mapping[int, Material]) -> None:
         self.motion, self.machine, self.control, self.found = motion, machine, machine.control, Findings()
         self.pushes = np.flatnonzero(motion.filament_mm != 0)
         self.prints = np.flatnonzero(motion.extruded_mm > 0)

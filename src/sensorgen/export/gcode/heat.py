@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isnan, nan
 
-from sensorgen.design import materials
+from sensorgen.design.materials import Material
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode.found import Findings
 from sensorgen.export.gcode.moves import Event
@@ -28,10 +28,10 @@ class Heat:
 class Heaters:
     """All heaters of a printer, cold at first, while its file is followed."""
 
-    def __init__(self, machine: Printer, loaded: Mapping[int, str], found: Findings) -> None:
+    def __init__(self, machine: Printer, loaded: Mapping[int, Material], found: Findings) -> None:
         """Take the material of each tool, as far as it is known, and the list that findings go to."""
         self.machine, self.found = machine, found
-        self.materials = {tool: materials.load(name) for tool, name in loaded.items()}
+        self.materials = dict(loaded)
         self.tools = {tool: Heat() for tool in machine.tool_numbers}
         self.bed = Heat()
 

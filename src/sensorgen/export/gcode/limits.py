@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.design import materials
+from sensorgen.design.materials import Material
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode.found import Found
 from sensorgen.export.gcode.moves import NO_TOOL, Motion
@@ -35,7 +35,9 @@ def check(motion: Motion, machine: Printer) -> Iterator[Found]:
         yield from rule(motion, machine)
 
 
-def check_loaded(motion: Motion, machine: Printer, loaded: Mapping[int, str], *, others_empty: bool) -> Iterator[Found]:
+def check_loaded(
+    motion: Motion, machine: Printer, loaded: Mapping[int, Material], *, others_empty: bool
+) -> Iterator[Found]:
     """Lines that suit no material of their tool: melted faster than it can be, or of a tool on which there is nothing.
 
     Parameters
@@ -44,14 +46,14 @@ def check_loaded(motion: Motion, machine: Printer, loaded: Mapping[int, str], *,
         The file.
     machine : Printer
         Who is to print it.
-    loaded : mapping of int to str
-        Material of each tool that has one.
+    loaded : mapping of int to Material
+        Of each tool that has one.
     others_empty : bool
         Whether nothing is on the other tools.
     """
     tools = motion.tools.column(len(motion.rows), NO_TOOL)
     if others_empty:
-        known = ", ".join(f"{name} on {one}" for one, name in loaded.items())
+        known = ", ".join(f"{material.name} on {one}" for one, material in loaded.items())
         for tool in np.setdiff1d(tools[motion.extruded_mm > 0], [NO_TOOL, *loaded]).astype(int).tolist():
             message = f"tool {tool} prints, and nothing is on it; loaded are {known}"
             rows = (tools == tool) & (motion.extruded_mm > 0)
@@ -59,13 +61,13 @@ def check_loaded(motion: Motion, machine: Printer, loaded: Mapping[int, str], *,
     lines = (motion.extruded_mm > 0) & (motion.across_mm > 0)
     area_mm2 = motion.extruded_mm * (math.pi / 4 * machine.filament_mm**2) / np.where(lines, motion.length_mm, 1.0)
     flow_mm3_s = np.where(lines, area_mm2 * motion.feed_mm_min / MM_MIN, 0.0)
-    for tool, name in loaded.items():
-        most = materials.load(name).print_range("max_flow_mm3_s", 0.0)[1]
+    for tool, material in loaded.items():
+        most = material.print_range("max_flow_mm3_s", 0.0)[1]
         wrong = (tools == tool) & (flow_mm3_s > most * (1 + 1e-6))
         fastest = float(flow_mm3_s[wrong].max(initial=0.0))
         yield from _found(
             motion, wrong, "melt", "error",
-            f"tool {tool} prints {fastest:.3g} mm3/s of {name}; it melts {most:g} mm3/s",
+            f"tool {tool} prints {fastest:.3g} mm3/s of {material.name}; it melts {most:g} mm3/s",
             "print slower or thinner lines",
         )  # fmt: skip
 

@@ -82,7 +82,10 @@ def clock(seconds: float) -> str:
     return f"{whole // 3600} h {round(seconds / 60) % 60:02} min"
 
 
-def report(motion: Motion, machine: Printer, loaded: dict[int, str] | None = None) -> Report:
+def report(
+    motion: Motion, machine: Printer, loaded: dict[int, str] | None = None,
+    texts: materials.Texts = materials.NO_TEXTS,
+) -> Report:  # fmt: skip
     """Sum a file up.
 
     Parameters
@@ -93,6 +96,8 @@ def report(motion: Motion, machine: Printer, loaded: dict[int, str] | None = Non
         Who is to print it.
     loaded : dict of int to str, optional
         Material of each tool; the printer's usual ones where a tool has one only.
+    texts : mapping
+        As of :func:`sensorgen.design.materials.load`.
     """
     printed = (motion.extruded_mm > 0) & (motion.length_mm > 0)
     low, high = motion.box_mm()  # axis by axis: a copy of all places would take much room
@@ -110,7 +115,7 @@ def report(motion: Motion, machine: Printer, loaded: dict[int, str] | None = Non
         moves=len(motion.rows),
         layers=int(max(motion.layer.values, default=0)),
         time_s=moving_s + (dwells_s if 0 <= dwells_s < math.inf else 0.0),
-        tools=tuple(_tools(motion, machine, usual(machine) | (loaded or {}))),
+        tools=tuple(_tools(motion, machine, usual(machine) | (loaded or {}), texts)),
         tool_changes=sum(a != b for a, b in pairwise(taken)),
         box_mm=(corners[0], corners[1]) if corners else None,
     )
@@ -123,7 +128,7 @@ def usual(machine: Printer) -> dict[int, str]:
     return {tool: material for material, tool in named if tools.count(tool) == 1}
 
 
-def _tools(motion: Motion, machine: Printer, loaded: dict[int, str]) -> Iterator[OfTool]:
+def _tools(motion: Motion, machine: Printer, loaded: dict[int, str], texts: materials.Texts) -> Iterator[OfTool]:
     count, start, extruded = len(motion.rows), machine.tool_at_start(), motion.extruded_mm
     tools = motion.tools.column(count, NO_TOOL if start is None else start).astype(np.int64)
     kinds = motion.kind.column(count, 0).astype(np.int64)
@@ -133,7 +138,7 @@ def _tools(motion: Motion, machine: Printer, loaded: dict[int, str]) -> Iterator
         length_mm, purge_mm = (float(extruded[rows].sum()) for rows in (tools == tool, (tools == tool) & waste))
         volume_mm3 = length_mm * math.pi / 4 * machine.filament_mm**2
         try:
-            density = materials.load(material).value("density_kg_m3").value if material else None
+            density = materials.load(material, texts=texts).value("density_kg_m3").value if material else None
         except (MissingValue, UnknownName):
             density = None
         mass_g = None if density is None else volume_mm3 * density * 1e-6

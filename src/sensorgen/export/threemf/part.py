@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sensorgen.core.errors import BadInput, OutOfRange
-from sensorgen.design import materials
 from sensorgen.design.design import Design
 from sensorgen.export.slicers.loads import load
 from sensorgen.export.slicers.prusa import volume_settings
@@ -131,7 +130,7 @@ def parts_of(design: Design, made: Mapping[str, Mesh]) -> list[Part]:
 
 def part_of(design: Design, name: str, material: str, mesh: Mesh) -> Part:
     """One body, with the tool that the design gives its material."""
-    tool, found = design.tool(material), materials.load(material)
+    tool, found = design.tool(material), design.material(material)
     settings = volume_settings(design.machine, design.layers, tool, load(design, material))
     if material not in {design.slot(end)[0].name for end in ("top_electrode", "bottom_electrode")}:
         settings["infill_overlap"] = FILM_OVERLAP

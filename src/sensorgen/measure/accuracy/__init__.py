@@ -12,13 +12,16 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from statistics import mean, stdev
 from typing import Any
 
 from sensorgen.core import yamlfile
+from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.design import packs
 from sensorgen.measure.immittance import impedance, quantity_of
 from sensorgen.measure.log.entries import Reading
+
+_KEYS = {"name", "also", "source", "ranges", "leads_ohm", "bands", "least_ohm", "most_ohm"}
 
 
 @dataclass(frozen=True)
@@ -227,15 +230,32 @@ def at_frequency(reading: Reading, frequency_hz: float) -> At:
 
 @cache
 def _all() -> dict[str, Instrument]:
-    found = {}
-    for file in sorted(files(__package__).iterdir(), key=lambda one: one.name):
-        if file.name.endswith(".yaml"):
-            one = _instrument(yamlfile.parse(file.read_text("utf-8"), file.name))
-            found[one.name] = one
-    return found
+    made = (parse(file.text(), str(file.path)) for file in packs.files("instruments"))
+    return {one.name: one for one in made}
+
+
+def parse(text: str, where: str) -> Instrument:
+    """An instrument by the text of its file, which ``where`` names in errors.
+
+    Raises
+    ------
+    BadInput
+        A key is missing, or is not what it should be.
+    """
+    try:
+        return _instrument(yamlfile.parse(text, where))
+    except KeyError as error:
+        raise BadInput(f"{where}: {error.args[0]} is missing") from None
+    except (AttributeError, TypeError, ValueError, ZeroDivisionError):
+        expected = "ranges of [ohm, percent, percent], bands of [Hz, Hz, percent, ohm, S]"
+        raise BadInput(f"{where}: expected name, source, and {expected}") from None
 
 
 def _instrument(data: dict[str, Any]) -> Instrument:
+    if unknown := set(data) - _KEYS:
+        raise UnknownName("key", min(unknown), _KEYS)
+    if not data["name"].split() or not isinstance(data["source"], str):
+        raise ValueError
     ranges = tuple(Range(ohm, percent / 100, of / 100) for ohm, percent, of in data.get("ranges", ()))
     bands = tuple(Band(low, high, percent / 100, zs, yo) for low, high, percent, zs, yo in data.get("bands", ()))
     plain = {name: data[name] for name in ("leads_ohm", "least_ohm", "most_ohm") if name in data}

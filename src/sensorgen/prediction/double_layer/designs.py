@@ -79,7 +79,7 @@ def halves(design: Design) -> list[Design]:
     if design.shape != "double":
         return [design]
     p = design.params
-    data = design.model_dump(include={"printer", "quality", "tools", "material_values"}) | {"shape": "reference"}
+    data = design.model_dump(include={"printer", "quality", "tools", "material_values", "own"}) | {"shape": "reference"}
     envelope = {f.name: getattr(p, f.name) for f in dataclasses.fields(p) if not f.name.endswith("dielectric_mm")}
     slots = design.model_dump(include={"materials"})["materials"]
     return [

@@ -19,7 +19,7 @@ from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless
 from sensorgen.workflows.batch import picture, printing, record, sheet, tab
 from sensorgen.workflows.batch.layout import Plate, Room, Size, column, packed, room
-from sensorgen.workflows.batch.pieces import Piece, pieces, shuffled, tools
+from sensorgen.workflows.batch.pieces import Piece, pieces, shuffled, texts, tools
 from sensorgen.workflows.batch.plan import Plan, load
 from sensorgen.workflows.batch.record import Record, ResolvedDesign, SlicedPlate
 from sensorgen.workflows.build import json_bytes, versions
@@ -231,7 +231,7 @@ def _record(
     found: Arranged, predicted: dict[str, Prediction], sliced: dict[str, SlicedPlate], stage: Path
 ) -> Record:  # fmt: skip
     plan, first = found.plan, found.pieces[0].design
-    loaded = record.tools(plan, found.tools)
+    loaded = record.tools(plan, found.tools, texts(found.designs.values()))
     for plate in reversed(sliced.values()):
         predicted |= {key: made.prediction for key, made in plate.printed.items() if made.prediction}
     return Record(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.design.design import Design
+from sensorgen.design.materials import Texts
 from sensorgen.design.specimen_name import Specimen, named
 from sensorgen.workflows.batch.plan import Plan
 
@@ -110,6 +111,23 @@ def _refuse_strangers(designs: Sequence[Design]) -> None:
                     f"set '{key}' in the plan, or make two plans"
                 )
     tools(designs)
+    texts(designs)
+
+
+def texts(designs: Iterable[Design]) -> Texts:
+    """Material files of all designs.
+
+    Raises
+    ------
+    BadInput
+        Two of one name that differ.
+    """
+    found: dict[str, str] = {}
+    for design in designs:
+        for name, text in design.own.get("materials", {}).items():
+            if found.setdefault(name, text) != text:
+                raise BadInput(f"one plate, two materials {name}, from different files: give each a name of its own")
+    return {"materials": found}
 
 
 def tools(designs: Iterable[Design]) -> dict[int, str]:

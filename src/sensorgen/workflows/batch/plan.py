@@ -11,10 +11,9 @@ from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
 from sensorgen.core.records import Strict, checked
 from sensorgen.design import design as design_files
-from sensorgen.design import materials
+from sensorgen.design import packs
 from sensorgen.design.design import Design, Slot
 from sensorgen.design.printer import Line
-from sensorgen.design.profile import with_own
 
 MOST = 1000  # specimens in one plan
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9._-]{0,58}[A-Za-z0-9])?$", examples=["26", "film-study"])]
@@ -40,8 +39,9 @@ class Item(Strict):
         path = folder / self.design
         if not path.exists():
             raise _unknown(self.design, path)
-        base = with_own(yamlfile.read(path), path.parent)
-        changes = {key: own for key in ("parameters", "materials") if (own := getattr(self, key))}
+        base = design_files.with_own_files(yamlfile.read(path), path.parent)
+        changes = {"parameters": self.parameters, "materials": packs.slots(self.materials)}
+        changes = {key: own for key, own in changes.items() if own}
         if not changes:
             return {"name": path.stem} | base
         unnamed = {key: value for key, value in base.items() if key != "name"}
@@ -123,7 +123,7 @@ class Plan(Strict):
             over["tools"] = _over(data.get("tools", {}), self.tools)
         if any(data.get(key) != value for key, value in over.items()):
             data = {key: value for key, value in (data | over).items() if key != "name"}
-        return design_files.make(data)
+        return design_files.make(packs.with_files(data, folder))
 
 
 def load(path: Path) -> Plan:
@@ -140,7 +140,7 @@ def load(path: Path) -> Plan:
         if plan.total > MOST:
             raise BadInput(f"{plan.total} specimens; expected at most {MOST}: make several plans")
         for name in plan.filaments:
-            materials.load(name)
+            packs.find("materials", name, path.parent)
     except SensorgenError as error:
         raise error.within(str(path)) from None
     return plan

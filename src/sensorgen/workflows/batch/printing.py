@@ -19,7 +19,7 @@ from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import timeless
 from sensorgen.workflows.batch import tab
 from sensorgen.workflows.batch.layout import Plate
-from sensorgen.workflows.batch.pieces import Piece, tools
+from sensorgen.workflows.batch.pieces import Piece, texts, tools
 from sensorgen.workflows.batch.plan import Plan
 from sensorgen.workflows.batch.record import PrintedDesign, SlicedPlate
 from sensorgen.workflows.build import json_bytes
@@ -80,7 +80,7 @@ def gcode(
         store.write(own, {settings: json_bytes(asdict(engine))})
     rmtree(inside)  # what is left are the bodies again, as the slicer took them
     loaded = tools(piece.design for piece in found)
-    checked = check_motion(made.lifted.motion, machine, loaded, others_empty=True)
+    checked = check_motion(made.lifted.motion, machine, loaded, others_empty=True, texts=texts(p.design for p in found))
     for piece in found:
         checked = checked.with_more(
             agreement.check(piece.design, made.lines, made.lifted.motion.changes, piece.sensor_mm(), piece=piece.name)

@@ -262,11 +262,11 @@ def specimens(pieces: Sequence[Piece], plate: Plate) -> dict[str, Specimen]:
     }  # fmt: skip
 
 
-def tools(plan: Plan, loaded: Mapping[int, str]) -> dict[str, Spool]:
-    """What is on each tool, by the printer's own number."""
+def tools(plan: Plan, loaded: Mapping[int, str], texts: materials.Texts) -> dict[str, Spool]:
+    """What is on each tool, by the printer's own number; ``texts`` as of :func:`sensorgen.design.materials.load`."""
     found = {}
     for tool, name in loaded.items():
-        material, filament = materials.load(name), plan.filaments.get(name, Filament())
+        material, filament = materials.load(name, texts=texts), plan.filaments.get(name, Filament())
         try:
             cam_dial = material.value("cam_dial").value
         except MissingValue:

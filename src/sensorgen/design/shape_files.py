@@ -1,0 +1,312 @@
+"""Shapes: those that ship are modules; the file of one from a pack runs in a process of its own, unless it is trusted.
+
+The process has a time and a memory limit, and what comes back is plain data, which is checked. Answers are stored by
+content (:mod:`sensorgen.core.cache`): a shape runs once for each set of parameters.
+"""
+
+import dataclasses
+import json
+import math
+import queue
+import re
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from functools import cache, lru_cache
+from hashlib import sha256
+from pathlib import Path
+from typing import IO, Any, Protocol, cast
+
+from sensorgen.core import cache as answers
+from sensorgen.core import errors, files
+from sensorgen.core.errors import BadInput, SensorgenError, Unwritable
+from sensorgen.design import packs, shape_process
+from sensorgen.scene.scene import FLOATING, Body, Envelope, Fill, Scene
+
+SECONDS = 5  # of processor time for one question; a scene takes milliseconds
+MEMORY_BYTES = 1 << 30
+MOST_BYTES = 1 << 26  # of an answer: 50 000 cells are a tenth of it
+TRUSTED = "trusted-shapes.txt"  # in the folder of the user's packs: hash and name, a line each
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
+_TERMINALS = ("", "top", "middle", "bottom", FLOATING)
+_OUTSIDE_MM = 1e-6
+
+
+class Shape(Protocol):
+    """What a shape is."""
+
+    __doc__: str | None
+
+    @property
+    def Params(self) -> type[Envelope]:  # noqa: N802 - a class
+        """Parameters, with range and help."""
+
+    def scene(self, p: Any, fill: Fill, /) -> Scene:
+        """Bodies for parameters and materials."""
+
+
+def load(name: str, text: str) -> Shape:
+    """A shape by its name and the text of its file.
+
+    Raises
+    ------
+    BadInput
+        The file is no shape; the message names its line.
+    """
+    return _trusted(name, text) if is_trusted(text) else _foreign(name, text)
+
+
+def digest(text: str) -> str:
+    """SHA-256 of a shape's file."""
+    return sha256(text.encode()).hexdigest()
+
+
+def is_trusted(text: str) -> bool:
+    """Whether the user has trusted a file with this very content."""
+    with suppress(OSError, UnicodeDecodeError):
+        lines = (packs.place() / TRUSTED).read_text("utf-8").splitlines()
+        return digest(text) in {line.partition(" ")[0] for line in lines}
+    return False
+
+
+def trust(name: str, text: str) -> Path:
+    """Let a shape's file with this content run in this process from now on; the list of such files."""
+    path, kept = packs.place() / TRUSTED, ""
+    with suppress(OSError, UnicodeDecodeError):
+        kept = path.read_text("utf-8")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        files.replace(path, f"{kept}{digest(text)} {name}\n".encode())
+    except OSError as error:
+        raise Unwritable(f"cannot write {str(path)!r}: {error.strerror or error}") from None
+    return path
+
+
+@lru_cache(maxsize=32)
+def _trusted(name: str, text: str) -> Shape:
+    module = _in_this_process(name, lambda: shape_process.module_of(f"sensorgen_shape_{digest(text)[:16]}", text))
+    _fields(name, shape_process.described(module))
+    made = module.scene
+    module.scene = lambda p, fill: _checked(name, _in_this_process(name, lambda: made(p, fill)), fill)
+    return cast(Shape, module)
+
+
+def _in_this_process(name: str, work: Callable[[], Any]) -> Any:
+    try:
+        return work()
+    except SensorgenError:
+        raise
+    except Exception as error:  # whatever the file does
+        raise BadInput(shape_process.fault(error, f"{name}.py")) from None
+
+
+class _Foreign:
+    """A shape whose file runs elsewhere: its parameters here, each scene from there."""
+
+    def __init__(self, name: str, text: str) -> None:
+        self._name, self._text = name, text
+        said = self._ask({})
+        self.__doc__ = str(said.get("about", ""))[:4000]
+        self.SHORT = said["short"] if _NAME.fullmatch(str(said.get("short") or "")) else name
+        cells = self._cells
+        self.Params: type[Envelope] = dataclasses.make_dataclass(
+            "Params", _fields(name, said), bases=(Envelope,), frozen=True, namespace={"cells": lambda p: cells(p)}
+        )
+        self.scene = lru_cache(maxsize=256)(self._scene)
+
+    def _cells(self, p: Envelope) -> float:
+        cells = self._ask({"parameters": dataclasses.asdict(p)})
+        if not isinstance(cells, (int, float)) or isinstance(cells, bool) or not cells > 0:
+            raise BadInput(f"{self._name}.py: cells() is {cells!r:.60}; expected a number above 0")
+        return float(cells)
+
+    def _scene(self, p: Envelope, fill: Fill) -> Scene:
+        data = self._ask({"parameters": dataclasses.asdict(p), "fill": dataclasses.asdict(fill)})
+        try:
+            return _checked(self._name, _adapter().validate_python(data), fill)
+        except ValueError as error:
+            first = error.errors()[0] if hasattr(error, "errors") else {"loc": (), "msg": str(error)}
+            place = ".".join(map(str, first["loc"]))
+            raise BadInput(f"{self._name}.py: scene() gives no scene: {place}: {first['msg']}") from None
+
+    def _ask(self, question: Mapping[str, Any]) -> Any:
+        """What the file answers, or answered before."""
+        key = {"shape": digest(self._text), "question": question}
+        known = answers.known(key)
+        if known is None:
+            known = _process(self._name, self._text).ask(question)
+            answers.keep(key, known)
+        return known
+
+
+@lru_cache(maxsize=32)
+def _foreign(name: str, text: str) -> Shape:
+    return cast(Shape, _Foreign(name, text))
+
+
+@cache
+def _adapter() -> Any:
+    from pydantic import TypeAdapter
+
+    from sensorgen.scene import polyhedra, revolved, scene
+
+    made = TypeAdapter(Scene)
+    made.rebuild(_types_namespace=vars(scene) | vars(polyhedra) | vars(revolved))
+    return made
+
+
+def _fields(name: str, said: Mapping[str, Any]) -> list[tuple[str, type, Any]]:
+    """Parameters as a shape's file describes them, checked."""
+    found: list[tuple[str, type, Any]] = []
+    inherited = {f.name for f in dataclasses.fields(Envelope)}
+    if missing := inherited - {str(field.get("name")) for field in said["fields"]}:
+        raise BadInput(f"{name}.py: Params has no {sorted(missing)[0]}; expected a dataclass derived from Envelope")
+    for field in said["fields"]:
+        key, default, about = str(field["name"]), field["default"], dict(field["metadata"])
+        where = f"{name}.py: parameter {key[:60]}"
+        if not _NAME.fullmatch(key):
+            raise BadInput(f"{where}: expected a name of small letters, digits and '_'")
+        if not isinstance(about.get("help"), str) or not about["help"]:
+            raise BadInput(f"{where} has no help; write metadata={{'help': ..., 'range': (low, high)}}")
+        if choices := about.get("choices"):
+            if default not in choices or not all(isinstance(each, str) for each in choices):
+                raise BadInput(f"{where}: default {default!r:.40} is not among its choices")
+            about["choices"] = tuple(choices)
+        else:
+            try:
+                low, high = (float(end) for end in about["range"])
+                sound = math.isfinite(high - low) and low <= float(default) <= high
+            except (KeyError, TypeError, ValueError):
+                raise BadInput(f"{where} has no range; write metadata={{'help': ..., 'range': (low, high)}}") from None
+            if not sound:
+                raise BadInput(f"{where}: default {default!r:.40} is outside its range {low:g} to {high:g}")
+            default, about["range"] = float(default), (low, high)
+        found.append((key, str if choices else float, dataclasses.field(default=default, metadata=about)))
+    return found
+
+
+def _checked(name: str, scene: Scene, fill: Fill) -> Scene:
+    """Refuse a scene that no sensor has.
+
+    Raises
+    ------
+    BadInput
+        No scene; a body without a sound name, terminal or material, or one that leaves the box.
+    """
+    if not isinstance(scene, Scene):
+        raise BadInput(f"{name}.py: scene() gives {type(scene).__name__}; expected a Scene")
+    if not all(math.isfinite(size) and size > 0 for size in scene.size_mm) or len(scene.size_mm) != 3:
+        raise BadInput(f"{name}.py: size_mm is {scene.size_mm}; expected three lengths above 0")
+    if not scene.bodies:
+        raise BadInput(f"{name}.py: the scene has no bodies")
+    names = [body.name for body in scene.bodies]
+    for body in scene.bodies:
+        _check_body(f"{name}.py: body {body.name[:60]!r}", body, scene.size_mm, names, fill)
+    return scene
+
+
+def _check_body(where: str, body: Body, size_mm: tuple[float, float, float], names: list[str], fill: Fill) -> None:
+    """Raise BadInput for a body that no sensor has."""
+    if not _NAME.fullmatch(body.name) or names.count(body.name) > 1:
+        raise BadInput(f"{where}: expected a name of its own, of small letters, digits and '_'")
+    if body.terminal not in _TERMINALS:
+        raise BadInput(f"{where}: terminal {body.terminal[:40]!r}; expected top, middle, bottom, floating or ''")
+    if not body.material or body.material not in dataclasses.asdict(fill).values():
+        raise BadInput(f"{where}: material {body.material[:40]!r} is none of the design's; take it from fill")
+    for piece in body.pieces:
+        for axis, size in zip("xyz", size_mm, strict=True):
+            low, high = piece.span(axis)
+            if not -_OUTSIDE_MM <= low < high <= size + _OUTSIDE_MM:
+                raise BadInput(f"{where}: {low:g} to {high:g} mm along {axis}; expected within 0 to {size:g} mm")
+
+
+class _Process:
+    """The process that runs one shape's file."""
+
+    def __init__(self, name: str, text: str) -> None:
+        self.name = name
+        self._process = subprocess.Popen(  # noqa: S603 - this very program
+            [sys.executable, "-I", "-S", "-B", shape_process.__file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL, env={},
+        )  # fmt: skip
+        self._lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        threading.Thread(target=_read, args=(self._process.stdout, self._lines), daemon=True).start()
+        self.about = self._exchange({"name": name, "text": text, "seconds": SECONDS, "memory_bytes": MEMORY_BYTES})
+
+    def ask(self, question: Mapping[str, Any]) -> Any:
+        """The answer to a question; to an empty one, what the file says of itself."""
+        return self._exchange(question) if question else self.about
+
+    def _exchange(self, question: Mapping[str, Any]) -> Any:
+        pipe = cast(IO[bytes], self._process.stdin)
+        with suppress(OSError):
+            pipe.write(f"{json.dumps(question)}\n".encode())
+            pipe.flush()
+        try:
+            line = self._lines.get(timeout=10 + 6 * SECONDS)
+        except queue.Empty:
+            line = b""
+        try:
+            said = json.loads(line, parse_constant=_refuse) if line else None
+        except ValueError:
+            said = None
+        if not isinstance(said, dict) or not said.keys() & {"answer", "refused", "fault"}:
+            code = self.close()
+            why = "time or memory is over" if code < 0 else f"exit code {code}"
+            raise BadInput(f"{self.name}.py: its process ended without an answer ({why}); a shape only computes")
+        if "answer" in said:
+            return said["answer"]
+        if "refused" in said:
+            kind = getattr(errors, str(said.get("kind")), SensorgenError)
+            refused: SensorgenError = kind.__new__(kind)
+            refused.args = (str(said["refused"])[:500],)
+            raise refused
+        self.close()
+        raise BadInput(str(said["fault"])[:500])
+
+    def close(self) -> int:
+        """End the process; its exit code."""
+        _RUNNING.pop(next((key for key, each in _RUNNING.items() if each is self), ("", "")), None)
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(0.2)
+        self._process.kill()
+        for pipe in (self._process.stdin, self._process.stdout):
+            with suppress(OSError):
+                pipe and pipe.close()
+        return self._process.wait()
+
+
+_RUNNING: dict[tuple[str, str], _Process] = {}
+_MOST = 4  # processes at once
+
+
+def _process(name: str, text: str) -> _Process:
+    key = name, text
+    if key not in _RUNNING:
+        if len(_RUNNING) >= _MOST:
+            next(iter(_RUNNING.values())).close()
+        if not _RUNNING:
+            import atexit
+
+            atexit.register(_close_all)
+        made = _Process(name, text)
+        _RUNNING[key] = made
+    return _RUNNING[key]
+
+
+def _close_all() -> None:
+    for each in list(_RUNNING.values()):
+        each.close()
+
+
+def _read(pipe: IO[bytes], lines: "queue.SimpleQueue[bytes]") -> None:
+    with suppress(OSError, ValueError):
+        while line := pipe.readline(MOST_BYTES):
+            lines.put(line if line.endswith(b"\n") else b"")
+    lines.put(b"")
+
+
+def _refuse(word: str) -> Any:
+    raise ValueError(word)
