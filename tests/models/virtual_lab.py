@@ -226,7 +226,7 @@ def plate_table(nominal_mm):
     """ln C over thickness and permittivity."""
     t, eps = np.array([0.7, 1.0, 1.4]) * nominal_mm, np.array([1.8, 3.0, 4.5, 7.0, 12.0])
     values = np.log([[plate_f(a, b) for b in eps] for a in t])
-    return RegularGridInterpolator((np.log(t), np.log(eps)), values)
+    return RegularGridInterpolator((np.log(t), np.log(eps)), values, bounds_error=False, fill_value=None)
 
 
 @lru_cache
@@ -327,7 +327,7 @@ def _true(coupon, actual, truth, rng):
             larger = (actual[f"top_{k}_diameter_mm"] / 2 / catalogue.PLATE_RADIUS_MM) ** 2
             found.append(c * larger * (1 + rng.normal(0, 0.003)) + stray)
         return found
-    role = "conductor" if len(coupon.readings) == 3 else "dielectric"
+    role = "conductor" if coupon.readings[0].key == "through_ohm" else "dielectric"
     e, q = getattr(truth, f"{role}_pa"), getattr(truth, f"{role}_1_2nu")
     a, h = actual["diameter_mm"] / 2, actual["height_mm"]
     area = pi * a**2 * 1e-6 * fill
@@ -335,6 +335,7 @@ def _true(coupon, actual, truth, rng):
     slides = e * 2 * (exp(rise) - rise - 1) / rise**2
     sticks = e * bonded(coupon.drawn("diameter_mm") / 2, coupon.drawn("height_mm"), q)
     pressed = [m * area / (h * 1e-3) * (1 + rng.normal(0, 0.01)) for m in (slides, sticks)]
+    pressed = pressed[: len(coupon.readings) - (role == "conductor")]
     if role == "dielectric":
         return pressed
     ends = truth.terminal_ohm_m2 * np.exp(rng.normal(0, 0.05, 2)).sum()

@@ -56,14 +56,19 @@ def _plan(
     render.deliver(made)
 
 
-def _read(form: str, name: str, *, dry_run: bool) -> None:
+def _read(form: str, name: str, picture: str | None, *, dry_run: bool) -> None:
     """Evaluate a form that was filled in: values with 95 % intervals, kept as a source that designs can name.
 
     Gaps are allowed. A coupon that contradicts the others is left out, with the probability that it is broken.
     """
+    from sensorgen.core import files
     from sensorgen.workflows.characterise import read
+    from sensorgen.workflows.characterise.intervals import svg
 
-    render.deliver(read(Path(form), name, keep=not dry_run))
+    found = read(Path(form), name, keep=not dry_run)
+    if picture:
+        files.replace(Path(picture), svg(found.source, found.rows).encode())
+    render.deliver(found)
 
 
 command = _PrinterGroup(
@@ -74,6 +79,7 @@ command = _PrinterGroup(
             params=[
                 click.Argument(["form"]),
                 click.Option(["--name"], default="", metavar="SOURCE", help="As in etpu@SOURCE; from the plate if not given."),
+                click.Option(["--picture"], metavar="FILE", help="Draw the intervals before and after, as SVG."),
                 click.Option(["--dry-run"], is_flag=True, help="Write no file."),
                 *render.options(file=False),
             ],

@@ -20,6 +20,7 @@ LADDER_MM = (3.0, 6.0, 12.0, 24.0)  # between neighbouring strips
 STRIP_MM = 3.0  # each strip of the ladder, along the bar
 PLATE_RADIUS_MM, ELECTRODE_MM, UPPER_MM = 10.0, 0.4, 0.2  # of plates: radius, and thickness of both electrodes
 PAD_MM = 8.0  # of the lower electrode, for a probe
+_LOWEST_MM = 1.5  # of a disc that is compressed: a thinner one moves less than a gauge resolves
 _STRAIN = 0.04  # that the proposed load makes
 _MOST_N = 100.0  # of a usual stand
 _FILL = 0.015  # coupons of one plate differ in how well they are filled [-]
@@ -399,19 +400,23 @@ def _disc(material: Material, role: str, diameter: float, height: float) -> Coup
         if not conducts:
             return pressed
         ends = values["terminal_ohm_m2"] * (sizes["lower_face"] + sizes["upper_face"])
-        return ((values["through_ohm_m"] * h + ends) / (pi * a**2 * sizes["fill"]), *pressed)
+        through = (values["through_ohm_m"] * h + ends) / (pi * a**2 * sizes["fill"])
+        return (through, *pressed) if height >= _LOWEST_MM else (through,)
 
     centre, _ = _range(material, "youngs_modulus_pa", 1e6, 1e8)
     a, h = diameter / 2 * M_PER_MM, height * M_PER_MM
     usual = (np.exp(centre), float(closed.bonded_modulus(np.exp(centre), 0.01, a, h)))
     loads = [min(_MOST_N, float(f"{_STRAIN * pi * a**2 * modulus:.2g}")) for modulus in usual]
+    presses = (
+        Reading("sliding", "stiffness", "compression between lubricated plates", loads[0]),
+        Reading("bonded", "stiffness", "compression between plates that it is glued to", loads[1]),
+    )
+    through = Reading("through_ohm", "resistance", "two-wire, terminals over both faces, DC")
     return Coupon(
         f"disc-{material.name}-{diameter:g}x{height:g}", "disc", material.name,
         (_millimetres("diameter_mm", diameter), _millimetres("height_mm", height), Size("fill", 1.0, _FILL),
          Size("bonded", 1.0, 0.05), Size("lower_face", 1.0, 0.05), Size("upper_face", 1.0, 0.05)),
-        (*([Reading("through_ohm", "resistance", "two-wire, terminals over both faces, DC")] if conducts else []),
-         Reading("sliding", "stiffness", "compression between lubricated plates", loads[0]),
-         Reading("bonded", "stiffness", "compression between plates that it is glued to", loads[1])),
+        (*([through] if conducts else []), *(presses if height >= _LOWEST_MM else ())),
         expected, pi * diameter**2 / 4 * height, (diameter, diameter),
     )  # fmt: skip
 

@@ -4,7 +4,7 @@ Each set of dead coupons is a model of its own: its evidence (Laplace) weighs it
 A dead coupon's readings may be anything within some decades.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import log
@@ -16,6 +16,7 @@ from sensorgen.core.arrays import Mask, Real
 
 DEAD = 0.05  # of coupons, before anything is read
 _DECADES = 6.0  # within which the reading of a dead coupon lies
+_MOST_DEAD, _REFINED = 3, 4  # coupons at once; sets of dead ones that are solved, of those that are sketched
 _STEP, _STEPS = 1e-4, 40
 _STILL = 0.02  # in standard deviations: the last step
 
@@ -101,17 +102,30 @@ class Mode:
     log_evidence: float
 
 
-def _mode(observations: Sequence[Observation], unknowns: Sequence[Unknown], dead: tuple[int, ...], start: Real) -> Mode:
-    """Most likely unknowns given which coupons are dead, by Gauss and Newton with halved steps."""
-    centre, spread = np.array([(u.centre, u.spread) for u in unknowns]).T
-    alive = [o for k, o in enumerate(observations) if k not in dead]
+class _Problem:
+    """Observations and unknowns: the posterior density near a point, and its peaks."""
 
-    def at(theta: Real) -> tuple[float, Real, Real]:
+    def __init__(self, observations: Sequence[Observation], unknowns: Sequence[Unknown]) -> None:
+        self.observations, self.unknowns = observations, unknowns
+        self.centre, self.spread = np.array([(u.centre, u.spread) for u in unknowns]).T
+
+    def lines(self, theta: Real, dead: Sequence[int] = ()) -> dict[int, Line]:
+        """Every coupon's readings near a point, but those of the dead."""
+        return {
+            k: linearised(o.coupon, o.sizes, o.noise, self.unknowns, theta)
+            for k, o in enumerate(self.observations) if k not in dead
+        }  # fmt: skip
+
+    def density(self, theta: Real, lines: Mapping[int, Line]) -> tuple[float, Real, Real]:
         """Minus ln of the posterior density, its gradient, and its curvature."""
-        off = (theta - centre) / spread
-        cost, gradient, curvature = 0.5 * off @ off + np.log(spread).sum(), off / spread, np.diag(spread**-2.0)
-        for o in alive:
-            line = linearised(o.coupon, o.sizes, o.noise, unknowns, theta)
+        off = (theta - self.centre) / self.spread
+        cost, gradient, curvature = (
+            0.5 * off @ off + np.log(self.spread).sum(),
+            off / self.spread,
+            np.diag(self.spread**-2.0),
+        )
+        for k, line in lines.items():
+            o = self.observations[k]
             residual = (o.log_values - line.log_values)[o.read]
             covariance = line.covariance[np.ix_(o.read, o.read)]
             if not np.isfinite(residual).all() or not np.isfinite(covariance).all():
@@ -123,26 +137,40 @@ def _mode(observations: Sequence[Observation], unknowns: Sequence[Unknown], dead
             curvature = curvature + jacobian.T @ jacobian
         return float(cost), gradient, curvature
 
-    theta, (cost, gradient, curvature) = start, at(start)
-    for _ in range(_STEPS):
+    def peak(self, start: Real, dead: tuple[int, ...]) -> Mode:
+        """Most likely unknowns given which coupons are dead, by Gauss and Newton with halved steps."""
+        theta, (cost, gradient, curvature) = start, self.density(start, self.lines(start, dead))
+        if not np.isfinite(cost):  # a gap that is wider than its film, as a step too far may have it
+            theta, (cost, gradient, curvature) = self.centre, self.density(self.centre, self.lines(self.centre, dead))
+        for _ in range(_STEPS):
+            step, share = -np.linalg.solve(curvature, gradient), 1.0
+            size = float(np.sqrt(step @ curvature @ step))
+            new = self.density(theta + step, self.lines(theta + step, dead))
+            while not new[0] <= cost + 1e-9 and share > 1e-3:
+                share /= 2
+                new = self.density(theta + share * step, self.lines(theta + share * step, dead))
+            if not new[0] <= cost + 1e-9:
+                break
+            theta, (cost, gradient, curvature) = theta + share * step, new
+            if size * share < _STILL:
+                break
+        return self.mode(theta, dead, cost, curvature)
+
+    def sketch(self, mode: Mode, lines: Mapping[int, Line], also: int) -> Mode:
+        """The peak with one more coupon dead, from readings that are linear around another peak."""
+        dead = tuple(sorted((*mode.dead, also)))
+        cost, gradient, curvature = self.density(mode.mean, {k: line for k, line in lines.items() if k not in dead})
         step = -np.linalg.solve(curvature, gradient)
-        size, share = float(np.sqrt(step @ curvature @ step)), 1.0
-        step *= min(1.0, 8.0 / max(size, 1e-30) if size > 1e3 else 1.0)
-        new = at(theta + step)
-        while new[0] > cost + 1e-9 and share > 1e-3:
-            share /= 2
-            new = at(theta + share * step)
-        if new[0] > cost + 1e-9:
-            break
-        theta, (cost, gradient, curvature) = theta + share * step, new
-        if size * share < _STILL:
-            break
-    covariance = np.linalg.inv(curvature)
-    _, log_det = np.linalg.slogdet(covariance)
-    count = sum(int(observations[k].read.sum()) for k in dead)
-    evidence = -cost + 0.5 * log_det - count * log(_DECADES * log(10.0))
-    evidence += len(dead) * log(DEAD) + len(alive) * log(1 - DEAD)
-    return Mode(dead, theta, covariance, evidence)
+        return self.mode(mode.mean + step, dead, cost + 0.5 * gradient @ step, curvature)
+
+    def mode(self, theta: Real, dead: tuple[int, ...], cost: float, curvature: Real) -> Mode:
+        """A peak with its evidence by Laplace's approximation."""
+        covariance = np.linalg.inv(curvature)
+        _, log_det = np.linalg.slogdet(covariance)
+        count = sum(int(self.observations[k].read.sum()) for k in dead)
+        evidence = -cost + 0.5 * log_det - count * log(_DECADES * log(10.0))
+        evidence += len(dead) * log(DEAD) + (len(self.observations) - len(dead)) * log(1 - DEAD)
+        return Mode(dead, theta, covariance, evidence)
 
 
 @dataclass(frozen=True)
@@ -234,13 +262,13 @@ def posterior(observations: Sequence[Observation], unknowns: Sequence[Unknown]) 
     unknowns : sequence of Unknown
         With what was known before.
     """
-    read = [o for o in observations if o.read.any()]
-    start = np.array([u.centre for u in unknowns])
-    modes: dict[tuple[int, ...], Mode] = {(): _mode(read, unknowns, (), start)}
-    best = modes[()]
-    for _ in range(3):
-        around = [tuple(sorted((*best.dead, k))) for k in range(len(read)) if k not in best.dead]
-        modes |= {dead: _mode(read, unknowns, dead, best.mean) for dead in around if dead not in modes}
+    problem = _Problem([o for o in observations if o.read.any()], unknowns)
+    best = problem.peak(problem.centre, ())
+    modes: dict[tuple[int, ...], Mode] = {(): best}
+    for _ in range(_MOST_DEAD):
+        lines = problem.lines(best.mean, best.dead)
+        around = sorted((problem.sketch(best, lines, k) for k in lines), key=lambda mode: -mode.log_evidence)
+        modes |= {m.dead: problem.peak(m.mean, m.dead) for m in around[:_REFINED] if m.dead not in modes}
         top = max(modes.values(), key=lambda mode: mode.log_evidence)
         if top is best:
             break
@@ -251,5 +279,5 @@ def posterior(observations: Sequence[Observation], unknowns: Sequence[Unknown]) 
     weights = np.where(kept, weights, 0.0)
     return Posterior(
         tuple(unknowns), tuple(m for m, k in zip(ranked, kept, strict=True) if k), weights[kept] / weights.sum(),
-        tuple(o.coupon.name for o in read),
+        tuple(o.coupon.name for o in problem.observations),
     )  # fmt: skip

@@ -24,6 +24,7 @@ COPIES = 3  # of one coupon at most
 MISSED = 10.0  # lambda, as much as five halved intervals are worth for a goal missed by a factor of two
 RESERVE = 3.0  # a dead coupon may widen an interval beyond its goal by this factor; more costs a share of lambda
 _SHARE = 0.4
+_MOST_PAIRS = 10_000  # of exchanges of two coupons at once
 _GAIN = 1e-9  # below which an exchange is rounding
 
 Fits = Callable[[tuple[int, ...]], bool]
@@ -121,7 +122,7 @@ def select(found: Candidates, count: int, fits: Fits) -> tuple[int, ...]:
     Notes
     -----
     Coupons are added while there is room, each the best one; then one is exchanged for another, removed or added, or two
-    for others of their kinds, as long as that is better (Fedorov's exchange). The optimum of such steps, not proved to
+    are exchanged at once, as long as that is better (Fedorov's exchange). The optimum of such steps, not proved to
     be the largest: equal to the search through all sets on small catalogues.
     """
     chosen: tuple[int, ...] = ()
@@ -159,17 +160,19 @@ def _one_step(found: Candidates, chosen: tuple[int, ...], count: int) -> set[tup
     return steps
 
 
-def _two_steps(found: Candidates, chosen: tuple[int, ...], _: int) -> set[tuple[int, ...]]:
-    """Two coupons for others of their kinds."""
-    kinds = [(coupon.kind, coupon.material) for coupon in found.coupons]
+def _two_steps(found: Candidates, chosen: tuple[int, ...], count: int) -> set[tuple[int, ...]]:
+    """One coupon for two, and two for two others; these of the same kinds alone where there are too many pairs."""
+    every = range(len(found.coupons))
+    steps: set[tuple[int, ...]] = set()
+    for left in _without_one(chosen) if len(chosen) < count else ():
+        steps |= {tuple(sorted((*left, a, b))) for a in every for b in range(a, len(every))}
+    few = len(chosen) ** 2 * len(every) ** 2 <= _MOST_PAIRS
+    kinds = [few or (coupon.kind, coupon.material) for coupon in found.coupons]
     alike = {k: [j for j, kind in enumerate(kinds) if kind == kinds[k]] for k in chosen}
-    pairs = {(i, j) for n, i in enumerate(chosen) for j in chosen[n + 1 :]}
-    steps = set()
-    for i, j in pairs:
-        left = list(chosen)
-        left.remove(i)
-        left.remove(j)
-        steps |= {tuple(sorted((*left, a, b))) for a in alike[i] for b in alike[j]}
+    for m, i in enumerate(chosen):
+        for n, j in enumerate(chosen[m + 1 :], m + 1):
+            left = chosen[:m] + chosen[m + 1 : n] + chosen[n + 1 :]
+            steps |= {tuple(sorted((*left, a, b))) for a in alike[i] for b in alike[j]}
     return steps
 
 

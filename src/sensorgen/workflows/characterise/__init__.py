@@ -25,7 +25,7 @@ from sensorgen.core import files as store
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError
 from sensorgen.core.version import __version__
-from sensorgen.design import materials
+from sensorgen.design import materials, packs
 from sensorgen.design.design import Design
 from sensorgen.design.materials import own
 from sensorgen.export.slicers.loads import load, recipe
@@ -384,13 +384,13 @@ def read(path: Path, source: str = "", *, keep: bool = True) -> Characterised:
     """
     form = forms.read(path)
     label = source or "lab-" + "".join(c if c.isalnum() else "-" for c in form.plate.lower()).strip("-")
-    if not own.NAME.fullmatch(label):
+    if not packs.is_name("sources", label):
         raise BadInput(f"--name {label!r}; expected lower-case letters, digits, '.' and '-', as in lab-spool7")
     try:
         study = Study.of(form.printer, [form.conductor, form.dielectric], quality=form.quality)
+        piece = forms.lines_of(form)
         observed = forms.observations(form, study.coupons, study.expected())
         found = posterior(observed, study.unknowns)
-        piece = forms.lines_of(form)
     except SensorgenError as error:
         raise error.within(str(path)) from None
     made = Characterised(
