@@ -14,6 +14,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "models"))
 
 import virtual_lab
+
 from sensorgen.analysis.characterise import selection
 from sensorgen.analysis.characterise.catalogue import Meters
 from sensorgen.analysis.characterise.posterior import posterior

@@ -23,7 +23,7 @@ PAGES = (
     ["bench", "hysteresis"], ["bench", "sets"], ["bench", "live"],
     ["log"],
     *(["log", w] for w in ("specimen", "add", "import", "bench", "predict", "list", "show", "export", "verify")),
-    ["report"], ["fit"], ["calibrate"], ["thesis"], ["list"], ["schema"], ["completion"],
+    ["report"], ["fit"], ["characterise"], ["characterise", "PRINTER"], ["characterise", "read"], ["calibrate"], ["thesis"], ["list"], ["schema"], ["completion"],
 )  # fmt: skip
 
 

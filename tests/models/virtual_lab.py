@@ -7,12 +7,14 @@ friction by Siebel's formula, a Hencky solid. Lines are extruded too thinly, and
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from math import exp, log, pi
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import spsolve
+
 from sensorgen.analysis.characterise import catalogue
 from sensorgen.analysis.characterise.posterior import Observation
 from sensorgen.models import traxels
@@ -47,7 +49,8 @@ def hidden(rng, names):
     bulk = exp(rng.uniform(log(0.05), log(0.8)))
     return Hidden(
         bulk, bulk * LINE_MM * 1e-3 * exp(rng.uniform(log(0.3), log(3.0))), bulk * rng.uniform(1.2, 4.0),
-        exp(rng.uniform(log(3e-5), log(5e-4))), rng.uniform(3.2, 7.5), float(np.clip(rng.normal(5e-6, 1e-5), -1.2e-5, 4e-5)),
+        exp(rng.uniform(log(3e-5), log(5e-4))), rng.uniform(3.2, 7.5),
+        float(np.clip(rng.normal(5e-6, 1e-5), -1.2e-5, 4e-5)),
         exp(rng.uniform(log(8e6), log(4e7))), exp(rng.uniform(log(8e5), log(1e7))),
         exp(rng.uniform(log(2e-3), log(0.1))), exp(rng.uniform(log(2e-3), log(0.1))),
         rng.uniform(1e-3, 0.1), rng.uniform(0.9, 1.0), str(rng.choice(names)),
@@ -178,7 +181,7 @@ def ladder_ohm(along, through, contact, gap_mm, width_mm, height_mm):
 def _graded(stops, step, growth=1.25):
     """Grid lines through given places, fine at each of them and growing away from it."""
     found = [stops[0]]
-    for a, b in zip(stops[:-1], stops[1:], strict=True):
+    for a, b in pairwise(stops):
         half, h, at = [], step, 0.0
         while at + h < (b - a) / 2:
             at += h
@@ -203,11 +206,11 @@ def plate_f(thickness_mm, permittivity, radius_mm=catalogue.PLATE_RADIUS_MM, ste
     index = np.arange(nr * nz).reshape(nr, nz)
     radial = eps * (rm / dr)[:, None] * dz / 2
     inner, outer = (rm**2 - r[:-1] ** 2) / 2, (r[1:] ** 2 - rm**2) / 2
-    links = []
-    for j in (0, 1):
-        links.append((index[:-1, j : nz - 1 + j], index[1:, j : nz - 1 + j], radial))
-    for area, i in ((inner, 0), (outer, 1)):
-        links.append((index[i : nr - 1 + i, :-1], index[i : nr - 1 + i, 1:], eps * area[:, None] / dz))
+    links = [(index[:-1, j : nz - 1 + j], index[1:, j : nz - 1 + j], radial) for j in (0, 1)]
+    links += [
+        (index[i : nr - 1 + i, :-1], index[i : nr - 1 + i, 1:], eps * area[:, None] / dz)
+        for area, i in ((inner, 0), (outer, 1))
+    ]
     a, b, g = (np.concatenate([link[k].ravel() for link in links]) for k in range(3))
     n = nr * nz
     rows, cols = np.concatenate([a, b, a, b]), np.concatenate([a, b, b, a])
@@ -267,7 +270,8 @@ def bonded_factor(radius_mm, height_mm, incompressibility, fine=10):
     x = np.zeros(whole.shape[0])
     x[top.all(["u^2"])] = -0.01 * h / 2
     held = np.unique(np.concatenate([
-        top.all(), basis.get_dofs(lambda x: x[1] < near).all(["u^2"]), basis.get_dofs(lambda x: x[0] < near).all(["u^1"]),
+        top.all(), basis.get_dofs(lambda x: x[1] < near).all(["u^2"]),
+        basis.get_dofs(lambda x: x[0] < near).all(["u^1"]),
     ]))  # fmt: skip
     x = fem.solve(*fem.condense(whole, np.zeros(len(x)), x=x, D=held))
     energy = 2 * pi * float(x @ (whole @ x)) / 2 if incompressibility > 1 else None

@@ -34,7 +34,7 @@ def _printer_command(printer: str) -> click.Command:
             click.Option(["--name"], default="", metavar="NAME", help="Of the plate, and of its folder."),
             click.Option(["--count"], type=int, default=12, show_default=True, help="Most coupons."),
             click.Option(["--hours"], type=float, default=4.0, show_default=True, help="Longest print [h]."),
-            click.Option(["--out"], default="out", show_default=True, metavar="DIR", help="Folder for plates' folders."),
+            click.Option(["--out"], default="out", show_default=True, metavar="DIR", help="Folder of plates."),
             *render.options(),
         ],
     )  # fmt: skip
@@ -78,7 +78,7 @@ command = _PrinterGroup(
             "read", callback=_read, help=_read.__doc__, short_help="Values from a filled-in form.",
             params=[
                 click.Argument(["form"]),
-                click.Option(["--name"], default="", metavar="SOURCE", help="As in etpu@SOURCE; from the plate if not given."),
+                click.Option(["--name"], default="", metavar="SOURCE", help="As in etpu@SOURCE; else from the plate."),
                 click.Option(["--picture"], metavar="FILE", help="Draw the intervals before and after, as SVG."),
                 click.Option(["--dry-run"], is_flag=True, help="Write no file."),
                 *render.options(file=False),

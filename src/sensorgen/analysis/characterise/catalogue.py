@@ -31,7 +31,7 @@ Values = Mapping[str, Real]  # of unknowns in SI, or of sizes [mm]
 
 @dataclass(frozen=True)
 class Unknown:
-    """What the readings depend on, and what is known of it before: a normal distribution, of ln unless linear.
+    """What the readings depend on, with its prior: a normal distribution, of ln unless linear.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Size:
     drawn : float
         As drawn, or its most likely value.
     spread : float
-        Standard deviation where nobody measures it.
+        Standard deviation where it is not measured.
     measured : bool
         Whether calipers can measure it.
     """
@@ -297,7 +297,8 @@ def _bar(material: str, degrees: float | None, height: float, line_m: float) -> 
     turned = {45.0: (54.0, 54.0), 90.0: (width + 4.0, 60.0)}.get(degrees or 0.0, (60.0, width + 4.0))
     return Coupon(
         name, "bar", material,
-        (_millimetres("width_mm", width), _millimetres("height_mm", height), Size("taps_mm", length, 0.2), Size("edge", 1.0, 0.012 if degrees else 0.005),
+        (_millimetres("width_mm", width), _millimetres("height_mm", height), Size("taps_mm", length, 0.2),
+         Size("edge", 1.0, 0.012 if degrees else 0.005),
          Size("fill", 1.0, _FILL)),
         (Reading("resistance_ohm", "resistance", f"four-wire, between the side taps {length:g} mm apart, DC"),),
         expected, 60 * width * height + 16 * height, turned, degrees,
@@ -379,8 +380,8 @@ def _plate(material: str, thicknesses_mm: tuple[float, ...]) -> Coupon:
         (*measured, _millimetres("electrode_mm", ELECTRODE_MM), Size("fringe", 1.0, 0.03), Size("fill", 1.0, 0.005),
          Size("stray_pf", 0.0, 0.02)),
         tuple(
-            Reading(f"capacitance_{k}_pf", "capacitance", "LCR meter, 1 kHz, open circuit subtracted; probes on the pad "
-                    f"and on the upper disc of the film of {thickness:g} mm")
+            Reading(f"capacitance_{k}_pf", "capacitance", "LCR meter, 1 kHz, open circuit subtracted; probes on the "
+                    f"pad and on the upper disc of the film of {thickness:g} mm")
             for k, thickness in enumerate(thicknesses_mm, 1)
         ),
         expected, sum(volumes) + PAD_MM**2 * ELECTRODE_MM, (2 * sum(rims) + PAD_MM, 2 * max(rims)),

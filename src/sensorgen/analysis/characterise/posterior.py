@@ -119,23 +119,20 @@ class _Problem:
     def density(self, theta: Real, lines: Mapping[int, Line]) -> tuple[float, Real, Real]:
         """Minus ln of the posterior density, its gradient, and its curvature."""
         off = (theta - self.centre) / self.spread
-        cost, gradient, curvature = (
-            0.5 * off @ off + np.log(self.spread).sum(),
-            off / self.spread,
-            np.diag(self.spread**-2.0),
-        )
+        cost, gradient = float(0.5 * off @ off + np.log(self.spread).sum()), off / self.spread
+        curvature: Real = np.diag(self.spread**-2.0)
         for k, line in lines.items():
             o = self.observations[k]
             residual = (o.log_values - line.log_values)[o.read]
             covariance = line.covariance[np.ix_(o.read, o.read)]
-            if not np.isfinite(residual).all() or not np.isfinite(covariance).all():
+            if not all(np.isfinite(part).all() for part in (residual, covariance, line.jacobian)):
                 return np.inf, gradient, curvature
             root = np.linalg.inv(np.linalg.cholesky(covariance))
             white, jacobian = root @ residual, root @ line.jacobian[o.read]
-            cost += 0.5 * white @ white - np.log(np.diag(root)).sum() + 0.5 * len(white) * log(2 * np.pi)
+            cost += float(0.5 * white @ white - np.log(np.diag(root)).sum()) + 0.5 * len(white) * log(2 * np.pi)
             gradient = gradient - jacobian.T @ white
             curvature = curvature + jacobian.T @ jacobian
-        return float(cost), gradient, curvature
+        return cost, gradient, curvature
 
     def peak(self, start: Real, dead: tuple[int, ...]) -> Mode:
         """Most likely unknowns given which coupons are dead, by Gauss and Newton with halved steps."""
@@ -161,14 +158,14 @@ class _Problem:
         dead = tuple(sorted((*mode.dead, also)))
         cost, gradient, curvature = self.density(mode.mean, {k: line for k, line in lines.items() if k not in dead})
         step = -np.linalg.solve(curvature, gradient)
-        return self.mode(mode.mean + step, dead, cost + 0.5 * gradient @ step, curvature)
+        return self.mode(mode.mean + step, dead, cost + 0.5 * float(gradient @ step), curvature)
 
     def mode(self, theta: Real, dead: tuple[int, ...], cost: float, curvature: Real) -> Mode:
         """A peak with its evidence by Laplace's approximation."""
-        covariance = np.linalg.inv(curvature)
+        covariance = np.asarray(np.linalg.inv(curvature), np.float64)
         _, log_det = np.linalg.slogdet(covariance)
         count = sum(int(self.observations[k].read.sum()) for k in dead)
-        evidence = -cost + 0.5 * log_det - count * log(_DECADES * log(10.0))
+        evidence = -cost + 0.5 * float(log_det) - count * log(_DECADES * log(10.0))
         evidence += len(dead) * log(DEAD) + (len(self.observations) - len(dead)) * log(1 - DEAD)
         return Mode(dead, theta, covariance, evidence)
 

@@ -121,8 +121,8 @@ def select(found: Candidates, count: int, fits: Fits) -> tuple[int, ...]:
 
     Notes
     -----
-    Coupons are added while there is room, each the best one; then one is exchanged for another, removed or added, or two
-    are exchanged at once, as long as that is better (Fedorov's exchange). The optimum of such steps, not proved to
+    Coupons are added while there is room, each the best one; then one is exchanged for another, removed or added, or
+    two are exchanged at once, as long as that is better (Fedorov's exchange). The optimum of such steps, not proved to
     be the largest: equal to the search through all sets on small catalogues.
     """
     chosen: tuple[int, ...] = ()

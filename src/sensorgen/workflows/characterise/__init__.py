@@ -124,7 +124,8 @@ class Study:
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
         """With what the materials' sources say."""
-        return unknowns(*map(materials.load, (self.conductor, self.dielectric)), self.design.machine.line_mm())
+        pair = materials.load(self.conductor), materials.load(self.dielectric)
+        return unknowns(*pair, self.design.machine.line_mm())
 
     @cached_property
     def targets(self) -> tuple[Target, ...]:
@@ -134,7 +135,8 @@ class Study:
     @cached_property
     def coupons(self) -> tuple[Coupon, ...]:
         """All that can be printed."""
-        return catalogue(*map(materials.load, (self.conductor, self.dielectric)), self.design.machine.line_mm())
+        pair = materials.load(self.conductor), materials.load(self.dielectric)
+        return catalogue(*pair, self.design.machine.line_mm())
 
     def expected(self) -> dict[str, list[float]]:
         """Readings at the middle of what the sources say, by coupon [ohm, F, N/m]."""
@@ -144,6 +146,11 @@ class Study:
                                                                                    c.sizes})]
             for c in self.coupons
         }  # fmt: skip
+
+    def head(self, plate: str) -> dict[str, str]:
+        """First lines of a form."""
+        return {"plate": plate, "printer": self.design.printer, "quality": self.design.quality,
+                "conductor": self.conductor, "dielectric": self.dielectric}  # fmt: skip
 
     def hours(self, chosen: Sequence[Coupon]) -> float:
         """Print time, from volumes, flow and tool changes [h]."""
@@ -248,12 +255,9 @@ def plan(
     chosen = selection.select(found, count - 1, fits)
     coupons = named([study.coupons[k] for k in chosen])
     label = name or f"{study.design.machine.name}-{study.conductor}-{study.dielectric}"
-    before, after = prior(study.unknowns), found.expected(chosen, study.unknowns)
-    result = rows(before, after, study.targets)
+    result = rows(prior(study.unknowns), found.expected(chosen, study.unknowns), study.targets)
     folder, names = out / label, (study.conductor, study.dielectric)
     plate = plates.arranged(coupons, study.design)
-    head = {"plate": label, "printer": study.design.printer, "quality": study.design.quality,
-            "conductor": study.conductor, "dielectric": study.dielectric}  # fmt: skip
     usual = study.expected()
     expected = {c.name: usual[study.coupons[k].name] for c, k in zip(coupons, chosen, strict=True)}
     with store.staging(folder) as stage:
@@ -262,14 +266,14 @@ def plan(
         step("profiles")
         store.write(stage, {path: text.encode() for path, text in profiles(study.design).items()})
         step("picture")
-        store.write(stage, {
-            "plate.svg": plates.picture(label, coupons, study.design, plate, names).encode(),
-            "form.yaml": forms.blank(head, coupons, expected).encode(),
-            "intervals.svg": svg(f"{label}: expected", result).encode(),
-        })  # fmt: skip
-        exposed = tuple(_exposed(found, chosen, coupons, study))
+        texts = {
+            "plate.svg": plates.picture(label, coupons, study.design, plate, names),
+            "form.yaml": forms.blank(study.head(label), coupons, expected),
+            "intervals.svg": svg(f"{label}: expected", result),
+        }
+        store.write(stage, {file: text.encode() for file, text in texts.items()})
         made = Planned(label, folder, tuple(sorted(store.hashes(stage))), (*(c.name for c in coupons), "lines"),
-                       study.hours(coupons), result, exposed)  # fmt: skip
+                       study.hours(coupons), result, tuple(_exposed(found, chosen, coupons, study)))  # fmt: skip
         content = {"files": store.hashes(stage), "versions": versions(), "coupons": list(made.coupons)}
         store.write(stage, {store.MANIFEST: json_bytes(content)})
         store.publish(stage, folder)
@@ -409,7 +413,8 @@ def _findings(piece: forms.Lines, line_mm: float) -> Iterator[str]:
     """Line width, shortest film, smallest distance and tool offset, as far as they were read."""
     walls = [(k, w) for k, w in enumerate(piece.walls_mm, 1) if w]
     if len(walls) > 1:
-        slope, over = np.polyfit(*np.array(walls).T, 1)
+        lines, widths = np.array(walls, float).T
+        slope, over = np.polyfit(lines, widths, 1)
         yield f"line width {slope:.3f} mm (set {line_mm:g}); a wall is {over:+.3f} mm wider than its lines"
     missing = [k for k, w in enumerate(piece.walls_mm, 1) if w == 0]
     if missing:

@@ -1,4 +1,4 @@
-"""The form for a plate's readings: written with comments, read back with units, gaps allowed."""
+"""The form for a plate's readings: written with comments, filled in with units, gaps allowed."""
 
 import math
 import re
@@ -55,7 +55,7 @@ class Lines:
 
 @dataclass(frozen=True)
 class Form:
-    """A form, its names looked up by nobody yet.
+    """A form as read, before its names are looked up.
 
     Attributes
     ----------
@@ -110,14 +110,17 @@ def blank(head: Mapping[str, str], coupons: Sequence[Coupon], expected: Mapping[
                 scale = 1e12 if reading.kind == "capacitance" else 1.0
                 lines.append(f"    {reading.key}: ~  # {reading.how}; {value * scale:.2g}?")
     lines.append(f"  {LINES}:")
-    lines += [f"    wall_{k}_mm: ~  # calipers, wall of {k} line{'s' * (k > 1)}; 0 if it is not there" for k in
-              range(1, WALLS + 1)]  # fmt: skip
-    lines += [f"    vernier_{axis}: ~  # number of the pair of lines that meet, -5 to 5 {way}; 0 is the middle" for axis, way in
-              (("x", "from left to right"), ("y", "from front to back"))]  # fmt: skip
-    lines += [f"    film_{k}_short: ~  # true or false: ohmmeter from strip to pad, below 1 Mohm" for k in
-              range(1, FILMS + 1)]  # fmt: skip
-    lines += [f"    comb_{k}_short: ~  # true or false: between the tracks {k} line{'s' * (k > 1)} apart" for k in
-              range(1, COMBS + 1)]  # fmt: skip
+    several = [(k, f"{k} line{'s' * (k > 1)}") for k in range(1, WALLS + 1)]
+    lines += [f"    wall_{k}_mm: ~  # calipers, wall of {words}; 0 if it is not there" for k, words in several]
+    for axis, way in (("x", "from left to right"), ("y", "from front to back")):
+        lines.append(f"    vernier_{axis}: ~  # number of the pair of lines that meet, -5 to 5 {way}; 0 is the middle")
+    films = range(1, FILMS + 1)
+    lines += [
+        f"    film_{k}_short: ~  # {k} layers: true or false; ohmmeter from strip to pad, below 1 Mohm" for k in films
+    ]
+    lines += [
+        f"    comb_{k}_short: ~  # true or false: between the tracks {words} apart" for k, words in several[:COMBS]
+    ]
     return "\n".join(lines) + "\n"
 
 
@@ -134,14 +137,16 @@ def read(path: Path) -> Form:
         for key in data:
             if key not in _HEAD:
                 raise UnknownName("key", key, _HEAD)
-        names = {key: data.get(key) for key in _HEAD[:5]}
-        for key, value in names.items():
+        names = [data.get(key) for key in _HEAD[:5]]
+        for key, value in zip(_HEAD, names, strict=False):
             if not isinstance(value, str) or not value:
                 raise BadInput(f"{key} is {shown(value)}; expected its name, as the plate's form has it")
         coupons = data.get("coupons")
         if not isinstance(coupons, Mapping) or any(not isinstance(v, Mapping) for v in coupons.values()):
             raise BadInput("coupons: expected each coupon's name with its readings, as the plate's form has them")
-        return Form(**names, meters=_meters(data.get("meters") or {}), coupons=coupons)
+        plate, printer, quality, conductor, dielectric = map(str, names)
+        meters = _meters(data.get("meters") or {})
+        return Form(plate, printer, quality, conductor, dielectric, meters, coupons)
     except SensorgenError as error:
         raise error.within(str(path)) from None
 
@@ -149,14 +154,14 @@ def read(path: Path) -> Form:
 def _meters(given: object) -> Meters:
     if not isinstance(given, Mapping):
         raise BadInput(f"meters is {shown(given)}; expected a mapping of names to numbers")
-    own = {}
+    own: dict[str, float] = {}
     for key, value in given.items():
         if key not in (*_PERCENT, "calipers_mm", "compression_mm"):
             raise UnknownName("key of meters", key, (*_PERCENT, "calipers_mm", "compression_mm"))
         number = _number(f"meters.{key}", value)
         if number is None or not 1e-6 <= number <= 50:
             raise OutOfRange(f"meters.{key} is {shown(value)}; expected 1e-6 to 50")
-        own[_PERCENT.get(key, key)] = number / 100 if key in _PERCENT else number
+        own[_PERCENT.get(str(key), str(key))] = number / 100 if key in _PERCENT else number
     return Meters(**own)
 
 

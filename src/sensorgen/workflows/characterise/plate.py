@@ -59,7 +59,7 @@ def carrier(conductor: str, dielectric: str, printer: str, quality: str, tools: 
 
 
 def bodies(coupon: Coupon, conductor: str, dielectric: str) -> tuple[Body, ...]:
-    """What is printed of a coupon, in coordinates of its own."""
+    """Bodies of a coupon, in coordinates of its own."""
     if coupon.kind == "bar":
         return (Body("bar", conductor, (_bar(coupon),)),)
     if coupon.kind == "ladder":
@@ -210,9 +210,10 @@ def picture(
             shown.append(f'<polygon points="{points}" fill="{colour[material]}" fill-opacity=".55"/>')
         if own and coupons[number].kind == "ladder":
             starts = [sum(LADDER_MM[:k]) + STRIP_MM * k for k in range(len(LADDER_MM) + 1)]
+            high = coupons[number].drawn("width_mm")
             shown += [
-                f'<rect x="{u + shift[0]:.4g}" y="{shift[1] - coupons[number].drawn("width_mm"):.4g}" width="{STRIP_MM}" '
-                f'height="{coupons[number].drawn("width_mm"):g}" fill="none" stroke="#b00" stroke-dasharray="1 .5"/>'
+                f'<rect x="{u + shift[0]:.4g}" y="{shift[1] - high:.4g}" width="{STRIP_MM}" height="{high:g}" '
+                'fill="none" stroke="#b00" stroke-dasharray="1 .5"/>'
                 for u in starts
             ]
         x_label, y_label = place.centre_mm[0] - bed.x0, bed.y1 - place.centre_mm[1] + 1.6
@@ -221,11 +222,14 @@ def picture(
         label = html.escape(coupons[number].name if own else "lines and shorts")
         legend.append(f'<text x="{column * 60 + 2}" y="{deep + 6 + 6 * row:g}" font-size="4">{order}: {label}</text>')
     shown += [*legend, f'<text x="182" y="{deep + 6:g}" font-size="4">red: terminals of 3 mm, made by hand</text>']
+    title = html.escape(f"{name}: {len(plate)} coupons on {design.machine.title}")
+    size = f'width="{wide + 8:g}mm" height="{deep + 42:g}mm"'
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-4 -12 {wide + 8:g} {deep + 42:g}" width="{wide + 8:g}mm" '
-        f'height="{deep + 42:g}mm">\n<style>text {{ font-family: sans-serif; fill: #111 }} polygon {{ stroke: #222; '
-        f'stroke-width: .15 }}</style>\n<rect x="-4" y="-12" width="{wide + 8:g}" height="{deep + 42:g}" fill="#fff"/>\n'
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-4 -12 {wide + 8:g} {deep + 42:g}" {size}>\n'
+        "<style>text { font-family: sans-serif; fill: #111 } polygon { stroke: #222; stroke-width: .15 }</style>\n"
+        f'<rect x="-4" y="-12" width="{wide + 8:g}" height="{deep + 42:g}" fill="#fff"/>\n'
         f'<rect x="0" y="0" width="{wide:g}" height="{deep:g}" fill="none" stroke="#555" stroke-width=".3"/>\n'
-        f'<text x="0" y="-4" font-size="5">{html.escape(f"{name}: {len(plate)} coupons on {design.machine.title}")}: x to '
-        "the right, y up; printed lines of bars and ladders run along x</text>\n" + "\n".join(shown) + "\n</svg>\n"
+        f'<text x="0" y="-4" font-size="5">{title}: x to the right, y up; lines of bars run along x</text>\n'
+        + "\n".join(shown)
+        + "\n</svg>\n"
     )
