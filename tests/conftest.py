@@ -20,6 +20,7 @@ def _cache(monkeypatch, tmp_path_factory):
     monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path_factory.mktemp("cache")))
     monkeypatch.setenv("SENSORGEN_LOG", str(tmp_path_factory.mktemp("log") / "log.db"))
     monkeypatch.setenv("SENSORGEN_MATERIALS", str(tmp_path_factory.mktemp("materials")))
+    monkeypatch.setenv("SENSORGEN_PACKS", str(tmp_path_factory.mktemp("packs")))
 
 
 @pytest.fixture(scope="session")

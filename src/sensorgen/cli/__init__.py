@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from sensorgen.core.errors import SensorgenError, Unprintable
+from sensorgen.core.errors import SensorgenError, Unprintable, nearest
 from sensorgen.core.version import __version__
 
 SECTIONS = {  # what each command is for, here so that --help imports none of them
@@ -39,7 +39,9 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
         "characterise": "Material values from a plate of test structures.",
     },
     "Reference": {
-        "list": "List shapes, materials, printers, qualities, models or sources.",
+        "new": "Write a material, shape, printer, quality, instrument or design to change.",
+        "pack": "Test packs of such files, and trust shape files.",
+        "list": "List shapes, materials, printers, qualities, packs, models or sources.",
         "schema": "Print the JSON schema of a design file or of prediction.json.",
         "completion": "Print the completion script for a shell.",
     },
@@ -54,6 +56,10 @@ WRONG_INPUT = 2
 FOUND_ERRORS = 1
 
 
+_ELSEWHERE = {  # options of other programs, and where the quantity is here
+    "--layer-height": ": the print quality has it; take another with --quality (sensorgen list qualities), or your own "
+    "(sensorgen new quality NAME).",
+}
 _CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 
 
@@ -159,7 +165,8 @@ def _run() -> int:
     except SensorgenError as error:
         return _complain(error, WRONG_INPUT)
     except click.NoSuchOption as error:
-        near = f"; did you mean '{error.possibilities[0]}'?" if error.possibilities else "."
+        meant = nearest(error.option_name, error.possibilities or ())
+        near = f"; did you mean '{meant}'?" if meant else _ELSEWHERE.get(error.option_name, ".")
         return _complain(f"unknown option '{error.option_name}'{near} --help lists all", WRONG_INPUT)
     except click.ClickException as error:
         return _complain(error.format_message(), WRONG_INPUT)

@@ -58,7 +58,7 @@ class Catalogue:
 
 def _of_packs(kind: Kind, entry: Callable[[packs.File], Entry]) -> Catalogue:
     """Every file of a kind by its name; one that is damaged says so, and hides no other."""
-    found: dict[str, Entry] = {}
+    entries: dict[str, Entry] = {}
     for file in packs.files(kind):
         try:
             made = entry(file)
@@ -68,8 +68,8 @@ def _of_packs(kind: Kind, entry: Callable[[packs.File], Entry]) -> Catalogue:
         with suppress(SensorgenError):
             version = file.pack.version
         origin = Entry(made.about, made.values, file.pack.name, version, file.pack.where, str(file.path))
-        found.setdefault(file.name, origin)
-    return Catalogue(dict(sorted(found.items())))
+        entries.setdefault(file.name, origin)
+    return Catalogue(dict(sorted(entries.items())))
 
 
 def shapes() -> Catalogue:
@@ -157,7 +157,7 @@ def instruments() -> Catalogue:
 
 def all_packs() -> Catalogue:
     """Packs with the number of files of each kind."""
-    found: dict[str, Entry] = {}
+    entries: dict[str, Entry] = {}
     for pack in packs.everywhere():
         counts = {kind: len(pack.names(kind)) for kind in packs.SINGULAR}
         holds = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
@@ -166,15 +166,15 @@ def all_packs() -> Catalogue:
                 about, version = pack.manifest.about or holds, pack.version
             except SensorgenError as error:
                 about, version = f"cannot be used: {error}", ""
-            name = pack.name if pack.name not in found else f"{pack.name} ({pack.where})"
-            found[name] = Entry(about, (holds,), pack.name, version, pack.where, str(pack.folder))
-    return Catalogue(found)
+            name = pack.name if pack.name not in entries else f"{pack.name} ({pack.where})"
+            entries[name] = Entry(about, (holds,), pack.name, version, pack.where, str(pack.folder))
+    return Catalogue(entries)
 
 
 def models() -> Catalogue:
     """Models with their cost and source."""
-    found = {name: registry.load(model_files, name) for name in model_files.names()}
-    return Catalogue({k: Entry(_first_line(m.__doc__), (f"cost {m.COST}; {m.SOURCE}",)) for k, m in found.items()})
+    entries = {name: registry.load(model_files, name) for name in model_files.names()}
+    return Catalogue({k: Entry(_first_line(m.__doc__), (f"cost {m.COST}; {m.SOURCE}",)) for k, m in entries.items()})
 
 
 def sources() -> Catalogue:

@@ -1,6 +1,7 @@
 """What went wrong, in words that tell the user what to do."""
 
 import difflib
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Self
@@ -35,14 +36,37 @@ class OutOfRange(SensorgenError):
     """A number outside the range in which it means something."""
 
 
+def nearest(given: str, names: Iterable[str]) -> str:
+    """The name that somebody may have meant, or "".
+
+    Of names of several words each word must be near: ``layer_height`` is another quantity than ``lower_height``.
+
+    >>> nearest("layer-height", ["lower-height"]), nearest("lower-heigth", ["lower-height"]), nearest("trj", ["tri"])
+    ('', 'lower-height', 'tri')
+    """
+
+    def words(name: str) -> list[str]:
+        return [word for word in re.split("[^a-z0-9]+", name.lower()) if word]
+
+    for near in difflib.get_close_matches(given.lower(), list(names), n=3):
+        pairs = list(zip(words(given), words(near), strict=False))
+        several = len(words(given)) == len(words(near)) > 1
+        if not several or all(difflib.SequenceMatcher(None, *pair).ratio() > _NEAR for pair in pairs):
+            return near
+    return ""
+
+
+_NEAR = 0.62  # of two words, from which one may be a slip of the other
+
+
 class UnknownName(SensorgenError):
     """A name that nothing goes by."""
 
     def __init__(self, kind: str, given: str, known: Iterable[str]) -> None:
         """Name the nearest of ``known`` to ``given``, and list them all."""
         names = sorted(known)
-        near = difflib.get_close_matches(given[:100].lower(), names, n=1)
-        hint = f"; did you mean '{near[0]}'?" if near else "."
+        near = nearest(given[:100], names)
+        hint = f"; did you mean '{near}'?" if near else "."
         super().__init__(f"unknown {kind} {given[:100]!r}{hint} Known: {', '.join(names)}")
 
 

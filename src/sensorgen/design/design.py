@@ -318,8 +318,24 @@ def parameters(shape_name: str, given: Mapping[str, float | str], text: str | No
             raise UnknownName(f"parameter of {shape_name}", name, known)
         values[name] = _checked(known[name], value)
     kind: Any = _shape(shape_name, text).Params
-    params: Envelope = kind(**values)
-    _refuse_swarms(params)
+
+    def made() -> tuple[Envelope, float]:
+        params = kind(**values)
+        return params, params.cells()
+
+    if text is None:
+        params, cells = made()
+    else:
+        from sensorgen.design import shape_files
+
+        params, cells = shape_files.in_this_process(shape_name, made)
+    if isinstance(cells, bool) or not isinstance(cells, (int, float)) or not cells > 0:
+        raise BadInput(f"{shape_name}.py: cells() is {cells!r:.60}; expected a number above 0")
+    if cells > MAX_CELLS:  # the mesh would fill the memory
+        raise OutOfRange(
+            f"{cells:.3g} cells of the pattern on {params.length_mm:g} x {params.width_mm:g} mm; expected at most "
+            f"{MAX_CELLS}: use a longer period or a smaller sensor"
+        )
     return params
 
 
@@ -334,16 +350,6 @@ def _checked(field: dataclasses.Field[Any], value: float | str) -> float | str:
         shown = repr(value) if isinstance(value, str) else f"{value:g}"
         raise OutOfRange(f"{field.name} is {shown}; expected a number from {low:g} to {high:g} mm")
     return float(value)
-
-
-def _refuse_swarms(params: Envelope) -> None:
-    """Refuse patterns so fine that their mesh would fill the memory."""
-    cells = params.cells()
-    if cells > MAX_CELLS:
-        raise OutOfRange(
-            f"{cells:.3g} cells of the pattern on {params.length_mm:g} x {params.width_mm:g} mm; expected at most "
-            f"{MAX_CELLS}: use a longer period or a smaller sensor"
-        )
 
 
 def load(path: Path) -> Design:

@@ -183,10 +183,10 @@ def beside(folder: Path) -> Pack:
 def own() -> list[Pack]:
     """The user's packs, and the folder of fitted sources."""
     try:
-        found = sorted(entry.path for entry in os.scandir(place()) if entry.is_dir())
+        places = sorted(entry.path for entry in os.scandir(place()) if entry.is_dir())
     except OSError:
-        found = []
-    packs = [Pack(path.name, "own", path) for path in map(Path, found) if NAME.fullmatch(path.name)]
+        places = []
+    packs = [Pack(path.name, "own", path) for path in map(Path, places) if NAME.fullmatch(path.name)]
     fits = paths.data(SOURCES, "materials")
     return [*packs, Pack("fits", "own", fits, moved=(("sources", fits),))]
 
@@ -217,9 +217,9 @@ def _of_package(point: "EntryPoint") -> Pack:
     dist = point.dist
     package = f"{dist.metadata['Name'] or '?'} {dist.metadata['Version'] or '?'}" if dist else "? ?"
     parts = point.value.split(".")
-    told = f"pack {point.name!r} of the installed package {package.partition(' ')[0]!r}"
+    whose = f"pack {point.name!r} of the installed package {package.partition(' ')[0]!r}"
     if not NAME.fullmatch(point.name) or not all(part.isidentifier() for part in parts):
-        raise BadInput(f"{told}: entry point {point.value!r:.80} names no folder, as in my_package.pack; uninstall it")
+        raise BadInput(f"{whose}: entry point {point.value!r:.80} names no folder, as in my_package.pack; uninstall it")
     folder = Path(str(dist.locate_file("/".join(parts)))) if dist else Path(*parts)
     if not folder.is_dir():
         from importlib.util import find_spec
@@ -231,7 +231,7 @@ def _of_package(point: "EntryPoint") -> Pack:
         top = list(spec.submodule_search_locations or ()) if spec else []
         folder = Path(top[0]).joinpath(*parts[1:]) if top else folder
     if not folder.is_dir():
-        raise BadInput(f"{told}: there is no folder {'/'.join(parts)!r} in it; repair or uninstall it")
+        raise BadInput(f"{whose}: there is no folder {'/'.join(parts)!r} in it; repair or uninstall it")
     return Pack(point.name, "installed", folder, package)
 
 

@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import IO, Any, Protocol, cast
 
 from sensorgen.core import cache as answers
-from sensorgen.core import errors, files
-from sensorgen.core.errors import BadInput, SensorgenError, Unwritable
+from sensorgen.core import files
+from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, Unwritable
 from sensorgen.design import packs, shape_process
 from sensorgen.scene.scene import FLOATING, Body, Envelope, Fill, Scene
 
@@ -86,14 +86,17 @@ def trust(name: str, text: str) -> Path:
 
 @lru_cache(maxsize=32)
 def _trusted(name: str, text: str) -> Shape:
-    module = _in_this_process(name, lambda: shape_process.module_of(f"sensorgen_shape_{digest(text)[:16]}", text))
-    _fields(name, shape_process.described(module))
+    module = in_this_process(name, lambda: shape_process.module_of(f"sensorgen_shape_{digest(text)[:16]}", text))
+    reply = in_this_process(name, lambda: shape_process.described(module))
+    in_this_process(name, lambda: _fields(name, reply))
+    module.SHORT = _short(name, reply)
     made = module.scene
-    module.scene = lambda p, fill: _checked(name, _in_this_process(name, lambda: made(p, fill)), fill)
+    module.scene = lambda p, fill: _checked(name, in_this_process(name, lambda: made(p, fill)), fill)
     return cast(Shape, module)
 
 
-def _in_this_process(name: str, work: Callable[[], Any]) -> Any:
+def in_this_process(name: str, work: Callable[[], Any]) -> Any:
+    """Result of a shape file's code; raises BadInput with the file's line for whatever goes wrong in it."""
     try:
         return work()
     except SensorgenError:
@@ -102,25 +105,34 @@ def _in_this_process(name: str, work: Callable[[], Any]) -> Any:
         raise BadInput(shape_process.fault(error, f"{name}.py")) from None
 
 
+def _short(name: str, reply: Mapping[str, Any]) -> str:
+    """How a shape's designs begin their names, which are those of files."""
+    return str(reply["short"]) if _NAME.fullmatch(str(reply["short"])) else name
+
+
 class _Foreign:
     """A shape whose file runs elsewhere: its parameters here, each scene from there."""
 
     def __init__(self, name: str, text: str) -> None:
         self._name, self._text = name, text
-        said = self._ask({})
-        self.__doc__ = str(said.get("about", ""))[:4000]
-        self.SHORT = said["short"] if _NAME.fullmatch(str(said.get("short") or "")) else name
+        reply = self._ask({})
+        try:
+            self.__doc__ = str(reply["about"])[:4000]
+            self.SHORT = _short(name, reply)
+            parameters = _fields(name, reply)
+        except (AttributeError, KeyError, TypeError, ValueError):
+            raise BadInput(
+                f"{name}.py: Params is no dataclass of parameters; expected one as in 'sensorgen new shape'"
+            ) from None
         cells = self._cells
         self.Params: type[Envelope] = dataclasses.make_dataclass(
-            "Params", _fields(name, said), bases=(Envelope,), frozen=True, namespace={"cells": lambda p: cells(p)}
+            "Params", parameters, bases=(Envelope,), frozen=True, namespace={"cells": lambda p: cells(p)}
         )
         self.scene = lru_cache(maxsize=256)(self._scene)
 
     def _cells(self, p: Envelope) -> float:
-        cells = self._ask({"parameters": dataclasses.asdict(p)})
-        if not isinstance(cells, (int, float)) or isinstance(cells, bool) or not cells > 0:
-            raise BadInput(f"{self._name}.py: cells() is {cells!r:.60}; expected a number above 0")
-        return float(cells)
+        cells: float = self._ask({"parameters": dataclasses.asdict(p)})  # checked where it is used
+        return cells
 
     def _scene(self, p: Envelope, fill: Fill) -> Scene:
         data = self._ask({"parameters": dataclasses.asdict(p), "fill": dataclasses.asdict(fill)})
@@ -157,13 +169,13 @@ def _adapter() -> Any:
     return made
 
 
-def _fields(name: str, said: Mapping[str, Any]) -> list[tuple[str, type, Any]]:
+def _fields(name: str, reply: Mapping[str, Any]) -> list[tuple[str, type, Any]]:
     """Parameters as a shape's file describes them, checked."""
-    found: list[tuple[str, type, Any]] = []
+    parameters: list[tuple[str, type, Any]] = []
     inherited = {f.name for f in dataclasses.fields(Envelope)}
-    if missing := inherited - {str(field.get("name")) for field in said["fields"]}:
+    if missing := inherited - {str(field.get("name")) for field in reply["fields"]}:
         raise BadInput(f"{name}.py: Params has no {sorted(missing)[0]}; expected a dataclass derived from Envelope")
-    for field in said["fields"]:
+    for field in reply["fields"]:
         key, default, about = str(field["name"]), field["default"], dict(field["metadata"])
         where = f"{name}.py: parameter {key[:60]}"
         if not _NAME.fullmatch(key):
@@ -183,8 +195,8 @@ def _fields(name: str, said: Mapping[str, Any]) -> list[tuple[str, type, Any]]:
             if not sound:
                 raise BadInput(f"{where}: default {default!r:.40} is outside its range {low:g} to {high:g}")
             default, about["range"] = float(default), (low, high)
-        found.append((key, str if choices else float, dataclasses.field(default=default, metadata=about)))
-    return found
+        parameters.append((key, str if choices else float, dataclasses.field(default=default, metadata=about)))
+    return parameters
 
 
 def _checked(name: str, scene: Scene, fill: Fill) -> Scene:
@@ -245,26 +257,24 @@ class _Process:
             pipe.write(f"{json.dumps(question)}\n".encode())
             pipe.flush()
         try:
-            line = self._lines.get(timeout=10 + 6 * SECONDS)
+            line = self._lines.get(timeout=5 + 3 * SECONDS)
         except queue.Empty:
             line = b""
         try:
-            said = json.loads(line, parse_constant=_refuse) if line else None
+            reply = json.loads(line, parse_constant=_refuse) if line else None
         except ValueError:
-            said = None
-        if not isinstance(said, dict) or not said.keys() & {"answer", "refused", "fault"}:
+            reply = None
+        if not isinstance(reply, dict) or not reply.keys() & {"answer", "refused", "fault"}:
             code = self.close()
             why = "time or memory is over" if code < 0 else f"exit code {code}"
             raise BadInput(f"{self.name}.py: its process ended without an answer ({why}); a shape only computes")
-        if "answer" in said:
-            return said["answer"]
-        if "refused" in said:
-            kind = getattr(errors, str(said.get("kind")), SensorgenError)
-            refused: SensorgenError = kind.__new__(kind)
-            refused.args = (str(said["refused"])[:500],)
-            raise refused
+        if "answer" in reply:
+            return reply["answer"]
+        if "refused" in reply:
+            kind = OutOfRange if reply.get("kind") == "OutOfRange" else BadInput
+            raise kind(str(reply["refused"])[:500])
         self.close()
-        raise BadInput(str(said["fault"])[:500])
+        raise BadInput(str(reply["fault"])[:500])
 
     def close(self) -> int:
         """End the process; its exit code."""
@@ -290,13 +300,14 @@ def _process(name: str, text: str) -> _Process:
         if not _RUNNING:
             import atexit
 
-            atexit.register(_close_all)
+            atexit.register(close)
         made = _Process(name, text)
         _RUNNING[key] = made
     return _RUNNING[key]
 
 
-def _close_all() -> None:
+def close() -> None:
+    """End the processes of all shape files; one that is needed again starts again."""
     for each in list(_RUNNING.values()):
         each.close()
 

@@ -149,6 +149,12 @@ def quantities() -> list[str]:
     return sorted({quantity for name in names() for quantity in load(name).properties} | {FILM_LEAK})
 
 
+@cache
+def print_quantities() -> list[str]:
+    """Names of all quantities of printing."""
+    return sorted({quantity for name in names() for quantity in load(name).print})
+
+
 def check_own(name: str, values: Mapping[str, float], texts: Texts = NO_TEXTS) -> None:
     """Refuse values of the user's own that no material can have; ``texts`` as of :func:`load`.
 
@@ -161,8 +167,8 @@ def check_own(name: str, values: Mapping[str, float], texts: Texts = NO_TEXTS) -
     """
     load(name, texts=texts)
     for quantity, value in values.items():
-        if quantity not in quantities():
-            raise UnknownName(f"quantity of {name}", quantity, quantities())
+        if quantity not in (known := sorted({*quantities(), *print_quantities()})):
+            raise UnknownName(f"quantity of {name}", quantity, known)
         low, high = _RANGES.get(quantity, (0.0, inf))
         if not low <= value <= high or isinf(value) or (value == 0 and quantity not in _RANGES):
             raise OutOfRange(f"{quantity} of {name} is {value:g}; expected {_said(low, high, 'a number above 0')}")
@@ -215,20 +221,26 @@ def own_source(source: str, text: str | None = None, texts: Texts = NO_TEXTS) ->
     BadInput
         Its file is damaged, or has the name of a source that ships.
     """
-    file = f"{source}.yaml"
+    made = _own(source, text)
     try:
-        if text is None:
-            from sensorgen.design.materials import own
-
-            file, text = str(own.path(source)), own.text(source)
-        made = checked(Own, yamlfile.parse(text, file))
-        if source in _shipped_citations():
+        if source in shipped_citations():
             raise BadInput(f"{source} is the name of a source that ships with sensorgen; expected another name")
         for name, values in made.materials.items():
             _check_values(name, {key: value.value for key, value in values.items()}, texts)
     except (BadInput, UnknownName, OutOfRange) as error:
-        raise error if file in str(error) else error.within(file) from None
+        raise error.within(f"{source}.yaml") from None
     return made
+
+
+def _own(source: str, text: str | None) -> Own:
+    """A source of the user's own, its values not checked yet."""
+    from sensorgen.design.materials import own
+
+    file = f"{source}.yaml" if text is not None else str(own.path(source))
+    try:
+        return checked(Own, yamlfile.parse(own.text(source) if text is None else text, file))
+    except BadInput as error:
+        raise error if file in str(error) else error.within(file) from None
 
 
 def _check_values(name: str, values: Mapping[str, float], texts: Texts) -> None:
@@ -282,18 +294,19 @@ def parse(name: str, text: str) -> Material:
 
 def citations() -> dict[str, str]:
     """What each source's name stands for, those of the user's own too."""
-    return _shipped_citations() | {name: own_source(name).about for name in packs.source_names()}
+    return shipped_citations() | {name: _own(name, None).about for name in packs.source_names()}
 
 
 def cited(texts: Texts) -> dict[str, str]:
     """What the sources of a design's own files stand for."""
     own_materials = (parse(name, text) for name, text in texts.get("materials", {}).items())
     said = {key: value for material in own_materials for key, value in material.citations.items()}
-    return said | {name: own_source(name, text, texts).about for name, text in texts.get("sources", {}).items()}
+    return said | {name: _own(name, text).about for name, text in texts.get("sources", {}).items()}
 
 
 @cache
-def _shipped_citations() -> dict[str, str]:
+def shipped_citations() -> dict[str, str]:
+    """What each source's name stands for, of the materials that ship."""
     text = (resources.files(__name__) / "sources.yaml").read_text("utf-8")
     data = yamlfile.parse(text, "sources.yaml")
     theses = {str(name): f"{data['thesis']}: {where}" for name, where in data["sources"].items()}

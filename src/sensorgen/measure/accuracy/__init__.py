@@ -269,8 +269,13 @@ def names() -> Sequence[str]:
 
 def is_named(name: str, text: str) -> bool:
     """Whether a text names an instrument, by its type: as a label, or a reply to ``*IDN?``."""
-    types = (name.split()[-1], *_all()[name].also)
-    return any(re.search(rf"(?<![0-9A-Za-z]){re.escape(one)}(?![0-9])", text, re.IGNORECASE) for one in types)
+    return is_of(_all()[name], text)
+
+
+def is_of(one: Instrument, text: str) -> bool:
+    """Whether a text names this instrument; as :func:`is_named`."""
+    types = (one.name.split()[-1], *one.also)
+    return any(re.search(rf"(?<![0-9A-Za-z]){re.escape(each)}(?![0-9])", text, re.IGNORECASE) for each in types)
 
 
 def find(text: str) -> Instrument | None:

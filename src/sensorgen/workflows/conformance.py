@@ -1,0 +1,265 @@
+"""Whether the files of a pack are what sensorgen needs: values with sources, valid scenes, profiles, code that runs."""
+
+import ast
+import math
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from sensorgen.core.document import Part, comma_separated
+from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
+from sensorgen.core.findings import Finding, counted, counts, listed, table
+from sensorgen.design import design as designs
+from sensorgen.design import materials, packs, printer, shape_files
+from sensorgen.design.packs import File, Kind, Pack
+from sensorgen.export.gcode.check import check
+from sensorgen.export.slicers import prusa
+from sensorgen.export.slicers.loads import Load
+from sensorgen.measure import accuracy
+from sensorgen.scene.geometry import meshes, validity
+from sensorgen.scene.scene import Envelope, Fill, Scene
+
+_SMALL = {"length_mm": 12.0, "width_mm": 5.0}  # of a test's sensor, where the shape's ranges hold it
+_IMPORTS = ("sensorgen.scene", "sensorgen.core.errors")
+_NEEDED = {True: ("resistivity_ohm_m",), False: ("relative_permittivity", "youngs_modulus_pa", "poisson_ratio")}
+_EMPTY = ("the file prints nothing", "no command for the bed: it stays as it is")  # of start and end code alone
+Step = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class PackReport:
+    """What is wrong with a pack.
+
+    Attributes
+    ----------
+    pack : str
+        Its name, or the file.
+    files : int
+        How many were tested.
+    counts : dict of str to int
+        Findings of each severity.
+    findings : tuple of Finding
+        All of them.
+    """
+
+    pack: str
+    files: int
+    counts: dict[str, int]
+    findings: tuple[Finding, ...]
+
+    def document(self) -> Iterator[Part]:
+        """The findings, then their number."""
+        yield from listed(self.findings)
+        yield f"{self.pack}: {self.files} file{'s' if self.files > 1 else ''}, {counted(self.counts)}"
+
+    def csv(self) -> Iterator[str]:
+        """The findings as a table."""
+        yield comma_separated(table(self.findings))
+
+
+def chosen(word: str) -> list[File]:
+    """Files of a pack by its name, of a folder, or one file.
+
+    Raises
+    ------
+    BadInput
+        There is no such pack or folder, nothing in it, or the file is in no folder of a kind.
+    UnknownName
+        No pack goes by that name.
+    """
+    path = Path(word)
+    if path.is_file():
+        kind = next((kind for kind in packs.SINGULAR if path.absolute().parent.name == kind), None)
+        if kind is None or path.suffix != packs.suffix(kind) or not packs.is_name(kind, path.stem):
+            folders = ", ".join(packs.SINGULAR)
+            raise BadInput(f"{word}: expected a file in a folder of its kind ({folders}), named by small letters")
+        return [File(kind, path.stem, packs.beside(path.parent.parent))]
+    pack = packs.beside(path) if path.is_dir() else _named(word)
+    files = [File(kind, name, pack) for kind in packs.SINGULAR for name in pack.names(kind)]
+    if not files:
+        raise BadInput(f"{word}: no files of a pack; expected folders as {', '.join(packs.SINGULAR)}")
+    return files
+
+
+def _named(word: str) -> Pack:
+    known = {pack.name: pack for pack in [*packs.installed(), *packs.own(), *packs.shipped()]}
+    if word not in known:
+        raise UnknownName("pack", word, known)
+    return known[word]
+
+
+def conformance(word: str, step: Step = lambda _: None) -> PackReport:
+    """Test the files of a pack; ``word`` as of :func:`chosen`, ``step`` gets the name of each file."""
+    files, findings = chosen(word), list[Finding]()
+    try:
+        packs.check_requires(files[0].pack)
+    except SensorgenError as error:
+        findings.append(_finding("requires", packs.MANIFEST, str(error), "install it, or correct 'requires'"))
+    for file in files:
+        step(file.name)
+        where = f"{file.kind}/{file.path.name}"
+        try:
+            if file.pack.where != "shipped" and file.name in packs.shipped_names(file.kind):
+                findings.append(
+                    _finding("name", where, f"a {packs.SINGULAR[file.kind]} of that name ships", "rename it")
+                )
+                continue
+            findings += [_finding(rule, where, *words) for rule, *words in _TESTS[file.kind](file)]
+        except SensorgenError as error:
+            findings.append(_finding("read", where, str(error), "correct the file"))
+    return PackReport(word, len(files), counts(findings), tuple(findings))
+
+
+def _finding(rule: str, where: str, message: str, advice: str) -> Finding:
+    return Finding(rule, "error", where, message, advice)
+
+
+Faults = Iterator[tuple[str, str, str]]  # rule, message, advice
+
+
+def _material(file: File) -> Faults:
+    made = materials.parse(file.name, file.text())
+    cited = {*made.citations, *materials.shipped_citations()}
+    known = {*materials.quantities(), *materials.print_quantities()}
+    for quantity, values in (*made.properties.items(), *made.print.items()):
+        if quantity not in known:
+            yield "quantity", str(UnknownName("quantity", quantity, known)), "take a name that sensorgen reads"
+        if values and not any(value.default for value in values):
+            usable = [value.source for value in values if not value.implausible and math.isfinite(value.value)]
+            if usable:
+                yield "default", f"{quantity} has no default value", f"add 'default: true' to that of {usable[0]}"
+        for value in values:
+            if value.source not in cited:
+                where = "say under 'citations' where it is published"
+                yield "source", f"{quantity}: source {value.source!r} is not explained", where
+            if value.default and value.implausible:
+                yield "default", f"{quantity} of {value.source} is implausible and a default", "remove one of them"
+    if not made.properties and not made.print:
+        yield "values", "no values", "add at least one quantity"
+
+
+def _shape(file: File) -> Faults:
+    text = file.text()
+    for name in _imported(text, file):
+        if not name.startswith(_IMPORTS) and name.partition(".")[0] not in sys.stdlib_module_names:
+            yield "imports", f"imports {name}", "a shape imports sensorgen.scene and the standard library only"
+    form = shape_files.load(file.name, text) if file.pack.where != "shipped" else designs.shape(file.name)
+    if not (form.__doc__ or "").strip():
+        yield "about", "the file does not say what the shape is", "begin with a docstring: one sentence, and a picture"
+    usual = {f.name: f.default for f in fields(form.Params)} | {
+        name: value for f in fields(form.Params) if (name := f.name) in _SMALL
+        for value in (min(max(_SMALL[name], f.metadata["range"][0]), f.metadata["range"][1]),)
+    }  # fmt: skip
+    for about, changed in _cases(form.Params, usual):
+        try:
+            params: Any = form.Params
+            made = params(**changed)
+            if not 0 < made.cells() < designs.MAX_CELLS:
+                continue
+            for fill in (Fill(), Fill(support="bvoh"), Fill(film="pla")):
+                yield from _scene_faults(about, form.scene(made, fill), fill)
+        except OutOfRange:
+            if not about:
+                raise
+
+
+def _imported(text: str, file: File) -> Iterator[str]:
+    try:
+        tree = ast.parse(text)
+    except SyntaxError as error:
+        raise BadInput(f"{file.path.name}, line {error.lineno}: {error.msg}") from None
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module or "."
+
+
+def _cases(params: type[Envelope], usual: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Defaults, then each parameter at the ends of its range, or at each of its choices."""
+    yield "", usual
+    for f in fields(params):
+        for value in f.metadata.get("choices") or f.metadata["range"]:
+            if not (f.name in _SMALL and value == f.metadata["range"][1]):  # a metre of a fine pattern takes long
+                yield f"{f.name} {value}: ", usual | {f.name: value}
+
+
+def _scene_faults(about: str, scene: Scene, fill: Fill) -> Faults:
+    advice = "correct scene()"
+    terminals = sorted(body.terminal for body in scene.bodies if body.terminal)
+    if terminals not in (["bottom", "top"], ["bottom", "middle", "top"]):
+        yield "terminals", f"{about}terminals are {terminals}", "give one body 'top', and one 'bottom'"
+    made = {body.name: meshes.mesh(body) for body in scene.bodies}
+    for body, fault in validity.faults(scene, made):
+        yield "scene", f"{about}{body}: {fault}", advice
+    volume, box = sum(body.volume_mm3() for body in scene.bodies), math.prod(scene.size_mm)
+    if volume > box * (1 + 1e-9):
+        yield "volume", f"{about}bodies have {volume:.6g} mm3, their box {box:.6g} mm3", advice
+    if fill.support and abs(volume - box) > 1e-9 * box:
+        missing = f"{about}with a support, {box - volume:.3g} mm3 of {box:.6g} mm3 are left empty"
+        yield "support", missing, "fill all air with a body 'support' where fill.support is given"
+
+
+def _printer(file: File) -> Faults:
+    machine = printer.load_printer(file.name, None if file.pack.where == "shipped" else file.text())
+    quality = printer.load_quality("fine")
+    loads = dict(zip(machine.tool_numbers, map(Load, map(materials.load, ("etpu", "x60"))), strict=False))
+    try:
+        prusa.profile(machine, quality, loads)
+    except SensorgenError as error:
+        yield "profile", f"no profile for etpu and x60 in 0.1 mm layers: {error}", "correct the printer's limits"
+    for name, tool in machine.default_tools.items():
+        try:
+            packs.find("materials", name, file.pack.folder)
+        except SensorgenError as error:
+            yield "tools", f"default_tools: tool {tool} has {error}", "correct the name, or leave it out"
+    code = f"{machine.start_gcode}\n{machine.end_gcode}".splitlines()
+    for fault in check(code, machine).findings:
+        if fault.message not in _EMPTY:
+            yield f"gcode-{fault.rule}", f"start and end code, line {fault.line}: {fault.message}", fault.advice
+
+
+def _quality(file: File) -> Faults:
+    quality = printer.load_quality(file.name, None if file.pack.where == "shipped" else file.text())
+    errors = []
+    for name in printer.printer_names():
+        machine = printer.load_printer(name)
+        loads = {machine.tool_numbers[0]: Load(materials.load("etpu"))}
+        try:
+            prusa.profile(machine, quality, loads)
+        except SensorgenError as error:
+            errors.append(str(error))
+    if len(errors) == len(printer.printer_names()):
+        yield "profile", f"no printer that ships can print it: {errors[0]}", "correct layers and speeds"
+
+
+def _instrument(file: File) -> Faults:
+    made = accuracy.parse(file.text(), file.path.name)
+    type_ = made.name.split()[-1]
+    if not made.ranges and not made.bands:
+        yield "limits", "neither ranges nor bands", "add the maker's limits of error"
+    if not accuracy.is_of(made, f"MAKER,{type_},0,1.0"):
+        yield "name", f"a reading of {type_!r} would not name it", "end 'name' with the type"
+    for one in made.ranges:
+        sure = made.dc_ohm(one.ohm / 2, 4)
+        if sure is None or not 0 < sure < one.ohm:
+            yield "limits", f"{one.ohm / 2:g} ohm is known to {sure} ohm", "correct the range"
+    z_ohm = complex(0, -math.sqrt(made.least_ohm * min(made.most_ohm, 1e12)) or -1.0)
+    for band in made.bands:
+        middle = math.sqrt(band.from_hz * band.to_hz)
+        sure = made.ac("X", z_ohm.imag, middle, z_ohm)
+        if sure is None or not 0 < sure < abs(z_ohm):
+            yield "limits", f"{abs(z_ohm):g} ohm at {middle:g} Hz are known to {sure} ohm", "correct the band"
+
+
+def _source(file: File) -> Faults:
+    yield from ()
+    materials.own_source(file.name, file.text())
+
+
+_TESTS: dict[Kind, Callable[[File], Faults]] = {
+    "materials": _material, "sources": _source, "shapes": _shape, "printers": _printer, "qualities": _quality,
+    "instruments": _instrument,
+}  # fmt: skip

@@ -1,0 +1,81 @@
+"""New files of a user's own, from commented templates that pass their checks as they are."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from sensorgen.core import files, yamlfile
+from sensorgen.core.document import Part
+from sensorgen.core.errors import BadInput
+from sensorgen.design import packs
+from sensorgen.design.packs import Kind
+
+What = Literal["material", "shape", "printer", "quality", "instrument", "design"]
+KINDS: dict[What, Kind | None] = {
+    "material": "materials", "shape": "shapes", "printer": "printers", "quality": "qualities",
+    "instrument": "instruments", "design": None,
+}  # fmt: skip
+_NEXT: dict[What, str] = {
+    "material": "replace its numbers; then sensorgen pack test {file}, and --material electrode={name} in any command",
+    "shape": "change it; then sensorgen pack test {file}, and sensorgen check {name}",
+    "printer": "replace its numbers; then sensorgen pack test {file}, and --printer {name} in any command",
+    "quality": "replace its numbers; then sensorgen pack test {file}, and --quality {name} in any command",
+    "instrument": "replace its numbers; then sensorgen pack test {file}",
+    "design": "change it; then sensorgen check {file}",
+}
+
+
+@dataclass(frozen=True)
+class Made:
+    """A new file.
+
+    Attributes
+    ----------
+    file : str
+        Where it is.
+    next : str
+        What to do with it.
+    """
+
+    file: str
+    next: str
+
+    def document(self) -> tuple[Part, ...]:
+        """Both, a line each."""
+        return self.file, f"next: {self.next}"
+
+
+def new(what: What, name: str, pack: str = "") -> Made:
+    """Write a template.
+
+    Parameters
+    ----------
+    what : str
+        One of ``KINDS``.
+    name : str
+        Of the material, shape ...
+    pack : str
+        The user's pack that it goes to; the working folder if not given.
+
+    Raises
+    ------
+    BadInput
+        The name cannot be one, is that of something that ships, or the file exists.
+    Unwritable
+        The file cannot be written.
+    """
+    kind = KINDS[what]
+    if (kind and not packs.is_name(kind, name)) or (not kind and not packs.is_name("shapes", name)):
+        example = "block_tip" if what == "shape" else "lab-eel"
+        raise BadInput(f"{name!r:.60} cannot be a {what}'s name; expected small letters and digits, as {example}")
+    if pack and not packs.NAME.fullmatch(pack):
+        raise BadInput(f"--pack {pack!r:.60}; expected small letters, digits and '-', as lab-filaments")
+    if kind and (ships := packs.shipped_names(kind).get(name)):
+        raise BadInput(f"a {what} {name!r} ships with sensorgen (pack {ships.name}); choose another name")
+    home = packs.Pack(pack, "own", packs.place() / pack) if pack else packs.beside(Path())
+    file = home.path(kind, name) if kind else home.folder / f"{name}.yaml"
+    if file.exists() or file.is_symlink():
+        raise BadInput(f"{str(file)!r} exists; choose another name, or delete it first")
+    template = Path(packs.__file__).parent / "templates" / f"{what}{packs.suffix(kind) if kind else '.yaml'}"
+    files.replace(file, yamlfile.text(template).replace("NAME", name).encode())
+    return Made(str(file), _NEXT[what].format(name=name, file=file))

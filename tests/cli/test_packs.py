@@ -1,0 +1,376 @@
+"""Packs as a new user has them: own files beside a design, in a folder of packs, and from an installed package."""
+
+import json
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+from sensorgen.core import yamlfile
+from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.design import design, materials, packs, shape_files
+from sensorgen.workflows.batch import plan as plans
+
+TEMPLATES = Path(packs.__file__).parent / "templates"
+DESIGN = "shape: zig\nparameters: {length_mm: 40}\nmaterials: {electrode: eel}\nprinter: mine\ntools: {eel: 0}\n"
+CYCLE = {"a": "requires: [b]", "b": "requires: [c]", "c": "requires: [a]"}
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty working folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def put(folder, what, name, change=("", "")):
+    """A template's file in a pack's folder."""
+    kind = {"material": "materials", "shape": "shapes", "printer": "printers", "quality": "qualities"}[what]
+    suffix = ".py" if what == "shape" else ".yaml"
+    text = (TEMPLATES / f"{what}{suffix}").read_text("utf-8").replace("NAME", name)
+    assert change[0] in text
+    path = folder / kind / f"{name}{suffix}"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text.replace(*change) if change[0] else text, "utf-8")
+    return path
+
+
+def install(folder, monkeypatch, value="lab_pack", name="lab"):
+    """A package with a pack, as an installer leaves it."""
+    put(folder / "lab_pack", "material", "lab-ink")
+    (folder / "lab_pack" / "__init__.py").write_text("raise SystemExit('a pack is not imported')\n")
+    info = folder / "lab_pack-2.1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-pack\nVersion: 2.1\n")
+    (info / "entry_points.txt").write_text(f"[sensorgen.packs]\n{name} = {value}\n")
+    monkeypatch.syspath_prepend(str(folder))
+
+
+def made(**changes):
+    return design.make({**yamlfile.parse(DESIGN, "design"), **changes})
+
+
+def test_from_an_empty_folder_to_files_for_a_print(run, unpressed):
+    for words in (("material", "eel"), ("shape", "zig"), ("printer", "mine"), ("quality", "mid"), ("design", "my")):
+        assert run("new", *words).code == 0
+    assert run("pack", "test", ".").out == ".: 4 files, no findings\n"
+    assert run("check", "my.yaml").out == "my: no findings\n"
+    Path("my.yaml").write_text(DESIGN)
+    assert run("check", "my.yaml").code == 0
+    said = run("predict", "my.yaml", "--json")
+    values = {(v["material"], v["quantity"]): v for v in json.loads(said.out)["values"]}
+    assert values["eel", "resistivity_ohm_m"]["source"] == "data-sheet"
+    assert run("build", "my.yaml", "--no-cad").code == 0
+    assert {"my.prusa.3mf", "prediction.json", "design.json"} <= {file.name for file in Path("out/my").iterdir()}
+    assert "eel" in Path("out/my/design.json").read_text()
+
+
+def test_by_options_alone(run):
+    for words in (("material", "eel"), ("shape", "zig")):
+        run("new", *words)
+    for shape in ("zig", "./shapes/zig.py"):
+        said = run("check", shape, "--material", "electrode=eel", "--tool", "eel=1", "--film", "0.3", "--json")
+        assert (said.code, said.err) == (0, "")
+        assert json.loads(said.out)["name"].startswith("zig-film0.3")
+    said = run("check", "zig", "--material", "dielectric=./materials/eel.yaml", "--tool", "eel=1")
+    assert said.line == "sensorgen: materials.dielectric: eel conducts"
+    said = run("check", "zig", "--material", "electrode=eel").line
+    assert said.startswith("sensorgen: no tool for eel on diabase-h5: name one with --tool eel=1, or 'tools: {eel: 1}'")
+    assert said.endswith("(free: 1, 2, 3, 5)")
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (
+            "check tri --material electrode=eel",
+            "unknown material 'eel'. .*; your own: sensorgen new material eel",
+        ),
+        ("check zig", "unknown shape 'zig'. Known: .*; your own: sensorgen new shape zig"),
+        ("check tri --printer mk4", "unknown printer 'mk4'. Known: .*; your own: sensorgen new printer mk4"),
+        ("new material x60", "a material 'x60' ships with sensorgen .pack thesis.; choose another name"),
+        ("new material ../x", "'../x' cannot be a material's name; expected small letters and digits, as lab-eel"),
+        ("new material a --pack ../x", "--pack '../x'; expected small letters, digits and '-'"),
+        ("pack test nothing", "unknown pack 'nothing'. Known: .*thesis"),
+        ("pack test .", ".: no files of a pack; expected folders as materials, sources, shapes"),
+        ("pack trust thesis", "thesis: has no shapes; expected a pack with shapes, or a shape's file"),
+        (
+            "check tri --layer-height 0.2",
+            "unknown option '--layer-height': the print quality has it; take another with",
+        ),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(run, words, expected):
+    said = run(*words.split())
+    assert said.code == 2
+    assert re.search(expected, said.line)
+    assert not list(Path().iterdir())
+
+
+def test_an_existing_file_stays(run):
+    run("new", "material", "eel")
+    Path("materials/eel.yaml").write_text("mine")
+    assert run("new", "material", "eel").line.startswith("sensorgen: 'materials/eel.yaml' exists; choose another name")
+    assert Path("materials/eel.yaml").read_text() == "mine"
+
+
+def test_a_parameter_with_the_name_of_an_option(run, recwarn, unpressed):
+    put(Path(), "shape", "zig", ("height_mm", "tip_mm"))
+    said = run("predict", "zig", "--shape-tip", "0.5", "--tip", "5", "--json", "--drawn")
+    assert (said.code, said.err) == (0, "")
+    assert json.loads(said.out)["design"]
+    assert "--shape-tip" in run("check", "zig", "--help").out.replace("--tip", "--shape-tip")
+    assert not [w for w in recwarn if "more than once" in str(w.message)]
+
+
+def test_where_each_comes_from(run, here, monkeypatch, tmp_path_factory):
+    run("new", "material", "eel")
+    run("new", "shape", "zig", "--pack", "mine")
+    install(tmp_path_factory.mktemp("site"), monkeypatch)
+    entries = json.loads(run("list", "materials", "--json").out)
+    found = {name: (entries[name]["pack"], entries[name]["where"], entries[name]["version"]) for name in entries}
+    assert found["eel"] == (here.name, "beside the design", "")
+    assert found["lab-ink"] == ("lab", "installed", "2.1")
+    assert found["x60"][:2] == ("thesis", "shipped")
+    shapes = json.loads(run("list", "shapes", "--json").out)
+    assert (shapes["zig"]["pack"], shapes["zig"]["where"]) == ("mine", "own")
+    assert shapes["zig"]["file"] == str(packs.place() / "mine" / "shapes" / "zig.py")
+    assert f"[pack lab 2.1, installed: {entries['lab-ink']['file']}]" in run("list", "materials").words
+    assert {"thesis", "mine", "lab"} <= set(json.loads(run("list", "packs", "--json").out))
+    assert run("check", "tri", "--material", "electrode=lab-ink", "--tool", "lab-ink=1").code in (0, 1)
+
+
+def test_one_damaged_file_does_not_hide_the_others(run):
+    run("new", "material", "eel")
+    Path("materials/bad.yaml").write_text("title: [")
+    said = run("list", "materials")
+    assert said.code == 0
+    assert "bad cannot be used: bad.yaml: line" in said.words
+
+
+@pytest.mark.parametrize(
+    ("value", "name", "expected"),
+    [
+        ("lab_pack.missing", "lab", "there is no folder 'lab_pack/missing' in it"),
+        ("not a name", "lab", "entry point 'not a name' names no folder"),
+        ("lab_pack:__path__", "lab", "names no folder"),
+        ("lab_pack", "../lab", "names no folder"),
+        ("..lab_pack", "lab", "names no folder"),
+    ],
+)
+def test_damaged_entry_points(run, monkeypatch, tmp_path_factory, value, name, expected):
+    install(tmp_path_factory.mktemp("site"), monkeypatch, value, name)
+    said = run("list", "materials")
+    assert said.code == 2
+    assert "'lab-pack'" in said.line
+    assert expected in said.line
+    assert run("check", "reference").code == 0  # nothing of it is needed
+
+
+def test_what_is_nearer_goes_before_and_what_ships_cannot_be_hidden(here):
+    own = packs.place()
+    put(own / "one", "material", "eel", ("value: 0.1,", "value: 0.2,"))
+    assert packs.find("materials", "eel").pack.name == "one"
+    put(here, "material", "eel")
+    assert packs.find("materials", "eel").pack.where == packs.BESIDE
+    put(own / "two", "material", "ink")
+    put(own / "three", "material", "ink")
+    with pytest.raises(BadInput, match=r"material 'ink' is in 2 packs: .*three.* and .*two.*; rename or remove one"):
+        packs.find("materials", "ink")
+    put(here, "material", "x60")
+    with pytest.raises(BadInput, match=r"a material 'x60' ships with sensorgen .pack thesis.; rename the file"):
+        design.make({"shape": "tri", "materials": {"film": "x60"}})
+
+
+def test_packs_that_require_each_other(run, here):
+    for name, manifest in CYCLE.items():
+        put(packs.place() / name, "material", f"{name}-ink")
+        (packs.place() / name / "pack.yaml").write_text(manifest)
+    said = run("check", "tri", "--material", "electrode=a-ink", "--tool", "a-ink=1")
+    assert said.code == 2
+    assert "packs require each other in a circle: a -> b -> c -> a" in said.line
+    (packs.place() / "c" / "pack.yaml").write_text("requires: [d]")
+    assert "requires pack 'd', which is not there; install it, or copy it to" in run("pack", "test", "c").words
+    (packs.place() / "c" / "pack.yaml").write_text("requires: [filaments]\nversion: '3'\n")
+    assert run("pack", "test", "a").code == 0
+
+
+def test_the_identity_of_a_design_holds_the_content_of_its_files(here):
+    files = {
+        "eel": put(here, "material", "eel"),
+        "zig": put(here, "shape", "zig"),
+        "mine": put(here, "printer", "mine"),
+    }
+    before = made().id()
+    assert made(name="other").id() == before
+    for name, old, new, same in (
+        ("eel", "value: 0.1,", "value: 0.11,", False), ("eel", "# in drawings", "# colour", True),
+        ("zig", "half, p.length_mm", "half, 1.0 * p.length_mm", False),
+        ("mine", "[250.0, 210.0]", "[240.0, 210.0]", False),
+        ("mine", "# or: centre", "", True),
+    ):  # fmt: skip
+        text = files[name].read_text()
+        assert old in text
+        files[name].write_text(text.replace(old, new))
+        assert (made().id() == before) is same, (name, new)
+        files[name].write_text(text)
+    for name in ("materials", "shapes", "printers"):
+        shutil.move(here / name, packs.place() / "moved" / name)
+    assert made().id() == before
+
+
+def test_a_record_of_a_design_does_not_need_its_files(here):
+    put(here, "material", "eel"), put(here, "shape", "zig"), put(here, "printer", "mine")
+    before = made()
+    record = json.loads(json.dumps(before.resolved()))
+    for name in ("materials", "shapes", "printers"):
+        shutil.rmtree(here / name)
+    again = design.of_resolved("zig", record)
+    assert again.id() == before.id()
+    assert again.drawn == before.drawn
+    with pytest.raises(UnknownName, match="unknown shape 'zig'"):
+        made()
+
+
+def test_designs_of_a_batch_have_the_files_beside_them(here):
+    put(here / "sub", "material", "eel")
+    (here / "sub" / "d.yaml").write_text("shape: reference\nmaterials: {electrode: eel}\ntools: {eel: 1}\n")
+    (here / "plan.yaml").write_text("iteration: 1\ndesigns: [{design: sub/d.yaml}]\n")
+    plan = plans.load(here / "plan.yaml")
+    assert plan.made(plan.designs[0], here).used()["eel"] == ""
+
+
+def test_a_design_cannot_bring_a_material_by_the_name_of_one_that_ships(here):
+    text = put(here, "material", "eel").read_text()
+    with pytest.raises(BadInput, match="a material 'x60' ships with sensorgen"):
+        design.make({"shape": "tri", "own": {"materials": {"x60": text}}})
+
+
+def test_a_copy_of_a_printer_by_its_path(here):
+    text = packs.find("printers", "diabase-h5").text().replace("nozzle_mm: 0.4", "nozzle_mm: 0.3")
+    (here / "diabase-h5.yaml").write_text(text)
+    found = design.make({"shape": "tri", "printer": "./diabase-h5.yaml"})
+    assert (found.machine.name, found.machine.nozzle_mm) == ("diabase-h5", 0.3)
+    assert design.of_resolved("tri", json.loads(json.dumps(found.resolved()))).id() == found.id()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
+def test_a_link_out_of_a_pack(run, here, tmp_path_factory):
+    secret = tmp_path_factory.mktemp("else") / "eel.yaml"
+    secret.write_text("title: secret")
+    (here / "materials").mkdir()
+    (here / "materials" / "eel.yaml").symlink_to(secret)
+    said = run("check", "tri", "--material", "electrode=eel", "--tool", "eel=1")
+    assert said.code == 2
+    assert "a link that leads out of its pack; copy the file to its place" in said.line
+    assert "secret" not in said.line
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a: &a [1]\nb: *a\n", "aliases .* are not taken"),
+        ("title: !!python/object/apply:os.system [ls]\n", "tags .* are not taken"),
+        ("title: x\n" * 20_000, "bytes; expected at most 100000"),
+        ("[" * 30, "nested deeper than 20 levels|expected"),
+        ("title: 1\n", "eel.yaml: title is 1; expected text"),
+    ],
+)
+def test_hostile_yaml(run, here, text, expected):
+    (here / "materials").mkdir()
+    (here / "materials" / "eel.yaml").write_text(text)
+    said = run("check", "tri", "--material", "electrode=eel", "--tool", "eel=1")
+    assert said.code == 2
+    assert re.search(expected, said.line), said.line
+
+
+def test_trust_is_of_a_content(run, here):
+    file = put(here, "shape", "zig")
+    assert not shape_files.is_trusted(file.read_text())
+    before = design.make({"shape": "zig"})
+    assert run("pack", "trust", "shapes/zig.py").out == f"trusted: {file.relative_to(here)}\n"
+    assert shape_files.is_trusted(file.read_text())
+    trusted = design.make({"shape": "zig"})
+    assert (trusted.id(), trusted.drawn) == (before.id(), before.drawn)
+    file.write_text(file.read_text() + "\n")
+    assert not shape_files.is_trusted(file.read_text())
+
+
+PLANTED = [
+    ("material", "source: data-sheet, default: true, low: 210.0", "source: web, default: true, low: 210.0",
+     "source: nozzle_temperature_c: source 'web' is not explained"),
+    ("material", "youngs_modulus_pa:", "youngs_modulus_mpa:", "quantity: unknown quantity 'youngs_modulus_mpa'"),
+    ("material", "value: 5.0, source: data-sheet, default: true", "value: 5.0, source: data-sheet",
+     "default: relative_permittivity has no default value"),
+    ("material", "value: 0.1,", "value: -0.1,", "read: .*resistivity_ohm_m of data-sheet is -0.1"),
+    ("shape", "box(*whole, low, film)", "box(*whole, low, film + 0.01)", "scene: .*overlap by"),
+    ("shape", '"bottom"),', '""),', "terminals: terminals are"),
+    ("shape", "min(x + half, p.length_mm)", "min(x + half, p.length_mm) - 0.1", "support: .*are left empty"),
+    ("shape", "from math import ceil", "from math import ceil\n\ntry:\n    import numpy\nexcept ImportError:\n    pass",
+     "imports: imports numpy"),
+    ("shape", '"Height of the blocks."', '""', "read: zig.py: parameter height_mm has no help"),
+    ("shape", "(0.05, 5.0)})\n    film_mm", "(0.5, 5.0)})\n    film_mm", "read: .*default 0.4 is outside its range"),
+    ("shape", '"range": (0.5, 50.0)', '"choices": (1, 2)', "read: .*default 4.0 is not among its choices"),
+    ("printer", "  G28\n", "  M999 S1\n", "gcode-command: start and end code, line 3: x has no M999|has no M999"),
+    ("printer", "min_layer_mm: 0.05", "min_layer_mm: 0.3", "profile: no profile"),
+    ("printer", "{etpu: 0, x60: 1}", "{etpy: 0}", "tools: .*unknown material 'etpy'"),
+    ("quality", "layer_mm: 0.15  ", "layer_mm: 0.9  ", "profile: no printer that ships can print it"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("what", "old", "new", "expected"), PLANTED, ids=[case[3][:40] for case in PLANTED])
+def test_planted_faults_are_found(run, here, what, old, new, expected):
+    put(here, what, "zig" if what == "shape" else "it", (old, new))
+    said = run("pack", "test", ".", "--json")
+    assert said.code == 1
+    findings = json.loads(said.out)["findings"]
+    assert any(re.search(expected, f"{f['rule']}: {f['message']}") for f in findings), findings
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rule"),
+    [
+        ("ranges:", "range:", "read"), ("  - [100.0, 0.01, 0.004]", "  - [100.0, 0.01]", "read"),
+        ("0.1, 0.0, 0.0]", "-0.1, 0.0, 0.0]", "limits"),
+        ("  - [1.0e+3, 0.01, 0.001]", "  - [1.0e+3, 0.0, 0.0]", "limits"),
+    ],
+)  # fmt: skip
+def test_planted_faults_of_instruments(run, old, new, rule):
+    run("new", "instrument", "m-100")
+    file = Path("instruments/m-100.yaml")
+    assert run("pack", "test", str(file)).code == 0
+    file.write_text(file.read_text().replace(old, new).replace("leads_ohm: 0.2", "leads_ohm: 0.0"))
+    said = run("pack", "test", str(file), "--json")
+    assert (said.code, json.loads(said.out)["findings"][0]["rule"]) == (1, rule)
+
+
+def test_packs_that_ship_have_no_findings(run):
+    for name in ("thesis", "filaments"):
+        assert run("pack", "test", name).out.endswith("no findings\n")
+
+
+def test_both_electrodes_by_one_word():
+    found = design.make({"shape": "tri", "materials": {"electrode": "etpu@thesis-3.2", "top_electrode": "etpu"}})
+    assert (found.materials.top_electrode, found.materials.bottom_electrode) == ("etpu", "etpu@thesis-3.2")
+
+
+def test_own_sources_of_fits_are_in_packs_too(here):
+    (packs.place() / "fits" / "sources").mkdir(parents=True)
+    text = "about: bars of June\nmaterials: {etpu: {resistivity_ohm_m: {value: 0.3}}}\n"
+    (packs.place() / "fits" / "sources" / "bars-6.yaml").write_text(text)
+    found = design.make({"shape": "tri", "materials": {"electrode": "etpu@bars-6"}})
+    assert found.own["sources"]["bars-6"] == text
+    assert found.material("etpu").value("resistivity_ohm_m", "bars-6").value == 0.3
+    assert materials.cited(found.own) == {"bars-6": "bars of June"}
+
+
+def test_the_commands_of_the_page(run, here):
+    """In one folder, one after the other; the design of the page too."""
+    page = (Path(__file__).parents[2] / "docs" / "packs.md").read_text("utf-8")
+    for line in re.search(r"```sh\n(.*?)```", page, re.DOTALL)[1].splitlines():
+        assert run(*line.partition("#")[0].split()[1:]).code == 0
+    put(here, "printer", "mine").rename(here / "lab-printer.yaml")
+    (here / "design.yaml").write_text(re.search(r"```yaml\n(.*?)```", page, re.DOTALL)[1])
+    assert run("check", "design.yaml").code == 0
