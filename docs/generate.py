@@ -23,7 +23,8 @@ PAGES = (
     ["bench", "hysteresis"], ["bench", "sets"], ["bench", "live"],
     ["log"],
     *(["log", w] for w in ("specimen", "add", "import", "bench", "predict", "list", "show", "export", "verify")),
-    ["report"], ["fit"], ["calibrate"], ["thesis"], ["new"], ["pack"], ["pack", "test"],
+    ["report"], ["fit"], ["characterise"], ["characterise", "PRINTER"], ["characterise", "read"],
+    ["calibrate"], ["thesis"], ["new"], ["pack"], ["pack", "test"],
     ["pack", "trust"], ["list"], ["schema"], ["completion"],
 )  # fmt: skip
 

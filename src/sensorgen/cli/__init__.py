@@ -39,6 +39,7 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
         "calibrate": "Calibrate specimens by known presses.",
         "report": "Compare predictions and measurements, as one page.",
         "fit": "Fit material values to what was measured.",
+        "characterise": "Material values from a plate of test structures.",
     },
     "Reference": {
         "new": "Write a material, shape, printer, quality, design or target to change.",
