@@ -234,7 +234,7 @@ def test_geometry_is_part_of_the_design(run, plates, tmp_path):
     bodies.write_text(bodies.read_text().replace("0.6", "0.7"))
     assert "its content is not that of its name" in run("check", "a.yaml").line
     bodies.unlink()
-    assert "cannot read" in run("check", "a.yaml").line
+    assert "not a file; expected the bodies" in run("check", "a.yaml").line
 
 
 @pytest.mark.parametrize(
