@@ -118,7 +118,10 @@ def _shape_of(base: Data) -> "Shape | ModuleType | None":
         return registry.load(shapes, name)
     from sensorgen.design import shape_files
 
-    return shape_files.load(name, base["own"]["shapes"][name])
+    kinds = base.get("own")
+    texts = kinds.get("shapes") if isinstance(kinds, dict) else None
+    text = texts.get(name) if isinstance(texts, dict) else None
+    return shape_files.load(name, text) if isinstance(text, str) else None
 
 
 def _about(module: "Shape | ModuleType | None") -> str:

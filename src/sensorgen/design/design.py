@@ -128,6 +128,12 @@ class Design(Strict):
             )
         return name
 
+    def __getstate__(self) -> dict[Any, Any]:
+        """State without derived values: classes of shape files exist in this process only."""
+        state = super().__getstate__()
+        kept = {key: value for key, value in state["__dict__"].items() if key in type(self).model_fields}
+        return state | {"__dict__": kept}
+
     @cached_property
     def params(self) -> Envelope:
         """The shape's parameters, checked and complete."""
@@ -225,19 +231,15 @@ class Design(Strict):
         """
         tools = self.machine.default_tools | self.tools
         if material not in tools:
-            taken = {tools[name] for name in self._tooled(tools)}
+            printing = {body.material for body in self.drawn.bodies}
+            taken = {tool for name, tool in tools.items() if name in printing}
             free = [tool for tool in self.machine.tool_numbers if tool not in taken]
-            advice = f"free: {', '.join(map(str, free))}" if free else "none of its tools is free"
+            first = free[0] if free else "NUMBER"
             raise MissingValue(
-                f"no tool for {material} on {self.machine.name}: name one with --tool {material}="
-                f"{free[0] if free else 'NUMBER'}, or 'tools: {{{material}: {free[0] if free else 'NUMBER'}}}' in the "
-                f"design ({advice})"
+                f"no tool for {material} on {self.machine.name}: name one with --tool {material}={first}, or 'tools: "
+                f"{{{material}: {first}}}' in the design (free: {', '.join(map(str, free)) or 'none'})"
             )
         return tools[material]
-
-    def _tooled(self, tools: Mapping[str, int]) -> set[str]:
-        """Materials in the sensor that have a tool."""
-        return {body.material for body in self.drawn.bodies} & tools.keys()
 
     def resolved(self) -> dict[str, Any]:
         """Everything that decides the sensor, with all defaults and the values of material and printer filled in."""

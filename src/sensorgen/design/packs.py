@@ -164,9 +164,12 @@ def shipped() -> tuple[Pack, ...]:
     here, package = Path(__file__).parent, Path(__file__).parents[1]
     thesis: tuple[tuple[Kind, Path], ...] = (
         ("printers", profiles() / "printers"), ("qualities", profiles() / "qualities"),
-        ("instruments", package / "measure" / "accuracy"),
     )  # fmt: skip
-    return (Pack("thesis", "shipped", here, moved=thesis), Pack("filaments", "shipped", here / "filaments"))
+    others: tuple[tuple[Kind, Path], ...] = (("instruments", package / "measure" / "accuracy"),)
+    return (
+        Pack("thesis", "shipped", here, moved=thesis), Pack("filaments", "shipped", here / "filaments"),
+        Pack("others", "shipped", profiles() / "others", moved=others),
+    )  # fmt: skip
 
 
 @cache
