@@ -18,9 +18,10 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
         "build": "Write all that a print needs: 3MF, STEP, profiles, drawing.",
         "import": "Import bodies from STEP, 3MF or STL as a design.",
         "batch": "Put several sensors on one plate, with a record.",
-        "check": "Check a design against nozzle, layers and bed.",
+        "check": "Decide whether to print a design, and what to change.",
         "slice": "Write printer-ready G-code, by a real slicer.",
         "gcode": "Check G-code before the printer does.",
+        "show": "Show a design as one page: 3D, section, layers, numbers.",
         "draw": "Draw the cross-section, its layers and findings, as SVG.",
     },
     "Predict": {

@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from sensorgen.checks.review import review
 from sensorgen.core.bounds import Bounds
@@ -15,14 +15,14 @@ from sensorgen.core.findings import Finding, Verdict, counted, counts, listed, m
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.walls import rule
-from sensorgen.export import slicing
-from sensorgen.export.gcode.drags import OfTool
-from sensorgen.export.gcode.report import report
 from sensorgen.export.slicers import SLICERS
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import DEFAULT, Query
 from sensorgen.prediction.results import Prediction
+
+if TYPE_CHECKING:
+    from sensorgen.export.gcode.drags import OfTool
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Toolpath:
     crossings: int
 
     @classmethod
-    def of(cls, source: str, time_s: float, tools: Iterable[OfTool]) -> "Toolpath":
+    def of(cls, source: str, time_s: float, tools: "Iterable[OfTool]") -> "Toolpath":
         """By what each tool passes over."""
         each = tuple(tools)
         touching = sum(tool.contact_mm + tool.rubbing_mm for tool in each)
@@ -237,6 +237,8 @@ def _at_hand(design: Design, folder: Path | None) -> tuple[Body, Toolpath | None
     body, file = bodies.default_body(design, folder), bodies.toolpath(design, folder)
     if file is None:
         return body, None
+    from sensorgen.export.gcode.drags import OfTool
+
     made = json.loads(file.with_name(f"{file.name}.json").read_text("utf-8"))
     try:
         tools = [OfTool(**tool) for tool in made["lifting"]["after"]["tools"]]
@@ -249,6 +251,8 @@ def _at_hand(design: Design, folder: Path | None) -> tuple[Body, Toolpath | None
 def _sliced(design: Design, slicer: str) -> tuple[Body, Toolpath, list[Finding]]:
     """The print by a real slicer, as ``sensorgen slice`` makes it, and the findings about it."""
     from sensorgen.asprinted.printed import body
+    from sensorgen.export import slicing
+    from sensorgen.export.gcode.report import report
 
     with tempfile.TemporaryDirectory() as stage:
         made = slicing.sliced([slicing.alone(design)], slicer, Path(stage))
