@@ -158,7 +158,7 @@ def test_a_row_without_mirrors_is_looked_at_once_for_each_place(monkeypatch):
     repeats = cells._repeats
     monkeypatch.setattr(cells, "_repeats", lambda *given: looked.append(given[1:]) or repeats(*given))
     section = sections(steps(12))[0]
-    found_here = cells.mirrored([cells._slice(column, HEIGHT_MM) for column in columns(section)])
+    found_here = cells.mirrored(tuple(cells._slice(column, HEIGHT_MM) for column in columns(section)))
     edges = {x for s in found_here.slices for x in (s.left_mm, s.right_mm)}
     places = edges | {(s.left_mm + s.right_mm) / 2 for s in found_here.slices if s.is_flat()}
     assert len(found_here.slices) == 12 * 4

@@ -1,6 +1,7 @@
 """Packs as a new user has them: own files beside a design, in a folder of packs, and from an installed package."""
 
 import json
+import pickle
 import re
 import shutil
 import sys
@@ -11,6 +12,7 @@ import pytest
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.design import design, materials, packs, shape_files
+from sensorgen.measure import accuracy
 from sensorgen.workflows.batch import plan as plans
 
 TEMPLATES = Path(packs.__file__).parent / "templates"
@@ -61,8 +63,9 @@ def test_from_an_empty_folder_to_files_for_a_print(run, unpressed):
     assert run("check", "my.yaml").code == 0
     said = run("predict", "my.yaml", "--json")
     values = {(v["material"], v["quantity"]): v for v in json.loads(said.out)["values"]}
-    assert values["eel", "resistivity_ohm_m"]["source"] == "data-sheet"
+    assert values["eel", "resistivity_ohm_m"]["source"] == "eel-sheet"
     assert run("build", "my.yaml", "--no-cad").code == 0
+    assert materials.citations()["eel-sheet"].startswith("example numbers")
     assert {"my.prusa.3mf", "prediction.json", "design.json"} <= {file.name for file in Path("out/my").iterdir()}
     assert "eel" in Path("out/my/design.json").read_text()
 
@@ -134,6 +137,9 @@ def test_where_each_comes_from(run, here, monkeypatch, tmp_path_factory):
     assert found["eel"] == (here.name, "beside the design", "")
     assert found["lab-ink"] == ("lab", "installed", "2.1")
     assert found["x60"][:2] == ("thesis", "shipped")
+    assert found["ninjatek-eel"][:2] == ("filaments", "shipped")
+    printers = json.loads(run("list", "printers", "--json").out)
+    assert {name: printers[name]["pack"] for name in printers} == {"diabase-h5": "thesis", "prusa-xl5": "others"}
     shapes = json.loads(run("list", "shapes", "--json").out)
     assert (shapes["zig"]["pack"], shapes["zig"]["where"]) == ("mine", "own")
     assert shapes["zig"]["file"] == str(packs.place() / "mine" / "shapes" / "zig.py")
@@ -167,6 +173,26 @@ def test_damaged_entry_points(run, monkeypatch, tmp_path_factory, value, name, e
     assert "'lab-pack'" in said.line
     assert expected in said.line
     assert run("check", "reference").code == 0  # nothing of it is needed
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "expected"),
+    [
+        ("entry_points.txt", "[sensorgen.packs]\nno sign of what it is\n", "cannot be read|names no folder"),
+        ("entry_points.txt", "[sensorgen.packs]\n= lab_pack\n", "names no folder"),
+        ("METADATA", None, ""), ("METADATA", "\x00\n", ""),
+    ],
+)  # fmt: skip
+def test_a_damaged_package(run, monkeypatch, tmp_path_factory, file, text, expected):
+    site = tmp_path_factory.mktemp("site")
+    install(site, monkeypatch)
+    path = site / "lab_pack-2.1.dist-info" / file
+    path.unlink()
+    if text is not None:
+        path.write_text(text)
+    said = run("list", "materials")
+    assert said.code == (2 if expected else 0)
+    assert re.search(expected, said.line if expected else "")
 
 
 def test_what_is_nearer_goes_before_and_what_ships_cannot_be_hidden(here):
@@ -207,7 +233,7 @@ def test_the_identity_of_a_design_holds_the_content_of_its_files(here):
     assert made(name="other").id() == before
     for name, old, new, same in (
         ("eel", "value: 0.1,", "value: 0.11,", False), ("eel", "# in drawings", "# colour", True),
-        ("zig", "half, p.length_mm", "half, 1.0 * p.length_mm", False),
+        ("zig", "p.period_mm / 4", "1.0 * p.period_mm / 4", False),
         ("mine", "[250.0, 210.0]", "[240.0, 210.0]", False),
         ("mine", "# or: centre", "", True),
     ):  # fmt: skip
@@ -234,12 +260,30 @@ def test_a_record_of_a_design_does_not_need_its_files(here):
         made()
 
 
+def test_a_design_goes_to_another_process(here):
+    put(here, "material", "eel"), put(here, "shape", "zig"), put(here, "printer", "mine")
+    before = made()
+    again = pickle.loads(pickle.dumps(before))
+    assert again == made()
+    assert (again.id(), again.drawn) == (before.id(), before.drawn)
+
+
 def test_designs_of_a_batch_have_the_files_beside_them(here):
     put(here / "sub", "material", "eel")
     (here / "sub" / "d.yaml").write_text("shape: reference\nmaterials: {electrode: eel}\ntools: {eel: 1}\n")
     (here / "plan.yaml").write_text("iteration: 1\ndesigns: [{design: sub/d.yaml}]\n")
     plan = plans.load(here / "plan.yaml")
     assert plan.made(plan.designs[0], here).used()["eel"] == ""
+
+
+@pytest.mark.parametrize(
+    "own", ["{shapes: {zig: 5}}", "{shapes: [zig]}", "5", "{forms: {zig: a}}", "{shapes: {zig: ''}}"]
+)
+def test_what_a_design_brings_is_checked(run, own):
+    Path("d.yaml").write_text(f"shape: zig\nown: {own}\n")
+    said = run("check", "d.yaml")
+    assert said.code == 2
+    assert said.line
 
 
 def test_a_design_cannot_bring_a_material_by_the_name_of_one_that_ships(here):
@@ -299,15 +343,15 @@ def test_trust_is_of_a_content(run, here):
 
 
 PLANTED = [
-    ("material", "source: data-sheet, default: true, low: 210.0", "source: web, default: true, low: 210.0",
+    ("material", "source: it-sheet, default: true, low: 210.0", "source: web, default: true, low: 210.0",
      "source: nozzle_temperature_c: source 'web' is not explained"),
     ("material", "youngs_modulus_pa:", "youngs_modulus_mpa:", "quantity: unknown quantity 'youngs_modulus_mpa'"),
-    ("material", "value: 5.0, source: data-sheet, default: true", "value: 5.0, source: data-sheet",
+    ("material", "value: 5.0, source: it-sheet, default: true", "value: 5.0, source: it-sheet",
      "default: relative_permittivity has no default value"),
-    ("material", "value: 0.1,", "value: -0.1,", "read: .*resistivity_ohm_m of data-sheet is -0.1"),
+    ("material", "value: 0.1,", "value: -0.1,", "read: .*resistivity_ohm_m of it-sheet is -0.1"),
     ("shape", "box(*whole, low, film)", "box(*whole, low, film + 0.01)", "scene: .*overlap by"),
     ("shape", '"bottom"),', '""),', "terminals: terminals are"),
-    ("shape", "min(x + half, p.length_mm)", "min(x + half, p.length_mm) - 0.1", "support: .*are left empty"),
+    ("shape", "min(x + 3 * quarter, end)", "min(x + 3 * quarter, end) - 0.1", "support: .*are left empty"),
     ("shape", "from math import ceil", "from math import ceil\n\ntry:\n    import numpy\nexcept ImportError:\n    pass",
      "imports: imports numpy"),
     ("shape", '"Height of the blocks."', '""', "read: zig.py: parameter height_mm has no help"),
@@ -347,8 +391,28 @@ def test_planted_faults_of_instruments(run, old, new, rule):
 
 
 def test_packs_that_ship_have_no_findings(run):
-    for name in ("thesis", "filaments"):
+    for name in ("thesis", "filaments", "others"):
         assert run("pack", "test", name).out.endswith("no findings\n")
+
+
+def test_an_own_dielectric(run, unpressed):
+    put(Path(), "material", "gel", ("conductor: true", "conductor: false"))
+    taken = ["--material", "dielectric=gel", "--material", "film=gel", "--tool", "gel=1"]
+    said = run("predict", "tri", *taken, "--drawn", "--json")
+    assert (said.code, said.err) == (0, "")
+    values = {(v["material"], v["quantity"]): v for v in json.loads(said.out)["values"]}
+    assert values["gel", "relative_permittivity"]["value"] == 5.0
+
+
+def test_an_instrument_beside_the_readings(here):
+    (here / "instruments").mkdir()
+    text = (TEMPLATES / "instrument.yaml").read_text("utf-8").replace("NAME", "LCR-7")
+    (here / "instruments" / "lcr-7.yaml").write_text(text)
+    accuracy._all.cache_clear()
+    try:
+        assert accuracy.find("LCR-7").dc_ohm(50.0, 4) == pytest.approx((50 * 1e-4 + 100 * 4e-5) / 3**0.5)
+    finally:
+        accuracy._all.cache_clear()
 
 
 def test_both_electrodes_by_one_word():

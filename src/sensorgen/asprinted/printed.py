@@ -81,10 +81,13 @@ class Printed:
     @cached_property
     def cells(self) -> dict[str, Cell]:
         """The unit cell by every convention."""
-        from sensorgen.asprinted.window import window
+        from sensorgen.asprinted.window import inside, window
 
-        scene = self.design.printed
-        plan = window(drawn(scene, self.design.layers.boundaries_mm(scene.size_mm[2])), scene)
+        whole = self.design.unbordered.printed
+        boundaries = self.design.layers.boundaries_mm(whole.size_mm[2])
+        plan = window(drawn(whole, boundaries), whole)
+        if self.design.border:
+            plan = inside(plan, whole, drawn(self.design.printed, boundaries))
         return {name: cell(self.design, found.layers, found.bodies, plan) for name, found in self._connected.items()}
 
     @cached_property

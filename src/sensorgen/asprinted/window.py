@@ -13,9 +13,11 @@ import shapely
 from shapely.affinity import translate
 
 from sensorgen.core.arrays import Real
+from sensorgen.core.errors import BadInput
 from sensorgen.scene.layers import LayerRegions, Region, cleaned, parts
 from sensorgen.scene.repetition import repeat
 from sensorgen.scene.scene import SLIVER_MM, Point, Scene, rounded
+from sensorgen.scene.sections import square_to
 from sensorgen.scene.unit_cell import Band, Slice, mirrored
 
 ROUNDED_MM = 2e-3  # edges nearer than this are one: G-code has three decimals
@@ -65,6 +67,36 @@ def window(layers: Sequence[LayerRegions], scene: Scene) -> Window:
     return Window(x, y, (one, other))
 
 
+def inside(plan: Window, whole: Scene, layers: Sequence[LayerRegions]) -> Window:
+    """The period of a rectangle inside a border that cuts it: as wide as a fifth of it where nothing changes across.
+
+    Parameters
+    ----------
+    plan : Window
+        Of the rectangle.
+    whole : Scene
+        The rectangle.
+    layers : sequence of LayerRegions
+        Inside the border.
+
+    Raises
+    ------
+    BadInput
+        The border cuts this period.
+    """
+    sides = []
+    for axis, (low, high) in zip("xy", (plan.x_mm, plan.y_mm), strict=True):
+        uniform = len(square_to(whole, axis)) == 1
+        sides.append((0.4 * high + 0.6 * low, 0.6 * high + 0.4 * low) if uniform else (low, high))
+    found = Window(sides[0], sides[1], plan.repeats)
+    box = shapely.box(sides[0][0], sides[1][0], sides[0][1], sides[1][1])
+    if not any(
+        shapely.covers(shapely.union_all(list(layer.regions.values())).buffer(SLIVER_MM), box) for layer in layers
+    ):
+        raise BadInput("the border cuts the period in the middle of the sensor; expected one that leaves it whole")
+    return found
+
+
 def _period(
     layers: Sequence[LayerRegions], conducting: set[str], size_mm: Sequence[float], axis: int
 ) -> tuple[Point, bool]:
@@ -85,7 +117,7 @@ def _period(
             (Band(look.tobytes().hex(), "", (0.0, 0.0), (1.0, 1.0)),) for look in looks.T.reshape(len(middles), -1)
         ]
         strips = [Slice(a, b, band) for (a, b), band in zip(pairwise(places.tolist()), bands, strict=True)]
-        piece = mirrored(strips).slices
+        piece = mirrored(tuple(strips)).slices
         low, width, shifts = piece[0].left_mm, piece[-1].right_mm - piece[0].left_mm, False
     else:
         found = repeat([region for layer in patterned for region in layer.regions.values()], size_mm, axis)

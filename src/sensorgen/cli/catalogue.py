@@ -31,7 +31,7 @@ class Entry:
     def origin(self) -> str:
         """Where it comes from, in words; "" for what ships."""
         if self.where in ("", "shipped"):
-            return f"pack {self.pack}" if self.pack else ""
+            return f"pack {self.pack}" if self.pack else "shipped" if self.where else ""
         version = f" {self.version}" if self.version else ""
         return f"pack {self.pack}{version}, {self.where}: {self.file}"
 
@@ -160,14 +160,15 @@ def all_packs() -> Catalogue:
     entries: dict[str, Entry] = {}
     for pack in packs.everywhere():
         counts = {kind: len(pack.names(kind)) for kind in packs.SINGULAR}
-        holds = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
+        holds = ", ".join(f"{n} {packs.SINGULAR[kind] if n == 1 else kind}" for kind, n in counts.items() if n)
         if holds:
             try:
-                about, version = pack.manifest.about or holds, pack.version
+                about, version = pack.manifest.about, pack.version
             except SensorgenError as error:
                 about, version = f"cannot be used: {error}", ""
             name = pack.name if pack.name not in entries else f"{pack.name} ({pack.where})"
-            entries[name] = Entry(about, (holds,), pack.name, version, pack.where, str(pack.folder))
+            values = (holds,) if about else ()
+            entries[name] = Entry(about or holds, values, pack.name, version, pack.where, str(pack.folder))
     return Catalogue(entries)
 
 

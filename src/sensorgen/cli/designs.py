@@ -101,7 +101,7 @@ class DesignGroup(click.Group):
 
 def _of_packs(base: Data, folder: Path) -> Data:
     """A design's data with its shape's file, where that does not ship."""
-    if not isinstance(base.get("shape"), str) or base["shape"] in registry.names(shapes):
+    if not isinstance(base.get("shape"), str) or base["shape"] in (IMPORTED, *registry.names(shapes)):
         return base
     from sensorgen.design import packs
 
@@ -112,13 +112,16 @@ def _of_packs(base: Data, folder: Path) -> Data:
 def _shape_of(base: Data) -> "Shape | ModuleType | None":
     """The shape of a design's data; None where the design is to be refused later."""
     name = base.get("shape")
-    if not isinstance(name, str):
+    if not isinstance(name, str) or name == IMPORTED:
         return None
     if name in registry.names(shapes):
         return registry.load(shapes, name)
     from sensorgen.design import shape_files
 
-    return shape_files.load(name, base["own"]["shapes"][name])
+    kinds = base.get("own")
+    texts = kinds.get("shapes") if isinstance(kinds, dict) else None
+    text = texts.get(name) if isinstance(texts, dict) else None
+    return shape_files.load(name, text) if isinstance(text, str) else None
 
 
 def _about(module: "Shape | ModuleType | None") -> str:
@@ -131,6 +134,7 @@ def _is_file(word: str) -> bool:
     return word.endswith((".yaml", ".yml", ".py")) or "/" in word
 
 
+IMPORTED = "imported"  # shape of a design whose bodies came from a CAD file: it has no parameters
 _OF_SHAPE = "of_shape_"  # before names of parameters, which a command's own may equal
 
 
@@ -192,6 +196,7 @@ def _design_options() -> list[click.Parameter]:
             "--infill", "[MATERIAL=]PERCENT", "Infill of a material; of the dielectric if none is named.", multiple=True
         ),
         option("--infill-pattern", "[MATERIAL=]PATTERN", "Pattern of the infill: rectilinear, grid ...", multiple=True),
+        option("--border", "FILE", "Outline of the sensor in plan, an SVG or DXF file; its size is the sensor's."),
         option("--shrinkage", "SHARE", "Shrinkage in the plane to print against, as in 0.2.", type=Share()),
         option(
             "--set settings", "KEY=VALUE",
@@ -244,6 +249,8 @@ def _changes(base: Data, given: Data) -> Data:
             k: given[k] for k in ("orientation", "printer", "quality", "nozzle_mm", "shrinkage") if given[k] is not None
         },
     }
+    if given["border"] is not None:
+        changes["border"] = str(Path(given["border"]).absolute())
     for key, value in pairs(given["settings"], "--set"):
         changes = merged(changes, setting(key, value, known))
     return {k: v for k, v in changes.items() if v != {}}

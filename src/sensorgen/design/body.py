@@ -50,6 +50,8 @@ class Cells:
         Where electrodes touch, and which conductors float, by the same rules.
     film : Film or None
         Of a print; None of a drawing, and where no film lies between the electrodes.
+    count_error : float
+        Of ``count``, relative, where a border cuts cells [-].
     """
 
     scenes: Mapping[str, Scene]
@@ -59,11 +61,17 @@ class Cells:
     tracks: Any = None
     remarks: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     film: Film | None = None
+    count_error: float = 0.0
 
     @cached_property
     def gap_mm(self) -> Mapping[str, float]:
         """Smallest distance of two electrodes, by the same rules; infinite where there are no two [mm]."""
         return self.gaps()
+
+    @property
+    def counted(self) -> tuple[float, float]:
+        """How many cells the sensor has, and the relative error of that [-]."""
+        return self.count, self.count_error
 
     def first(self) -> Scene:
         """The cell by the most likely rule."""

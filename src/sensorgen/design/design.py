@@ -17,8 +17,8 @@ from sensorgen.core import plugins as registry
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding
 from sensorgen.core.records import Strict, checked, shown
+from sensorgen.design import borders, imported, packs, shapes
 from sensorgen.design import materials as material_files
-from sensorgen.design import packs, shapes
 from sensorgen.design.packs import Kind
 from sensorgen.design.printer import Pattern, Printer, Quality, load_printer, load_quality
 from sensorgen.design.profile import Profile, with_own
@@ -110,6 +110,13 @@ class Design(Strict):
     own: dict[Kind, dict[str, str]] = Field(
         default={}, description="Text of each file that the design takes from packs that do not ship, by kind and name."
     )
+    geometry: str | None = Field(
+        default=None, description="File of the bodies of an imported sensor, relative to the design's own file."
+    )
+    bodies: dict[str, imported.Filled] = Field(default={}, description="Imported body to material and terminal.")
+    border: str | None = Field(
+        default=None, description="SVG or DXF file of the sensor's outline in plan, relative to the design's own file."
+    )
 
     @field_validator("name")
     @classmethod
@@ -121,9 +128,17 @@ class Design(Strict):
             )
         return name
 
+    def __getstate__(self) -> dict[Any, Any]:
+        """State without derived values: classes of shape files exist in this process only."""
+        state = super().__getstate__()
+        kept = {key: value for key, value in state["__dict__"].items() if key in type(self).model_fields}
+        return state | {"__dict__": kept}
+
     @cached_property
     def params(self) -> Envelope:
         """The shape's parameters, checked and complete."""
+        if self.geometry:
+            return imported.params(self.geometry)
         return parameters(self.shape, self.parameters, self._shape_text)
 
     @property
@@ -149,9 +164,13 @@ class Design(Strict):
 
     def material(self, name: str) -> material_files.Material:
         """A material by name, with the values that this design sets itself."""
-        slots = ((getattr(self.materials, part) or "").partition("@") for part in Slots.model_fields)
+        slots = (slot.partition("@") for slot in self._filled())
         sources = sorted({source for material, _, source in slots if material == name and source})
         return material_files.load(name, sources, self.own).with_values(self.material_values.get(name, {}))
+
+    def _filled(self) -> list[str]:
+        """Material, with source, of every part that has one, or of every imported body."""
+        return [body.material for body in self.bodies.values()] or [slot for _, slot in self.materials if slot]
 
     def conducts(self, name: str) -> bool:
         """Whether a material does."""
@@ -166,18 +185,24 @@ class Design(Strict):
         """Materials of the scene's bodies with their source; the first slot that names one decides."""
         here = {body.material for body in self.drawn.bodies}
         found: dict[str, str] = {}
-        for part in Slots.model_fields:
-            if getattr(self.materials, part):
-                material, source = self.slot(part)
-                if material.name in here:
-                    found[material.name] = found.get(material.name) or source
+        for name, _, source in (slot.partition("@") for slot in self._filled()):
+            if name in here:
+                found[name] = found.get(name) or source
         return found
 
     @cached_property
     def drawn(self) -> Scene:
         """The sensor as it is meant to be, bottom electrode down."""
+        if self.geometry:
+            return imported.scene(self.geometry, self.bodies)
         names = {part: (value or "").partition("@")[0] for part, value in self.materials.model_dump().items()}
-        return self.form.scene(self.params, Fill(**names))
+        scene = self.form.scene(self.params, Fill(**names))
+        return borders.cut(scene, self.border) if self.border else scene
+
+    @cached_property
+    def unbordered(self) -> "Design":
+        """The design without its border: a rectangle of the same length and width."""
+        return checked(Design, self.model_dump(exclude={"border"})) if self.border else self
 
     @cached_property
     def in_use(self) -> Scene:
@@ -200,19 +225,15 @@ class Design(Strict):
         """
         tools = self.machine.default_tools | self.tools
         if material not in tools:
-            taken = {tools[name] for name in self._tooled(tools)}
+            printing = {body.material for body in self.drawn.bodies}
+            taken = {tool for name, tool in tools.items() if name in printing}
             free = [tool for tool in self.machine.tool_numbers if tool not in taken]
-            advice = f"free: {', '.join(map(str, free))}" if free else "none of its tools is free"
+            first = free[0] if free else "NUMBER"
             raise MissingValue(
-                f"no tool for {material} on {self.machine.name}: name one with --tool {material}="
-                f"{free[0] if free else 'NUMBER'}, or 'tools: {{{material}: {free[0] if free else 'NUMBER'}}}' in the "
-                f"design ({advice})"
+                f"no tool for {material} on {self.machine.name}: name one with --tool {material}={first}, or 'tools: "
+                f"{{{material}: {first}}}' in the design (free: {', '.join(map(str, free)) or 'none'})"
             )
         return tools[material]
-
-    def _tooled(self, tools: Mapping[str, int]) -> set[str]:
-        """Materials in the sensor that have a tool."""
-        return {body.material for body in self.drawn.bodies} & tools.keys()
 
     def resolved(self) -> dict[str, Any]:
         """Everything that decides the sensor, with all defaults and the values of material and printer filled in."""
@@ -229,7 +250,8 @@ class Design(Strict):
 
     def _plain(self) -> set[str]:
         """Parts that have come later and are not used: without them the identities of older designs last."""
-        return {key for key, usual in (("profile", Profile()), ("own", {})) if getattr(self, key) == usual}
+        usual = {"profile": Profile(), "own": {}, "geometry": None, "bodies": {}, "border": None}
+        return {key for key, value in usual.items() if getattr(self, key) == value}
 
     @property
     def walls(self) -> str:
@@ -289,6 +311,8 @@ def shape(name: str) -> "Shape":
 
 def _shape(name: str, text: str | None) -> "Shape":
     """A shape by its name, or by the text of its file where that does not ship."""
+    if name == imported.SHAPE:
+        return cast("Shape", imported)
     if text is None:
         return shape(name)
     from sensorgen.design import shape_files
@@ -370,6 +394,8 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
         if isinstance(data, Mapping) and "shape" not in data:
             raise BadInput(f"shape is missing; expected {', '.join(packs.names('shapes', Path(where).parent))}")
         design = checked(Design, with_own_files(dict(data), Path(where).parent) if isinstance(data, Mapping) else data)
+        if design.shape == imported.SHAPE or design.geometry or design.bodies:
+            design = _imported(design)
         _check_names(design)
     except SensorgenError as error:
         raise error.within(where) from None
@@ -378,7 +404,18 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
 
 def with_own_files(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     """A design's data with the content of all files in place of their names, relative to a folder."""
-    return packs.with_files(with_own(data, folder), folder)
+    return borders.with_border(imported.with_geometry(packs.with_files(with_own(data, folder), folder), folder), folder)
+
+
+def _imported(design: Design) -> Design:
+    """An imported design, its map checked, with the materials of its parts."""
+    if design.shape != imported.SHAPE:
+        raise BadInput(f"geometry, bodies: {design.shape} is drawn from parameters; expected shape: {imported.SHAPE}")
+    imported.check(design.geometry, design.bodies, design.parameters)
+    conductors = {name for slot in design._filled() if design.conducts(name := slot.partition("@")[0])}
+    parts = imported.slots(design.geometry or "", design.bodies, conductors)
+    given = design.materials.model_dump(include=design.materials.model_fields_set)
+    return design.model_copy(update={"materials": Slots(**{**parts, **given}), "parameters": {}})
 
 
 def of_resolved(name: str, data: Mapping[str, Any]) -> Design:
@@ -494,7 +531,8 @@ def name_of(design: Design) -> str:
         parts.append("" if given == usual else _plain(Path(given).stem))
     if design.orientation != default.orientation:
         parts.append("upside-down")
-    said_if_set = ({"material_values"} if design.material_values else set()) | ({"profile"} - design._plain())
+    said_if_set = {key for key in ("material_values", "border") if getattr(design, key)}
+    said_if_set |= {"profile"} - design._plain()
     others = design.model_dump(include={"materials", "nozzle_mm", "tools", "infill", "shrinkage"} | said_if_set)
     if others != default.model_dump(include=set(others)):
         parts.append(_digest(others))

@@ -164,9 +164,12 @@ def shipped() -> tuple[Pack, ...]:
     here, package = Path(__file__).parent, Path(__file__).parents[1]
     thesis: tuple[tuple[Kind, Path], ...] = (
         ("printers", profiles() / "printers"), ("qualities", profiles() / "qualities"),
-        ("instruments", package / "measure" / "accuracy"),
     )  # fmt: skip
-    return (Pack("thesis", "shipped", here, moved=thesis), Pack("filaments", "shipped", here / "filaments"))
+    others: tuple[tuple[Kind, Path], ...] = (("instruments", package / "measure" / "accuracy"),)
+    return (
+        Pack("thesis", "shipped", here, moved=thesis), Pack("filaments", "shipped", here / "filaments"),
+        Pack("others", "shipped", profiles() / "others", moved=others),
+    )  # fmt: skip
 
 
 @cache
@@ -347,6 +350,11 @@ def with_files(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     made.update(_shape_and_machine(data, texts, folder))
     if isinstance(data.get("materials"), dict):
         made["materials"] = {part: _slot(word, texts, folder) for part, word in slots(data["materials"]).items()}
+    if isinstance(data.get("bodies"), dict):
+        made["bodies"] = {
+            name: body | {"material": _slot(body.get("material"), texts, folder)} if isinstance(body, dict) else body
+            for name, body in data["bodies"].items()
+        }
     for name in _other_materials(data):
         if isinstance(name, str) and is_name("materials", name) and name not in shipped_names("materials"):
             _add(texts, "materials", name, folder)
@@ -373,7 +381,7 @@ def _shape_and_machine(
     kinds: tuple[tuple[str, Kind], ...] = (("shape", "shapes"), ("printer", "printers"), ("quality", "qualities"))
     for key, kind in kinds:
         word = data.get(key)
-        if isinstance(word, str):
+        if isinstance(word, str) and not (key == "shape" and "geometry" in data):  # that of imported bodies is no file
             yield key, _add(texts, kind, word, folder)
 
 

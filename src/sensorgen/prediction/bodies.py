@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from hashlib import sha256
 from itertools import product
@@ -28,6 +29,8 @@ def drawn(design: Design) -> Body:
 
 
 def _drawn_cells(design: Design) -> Cells:
+    if design.border:
+        return _inside(design, _drawn_cells(design.unbordered))
     period, scene = getattr(design.params, "period_mm", None), design.in_use
     conducting = [b.terminal for b in scene.bodies if b.terminal or design.conducts(b.material) for _ in b.pieces]
     if "" in conducting or len(set(conducting)) < len(conducting):  # else each electrode is one piece
@@ -35,6 +38,24 @@ def _drawn_cells(design: Design) -> Cells:
 
         scene = connected_scene(scene, design.conducts)
     return Cells({DRAWN: scene}, 1.0, period, partial(_drawn_gap, design))
+
+
+def _inside(design: Design, whole: Cells) -> Cells:
+    """Cells of a rectangle, counted inside the border of a design."""
+    from sensorgen.asprinted.window import window
+    from sensorgen.design import borders
+    from sensorgen.scene.border import share
+    from sensorgen.scene.layers import drawn as layers
+
+    scene = design.unbordered.drawn
+    plan = window(layers(scene, design.layers.boundaries_mm(scene.size_mm[2])), scene)
+    left = share(scene, borders.region(design.border or ""), plan.sides_mm())
+    remark = (
+        f"{100 * left.area:.3g} % of the rectangle is inside the border: its capacitance is that share of the cells', "
+        f"to {100 * left.error:.2g} %; resistances and loads are those of the rectangle"
+    )
+    remarks = {name: (*whole.remarks.get(name, ()), remark) for name in whole.scenes}
+    return replace(whole, count=whole.count * left.area, count_error=left.error, remarks=remarks)
 
 
 def _drawn_gap(design: Design) -> dict[str, float]:
@@ -60,6 +81,8 @@ def estimated(design: Design, walls: str = "") -> Body:
 
 
 def _estimated_cells(design: Design, rules: Sequence[str]) -> Cells:
+    if design.border:
+        return _inside(design, _estimated_cells(design.unbordered, rules))
     from sensorgen.asprinted import printed
     from sensorgen.checks.estimate import SHIFTS, lines
 
@@ -186,7 +209,8 @@ def _printed_cells(prints: "Mapping[str, Printed]") -> Cells:
     error_mm = printed.design.machine.tool_height_error_mm
     thicker = film.thicker(first.scene, error_mm)
     changed = Film(error_mm, film.thicker(first.scene, -error_mm), thicker) if error_mm and thicker else None
-    return Cells(scenes, first.count, period, partial(_printed_gaps, scenes), printed.lines, remarks, changed)
+    found = Cells(scenes, first.count, period, partial(_printed_gaps, scenes), printed.lines, remarks, changed)
+    return _inside(printed.design, found) if printed.design.border else found
 
 
 def _printed_gaps(scenes: "Mapping[str, Scene]") -> dict[str, float]:

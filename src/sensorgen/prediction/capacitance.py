@@ -86,10 +86,14 @@ class Answer:
         real, loss = self.capacitance_f, self.loss_f
         return (real.upper - real.lower) / hypot(real.upper + real.lower, loss.upper + loss.lower) * 2
 
-    def times(self, count: float) -> "Answer":
-        """The capacitance of ``count`` such cells side by side."""
-        loss = self.loss_f and self.loss_f.times(count)
-        return replace(self, capacitance_f=self.capacitance_f.times(count), loss_f=loss)
+    def times(self, count: float, error: float = 0.0) -> "Answer":
+        """The capacitance of ``count`` such cells side by side, known to a relative ``error``."""
+
+        def whole(cell: Interval) -> Interval:
+            return Interval(cell.lower * count * (1 - error), cell.upper * count * (1 + error))
+
+        loss = self.loss_f and whole(self.loss_f)
+        return replace(self, capacitance_f=whole(self.capacitance_f), loss_f=loss)
 
     def seconds(self) -> float:
         """Time that all models took together, imports left out [s]."""

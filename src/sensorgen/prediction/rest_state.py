@@ -72,7 +72,7 @@ def rest_state(body: Body, width: float | None = None) -> RestState:
     wanted = inf if rough else min(width or inf, default_width(scene))
     said = cells.remarks.get(next(iter(cells.scenes)), ())
     try:
-        answer = capacitance(scene, eps, wanted).times(cells.count)
+        answer = capacitance(scene, eps, wanted).times(*cells.counted)
     except Unpredictable as error:
         raise Unpredictable("; ".join((*said, str(error)))) from None
     c = answer.capacitance_f

@@ -79,8 +79,8 @@ def raster(
         names = [looks.setdefault(layer.tobytes(), str(len(looks))) for layer in np.moveaxis(fill, k, 0)]
         bands = [(Band(name, "", (0.0, 0.0), (1.0, 1.0)),) for name in names]
         walk = [Slice(a, b, band) for (a, b), band in zip(pairwise(planes[k].tolist()), bands, strict=True)]
-        cell = mirrored(walk, evenly=False)
-        even = mirrored(walk) if evenly else cell
+        cell = mirrored(tuple(walk), evenly=False)
+        even = mirrored(tuple(walk)) if evenly else cell
         if len(even.slices) <= LARGER * len(cell.slices):
             cell = even
         middles = [(s.left_mm + s.right_mm) / 2 for s in cell.slices]

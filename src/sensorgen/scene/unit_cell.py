@@ -107,10 +107,11 @@ def cell(section: Section, height_mm: float, evenly: bool = True) -> Cell:
     ValueError
         Outlines overlap, or an outline is open.
     """
-    return mirrored([_slice(column, height_mm) for column in columns(section)], evenly)
+    return mirrored(tuple(_slice(column, height_mm) for column in columns(section)), evenly)
 
 
-def mirrored(slices: list[Slice], evenly: bool = True) -> Cell:
+@lru_cache(maxsize=16)
+def mirrored(slices: tuple[Slice, ...], evenly: bool = True) -> Cell:
     """The smallest run of slices that mirrors at its own two sides continue to all of them."""
     # Slices as wide as their interfaces are straight
     whole: list[Slice] = []

@@ -15,7 +15,7 @@ from sensorgen.design import design as designs
 from sensorgen.design import materials, packs, printer, shape_files
 from sensorgen.design.packs import File, Kind, Pack
 from sensorgen.export.gcode.check import check
-from sensorgen.export.slicers import prusa
+from sensorgen.export.slicers import cura, orca, prusa
 from sensorgen.export.slicers.loads import Load
 from sensorgen.measure import accuracy
 from sensorgen.scene.geometry import meshes, validity
@@ -208,6 +208,8 @@ def _printer(file: File) -> Faults:
     loads = dict(zip(machine.tool_numbers, map(Load, map(materials.load, ("etpu", "x60"))), strict=False))
     try:
         prusa.profile(machine, quality, loads)
+        cura.profiles(machine, quality, loads)
+        orca.profiles(machine, quality, loads)
     except SensorgenError as error:
         yield "profile", f"no profile for etpu and x60 in 0.1 mm layers: {error}", "correct the printer's limits"
     for name, tool in machine.default_tools.items():

@@ -6,6 +6,7 @@ files of packs too; a design that names none of them never sees them, so that it
 """
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from functools import cache, lru_cache
 from importlib import resources
 from math import inf, isinf
@@ -14,7 +15,7 @@ from typing import Annotated
 from pydantic import Field
 
 from sensorgen.core import yamlfile
-from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
+from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.records import Strict, checked
 from sensorgen.design import packs
 from sensorgen.design.packs import Kind
@@ -293,8 +294,13 @@ def parse(name: str, text: str) -> Material:
 
 
 def citations() -> dict[str, str]:
-    """What each source's name stands for, those of the user's own too."""
-    return shipped_citations() | {name: _own(name, None).about for name in packs.source_names()}
+    """What each source's name stands for, those of the user's own and of packs too; a damaged material has none."""
+    cited = dict[str, str]()
+    for file in packs.files("materials"):
+        if file.pack.where != "shipped":
+            with suppress(SensorgenError):
+                cited |= parse(file.name, file.text()).citations
+    return cited | shipped_citations() | {name: _own(name, None).about for name in packs.source_names()}
 
 
 def cited(texts: Texts) -> dict[str, str]:

@@ -80,6 +80,9 @@ def _view(scene: Scene, across: str) -> View:
     edges = sorted({edge for span, _, _ in spans for edge in span})
     # Through the first stretches in which the sensor keeps one look.
     stretches = [(low, high) for low, high in pairwise(edges) if high - low > SLIVER_MM]
+    if not all(p.is_constant(normal) for _, _, p in spans):  # nor does any other stretch: through its middle
+        middle = scene.size_mm[AXES.index(normal)] / 2
+        stretches.sort(key=lambda ends: abs(sum(ends) / 2 - middle))
     cuts = []
     for low, high in stretches[:PLACES]:
         at = (low + high) / 2

@@ -20,10 +20,13 @@ import threading
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from sensorgen.core.errors import CadFailed
+from sensorgen.core.errors import CadFailed, SensorgenError
 from sensorgen.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from sensorgen.scene.geometry.mesh_files import FileBody
 
 # Import and work take 4 s together; a cold disk, a slow machine and a large sensor may need twenty times as much.
 TIMEOUT_S = 300.0
@@ -32,7 +35,7 @@ WORKER = ("-P", "-m", "sensorgen.scene.geometry.solids")  # -P: no module of the
 
 
 class CadProcess:
-    """A process that turns scenes into STEP files, one after the other.
+    """A process that writes and reads STEP files, one after the other.
 
     It starts with the object and is gone after the ``with`` block, whatever happens in there. When this process is
     killed, the other one reads the end of its input and leaves too.
@@ -88,28 +91,33 @@ class CadProcess:
             ``result()`` waits for the file. It raises CadFailed where the kernel cannot make a body, where the
             process ended or where it took longer than ``timeout_s``, and Unwritable where the file cannot be written.
         """
-        return self._thread.submit(self._exchange, (scene, dict(colours), title, path.absolute()))
+        return self._thread.submit(self._exchange, "write_step", scene, dict(colours), title, path.absolute())
 
     def write_step(self, scene: Scene, colours: Mapping[str, str], title: str, path: Path) -> None:
         """Have a STEP file written and wait for it; arguments and errors as in ``submit``."""
         self.submit(scene, colours, title, path).result()
 
-    def _exchange(self, job: tuple[Any, ...]) -> None:
+    def read_step(self, path: Path, chord_mm: float) -> "list[FileBody]":
+        """Have a STEP file read and wait for it; as of :func:`sensorgen.scene.geometry.step_files.read_step`."""
+        return list(self._thread.submit(self._exchange, "read_step", path.absolute(), chord_mm).result())
+
+    def _exchange(self, name: str, *arguments: Any) -> Any:
         """Send one job and wait for its answer."""
         stdin, stdout = self._process.stdin, self._process.stdout
         assert stdin is not None and stdout is not None  # noqa: PT018, S101  (both are pipes, see above)
         clock = threading.Timer(self.timeout_s, self._expire)
         clock.start()
         try:
-            stdin.write(pickle.dumps(job))
+            stdin.write(pickle.dumps((name, arguments)))
             stdin.flush()
             answer = pickle.load(stdout)  # noqa: S301  (from the process that we started)
         except (OSError, EOFError, pickle.UnpicklingError):
             raise CadFailed(self._obituary()) from None
         finally:
             clock.cancel()
-        if answer is not None:
+        if isinstance(answer, SensorgenError):
             raise answer
+        return answer
 
     def _expire(self) -> None:
         self._late = True

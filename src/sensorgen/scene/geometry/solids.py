@@ -1,4 +1,4 @@
-"""From the scene to CAD solids and a STEP file: the only file that knows build123d.
+"""From the scene to CAD solids and a STEP file; beside ``step_files`` the only file that knows build123d.
 
 Run as a program it is the far end of :class:`sensorgen.scene.geometry.cad.CadProcess`; build123d is imported where it
 is used, because that takes seconds.
@@ -22,12 +22,13 @@ import os
 import pickle
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from sensorgen.core.errors import CadFailed, SensorgenError, Unwritable
 from sensorgen.core.leash import end_with_parent
+from sensorgen.scene.geometry.step_files import read_step
 from sensorgen.scene.scene import AXES, PLANE, Body, Piece, Point, Prism, Scene
 
 if TYPE_CHECKING:
@@ -213,7 +214,7 @@ def _step_string(text: str) -> bytes:
 
 
 def main() -> None:
-    """Write one STEP file for each job on standard input, until it ends; answer None, or what went wrong."""
+    """Do each job on standard input, a function's name and arguments, until it ends; answer its result or error."""
     end_with_parent()
     with os.fdopen(os.dup(1), "wb") as answers:
         os.dup2(2, 1)  # what the kernel prints is no answer
@@ -222,19 +223,20 @@ def main() -> None:
 
         gc.freeze()
         gc.enable()
-        for scene, colours, title, path in _jobs(sys.stdin.buffer):
-            answer: SensorgenError | None = None
+        for name, arguments in _jobs(sys.stdin.buffer):
             try:
-                write_step(scene, colours, title, path)
+                work: Callable[..., object] = write_step if name == "write_step" else read_step
+                answer = work(*arguments)
             except SensorgenError as error:
                 answer = error
             except Exception as error:  # the process lives on, and the user learns of it
-                answer = CadFailed(f"the CAD process failed on {title!r}: {type(error).__name__}: {error}")
+                what = arguments[2] if name == "write_step" else arguments[0].name
+                answer = CadFailed(f"the CAD process failed on {what!r}: {type(error).__name__}: {error}")
             pickle.dump(answer, answers)
             answers.flush()
 
 
-def _jobs(stream: BinaryIO) -> Iterator[tuple[Scene, Mapping[str, str], str, Path]]:
+def _jobs(stream: BinaryIO) -> Iterator[tuple[str, tuple[Any, ...]]]:
     while True:
         try:
             yield pickle.load(stream)  # noqa: S301  (from the process that started this one)

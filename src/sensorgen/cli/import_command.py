@@ -1,0 +1,62 @@
+"""``sensorgen import``: a sensor from another CAD program."""
+
+from pathlib import Path
+
+import click
+
+from sensorgen.cli import render
+from sensorgen.cli.words import Length
+from sensorgen.core.errors import BadInput
+
+
+@click.command(
+    "import",
+    help="Import bodies drawn in another CAD program as a design: STEP, 3MF, or STL with --unit. All commands take it.",
+)
+@click.argument("files", nargs=-1, required=True, metavar="FILE...")
+@click.option("--map", "maps", multiple=True, metavar="BODY=MATERIAL[@SOURCE][@TOOL]",
+              help="What a body is printed of, and by which tool; * in BODY stands for anything.")  # fmt: skip
+@click.option("--terminal", "terminals", multiple=True, metavar="BODY=END",
+              help="Electrode of a conductor: top, middle, bottom, none; by height if not given.")  # fmt: skip
+@click.option("--list", "only_list", is_flag=True, help="Print the bodies and a map to start from; write nothing.")
+@click.option(
+    "--unit", default="", metavar="UNIT", help="Of STL, or in place of a 3MF's: mm, cm, m, inch, foot, micron."
+)
+@click.option("--chord", type=Length(), default="0.01", show_default=True,
+              help="How far triangles may lie from curved faces of a STEP.")  # fmt: skip
+@click.option("--name", default=None, help="Name of the design; that of the file if not given.")
+@click.option("--out", default=".", show_default=True, metavar="DIR", help="Folder for the design file.")
+@click.option("--printer", default=None, metavar="NAME", help="A printer that is listed, or a YAML file.")
+@click.option("--quality", default=None, metavar="NAME", help="A quality that is listed, or a YAML file.")
+@click.option("--force", is_flag=True, help="Replace a design of that name.")
+def command(
+    *, files: tuple[str, ...], maps: tuple[str, ...], terminals: tuple[str, ...], only_list: bool, unit: str,
+    chord: float, name: str | None, out: str, printer: str | None, quality: str | None, force: bool,
+) -> int:  # fmt: skip
+    """Read, repair or refuse, and write."""
+    from sensorgen.core import files as store
+    from sensorgen.workflows import importing
+
+    if not 1e-4 <= chord <= 1.0:
+        raise BadInput(f"--chord {chord:g}: expected 0.0001 to 1 mm")
+    assembly = importing.read([Path(file) for file in files], unit, chord)
+    name = name or Path(files[0]).stem
+    if assembly.errors:
+        drawing = Path(out) / f"{name}-faults.svg"
+        store.replace(drawing, importing.picture(assembly).encode())
+        render.deliver(importing.Listing.of(assembly))
+        first = assembly.errors[0]
+        raise BadInput(f"{first.body}: {first.text}; nothing was imported, {drawing} shows where")
+    if only_list or not maps:
+        render.deliver(importing.Listing.of(assembly))
+        return 0
+    filled, tools = importing.assigned(assembly, maps, terminals, Path(out))
+    more = {key: value for key, value in (("printer", printer), ("quality", quality)) if value}
+    made = importing.write(
+        assembly, filled, tools, name=name, folder=Path(out), more=more, replace_existing=force
+    )  # fmt: skip
+    render.deliver(made)
+    return 0
+
+
+command.params += render.options("json", "csv", "markdown")

@@ -1,0 +1,344 @@
+"""Bodies from files of triangles: STL, and 3MF as slicers and CAD programs write it.
+
+The files may be of strangers: sizes are limited before and while they are unpacked, and XML may neither define
+entities nor name other files.
+"""
+
+import math
+import re
+import struct
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+import numpy as np
+
+from sensorgen.core.arrays import Real, Whole
+from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.core.files import reading
+
+UNITS_MM = {"micron": 1e-3, "mm": 1.0, "cm": 10.0, "inch": 25.4, "foot": 304.8, "m": 1000.0}
+MOST_BYTES = 100_000_000  # of a file
+MOST_UNPACKED = 400_000_000  # of the model files in a 3MF
+MOST_TRIANGLES = 500_000
+_3MF_UNITS = {"millimeter": "mm", "centimeter": "cm", "meter": "m"}  # others as in UNITS_MM
+_DEPTH = 20  # of components within components
+_NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_VERTEX = re.compile(rb"vertex\s+(%b)\s+(%b)\s+(%b)" % (_NUMBER, _NUMBER, _NUMBER))
+
+
+@dataclass(frozen=True, eq=False)
+class FileBody:
+    """A body as a file has it, in any state.
+
+    Attributes
+    ----------
+    name : str
+        As in the file; "" where it has none.
+    vertices_mm : (n, 3) array
+        Corners [mm].
+    triangles : (m, 3) array
+        Numbers of corners, counter-clockwise from outside, where the file is in order.
+    colour : str
+        As "#202428", or "".
+    rounding_mm : float
+        Of the file's numbers [mm].
+    chord_mm : float
+        How far flat faces may lie from the file's curved ones; 0 where it has none [mm].
+    """
+
+    name: str
+    vertices_mm: Real
+    triangles: Whole
+    colour: str = ""
+    rounding_mm: float = 0.0
+    chord_mm: float = 0.0
+
+
+def check_size(path: Path) -> None:
+    """Refuse files that are empty, missing, or too large to be one sensor."""
+    with reading(path):
+        size = path.stat().st_size if path.is_file() else -1
+    if size < 0:
+        raise BadInput(f"{path}: not a file; expected a STEP, 3MF or STL file")
+    if size == 0:
+        raise BadInput(f"{path}: the file is empty; export it again")
+    if size > MOST_BYTES:
+        raise BadInput(
+            f"{path}: {size / 1e6:.0f} MB; expected at most {MOST_BYTES / 1e6:.0f} MB: export the sensor alone, or "
+            "with a coarser mesh"
+        )
+
+
+def read_stl(path: Path, unit: str) -> list[FileBody]:
+    """Bodies of an STL file: one for each ``solid`` of a text, one of a binary file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    unit : str
+        Of its numbers, one of :data:`UNITS_MM`: the format has none.
+
+    Raises
+    ------
+    BadInput
+        No STL.
+    UnknownName
+        No such unit.
+    """
+    check_size(path)
+    scale = _scale(unit)
+    with reading(path):
+        data = path.read_bytes()
+    count = struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else -1
+    if len(data) == 84 + 50 * count:
+        rows = np.frombuffer(data, np.dtype([("face", "<f4", (4, 3)), ("more", "<u2")]), count, 84)
+        singles = rows["face"][:, 1:].reshape(-1, 3)
+        solids = [(path.stem, _shortest(singles))]
+        rounding = 2.0**-23 * float(np.abs(singles).max(initial=0.0))
+    elif data.lstrip()[:5].lower() == b"solid":
+        texts = re.split(rb"(?m)^\s*solid\b[ \t]*([^\r\n]*)", data)[1:]
+        solids = [
+            (
+                name.decode("utf-8", "replace").strip() or path.stem,
+                np.array(_VERTEX.findall(text), float).reshape(-1, 3),
+            )
+            for name, text in zip(texts[::2], texts[1::2], strict=True)
+        ]
+        rounding = 2.0**-23 * max((float(np.abs(p).max(initial=0.0)) for _, p in solids), default=0.0)
+    else:
+        raise BadInput(
+            f"{path}: no STL: {len(data)} bytes do not fit the {count} triangles of its head; export it again"
+        )
+    solids = [(name, points) for name, points in solids if len(points)]
+    if not solids or any(len(points) % 3 for _, points in solids):
+        raise BadInput(f"{path}: an STL without whole triangles; expected a closed surface")
+    _refuse_many(path, sum(len(points) // 3 for _, points in solids))
+    return [
+        FileBody(name, points * scale, np.arange(len(points)).reshape(-1, 3), rounding_mm=4 * rounding * scale)
+        for name, points in solids
+    ]
+
+
+def _shortest(singles: np.ndarray) -> Real:
+    """Numbers of single precision as the shortest decimals that they may have been: 0.3, not 0.30000001192."""
+    values, back = np.unique(singles, return_inverse=True)
+    return np.array([float(str(value)) for value in values])[back].reshape(singles.shape)
+
+
+def _scale(unit: str) -> float:
+    if unit not in UNITS_MM:
+        raise UnknownName("unit", unit, UNITS_MM)
+    return UNITS_MM[unit]
+
+
+def _refuse_many(path: Path, count: int) -> None:
+    if count > MOST_TRIANGLES:
+        raise BadInput(
+            f"{path}: {count} triangles; expected at most {MOST_TRIANGLES}: export with a coarser mesh, as of 0.01 mm"
+        )
+
+
+@dataclass
+class _Object:
+    """An object of a 3MF: triangles, or other objects in their places."""
+
+    name: str = ""
+    kind: str = "model"
+    colour: tuple[str, int] = ("", 0)
+    vertices: list[tuple[float, float, float]] = field(default_factory=list)
+    triangles: list[tuple[int, int, int]] = field(default_factory=list)
+    materials: list[int] = field(default_factory=list)  # of each triangle, from the object's own group
+    components: list[tuple[tuple[str, str], Real]] = field(default_factory=list)
+
+
+@dataclass
+class _Model:
+    """What the model files of a 3MF hold; keys are file and number."""
+
+    unit: str = ""
+    objects: dict[tuple[str, str], _Object] = field(default_factory=dict)
+    colours: dict[tuple[str, str], list[tuple[str, str]]] = field(default_factory=dict)
+    built: list[tuple[tuple[str, str], Real]] = field(default_factory=list)
+
+
+def read_3mf(path: Path, unit: str = "") -> list[FileBody]:
+    """Bodies of a 3MF: one for each object that has triangles, or each volume that a slicer has named.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    unit : str
+        In place of the one that the file states, one of :data:`UNITS_MM`.
+
+    Raises
+    ------
+    BadInput
+        No 3MF, one that unpacks to more than :data:`MOST_UNPACKED` bytes, or one that is not in order.
+    """
+    check_size(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = [name for name in archive.namelist() if name.endswith(".model")]
+            size = sum(archive.getinfo(name).file_size for name in names)
+            if size > MOST_UNPACKED:
+                raise BadInput(f"{path}: unpacks to {size / 1e6:.0f} MB; expected at most {MOST_UNPACKED / 1e6:.0f} MB")
+            model = _Model()
+            for name in names:
+                _parse(archive, name, _model_handler(model, "/" + name))
+            volumes = _volumes(archive)
+            part_names = _part_names(archive)
+        if not model.built:
+            raise BadInput("it builds nothing; expected objects in its <build>")
+        scale = _scale(unit or _3MF_UNITS.get(model.unit, model.unit or "mm"))
+        bodies = [body for key, where in model.built for body in _bodies(model, key, where, volumes, part_names)]
+        _refuse_many(path, sum(len(body.triangles) for body in bodies))
+        return [
+            FileBody(b.name, b.vertices_mm * scale, b.triangles, b.colour, 1e-6 * scale)
+            for b in bodies
+            if len(b.triangles)
+        ]
+    except BadInput as error:
+        raise error.within(str(path)) from None
+    except (zipfile.BadZipFile, expat.ExpatError, KeyError, ValueError, IndexError, OverflowError, EOFError,
+            NotImplementedError, RuntimeError, OSError) as error:  # fmt: skip
+        raise BadInput(f"{path}: not a 3MF: {error or type(error).__name__}; export it again") from None
+
+
+def _parse(archive: zipfile.ZipFile, name: str, start: Callable[[str, Mapping[str, str]], None]) -> None:
+    """Parse one file of a zip, without entities or anything from outside, and no more than is allowed."""
+    parser = expat.ParserCreate(namespace_separator=" ")
+
+    def refuse(*_: object) -> None:
+        raise BadInput(f"{name} has a document type, which a 3MF has not: it is refused")
+
+    parser.StartDoctypeDeclHandler = refuse
+    parser.EntityDeclHandler = refuse
+    parser.StartElementHandler = lambda tag, values: start(
+        tag.rpartition(" ")[2], {key.rpartition(" ")[2]: value for key, value in values.items()}
+    )
+    read = 0
+    with archive.open(name) as stream:
+        while block := stream.read(1 << 20):
+            read += len(block)
+            if read > MOST_UNPACKED:
+                raise BadInput(f"{name} unpacks to over {MOST_UNPACKED / 1e6:.0f} MB")
+            parser.Parse(block, False)
+    parser.Parse(b"", True)
+
+
+def _model_handler(model: _Model, file: str) -> Callable[[str, Mapping[str, str]], None]:
+    """Takes the elements of a model file into ``model``."""
+    now, group = _Object(), [("", "")]
+    triangles = 0
+
+    def start(tag: str, has: Mapping[str, str]) -> None:
+        nonlocal now, group, triangles
+        if tag == "vertex":
+            now.vertices.append((float(has["x"]), float(has["y"]), float(has["z"])))
+        elif tag == "triangle":
+            triangles += 1
+            _refuse_many(Path(file), triangles)
+            now.triangles.append((int(has["v1"]), int(has["v2"]), int(has["v3"])))
+            now.materials.append(int(has.get("p1", now.colour[1])))
+        elif tag == "object":
+            now = _Object(
+                has.get("name", ""), has.get("type", "model"), (has.get("pid", ""), int(has.get("pindex", 0)))
+            )
+            model.objects[file, has["id"]] = now
+        elif tag == "component":
+            now.components.append(((has.get("path", file), has["objectid"]), _matrix(has.get("transform", ""))))
+        elif tag == "item":
+            model.built.append(((has.get("path", file), has["objectid"]), _matrix(has.get("transform", ""))))
+        elif tag in ("basematerials", "colorgroup"):
+            group = model.colours[file, has["id"]] = []
+        elif tag in ("base", "color"):
+            group.append((has.get("name", ""), has.get("displaycolor", has.get("color", ""))[:7].lower()))
+        elif tag == "model" and (not model.unit or file == "/3D/3dmodel.model"):
+            model.unit = has.get("unit", "millimeter")
+
+    return start
+
+
+def _matrix(text: str) -> Real:
+    """A 3MF's transform: rows for x, y and z, and a shift (4, 3)."""
+    values = [float(word) for word in text.split()] or [1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]
+    if len(values) != 12 or not all(map(math.isfinite, values)):
+        raise BadInput(f"transform {text[:60]!r}: expected 12 numbers")
+    return np.array(values, float).reshape(4, 3)
+
+
+def _bodies(
+    model: _Model,
+    key: tuple[str, str],
+    where: Real,
+    volumes: Mapping[str, list[tuple[int, int, str]]],
+    part_names: Mapping[str, str],
+    depth: int = 0,
+) -> Iterator[FileBody]:
+    """The bodies of an object and of its components, in their places."""
+    if depth > _DEPTH:
+        raise BadInput(f"components {_DEPTH} deep, or one that holds itself")
+    if key not in model.objects:
+        raise BadInput(f"object {key[1]} is built, but not there")
+    one = model.objects[key]
+    if one.kind not in ("model", "other"):
+        return
+    for part, place in one.components:
+        linear = place[:3] @ where[:3]
+        yield from _bodies(
+            model, part, np.vstack([linear, place[3] @ where[:3] + where[3]]), volumes, part_names, depth + 1
+        )
+    if not one.triangles:
+        return
+    points = np.array(one.vertices, float).reshape(-1, 3) @ where[:3] + where[3]
+    faces = np.array(one.triangles, np.int64)
+    if faces.min() < 0 or faces.max() >= len(points):
+        raise BadInput(f"object {key[1]} has a triangle of a vertex that it does not have")
+    if np.linalg.det(where[:3]) < 0:
+        faces = faces[:, ::-1]
+    known = model.colours.get((key[0], one.colour[0]), [])
+    for first, last, name in volumes.get(key[1]) or [(0, len(faces) - 1, part_names.get(key[1]) or one.name)]:
+        paint = one.materials[first]
+        colour = known[paint][1] if 0 <= paint < len(known) else ""
+        yield FileBody(name, points, faces[first : last + 1], colour)
+
+
+def _volumes(archive: zipfile.ZipFile) -> dict[str, list[tuple[int, int, str]]]:
+    """PrusaSlicer's volumes: ranges of an object's triangles, and their names."""
+    found: dict[str, list[tuple[int, int, str]]] = {}
+    last = ""
+
+    def start(tag: str, has: Mapping[str, str]) -> None:
+        nonlocal last
+        if tag == "object":
+            last = has["id"]
+        elif tag == "volume":
+            found.setdefault(last, []).append((int(has["firstid"]), int(has["lastid"]), ""))
+        elif tag == "metadata" and has.get("type") == "volume" and has.get("key") == "name":
+            found[last][-1] = (*found[last][-1][:2], has.get("value", ""))
+
+    if "Metadata/Slic3r_PE_model.config" in archive.namelist():
+        _parse(archive, "Metadata/Slic3r_PE_model.config", start)
+    return found
+
+
+def _part_names(archive: zipfile.ZipFile) -> dict[str, str]:
+    """Names of parts as OrcaSlicer and Bambu Studio keep them, by number of the object."""
+    found: dict[str, str] = {}
+    last = ""
+
+    def start(tag: str, has: Mapping[str, str]) -> None:
+        nonlocal last
+        if tag in ("object", "part"):
+            last = has.get("id", "")
+        elif tag == "metadata" and has.get("key") == "name" and last:
+            found.setdefault(last, has.get("value", ""))
+
+    if "Metadata/model_settings.config" in archive.namelist():
+        _parse(archive, "Metadata/model_settings.config", start)
+    return found

@@ -1,0 +1,406 @@
+"""Triangles of strangers as closed surfaces: what is wrong with them is put right where that is safe, or refused.
+
+The order: equal corners become one, triangles that say nothing go, all look outwards, flat openings are closed. Faces
+around an edge are paired through the material between them, so that solids which only touch stay apart.
+"""
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.core.arrays import Real, Whole
+from sensorgen.scene.geometry.meshes import Mesh
+from sensorgen.scene.scene import Place
+
+if TYPE_CHECKING:
+    import manifold3d
+
+WELD_MM = 1e-6  # corners nearer than this are one
+GAP_MM = 1e-3  # and these too where a surface is open without it: far below what any printer prints
+FLAT_MM = 1e-3  # an opening whose edge is as flat as this is closed by a face
+_NOTHING = 1e-9  # volume over surface and size below which a surface encloses nothing [-]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What is wrong with a surface, and cannot be put right.
+
+    Attributes
+    ----------
+    message, advice : str
+        What it is, and what to do in CAD.
+    place_mm : (float, float, float)
+        One place where it shows.
+    """
+
+    message: str
+    advice: str
+    place_mm: Place
+
+
+@dataclass(frozen=True)
+class Closed:
+    """A closed surface, or what keeps it from being one.
+
+    Attributes
+    ----------
+    shells : tuple of Mesh
+        Connected surfaces, each edge between two triangles; cavities, which are inside out, after the outer ones.
+    repairs : tuple of str
+        What was put right.
+    faults : tuple of Fault
+        What was not; without shells.
+    """
+
+    shells: tuple[Mesh, ...]
+    repairs: tuple[str, ...] = ()
+    faults: tuple[Fault, ...] = ()
+
+
+def closed(vertices_mm: Real, triangles: Whole, weld_mm: float = WELD_MM) -> Closed:
+    """Closed surfaces of triangles in any state.
+
+    Parameters
+    ----------
+    vertices_mm : (n, 3) array
+        Corners [mm].
+    triangles : (m, 3) array
+        Numbers of corners.
+    weld_mm : float
+        Distance within which corners are one: the rounding of the file.
+    """
+    if not np.isfinite(vertices_mm).all():
+        bad = vertices_mm[~np.isfinite(vertices_mm).all(1)]
+        return Closed((), (), (Fault(f"{len(bad)} corners are no numbers", "export it again", (0.0, 0.0, 0.0)),))
+    points, faces = _welded(vertices_mm, triangles, weld_mm)
+    repairs = []
+    if len(_open(faces)) and weld_mm < GAP_MM:
+        nearer = _welded(vertices_mm, triangles, GAP_MM)
+        if len(_open(nearer[1])) < len(_open(faces)):
+            points, faces = nearer
+            repairs.append(f"gaps of up to {GAP_MM:g} mm closed")
+    faces, twice = _once(faces)
+    repairs += [f"{twice} faces that are there twice removed"] if twice else []
+    faces, turned = _oriented(faces)
+    repairs += [f"{turned} faces turned to look outwards like their neighbours"] if turned else []
+    faces, filled, faults = _filled(points, faces)
+    repairs += filled
+    if faults:
+        return Closed((), tuple(repairs), tuple(faults))
+    mates, faults = _mates(points, faces)
+    if faults:
+        return Closed((), tuple(repairs), tuple(faults))
+    shells, inverted, faults = _outwards(_shells(points, faces, mates))
+    repairs += [f"{inverted} surfaces that were inside out turned"] if inverted else []
+    return Closed(tuple(shells) if not faults else (), tuple(repairs), tuple(faults))
+
+
+def _place(point: Real) -> Place:
+    x, y, z = point.round(6).tolist()
+    return x, y, z
+
+
+def _welded(points: Real, faces: Whole, near_mm: float) -> tuple[Real, Whole]:
+    """Corners within a distance as one, faces of fewer than three corners left out."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    exact, back = np.unique(points, axis=0, return_inverse=True)
+    pairs = cKDTree(exact).query_pairs(near_mm, output_type="ndarray")
+    label = np.arange(len(exact))
+    if len(pairs):
+        links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(exact), len(exact)))
+        _, label = connected_components(links, directed=False)
+    _, first, label = np.unique(label, return_index=True, return_inverse=True)
+    faces = label[back.reshape(-1)[faces]]
+    distinct = (faces != np.roll(faces, 1, axis=1)).all(1)
+    return exact[first], faces[distinct]
+
+
+def _edges(faces: Whole) -> Whole:
+    """Directed edges of triangles (3 m, 2), those of the first triangle first."""
+    return faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+
+
+def _open(faces: Whole) -> Whole:
+    """Numbers of directed edges that have no opposite one."""
+    edges = _edges(faces)
+    n = int(edges.max(initial=0)) + 1
+    there, back = edges @ [n, 1], edges @ [1, n]
+    keys = np.unique(there)
+    found = np.searchsorted(keys, back).clip(max=max(len(keys) - 1, 0))
+    has = keys[found] == back if len(keys) else np.zeros(0, bool)
+    return np.flatnonzero(~has)
+
+
+def _once(faces: Whole) -> tuple[Whole, int]:
+    """Triangles without copies of others."""
+    turn = np.argmin(faces, axis=1)
+    canonical = faces[np.arange(len(faces))[:, None], (turn[:, None] + np.arange(3)) % 3]
+    _, first = np.unique(canonical, axis=0, return_index=True)
+    return faces[np.sort(first)], len(faces) - len(first)
+
+
+def _oriented(faces: Whole) -> tuple[Whole, int]:
+    """Triangles turned so that neighbours over an edge of two look to the same side, and how many were turned."""
+    edges = np.sort(_edges(faces), axis=1)
+    order = np.lexsort(edges.T)
+    same = (edges[order][1:] == edges[order][:-1]).all(1)
+    pair = same & ~np.append(False, same[:-1]) & ~np.append(same[1:], False)
+    one, other = order[:-1][pair], order[1:][pair]
+    directed = _edges(faces)
+    against = (directed[one] == directed[other]).all(1)
+    if not against.any():
+        return faces, 0
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+    a, b = one // 3, other // 3
+    n = len(faces)
+    links = coo_matrix((np.ones(len(a)), (a, b)), shape=(n, n)).tocsr()
+    flips = {**{(int(i), int(j)): bool(f) for i, j, f in zip(a, b, against, strict=True)},
+             **{(int(j), int(i)): bool(f) for i, j, f in zip(a, b, against, strict=True)}}  # fmt: skip
+    turned = np.zeros(n, bool)
+    _, label = connected_components(links, directed=False)
+    for start in np.unique(label, return_index=True)[1]:
+        order, before = breadth_first_order(links, start, directed=False)
+        for k in order[1:].tolist():
+            turned[k] = turned[before[k]] ^ flips[int(before[k]), k]
+        here = label == label[start]
+        if turned[here].sum() > here.sum() / 2:
+            turned[here] = ~turned[here]
+    return np.where(turned[:, None], faces[:, ::-1], faces), int(turned.sum())
+
+
+def _filled(points: Real, faces: Whole) -> tuple[Whole, list[str], list[Fault]]:
+    """Triangles with flat openings closed, how, and the openings that are not flat."""
+    edges = _edges(faces)[_open(faces)]
+    if not len(edges):
+        return faces, [], []
+    after = defaultdict(list)
+    for a, b in edges.tolist():
+        after[b].append(a)  # the other way round: as the face that is missing has them
+    added, repairs, faults = [faces], [], []
+    while after:
+        start = next(iter(after))
+        loop = [start]
+        while loop[-1] in after and (len(loop) == 1 or loop[-1] != start):
+            ends = after[loop[-1]]
+            loop.append(ends.pop())
+            if not ends:
+                del after[loop[-2]]
+        ring = np.array(loop[:-1] if loop[-1] == start else loop)
+        cap = _cap(points[ring]) if loop[-1] == start and len(ring) > 2 else None
+        place = _place(points[ring].mean(0))
+        if cap is None:
+            message = f"it is open: a gap with an edge of {len(ring)} sides that is not flat"
+            faults.append(Fault(message, "close the gap in CAD, or join the faces into a solid", place))
+        else:
+            x, y, z = place
+            repairs.append(f"a flat opening of {len(ring)} sides closed at x {x:g}, y {y:g}, z {z:g} mm")
+            added.append(ring[cap])
+    return np.concatenate(added), repairs, faults
+
+
+def _cap(ring: Real) -> Whole | None:
+    """Triangles over a flat ring of corners; None where it is not flat."""
+    if len(ring) == 3:
+        return np.array([[0, 1, 2]])
+    middle = ring.mean(0)
+    _, _, axes = np.linalg.svd(ring - middle, full_matrices=False)
+    local = (ring - middle) @ axes.T
+    if abs(local[:, 2]).max() > FLAT_MM:
+        return None
+    import manifold3d
+    import shapely
+
+    plane = local[:, :2]
+    if not shapely.Polygon(plane).is_valid:
+        return None
+    area = np.sum(plane[:, 0] * np.roll(plane[:, 1], -1) - np.roll(plane[:, 0], -1) * plane[:, 1])
+    flat = plane if area > 0 else plane * [1.0, -1.0]
+    return np.asarray(manifold3d.triangulate([flat]), np.int64)
+
+
+def _mates(points: Real, faces: Whole) -> tuple[Whole, list[Fault]]:
+    """For each directed edge the one of the neighbouring face; faults where there is none."""
+    edges = _edges(faces)
+    sides = np.sort(edges, axis=1)
+    _, label = np.unique(sides, axis=0, return_inverse=True)
+    order = np.argsort(label.reshape(-1), kind="stable")
+    starts = np.flatnonzero(np.append(True, np.diff(label.reshape(-1)[order]) > 0))
+    counts = np.diff(np.append(starts, len(order)))
+    forward = edges[:, 0] < edges[:, 1]
+    mates = np.full(len(edges), -1)
+    two = starts[counts == 2]
+    one, other = order[two], order[two + 1]
+    good = forward[one] != forward[other]
+    mates[one[good]], mates[other[good]] = other[good], one[good]
+    bad = [*one[~good].tolist()]
+    for start, count in zip(starts[counts != 2].tolist(), counts[counts != 2].tolist(), strict=True):
+        here = order[start : start + count]
+        if 2 * int(forward[here].sum()) != count:
+            bad.append(int(here[0]))
+            continue
+        for a, b in _through_material(points, faces, edges, here, forward):
+            mates[a], mates[b] = b, a
+    faults = []
+    if bad:
+        place = _place(points[edges[bad[0]]].mean(0))
+        many = f" and {len(bad) - 1} others" if len(bad) > 1 else ""
+        message = f"no outside can be given to its faces: one edge{many} has faces that look to different sides"
+        faults.append(Fault(message, "remove faces inside the body, and export a solid", place))
+    return mates, faults
+
+
+def _through_material(
+    points: Real, faces: Whole, edges: Whole, here: Whole, forward: NDArray[np.bool_]
+) -> list[tuple[int, int]]:
+    """Pairs of the faces around one edge between which there is material."""
+    a, b = points[np.sort(edges[here[0]])]
+    axis = (b - a) / np.linalg.norm(b - a)
+    tips = points[[next(c for c in faces[k // 3] if c not in edges[k]) for k in here]] - a
+    tips -= (tips @ axis)[:, None] * axis
+    u = tips[0] / max(np.linalg.norm(tips[0]), 1e-300)
+    angle = np.arctan2(tips @ np.cross(axis, u), tips @ u)
+    pairs, ups = [], [k for k in range(len(here)) if forward[here[k]]]
+    left = [k for k in range(len(here)) if not forward[here[k]]]
+    for k in ups:  # material lies clockwise of a face whose edge runs along the axis
+        gaps = [(angle[k] - angle[j]) % (2 * np.pi) for j in left]
+        gaps = [g if 1e-7 < g < 2 * np.pi - 1e-7 else 2 * np.pi for g in gaps]
+        j = left.pop(int(np.argmin(gaps)))
+        pairs.append((int(here[k]), int(here[j])))
+    return pairs
+
+
+def _shells(points: Real, faces: Whole, mates: Whole) -> list[Mesh]:
+    """Connected surfaces, each with corners of its own: those of one fan of faces are one."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    number = np.arange(len(mates))
+    following = number - number % 3 + (number + 1) % 3  # directed edge k starts at corner k, and ends at this one
+    corners = coo_matrix((np.ones(2 * len(mates)), (np.concatenate([number, following]),
+                          np.concatenate([following[mates], mates]))), shape=(len(mates),) * 2)  # fmt: skip
+    _, vertex = connected_components(corners, directed=False)
+    pieces = coo_matrix((np.ones(len(mates)), (number // 3, mates // 3)), shape=(len(faces),) * 2)
+    count, label = connected_components(pieces, directed=False)
+    places = points[faces.reshape(-1)]
+    found = []
+    for k in range(count):
+        own = vertex.reshape(-1, 3)[label == k]
+        _, first, back = np.unique(own, return_index=True, return_inverse=True)
+        where = np.flatnonzero(np.repeat(label == k, 3))[first]
+        found.append(Mesh(places[where], back.reshape(-1, 3).astype(np.int32)))
+    return found
+
+
+def _outwards(shells: Sequence[Mesh]) -> tuple[list[Mesh], int, list[Fault]]:
+    """Shells with their outside out; one inside another that is inside out is a cavity. And how many were turned."""
+    outer: list[Mesh] = []
+    inner: list[Mesh] = []
+    faults, turned = [], 0
+    for shell in shells:
+        low, high = shell.vertices_mm.min(0), shell.vertices_mm.max(0)
+        corners = shell.vertices_mm[shell.triangles]
+        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+        volume = shell.volume_mm3()
+        if abs(volume) <= _NOTHING * area * np.linalg.norm(high - low):
+            faults.append(
+                Fault("it encloses nothing: a sheet without thickness", "give it a thickness in CAD, or leave it out",
+                      _place((low + high) / 2))
+            )  # fmt: skip
+        (outer if volume > 0 else inner).append(shell)
+    cavities = []
+    for shell in inner:
+        low, high = shell.vertices_mm.min(0), shell.vertices_mm.max(0)
+        inside = any(
+            (o.vertices_mm.min(0) < low).all() and (o.vertices_mm.max(0) > high).all() for o in (*outer, *inner)
+        )
+        if inside and any((o.vertices_mm.min(0) < low).all() for o in outer):
+            cavities.append(shell)
+        else:
+            outer.append(replace(shell, triangles=shell.triangles[:, ::-1].copy()))
+            turned += 1
+    return [*outer, *cavities], turned, faults
+
+
+def crossing(mesh: Mesh) -> Place | None:
+    """A place where faces of a surface pass through each other; None where none do [mm].
+
+    Faces that share a corner are not compared.
+    """
+    import shapely
+
+    corners = mesh.vertices_mm[mesh.triangles]
+    low, high = corners.min(1), corners.max(1)
+    flat = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
+    one, other = shapely.STRtree(flat).query(flat, predicate="intersects")
+    keep = (one < other) & (low[one, 2] <= high[other, 2]) & (low[other, 2] <= high[one, 2])
+    one, other = one[keep], other[keep]
+    shared = (mesh.triangles[one][:, :, None] == mesh.triangles[other][:, None, :]).any((1, 2))
+    one, other = one[~shared], other[~shared]
+    for a, b in ((one, other), (other, one)):
+        for k in range(3):
+            start, end = corners[a, k], corners[a, (k + 1) % 3]
+            hit = _pierced(start, end, corners[b])
+            if hit is not None:
+                return _place(hit)
+    return None
+
+
+def _pierced(start: Real, end: Real, faces: Real) -> Real | None:
+    """First place where a line segment passes through the inside of a triangle, row by row (Moeller, Trumbore 1997)."""
+    way, side, other = end - start, faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0]
+    normal = np.cross(way, other)
+    size = np.einsum("ij,ij->i", side, normal)
+    scale = np.linalg.norm(way, axis=1) * np.linalg.norm(side, axis=1) * np.linalg.norm(other, axis=1)
+    steep = abs(size) > 1e-9 * scale
+    size = np.where(steep, size, 1.0)
+    offset = start - faces[:, 0]
+    turned = np.cross(offset, side)
+    u, v = np.einsum("ij,ij->i", offset, normal) / size, np.einsum("ij,ij->i", way, turned) / size
+    t = np.einsum("ij,ij->i", other, turned) / size
+    eps = 1e-6
+    inside = steep & (u > eps) & (v > eps) & (u + v < 1 - eps) & (t > eps) & (t < 1 - eps)
+    at = np.flatnonzero(inside)
+    return start[at[0]] + t[at[0]] * way[at[0]] if len(at) else None
+
+
+def joined(shells: Sequence[Mesh]) -> Mesh:
+    """Shells side by side in one mesh."""
+    first = np.cumsum([0, *(len(shell.vertices_mm) for shell in shells)])
+    triangles = [shell.triangles + start for shell, start in zip(shells, first, strict=False)]
+    return Mesh(np.concatenate([s.vertices_mm for s in shells]), np.concatenate(triangles).astype(np.int32))
+
+
+def solid(shells: Sequence[Mesh]) -> "manifold3d.Manifold":
+    """Shells as one solid of manifold3d."""
+    import manifold3d
+
+    whole = joined(shells)
+    data = manifold3d.Mesh64(vert_properties=whole.vertices_mm, tri_verts=whole.triangles.astype(np.uint64))
+    return manifold3d.Manifold(data)
+
+
+def united(shells: Sequence[Mesh]) -> tuple[Mesh, ...]:
+    """Shells of one body that overlap as one; cavities stay cavities."""
+    import manifold3d
+
+    outer = [solid([shell]) for shell in shells if shell.volume_mm3() > 0]
+    hollow = [shell for shell in shells if shell.volume_mm3() < 0]
+    whole = manifold3d.Manifold.batch_boolean(outer, manifold3d.OpType.Add)
+    for shell in hollow:
+        whole = whole - solid([Mesh(shell.vertices_mm, shell.triangles[:, ::-1].copy())])
+    return shells_of(whole)
+
+
+def shells_of(whole: "manifold3d.Manifold") -> tuple[Mesh, ...]:
+    """Shells of a solid of manifold3d."""
+    data = whole.to_mesh64()
+    return closed(np.asarray(data.vert_properties)[:, :3], np.asarray(data.tri_verts).astype(np.int64)).shells

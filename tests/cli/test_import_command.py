@@ -1,0 +1,274 @@
+"""``sensorgen import``: sensors of other CAD programs, from the file to everything that a drawn shape gets."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import cad_models
+from sensorgen.cli import WRONG_INPUT
+from sensorgen.design.design import load, make
+from sensorgen.design.values import permittivities
+from sensorgen.prediction.capacitance import capacitance
+from sensorgen.scene.geometry import cad
+
+ROUND_TRIP = {
+    "tri": {"length_mm": 12.0, "width_mm": 6.0},
+    "rect": {"length_mm": 12.0, "width_mm": 6.0, "along": "xy"},
+    "reference": {"length_mm": 12.0, "width_mm": 6.0},
+}
+MAP = ("--map", "*=x60@1", "--map", "*electrode*=etpu@2")
+
+
+@pytest.fixture(scope="module")
+def kernel():
+    """One CAD process for all tests of this file: loading its kernel takes seconds."""
+    with cad.CadProcess() as process:
+        yield process
+
+
+@pytest.fixture(scope="module")
+def models(tmp_path_factory, kernel):
+    """STEP files by build123d itself, and of our own designs."""
+    folder = tmp_path_factory.mktemp("models")
+    subprocess.run([sys.executable, cad_models.__file__, str(folder)], check=True, capture_output=True)
+    for name, given in ROUND_TRIP.items():
+        scene = make({"shape": name, "parameters": given}).drawn
+        kernel.write_step(scene, {b.name: "#202428" for b in scene.bodies}, name, folder / f"{name}.step")
+    return folder
+
+
+@pytest.fixture
+def shared_kernel(monkeypatch, kernel):
+    class Lent:
+        def __enter__(self):
+            return kernel
+
+        def __exit__(self, *_):
+            pass
+
+    monkeypatch.setattr(cad, "CadProcess", Lent)
+
+
+@pytest.fixture
+def plates(tmp_path):
+    """Three plates as STL files; each can be damaged."""
+
+    def write(damage=None, **at):
+        heights = {"low": (0.0, 0.4), "film": (0.4, 0.6), "up": (0.6, 1.0)} | at
+        for name, (z0, z1) in heights.items():
+            made = trimesh.creation.box(bounds=[(0, 0, z0), (20, 10, z1)])
+            made = damage(made) if damage and name == "film" else made
+            made.export(tmp_path / f"{name}.stl")
+        return [f"{name}.stl" for name in heights]
+
+    return write
+
+
+PLATES = ("--map", "film=x60@1", "--map", "*=etpu@2", "--map", "film=x60@1")
+
+
+@pytest.mark.usefixtures("shared_kernel")
+@pytest.mark.parametrize("name", ROUND_TRIP)
+def test_our_own_step_is_the_design_again(run, models, name):
+    """Same capacitance as the design that was exported, by models that know nothing of the import."""
+    said = run("import", models / f"{name}.step", *MAP)
+    assert (said.code, said.err) == (0, "")
+    again, drawn = load(Path(f"{name}.yaml")), make({"shape": name, "parameters": ROUND_TRIP[name]})
+    assert again.drawn.size_mm == pytest.approx(drawn.drawn.size_mm, abs=1e-12)
+    assert [b.terminal for b in again.drawn.bodies] == [b.terminal for b in drawn.drawn.bodies]
+    assert again.params.period_mm == (2.0 if name == "tri" else None)
+    one, other = (
+        capacitance(d.in_use, {v.material: v.value for v in permittivities(d)}, 3e-2, keep=False)
+        for d in (again, drawn)
+    )
+    assert one.model == other.model
+    assert one.capacitance_f.lower == pytest.approx(other.capacitance_f.lower, rel=1e-6)
+    assert one.capacitance_f.upper == pytest.approx(other.capacitance_f.upper, rel=1e-6)
+
+
+@pytest.mark.usefixtures("shared_kernel")
+def test_bodies_are_listed_with_a_map_to_start_from(run, models):
+    said = run("import", models / "dome.step", "--list", "--json")
+    found = {body["name"]: body for body in json.loads(said.out)["bodies"]}
+    assert list(found) == ["base_electrode", "film", "bump", "top_electrode"]
+    cap = np.pi * cad_models.RISE_MM**2 * (cad_models.BALL_MM - cad_models.RISE_MM / 3)
+    assert found["bump"]["volume_mm3"] == pytest.approx(cap, rel=0.03)
+    assert found["bump"]["volume_mm3"] < cap  # triangles lie inside what is round
+    assert {name: body["material"] for name, body in found.items()} == {
+        "base_electrode": "etpu", "film": "x60", "bump": "x60", "top_electrode": "etpu"
+    }  # fmt: skip
+    assert not list(Path().iterdir())
+
+
+@pytest.mark.usefixtures("shared_kernel")
+def test_triangles_lie_as_near_as_stated(kernel, models):
+    for chord in (0.05, 0.002):
+        bump = next(body for body in kernel.read_step(models / "dome.step", chord) if body.name == "bump")
+        corners = bump.vertices_mm[bump.triangles]
+        faces = corners[(np.ptp(corners[:, :, 2], axis=1) > 1e-6)]
+        share = np.random.default_rng(1).dirichlet((1, 1, 1), 50)
+        inside = np.einsum("sk,fkx->fsx", share, faces).reshape(-1, 3)
+        centre = np.array([15.0, 15.0, 0.6 + cad_models.RISE_MM - cad_models.BALL_MM])
+        off = cad_models.BALL_MM - np.linalg.norm(inside - centre, axis=1)
+        assert off.min() > -1e-6
+        assert off.max() <= chord
+
+
+@pytest.mark.usefixtures("shared_kernel")
+def test_inches_are_read_as_such(kernel, models):
+    sizes = [np.ptp(np.concatenate([b.vertices_mm for b in kernel.read_step(models / f"{name}.step", 0.01)]), axis=0)
+             for name in ("filleted", "inches")]  # fmt: skip
+    assert sizes[0] == pytest.approx([30, 10, 1.6], abs=1e-6)
+    ratio = sizes[1] / sizes[0]
+    assert ratio == pytest.approx([ratio[0]] * 3)
+    assert ratio[0] == pytest.approx(1.0) or ratio[0] == pytest.approx(25.4)
+
+
+@pytest.mark.usefixtures("shared_kernel")
+def test_electrodes_get_their_ends_by_height_unless_told(run, models):
+    words = ("--map", "*er=etpu@2", "--map", "film=x60@1", "--map", "carrier=x60@1")
+    said = run("import", models / "crossed.step", *words)
+    assert said.code == 0
+    assert {b.name: b.terminal for b in load(Path("crossed.yaml")).drawn.bodies} == {
+        "carrier": "", "lower": "bottom", "film": "", "upper": "top"
+    }  # fmt: skip
+    assert run("import", models / "crossed.step", *words).line.endswith(
+        "crossed.yaml exists; expected --force to replace it, or another --name"
+    )
+    swapped = ("--terminal", "lower=top", "--terminal", "upper=bottom", "--force")
+    assert run("import", models / "crossed.step", *words, *swapped).code == 0
+    assert load(Path("crossed.yaml")).drawn.body("lower").terminal == "top"
+    assert "unknown terminal 'left'" in run("import", models / "crossed.step", *words, "--terminal", "lower=left").line
+
+
+@pytest.mark.usefixtures("shared_kernel")
+def test_bodies_that_overlap_are_refused_with_place_and_picture(run, models):
+    said = run("import", models / "colliding.step", *MAP)
+    assert said.code == WRONG_INPUT
+    assert "film / up___Gr_e_1" in said.out
+    assert "overlap by 5 mm3, 0.0971 mm deep" in said.words
+    assert "x 10, y 4.5, z 0.65 mm" in said.line
+    assert [path.name for path in Path().iterdir()] == ["colliding-faults.svg"]
+    text = Path("colliding-faults.svg").read_text()
+    assert text.count("<circle") == 3
+    assert "from above" in text
+
+
+def faulty_open(made):
+    """Without its top."""
+    return trimesh.Trimesh(made.vertices, made.faces[made.triangles[:, :, 2].mean(1) < made.bounds[1, 2] - 1e-9])
+
+
+def test_stl_files_are_repaired_and_walk_on(run, plates):
+    files = plates(faulty_open)
+    said = run("import", *files, "--unit", "mm", "--name", "three", *PLATES)
+    assert said.code == 0
+    assert "a flat opening" in said.words
+    design = load(Path("three.yaml"))
+    assert [b.volume_mm3() for b in design.drawn.bodies] == pytest.approx([80.0, 40.0, 80.0])
+    eps = {v.material: v.value for v in permittivities(design)}
+    plate_f = 8.8541878128e-12 * eps["x60"] * 0.02 * 0.01 / 0.2e-3
+    assert capacitance(design.in_use, eps).capacitance_f.middle() == pytest.approx(plate_f, rel=1e-9, abs=0.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["--unit", "m"], "it is 20000 x 10000 x 1000 mm; expected 1 to 1000 mm"),
+        (["--unit", "micron"], "it is 0.02 x 0.01 x 0.001 mm; expected 1 to 1000 mm"),
+        ([], "an STL has no unit; expected --unit mm"),
+        (["--unit", "mm", "--map", "low=etpu@2"], "no material for film, up: give --map film=x60 --map up=MATERIAL"),
+        (["--unit", "mm", *PLATES, "--map", "film=x61"], "unknown material 'x61'; did you mean 'x60'?"),
+        (["--unit", "mm", *PLATES, "--map", "film=x60@2"], "tool 2 is given to both etpu and x60"),
+        (["--unit", "mm", *PLATES, "--map", "low=etpu@3"], "etpu is on tools 3 and 2; expected one tool"),
+        (["--unit", "mm", *PLATES, "--map", "flim=x60"], "unknown body 'flim'; did you mean 'film'?"),
+        (["--unit", "mm", *PLATES, "--map", "film=x60@99"], "tools.x60: diabase-h5 has no tool 99"),
+        (["--unit", "mm", *PLATES, "--chord", "5"], "--chord 5: expected 0.0001 to 1 mm"),
+    ],
+)
+def test_wrong_words_are_one_line_and_nothing_is_written(run, plates, words, line):
+    files = plates()
+    before = sorted(path.name for path in Path().iterdir())
+    said = run("import", *files, *words)
+    assert said.code == WRONG_INPUT
+    assert line in said.line
+    assert sorted(p.name for p in Path().iterdir() if not p.name.endswith("-faults.svg")) == before
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "line"),
+    [
+        ("a.step", b"", "the file is empty"),
+        ("a.step", b"solid", "no STEP: it does not begin with ISO-10303-21"),
+        ("a.step", b"ISO-10303-21; nothing follows", "no solids that the CAD kernel can read"),
+        ("a.obj", b"v 1 2 3", "expected a file in .step, .stp, .3mf, .stl"),
+        ("a.3mf", b"PK", "not a 3MF"),
+    ],
+)
+@pytest.mark.usefixtures("shared_kernel")
+def test_files_that_are_none_are_one_line(run, tmp_path, name, content, line):
+    (tmp_path / name).write_bytes(content)
+    said = run("import", name)
+    assert said.code == WRONG_INPUT
+    assert line in said.line
+
+
+def test_a_step_of_500_mb_is_refused_at_once(run, tmp_path):
+    with (tmp_path / "big.step").open("wb") as file:
+        file.truncate(500_000_000)
+    assert "500 MB; expected at most 100 MB" in run("import", "big.step").line
+
+
+def test_geometry_is_part_of_the_design(run, plates, tmp_path):
+    assert run("import", *plates(), "--unit", "mm", "--name", "a", *PLATES).code == 0
+    first = load(Path("a.yaml"))
+    assert run("import", *plates(film=(0.4, 0.61), up=(0.61, 1.0)), "--unit", "mm", "--name", "b", *PLATES).code == 0
+    assert load(Path("b.yaml")).id() != first.id()
+    assert make(first.model_dump(mode="json")).id() == first.id()  # a record holds all of it
+    (bodies,) = tmp_path.glob("a-*.bodies.json")
+    bodies.write_text(bodies.read_text().replace("0.6", "0.7"))
+    assert "its content is not that of its name" in run("check", "a.yaml").line
+    bodies.unlink()
+    assert "cannot read" in run("check", "a.yaml").line
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        ({"bodies": {"low": {"material": "etpu"}}}, "bodies.film is missing"),
+        ({"bodies": {"lid": {"material": "etpu"}}}, "unknown body 'lid'"),
+        ({"parameters": {"length_mm": 50.0}}, "parameters.length_mm: an imported sensor is as large as its bodies"),
+        ({"geometry": None}, "geometry is missing"),
+        ({"geometry": "data:application/zlib;base64,AAAA"}, "geometry: no bodies in it"),
+        ({"shape": "tri"}, "tri is drawn from parameters; expected shape: imported"),
+    ],
+)
+def test_designs_that_do_not_fit_their_bodies_are_refused(run, plates, change, line):
+    assert run("import", *plates(), "--unit", "mm", "--name", "a", *PLATES).code == 0
+    from sensorgen.core.errors import SensorgenError
+
+    with pytest.raises(SensorgenError, match=line):
+        make(load(Path("a.yaml")).model_dump(mode="json") | change)
+
+
+@pytest.mark.usefixtures("shared_kernel")
+def test_the_whole_walk_in_an_empty_folder(run, models, program):
+    """From a STEP of another program to a sliced print, with commands alone."""
+    program("prusa-slicer", "prusa-slicer")
+    said = run("import", models / "filleted.step", "--map", "pad=x60@1", "--map", "*=etpu@2", "--map", "pad=x60@1")
+    assert said.code == 0
+    assert "30 x 10 x 1.6 mm" in said.words
+    assert run("check", "filleted.yaml").code == 0
+    predicted = run("predict", "filleted.yaml", "--json")
+    assert predicted.code == 0, predicted.err
+    assert run("build", "filleted.yaml", "--no-cad").code == 0
+    made = {path.name for path in Path("out/filleted").iterdir()}
+    assert {"filleted.prusa.3mf", "filleted.cura.3mf", "filleted.svg", "design.json"} <= made
+    sliced = run("slice", "filleted.yaml")
+    assert sliced.code == 0, sliced.err
+    assert Path("out/filleted/filleted.prusa.gcode").stat().st_size > 10_000
