@@ -187,14 +187,17 @@ def answer(body: Body, asked: Asked) -> CellCapacitance:
 
 
 def sweep(
-    key: str, points: Sequence[tuple[float | str, Body]], asked: Asked, jobs: int, done: Callable[[], None]
+    key: str, points: Sequence[tuple[float | str, Body]], asked: Asked, jobs: int, done: Callable[[], None],
+    cluster: str = "",
 ) -> Sweep[CellCapacitance]:  # fmt: skip
     """The same along a sweep; a reason stands in place of what no model applies to, or at which one fails.
 
     Parameters and errors as of :func:`answer` and :func:`sensorgen.prediction.sweep.sweep`.
     """
     work = partial(answer, asked=asked)
-    return swept(key, points, work, _failed, refused=(Unpredictable,), keep=asked.keep, jobs=jobs, done=done)
+    return swept(
+        key, points, work, _failed, refused=(Unpredictable,), keep=asked.keep, jobs=jobs, cluster=cluster, done=done
+    )
 
 
 def _failed(body: Body, reason: str) -> CellCapacitance:
