@@ -104,7 +104,7 @@ def _spans(shape: Region, ground: Sequence[Region], least_mm: float) -> dict[str
         under = shapely.union_all(ground)
         places = shapely.get_parts(shapely.difference(shape, under))
         radii = shapely.length(shapely.maximum_inscribed_circle(places, tolerance=least_mm / 10))
-        corners = shapely.points(np.unique(shapely.get_coordinates(places).round(9), axis=0))
+        corners = shapely.points(np.unique(shapely.get_coordinates(shape).round(9), axis=0))
         _, away = shapely.STRtree(shapely.get_parts(under)).query_nearest(
             corners, return_distance=True, all_matches=False
         )

@@ -11,8 +11,9 @@ from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
+from sensorgen.core.findings import Finding
 from sensorgen.design.values import MaterialValue
-from sensorgen.prediction.identifiability.results import Identifiability, of_schema_1
+from sensorgen.prediction.identifiability.results import GUESS, Identifiability, of_schema_1
 from sensorgen.prediction.plan import Plan, without_times
 
 if TYPE_CHECKING:
@@ -230,13 +231,14 @@ class Prediction(Displayed):
     def summary(self) -> Iterator[Part]:
         """Quantities of the print beside the drawing's: the best value and the range with all errors."""
         shown = [self.drawn, self] if self.drawn else [self]
+        length_m = max(self.identifiability.map.position_m, default=inf) if self.identifiability else inf
         rows = [
             ("electrode gap", *(_words(p.gap) for p in shown)),
             ("capacitance", *(p.capacitance.words() if p.capacitance else p.status for p in shown)),
             *((f"{end} electrode", *(_words(p.resistance.get(end)) for p in shown)) for end in self.resistance),
             ("sensitivity [1/kPa]", *((_words(p.sensitivity) or "–").replace(" 1/kPa", "") for p in shown)),
-            ("force resolution", *(_words(p.force_resolution) for p in shown)),
-            ("position resolution", *(_words(p.position_resolution) for p in shown)),
+            ("force resolution", *(resolved(p.force_resolution, p.force_n, "cannot sense force") for p in shown)),
+            ("position resolution", *(resolved(p.position_resolution, length_m, "cannot locate") for p in shown)),
         ]
         columns = (Column(""), *(Column(p.body.partition(",")[0]) for p in shown))
         yield Table("quantities", "", columns, tuple(rows))
@@ -295,6 +297,13 @@ class Prediction(Displayed):
         """Indented JSON of the published schema."""
         return json.dumps(json.loads(to_json(self)), indent=2, ensure_ascii=False) + "\n"
 
+    def with_short(self, found: Sequence[Finding]) -> tuple[Finding, ...]:
+        """Findings about a drawing, and an error where its print is a short."""
+        if self.status != "short" or any(f.rule == "1-short" for f in found):
+            return tuple(found)
+        advice = "widen narrow parts to a line, or draw the electrodes further apart"
+        return (Finding("1-short", "error", "sensor", f"as {self.body}: {self.reason}", advice, 0.0), *found)
+
     def problems(self, accuracy: float | None) -> Sequence[str]:
         """That abs(Z) is not within an accuracy that was asked for [-]."""
         if accuracy is None or self.capacitance is None:
@@ -304,6 +313,21 @@ class Prediction(Displayed):
             return ()
         best = "error unknown" if reached in (None, inf) else f"{reached:.2g}"
         return ("; ".join((f"accuracy {accuracy:g} not reached: {best}", *(self.plan.shares() if self.plan else ()))),)
+
+
+def resolved(error: Bounds | None, most: float, cannot: str) -> str:
+    """A standard error in words; where it is that of a reading without information, what the sensor cannot do.
+
+    >>> resolved(Bounds.of(8580.0, "m"), 0.1, "cannot locate"), resolved(Bounds.of(0.2, "N"), 6.0, "cannot sense")
+    ('cannot locate', '200 mN')
+    """
+    if error is None:
+        return "–"
+    if not error.value < GUESS * most:
+        return cannot
+    if error.upper > most:
+        error = replace(error, upper=most, open="upper")
+    return error.words()
 
 
 def _words(bounds: Bounds | None) -> str | None:

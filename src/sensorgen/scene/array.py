@@ -28,16 +28,10 @@ class ArrayParams(Envelope):
         return self.length_mm * self.width_mm / self.period_mm**2
 
     def refuse_wider(self, width_mm: float) -> None:
-        """Refuse structures that would run into each other, or that do not fit the sensor once."""
+        """Refuse structures that would run into each other."""
         if width_mm > self.period_mm:
             raise OutOfRange(
                 f"a structure {width_mm:g} mm wide does not fit period_mm {self.period_mm:g}: expected at most that"
-            )
-        least = min(self.length_mm, self.width_mm)
-        if least < self.period_mm:
-            raise OutOfRange(
-                f"no whole period of {self.period_mm:g} mm fits a sensor {self.length_mm:g} x {self.width_mm:g} mm: "
-                "use a shorter period or a larger sensor"
             )
 
 
@@ -47,7 +41,7 @@ def array_scene(
     structure: Callable[[float, float, float], Sequence[Piece]],
     around: Callable[[float, float, float], Sequence[Piece]],
 ) -> Scene:
-    """Bodies of an array of whole cells, in the middle of the sensor.
+    """Bodies of an array of whole cells in the middle of the sensor; of no cell in one shorter than a period.
 
     Parameters
     ----------

@@ -2,10 +2,10 @@
 
 import json
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from sensorgen.checks.review import review
 from sensorgen.core.bounds import Bounds
@@ -15,14 +15,14 @@ from sensorgen.core.findings import Finding, Verdict, counted, counts, listed, m
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.walls import rule
-from sensorgen.export import slicing
-from sensorgen.export.gcode.drags import OfTool
-from sensorgen.export.gcode.report import report
 from sensorgen.export.slicers import SLICERS
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import DEFAULT, Query
 from sensorgen.prediction.results import Prediction
+
+if TYPE_CHECKING:
+    from sensorgen.export.gcode.drags import OfTool
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Toolpath:
     crossings: int
 
     @classmethod
-    def of(cls, source: str, time_s: float, tools: Iterable[OfTool]) -> "Toolpath":
+    def of(cls, source: str, time_s: float, tools: "Iterable[OfTool]") -> "Toolpath":
         """By what each tool passes over."""
         each = tuple(tools)
         touching = sum(tool.contact_mm + tool.rubbing_mm for tool in each)
@@ -179,8 +179,9 @@ def _shown(name: str, value: Bounds | float | None) -> str:
 
 
 def trial(
-    design: Design, query: Query = DEFAULT, *, folder: Path | None = None, slicer: str = "", keep: bool = True
-) -> Trial:
+    design: Design, query: Query = DEFAULT, *, folder: Path | None = None, slicer: str = "", keep: bool = True,
+    drawn: bool = True,
+) -> Trial:  # fmt: skip
     """Check a design, and predict its drawing and its print.
 
     Parameters
@@ -195,6 +196,8 @@ def trial(
         Slice now, by ``prusa`` or ``cura``; "" for what ``folder`` has.
     keep : bool
         Read stored predictions and store new ones.
+    drawn : bool
+        Predict the drawing, too.
 
     Raises
     ------
@@ -209,27 +212,19 @@ def trial(
     """
     walls = rule(slicer, design.walls) if slicer in SLICERS else ""
     held = review(design, walls=walls)
+    path: Toolpath | None
     if slicer:
         body, path, of_print = _sliced(design, slicer)
         found = [*held.sliced().findings, *of_print]
     else:
         (body, path), found = _at_hand(design, folder), held.findings
-    predicted = evaluate(body, query, keep=keep)
-    findings = tuple(f for f in with_print(found, predicted) if not f.waiver)
-    drawn, printed = predicted.drawn or predicted, predicted
+    predicted = evaluate(body, query, keep=keep, beside=drawn)
+    findings = tuple(f for f in predicted.with_short(found) if not f.waiver)
     return Trial(
-        design.name, design.id(), body.provenance, printed.status, printed.reason, verdict(findings), findings,
-        printed.force_n, printed.position_m, Numbers.of(drawn), Numbers.of(printed), printed.doubts, path,
+        design.name, design.id(), body.provenance, predicted.status, predicted.reason, verdict(findings), findings,
+        predicted.force_n, predicted.position_m, Numbers.of(predicted.drawn) if predicted.drawn else Numbers(),
+        Numbers.of(predicted), predicted.doubts, path,
     )  # fmt: skip
-
-
-def with_print(found: Sequence[Finding], predicted: Prediction) -> tuple[Finding, ...]:
-    """Findings about the drawing, and an error where its print is a short."""
-    if predicted.status != "short" or any(f.rule == "1-short" for f in found):
-        return tuple(found)
-    what = f"as {predicted.body}: {predicted.reason}"
-    advice = "widen narrow parts to a line, or draw the electrodes further apart"
-    return (Finding("1-short", "error", "sensor", what, advice, 0.0), *found)
 
 
 def _at_hand(design: Design, folder: Path | None) -> tuple[Body, Toolpath | None]:
@@ -237,6 +232,8 @@ def _at_hand(design: Design, folder: Path | None) -> tuple[Body, Toolpath | None
     body, file = bodies.default_body(design, folder), bodies.toolpath(design, folder)
     if file is None:
         return body, None
+    from sensorgen.export.gcode.drags import OfTool  # a build reads no G-code
+
     made = json.loads(file.with_name(f"{file.name}.json").read_text("utf-8"))
     try:
         tools = [OfTool(**tool) for tool in made["lifting"]["after"]["tools"]]
@@ -249,6 +246,8 @@ def _at_hand(design: Design, folder: Path | None) -> tuple[Body, Toolpath | None
 def _sliced(design: Design, slicer: str) -> tuple[Body, Toolpath, list[Finding]]:
     """The print by a real slicer, as ``sensorgen slice`` makes it, and the findings about it."""
     from sensorgen.asprinted.printed import body
+    from sensorgen.export import slicing
+    from sensorgen.export.gcode.report import report
 
     with tempfile.TemporaryDirectory() as stage:
         made = slicing.sliced([slicing.alone(design)], slicer, Path(stage))

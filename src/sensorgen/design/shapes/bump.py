@@ -11,6 +11,7 @@ One cell, cut through its middle (e: conductor, x: dielectric, blank: air)::
 """
 
 from dataclasses import dataclass, field
+from math import sqrt
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.scene.array import ArrayParams, array_scene, beside_round
@@ -22,23 +23,23 @@ from sensorgen.scene.scene import Fill, Piece, Scene, rounded
 class Params(ArrayParams):
     """Parameters of the bumps."""
 
-    base_mm: float = field(
+    root_mm: float = field(
         default=1.0, metadata={"help": "Diameter of a bump at the top electrode.", "range": (0.02, 100.0)}
     )
 
     def __post_init__(self) -> None:
         """Refuse bumps that would run into each other, or that are more than half a sphere."""
-        self.refuse_wider(self.base_mm)
-        if self.height_mm > self.base_mm / 2:
+        self.refuse_wider(self.root_mm)
+        if self.height_mm > self.root_mm / 2:
             raise OutOfRange(
-                f"height_mm {self.height_mm:g} is more than half of base_mm {self.base_mm:g}: expected at most "
+                f"height_mm {self.height_mm:g} is more than half of root_mm {self.root_mm:g}: expected at most "
                 "half a sphere"
             )
 
 
 def scene(p: Params, fill: Fill) -> Scene:
     """Bodies of the array of bumps."""
-    base = p.base_mm / 2
+    base = p.root_mm / 2
     bulge = p.height_mm / base  # a cap's half angle is four times the angle of which this is the tangent
 
     def bump(x: float, y: float, z: float) -> list[Piece]:
@@ -60,4 +61,4 @@ def _half_arc(whole: float) -> float:
     >>> round(_half_arc(1.0), 6)  # of half a circle, a quarter
     0.414214
     """
-    return ((1.0 + whole * whole) ** 0.5 - 1.0) / whole
+    return (sqrt(1.0 + whole * whole) - 1.0) / whole

@@ -22,7 +22,7 @@ from sensorgen.scene.scene import Fill, Piece, Scene, rounded
 class Params(ArrayParams):
     """Parameters of the cones."""
 
-    base_mm: float = field(
+    root_mm: float = field(
         default=1.0, metadata={"help": "Diameter of a cone at the top electrode.", "range": (0.02, 100.0)}
     )
     tip_mm: float = field(
@@ -31,14 +31,14 @@ class Params(ArrayParams):
 
     def __post_init__(self) -> None:
         """Refuse cones that would run into each other, or that grow towards the tip."""
-        self.refuse_wider(self.base_mm)
-        if self.tip_mm > self.base_mm:
-            raise OutOfRange(f"tip_mm {self.tip_mm:g} is wider than base_mm {self.base_mm:g}: expected at most that")
+        self.refuse_wider(self.root_mm)
+        if self.tip_mm > self.root_mm:
+            raise OutOfRange(f"tip_mm {self.tip_mm:g} is wider than root_mm {self.root_mm:g}: expected at most that")
 
 
 def scene(p: Params, fill: Fill) -> Scene:
     """Bodies of the array of cones."""
-    tip, base = p.tip_mm / 2, p.base_mm / 2
+    tip, base = p.tip_mm / 2, p.root_mm / 2
 
     def cone(x: float, y: float, z: float) -> list[Piece]:
         roof = rounded(z + p.height_mm)

@@ -22,7 +22,7 @@ from sensorgen.scene.scene import Fill, Outline, Piece, Scene, rectangle, rounde
 class Params(ArrayParams):
     """Parameters of the pyramids."""
 
-    base_mm: float = field(
+    root_mm: float = field(
         default=1.0, metadata={"help": "Side of a pyramid at the top electrode.", "range": (0.02, 100.0)}
     )
     tip_mm: float = field(
@@ -31,9 +31,9 @@ class Params(ArrayParams):
 
     def __post_init__(self) -> None:
         """Refuse pyramids that would run into each other, or that grow towards the tip."""
-        self.refuse_wider(self.base_mm)
-        if self.tip_mm > self.base_mm:
-            raise OutOfRange(f"tip_mm {self.tip_mm:g} is wider than base_mm {self.base_mm:g}: expected at most that")
+        self.refuse_wider(self.root_mm)
+        if self.tip_mm > self.root_mm:
+            raise OutOfRange(f"tip_mm {self.tip_mm:g} is wider than root_mm {self.root_mm:g}: expected at most that")
 
 
 def scene(p: Params, fill: Fill) -> Scene:
@@ -44,10 +44,10 @@ def scene(p: Params, fill: Fill) -> Scene:
         return tuple((rounded(u), rounded(v)) for u, v in rectangle(x - half, x + half, y - half, y + half))
 
     def pyramid(x: float, y: float, z: float) -> list[Piece]:
-        return [Loft(square(x, y, p.tip_mm), square(x, y, p.base_mm), z, rounded(z + p.height_mm))]
+        return [Loft(square(x, y, p.tip_mm), square(x, y, p.root_mm), z, rounded(z + p.height_mm))]
 
     def around(x: float, y: float, z: float) -> list[Piece]:
-        tip, base, cell = (square(x, y, side) for side in (p.tip_mm, p.base_mm, p.period_mm))
+        tip, base, cell = (square(x, y, side) for side in (p.tip_mm, p.root_mm, p.period_mm))
         sides = [((cell[k - 1], cell[k], low[k], low[k - 1]), (cell[k - 1], cell[k], high[k], high[k - 1]))
                  for k in range(4) for low, high in [(tip, base)]]  # fmt: skip
         return [Loft(low, high, z, rounded(z + p.height_mm)) for low, high in sides] if p.tip_mm < p.period_mm else []

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from sensorgen.scene.connections import groups
 from sensorgen.scene.geometry.meshes import CHORD_MM, Mesh
 from sensorgen.scene.scene import AXES, Body, Scene
 from sensorgen.scene.sections import overlap, sections
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
 
 # Where bodies share a face, rounding leaves a film of some 1e-13 mm; a real overlap is far above this.
 OVERLAP_MM = 1e-9
+_MANY = 10_000  # triangles, from which on taking a mesh apart takes seconds
 
 
 @lru_cache(maxsize=16)
@@ -100,7 +100,7 @@ def _self_overlap_mm3(mesh: Mesh, solid: "manifold3d.Manifold") -> float:
     """Volume that the shells of one body enclose more than once [mm3]."""
     import manifold3d
 
-    if _shells_are_apart(mesh):
+    if len(mesh.triangles) > _MANY and _shells_are_apart(mesh):
         return 0.0
     shells = solid.decompose()
     united = manifold3d.Manifold.batch_boolean(shells, manifold3d.OpType.Add) if len(shells) > 1 else solid
@@ -109,6 +109,8 @@ def _self_overlap_mm3(mesh: Mesh, solid: "manifold3d.Manifold") -> float:
 
 def _shells_are_apart(mesh: Mesh) -> bool:
     """Whether the boxes around its shells share faces at most: a thousandth of the time to take it apart."""
+    from sensorgen.scene.connections import groups
+
     ends = mesh.triangles[:, [0, 1, 1, 2]].astype(np.int64)
     label = groups(len(mesh.vertices_mm), *ends.reshape(-1, 2).T)
     order = np.argsort(label, kind="stable")
