@@ -88,4 +88,4 @@ def test_a_bump_is_hertz_within_the_error_that_two_numbers_of_columns_state():
     down, other = fine.displacement_m[1:], coarse.displacement_m[1:]
     error = np.maximum(0.24 * down, 1.25 / ((8 / 7) ** 2 - 1) * abs(down - other))
     assert (abs(down - hertz) <= error).all()
-    assert abs(fine.imbalance).max() < 0.01
+    assert abs(fine.imbalance).max() < 0.02  # a spline through two loads
