@@ -199,6 +199,12 @@ class Design(Strict):
         scene = self.form.scene(self.params, Fill(**names))
         return borders.cut(scene, self.border) if self.border else scene
 
+    @property
+    def area_mm2(self) -> float:
+        """Area of the sensor in plan [mm2]."""
+        whole = self.params.length_mm * self.params.width_mm
+        return borders.region(self.border).area if self.border else whole
+
     @cached_property
     def unbordered(self) -> "Design":
         """The design without its border: a rectangle of the same length and width."""
