@@ -64,9 +64,13 @@ def in_parallel(
         spent, done = 0.0, 0
         while todo or again or running:
             while free and (todo or again):
-                size = int(CHUNK_S * done / spent) if spent else 1
-                size = max(1, min(size, len(todo) // (2 * len(lanes))))
-                chunk = again.popleft() if again else _Chunk(tuple(todo.popleft() for _ in range(min(size, len(todo)))))
+                if again and not (lanes[0].shared and (todo or running)):
+                    chunk = again.popleft()
+                elif todo:
+                    size = max(1, min(int(CHUNK_S * done / spent) if spent else 1, len(todo) // (2 * len(lanes))))
+                    chunk = _Chunk(tuple(todo.popleft() for _ in range(size)))
+                else:
+                    break
                 lane = free.pop()
                 running[lane.submit(work, [inputs[k] for k in chunk.numbers])] = lane, chunk
             finished = wait(running, _POLL_S, FIRST_COMPLETED).done
@@ -78,8 +82,8 @@ def in_parallel(
                     seconds, results = future.result()
                 except lane.deadly:
                     lane.renew()
-                    again.extend(chunk.after(lane.deaths))
-                    if len(chunk.numbers) == 1 and not chunk.after(lane.deaths):
+                    again.extend(chunk.after_death())
+                    if not chunk.after_death():
                         if lost is None:
                             raise SensorgenError(_DIED) from None
                         yield chunk.numbers[0], lost(chunk.numbers[0], _DIED)
@@ -145,11 +149,10 @@ class _Chunk:
     numbers: tuple[int, ...]
     deaths: int = 0
 
-    def after(self, deaths: int) -> "list[_Chunk]":
-        """What to send after more deaths: the same again, its works one by one, or nothing."""
-        deaths += self.deaths
-        if deaths < 2:
-            return [_Chunk(self.numbers, deaths)]
+    def after_death(self) -> "list[_Chunk]":
+        """What to send after another death: the same again, its works one by one, or nothing."""
+        if not self.deaths:
+            return [_Chunk(self.numbers, 1)]
         return [_Chunk((k,), 1) for k in self.numbers] if len(self.numbers) > 1 else []
 
 
@@ -197,7 +200,7 @@ class _Lane(Protocol):
 
     executor: "Executor"
     deadly: tuple[type[BaseException], ...]  # what a future raises whose process has died
-    deaths: int  # of processes, that such an error stands for
+    shared: bool  # whether its process also has other chunks, which die with it: what is sent again is sent alone
 
     def submit(self, work: Work[Result], inputs: Sequence[tuple[Any, ...]]) -> "Future[tuple[float, list[Result]]]":
         """Begin a chunk."""
@@ -212,7 +215,7 @@ class _Lane(Protocol):
 class _Process:
     """A fresh process, so that solver and CAD kernel never meet in one; alone in its pool, so that it dies alone."""
 
-    deaths = 1
+    shared = False
 
     def __init__(self) -> None:
         from concurrent.futures.process import BrokenProcessPool
@@ -283,7 +286,7 @@ def _begin() -> None:
 class _Cluster:
     """One of the places of a Dask cluster."""
 
-    deaths = 2  # the scheduler has tried it several times itself
+    shared = True
 
     def __init__(self, client: Any, address: str) -> None:
         from distributed.scheduler import KilledWorker
