@@ -28,6 +28,7 @@ lint: $(READY_DEV) ## style, types, and which module may import which
 docs: $(READY_DEV) ## write docs/reference.md from the --help texts, and the pictures of README and docs
 	$(BIN)/python docs/generate.py
 	$(BIN)/python docs/pictures.py
+	$(BIN)/python docs/screenshot.py
 
 site: $(READY_DEV) ## build the documentation as a site that works offline, out/site/index.html; a broken link fails
 	$(BIN)/sphinx-build -q -W --keep-going -c docs . out/site

@@ -13,7 +13,7 @@ FIRST_SCREEN = ["build", "tri", "--dielectric", "0.2"]
 LINES = 30  # of the first screen
 PICTURES = {"trix-d0.2": ["tri", "--drawn"]}
 PAGES = (
-    [], ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["draw"],
+    [], ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["show"], ["draw"],
     ["optimise"], ["slice"], ["slice", "tri"], ["import"], ["gcode"], ["gcode", "check"], ["gcode", "drags"],
     ["gcode", "pinholes"], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
     ["predict"], ["predict", "tri"], ["cell"], ["cell", "tri"], ["chart"], ["chart", "tri"],
@@ -23,7 +23,8 @@ PAGES = (
     ["bench", "hysteresis"], ["bench", "sets"], ["bench", "live"],
     ["log"],
     *(["log", w] for w in ("specimen", "add", "import", "bench", "predict", "list", "show", "export", "verify")),
-    ["report"], ["fit"], ["calibrate"], ["thesis"], ["new"], ["pack"], ["pack", "test"],
+    ["report"], ["fit"], ["characterise"], ["characterise", "PRINTER"], ["characterise", "read"],
+    ["calibrate"], ["thesis"], ["new"], ["pack"], ["pack", "test"],
     ["pack", "trust"], ["list"], ["schema"], ["completion"],
 )  # fmt: skip
 
@@ -31,7 +32,13 @@ PAGES = (
 def sensorgen(*words: str, folder: str = ".") -> str:
     """Output of a command in a folder, on a terminal of 100 columns."""
     command = [sys.executable, "-m", "sensorgen", *words]
-    environment = {"COLUMNS": "100", "TERMINAL_WIDTH": "100", "PYTHONIOENCODING": "utf-8", "PATH": ""}
+    environment = {
+        "COLUMNS": "100",
+        "TERMINAL_WIDTH": "100",
+        "PYTHONIOENCODING": "utf-8",
+        "PATH": "",
+        "SENSORGEN_BUDGET": "0",
+    }
     environment["PYTHONPATH"] = os.environ.get("PYTHONPATH", "")
     done = subprocess.run(command, capture_output=True, text=True, env=environment, cwd=folder)
     if done.returncode not in (0, 1) or "Traceback" in done.stderr:  # 1: the design has findings

@@ -19,6 +19,8 @@ def _cache(monkeypatch, tmp_path_factory):
     """No test finds what another one, or the user, has kept."""
     monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path_factory.mktemp("cache")))
     monkeypatch.setenv("SENSORGEN_LOG", str(tmp_path_factory.mktemp("log") / "log.db"))
+    monkeypatch.setenv("BROWSER", "true")  # opens nothing
+    monkeypatch.setenv("SENSORGEN_BUDGET", "0")  # changes of designs are tried by the tests of that alone
     monkeypatch.setenv("SENSORGEN_MATERIALS", str(tmp_path_factory.mktemp("materials")))
     monkeypatch.setenv("SENSORGEN_PACKS", str(tmp_path_factory.mktemp("packs")))
 

@@ -7,7 +7,7 @@ import pytest
 import shapely
 from browser import Page
 
-from sensorgen.analysis.plots import layers
+from sensorgen.analysis.plots import layers, pages
 from sensorgen.asprinted.printed import body
 from sensorgen.design.design import make
 from sensorgen.export.gcode.crossings import Stretches
@@ -26,7 +26,7 @@ def browser(program, tmp_path):
 def test_a_path_is_the_region():
     """Area by the shoelace rule of what is written, holes taken off, y turned over."""
     region = shapely.box(0, 0, 10, 4).difference(shapely.box(2, 1, 3, 2)).union(shapely.box(12, 0, 13, 4))
-    data = layers.path(region, 4.0)
+    data = pages.path(region, 4.0)
     areas = []
     for ring in re.findall(r"M([^Z]+)Z", data):
         xy = [tuple(map(float, corner.split())) for corner in ring.split("L")]

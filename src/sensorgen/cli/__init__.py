@@ -18,10 +18,11 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
         "build": "Write all that a print needs: 3MF, STEP, profiles, drawing.",
         "import": "Import bodies from STEP, 3MF or STL as a design.",
         "batch": "Put several sensors on one plate, with a record.",
+        "check": "Decide whether to print a design, and what to change.",
         "optimise": "Find the best printable designs for a target.",
-        "check": "Check a design against nozzle, layers and bed.",
         "slice": "Write printer-ready G-code, by a real slicer.",
         "gcode": "Check G-code before the printer does.",
+        "show": "Show a design as one page: 3D, section, layers, numbers.",
         "draw": "Draw the cross-section, its layers and findings, as SVG.",
     },
     "Predict": {
@@ -38,6 +39,7 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
         "calibrate": "Calibrate specimens by known presses.",
         "report": "Compare predictions and measurements, as one page.",
         "fit": "Fit material values to what was measured.",
+        "characterise": "Material values from a plate of test structures.",
     },
     "Reference": {
         "new": "Write a material, shape, printer, quality, design or target to change.",

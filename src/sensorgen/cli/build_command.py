@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, body_options, log_words, render, show
+from sensorgen.cli import FOUND_ERRORS, body_options, render, settings, show
 from sensorgen.cli.designs import DesignGroup
+from sensorgen.core.errors import Unprintable
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
@@ -19,6 +20,7 @@ OWN: list[click.Parameter] = [
     body_options.compensate_option(),
     click.Option(["--verify"], is_flag=True, help="Write nothing: compare the folder with its record and the log."),
     click.Option(["--details"], is_flag=True, help="Print all findings and the whole prediction."),
+    *settings.advice_options(),
     *render.options("json", "markdown"),
 ]
 
@@ -33,6 +35,8 @@ def _work(
     compensate: str | None,
     verify: bool,
     details: bool,
+    budget: float,
+    apply_change: int | None,
 ) -> int:
     from sensorgen.checks.review import lost
     from sensorgen.workflows.build import STEPS, DetailedBuild, build
@@ -40,15 +44,33 @@ def _work(
     if verify:
         return _verify(design, Path(out) / design.name)
     design, changes = body_options.compensated(design, compensate, design.walls)
-    with render.refused(design.name), show.progress(STEPS) as step:
-        built = build(
-            design, Path(out), cad=not no_cad, force=force, strict=strict, compensated=changes, step=step
-        )  # fmt: skip
+    try:
+        with show.progress(STEPS) as step:
+            built = build(
+                design, Path(out), cad=not no_cad, force=force, strict=strict, compensated=changes, budget_s=budget,
+                step=step,
+            )  # fmt: skip
+    except Unprintable as error:
+        _refuse(design, error, budget, apply_change)
+        raise
     render.deliver(DetailedBuild(**vars(built)) if details else built)
+    settings.applied(design, built.advice, apply_change)
     return 1 if lost(built.findings) and not force else 0
 
 
+def _refuse(design: "Design", error: Unprintable, budget: float, apply_change: int | None) -> None:
+    """Deliver why a design is not built, and the changes that were tried."""
+    from sensorgen.checks.review import review
+    from sensorgen.workflows.decision import STEPS, RefusedBuild, decision
+
+    with show.progress(STEPS) as step:
+        advice = decision(design, review(design), budget, predict=budget > 0, step=step).advice
+    render.deliver(RefusedBuild(design.name, tuple(error.findings), len(error.stopping), advice=advice))
+    settings.applied(design, advice, apply_change)
+
+
 def _verify(design: "Design", folder: Path) -> int:
+    from sensorgen.cli import log_words
     from sensorgen.workflows.sealed import build_differences
 
     with log_words.existing(None) as log:

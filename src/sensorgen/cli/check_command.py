@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import render, show
+from sensorgen.cli import render, settings, show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
@@ -12,17 +12,24 @@ if TYPE_CHECKING:
 
 OWN: list[click.Parameter] = [
     click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
+    *settings.advice_options(),
     *render.options(),
 ]
 
 
-def _work(design: "Design", *, strict: bool) -> int:
-    from sensorgen.checks.review import STEPS, report, review
+def _work(design: "Design", *, strict: bool, budget: float, apply_change: int | None) -> int:
+    from sensorgen.checks.review import STEPS, review
+    from sensorgen.workflows import decision
 
-    with show.progress(STEPS) as step:
+    with show.progress((*STEPS, *decision.STEPS)) as step:
         held = review(design, step)
-    render.deliver(report(design, held))
-    return 1 if held.errors(strict) or held.lost() else 0
+        decided = decision.decision(design, held, budget, predict=budget > 0, step=step)
+    render.deliver(decided)
+    settings.applied(design, decided.advice, apply_change)
+    return 1 if held.errors(strict) or decided.verdict == "CHANGE" else 0
 
 
-command = DesignGroup(_work, OWN, name="check", help="Check a design against nozzle, layers and bed.")
+command = DesignGroup(
+    _work, OWN, name="check",
+    help="Decide whether to print a design: check it against nozzle, layers and bed, predict it, and try changes.",
+)  # fmt: skip

@@ -1,5 +1,6 @@
 """Findings of checks, as data and for people."""
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -7,6 +8,7 @@ from typing import Literal
 from sensorgen.core.document import Column, Facts, Part, Table
 
 SEVERITIES = ("error", "warning", "info")
+_NUMBER = re.compile(r"\d+(?:\.\d+)?")
 Verdict = Literal["PRINT", "PRINT WITH WARNINGS", "CHANGE"]
 
 
@@ -152,14 +154,31 @@ def counted(counts: Mapping[str, int]) -> str:
     return ", ".join(words) or "no findings"
 
 
+def grouped(found: Sequence[Finding]) -> list[Finding]:
+    """Each sentence once, whatever its numbers: with all bodies and layers, and the worst place; the severe first.
+
+    >>> wide = [Finding("5-width", "warning", "film", f"{w} mm wide", "widen it", w, 0.44, k, count=9)
+    ...         for k, w in enumerate((0.3, 0.2, 0.4), 5)]
+    >>> [(f.message, f.layer, f.last_layer, f.count) for f in grouped(wide)]
+    [('0.2 mm wide', 5, 7, 27)]
+    """
+    merged: dict[tuple[str, str, str, str], list[Finding]] = {}
+    for f in sorted(found, key=lambda f: (bool(f.waiver), SEVERITIES.index(f.severity))):
+        merged.setdefault((f.severity, f.waiver, f.rule, _NUMBER.sub("0", f.message)), []).append(f)
+    return [_joined(alike) for alike in merged.values()]
+
+
+def _joined(alike: Sequence[Finding]) -> Finding:
+    """Findings of one sentence as one, with the numbers of the worst."""
+    worst = min(alike, key=lambda f: f.margin_mm or 0.0)
+    layers = [k for f in alike for k in (f.layer, f.last_layer) if k is not None]
+    bodies = dict.fromkeys(name for f in alike for name in f.body.split(", "))
+    return replace(
+        worst, body=", ".join(bodies), count=sum(f.count for f in alike), layer=min(layers, default=None),
+        last_layer=max(layers) if len(set(layers)) > 1 else None,
+    )  # fmt: skip
+
+
 def most_severe(found: Sequence[Finding], count: int) -> list[Finding]:
-    """The first findings that matter: each rule and advice once, with all bodies and places, the severe first."""
-    merged: dict[tuple[str, str, str], Finding] = {}
-    for f in sorted((f for f in found if not f.waiver), key=lambda f: SEVERITIES.index(f.severity)):
-        key = (f.severity, f.rule, f.advice)
-        if key in merged:
-            one = merged[key]
-            bodies = dict.fromkeys([*one.body.split(", "), f.body])
-            f = replace(one, body=", ".join(bodies), count=one.count + f.count, layer=None, last_layer=None)
-        merged[key] = f
-    return list(merged.values())[:count]
+    """The first findings that matter of those that the design does not waive, each sentence once."""
+    return grouped([f for f in found if not f.waiver])[:count]

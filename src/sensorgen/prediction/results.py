@@ -13,7 +13,7 @@ from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
 from sensorgen.design.values import MaterialValue
-from sensorgen.prediction.identifiability.results import Identifiability, of_schema_1
+from sensorgen.prediction.identifiability.results import GUESS, Identifiability, of_schema_1
 from sensorgen.prediction.plan import Plan, without_times
 
 if TYPE_CHECKING:
@@ -231,13 +231,14 @@ class Prediction(Displayed):
     def summary(self) -> Iterator[Part]:
         """Quantities of the print beside the drawing's: the best value and the range with all errors."""
         shown = [self.drawn, self] if self.drawn else [self]
+        length_m = max(self.identifiability.map.position_m, default=inf) if self.identifiability else inf
         rows = [
             ("electrode gap", *(_words(p.gap) for p in shown)),
             ("capacitance", *(p.capacitance.words() if p.capacitance else p.status for p in shown)),
             *((f"{end} electrode", *(_words(p.resistance.get(end)) for p in shown)) for end in self.resistance),
             ("sensitivity [1/kPa]", *((_words(p.sensitivity) or "–").replace(" 1/kPa", "") for p in shown)),
-            ("force resolution", *(_words(p.force_resolution) for p in shown)),
-            ("position resolution", *(_words(p.position_resolution) for p in shown)),
+            ("force resolution", *(resolved(p.force_resolution, p.force_n, "cannot sense force") for p in shown)),
+            ("position resolution", *(resolved(p.position_resolution, length_m, "cannot locate") for p in shown)),
         ]
         columns = (Column(""), *(Column(p.body.partition(",")[0]) for p in shown))
         yield Table("quantities", "", columns, tuple(rows))
@@ -312,6 +313,21 @@ class Prediction(Displayed):
             return ()
         best = "error unknown" if reached in (None, inf) else f"{reached:.2g}"
         return ("; ".join((f"accuracy {accuracy:g} not reached: {best}", *(self.plan.shares() if self.plan else ()))),)
+
+
+def resolved(error: Bounds | None, most: float, cannot: str) -> str:
+    """A standard error in words; where it is that of a reading without information, what the sensor cannot do.
+
+    >>> resolved(Bounds.of(8580.0, "m"), 0.1, "cannot locate"), resolved(Bounds.of(0.2, "N"), 6.0, "cannot sense")
+    ('cannot locate', '200 mN')
+    """
+    if error is None:
+        return "–"
+    if not error.value < GUESS * most:
+        return cannot
+    if error.upper > most:
+        error = replace(error, upper=most, open="upper")
+    return error.words()
 
 
 def _words(bounds: Bounds | None) -> str | None:

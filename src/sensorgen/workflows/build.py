@@ -10,14 +10,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, ClassVar
 
-from sensorgen.analysis.plots import layers
 from sensorgen.asprinted.printed import body as estimate
 from sensorgen.checks.review import Review, Step, draw, report, review
 from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.document import Part
 from sensorgen.core.errors import Unprintable
-from sensorgen.core.findings import Finding, counted, counts, listed, most_severe, verdict
+from sensorgen.core.findings import Finding, counted, counts, grouped, listed, most_severe
 from sensorgen.core.version import __version__
 from sensorgen.design import printer
 from sensorgen.design.design import Design
@@ -30,8 +29,10 @@ from sensorgen.export.threemf.part import parts_of
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless, to_json
-from sensorgen.workflows import compensation, sealed
+from sensorgen.workflows import compensation, decision, sealed
 from sensorgen.workflows.compensation import Change
+from sensorgen.workflows.decision import Advice, Decision
+from sensorgen.workflows.trial import Trial
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
 LIBRARIES = ("build123d", "cadquery-ocp", "manifold3d", "numpy", "pydantic", "PyYAML", "click")
@@ -60,6 +61,10 @@ class Built:
         How the design differs from the one that was asked for.
     replaced : tuple of str
         What made room: files of another design in the same folder.
+    trial : Trial or None
+        The numbers that decide; None where nothing is predicted.
+    advice : Advice or None
+        Changes that were tried; None where none was looked for.
     """
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
@@ -72,20 +77,26 @@ class Built:
     prediction: Prediction
     compensated: tuple[Change, ...] = ()
     replaced: tuple[str, ...] = ()
+    trial: Trial | None = None
+    advice: Advice | None = None
 
     def document(self) -> Iterator[Part]:
         """Verdict, quantities drawn beside printed, and the three findings that matter most."""
         yield from self._head()
-        yield from self.prediction.summary()
-        yield ""
-        yield from listed(most_severe(self.findings, 3))
+        yield from decision.table(self.trial) if self.trial else self.prediction.summary()
+        if shown := most_severe(self.findings, 3):
+            yield ""
+            yield from listed(shown)
+        if self.advice:
+            yield ""
+            yield from self.advice.document()
         yield ""
         yield f"{self.folder}: {len(self.files)} files; --details prints all"
 
     def _head(self) -> Iterator[Part]:
         yield from self.replaced
         yield from compensation.document(self.compensated)
-        yield f"{self.verdict}  {self.name}: {counted(counts(self.findings))}"
+        yield f"{self.verdict}  {self.name}: {counted(counts(grouped(self.findings)))}"
         yield ""
 
 
@@ -110,6 +121,7 @@ def build(
     force: bool = False,
     strict: bool = False,
     compensated: Sequence[Change] = (),
+    budget_s: float = 0.0,
     step: Step = lambda _: None,
 ) -> Built:
     """Write all files of a design into ``out/<name>``.
@@ -128,6 +140,8 @@ def build(
         Take warnings for errors.
     compensated : sequence of Change
         How the design differs from the one that was asked for, for the record.
+    budget_s : float
+        Processor time for trying changes that remove findings [s].
     step : callable
         Called with the next step, for a progress display.
 
@@ -154,7 +168,8 @@ def build(
         job = kernel.submit(design.printed, _colours(design), design.name, step_file) if kernel else None
         step("prediction")
         predicted = evaluate(bodies.default_body(design, folder))
-        for name, content in _files(design, held, predicted, step):
+        decided = decision.decision(design, held, budget_s, folder=folder, step=step)
+        for name, content in _files(design, held, predicted, decided, step):
             store.write(stage, {name: content})
         if job:
             _await(job, step)
@@ -163,10 +178,9 @@ def build(
         store.publish(stage, folder)
         replaced += sealed.set_aside(folder, design)
         step("done")
-    findings = predicted.with_short(held.findings)
     return Built(
-        design.name, folder, tuple(sorted([*store.listed(folder), store.MANIFEST])),
-        verdict(findings), findings, timeless(predicted), tuple(compensated), replaced,
+        design.name, folder, tuple(sorted([*store.listed(folder), store.MANIFEST])), decided.verdict,
+        decided.findings, timeless(predicted), tuple(compensated), replaced, decided.trial, decided.advice,
     )  # fmt: skip
 
 
@@ -179,7 +193,9 @@ def _replaced(folder: Path, design: Design) -> tuple[str, ...]:
     return (f"{folder} held another design, {key!r:.40}: its files were replaced",) if key != design.id() else ()
 
 
-def _files(design: Design, held: Review, predicted: Prediction, step: Step) -> Iterator[tuple[str, bytes]]:
+def _files(
+    design: Design, held: Review, predicted: Prediction, decided: Decision, step: Step
+) -> Iterator[tuple[str, bytes]]:
     name, primed = design.name, tower(design.machine, design.layers, len(design.used()))
     step("3MF")
     parts, settings = parts_of(design, held.meshes), prusa.profile(design.machine, design.layers, loads(design))
@@ -192,7 +208,7 @@ def _files(design: Design, held: Review, predicted: Prediction, step: Step) -> I
     step("drawing")
     printed = estimate(design)
     yield f"{name}.svg", draw(design, held, printed.scene, printed.provenance).encode()
-    yield f"{name}.layers.html", layers.of_print(printed, held.findings).encode()
+    yield f"{name}.html", decided.page(printed, held, predicted).encode()
     yield "check.json", document.to_json(report(design, held)).encode()
     yield "prediction.json", json_bytes(json.loads(to_json(predicted)))
     yield "design.json", json_bytes(design.model_dump(mode="json"))

@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from sensorgen.analysis.plots.pages import render
+from sensorgen.analysis.plots.pages import path, render
 from sensorgen.core.arrays import Real
 from sensorgen.core.findings import SEVERITIES, Finding
-from sensorgen.scene.layers import LayerRegions, Region, parts
+from sensorgen.scene.layers import LayerRegions
 from sensorgen.scene.scene import SLIVER_MM
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
     from sensorgen.export.gcode.crossings import Stretches
 
-_COARSE_MM = 5e-3  # by which an outline may be moved to spare corners
 _LEVEL_MM = 5e-3  # above the top of a layer, the nozzle still prints it
 _GAPS = (("in contact with", True, "#d00000"), ("one layer or less above", False, "#e07000"))
 
@@ -150,15 +149,3 @@ def _ways(ends_mm: Real, height_mm: float) -> str:
     """Pairs of points, (n, 2, 2), as the data of an SVG path."""
     rows = np.round(ends_mm * [1, -1] + [0, height_mm], 3).reshape(-1, 4).tolist()
     return "".join(f"M{x0:g} {y0:g}L{x1:g} {y1:g}" for x0, y0, x1, y1 in rows)
-
-
-def path(region: Region, height_mm: float) -> str:
-    """A region as the data of an SVG path, y upwards from the bottom of the picture [mm]."""
-    return "".join(_rings(shapely.simplify(region, _COARSE_MM), height_mm))
-
-
-def _rings(region: Region, height_mm: float) -> Iterator[str]:
-    for part in parts(region):
-        for ring in (part.exterior, *part.interiors):
-            corners = np.round(shapely.get_coordinates(ring)[:-1], 3)
-            yield "M" + "L".join(f"{x:g} {round(height_mm - y, 3):g}" for x, y in corners.tolist()) + "Z"

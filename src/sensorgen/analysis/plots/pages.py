@@ -1,6 +1,6 @@
 """HTML pages that need nothing else: styles, scripts and figures are inside, and nothing is fetched."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
@@ -11,8 +11,10 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
     from sensorgen.analysis.plots.figure import Figure
+    from sensorgen.scene.layers import Region
 
 _OWN = "sensorgen.analysis.plots"
+_COARSE_MM = 5e-3  # by which an outline may be moved to spare corners
 
 
 def render(package: str, name: str, figures: "Sequence[Figure]" = (), **context: Any) -> str:
@@ -47,6 +49,25 @@ def render(package: str, name: str, figures: "Sequence[Figure]" = (), **context:
 def page(title: str, words: Sequence[str], figures: "Sequence[Figure]") -> str:
     """A page of figures under a title and paragraphs of text."""
     return render(_OWN, "page.html", figures, title=title, words=words)
+
+
+def path(region: "Region", height_mm: float) -> str:
+    """A region as the data of an SVG path, y upwards from the bottom of the picture [mm]."""
+    import shapely
+
+    return "".join(_rings(shapely.simplify(region, _COARSE_MM), height_mm))
+
+
+def _rings(region: "Region", height_mm: float) -> Iterator[str]:
+    import numpy as np
+    import shapely
+
+    from sensorgen.scene.layers import parts
+
+    for part in parts(region):
+        for ring in (part.exterior, *part.interiors):
+            corners = np.round(shapely.get_coordinates(ring)[:-1], 3)
+            yield "M" + "L".join(f"{x:g} {round(height_mm - y, 3):g}" for x, y in corners.tolist()) + "Z"
 
 
 @cache

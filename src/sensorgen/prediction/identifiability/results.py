@@ -12,6 +12,8 @@ from sensorgen.core.units import si
 
 Rows = tuple[tuple[float | None, ...], ...]
 Real = float | NDArray[np.float64]
+FORCE_SHARE = 0.1  # force is sensed where its standard error is a tenth of it
+GUESS = 12**-0.5  # standard deviation of a uniform distribution, relative to its range [-]
 SHOWN = 7  # frequencies; of more, those with most information on position
 
 
@@ -277,9 +279,11 @@ class Identifiability(StandardErrors):
             words = f"perfect model {self.words()}; after 30 known presses {known}; not calibrated {unknown}"
             yield "on a bench", words
         force, position = self.map.of_force, self.map.of_position
+        most_n, length_m = max(self.map.force_n, key=abs), max(self.map.position_m)
         yield "over all", "; ".join((
-            f"median {newtons(force.median)}, {metres(position.median)}",
-            f"worst {newtons(force.worst)}{force.where()}, {metres(position.worst)}{position.where()}",
+            f"median {_sensed(force.median, most_n)}, {_located(position.median, length_m)}",
+            f"worst {_sensed(force.worst, most_n)}{force.where()}, "
+            f"{_located(position.worst, length_m)}{position.where()}",
             f"above {force.from_force_n:g} N, force is resolved to {newtons(self.required.sigma_force_n)} in "
             f"{100 * force.share_known:.0f} % of presses, position to {metres(self.required.sigma_position_m)} in "
             f"{100 * position.share_known:.0f} %",
@@ -298,6 +302,16 @@ class Identifiability(StandardErrors):
             yield "" if k else "to improve", f"{k + 1}. {change.change}: {change.words()}"
         if self.changes_together and len(self.changes) > 1:
             yield "", f"all together: {self.changes_together.words()}"
+
+
+def _sensed(error_n: float | None, most_n: float) -> str:
+    """A standard error of force; what the sensor cannot do where it exceeds the force [N]."""
+    return newtons(error_n) if error_n is None or error_n <= abs(most_n) else "cannot sense force"
+
+
+def _located(error_m: float | None, length_m: float) -> str:
+    """A standard error of position; what the sensor cannot do where it exceeds the sensor's length [m]."""
+    return metres(error_m) if error_m is None or error_m <= length_m else "cannot locate"
 
 
 def _percent(share: float | None) -> float | None:

@@ -5,10 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sensorgen.prediction.identifiability.fisher import Bounds, Real, Setup
-from sensorgen.prediction.identifiability.results import StandardErrors, metres, newtons
-
-FORCE_SHARE = 0.1  # force is sensed where its standard error is a tenth of it
-GUESS = 12**-0.5  # standard deviation of a uniform distribution, relative to its range [-]
+from sensorgen.prediction.identifiability.results import FORCE_SHARE, GUESS, StandardErrors, metres, newtons
 
 _FORCE = {"yes": "senses force", "roughly": "senses force only roughly", "no": "cannot sense force"}
 _POSITION = {"yes": "locates a press", "roughly": "locates a press only roughly", "no": "cannot locate a press"}

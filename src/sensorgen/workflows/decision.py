@@ -1,0 +1,333 @@
+"""Whether to print a design: verdict, the numbers that decide, each finding once, and changes that were tried."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from sensorgen.checks.review import CheckReport, Review
+from sensorgen.core import cache as answers
+from sensorgen.core.bounds import Bounds
+from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.errors import SensorgenError
+from sensorgen.core.findings import Finding, Refused, Verdict, counted, counts, grouped, listed, verdict
+from sensorgen.design.design import Design
+from sensorgen.prediction.identifiability.results import FORCE_SHARE, GUESS
+from sensorgen.prediction.results import resolved
+from sensorgen.workflows.trial import Numbers, Trial, trial
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
+
+    from sensorgen.asprinted.printed import Printed
+    from sensorgen.prediction.results import Prediction
+
+_VERSION = 2  # of the search for changes: stored advice of another one is not read
+STEPS = ("prediction", "changes", "done")
+Step = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Change:
+    """One value that changes.
+
+    Attributes
+    ----------
+    key : str
+        In the design file, as ``parameters.period_mm``.
+    before, after : float or str
+        In the unit that the key ends in.
+    """
+
+    key: str
+    before: float | str | None
+    after: float | str
+
+    def words(self) -> str:
+        """Key, before and after."""
+        name = self.key.rpartition(".")[2]
+        before, after = (f"{v:g}" if isinstance(v, float) else v or "none" for v in (self.before, self.after))
+        return f"{name} {before} -> {after}"
+
+
+@dataclass(frozen=True)
+class TriedChange:
+    """A change of the design that was checked and predicted.
+
+    Attributes
+    ----------
+    changes : tuple of Change
+        What differs from the design.
+    distance : float
+        How far: sum of abs(ln(after / before)), with a constant for each choice [-].
+    trial : Trial
+        The changed design.
+    """
+
+    changes: tuple[Change, ...]
+    distance: float
+    trial: Trial
+
+    def counts(self) -> tuple[int, int]:
+        """Errors and warnings that are left, each sentence once."""
+        return finding_counts(self.trial.findings)
+
+    def words(self) -> str:
+        """Changes, findings and numbers in one line."""
+        errors, warnings = self.counts()
+        numbers = words_of(self.trial)
+        changes = ", ".join(change.words() for change in self.changes)
+        left = f"{errors} error{'s' * (errors != 1)}, {warnings} warning{'s' * (warnings != 1)}"
+        return f"{changes}: {left}; {numbers}"
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What was tried to remove the findings of a design.
+
+    Attributes
+    ----------
+    tried : tuple of TriedChange
+        The nearest first.
+    now : str
+        Numbers of the design itself, in words.
+    checked, predicted : int
+        How many designs were checked, and how many of them predicted too.
+    seconds, budget_s : float
+        Processor time that it took, and what it may take [s].
+    complete : bool
+        Whether all changes up to the distance ``farthest`` were checked.
+    farthest : float
+        Up to which distance changes were tried [-].
+    not_tried : str
+        What was left out.
+    """
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
+
+    tried: tuple[TriedChange, ...]
+    now: str
+    checked: int
+    predicted: int
+    seconds: float
+    budget_s: float
+    complete: bool
+    farthest: float
+    not_tried: str
+
+    def document(self) -> Iterator[Part]:
+        """The changes, the nearest first, and what was tried."""
+        effort = f"{self.checked} designs checked, {self.predicted} predicted"
+        if self.tried:
+            rows = ((f"{k}.", one.words()) for k, one in enumerate(self.tried, 1))
+            yield f"changes that were tried, the smallest first (now {self.now}):"
+            yield Facts(tuple(rows))
+        else:
+            yield "no change was found that removes findings and keeps what the sensor senses"
+        limit = "" if self.complete else f"; ended by the budget of {self.budget_s:g} s (--budget)"
+        yield f"({effort}{limit}; not tried: {self.not_tried})"
+
+
+@dataclass(frozen=True)
+class Decision(CheckReport):
+    """The findings about a design, and what follows from them.
+
+    Attributes
+    ----------
+    verdict : str
+        CHANGE where a finding is an error, PRINT WITH WARNINGS, or PRINT.
+    trial : Trial or None
+        Numbers of the drawing and the print; None for checks alone, or where nothing is predicted.
+    reason : str
+        Why nothing is predicted, or "".
+    advice : Advice or None
+        Changes that were tried; None where none was looked for.
+    """
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
+
+    verdict: Verdict = "PRINT"
+    trial: Trial | None = None
+    reason: str = ""
+    advice: Advice | None = None
+
+    def document(self) -> Iterator[Part]:
+        """Verdict, numbers, findings and changes."""
+        yield f"{self.verdict}  {self.name}: {counted(counts(grouped(self.findings)))}"
+        yield from ("", *self.numbers())
+        if self.findings:
+            yield ""
+            yield from listed(grouped(self.findings))
+        if self.advice:
+            yield ""
+            yield from self.advice.document()
+
+    def page(self, printed: "Printed", held: Review, predicted: "Prediction") -> str:
+        """All that is known of the design as one page, HTML."""
+        from sensorgen.analysis import preview
+
+        advice = self.advice.document() if self.advice else ()
+        return preview.page(printed, held, predicted, self.verdict, self.numbers(), advice)
+
+    def numbers(self) -> Iterator[Part]:
+        """The numbers that decide; why there are none."""
+        if self.trial:
+            yield from table(self.trial)
+        elif self.reason:
+            yield f"not predicted: {self.reason}"
+
+
+@dataclass(frozen=True)
+class RefusedBuild(Refused):
+    """A design that is not built because of findings, with changes that were tried."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
+
+    advice: Advice | None = None
+
+    def document(self) -> Iterator[Part]:
+        """Verdict, the findings that matter most, and changes."""
+        yield from super().document()
+        if self.advice:
+            yield ""
+            yield from self.advice.document()
+
+
+def decision(
+    design: Design,
+    held: Review,
+    budget_s: float,
+    *,
+    predict: bool = True,
+    folder: Path | None = None,
+    step: Step = lambda _: None,
+) -> Decision:
+    """What follows from the findings about a design.
+
+    Parameters
+    ----------
+    design : Design
+        What was checked.
+    held : Review
+        Its findings.
+    budget_s : float
+        Processor time for trying changes; at 0, advice that is stored is given [s].
+    predict : bool
+        Also predict drawing and print, without which no change is tried.
+    folder : Path, optional
+        With the design's files, as of :func:`sensorgen.workflows.trial.trial`.
+    step : callable
+        Called with the next step, for a progress display.
+    """
+    findings, made, reason, advice = tuple(held.findings), None, "", None
+    if predict and held.meshes:
+        step("prediction")
+        try:
+            made = trial(design, folder=folder)
+        except SensorgenError as error:
+            reason = str(error)
+    if made:
+        findings = (*(f for f in made.findings if f.rule == "1-short" and f not in findings), *findings)
+        step("changes")
+        advice = advised(design, made, budget_s, step)
+    return Decision(
+        design.name, design.id(), design.machine.name, design.layers.name, counts(findings), findings,
+        verdict(findings), made, reason, advice,
+    )  # fmt: skip
+
+
+def advised(design: Design, made: Trial, budget_s: float, step: Step = lambda _: None) -> Advice | None:
+    """Changes of a design with findings, tried now or before; None where nothing is to be changed, or nothing known."""
+    if made.verdict == "PRINT":
+        return None
+    digest = sha256(json.dumps(_adapter(Trial).dump_python(made, mode="json"), sort_keys=True).encode()).hexdigest()
+    question = {"advice": _VERSION, "design": design.id(), "trial": digest}
+    stored = answers.known(question)
+    known: Advice | None = _adapter(Advice).validate_json(json.dumps(stored)) if stored else None
+    if known and (known.complete or known.budget_s >= budget_s):
+        return known
+    if budget_s <= 0:
+        return None
+    from sensorgen.workflows.advice import advise
+
+    advice = advise(design, made, budget_s, step)
+    answers.keep(question, _adapter(Advice).dump_python(advice, mode="json"))
+    return advice
+
+
+@cache
+def _adapter(kind: type) -> "TypeAdapter[Any]":
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(kind)
+
+
+def grade(tried: Trial) -> tuple[int, int]:
+    """Whether the print senses force, and locates: 2 yes, 1 roughly, 0 no."""
+    length_m = 2 * tried.position_m  # the reference load is in the middle
+    force, place = tried.printed.force_resolution, tried.printed.position_resolution
+    return (
+        _grade(force, FORCE_SHARE * tried.force_n, GUESS * tried.force_n),
+        _grade(place, FORCE_SHARE * length_m, GUESS * length_m),
+    )
+
+
+def _grade(error: Bounds | None, good: float, useless: float) -> int:
+    return 0 if error is None or not error.value < useless else 2 if error.value <= good else 1
+
+
+def table(tried: Trial) -> Iterator[Part]:
+    """Electrode gap, capacitance, resistance of the electrodes, resolution, and the time of the print where known."""
+    both, length_m = (tried.drawn, tried.printed), 2 * tried.position_m
+    rows = [
+        ("electrode gap", *(_words(n.gap) for n in both)),
+        ("capacitance", *(_words(n.capacitance) for n in both)),
+        ("top electrode", *(_words(n.top_electrode) for n in both)),
+        ("bottom electrode", *(_words(n.bottom_electrode) for n in both)),
+        ("force resolution", *(_force(n, tried.force_n) for n in both)),
+        ("position resolution", *(_place(n, length_m) for n in both)),
+    ]
+    if tried.toolpath:
+        rows.append(("print time", "", f"at least {tried.toolpath.time_s / 60:.0f} min"))
+    yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
+    yield f"(resolution at {tried.force_n:g} N and {tried.position_m * 1e3:g} mm; {tried.body})"
+    if tried.reason:
+        yield tried.reason
+
+
+def words_of(tried: Trial) -> str:
+    """Capacitance and resolutions of the print, in one line."""
+    printed = tried.printed
+    c = printed.capacitance
+    force, place = _force(printed, tried.force_n), _place(printed, 2 * tried.position_m)
+    return ", ".join((
+        f"C {_best(c)}" if c else tried.status,
+        force if force.startswith("cannot") else f"force {_best(printed.force_resolution)}",
+        place if place.startswith("cannot") else f"position {_best(printed.position_resolution)}",
+    ))  # fmt: skip
+
+
+def _force(numbers: Numbers, force_n: float) -> str:
+    return resolved(numbers.force_resolution, force_n, "cannot sense force")
+
+
+def _place(numbers: Numbers, length_m: float) -> str:
+    return resolved(numbers.position_resolution, length_m, "cannot locate")
+
+
+def _words(bounds: Bounds | None) -> str:
+    return bounds.words() if bounds else "–"
+
+
+def _best(bounds: Bounds | None) -> str:
+    """The best value alone, to two digits."""
+    return Bounds.of(float(f"{bounds.value:.2g}"), bounds.unit).words() if bounds else "–"
+
+
+def finding_counts(findings: Sequence[Finding]) -> tuple[int, int]:
+    """Errors and warnings, each sentence once [-]."""
+    heads = [f.severity for f in grouped(findings)]
+    return heads.count("error"), heads.count("warning")

@@ -1,0 +1,167 @@
+"""Single steps from a design to a neighbour on the printable grid: layers for heights, line widths for widths."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict
+from math import ceil, floor, log
+
+from sensorgen.core.errors import SensorgenError
+from sensorgen.core.findings import Finding
+from sensorgen.design.design import Design, make
+from sensorgen.scene.scene import Envelope
+
+Key = tuple[str, ...]  # of a design file, as in ("parameters", "period_mm")
+Value = float | str
+Changes = Mapping[Key, Value]
+
+NOZZLES_MM = (0.25, 0.4, 0.6)
+QUALITIES = ("fine", "extrafine")
+SUPPORT = "bvoh"
+# Distance of a choice, as if a length had changed by that share [-]
+CHOICES = {"walls": 0.1, "orientation": 0.1, "quality": 0.15, "materials": 0.3, "nozzle_mm": 0.4}
+# By the number of a rule, what can satisfy it
+MOVES = {
+    "1": ("film", "height", "wider", "walls", "quality"),
+    "2": ("film", "wider", "height", "walls", "quality"),
+    "3": ("grid", "quality"),
+    "4": ("grid", "quality"),
+    "5": ("wider", "height", "walls", "nozzle", "quality"),
+    "6": ("wider", "nozzle"),
+    "7": ("wider", "height", "walls", "quality", "nozzle"),
+    "8": ("shorter",),
+    "9": ("orientation", "narrower", "whole", "support"),
+    "10": ("film", "quality"),
+}
+PERIODS = 6  # that a short sensor has
+_EPS = 1e-6
+
+
+def kinds(findings: Iterable[Finding]) -> list[str]:
+    """Kinds of moves that can satisfy the findings, those of the most severe first."""
+    return list(dict.fromkeys(kind for f in findings for kind in MOVES.get(f.rule.partition("-")[0], ())))
+
+
+def changed(design: Design, changes: Changes) -> Design:
+    """The design with other values.
+
+    Raises
+    ------
+    SensorgenError
+        There is no such design.
+    """
+    data = design.model_dump(mode="json", exclude_unset=True) | {"name": design.name}
+    for key, value in changes.items():
+        at = data
+        for part in key[:-1]:
+            at[part] = at = dict(at.get(part) or {})
+        at[key[-1]] = value
+    return make(data)
+
+
+def distance(design: Design, changes: Changes) -> float:
+    """How far a changed design is: sum of abs(ln(after / before)), and a constant for each choice [-]."""
+    own = asdict(design.params)
+    total = 0.0
+    for key, value in changes.items():
+        if key[0] == "parameters" and isinstance(value, float):
+            total += abs(log(value / own[key[1]]))
+        else:
+            total += CHOICES["walls" if key[0] == "profile" else key[0]]
+    return total
+
+
+def is_choice(key: Key) -> bool:
+    """Whether a value is another way to print, and no length."""
+    return key[0] != "parameters"
+
+
+def short(design: Design) -> Design:
+    """A sensor of a few periods, which is checked sooner; the design itself where it has no period."""
+    period = float(getattr(design.params, "period_mm", 0.0))
+    names = [name for name in ("length_mm", "width_mm") if getattr(design.params, name) > PERIODS * period > 0]
+    return changed(design, {("parameters", name): PERIODS * period for name in names}) if names else design
+
+
+def steps(design: Design, wanted: Iterable[str]) -> Iterator[tuple[Key, Value]]:
+    """One step of every kind that is wanted, up and down."""
+    for kind in wanted:
+        yield from _PARAMETERS[kind](design, kind) if kind in _PARAMETERS else _choices(design, kind)
+
+
+def _choices(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
+    """Another choice of printing the same sensor."""
+    nozzle = design.machine.nozzle_mm
+    finer = [size for size in NOZZLES_MM if size < nozzle - _EPS]
+    if kind == "walls":
+        yield ("profile", "walls"), "arachne" if design.walls == "classic" else "classic"
+    elif kind == "orientation":
+        yield ("orientation",), "as-drawn" if design.orientation == "upside-down" else "upside-down"
+    elif kind == "quality":
+        yield from ((("quality",), name) for name in QUALITIES if name != design.quality)
+    elif kind == "nozzle" and finer:
+        yield ("nozzle_mm",), finer[-1]
+    elif kind == "support" and not design.materials.support:
+        yield ("materials", "support"), SUPPORT
+
+
+def _heights(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
+    """The nearest whole numbers of layers below and above: of the film, of other heights, or of those off the grid."""
+    layer, plain = design.layers.layer_mm, asdict(Envelope())
+    for name, value, vertical in _lengths(design):
+        is_film = name.endswith("dielectric_mm")
+        off = abs(value / layer - round(value / layer)) > _EPS
+        if vertical and (off if kind == "grid" else is_film if kind == "film" else not is_film and name not in plain):
+            yield from _beside(name, value, layer)
+
+
+def _widths(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
+    """The nearest whole number of lines above, or of half lines below, each width: air may be narrower than a line."""
+    for name, value, vertical in _lengths(design):
+        if not vertical:
+            line = design.machine.line_mm()
+            found = _beside(name, value, line)[1] if kind == "wider" else _beside(name, value, line / 2)[0]
+            if (found[1] > value) == (kind == "wider"):
+                yield found
+
+
+def _sides(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
+    """Length and width in whole periods, or a tenth shorter."""
+    period = float(getattr(design.params, "period_mm", 0.0))
+    for name in ("length_mm", "width_mm"):
+        value = float(getattr(design.params, name))
+        if kind == "shorter":
+            yield ("parameters", name), round(0.9 * value, 3)
+        elif period and abs(value / period - round(value / period)) > _EPS:
+            yield from _beside(name, value, period)
+
+
+_PARAMETERS = {
+    "film": _heights, "grid": _heights, "height": _heights,
+    "wider": _widths, "narrower": _widths,
+    "shorter": _sides, "whole": _sides,
+}  # fmt: skip
+
+
+def _beside(name: str, value: float, step: float) -> list[tuple[Key, float]]:
+    """The multiples of a step below and above a value; at least one step."""
+    low, high = (ceil(value / step - _EPS) - 1) * step, (floor(value / step + _EPS) + 1) * step
+    return [(("parameters", name), round(max(each, step), 6)) for each in (low, high)]
+
+
+def _lengths(design: Design) -> Iterator[tuple[str, float, bool]]:
+    """The shape's own lengths that are not 0, and whether a face moves up or down with them."""
+    levels = _levels(design)
+    for name, value in asdict(design.params).items():
+        if not isinstance(value, float) or not value or name in ("length_mm", "width_mm"):
+            continue
+        try:
+            moved = _levels(changed(design, {("parameters", name): 1.01 * value}))
+        except SensorgenError:
+            continue
+        yield name, value, name in asdict(Envelope()) or not levels <= moved
+
+
+def _levels(design: Design) -> set[float]:
+    """Heights of all faces and corners [mm]."""
+    from sensorgen.scene.layers import faces_mm
+
+    return {round(z, 6) for body in design.drawn.bodies for z in faces_mm(body)}

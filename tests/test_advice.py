@@ -1,0 +1,142 @@
+"""Changes that are tried: the nearest that removes findings, checked again by hand, and written into the file."""
+
+from math import log
+
+import pytest
+
+from sensorgen.checks.review import review
+from sensorgen.core import yamledit, yamlfile
+from sensorgen.core.bounds import Bounds
+from sensorgen.core.errors import BadInput
+from sensorgen.core.findings import Finding, grouped
+from sensorgen.design.design import load, make
+from sensorgen.prediction.results import resolved
+from sensorgen.workflows import moves
+from sensorgen.workflows.advice import advise
+from sensorgen.workflows.decision import advised, decision
+from sensorgen.workflows.trial import trial
+
+OFF_GRID = """# my plate
+shape: reference   # no pattern
+
+parameters:
+  dielectric_mm: 0.57  # between two layers
+  length_mm: 30
+quality: fine
+"""
+
+
+def warnings(design):
+    return [f for f in review(design).findings if f.severity in ("error", "warning") and not f.waiver]
+
+
+@pytest.fixture(scope="module")
+def plate(tmp_path_factory, _session_cache):
+    """A plate whose film ends between two layers, its trial, and the advice."""
+    path = tmp_path_factory.mktemp("advice") / "plate.yaml"
+    path.write_text(OFF_GRID, "utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SENSORGEN_CACHE", str(_session_cache))
+        design = load(path)
+        made = trial(design)
+        return design, made, advise(design, made, 1e9)
+
+
+def test_the_nearest_change_is_the_nearest_whole_layer(plate):
+    """By hand: 0.6 mm is ln(0.6 / 0.57) away, 0.5 mm ln(0.57 / 0.5); nothing else removes the warnings."""
+    design, made, advice = plate
+    assert made.verdict == "PRINT WITH WARNINGS"
+    assert advice.complete
+    changes = [{c.key: c.after for c in one.changes} for one in advice.tried]
+    assert changes[0] == {"parameters.dielectric_mm": 0.6}
+    assert advice.tried[0].distance == pytest.approx(log(0.6 / 0.57))
+    for one in advice.tried:  # every one is checked again here, from its values alone
+        again = moves.changed(design, {tuple(c.key.split(".")): c.after for c in one.changes})
+        assert len(warnings(again)) < len(warnings(design))
+        assert again.id() == one.trial.design
+        assert not one.trial.errors()
+    assert [one.distance for one in advice.tried] == sorted(one.distance for one in advice.tried)
+
+
+def test_numbers_of_a_change_are_those_of_its_own_trial(plate):
+    """The plate's capacitance between two plates, eps A / d, which the trial has not computed that way."""
+    eps = 4.68 * 8.8541878128e-12
+    first = plate[2].tried[0]
+    assert first.trial.printed.capacitance.value == pytest.approx(eps * 0.03 * 0.01 / 0.6e-3, rel=1e-3)
+    assert first.words().startswith("dielectric_mm 0.57 -> 0.6: 0 errors, 0 warnings; C ")
+
+
+def test_no_change_of_a_design_without_findings(shared_cache):
+    design = make({"shape": "reference", "parameters": {"length_mm": 30.0}})
+    held = review(design)
+    decided = decision(design, held, 5.0)
+    assert (decided.verdict, decided.advice) == ("PRINT", None)
+
+
+def test_advice_is_stored_and_read_again(plate, shared_cache, monkeypatch):
+    design, made, _ = plate
+    first = advised(design, made, 1e6)
+    monkeypatch.setattr("sensorgen.workflows.advice.advise", None)
+    assert advised(design, made, 1e6) == first
+    assert advised(design, made, 0.0) == first
+
+
+def test_a_budget_that_is_used_up_is_stated(plate):
+    design, made, _ = plate
+    advice = advise(design, made, 1e-9)
+    assert not advice.complete
+    assert "ended by the budget" in list(advice.document())[-1]
+
+
+def test_a_change_that_senses_nothing_is_not_advice(plate, monkeypatch):
+    """Planted: the design senses, its changes do not."""
+    design, made, _ = plate
+    monkeypatch.setattr("sensorgen.workflows.advice.grade", lambda one: (2, 2) if one is made else (0, 0))
+    advice = advise(design, made, 1e9)
+    assert advice.tried == ()
+    assert "no change was found" in next(iter(advice.document()))
+
+
+@pytest.mark.parametrize(("error", "words"), [
+    (None, "–"),
+    (Bounds.of(8580.0, "m"), "cannot locate"),
+    (Bounds.of(0.03, "m"), "cannot locate"),  # more than 100 mm / sqrt(12)
+    (Bounds.of(0.02, "m"), "20 mm"),
+    (Bounds(0.02, 0.001, 41.0, "m", *(None,) * 3), "20 mm (1 to >100)"),
+])  # fmt: skip
+def test_extremes_are_words(error, words):
+    assert resolved(error, 0.1, "cannot locate") == words
+
+
+def test_seven_layers_of_one_sentence_are_one_finding():
+    alike = [Finding("5-width", "warning", b, f"{w} mm wide", "widen it", w, 0.44, layer, (1, 2, 3), 50)
+             for b, w, layer in (("a", 0.3, 5), ("b", 0.1, 6), ("a", 0.2, 9))]  # fmt: skip
+    (one,) = grouped([*alike])
+    assert (one.message, one.count, one.layer, one.last_layer, one.body) == ("0.1 mm wide", 150, 5, 9, "a, b")
+    assert len(grouped([*alike, Finding("5-width", "error", "a", "0.3 mm wide", "widen it")])) == 2
+
+
+@pytest.mark.parametrize(("text", "values", "after"), [
+    ("a: 1  # one\nb: two\n", {("a",): 2.5}, "a: 2.5  # one\nb: two\n"),
+    ("a: 'x'\r\nb:\r\n  c: 1\r\n  # end\r\n", {("b", "d"): 3.0},
+     "a: 'x'\r\nb:\r\n  c: 1\r\n  d: 3\r\n  # end\r\n"),
+    ("p: {c: 1, d: [1, 2]}", {("p", "c"): 2.0, ("p", "e"): "on"}, 'p: {c: 2, d: [1, 2], e: "on"}'),
+    ("a: 1", {("profile", "walls"): "classic"}, "a: 1\nprofile:\n  walls: classic\n"),
+    ("p: {}\na: 1\n", {("p", "x"): 1.0}, "p: {x: 1}\na: 1\n"),
+    ("w:\n- rule: '5'\n  reason: |\n    several\n    lines\n", {("q",): "fine"},
+     "w:\n- rule: '5'\n  reason: |\n    several\n    lines\nq: fine\n"),
+    ("a:\nb: 1\n", {("a",): 2.0}, "a: 2\nb: 1\n"),
+])  # fmt: skip
+def test_a_value_is_changed_in_place(text, values, after):
+    assert yamledit.changed(text, values, "x.yaml") == after
+    for path, value in values.items():
+        at = yamlfile.parse(after, "x.yaml")
+        for key in path:
+            at = at[key]
+        assert at == value
+
+
+@pytest.mark.parametrize("text", ["a: [1, 2]\n", "a: {b: 1}\n", "- a\n", "a: &x 1\nb: *x\n"])
+def test_what_cannot_be_changed_in_place_is_refused(text):
+    with pytest.raises(BadInput):
+        yamledit.changed(text, {("a",): 1.0}, "x.yaml")
