@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 CHUNK_S = 1.0  # sending work to a process takes a millisecond, to another computer ten
 _SAFE = "PYTHONSAFEPATH"
-_POLL_S, _CONNECT_S = 1.0, 10.0
+_POLL_S, _CONNECT_S, _ALONE_S = 1.0, 10.0, 60.0
 _DIED = "a process ended before its answer, as when the memory is full: ask for less accuracy, or --jobs 1"
 Result = TypeVar("Result")
 Work = Callable[..., Result]
@@ -74,7 +74,7 @@ def in_parallel(
                 lane = free.pop()
                 running[lane.submit(work, [inputs[k] for k in chunk.numbers])] = lane, chunk
             finished = wait(running, _POLL_S, FIRST_COMPLETED).done
-            lanes[0].check()
+            lanes[0].check(idle=not finished)
             for future in finished:
                 lane, chunk = running.pop(future)
                 free.append(lane)
@@ -208,7 +208,7 @@ class _Lane(Protocol):
     def renew(self) -> None:
         """Go on after a death."""
 
-    def check(self) -> None:
+    def check(self, *, idle: bool) -> None:
         """Raise SensorgenError where no results will come any more."""
 
 
@@ -242,7 +242,7 @@ class _Process:
         self.executor.shutdown()
         self.executor = self._made()
 
-    def check(self) -> None:
+    def check(self, *, idle: bool) -> None:
         """A process that has died says so itself."""
 
 
@@ -291,6 +291,7 @@ class _Cluster:
     def __init__(self, client: Any, address: str) -> None:
         from distributed.scheduler import KilledWorker
 
+        self.seen_s = perf_counter()
         self.client, self.address, self.executor = client, address, client.get_executor(pure=False)
         self.deadly: tuple[type[BaseException], ...] = (KilledWorker,)
 
@@ -302,10 +303,19 @@ class _Cluster:
     def renew(self) -> None:
         """The cluster replaces its workers itself."""
 
-    def check(self) -> None:
-        """Raise SensorgenError where the scheduler has gone."""
+    def check(self, *, idle: bool) -> None:
+        """Raise SensorgenError where the scheduler, or for a while every worker, has gone."""
+        if not idle:
+            return
         if self.client.status not in ("running", "connecting"):
             raise gone(self.address)
+        if self.client.nthreads():
+            self.seen_s = perf_counter()
+        elif perf_counter() - self.seen_s > _ALONE_S:
+            raise SensorgenError(
+                f"the Dask cluster {self.address!r} has lost all its workers; results so far are kept: start some, "
+                "and run it again"
+            )
 
 
 def gone(address: str) -> SensorgenError:
