@@ -25,8 +25,8 @@ def timed(words: list[str], cache: Path, out: Path) -> tuple[float, float]:
 
 def main() -> None:
     """Write the table."""
-    lines = ["# Page of a design", "", "Processor time of `sensorgen show`: with an empty cache, and with the prediction",
-             "stored (`python bench/show.py`). Goal: 3 s, 3 MB.", "",
+    lines = ["# Page of a design", "", "Processor time of `sensorgen show`: with an empty cache, and with the",
+             "prediction stored (`python bench/show.py`). Goal: 3 s, 3 MB.", "",
              "| design | cold [s] | stored [s] | page [kB] |", "|---|---:|---:|---:|"]  # fmt: skip
     for name, words in DESIGNS.items():
         with tempfile.TemporaryDirectory() as folder:
