@@ -14,7 +14,7 @@ LINES = 30  # of the first screen
 PICTURES = {"trix-d0.2": ["tri", "--drawn"]}
 PAGES = (
     [], ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["show"], ["draw"],
-    ["slice"], ["slice", "tri"], ["import"], ["gcode"], ["gcode", "check"], ["gcode", "drags"],
+    ["optimise"], ["slice"], ["slice", "tri"], ["import"], ["gcode"], ["gcode", "check"], ["gcode", "drags"],
     ["gcode", "pinholes"], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
     ["predict"], ["predict", "tri"], ["cell"], ["cell", "tri"], ["chart"], ["chart", "tri"],
     ["compress"], ["compress", "tri"],
@@ -23,7 +23,8 @@ PAGES = (
     ["bench", "hysteresis"], ["bench", "sets"], ["bench", "live"],
     ["log"],
     *(["log", w] for w in ("specimen", "add", "import", "bench", "predict", "list", "show", "export", "verify")),
-    ["report"], ["fit"], ["calibrate"], ["thesis"], ["new"], ["pack"], ["pack", "test"],
+    ["report"], ["fit"], ["characterise"], ["characterise", "PRINTER"], ["characterise", "read"],
+    ["calibrate"], ["thesis"], ["new"], ["pack"], ["pack", "test"],
     ["pack", "trust"], ["list"], ["schema"], ["completion"],
 )  # fmt: skip
 

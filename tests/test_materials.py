@@ -40,6 +40,8 @@ PRINTED = [
     ("etpu", "resistivity_ohm_m", "thesis-c.1-top", 0.07),
     ("etpu", "resistivity_ohm_m", "thesis-c.1-bottom", 0.2),
     ("air", "relative_permittivity", "thesis-3.2", 1.00059),
+    ("filaflex-conductive", "resistivity_ohm_m", "bifur-circuits", 0.039),  # 3.9 ohm cm
+    ("ninjatek-eel", "youngs_modulus_pa", "ninjatek-eel-cond", 298e6),
 ]
 
 

@@ -451,7 +451,7 @@ def test_without_losses_nothing_is_asked():
 
 def test_a_strong_leak_is_doubted():
     strong = make({"shape": "reference", "material_values": {"x60": {"resistivity_ohm_m": 1e7}}})
-    (said,) = [a for a in prediction(strong).assumptions if "depends on the frequency" in a]
+    (said,) = [a for a in prediction(strong).doubts if "depends on the frequency" in a]
     assert said.startswith("x60 leaks 0.35 of what it stores at 1.1 kHz")
     weak = make({"shape": "reference", "material_values": {"x60": {"resistivity_ohm_m": 1e8}}})
-    assert not any("depends on the frequency" in a for a in prediction(weak).assumptions)
+    assert not any("depends on the frequency" in a for a in prediction(weak).doubts)

@@ -10,7 +10,21 @@ from sensorgen.design import shapes
 
 
 def test_names_are_those_of_the_files():
-    assert registry.names(shapes) == ["double", "rect", "reference", "tri"]
+    own = [
+        "bump",
+        "cog",
+        "cone",
+        "double",
+        "double_tri",
+        "gaps",
+        "pillar",
+        "porous",
+        "pyramid",
+        "rect",
+        "reference",
+        "tri",
+    ]
+    assert registry.names(shapes) == own
     assert "columns" in registry.names(models)
 
 

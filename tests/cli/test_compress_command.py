@@ -320,12 +320,13 @@ def asked(monkeypatch):
 
 def test_a_sweep_solves_only_what_is_not_known(run, asked, monkeypatch):
     """The first point is too soft for its load: a reason in place of numbers, and exit code 1."""
-    from sensorgen.prediction import sweep as swept
+    from sensorgen.core import parallel
 
-    handed, in_parallel = [], swept.in_parallel
+    handed, in_parallel = [], parallel.in_parallel
     monkeypatch.setattr(
-        swept, "in_parallel", lambda w, points, n: handed.append(len(points)) or in_parallel(w, points, n)
-    )
+        parallel, "in_parallel",
+        lambda w, points, n, **more: handed.append(len(points)) or in_parallel(w, points, n, **more),
+    )  # fmt: skip
     said = run(*MODULI, "--json")
     soft, *rest = json.loads(said.out)
     assert (said.code, soft["model"], asked) == (1, None, [3e6, 6e6])

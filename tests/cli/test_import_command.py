@@ -234,7 +234,7 @@ def test_geometry_is_part_of_the_design(run, plates, tmp_path):
     bodies.write_text(bodies.read_text().replace("0.6", "0.7"))
     assert "its content is not that of its name" in run("check", "a.yaml").line
     bodies.unlink()
-    assert "cannot read" in run("check", "a.yaml").line
+    assert "not a file; expected the bodies" in run("check", "a.yaml").line
 
 
 @pytest.mark.parametrize(
@@ -272,3 +272,25 @@ def test_the_whole_walk_in_an_empty_folder(run, models, program):
     sliced = run("slice", "filleted.yaml")
     assert sliced.code == 0, sliced.err
     assert Path("out/filleted/filleted.prusa.gcode").stat().st_size > 10_000
+
+
+ELLIPSE = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="40mm" height="20mm" viewBox="0 0 400 200">'
+    '<ellipse cx="200" cy="100" rx="180" ry="80"/></svg>'
+)
+
+
+def test_a_sensor_cut_to_an_outline_is_sliced_and_predicted(run, program):
+    """The skirt follows the outline into the corners of its box, which is no collision."""
+    program("prusa-slicer", "prusa-slicer")
+    Path("oval.svg").write_text(ELLIPSE)
+    words = ("reference", "--border", "oval.svg", "--name", "oval")
+    sliced = run("slice", *words)
+    assert (sliced.code, sliced.err) == (0, "")
+    said = run("predict", *words, "--json")
+    found = json.loads(said.out)
+    assert "oval.prusa.gcode" in json.dumps(found)
+    area, eps = np.pi * 18e-3 * 8e-3, 4.68
+    assert found["capacitance"]["value"] == pytest.approx(8.8541878128e-12 * eps * area / 0.6e-3, rel=0.02)
+    assert "--border" in run("build", "reference", "--help").out
+    assert "the border is 36 mm" in run("check", *words, "--size", "50x16").line

@@ -108,7 +108,7 @@ def _of_piece(
         *_shifts(design, lines, layers),
         *_widths(design, lines),
         *_purged(design, paths, changes, piece),
-        *_beside(paths, ends, design.printed.size_mm, model & ~inside & alone, waste),
+        *_beside(paths, ends, _plan(design, layers), model & ~inside & alone, waste),
     ]
 
 
@@ -335,14 +335,23 @@ def _purged(design: Design, paths: Paths, changes: Sequence[Change], piece: Mask
         yield Found("purge", "error", number, message, "use a prime tower", len(found))
 
 
-def _beside(paths: Paths, ends: list[Real], size_mm: Sequence[float], stray: Mask, waste: Mask) -> Iterator[Found]:
+def _plan(design: Design, layers: Sequence[LayerRegions]) -> shapely.Geometry:
+    """What the piece covers of the bed: its rectangle, unless it was drawn elsewhere or cut to a border."""
+    if design.border or design.geometry:
+        return shapely.union_all([region for layer in layers for region in layer.regions.values()])
+    return shapely.box(0.0, 0.0, *design.printed.size_mm[:2])
+
+
+def _beside(
+    paths: Paths, ends: list[Real], plan: shapely.Geometry, stray: Mask, waste: Mask
+) -> Iterator[Found]:  # fmt: skip
     """Tower and skirt keep clear of the piece, and nothing else is printed beside it."""
     support = np.array([kind.startswith(_SUPPORT) for kind in paths.kinds])[paths.kind]
     low, high = np.minimum(*ends), np.maximum(*ends)
-    near = waste & ~support & (paths.length_mm() > 0) & (high > 0).all(1) & (low < np.array(size_mm[:2])).all(1)
+    near = waste & ~support & (paths.length_mm() > 0) & (high > 0).all(1) & (low < np.array(plan.bounds[2:])).all(1)
     rows = np.flatnonzero(near)
     ways = shapely.linestrings(np.stack([ends[0][rows], ends[1][rows]], axis=1))
-    near[rows] = shapely.intersects(ways, shapely.box(0.0, 0.0, size_mm[0], size_mm[1]))
+    near[rows] = shapely.intersects(ways, plan)
     if near.any():
         number, count = _line(paths.number, near)
         kinds = ", ".join(sorted({paths.kinds[kind] for kind in paths.kind[near].tolist()}))

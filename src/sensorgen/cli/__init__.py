@@ -19,6 +19,7 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
         "import": "Import bodies from STEP, 3MF or STL as a design.",
         "batch": "Put several sensors on one plate, with a record.",
         "check": "Decide whether to print a design, and what to change.",
+        "optimise": "Find the best printable designs for a target.",
         "slice": "Write printer-ready G-code, by a real slicer.",
         "gcode": "Check G-code before the printer does.",
         "show": "Show a design as one page: 3D, section, layers, numbers.",
@@ -38,12 +39,13 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
         "calibrate": "Calibrate specimens by known presses.",
         "report": "Compare predictions and measurements, as one page.",
         "fit": "Fit material values to what was measured.",
+        "characterise": "Material values from a plate of test structures.",
     },
     "Reference": {
-        "new": "Write a material, shape, printer, quality, instrument or design to change.",
+        "new": "Write a material, shape, printer, quality, design or target to change.",
         "pack": "Test packs of such files, and trust shape files.",
         "list": "List shapes, materials, printers, qualities, packs, models or sources.",
-        "schema": "Print the JSON schema of a design file or of prediction.json.",
+        "schema": "Print the JSON schema of a design, a target or prediction.json.",
         "completion": "Print the completion script for a shell.",
     },
     "For developers": {

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 from click.shell_completion import CompletionItem
 
-from sensorgen.cli import FOUND_ERRORS, log_words, render, show
+from sensorgen.cli import FOUND_ERRORS, log_words, render, show, sweeps
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.export.slicers import TIME_LIMIT_S
 
@@ -44,12 +44,15 @@ def _plan_command(name: str) -> click.Command:
             ),
             click.Option(["--force"], is_flag=True, help="Write the files even if checks report errors."),
             click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
-            *render.options(),
+            *sweeps.workers("one"), *render.options(),
         ],
     )  # fmt: skip
 
 
-def _make(plan: str, *, out: str, no_gcode: bool, time_limit_s: float, force: bool, strict: bool) -> int:
+def _make(
+    plan: str, *, out: str, no_gcode: bool, time_limit_s: float, force: bool, strict: bool, jobs: int | None,
+    cluster: str,
+) -> int:  # fmt: skip
     from sensorgen.workflows.batch import STEPS, make
 
     if not 0 < time_limit_s < float("inf"):
@@ -59,7 +62,7 @@ def _make(plan: str, *, out: str, no_gcode: bool, time_limit_s: float, force: bo
     with render.refused(Path(plan).stem), show.progress(STEPS) as step:
         made = make(
             Path(plan), Path(out), gcode=not no_gcode, time_limit_s=time_limit_s, force=force, strict=strict,
-            log_head=head, step=step,
+            log_head=head, jobs=jobs or 1, cluster=cluster, step=step,
         )  # fmt: skip
     render.deliver(made)
     return FOUND_ERRORS if made.errors(force=force) else 0

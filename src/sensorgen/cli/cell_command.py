@@ -35,7 +35,7 @@ OWN: list[click.Parameter] = [
 def _work(
     design: "Design", *, accuracy: float | None, model: str, frequency: tuple[float, ...] | None,
     press_mm: tuple[float, ...] | None, explain: bool, no_cache: bool,
-    sweep: str | None, jobs: int | None,
+    sweep: str | None, jobs: int | None, cluster: str,
 ) -> int:  # fmt: skip
     from sensorgen.prediction import capacitance_answer as cell
 
@@ -58,7 +58,9 @@ def _work(
         raise BadInput("--press is for formulas, as --model thesis-3.1.2; solved, under a stress: sensorgen compress")
     elif sweep:
         with sweeps.bar(len(points)) as done:
-            found = cell.sweep(key, [(value, of(each)) for value, each in points], asked, sweeps.at_once(jobs), done)
+            found = cell.sweep(
+                key, [(value, of(each)) for value, each in points], asked, sweeps.at_once(jobs), done, cluster
+            )
     else:
         found = cell.answer(of(design), asked)
     render.deliver(found, before=found.explained() if explain else ())

@@ -48,7 +48,7 @@ OWN: list[click.Parameter] = [
 def _work(
     design: "Design", *, stress: tuple[float, ...], model: str | None, accuracy: float | None, explain: bool,
     check_mesh: bool, no_cache: bool, sweep: str | None,
-    jobs: int | None, plot: str | None, **boundary: str,
+    jobs: int | None, cluster: str, plot: str | None, **boundary: str,
 ) -> int:  # fmt: skip
     from sensorgen.prediction import compression
 
@@ -69,7 +69,7 @@ def _work(
         key, designs = settings.sweep(sweep, design)
         points = [(value, of(each)) for value, each in designs]
         with sweeps.bar(len(points)) as done:
-            found = compression.sweep(key, points, asked, sweeps.at_once(jobs), done)
+            found = compression.sweep(key, points, asked, sweeps.at_once(jobs), done, cluster)
     else:
         with sweeps.pressing(asked.stress_kpa) as step:
             found = compression.answer(of(design), asked, step=step)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import body_options, options, render, show
+from sensorgen.cli import body_options, options, render, settings, show, sweeps
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.options import option
 from sensorgen.cli.words import Length, OneOf, Values, proper
@@ -16,6 +16,7 @@ from sensorgen.core.errors import BadInput
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
     from sensorgen.prediction.loaded import Loaded
+    from sensorgen.prediction.query import Query
 
 _WORK = ("cell, press, line",)
 
@@ -48,7 +49,7 @@ OWN: list[click.Parameter] = [
         "Of |Z|: cell, compression and line by the least expensive models that together meet it. Exit code 1 where "
         "they do not."
     ),
-    options.explain(), *body_options.body_options(),
+    options.explain(), *body_options.body_options(), *sweeps.options(),
     option("--plot", None, "Draw R, X, sensitivities and inverse maps there, as PNG and HTML.", metavar="DIR"),
     *render.options(csv="Print R and X as CSV, a row per force and position."),
 ]  # fmt: skip
@@ -58,12 +59,12 @@ def _work(
     design: "Design", *, frequency_hz: Sequence[float] | None, force_n: Sequence[float] | None,
     position_mm: Sequence[float] | None, tip_mm: float | None, radius_mm: float | None, compression: str | None,
     profile: str, accuracy: float | None, noise: float, explain: bool, plot: str | None,
+    sweep: str | None, jobs: int | None, cluster: str,
 ) -> int:  # fmt: skip
     if plot:
         render.refuse_beside("--plot")
-    options.refuse_explain(explain, many=bool(plot))
+    options.refuse_explain(explain, many=bool(plot or sweep))
     proper("--noise", noise)
-    body = body_options.body_of()(design)
     from sensorgen.prediction.evaluate import evaluate
     from sensorgen.prediction.query import DEFAULT, TIP_M, Query, Tip
     from sensorgen.prediction.results import Prediction
@@ -74,7 +75,10 @@ def _work(
     )  # fmt: skip
     frequencies = tuple(frequency_hz or DEFAULT.frequency_hz)
     query = Query(frequencies, tip=tip, law=compression or "", accuracy=accuracy, noise=noise)
+    if sweep:
+        return _sweep(design, sweep, query, sweeps.at_once(jobs), cluster, alone=not (force_n or position_mm or plot))
     found: Prediction | Loaded
+    body = body_options.body_of()(design)
     with show.progress(_WORK) as step:
         step(_WORK[0])
         if force_n or position_mm or plot or render.form() == "csv":
@@ -92,6 +96,19 @@ def _work(
     else:
         render.deliver(found, before=prediction.explained() if explain else ())
     return render.verdict(*prediction.problems(accuracy))
+
+
+def _sweep(design: "Design", words: str, query: "Query", jobs: int, cluster: str, *, alone: bool) -> int:
+    from sensorgen.prediction import swept_prediction
+
+    if not alone:
+        raise BadInput("--sweep predicts each design at the reference load; leave out --force, --position and --plot")
+    key, designs = settings.sweep(words, design)
+    of = body_options.body_of()
+    with sweeps.bar(len(designs)) as done:
+        found = swept_prediction.sweep(key, [(value, of(each)) for value, each in designs], query, jobs, done, cluster)
+    render.deliver(found)
+    return render.verdict(*found.problems())
 
 
 def _plot(found: "Loaded", folder: Path) -> None:

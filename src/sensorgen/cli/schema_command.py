@@ -13,6 +13,10 @@ def _schema(of: str) -> None:
         from sensorgen.cli import catalogue
 
         found = catalogue.schema()
+    elif of == "target":
+        from sensorgen.workflows.optimise.target import Target
+
+        found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Target.model_json_schema()}
     else:
         from sensorgen.prediction.results import adapter
 
@@ -23,6 +27,7 @@ def _schema(of: str) -> None:
 command = click.Command(
     "schema", callback=_schema, help=_schema.__doc__,
     params=[
-        click.Argument(["of"], type=click.Choice(["design", "prediction"]), default="design"), render.options()[-1]
+        click.Argument(["of"], type=click.Choice(["design", "target", "prediction"]), default="design"),
+        render.options()[-1],
     ],
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""``--sweep`` and ``--jobs``, and progress bars of solvers."""
+"""``--sweep``, ``--jobs`` and ``--cluster``, and progress bars of solvers."""
 
 import os
 import sys
@@ -9,15 +9,26 @@ import click
 
 
 def options() -> list[click.Parameter]:
-    """``--sweep`` and ``--jobs``."""
+    """``--sweep`` and where it is worked out."""
     return [
         click.Option(
             ["--sweep"], metavar="KEY=VALUES",
             help="Answer for each value of one setting: dielectric_mm=0.05:0.2:0.05, or eps_x60=3,4,5.",
         ),
+        *workers(),
+    ]  # fmt: skip
+
+
+def workers(usual: str = "one for each core") -> list[click.Parameter]:
+    """``--jobs`` and ``--cluster``."""
+    return [
         click.Option(
             ["--jobs"], type=click.IntRange(1, 64), default=None, metavar="N",
-            help="Processes at once in a sweep; one for each core if not given.",
+            help=f"Processes at once; {usual} if not given.",
+        ),
+        click.Option(
+            ["--cluster"], metavar="ADDRESS", default="",
+            help="Work on a Dask cluster: its scheduler's address, as tcp://10.0.0.5:8786, or its scheduler file.",
         ),
     ]  # fmt: skip
 

@@ -19,7 +19,17 @@ from sensorgen.core.errors import Unwritable
 from sensorgen.core.version import __version__
 
 PLACE = "SENSORGEN_CACHE"  # environment variable with another folder
-_SOURCES = ("models", "solvers", "scene", "prediction", "core/bounds.py", "core/units.py")  # what decides an answer
+_SOURCES = (
+    "asprinted",
+    "checks",
+    "design",
+    "models",
+    "prediction",
+    "scene",
+    "solvers",
+    "core/bounds.py",
+    "core/units.py",
+)  # what decides an answer
 
 JSON = Any  # None, bool, int, float, str, and lists and string-keyed dicts of these
 

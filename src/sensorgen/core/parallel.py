@@ -1,25 +1,38 @@
-"""The same work for many, several at once in processes of their own; what goes wrong with one leaves the others."""
+"""The same work for many, in processes of this computer or on a Dask cluster; a process that dies costs one chunk."""
 
 import os
 import signal
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, TypeVar
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from sensorgen.core.errors import NotInstalled, SensorgenError
 from sensorgen.core.leash import end_with_parent
 
 if TYPE_CHECKING:
-    from concurrent.futures import ProcessPoolExecutor
+    from concurrent.futures import Executor, Future
+    from contextlib import AbstractContextManager
 
+CHUNK_S = 1.0  # sending work to a process takes a millisecond, to another computer ten
 _SAFE = "PYTHONSAFEPATH"
-Found = TypeVar("Found")
+_POLL_S, _CONNECT_S = 1.0, 10.0
+_DIED = "a process ended before its answer, as when the memory is full: ask for less accuracy, or --jobs 1"
+Result = TypeVar("Result")
+Work = Callable[..., Result]
+Lost = Callable[[int, str], Result]
 
 
 def in_parallel(
-    work: Callable[..., Found], inputs: Sequence[tuple[Any, ...]], jobs: int
-) -> Iterator[tuple[int, Found]]:
+    work: Work[Result], inputs: Sequence[tuple[Any, ...]], jobs: int, *, cluster: str = "",
+    lost: Lost[Result] | None = None,
+) -> Iterator[tuple[int, Result]]:  # fmt: skip
     """Number and result of each, as they come; in this process where one is enough.
+
+    Works are sent in chunks that take about ``CHUNK_S``. A chunk whose process dies is sent again; one that kills twice
+    is divided into its works, and one that kills alone is lost.
 
     Parameters
     ----------
@@ -28,32 +41,126 @@ def in_parallel(
     inputs : sequence of tuple
         What it is called with.
     jobs : int
-        How many processes at once, 1 or more.
+        How many processes at once, 1 or more; a cluster decides by itself.
+    cluster : str
+        Address of a Dask scheduler, or its scheduler file; "" for processes of this computer.
+    lost : callable, optional
+        Makes a result of the number of a work that kills its process, and the reason; an error if not given.
 
     Raises
     ------
     SensorgenError
-        A process ended before its result, as when the memory is full; whatever ``work`` raises.
+        A process ended before its result; a cluster that cannot be reached; whatever ``work`` raises.
     """
     jobs = min(jobs, len(inputs))
-    if jobs < 2:
+    if jobs < 2 and not (cluster and inputs):
         yield from ((k, work(*each)) for k, each in enumerate(inputs))
         return
-    from concurrent.futures import Future, as_completed
-    from concurrent.futures.process import BrokenProcessPool
+    from concurrent.futures import FIRST_COMPLETED, wait
 
-    with _pool(jobs) as pool:
-        numbers: dict[Future[Found], int] = {pool.submit(work, *each): k for k, each in enumerate(inputs)}
+    with _lanes(jobs, cluster) as lanes:
+        todo, again, free = deque(range(len(inputs))), deque[_Chunk](), list(lanes)
+        running: dict[Future[tuple[float, list[Result]]], tuple[_Lane, _Chunk]] = {}
+        spent, done = 0.0, 0
+        while todo or again or running:
+            while free and (todo or again):
+                size = int(CHUNK_S * done / spent) if spent else 1
+                size = max(1, min(size, len(todo) // (2 * len(lanes))))
+                chunk = again.popleft() if again else _Chunk(tuple(todo.popleft() for _ in range(min(size, len(todo)))))
+                lane = free.pop()
+                running[lane.submit(work, [inputs[k] for k in chunk.numbers])] = lane, chunk
+            finished = wait(running, _POLL_S, FIRST_COMPLETED).done
+            lanes[0].check()
+            for future in finished:
+                lane, chunk = running.pop(future)
+                free.append(lane)
+                try:
+                    seconds, results = future.result()
+                except lane.deadly:
+                    lane.renew()
+                    again.extend(chunk.after(lane.deaths))
+                    if len(chunk.numbers) == 1 and not chunk.after(lane.deaths):
+                        if lost is None:
+                            raise SensorgenError(_DIED) from None
+                        yield chunk.numbers[0], lost(chunk.numbers[0], _DIED)
+                    continue
+                spent, done = spent + seconds, done + len(results)
+                yield from zip(chunk.numbers, results, strict=True)
+
+
+def remembered(
+    work: Work[Result], inputs: Sequence[tuple[Any, ...]], jobs: int, *, cluster: str = "", keep: bool = True,
+    lost: Lost[Result] | None = None,
+) -> Iterator[tuple[int, Result]]:  # fmt: skip
+    """The same, of works that ask :mod:`sensorgen.core.cache`: those it has all answers to first, and in this process.
+
+    What the others have worked out is stored as it comes: work that is stopped goes on where it was.
+
+    Parameters
+    ----------
+    work, inputs, jobs, cluster, lost
+        As of :func:`in_parallel`.
+    keep : bool
+        Read the cache and store new answers.
+    """
+    from sensorgen.core import cache
+
+    missing = []
+    for k, each in enumerate(inputs):
+        if not keep:
+            missing.append(k)
+            continue
         try:
-            for future in as_completed(numbers):
-                yield numbers[future], future.result()
-        except BrokenProcessPool:
-            raise SensorgenError(
-                "a process ended before its answer, as when the memory is full: ask for less accuracy, or --jobs 1"
-            ) from None
+            with cache.only_known():
+                known = work(*each)
+        except cache.Unknown:
+            missing.append(k)
+            continue
+        yield k, known
+    apart = [(work, *inputs[k]) for k in missing]
+
+    def lost_apart(n: int, reason: str) -> tuple[Result, list[tuple[Any, Any]]]:
+        if lost is None:
+            raise SensorgenError(reason)
+        return lost(missing[n], reason), []
+
+    for n, (result, entries) in in_parallel(_apart, apart, jobs, cluster=cluster, lost=lost_apart):
+        for entry in entries if keep else ():  # this process alone writes: the others may be ended at any moment
+            cache.keep(*entry)
+        yield missing[n], result
 
 
-def said(work: Callable[..., Found], *given: Any, refused: tuple[type[SensorgenError], ...]) -> Found | str:
+def _apart(work: Work[Result], *given: Any) -> tuple[Result, list[tuple[Any, Any]]]:
+    """The result of a work, and what is to be kept of it."""
+    from sensorgen.core import cache
+
+    with cache.held_back() as entries:
+        return work(*given), entries
+
+
+@dataclass(frozen=True)
+class _Chunk:
+    """Numbers of works that are sent together, and how many processes they have killed."""
+
+    numbers: tuple[int, ...]
+    deaths: int = 0
+
+    def after(self, deaths: int) -> "list[_Chunk]":
+        """What to send after more deaths: the same again, its works one by one, or nothing."""
+        deaths += self.deaths
+        if deaths < 2:
+            return [_Chunk(self.numbers, deaths)]
+        return [_Chunk((k,), 1) for k in self.numbers] if len(self.numbers) > 1 else []
+
+
+def _chunk(work: Work[Result], inputs: Sequence[tuple[Any, ...]]) -> tuple[float, list[Result]]:
+    """Time that works take [s], and their results."""
+    begun = perf_counter()
+    results = [work(*each) for each in inputs]
+    return perf_counter() - begun, results
+
+
+def said(work: Work[Result], *given: Any, refused: tuple[type[SensorgenError], ...]) -> Result | str:
     """What a work finds, or why it finds nothing.
 
     Parameters
@@ -85,26 +192,79 @@ def said(work: Callable[..., Found], *given: Any, refused: tuple[type[SensorgenE
         return f"{type(error).__name__}: {error}; a fault of sensorgen, please report it"
 
 
+class _Lane(Protocol):
+    """Takes one chunk at a time."""
+
+    executor: "Executor"
+    deadly: tuple[type[BaseException], ...]  # what a future raises whose process has died
+    deaths: int  # of processes, that such an error stands for
+
+    def submit(self, work: Work[Result], inputs: Sequence[tuple[Any, ...]]) -> "Future[tuple[float, list[Result]]]":
+        """Begin a chunk."""
+
+    def renew(self) -> None:
+        """Go on after a death."""
+
+    def check(self) -> None:
+        """Raise SensorgenError where no results will come any more."""
+
+
+class _Process:
+    """A fresh process, so that solver and CAD kernel never meet in one; alone in its pool, so that it dies alone."""
+
+    deaths = 1
+
+    def __init__(self) -> None:
+        from concurrent.futures.process import BrokenProcessPool
+
+        self.deadly: tuple[type[BaseException], ...] = (BrokenProcessPool,)
+        self.executor = self._made()
+
+    def _made(self) -> "Executor":
+        import multiprocessing
+        from concurrent.futures import ProcessPoolExecutor
+
+        return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _begin)
+
+    def submit(self, work: Work[Result], inputs: Sequence[tuple[Any, ...]]) -> "Future[tuple[float, list[Result]]]":
+        """Begin a chunk, in another process if this one has died at rest."""
+        try:
+            return self.executor.submit(_chunk, work, inputs)
+        except self.deadly:
+            self.renew()
+            return self.executor.submit(_chunk, work, inputs)
+
+    def renew(self) -> None:
+        """Another process in place of the dead one."""
+        self.executor.shutdown()
+        self.executor = self._made()
+
+    def check(self) -> None:
+        """A process that has died says so itself."""
+
+
+def _lanes(jobs: int, cluster: str) -> "AbstractContextManager[Sequence[_Lane]]":
+    return _on_cluster(cluster) if cluster else _processes(jobs)
+
+
 @contextmanager
-def _pool(jobs: int) -> Iterator["ProcessPoolExecutor"]:
-    """Fresh processes, so that solver and CAD kernel never meet in one; ended at once if anything goes wrong."""
+def _processes(jobs: int) -> Iterator[Sequence[_Lane]]:
+    """Processes of this computer, ended at once if anything goes wrong."""
     import multiprocessing
-    from concurrent.futures import ProcessPoolExecutor
 
     before = os.environ.get(_SAFE)
     os.environ[_SAFE] = "1"  # a process that is spawned would look for Python's own modules in the working folder
-    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _begin)
+    lanes = [_Process() for _ in range(jobs)]
     try:
-        yield pool
+        yield lanes
     except BaseException:
         for process in multiprocessing.active_children():
             process.terminate()
-        # wait: else the interpreter, as it ends, may write to a pipe that the pool's thread closes
-        pool.shutdown(cancel_futures=True)
         raise
-    else:
-        pool.shutdown()
     finally:
+        # wait: else the interpreter, as it ends, may write to a pipe that the pool's thread closes
+        for lane in lanes:
+            lane.executor.shutdown(cancel_futures=True)
         if before is None:
             del os.environ[_SAFE]
         else:
@@ -118,3 +278,65 @@ def _begin() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     parent = parent_process()
     end_with_parent(parent.join if parent else None)
+
+
+class _Cluster:
+    """One of the places of a Dask cluster."""
+
+    deaths = 2  # the scheduler has tried it several times itself
+
+    def __init__(self, client: Any, address: str) -> None:
+        from distributed.scheduler import KilledWorker
+
+        self.client, self.address, self.executor = client, address, client.get_executor(pure=False)
+        self.deadly: tuple[type[BaseException], ...] = (KilledWorker,)
+
+    def submit(self, work: Work[Result], inputs: Sequence[tuple[Any, ...]]) -> "Future[tuple[float, list[Result]]]":
+        """Begin a chunk."""
+        future: Future[tuple[float, list[Result]]] = self.executor.submit(_chunk, work, inputs)
+        return future
+
+    def renew(self) -> None:
+        """The cluster replaces its workers itself."""
+
+    def check(self) -> None:
+        """Raise SensorgenError where the scheduler has gone."""
+        if self.client.status not in ("running", "connecting"):
+            raise gone(self.address)
+
+
+def gone(address: str) -> SensorgenError:
+    """The error where a cluster no longer answers."""
+    return SensorgenError(f"the Dask cluster {address!r} no longer answers; results so far are kept: run it again")
+
+
+@contextmanager
+def _on_cluster(address: str) -> Iterator[Sequence[_Lane]]:
+    """Places of a Dask cluster: two chunks for each of its threads."""
+    import importlib.util
+    import logging
+    from concurrent.futures import CancelledError
+    from pathlib import Path
+
+    if importlib.util.find_spec("distributed") is None:
+        raise NotInstalled("--cluster needs Dask distributed: pip install 'sensorgen[cluster]'")
+    from distributed import Client
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is said once, by us
+    where = {"scheduler_file": address} if Path(address).is_file() else {"address": address}
+    try:
+        client = Client(**where, timeout=_CONNECT_S)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise SensorgenError(
+            f"no Dask scheduler at {address!r} ({str(error).splitlines()[0]:.80}); expected its address, as "
+            "tcp://10.0.0.5:8786, or its scheduler file"
+        ) from None
+    try:
+        threads = sum(client.nthreads().values())
+        if not threads:
+            raise SensorgenError(f"the Dask cluster {address!r} has no workers; start some: dask worker {address}")
+        yield [_Cluster(client, address)] * (2 * threads)
+    except (CancelledError, OSError):
+        raise gone(address) from None
+    finally:
+        client.close(timeout=_CONNECT_S)

@@ -111,7 +111,9 @@ def with_geometry(data: dict[str, Any], folder: Path) -> dict[str, Any]:
         return data
     path = folder / name
     with reading(path):
-        if path.is_file() and path.stat().st_size > MOST_BYTES:
+        if not path.is_file():
+            raise BadInput(f"{path}: not a file; expected the bodies that sensorgen import wrote beside the design")
+        if path.stat().st_size > MOST_BYTES:
             raise BadInput(f"{path}: {path.stat().st_size / 1e6:.0f} MB; expected at most {MOST_BYTES / 1e6:.0f} MB")
         content = path.read_text("utf-8")
     own = _HASHED.search(path.name)
@@ -136,7 +138,17 @@ def bodies(geometry: str) -> Bodies:
         size = tuple(float(value) for value in data["size_mm"])
         pieces = {str(name): tuple(map(_piece, own)) for name, own in data["bodies"].items()}
         return Bodies(pieces, (size[0], size[1], size[2]), float(data["chord_mm"]), str(data["source"]))
-    except (binascii.Error, zlib.error, ValueError, KeyError, TypeError, AttributeError, IndexError, BadInput) as error:
+    except (
+        binascii.Error,
+        zlib.error,
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        IndexError,
+        RecursionError,
+        BadInput,
+    ) as error:
         raise BadInput(
             f"geometry: no bodies in it ({error or type(error).__name__}); expected a file that sensorgen import wrote"
         ) from None

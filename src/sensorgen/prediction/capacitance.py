@@ -90,7 +90,7 @@ class Answer:
         """The capacitance of ``count`` such cells side by side, known to a relative ``error``."""
 
         def whole(cell: Interval) -> Interval:
-            return Interval(cell.lower * count * (1 - error), cell.upper * count * (1 + error))
+            return Interval(cell.lower * count * max(1 - error, 0.0), cell.upper * count * (1 + error))
 
         loss = self.loss_f and whole(self.loss_f)
         return replace(self, capacitance_f=whole(self.capacitance_f), loss_f=loss)

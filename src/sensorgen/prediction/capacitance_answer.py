@@ -168,8 +168,8 @@ def answer(body: Body, asked: Asked) -> CellCapacitance:
     design, scene = body.design, body.cells.first()
     permittivity, values = losses.permittivity(design, asked.frequency_hz)
     width = default_width(scene) if asked.width is None else asked.width
-    found = capacitance(scene, permittivity, width, asked.model, asked.keep).times(*body.cells.counted)
-    area_m2 = design.params.length_mm * design.params.width_mm * M_PER_MM**2
+    found = capacitance(scene, permittivity, width, asked.model, asked.keep).times(body.cells.count)
+    area_m2 = design.area_mm2 * M_PER_MM**2
     real, loss, per_area = found.capacitance_f, found.loss_f, found.capacitance_f.times(1 / area_m2)
     tan_delta = None
     if loss and real.lower > 0:
@@ -187,14 +187,17 @@ def answer(body: Body, asked: Asked) -> CellCapacitance:
 
 
 def sweep(
-    key: str, points: Sequence[tuple[float | str, Body]], asked: Asked, jobs: int, done: Callable[[], None]
+    key: str, points: Sequence[tuple[float | str, Body]], asked: Asked, jobs: int, done: Callable[[], None],
+    cluster: str = "",
 ) -> Sweep[CellCapacitance]:  # fmt: skip
     """The same along a sweep; a reason stands in place of what no model applies to, or at which one fails.
 
     Parameters and errors as of :func:`answer` and :func:`sensorgen.prediction.sweep.sweep`.
     """
     work = partial(answer, asked=asked)
-    return swept(key, points, work, _failed, refused=(Unpredictable,), keep=asked.keep, jobs=jobs, done=done)
+    return swept(
+        key, points, work, _failed, refused=(Unpredictable,), keep=asked.keep, jobs=jobs, cluster=cluster, done=done
+    )
 
 
 def _failed(body: Body, reason: str) -> CellCapacitance:

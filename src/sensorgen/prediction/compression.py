@@ -232,7 +232,12 @@ def answer(body: Body, asked: Asked, *, step: Step | None = None) -> Compression
 
 
 def sweep(
-    key: str, points: Sequence[tuple[float | str, Body]], asked: Asked, jobs: int, done: Callable[[], None]
+    key: str,
+    points: Sequence[tuple[float | str, Body]],
+    asked: Asked,
+    jobs: int,
+    done: Callable[[], None],
+    cluster: str = "",
 ) -> Sweep[CompressionResult]:
     """The same along a sweep; a reason stands in place of a point that has no answer.
 
@@ -240,7 +245,7 @@ def sweep(
     """
     alone = (BadInput, MissingValue, OutOfRange, Unpredictable)
     work = partial(answer, asked=asked)
-    return swept(key, points, work, _failed, refused=alone, keep=asked.keep, jobs=jobs, done=done)
+    return swept(key, points, work, _failed, refused=alone, keep=asked.keep, jobs=jobs, cluster=cluster, done=done)
 
 
 def _failed(body: Body, reason: str) -> CompressionResult:

@@ -9,7 +9,7 @@ from sensorgen.prediction.query import DEFAULT, Query
 from sensorgen.prediction.results import SCHEMA, Prediction, adapter, from_json
 
 
-def evaluate(body: Body, query: Query = DEFAULT, *, keep: bool = True) -> Prediction:
+def evaluate(body: Body, query: Query = DEFAULT, *, keep: bool = True, beside: bool = True) -> Prediction:
     """What a body should measure.
 
     Parameters
@@ -20,6 +20,8 @@ def evaluate(body: Body, query: Query = DEFAULT, *, keep: bool = True) -> Predic
         Frequencies, reference load, tip, accuracy.
     keep : bool
         Read the stored prediction of this body and query where there is one, and store a new one.
+    beside : bool
+        Predict the drawing of a print, too.
 
     Returns
     -------
@@ -32,7 +34,7 @@ def evaluate(body: Body, query: Query = DEFAULT, *, keep: bool = True) -> Predic
         A query that no sensor can answer: an accuracy or a noise that is not above 0, a tip that does not fit.
     """
     found = _stored(body, query) if keep else _computed(body, query)
-    if body.is_drawn:
+    if body.is_drawn or not beside:
         return found
     return replace(found, drawn=evaluate(bodies.drawn(body.design), query, keep=keep))
 

@@ -117,8 +117,8 @@ def lost(design: Design) -> Lost:
     taken, sets = permittivities(design), set_losses(design)
     parts = {quantity: [t for t in sets if t.quantity == quantity] for quantity in LOSSES}
     tangents, leaks = (_tangent(design, taken, parts[quantity]) for quantity in LOSSES)
-    film, p = _film_leak(design), design.params
-    through_film_s = sum(t.value for t in film) * p.length_mm * p.width_mm * M_PER_MM**2
+    film = _film_leak(design)
+    through_film_s = sum(t.value for t in film) * design.area_mm2 * M_PER_MM**2
     return Lost(
         tangents[0], 2 * pi * LOWEST_HZ * leaks[1] + through_film_s, (*sets, *film),
         tuple(_strong(taken, parts[LOSSES[1]])),

@@ -35,6 +35,7 @@ Otherwise = tuple[Sequence[Sensor | None], Sequence[Sensor | None]]  # by other 
 
 _ASSUMED = "the cell was not solved, and is taken to deform as a solid plate"
 _PA_PER_KPA = 1e3
+_PERIODS = 1.5  # under the tip, from which on the cell is taken as one of an endless pattern
 _SAME = 0.05  # capacitances that differ by less are not told apart: solving takes seconds
 
 
@@ -147,14 +148,28 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
         if law.bounded:
             others = list(_printed_otherwise(model, load, query)), list(_other_films(model, load, query))
         beyond = law.compression.doubt(float(model.sensor.stress_pa(load.force_n, load.position_m)))
+        pressed = (beyond, _few_periods(model.body, query))
         found = replace(
             found, identifiability=made, sensitivity=_sensitivity(model, load, query, others),
-            doubts=(*found.doubts, *([beyond] if beyond else ())),
+            doubts=(*found.doubts, *filter(None, pressed)),
             budget=error_budget(model, query.load(model.body.design), query.accuracy, *others),
         )  # fmt: skip
         return _resolution(found, model, load, query, others)
     except SensorgenError as error:
         return replace(found, reason=str(error))
+
+
+def _few_periods(body: Body, query: Query) -> str:
+    """That a tip is too short for the cells under it to deform as under a uniform pressure."""
+    period_mm = getattr(body.design.params, "period_mm", None)
+    if not period_mm or getattr(body.design.params, "along", "") == "y":
+        return ""
+    count = query.tip.length_m / (period_mm * M_PER_MM)
+    if count > _PERIODS - 1e-9:
+        return ""
+    return (
+        f"the tip covers {count:.2g} periods, less than {_PERIODS:g}: the response depends on where in one it presses"
+    )
 
 
 def _printed_otherwise(model: SensorModel, load: Load, query: Query) -> Iterator[Sensor | None]:

@@ -11,6 +11,7 @@ from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
+from sensorgen.core.findings import Finding
 from sensorgen.design.values import MaterialValue
 from sensorgen.prediction.identifiability.results import GUESS, Identifiability, of_schema_1
 from sensorgen.prediction.plan import Plan, without_times
@@ -295,6 +296,13 @@ class Prediction(Displayed):
     def to_json(self) -> str:
         """Indented JSON of the published schema."""
         return json.dumps(json.loads(to_json(self)), indent=2, ensure_ascii=False) + "\n"
+
+    def with_short(self, found: Sequence[Finding]) -> tuple[Finding, ...]:
+        """Findings about a drawing, and an error where its print is a short."""
+        if self.status != "short" or any(f.rule == "1-short" for f in found):
+            return tuple(found)
+        advice = "widen narrow parts to a line, or draw the electrodes further apart"
+        return (Finding("1-short", "error", "sensor", f"as {self.body}: {self.reason}", advice, 0.0), *found)
 
     def problems(self, accuracy: float | None) -> Sequence[str]:
         """That abs(Z) is not within an accuracy that was asked for [-]."""

@@ -5,16 +5,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
-from sensorgen.core import cache as cached
 from sensorgen.core.document import Column, Part, Table, shown, to_json
 from sensorgen.core.errors import SensorgenError
-from sensorgen.core.parallel import in_parallel, said
+from sensorgen.core.parallel import remembered, said
 from sensorgen.design.body import Body
 
 Value = float | str
-Kept = list[tuple[Any, Any]]
 
 
 class Point(Protocol):
@@ -85,7 +83,7 @@ class Sweep(Generic[Result]):
 def sweep(
     key: str, points: Sequence[tuple[Value, Body]], work: Callable[[Body], Result],
     failed: Callable[[Body, str], Result], *, refused: tuple[type[SensorgenError], ...], keep: bool = True,
-    jobs: int = 1, done: Callable[[], None] = lambda: None,
+    jobs: int = 1, cluster: str = "", done: Callable[[], None] = lambda: None,
 ) -> Sweep[Result]:  # fmt: skip
     """The same work for each body, those whose answer is not cached in several processes.
 
@@ -105,44 +103,25 @@ def sweep(
         Read the cache and store new answers.
     jobs : int
         How many processes at once, 1 or more.
+    cluster : str
+        Of Dask, in place of processes, as of :func:`sensorgen.core.parallel.in_parallel`.
     done : callable
         Called after each point.
 
     Raises
     ------
     SensorgenError
-        Not in ``refused``; a process that ended before its answer, as when the memory is full.
+        Not in ``refused``; a cluster that cannot be reached. A point that ends its process, as when the memory is full,
+        has that as its reason.
     """
     attempt = partial(said, work, refused=refused)
     found: dict[int, Result | str] = {}
-    for k, (_, body) in enumerate(points if keep else ()):
-        known = _known(attempt, body)
-        if known is not None:
-            found[k] = known
-            done()
-    missing = [k for k in range(len(points)) if k not in found]
-    for n, (result, entries) in in_parallel(_apart, [(attempt, points[k][1]) for k in missing], jobs):
-        for entry in entries if keep else ():  # this process alone writes: the others may be ended at any moment
-            cached.keep(*entry)
-        found[missing[n]] = result
+    given = [(body,) for _, body in points]
+    for k, one in remembered(attempt, given, jobs, cluster=cluster, keep=keep, lost=lambda _, reason: reason):
+        found[k] = one
         done()
     results = []
     for k, (_, body) in enumerate(points):
         known = found[k]
         results.append(failed(body, known) if isinstance(known, str) else known)
     return Sweep(key, tuple(value for value, _ in points), tuple(results))
-
-
-def _known(attempt: Callable[[Body], Result | str], body: Body) -> Result | str | None:
-    """The result of a point, or why there is none; None where something has to be solved for it."""
-    try:
-        with cached.only_known():
-            return attempt(body)
-    except cached.Unknown:
-        return None
-
-
-def _apart(attempt: Callable[[Body], Result | str], body: Body) -> tuple[Result | str, Kept]:
-    """The result of a point, or why there is none; and what is to be kept of it."""
-    with cached.held_back() as entries:
-        return attempt(body), entries

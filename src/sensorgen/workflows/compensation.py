@@ -447,7 +447,7 @@ def _steps(design: Design) -> Iterator[tuple[str, float, str]]:
             nudged = _with(design, **{name: value * 1.01})
         except SensorgenError:
             continue
-        if not _levels(design) <= _levels(nudged):  # a face has moved up or down: a cut at the end only adds levels
+        if not levels(design) <= levels(nudged):  # a face has moved up or down: a cut at the end only adds levels
             whole = max(round(value / layer), 1) * layer
             if abs(whole - value) > SLIVER_MM:
                 yield name, round(whole, 9), f"whole layers of {layer:g} mm"
@@ -458,7 +458,7 @@ def _steps(design: Design) -> Iterator[tuple[str, float, str]]:
                 yield name, round(least / larger, 9), "one line" if is_material else "a gap that stays open"
 
 
-def _levels(design: Design) -> set[float]:
+def levels(design: Design) -> set[float]:
     """Heights of all faces and corners [mm]."""
     return {round(z, 6) for body in design.drawn.bodies for z in faces_mm(body)}
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
-from functools import cache
+from functools import cache, cached_property
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +14,7 @@ import numpy as np
 import yaml
 
 from sensorgen.core import files
+from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import BadInput, MissingValue, UnknownName
 from sensorgen.core.findings import Finding, listed
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 CHORD_MM = 0.01  # from curved faces to the triangles that stand for them
 _LEAST_MM, _MOST_MM = (1.0, 1.0, 0.05), 1000.0  # of a sensor's edges, in x, y and z
+_MOST_BODIES = 300
 _CONTACT_MM = 1e-4  # conductors nearer than this are one electrode
 _OVERLAP_MM = 1e-6  # mean depth up to which bodies overlap by rounding
 _FORMATS = (".step", ".stp", ".3mf", ".stl")
@@ -57,11 +59,11 @@ class ReadBody:
     given: FileBody
     repairs: tuple[str, ...] = ()
 
-    @property
-    def box_mm(self) -> "np.ndarray":
+    @cached_property
+    def box_mm(self) -> Real:
         """Lowest and highest corner (2, 3) [mm]."""
         points = self.given.vertices_mm[np.unique(self.given.triangles)]
-        return np.array([points.min(0), points.max(0)])
+        return np.asarray([points.min(0), points.max(0)], float)
 
     def volume_mm3(self) -> float:
         """Enclosed volume [mm3]."""
@@ -225,6 +227,8 @@ def read(paths: Sequence[Path], unit: str = "", chord_mm: float = CHORD_MM) -> A
         process = cache(lambda: stack.enter_context(cad.CadProcess()))
         for path in paths:
             given += _file(path, unit, lambda path: process().read_step(path, chord_mm))
+    if len(given) > _MOST_BODIES:
+        raise BadInput(f"{len(given)} bodies; expected at most {_MOST_BODIES}: join those that one tool prints in CAD")
     names = _names([body.name for body in given])
     findings, bodies = [], []
     for name, raw in zip(names, given, strict=True):
@@ -327,8 +331,7 @@ def _apart(bodies: Sequence[ReadBody]) -> tuple[list[ReadBody], list[Finding]]:
     findings = []
     for a, b in combinations(made, 2):
         one, other = made[a], made[b]
-        sides = np.minimum(one.box_mm[1], other.box_mm[1]) - np.maximum(one.box_mm[0], other.box_mm[0])
-        if (sides <= 1e-9).any():
+        if (_shared_mm(one.box_mm, other.box_mm) <= 1e-9).any():
             continue
         common = solids[a] ^ solids[b]
         area = common.surface_area()
@@ -351,6 +354,11 @@ def _apart(bodies: Sequence[ReadBody]) -> tuple[list[ReadBody], list[Finding]]:
         text = f"{words}, as the triangles of curved faces do: {small} has it"
         findings.append(Finding("11-repaired", "info", f"{a} / {b}", text, "nothing", place_mm=at))
     return list(made.values()), findings
+
+
+def _shared_mm(one: Real, other: Real) -> Real:
+    """Sides of what two boxes share; negative where they are apart [mm]."""
+    return np.asarray(np.minimum(one[1], other[1]) - np.maximum(one[0], other[0]))
 
 
 def _suggested(name: str, colour: str) -> str:
@@ -449,10 +457,10 @@ def _matching(pattern: str, names: Sequence[str]) -> list[str]:
 def _terminals(assembly: Assembly, conductors: set[str]) -> dict[str, str]:
     """Terminals by height: conductors that touch are one electrode; the lowest is the bottom, the highest the top."""
     bodies = [body for body in assembly.bodies if body.name in conductors]
-    solids = {body.name: body.solid() for body in bodies}
+    solids, boxes = {body.name: body.solid() for body in bodies}, {body.name: body.box_mm for body in bodies}
     groups = {body.name: {body.name} for body in bodies}
     for a, b in combinations(groups, 2):
-        if solids[a].min_gap(solids[b], 1.0) < _CONTACT_MM:
+        if (_shared_mm(boxes[a], boxes[b]) > -_CONTACT_MM).all() and solids[a].min_gap(solids[b], 1.0) < _CONTACT_MM:
             joined = groups[a] | groups[b]
             groups |= dict.fromkeys(joined, joined)
     every = list({frozenset(group) for group in groups.values()})

@@ -10,10 +10,10 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design import packs
 from sensorgen.design.packs import Kind
 
-What = Literal["material", "shape", "printer", "quality", "instrument", "design"]
+What = Literal["material", "shape", "printer", "quality", "instrument", "design", "target"]
 KINDS: dict[What, Kind | None] = {
     "material": "materials", "shape": "shapes", "printer": "printers", "quality": "qualities",
-    "instrument": "instruments", "design": None,
+    "instrument": "instruments", "design": None, "target": None,
 }  # fmt: skip
 _NEXT: dict[What, str] = {
     "material": "replace its numbers; then sensorgen pack test {file}, and --material electrode={name} in any command",
@@ -22,6 +22,7 @@ _NEXT: dict[What, str] = {
     "quality": "replace its numbers; then sensorgen pack test {file}, and --quality {name} in any command",
     "instrument": "replace its numbers; then sensorgen pack test {file}",
     "design": "change it; then sensorgen check {file}",
+    "target": "change it; then sensorgen optimise {file}",
 }
 
 

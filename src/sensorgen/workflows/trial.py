@@ -2,7 +2,7 @@
 
 import json
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -179,8 +179,9 @@ def _shown(name: str, value: Bounds | float | None) -> str:
 
 
 def trial(
-    design: Design, query: Query = DEFAULT, *, folder: Path | None = None, slicer: str = "", keep: bool = True
-) -> Trial:
+    design: Design, query: Query = DEFAULT, *, folder: Path | None = None, slicer: str = "", keep: bool = True,
+    drawn: bool = True,
+) -> Trial:  # fmt: skip
     """Check a design, and predict its drawing and its print.
 
     Parameters
@@ -195,6 +196,8 @@ def trial(
         Slice now, by ``prusa`` or ``cura``; "" for what ``folder`` has.
     keep : bool
         Read stored predictions and store new ones.
+    drawn : bool
+        Predict the drawing, too.
 
     Raises
     ------
@@ -209,27 +212,19 @@ def trial(
     """
     walls = rule(slicer, design.walls) if slicer in SLICERS else ""
     held = review(design, walls=walls)
+    path: Toolpath | None
     if slicer:
         body, path, of_print = _sliced(design, slicer)
         found = [*held.sliced().findings, *of_print]
     else:
         (body, path), found = _at_hand(design, folder), held.findings
-    predicted = evaluate(body, query, keep=keep)
-    findings = tuple(f for f in with_print(found, predicted) if not f.waiver)
-    drawn, printed = predicted.drawn or predicted, predicted
+    predicted = evaluate(body, query, keep=keep, beside=drawn)
+    findings = tuple(f for f in predicted.with_short(found) if not f.waiver)
     return Trial(
-        design.name, design.id(), body.provenance, printed.status, printed.reason, verdict(findings), findings,
-        printed.force_n, printed.position_m, Numbers.of(drawn), Numbers.of(printed), printed.doubts, path,
+        design.name, design.id(), body.provenance, predicted.status, predicted.reason, verdict(findings), findings,
+        predicted.force_n, predicted.position_m, Numbers.of(predicted.drawn) if predicted.drawn else Numbers(),
+        Numbers.of(predicted), predicted.doubts, path,
     )  # fmt: skip
-
-
-def with_print(found: Sequence[Finding], predicted: Prediction) -> tuple[Finding, ...]:
-    """Findings about the drawing, and an error where its print is a short."""
-    if predicted.status != "short" or any(f.rule == "1-short" for f in found):
-        return tuple(found)
-    what = f"as {predicted.body}: {predicted.reason}"
-    advice = "widen narrow parts to a line, or draw the electrodes further apart"
-    return (Finding("1-short", "error", "sensor", what, advice, 0.0), *found)
 
 
 def _at_hand(design: Design, folder: Path | None) -> tuple[Body, Toolpath | None]:
@@ -237,7 +232,7 @@ def _at_hand(design: Design, folder: Path | None) -> tuple[Body, Toolpath | None
     body, file = bodies.default_body(design, folder), bodies.toolpath(design, folder)
     if file is None:
         return body, None
-    from sensorgen.export.gcode.drags import OfTool
+    from sensorgen.export.gcode.drags import OfTool  # a build reads no G-code
 
     made = json.loads(file.with_name(f"{file.name}.json").read_text("utf-8"))
     try:

@@ -38,7 +38,7 @@ def allowed(row: Compared, body: Body) -> Allowed | None:
     ry, rz = row.verdict.ry_ohm, row.verdict.rz_ohm
     per, design = _per_resistivity(body), body.design
     highest, leak = electrode_and_leak(ry, rz) if rz > 0 else (ry, float("nan"))
-    area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
+    area = design.area_mm2 * M_PER_MM**2
     return Allowed(log(ry / per[1]), log(highest / per[0]), log(leak / area) if leak > 0 else float("nan"))
 
 

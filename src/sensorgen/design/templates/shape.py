@@ -3,7 +3,7 @@
 One period, seen along the blocks (e: conductor, x: dielectric, blank: air)::
 
     eeeeeeeeeeee   top electrode
-    xxxx    xxxx   blocks, half a period wide
+    xxx      xxx   blocks, half a period wide
     xxxxxxxxxxxx   film
     eeeeeeeeeeee   bottom electrode
 """
@@ -33,16 +33,17 @@ def scene(p: Params, fill: Fill) -> Scene:
     film = low + p.film_mm
     roof = film + p.height_mm
     top = roof + p.electrode_mm
-    half = p.period_mm / 2
-    starts = [k * half for k in range(ceil(p.length_mm / half - 1e-9))]
-    parts = [box(x, min(x + half, p.length_mm), 0, p.width_mm, film, roof) for x in starts]
-    blocks = [part for k, part in enumerate(parts) if k % 2 == 0 or k == len(parts) - 1]  # nothing hangs at the end
+    # Half a block at either end: a mirror in its middle, so that one period is solved for the whole sensor.
+    quarter, end, across = p.period_mm / 4, p.length_mm, (0, p.width_mm, film, roof)
+    middles = [k * p.period_mm for k in range(ceil(p.cells()) + 1)]
+    blocks = [box(max(x - quarter, 0), min(x + quarter, end), *across) for x in middles if x - quarter < end]
+    gaps = [box(x + quarter, min(x + 3 * quarter, end), *across) for x in middles if x + quarter < end]
     whole = (0, p.length_mm, 0, p.width_mm)
     bodies = (
         Body("bottom_electrode", fill.bottom_electrode, (box(*whole, 0, low),), "bottom"),
         Body("film", fill.film, (box(*whole, low, film),)),
         Body("blocks", fill.dielectric, tuple(blocks)),
-        Body("support", fill.support, tuple(p for p in parts if p not in blocks) if fill.support else ()),
+        Body("support", fill.support, tuple(gaps) if fill.support else ()),
         Body("top_electrode", fill.top_electrode, (box(*whole, roof, top),), "top"),
         Body("isolation", fill.isolation, (box(*whole, top, top + p.isolation_mm),) if p.isolation_mm else ()),
     )

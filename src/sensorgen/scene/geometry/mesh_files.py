@@ -319,8 +319,11 @@ def _volumes(archive: zipfile.ZipFile) -> dict[str, list[tuple[int, int, str]]]:
             last = has["id"]
         elif tag == "volume":
             found.setdefault(last, []).append((int(has["firstid"]), int(has["lastid"]), ""))
-        elif tag == "metadata" and has.get("type") == "volume" and has.get("key") == "name":
-            found[last][-1] = (*found[last][-1][:2], has.get("value", ""))
+        elif tag == "metadata" and has.get("type") == "volume":
+            if has.get("key") == "name":
+                found[last][-1] = (*found[last][-1][:2], has.get("value", ""))
+            elif has.get("key") == "volume_type" and has.get("value") != "ModelPart":
+                raise BadInput("it has modifiers or negative volumes of a slicer; expected solid parts only")
 
     if "Metadata/Slic3r_PE_model.config" in archive.namelist():
         _parse(archive, "Metadata/Slic3r_PE_model.config", start)

@@ -38,7 +38,7 @@ def read(path: Path) -> shapely.Polygon:
         smaller than a sensor can be.
     """
     with reading(path):
-        size = path.stat().st_size
+        size = path.stat().st_size if path.is_file() else 0
     if not 0 < size <= MOST_BYTES:
         raise BadInput(f"{path}: {size} bytes; expected an outline of 1 to {MOST_BYTES} bytes")
     kinds = {".svg": _of_svg, ".dxf": _of_dxf}
@@ -55,7 +55,7 @@ def read(path: Path) -> shapely.Polygon:
             )
     except BadInput as error:
         raise error.within(str(path)) from None
-    moved = shapely.transform(region, lambda points: (points - low).round(6) + 0.0)
+    moved = shapely.transform(region, lambda points: (points - low).round(4) + 0.0)
     return shapely.Polygon(moved.exterior, moved.interiors)
 
 

@@ -11,6 +11,7 @@ from sensorgen.core import files as store
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import BadInput, OutOfRange, Unprintable
 from sensorgen.core.findings import Finding, counted, counts
+from sensorgen.core.parallel import remembered
 from sensorgen.design.design import Design
 from sensorgen.export import threemf
 from sensorgen.export.slicers import TIME_LIMIT_S
@@ -148,6 +149,8 @@ def make(
     force: bool = False,
     strict: bool = False,
     log_head: str = "",
+    jobs: int = 1,
+    cluster: str = "",
     step: Step = lambda _: None,
 ) -> Batch:
     """Write all files of a batch into ``out/<name>``.
@@ -168,6 +171,8 @@ def make(
         Take warnings for errors.
     log_head : str
         Identity of the last record of the log, for the labels.
+    jobs, cluster : int, str
+        Where predictions are worked out, as of :func:`sensorgen.core.parallel.in_parallel`.
     step : callable
         Called with the next step, for a progress display.
 
@@ -185,7 +190,9 @@ def make(
     held = {key: review(design) for key, design in found.designs.items()}
     _refuse_unprintable(found, held, force=force, strict=strict)
     step("predictions")
-    predicted = {key: timeless(evaluate(bodies.estimated(design))) for key, design in found.designs.items()}
+    prints = [(bodies.estimated(design),) for design in found.designs.values()]
+    known = dict(remembered(evaluate, prints, jobs, cluster=cluster))
+    predicted = {key: timeless(known[k]) for k, key in enumerate(found.designs)}
     folder = out / found.plan.name
     with store.staging(folder) as stage:
         step("3MF")

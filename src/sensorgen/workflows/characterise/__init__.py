@@ -1,0 +1,430 @@
+"""From a printer and two materials to a plate of coupons, and from its readings to values that designs can name."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+
+from sensorgen.analysis.characterise import selection
+from sensorgen.analysis.characterise.catalogue import (
+    Coupon,
+    Meters,
+    Target,
+    Unknown,
+    catalogue,
+    targets,
+    unknowns,
+)
+from sensorgen.analysis.characterise.posterior import Interval95, Posterior, physical, posterior, prior
+from sensorgen.checks.review import Step
+from sensorgen.core import files as store
+from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError
+from sensorgen.core.version import __version__
+from sensorgen.design import materials, packs
+from sensorgen.design.design import Design
+from sensorgen.design.materials import own
+from sensorgen.export.slicers.loads import load, recipe
+from sensorgen.workflows.build import json_bytes, profiles, versions
+from sensorgen.workflows.characterise import form as forms
+from sensorgen.workflows.characterise import plate as plates
+from sensorgen.workflows.characterise.intervals import svg
+
+STEPS = ("catalogue", "selection", "3MF", "profiles", "picture", "done")
+MOST, HOURS = 12, 4.0  # coupons with the piece for lines and shorts, and print time
+_SLOWER, _CHANGE_S = 1.15, 20.0  # of a print against its flow; two tool changes of a layer [s]
+_DETERMINED = 0.5  # of an interval before, below which one after counts as measured
+
+
+@dataclass(frozen=True)
+class Row:
+    """A target before and after.
+
+    Attributes
+    ----------
+    quantity, material : str
+        As a material's file has them.
+    value, low, high : float
+        Afterwards: median and 95 % interval.
+    half_width, goal : float
+        Half of the interval, relative to the value, and what is wanted [%].
+    before_low, before_high : float
+        The 95 % interval before.
+    """
+
+    quantity: Annotated[str, Column("quantity")]
+    material: Annotated[str, Column("material")]
+    before_low: Annotated[float, Column("before", digits=2)]
+    before_high: Annotated[float, Column("to", digits=2)]
+    value: Annotated[float, Column("after", digits=3)]
+    low: Annotated[float, Column("low", digits=3)]
+    high: Annotated[float, Column("high", digits=3)]
+    half_width: Annotated[float, Column("+-", "%", digits=2)]
+    goal: Annotated[float, Column("goal", "%", digits=2)]
+    title: Annotated[str, Column("meaning", hidden=True)]
+
+    def determined(self) -> bool:
+        """Whether the readings say more than what was known before."""
+        return self.high - self.low < _DETERMINED * (self.before_high - self.before_low)
+
+
+def rows(before: Posterior, after: Posterior, wanted: Sequence[Target]) -> tuple[Row, ...]:
+    """All targets, with their intervals before and after."""
+
+    def row(target: Target, was: Interval95, now: Interval95) -> Row:
+        goal = 100 * target.goal if target.goal else np.nan
+        half = 100 * now.half_width() if target.goal else np.nan
+        return Row(target.quantity, target.material, was.low, was.high, now.value, now.low, now.high, half, goal,
+                   target.title)  # fmt: skip
+
+    return tuple(row(target, before.interval(target), after.interval(target)) for target in wanted)
+
+
+@dataclass(frozen=True)
+class Study:
+    """A printer and two materials, and all that follows from their sources before anything is measured.
+
+    Attributes
+    ----------
+    design : Design
+        Carries printer, quality, tools and materials.
+    conductor, dielectric : str
+        Names of the materials.
+    """
+
+    design: Design
+    conductor: str
+    dielectric: str
+
+    @classmethod
+    def of(
+        cls, printer: str, names: Sequence[str], *, quality: str = "fine", tools: Mapping[str, int] | None = None
+    ) -> "Study":
+        """Look everything up.
+
+        Raises
+        ------
+        BadInput
+            Not one material that conducts and one that does not.
+        SensorgenError
+            A name that is not known, a material without a tool, or one that the printer cannot print.
+        """
+        loaded = [materials.load(name) for name in names]
+        pairs = [m for m in loaded if m.conductor], [m for m in loaded if not m.conductor]
+        if [len(kind) for kind in pairs] != [1, 1]:
+            given = ", ".join(f"{m.name} ({'conducts' if m.conductor else 'does not conduct'})" for m in loaded)
+            raise BadInput(f"materials are {given or 'none'}; expected one that conducts and one that does not")
+        conductor, dielectric = pairs[0][0].name, pairs[1][0].name
+        return cls(plates.carrier(conductor, dielectric, printer, quality, tools or {}), conductor, dielectric)
+
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """With what the materials' sources say."""
+        pair = materials.load(self.conductor), materials.load(self.dielectric)
+        return unknowns(*pair, self.design.machine.line_mm())
+
+    @cached_property
+    def targets(self) -> tuple[Target, ...]:
+        """What is wanted."""
+        return targets(self.conductor, self.dielectric, self.design.machine.line_mm())
+
+    @cached_property
+    def coupons(self) -> tuple[Coupon, ...]:
+        """All that can be printed."""
+        pair = materials.load(self.conductor), materials.load(self.dielectric)
+        return catalogue(*pair, self.design.machine.line_mm())
+
+    def expected(self) -> dict[str, list[float]]:
+        """Readings at the middle of what the sources say, by coupon [ohm, F, N/m]."""
+        theta = np.array([u.centre for u in self.unknowns])
+        return {
+            c.name: [float(v) for v in c.expected(physical(self.unknowns, theta), {s.key: np.asarray(s.drawn) for s in
+                                                                                   c.sizes})]
+            for c in self.coupons
+        }  # fmt: skip
+
+    def head(self, plate: str) -> dict[str, str]:
+        """First lines of a form."""
+        return {"plate": plate, "printer": self.design.printer, "quality": self.design.quality,
+                "conductor": self.conductor, "dielectric": self.dielectric}  # fmt: skip
+
+    def hours(self, chosen: Sequence[Coupon]) -> float:
+        """Print time, from volumes, flow and tool changes [h]."""
+        machine, layers = self.design.machine, self.design.layers
+        flows = []
+        for name in (self.conductor, self.dielectric):
+            made = recipe(machine, layers, self.design.tool(name), load(self.design, name))
+            flows.append(made.speed_mm_s * made.line_mm * layers.layer_mm)
+        lines = plates.lines_bodies(self.design, self.conductor, self.dielectric)
+        volume = sum(c.volume_mm3 for c in chosen) + sum(body.volume_mm3() for body in lines)
+        tallest = max((_height_mm(c) for c in chosen), default=0.0)
+        return (_SLOWER * volume / min(flows) + _CHANGE_S * tallest / layers.layer_mm) / 3600
+
+
+def _height_mm(coupon: Coupon) -> float:
+    keys = [s.drawn for s in coupon.sizes if s.key == "height_mm" or s.key.startswith("film_")]
+    return max(keys)
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A plate of coupons.
+
+    Attributes
+    ----------
+    name, folder, files : str, Path, tuple of str
+        Of the plate, and what was written.
+    coupons : tuple of str
+        Their names, in the order of the plate.
+    hours : float
+        Print time, estimated [h].
+    rows : tuple of Row
+        Intervals before, and as expected if all coupons are sound.
+    exposed : tuple of (str, str)
+        Coupons without which an interval is beyond three times its goal, with the quantities.
+    """
+
+    name: str
+    folder: Path
+    files: tuple[str, ...]
+    coupons: tuple[str, ...]
+    hours: float
+    rows: tuple[Row, ...]
+    exposed: tuple[tuple[str, str], ...]
+
+    def document(self) -> Iterator[Part]:
+        """Coupons, expected intervals, goals that are missed, and where to go on."""
+        yield f"{self.name}: {len(self.coupons)} coupons, about {self.hours:.1f} h of printing"
+        yield Facts((("coupons", ", ".join(self.coupons)),))
+        yield Table.of("expected", "95 % intervals, before and as expected", self.rows)
+        for row in self.rows:
+            if row.half_width > row.goal * 1.0005:
+                yield f"goal missed: {row.quantity} of {row.material}: {row.half_width:.2g} %, goal {row.goal:g} %"
+        yield from (f"rests on {coupon} alone: {quantities}" for coupon, quantities in self.exposed)
+        yield f"{self.folder}: {len(self.files)} files; fill in form.yaml, then: sensorgen characterise read FORM"
+
+
+def plan(
+    study: Study, out: Path, *, name: str = "", count: int = MOST, hours: float = HOURS,
+    step: Step = lambda _: None,
+) -> Planned:  # fmt: skip
+    """Choose coupons and write all files of their plate into ``out/<name>``.
+
+    Parameters
+    ----------
+    study : Study
+        Printer and materials.
+    out : Path
+        Folder that holds the plates' folders.
+    name : str
+        Of the plate; from the materials unless given.
+    count : int
+        Most coupons, the piece for lines and shorts among them [-].
+    hours : float
+        Longest print [h].
+    step : callable
+        Called with each of ``STEPS``.
+
+    Raises
+    ------
+    OutOfRange
+        Nothing fits on the plate within the print time.
+    Unwritable
+        The place cannot be written to; nothing was written.
+    """
+    if not 2 <= count <= MOST or not 0 < hours < np.inf:
+        raise OutOfRange(f"{count} coupons in {hours:g} h; expected 2 to {MOST} coupons, and a time above 0")
+    step("catalogue")
+    found = selection.candidates(study.coupons, study.unknowns, study.targets, Meters())
+    step("selection")
+
+    def fits(chosen: tuple[int, ...]) -> bool:
+        coupons = [study.coupons[k] for k in chosen]
+        if study.hours(coupons) > hours:
+            return False
+        try:
+            plates.arranged(coupons, study.design)
+        except OutOfRange:
+            return False
+        return True
+
+    chosen = selection.select(found, count - 1, fits)
+    coupons = named([study.coupons[k] for k in chosen])
+    label = name or f"{study.design.machine.name}-{study.conductor}-{study.dielectric}"
+    result = rows(prior(study.unknowns), found.expected(chosen, study.unknowns), study.targets)
+    folder, names = out / label, (study.conductor, study.dielectric)
+    plate = plates.arranged(coupons, study.design)
+    usual = study.expected()
+    expected = {c.name: usual[study.coupons[k].name] for c, k in zip(coupons, chosen, strict=True)}
+    with store.staging(folder) as stage:
+        step("3MF")
+        store.write(stage, dict(plates.threemfs(label, coupons, study.design, plate, names)))
+        step("profiles")
+        store.write(stage, {path: text.encode() for path, text in profiles(study.design).items()})
+        step("picture")
+        texts = {
+            "plate.svg": plates.picture(label, coupons, study.design, plate, names),
+            "form.yaml": forms.blank(study.head(label), coupons, expected),
+            "intervals.svg": svg(f"{label}: expected", result),
+        }
+        store.write(stage, {file: text.encode() for file, text in texts.items()})
+        made = Planned(label, folder, tuple(sorted(store.hashes(stage))), (*(c.name for c in coupons), "lines"),
+                       study.hours(coupons), result, tuple(_exposed(found, chosen, coupons, study)))  # fmt: skip
+        content = {"files": store.hashes(stage), "versions": versions(), "coupons": list(made.coupons)}
+        store.write(stage, {store.MANIFEST: json_bytes(content)})
+        store.publish(stage, folder)
+    step("done")
+    return made
+
+
+def named(coupons: Sequence[Coupon]) -> list[Coupon]:
+    """Coupons with names of their own: copies get a letter."""
+    found: list[Coupon] = []
+    for coupon in coupons:
+        copies = sum(other.name.rpartition("-")[0] == coupon.name or other.name == coupon.name for other in found)
+        found.append(replace(coupon, name=coupon.name + ("" if not copies else f"-{'abcd'[copies]}")))
+    return found
+
+
+def _exposed(
+    found: selection.Candidates, chosen: tuple[int, ...], coupons: Sequence[Coupon], study: Study
+) -> Iterator[tuple[str, str]]:
+    for k, coupon in enumerate(coupons):
+        without = found.expected(chosen[:k] + chosen[k + 1 :], study.unknowns)
+        wide = [
+            t.title for t in study.targets if t.goal and without.interval(t).half_width() > selection.RESERVE * t.goal
+        ]
+        if wide:
+            yield coupon.name, ", ".join(wide)
+
+
+@dataclass(frozen=True)
+class Characterised:
+    """Values from a plate's readings.
+
+    Attributes
+    ----------
+    source : str
+        Name by which designs take them.
+    conductor, dielectric : str
+        Materials that they are of.
+    coupons, readings : int
+        How many were read.
+    rows : tuple of Row
+        Intervals before and after.
+    dead : mapping of str to float
+        Probability that a coupon is broken, where it exceeds one half [-].
+    findings : tuple of str
+        Of lines, shorts and tool offset.
+    file : str or None
+        Where the source is kept.
+    """
+
+    source: str
+    conductor: str
+    dielectric: str
+    coupons: int
+    readings: int
+    rows: tuple[Row, ...]
+    dead: Mapping[str, float]
+    findings: tuple[str, ...]
+    file: str | None = None
+
+    def document(self) -> Iterator[Part]:
+        """Values, coupons that are left out, findings, and how a design takes the values."""
+        yield f"{self.source}: {self.readings} readings of {self.coupons} coupons"
+        yield Table.of("values", "95 % intervals, before and after", self.rows)
+        yield from (f"{name} is left out: dead with probability {share:.0%}" for name, share in self.dead.items())
+        yield from self.findings
+        left = ", ".join(row.quantity for row in self.rows if not row.determined())
+        if left:
+            yield f"not determined: {left}"
+        if self.file:
+            yield f"in {self.file}"
+            yield (
+                f"take them with --material electrode={self.conductor}@{self.source} "
+                f"--material dielectric={self.dielectric}@{self.source}"
+            )
+
+    def text(self) -> str:
+        """The file of the source: YAML."""
+        about = (
+            f"coupons of {self.conductor} and {self.dielectric}: {self.readings} readings of {self.coupons} coupons; "
+            f"95 % intervals; sensorgen {__version__}"
+        )
+        lines = [f"about: {json.dumps(about)}", "materials:"]
+        for material in (self.conductor, self.dielectric):
+            known = [row for row in self.rows if row.material == material and row.determined()]
+            lines += [f"  {material}:{'' if known else ' {}'}"]
+            lines += [
+                f"    {r.quantity}: {{value: {r.value:.6g}, low: {r.low:.6g}, high: {r.high:.6g}, note: "
+                f"{json.dumps(r.title)}}}"
+                for r in known
+            ]
+        lines += [f"# {finding}" for finding in self.findings]
+        return "\n".join(lines) + "\n"
+
+
+def read(path: Path, source: str = "", *, keep: bool = True) -> Characterised:
+    """Evaluate a filled-in form, and keep the values as a source.
+
+    Parameters
+    ----------
+    path : Path
+        Of the form.
+    source : str
+        Name of the source; the plate's with "lab-" before it unless given.
+    keep : bool
+        Write the source's file.
+
+    Raises
+    ------
+    SensorgenError
+        The form or a name in it is wrong; nothing was written.
+    """
+    form = forms.read(path)
+    label = source or "lab-" + "".join(c if c.isalnum() else "-" for c in form.plate.lower()).strip("-")
+    if not packs.is_name("sources", label):
+        raise BadInput(f"--name {label!r}; expected lower-case letters, digits, '.' and '-', as in lab-spool7")
+    try:
+        study = Study.of(form.printer, [form.conductor, form.dielectric], quality=form.quality)
+        piece = forms.lines_of(form)
+        observed = forms.observations(form, study.coupons, study.expected())
+        found = posterior(observed, study.unknowns)
+    except SensorgenError as error:
+        raise error.within(str(path)) from None
+    made = Characterised(
+        label, study.conductor, study.dielectric, sum(bool(o.read.any()) for o in observed),
+        sum(int(o.read.sum()) for o in observed), rows(prior(study.unknowns), found, study.targets), found.dead(),
+        tuple(_findings(piece, study.design.machine.line_mm())),
+    )  # fmt: skip
+    if not keep:
+        return made
+    file = own.path(label)
+    store.replace(file, made.text().encode())
+    return replace(made, file=str(file))
+
+
+def _findings(piece: forms.Lines, line_mm: float) -> Iterator[str]:
+    """Line width, shortest film, smallest distance and tool offset, as far as they were read."""
+    walls = [(k, w) for k, w in enumerate(piece.walls_mm, 1) if w]
+    if len(walls) > 1:
+        lines, widths = np.array(walls, float).T
+        slope, over = np.polyfit(lines, widths, 1)
+        yield f"line width {slope:.3f} mm (set {line_mm:g}); a wall is {over:+.3f} mm wider than its lines"
+    missing = [k for k, w in enumerate(piece.walls_mm, 1) if w == 0]
+    if missing:
+        yield f"walls of {max(missing)} lines or fewer are not printed"
+    for what, short, unit in (("film", piece.films_short, "layers"), ("distance", piece.combs_short, "lines")):
+        tight = [k for k, found in enumerate(short, 1) if found is not None and not any(short[k - 1 :])]
+        if tight:
+            yield f"smallest {what} without a short: {tight[0]} {unit} (one piece each)"
+        elif any(short):
+            yield f"{what}: all are short; expected one that insulates"
+    along = [f"{axis} {value:+.2f} mm" for axis, value in zip("xy", piece.offsets_mm, strict=True) if value is not None]
+    if along:
+        yield f"dielectric's tool against the conductor's: {', '.join(along)} (+-{plates.STEP_MM / 2:g} mm)"

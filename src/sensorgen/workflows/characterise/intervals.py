@@ -1,0 +1,57 @@
+"""Intervals before and after as a picture: one bar each, relative to the value, on a logarithmic axis."""
+
+import html
+from collections.abc import Sequence
+from math import log10
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sensorgen.workflows.characterise import Row
+
+_LEFT, _WIDE, _ROW, _DECADES = 250, 420, 26, 2.0  # pixels, and decades to each side
+
+
+def svg(title: str, rows: "Sequence[Row]") -> str:
+    """The picture; quantities that may be 0 or below are left out.
+
+    Parameters
+    ----------
+    title : str
+        Above the bars.
+    rows : sequence of Row
+        In the order of reading.
+    """
+    shown = [row for row in rows if row.low > 0 and row.before_low > 0]
+    height = 70 + _ROW * len(shown)
+    parts = [_text(10, 20, f"{title} (95 % intervals; grey before, blue after)", 14)]
+    for factor in (0.01, 0.1, 0.5, 1, 2, 10, 100):
+        x = _at(factor)
+        parts.append(f'<path d="M{x:.1f} 34V{height - 24}" stroke="#ccc"/>' + _text(x - 8, height - 8, f"x {factor:g}"))
+    for k, row in enumerate(shown):
+        y = 38 + _ROW * k
+        parts.append(_text(10, y + 14, f"{row.quantity} of {row.material}"))
+        for low, high, colour, thick in (
+            (row.before_low, row.before_high, "#bbb", 14), (row.low, row.high, "#1f5fa8", 8),
+        ):  # fmt: skip
+            left, right = _at(low / row.value), _at(high / row.value)
+            parts.append(
+                f'<rect x="{left:.1f}" y="{y + 10 - thick / 2:g}" width="{max(right - left, 1.5):.1f}" '
+                f'height="{thick}" fill="{colour}"/>'
+            )
+        half = (row.high - row.low) / 2 / row.value
+        parts.append(_text(_LEFT + _WIDE + 12, y + 14, f"{row.value:.3g} +- {100 * half:.2g} %"))
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_LEFT + _WIDE + 150} {height}" '
+        f'width="{_LEFT + _WIDE + 150}" height="{height}">\n<rect width="100%" height="100%" fill="#fff"/>\n'
+        + "\n".join(parts)
+        + "\n</svg>\n"
+    )
+
+
+def _at(factor: float) -> float:
+    """Place of a factor on the axis [px]."""
+    return _LEFT + _WIDE * (0.5 + min(max(log10(factor) / _DECADES, -1.0), 1.0) / 2)
+
+
+def _text(x: float, y: float, words: str, size: int = 12) -> str:
+    return f'<text x="{x:.1f}" y="{y:.1f}" font-family="sans-serif" font-size="{size}">{html.escape(words)}</text>'

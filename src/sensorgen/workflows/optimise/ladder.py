@@ -1,0 +1,135 @@
+"""Knowledge of one design, the least expensive first: design rules, bounds at rest, a coarse mesh, everything."""
+
+import json
+from dataclasses import asdict, dataclass
+from functools import cache as once
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sensorgen.checks.review import review
+from sensorgen.core import cache
+from sensorgen.core.bounds import Bounds
+from sensorgen.core.errors import SensorgenError
+from sensorgen.core.units import M_PER_MM
+from sensorgen.design.body import Body
+from sensorgen.design.design import Design
+from sensorgen.prediction import bodies
+from sensorgen.prediction.compression_law import at_a_few_pressures
+from sensorgen.prediction.identifiability.fisher import bounds, slopes
+from sensorgen.prediction.query import Query
+from sensorgen.prediction.rest_state import rest_state
+from sensorgen.prediction.sensor_model import build_sensor, piece
+from sensorgen.workflows.optimise.target import NUMBERS
+from sensorgen.workflows.trial import Numbers, Trial, trial
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
+
+AT_REST = frozenset({"gap_mm", "capacitance_pf", "top_electrode_ohm", "bottom_electrode_ohm"})
+COARSE = AT_REST | {"force_resolution_n", "position_resolution_mm", "sensitivity_per_kpa"}
+_NO_FOLDER = Path("/dev/null")  # holds no G-code: the print is estimated
+_PA_PER_KPA = 1e3
+
+
+@dataclass(frozen=True)
+class Known:
+    """A number of one design before it is evaluated.
+
+    Attributes
+    ----------
+    lower, upper : float
+        Bounds where they are certified; else both are a value of unknown error [unit of its name].
+    certified : bool
+        Whether they are proven.
+    """
+
+    lower: float
+    upper: float
+    certified: bool
+
+
+def rules(design: Design) -> list[tuple[str, str]]:
+    """Rule and severity of the findings that the design does not waive."""
+
+    def work() -> list[list[str]]:
+        return [[f.rule, f.severity] for f in review(design).findings if not f.waiver]
+
+    waived = [w.model_dump() for w in design.waivers]
+    return [(r, s) for r, s in cache.answer({"what": "rules", "design": design.id(), "waivers": waived}, work)]
+
+
+def known(design: Design, query: Query, solve: bool) -> dict[str, Known]:
+    """Numbers by the least expensive models: certified bounds at rest, and, if ``solve``, under load on a coarse mesh.
+
+    Empty where no model applies, as of a short.
+    """
+    body = bodies.estimated(design)
+    question = {"what": "known", "body": body.identity, "query": asdict(query), "solve": solve}
+
+    def work() -> dict[str, list[float]]:
+        try:
+            return {key: [k.lower, k.upper, float(k.certified)] for key, k in _known(body, query, solve).items()}
+        except SensorgenError:
+            return {}
+
+    found = cache.answer(question, work)
+    return {key: Known(low, high, bool(certified)) for key, (low, high, certified) in found.items()}
+
+
+def _known(body: Body, query: Query, solve: bool) -> dict[str, Known]:
+    rule, gap_mm = next(iter(body.cells.gap_mm.items()))
+    body = body.printed_otherwise(rule)  # the most likely cell alone
+    rest = rest_state(body)
+    numbers = Numbers(
+        Bounds.of(gap_mm * M_PER_MM, "m", certified=True) if 0 < gap_mm < np.inf else None,
+        rest.capacitance, rest.resistance["top"], rest.resistance["bottom"],
+    )  # fmt: skip
+    found = {}
+    for key in AT_REST:
+        value = NUMBERS[key].of(numbers)
+        if value:
+            found[key] = Known(value.model.lower, value.model.upper, value.certified)
+    if not solve:
+        return found
+    load, p = query.load(body.design), body.design.params
+    pressure_pa = load.force_n / (query.tip.length_m * p.width_mm * M_PER_MM)
+    low_pa, high_pa = (_PA_PER_KPA * kpa for kpa in query.range_kpa) if query.range_kpa else (0.0, pressure_pa)
+    law = at_a_few_pressures(body.design, piece(body), rest.answer, max(pressure_pa, high_pa))
+    if law is None:
+        return found
+    sensor = build_sensor(body, law, query.tip, rest=rest).sensor
+    at = slopes(sensor, load.frequency_hz, load.force_n, load.position_m)
+    force_n, position_m, _ = bounds(at, query.noise)
+    low, high = law.compression.capacitive_strain(np.array([low_pa, high_pa]))[0].tolist()
+    rough = {
+        "force_resolution_n": float(force_n), "position_resolution_mm": float(position_m) / M_PER_MM,
+        "sensitivity_per_kpa": ((1 - low) / (1 - high) - 1) / (high_pa - low_pa) * _PA_PER_KPA,
+    }  # fmt: skip
+    return found | {key: Known(value, value, False) for key, value in rough.items() if np.isfinite(value)}
+
+
+def everything(design: Design, query: Query, slicer: str) -> Trial:
+    """The design tried: estimated, or sliced now."""
+    question: dict[str, Any] = {
+        "what": "trial",
+        "design": design.id(),
+        "name": design.name,
+        "query": asdict(query),
+        "slicer": slicer,
+    }
+    question["waivers"] = [w.model_dump() for w in design.waivers]
+
+    def work() -> object:
+        found = trial(design, query, folder=_NO_FOLDER, slicer=slicer, drawn=False)
+        return json.loads(_adapter().dump_json(found))
+
+    return _adapter().validate_json(json.dumps(cache.answer(question, work)))
+
+
+@once
+def _adapter() -> "TypeAdapter[Trial]":
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(Trial)

@@ -1,0 +1,43 @@
+"""The front as one page: every evaluated design in the plane of the first two objectives, and the tables."""
+
+from sensorgen.analysis.plots import pages
+from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, Axis, Curve, Figure, Panel
+from sensorgen.core.bounds import Bounds
+from sensorgen.core.document import Facts, Table, html
+from sensorgen.workflows.optimise.result import Chosen, Optimised
+
+
+def page(found: Optimised) -> str:
+    """A self-contained page; raises MissingValue where Plotly is not installed."""
+    names = [*found.objectives, *({n: 0 for c in found.front for n in c.numbers})]
+    across, up = list(dict.fromkeys(names))[:2] if len(set(names)) > 1 else (names[0], names[0])
+    front = {c.number for c in found.front}
+    groups = (
+        ("leads", BLUE, [c for c in found.front if c.leads]),
+        ("on the front by its interval", ORANGE, [c for c in found.front if not c.leads]),
+        ("evaluated", GREY, [c for c in found.designs if c.numbers and c.number not in front and not c.violated]),
+        ("violates a constraint", "#cc79a7", [c for c in found.designs if c.numbers and c.violated]),
+    )
+    curves = tuple(_points(name, colour, some, across, up) for name, colour, some in groups if _known(some, across, up))
+    panel = Panel(curves, Axis(across, log=True), Axis(up, log=True))
+    alt = f"Evaluated designs by {across} and {up}, with what the models leave open of {across}."
+    figures = [Figure("front", f"{across} and {up} as printed", alt, {"": (panel,)})] if curves else []
+    parts = [part for part in found.document() if isinstance(part, (Table, Facts)) or part]
+    return pages.render(
+        "sensorgen.workflows.optimise", "optimised.html", figures, title=f"Best designs: {found.name}", words=(),
+        content=html(parts),
+    )  # fmt: skip
+
+
+def _known(some: list[Chosen], *keys: str) -> list[Chosen]:
+    return [c for c in some if all(k in c.numbers and c.numbers[k].value > 0 for k in keys)]
+
+
+def _points(name: str, colour: str, some: list[Chosen], across: str, up: str) -> Curve:
+    shown = _known(some, across, up)
+    x: list[Bounds] = [c.numbers[across] for c in shown]
+    return Curve(
+        "points", name, [b.value for b in x], [c.numbers[up].value for c in shown], low=[b.model.lower for b in x],
+        high=[b.model.upper for b in x], colour=colour,
+        text=[f"{c.number}: " + ", ".join(f"{k} {v}" for k, v in c.values.items()) for c in shown],
+    )  # fmt: skip

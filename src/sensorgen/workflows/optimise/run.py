@@ -1,0 +1,48 @@
+"""From a target's file to its answer: table, page, and the files of the designs to print."""
+
+from pathlib import Path
+
+from sensorgen.core import document
+from sensorgen.core import files as store
+from sensorgen.workflows.optimise.page import page
+from sensorgen.workflows.optimise.recommend import recommended
+from sensorgen.workflows.optimise.result import Optimised, Recommended, result
+from sensorgen.workflows.optimise.search import HERE, Progress, Workers, search
+from sensorgen.workflows.optimise.space import candidates
+from sensorgen.workflows.optimise.target import load
+
+
+def optimise(
+    path: Path, out: Path, workers: Workers = HERE, *, keep: bool = True, built: bool = True, sliced: bool = True,
+    progress: Progress = lambda *_: None,
+) -> Optimised:  # fmt: skip
+    """The best printable designs for a target; page, JSON and CSV are written into ``out``.
+
+    Parameters
+    ----------
+    path : Path
+        The target.
+    out : Path
+        Folder of all files.
+    workers, keep, progress
+        As of :func:`sensorgen.workflows.optimise.search.search`.
+    built, sliced : bool
+        Build the recommended designs, and slice them.
+
+    Raises
+    ------
+    SensorgenError
+        A target that is none, or an empty or too large space; a cluster that goes away.
+    """
+    target, name = load(path), path.stem
+    found = search(target, candidates(target, path.parent), workers, keep=keep, progress=progress)
+    chosen: tuple[Recommended, ...] = ()
+    if built and found.front:
+        chosen = recommended(
+            name, found, out, workers, keep=keep, sliced=sliced, step=lambda role: progress(role, 0, 1)
+        )  # fmt: skip
+    answer = result(name, found, chosen)
+    store.replace(out / f"{name}.html", page(answer).encode())
+    store.replace(out / f"{name}.json", document.to_json(answer).encode())
+    store.replace(out / f"{name}.csv", "".join(answer.csv()).encode())
+    return answer

@@ -1,0 +1,151 @@
+"""The designs of a target: every combination of its values, heights in layers and widths in half lines."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from itertools import product
+from math import ceil, floor, prod
+from pathlib import Path
+from typing import Any
+
+from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
+from sensorgen.design.design import Design, make, with_own_files
+from sensorgen.workflows.compensation import levels
+from sensorgen.workflows.optimise.target import Range, Target
+
+MOST = 20_000  # designs: their checks alone take half an hour on two cores
+_NEAR = 1e-9
+Value = float | str
+Data = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A design of the space.
+
+    Attributes
+    ----------
+    values : dict of str to float or str
+        Of the parameters that are varied.
+    design : Design or None
+        None where there is no such design.
+    reason : str
+        Why there is none, or "".
+    """
+
+    values: dict[str, Value]
+    design: Design | None
+    reason: str = ""
+
+
+def candidates(target: Target, folder: Path = Path()) -> list[Candidate]:
+    """Every design of a target.
+
+    Parameters
+    ----------
+    target : Target
+        Its base design and the values that it takes.
+    folder : Path
+        Of the target's file, from which files of materials, printers and shapes are seen.
+
+    Raises
+    ------
+    UnknownName
+        A parameter that neither the shape nor a design file has.
+    BadInput
+        No design at all, or more than ``MOST``.
+    """
+    base = dict(target.design) if isinstance(target.design, Mapping) else {}
+    base = with_own_files({k: v for k, v in base.items() if k != "name"}, folder)
+    known = asdict(make(base).params)
+    for key in target.parameters:
+        if key not in known and key.partition(".")[0] not in Design.model_fields:
+            raise UnknownName(
+                "parameter to vary", key, [*known, "quality", "materials.film", "orientation", "nozzle_mm"]
+            )
+        if isinstance(target.parameters[key], Range) and key not in known and target.parameters[key].step is None:  # type: ignore[union-attr]
+            raise BadInput(f"parameters.{key}: a range without a step; only lengths of the shape have a printable grid")
+    # the grid of a length follows from quality, printer and nozzle: those are chosen first
+    outer = {k: v for k, v in target.parameters.items() if k not in known}
+    inner = {k: v for k, v in target.parameters.items() if k in known}
+    spaces = [(chosen, {k: _values(k, v, with_own_files(_with(base, known, chosen), folder)) for k, v in inner.items()})
+              for chosen in _combinations({k: _listed(v) for k, v in outer.items()})]  # fmt: skip
+    size = sum(prod(len(values) for values in space.values()) for _, space in spaces)
+    if size > MOST:
+        longest = max(((len(v), k) for _, space in spaces for k, v in space.items()), default=(0, ""))
+        raise BadInput(
+            f"{size:.3g} designs; expected at most {MOST}: give a larger step, narrower ranges or fewer choices "
+            f"({longest[1]} alone has {longest[0]} values)"
+        )
+    if not size:
+        empty = sorted(
+            {k for _, space in spaces for k, values in space.items() if not values}
+            | {k for k, v in outer.items() if not _listed(v)}
+        )
+        raise BadInput(
+            f"no printable value of {', '.join(empty)} in its range: expected a whole layer or half line in it"
+        )
+    return [
+        _candidate(base, known, chosen | inside, folder) for chosen, space in spaces for inside in _combinations(space)
+    ]
+
+
+def _combinations(space: Mapping[str, list[Value]]) -> Iterator[dict[str, Value]]:
+    for values in product(*space.values()):
+        yield dict(zip(space, values, strict=True))
+
+
+def _candidate(base: Data, known: Mapping[str, Any], values: dict[str, Value], folder: Path) -> Candidate:
+    try:
+        return Candidate(values, make(with_own_files(_with(base, known, values), folder)))
+    except SensorgenError as error:
+        return Candidate(values, None, str(error))
+
+
+def _with(base: Data, known: Mapping[str, Any], values: Mapping[str, Value]) -> Data:
+    """The base design as data with other values."""
+    made: Data = {k: dict(v) if isinstance(v, dict) else v for k, v in base.items() if k != "name"}
+    for key, value in values.items():
+        *path, last = ["parameters", key] if key in known else key.split(".")
+        place = made
+        for part in path:
+            place[part] = dict(place.get(part) or {})
+            place = place[part]
+        place[last] = value
+    return made
+
+
+def _listed(given: Range | list[Value]) -> list[Value]:
+    """Choices as written, or numbers by their step."""
+    if isinstance(given, list):
+        return list(dict.fromkeys(given))
+    step = given.step or 1.0
+    return _steps(given.first, step, floor((given.to - given.first) / step + _NEAR) + 1)
+
+
+def _values(key: str, given: Range | list[Value], data: Data) -> list[Value]:
+    """Values of a parameter: on the printable grid where a range has no step."""
+    if isinstance(given, list) or given.step is not None:
+        return _listed(given)
+    step = grid_mm(make(data), key)
+    low, high = ceil(given.first / step - _NEAR), floor(given.to / step + _NEAR)
+    return _steps(low * step, step, high - low + 1)
+
+
+def _steps(first: float, step: float, count: int) -> list[Value]:
+    if count > MOST:
+        raise BadInput(
+            f"{count:.3g} values from {first:g} in steps of {step:g}; expected at most {MOST} designs in all"
+        )
+    return [round(first + k * step, 9) for k in range(count)]
+
+
+def grid_mm(design: Design, key: str) -> float:
+    """Printable step of a length: a layer where it moves a face up or down, else half a line [mm]."""
+    value = float(asdict(design.params)[key])
+    try:
+        data = design.model_dump(mode="json", exclude_unset=True)
+        nudged = make(data | {"parameters": data.get("parameters", {}) | {key: value * 1.01 or 0.01}})
+        is_height = not levels(design) <= levels(nudged)
+    except SensorgenError:
+        is_height = "height" in key
+    return design.layers.layer_mm if is_height else design.machine.line_mm() / 2

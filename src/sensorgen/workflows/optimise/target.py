@@ -1,0 +1,211 @@
+"""A target as it is written, in a YAML file: what to vary, what to reach, and what is not accepted."""
+
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from sensorgen.core import yamlfile
+from sensorgen.core.bounds import Bounds, Interval
+from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
+from sensorgen.core.records import Strict, checked
+from sensorgen.core.units import M_PER_MM
+from sensorgen.design.design import with_own_files
+from sensorgen.export.slicers import SLICERS
+from sensorgen.prediction.query import DEFAULT, FORCE_N, NOISE, TIP_M, Query, Tip
+from sensorgen.workflows.trial import Numbers, Toolpath, Trial
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number that a target may name: its place in a trial, and its unit there over the one in its name."""
+
+    field: str
+    unit: str
+    size: float = 1.0
+    of_path: bool = False
+
+    def of(self, found: Numbers, path: Toolpath | None = None) -> Bounds | None:
+        """Its value with its range, in the unit of its name; None where unknown."""
+        value = getattr(path, self.field, None) if self.of_path else getattr(found, self.field)
+        if value is None:
+            return None
+        bounds = Bounds.of(value, self.unit) if isinstance(value, float) else value
+        return bounds.times(1 / self.size, self.unit)
+
+
+NUMBERS = {
+    "force_resolution_n": Number("force_resolution", "N"),
+    "position_resolution_mm": Number("position_resolution", "mm", M_PER_MM),
+    "force_calibrated_n": Number("force_calibrated", "N"),
+    "position_calibrated_mm": Number("position_calibrated", "mm", M_PER_MM),
+    "force_typical_n": Number("force_typical", "N"),
+    "position_typical_mm": Number("position_typical", "mm", M_PER_MM),
+    "sensitivity_per_kpa": Number("sensitivity", "1/kPa"),
+    "capacitance_pf": Number("capacitance", "pF", 1e-12),
+    "gap_mm": Number("gap", "mm", M_PER_MM),
+    "top_electrode_ohm": Number("top_electrode", "ohm"),
+    "bottom_electrode_ohm": Number("bottom_electrode", "ohm"),
+    "print_time_min": Number("time_s", "min", 60.0, of_path=True),
+    "exposure_mm": Number("exposure_mm", "mm", of_path=True),
+}
+_NOT_PREDICTED = {"hysteresis": "no material file has the viscoelastic data that a model of hysteresis needs"}
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Range(Strict):
+    """Values from one to another: on the printable grid where no step is given."""
+
+    first: Finite = Field(alias="from")
+    to: Finite
+    step: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = Field(
+        default=None, description="If not given, a layer for heights, half a line for widths."
+    )
+
+    @model_validator(mode="after")
+    def _rises(self) -> "Range":
+        if self.to < self.first:
+            raise ValueError(f"from {self.first:g} to {self.to:g} is empty; expected numbers that rise")
+        return self
+
+
+class Near(Strict):
+    """A value to come near."""
+
+    near: Finite
+
+
+class Limit(Strict):
+    """What a number may be, in the unit of its name."""
+
+    least: Finite = -inf
+    most: Finite = inf
+
+    @model_validator(mode="after")
+    def _holds_something(self) -> "Limit":
+        if self.most < self.least:
+            raise ValueError(f"least {self.least:g} and most {self.most:g} contradict each other")
+        return self
+
+    def beyond(self, value: float) -> float:
+        """How far a value is outside, relative to the limit [-]; 0 within."""
+        over = max(self.least - value, value - self.most, 0.0)
+        return over / (abs(self.least if value < self.least else self.most) or 1.0)
+
+
+class Loading(Strict):
+    """The load at which resolutions are stated, and the pressures of the sensitivity."""
+
+    force_n: Annotated[float, Field(gt=0, allow_inf_nan=False)] = FORCE_N
+    position_mm: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = Field(
+        default=None, description="The sensor's middle if not given [mm]."
+    )
+    tip_mm: Annotated[float, Field(gt=0, allow_inf_nan=False)] = TIP_M / M_PER_MM
+    noise: Annotated[float, Field(gt=0, lt=1)] = NOISE
+    pressures_kpa: Annotated[tuple[float, ...], Field(min_length=2, max_length=2, strict=False)] | None = Field(
+        default=None, description="Of the sensitivity; from rest to the load if not given [kPa]."
+    )
+
+
+class Target(Strict):
+    """What the best design is to be best at, and among which designs."""
+
+    design: dict[str, Any] | str = Field(description="The design that is varied, as in a design file; or its file.")
+    parameters: dict[str, Range | list[float | str]] = Field(
+        min_length=1,
+        description="Parameters of the shape, or keys of a design file as materials.film, to their values.",
+    )
+    objectives: dict[str, Literal["minimise", "maximise"] | Near] = Field(min_length=1)
+    limits: dict[str, Limit] = Field(default={}, description="Of numbers, as printed.")
+    refuse_warnings: tuple[str, ...] = Field(
+        default=(), strict=False, description="Rules whose warnings are refused as errors are: 2-film."
+    )
+    accept_doubts: tuple[str, ...] = Field(
+        default=(), strict=False, description="Parts of doubts that are accepted; a design with another one is out."
+    )
+    load: Loading = Loading()
+    slicer: Literal["", "prusa", "cura"] = Field(
+        default="", description="Slice every design that is evaluated; estimated if not given."
+    )
+    tolerance_mm: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=0.05, description="By which lengths in the plane may differ in print, for the recommended designs [mm]."
+    )
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> "Target":
+        for key in (*self.objectives, *self.limits):
+            word = next((w for w in _NOT_PREDICTED if key.startswith(w)), None)
+            if word:
+                raise ValueError(f"{key}: {_NOT_PREDICTED[word]}; leave it out")
+            if key not in NUMBERS:
+                raise ValueError(str(UnknownName("number", key, NUMBERS)))
+            if NUMBERS[key].of_path and not self.slicer:
+                raise ValueError(f"{key} is known of G-code alone: add slicer: prusa")
+        for key, goal in self.objectives.items():
+            limit = self.limits.get(key, Limit())
+            if isinstance(goal, Near) and limit.beyond(goal.near):
+                raise ValueError(f"{key}: near {goal.near:g} contradicts its limit {limit.least:g} to {limit.most:g}")
+        return self
+
+    def query(self) -> Query:
+        """What is asked of every design."""
+        load = self.load
+        at = None if load.position_mm is None else load.position_mm * M_PER_MM
+        pressures = None if load.pressures_kpa is None else (load.pressures_kpa[0], load.pressures_kpa[1])
+        tip = Tip(load.tip_mm * M_PER_MM)
+        return Query(DEFAULT.frequency_hz, load.force_n, at, tip, noise=load.noise, range_kpa=pressures)
+
+    def badness(self, key: str, value: Interval) -> Interval:
+        """An objective's interval, the lower the better."""
+        goal = self.objectives[key]
+        if goal == "minimise":
+            return value
+        if goal == "maximise":
+            return Interval(-value.upper, -value.lower)
+        ends = [abs(end - goal.near) for end in (value.lower, value.upper)]
+        inside = value.lower <= goal.near <= value.upper
+        return Interval(0.0 if inside else min(ends), max(ends))
+
+    def worth(self, key: str, value: float) -> float:
+        """An objective's badness at one value."""
+        return self.badness(key, Interval(value, value)).lower
+
+    def violated(self, trial: Trial) -> dict[str, float]:
+        """Constraints that a trial violates, and by how much, relative [-]."""
+        found = {f"check {f.rule}": 1.0 for f in trial.findings if self.refuses(f.severity, f.rule)}
+        if trial.status != "predicted":
+            found[trial.status] = 1.0
+        found |= {f"doubt: {d}": 1.0 for d in trial.doubts if not any(part in d for part in self.accept_doubts)}
+        for key, limit in self.limits.items():
+            value = NUMBERS[key].of(trial.printed, trial.toolpath)
+            if value is None or limit.beyond(value.value):
+                found[f"limit {key}"] = 1.0 if value is None else limit.beyond(value.value)
+        unknown = (k for k in self.objectives if NUMBERS[k].of(trial.printed, trial.toolpath) is None)
+        return found | ({f"unknown {key}": 1.0 for key in unknown} if trial.status == "predicted" else {})
+
+    def refuses(self, severity: str, rule: str) -> bool:
+        """Whether a design with such a finding is out."""
+        return severity == "error" or (severity == "warning" and rule in self.refuse_warnings)
+
+
+def load(path: Path) -> Target:
+    """Read a target; its design file is seen from its own folder.
+
+    Raises
+    ------
+    BadInput
+        Not readable, not YAML, or not a target; the message names file and key.
+    """
+    try:
+        target = checked(Target, yamlfile.read(path))
+        if isinstance(target.design, str):
+            file = path.parent / target.design
+            data = with_own_files({k: v for k, v in yamlfile.read(file).items() if k != "name"}, file.parent)
+            target = target.model_copy(update={"design": data})
+    except SensorgenError as error:
+        raise error.within(str(path)) from None
+    if target.slicer and target.slicer not in SLICERS:
+        raise BadInput(f"{path}: slicer {target.slicer!r}; expected one of {', '.join(SLICERS)}")
+    return target

@@ -1,0 +1,95 @@
+"""Works in chunks: a process that dies costs its chunk, a work that kills is named, a cluster does the same."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from sensorgen.core import cache, parallel
+from sensorgen.core.errors import SensorgenError
+from sensorgen.core.parallel import in_parallel, remembered
+
+
+def fatal(number, folder, deaths):
+    """The square; number 3 first ends its process so many times."""
+    dead = len(list(Path(folder).iterdir()))
+    if number == 3 and dead < deaths:
+        (Path(folder) / str(dead)).touch()
+        os._exit(1)
+    return number**2
+
+
+def asked(number):
+    return cache.answer({"what": "square", "number": number}, lambda: number**2)
+
+
+def test_a_death_costs_one_chunk(tmp_path):
+    """One death: the chunk is sent again. Every death: it is divided, and its work alone is lost."""
+    works = [(k, str(tmp_path), 1) for k in range(6)]
+    assert dict(in_parallel(fatal, works, 2)) == {k: k**2 for k in range(6)}
+    works = [(k, str(tmp_path), 99) for k in range(6)]
+    found = dict(in_parallel(fatal, works, 2, lost=lambda k, reason: f"{k}: {reason:.15}"))
+    assert found == {k: k**2 for k in range(6) if k != 3} | {3: "3: a process ended"}
+    with pytest.raises(SensorgenError, match="a process ended before its answer"):
+        dict(in_parallel(fatal, works, 2))
+
+
+def test_a_chunk_that_kills_twice_is_divided():
+    twice = parallel._Chunk((1, 2, 3)).after(1)
+    assert [c.numbers for c in twice] == [(1, 2, 3)]
+    assert [c.numbers for c in twice[0].after(1)] == [(1,), (2,), (3,)]
+    assert twice[0].after(1)[0].after(1) == []
+
+
+def test_works_that_are_stopped_go_on_where_they_were(tmp_path, monkeypatch):
+    monkeypatch.setenv(cache.PLACE, str(tmp_path))
+    works = [(k,) for k in range(6)]
+    first = remembered(asked, works, 1)
+    assert [next(first) for _ in range(4)] == [(k, k**2) for k in range(4)]
+    first.close()
+    with cache.only_known():
+        assert [asked(k) for k in range(3)] == [0, 1, 4]
+    handed = []
+    monkeypatch.setattr(
+        parallel,
+        "in_parallel",
+        lambda w, some, *_, **__: handed.append(len(some)) or ((k, w(*s)) for k, s in enumerate(some)),
+    )
+    assert dict(remembered(asked, works, 1)) == {k: k**2 for k in range(6)}
+    assert handed == [2]
+
+
+def test_a_cluster_that_does_not_answer_is_one_line(monkeypatch):
+    monkeypatch.setattr(parallel, "_CONNECT_S", 0.2)
+    with pytest.raises(SensorgenError, match=r"no Dask scheduler at 'tcp://127.0.0.1:9'") as error:
+        list(in_parallel(divmod, [(7, 2)], 1, cluster="tcp://127.0.0.1:9"))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_dask_cluster_gives_the_same(tmp_path):
+    """Its workers are threads of this process; the scheduler file names it. When it goes away, one line says so."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None, protocol="inproc"
+    ) as cluster:
+        works = [(k, 3) for k in range(40)]
+        assert dict(in_parallel(divmod, works, 1, cluster=cluster.scheduler_address)) == {
+            k: divmod(k, 3) for k in range(40)
+        }
+        with pytest.raises(ZeroDivisionError):
+            dict(in_parallel(divmod, [(1, 0)], 1, cluster=cluster.scheduler_address))
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_that_goes_away_is_one_line(monkeypatch):
+    """Works that are not sent yet can have no result; those that have come are kept."""
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(parallel, "_CONNECT_S", 1.0)
+    cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None)
+    results = in_parallel(divmod, [(k, 3) for k in range(400)], 1, cluster=cluster.scheduler_address)
+    number, found = next(results)
+    assert found == divmod(number, 3)
+    cluster.close()
+    with pytest.raises(SensorgenError, match="no longer answers; results so far are kept"):
+        list(results)

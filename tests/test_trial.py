@@ -1,0 +1,77 @@
+"""One design tried: the verdict is the build's, the numbers are the prediction's, doubts are apart."""
+
+import pickle
+from dataclasses import replace
+
+import pytest
+from pydantic import TypeAdapter
+
+from sensorgen.checks.review import review
+from sensorgen.core import cache
+from sensorgen.core.document import text, to_json
+from sensorgen.core.errors import OutOfRange
+from sensorgen.core.findings import Finding
+from sensorgen.design.design import make
+from sensorgen.prediction import bodies
+from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.query import DEFAULT, Query, Tip
+from sensorgen.workflows.build import build
+from sensorgen.workflows.trial import Trial, trial
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv(cache.PLACE, str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "data", [{"shape": "reference"}, {"shape": "tri", "parameters": {"dielectric_mm": 0.1}}], ids=["plate", "tri"]
+)
+def test_verdict_and_numbers_are_those_of_the_build(data, tmp_path):
+    design = make(data)
+    built = build(design, tmp_path / "files", cad=False, force=True)
+    tried = trial(design)
+    assert tried.verdict == built.verdict
+    assert tried.findings == tuple(f for f in built.findings if not f.waiver)
+    assert tried.printed.capacitance == built.prediction.capacitance
+    assert tried.drawn.force_resolution == built.prediction.drawn.force_resolution
+    assert tried.printed.force_calibrated == built.prediction.identifiability.calibrated.sigma_force_n
+    assert TypeAdapter(Trial).validate_json(to_json(tried)) == tried == pickle.loads(pickle.dumps(tried))
+    assert next(iter(text(tried.document()))).startswith(tried.verdict)
+
+
+def test_a_short_print_changes_the_verdict():
+    found = evaluate(bodies.drawn(make({"shape": "reference"})))
+    short = replace(found, status="short", reason="electrodes touch")
+    assert [f.rule for f in short.with_short(())] == ["1-short"]
+    known = (Finding("1-short", "error", "a", "b", "c"),)
+    assert short.with_short(known) == known
+    assert found.with_short(()) == ()
+
+
+def test_waived_findings_do_not_count():
+    open_, waived = (
+        make({"shape": "reference", "parameters": {"dielectric_mm": 0.1}, "waivers": waivers})
+        for waivers in ([], [{"rule": "2-film", "reason": "a study of pinholes"}])
+    )
+    assert [f.rule for f in review(open_).findings] == ["2-film"]
+    assert (trial(open_).verdict, trial(waived).verdict) == ("PRINT WITH WARNINGS", "PRINT")
+
+
+def test_sensitivity_between_two_pressures():
+    """Of a free plate: C(p) = C / (1 - p / E), so between p and q (E - p) / (E - q) - 1 over q - p."""
+    design, e_kpa = make({"shape": "reference"}), 6e3  # thesis, Table 3.2
+    for low, high in ((0.0, 60.0), (10.0, 30.0)):
+        found = evaluate(bodies.drawn(design), Query(range_kpa=(low, high))).sensitivity
+        assert found.value == pytest.approx(((e_kpa - low) / (e_kpa - high) - 1) / (high - low), rel=1e-9)
+    with pytest.raises(OutOfRange, match="pressures that rise"):
+        Query(range_kpa=(5.0, 5.0))
+
+
+def test_a_tip_over_few_periods_is_doubted():
+    """10 mm over the thesis's 2 mm are five; a tip of 2.5 mm covers one and a quarter."""
+    design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})
+    assert not [d for d in evaluate(bodies.drawn(design)).doubts if "periods" in d]
+    shorter = evaluate(bodies.drawn(design), replace(DEFAULT, tip=Tip(2.5e-3), force_n=1.0))
+    assert [d for d in shorter.doubts if "covers 1.2 periods, less than 1.5" in d]
