@@ -106,6 +106,17 @@ def test_bodies_are_listed_with_a_map_to_start_from(run, models):
 
 
 @pytest.mark.usefixtures("shared_kernel")
+def test_a_round_bump_is_a_body_of_revolution_exactly(run, models):
+    said = run("import", models / "dome.step", *MAP)
+    assert (said.code, said.err) == (0, "")
+    (bump,) = load(Path("dome.yaml")).drawn.body("bump").pieces
+    cap = np.pi * cad_models.RISE_MM**2 * (cad_models.BALL_MM - cad_models.RISE_MM / 3)
+    assert bump.volume_mm3() == pytest.approx(cap, rel=1e-6)
+    assert bump.span("x") == pytest.approx((10 - cad_models.BUMP_MM, 10 + cad_models.BUMP_MM))
+    assert bump.span("z") == pytest.approx((0.6, 1.2))
+
+
+@pytest.mark.usefixtures("shared_kernel")
 def test_triangles_lie_as_near_as_stated(kernel, models):
     for chord in (0.05, 0.002):
         bump = next(body for body in kernel.read_step(models / "dome.step", chord) if body.name == "bump")
