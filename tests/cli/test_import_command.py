@@ -81,7 +81,7 @@ def test_our_own_step_is_the_design_again(run, models, name):
     again, drawn = load(Path(f"{name}.yaml")), make({"shape": name, "parameters": ROUND_TRIP[name]})
     assert again.drawn.size_mm == pytest.approx(drawn.drawn.size_mm, abs=1e-12)
     assert [b.terminal for b in again.drawn.bodies] == [b.terminal for b in drawn.drawn.bodies]
-    assert again.params.period_mm == (2.0 if name == "tri" else None)
+    assert getattr(again.params, "period_mm", None) == (2.0 if name == "tri" else None)
     one, other = (
         capacitance(d.in_use, {v.material: v.value for v in permittivities(d)}, 3e-2, keep=False)
         for d in (again, drawn)
