@@ -1,4 +1,4 @@
-"""Write the pictures of predictions, resolution, sheets and double layers in the docs; run by `make docs`."""
+"""Write the pictures of shapes, predictions, resolution, sheets and double layers in the docs; run by `make docs`."""
 
 import tempfile
 from pathlib import Path
@@ -75,7 +75,27 @@ def touch() -> None:
     drawn.savefig(PICTURES / "stack-touch.png", dpi=110)
 
 
+def shapes() -> None:
+    """Sections of the shapes through the middle of a cell, over two periods, and one plan."""
+    figure = Figure(figsize=(9, 4.2), layout="constrained")
+    colours = {"etpu": "#303436", "x60": "#f2c14e"}
+    shown = [("bump", {}), ("cone", {}), ("pyramid", {"cog": "dielectric"}), ("pillar", {}), ("gaps", {}), ("cog", {}),
+             ("porous", {}), ("tri", {"tip_mm": 0.44}), ("double_tri", {}), ("rect", {"angle_deg": 45.0})]  # fmt: skip
+    for axes, (name, parameters) in zip(figure.subplots(2, 5).flat, shown, strict=True):
+        design = make({"shape": name, "parameters": parameters | {"length_mm": 20.0, "width_mm": 20.0}})
+        period = getattr(design.params, "period_mm", 2.0)
+        seen, at = ("z", 0.95) if name == "rect" else ("y", period / 2)
+        for body in design.in_use.bodies:
+            for outline in (o for piece in body.pieces for o in piece.cut(seen, at)):
+                axes.fill(*zip(*outline, strict=True), color=colours[body.material], lw=0)
+        axes.set(title=name, xlim=(0, 2 * period if seen == "y" else 8.0), ylim=(0, 8.0) if seen == "z" else None)
+        axes.tick_params(labelsize=6)
+    figure.supxlabel("mm; rect in plan, the others in section, heights enlarged", fontsize=8)
+    figure.savefig(PICTURES / "shapes.png", dpi=110)
+
+
 if __name__ == "__main__":
+    shapes()
     for each in SENSORS:
         identifiability(each)
     predictions()

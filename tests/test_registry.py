@@ -10,7 +10,21 @@ from sensorgen.design import shapes
 
 
 def test_names_are_those_of_the_files():
-    assert registry.names(shapes) == ["double", "rect", "reference", "tri"]
+    own = [
+        "bump",
+        "cog",
+        "cone",
+        "double",
+        "double_tri",
+        "gaps",
+        "pillar",
+        "porous",
+        "pyramid",
+        "rect",
+        "reference",
+        "tri",
+    ]
+    assert registry.names(shapes) == own
     assert "columns" in registry.names(models)
 
 
@@ -63,4 +77,4 @@ def test_modules_are_found_by_what_they_define(tmp_path):
     package = type("Package", (), {"__path__": [str(tmp_path)]})
     assert registry.stating(package, "def answer(") == ("two",)
     assert registry.stating(package, "def answ(") == ()
-    assert tuple(models.capacitance_models()) == ("columns", "fem2d", "fem3d", "prisms")
+    assert tuple(models.capacitance_models()) == ("columns", "curved", "fem2d", "fem3d", "prisms")

@@ -271,7 +271,7 @@ def test_designs_that_do_not_fit_their_bodies_are_refused(run, plates, change, l
 def test_the_whole_walk_in_an_empty_folder(run, models, program):
     """From a STEP of another program to a sliced print, with commands alone."""
     program("prusa-slicer", "prusa-slicer")
-    said = run("import", models / "filleted.step", "--map", "pad=x60@1", "--map", "*=etpu@2", "--map", "pad=x60@1")
+    said = run("import", models / "filleted.step", "--map", "pad=x60@1", "--map", "*=etpu@2")
     assert said.code == 0
     assert "30 x 10 x 1.6 mm" in said.words
     assert run("check", "filleted.yaml").code == 0

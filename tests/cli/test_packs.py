@@ -58,7 +58,7 @@ def test_from_an_empty_folder_to_files_for_a_print(run, unpressed):
     for words in (("material", "eel"), ("shape", "zig"), ("printer", "mine"), ("quality", "mid"), ("design", "my")):
         assert run("new", *words).code == 0
     assert run("pack", "test", ".").out == ".: 4 files, no findings\n"
-    assert run("check", "my.yaml").out == "my: no findings\n"
+    assert run("check", "my.yaml").out.startswith("PRINT  my: no findings")
     Path("my.yaml").write_text(DESIGN)
     assert run("check", "my.yaml").code == 0
     said = run("predict", "my.yaml", "--json")
@@ -110,6 +110,15 @@ def test_what_is_wrong_is_said_in_one_line(run, words, expected):
     assert said.code == 2
     assert re.search(expected, said.line)
     assert not list(Path().iterdir())
+
+
+def test_from_another_folder(run, unpressed):
+    """What is beside the design is not beside the working folder."""
+    put(Path("sub"), "material", "eel"), put(Path("sub"), "shape", "zig"), put(Path("sub"), "printer", "mine")
+    Path("sub/my.yaml").write_text(DESIGN)
+    for words in (["check"], ["predict", "--drawn"], ["build", "--no-cad"], ["draw", "-o", "d.svg"]):
+        said = run(words[0], "sub/my.yaml", *words[1:])
+        assert (said.code, said.err) == (0, ""), words
 
 
 def test_an_existing_file_stays(run):

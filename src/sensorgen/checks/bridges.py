@@ -75,6 +75,7 @@ def _grid(
     else:
         x, y = (np.linspace(at[0], at[-1], ceil((at[-1] - at[0]) / step_mm) + 1) for at in (x, y))
     middles = np.meshgrid((x[:-1] + x[1:]) / 2, (y[:-1] + y[1:]) / 2, indexing="ij")
+    shapely.prepare([shape, *ground])
     below = np.any([shapely.contains_xy(region, *middles) for region in ground], axis=0)
     return (x, y), shapely.contains_xy(shape, *middles), below
 
@@ -96,7 +97,21 @@ def _spans(shape: Region, ground: Sequence[Region], least_mm: float) -> dict[str
     lines, filled, below = _grid(shape, ground, least_mm / 2, rectilinear)
     air = filled & ~below
 
+    # Lines that graze round supports miss some of them: no bridge is longer than the widest place without support is
+    # wide, no overhang than its furthest place is away.
+    most = {"bridge": np.inf, "overhang": np.inf, "island": np.inf}
+    if not rectilinear:
+        under = shapely.union_all(ground)
+        places = shapely.get_parts(shapely.difference(shape, under))
+        radii = shapely.length(shapely.maximum_inscribed_circle(places, tolerance=least_mm / 10))
+        corners = shapely.points(np.unique(shapely.get_coordinates(shape).round(9), axis=0))
+        _, away = shapely.STRtree(shapely.get_parts(under)).query_nearest(
+            corners, return_distance=True, all_matches=False
+        )
+        most["bridge"], most["overhang"] = 2 * float(radii.max()), float(away.max())
+
     def note(kind: str, lengths: Real, where: Mask) -> None:
+        lengths = lengths.clip(max=most[kind])
         i, j = np.unravel_index(np.argmax(np.where(where, lengths, 0.0)), where.shape)
         if where[i, j] and lengths[i, j] > found[kind].mm:
             x, y = (float(line[k] + line[k + 1]) / 2 for line, k in zip(lines, (i, j), strict=True))

@@ -91,8 +91,8 @@ command = _PrinterGroup(
     help="""Print test structures (coupons), and turn their readings into material values.
 
     \b
-    sensorgen characterise diabase-h5 etpu x60        a plate, a form, and what they will tell
-    sensorgen characterise read out/NAME/form.yaml    values for designs, as etpu@lab-NAME
+    sensorgen characterise diabase-h5 etpu x60      plate, form, intervals
+    sensorgen characterise read out/NAME/form.yaml  values: etpu@lab-NAME
 
     docs/characterise.md explains the coupons.
     """,

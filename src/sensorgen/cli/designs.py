@@ -140,7 +140,7 @@ _OF_SHAPE = "of_shape_"  # before names of parameters, which a command's own may
 
 def option_of(field: str) -> str:
     """Option for a parameter: ``hang_height_mm`` is ``--hang-height``."""
-    return "--" + field.removesuffix("_mm").replace("_", "-")
+    return "--" + field.removesuffix("_mm").removesuffix("_deg").replace("_", "-")
 
 
 def _parameter_options(params: type, taken: set[str]) -> list[click.Parameter]:
@@ -152,7 +152,7 @@ def _parameter_options(params: type, taken: set[str]) -> list[click.Parameter]:
         options.append(
             click.Option(
                 [option, _OF_SHAPE + field.name],
-                type=OneOf(choices) if choices else Length(),
+                type=OneOf(choices) if choices else click.FLOAT if field.name.endswith("_deg") else Length(),
                 help=f"{field.metadata['help']}  [default: {_plainly(field.default)}]",
             )
         )

@@ -248,11 +248,17 @@ class Design(Strict):
             stuff[name] = self.material(name).model_dump(exclude=_LIMITS) | {"source": source}
         return {
             **self.model_dump(exclude={"name", "parameters", "printer", "quality", "waivers"} | self._plain()),
-            "parameters": dataclasses.asdict(self.params),
+            "parameters": self._decisive_parameters(),
             "materials_values": stuff,
             "printer_values": self.machine.model_dump(exclude=_LIMITS),
             "quality_values": self.layers.model_dump(),
         }
+
+    def _decisive_parameters(self) -> dict[str, Any]:
+        """All parameters but those that their shape got later and that are not used: older designs stay the same."""
+        unused = {f.name for f in dataclasses.fields(self.params)
+                  if f.metadata.get("later") and getattr(self.params, f.name) == f.default}  # fmt: skip
+        return {name: value for name, value in dataclasses.asdict(self.params).items() if name not in unused}
 
     def _plain(self) -> set[str]:
         """Parts that have come later and are not used: without them the identities of older designs last."""
@@ -378,7 +384,8 @@ def _checked(field: dataclasses.Field[Any], value: float | str) -> float | str:
     low, high = field.metadata["range"]
     if isinstance(value, str) or not math.isfinite(value) or not low <= value <= high:
         shown = repr(value) if isinstance(value, str) else f"{value:g}"
-        raise OutOfRange(f"{field.name} is {shown}; expected a number from {low:g} to {high:g} mm")
+        unit = "degrees" if field.name.endswith("_deg") else "mm"
+        raise OutOfRange(f"{field.name} is {shown}; expected a number from {low:g} to {high:g} {unit}")
     return float(value)
 
 

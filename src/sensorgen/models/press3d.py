@@ -38,7 +38,7 @@ _STEP = 1 / 60  # longest load step over the least Young's modulus: 100 kPa for 
 _MOST = 4000  # solid bricks: more would take hours
 _ORDER = 2  # power of the number of pieces with which the mesh's error falls, as another program shows it [-]
 _DOUBT = 0.5  # error of where two meshes lead, over how far that is beyond the finer one; 0.25 was seen [-]
-_OPEN = (1e-4, 1e-3, 1e-2)  # least height of a gap in the field, over that as drawn: to be tried in turn [-]
+_OPEN = (1e-4, 1e-3, 1e-2, 5e-2, 0.15)  # least height of a gap in the field over that as drawn, tried in turn [-]
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from hashlib import sha256
 from itertools import product
@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 from sensorgen.core.errors import BadInput
 from sensorgen.core.files import reading
 from sensorgen.design.body import DRAWN, Body, Cells, Film
-from sensorgen.design.design import Design
+from sensorgen.design.design import Design, make
 from sensorgen.design.walls import WALLS
 from sensorgen.design.walls import rules as wall_rules
+from sensorgen.scene.scene import Prism
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
@@ -31,13 +32,30 @@ def drawn(design: Design) -> Body:
 def _drawn_cells(design: Design) -> Cells:
     if design.border:
         return _inside(design, _drawn_cells(design.unbordered))
-    period, scene = getattr(design.params, "period_mm", None), design.in_use
+    period, (scene, count) = getattr(design.params, "period_mm", None), _one_cell(design)
     conducting = [b.terminal for b in scene.bodies if b.terminal or design.conducts(b.material) for _ in b.pieces]
     if "" in conducting or len(set(conducting)) < len(conducting):  # else each electrode is one piece
         from sensorgen.scene.connections import connected_scene
 
         scene = connected_scene(scene, design.conducts)
-    return Cells({DRAWN: scene}, 1.0, period, partial(_drawn_gap, design))
+    return Cells({DRAWN: scene}, count, period, partial(_drawn_gap, design))
+
+
+def _one_cell(design: Design) -> "tuple[Scene, float]":
+    """What stands for the sensor as drawn, and how many of it there are: one cell of an array that is no prisms.
+
+    Other patterns are whole: models of prisms find the cell, and what the sensor's ends cut off.
+    """
+    scene, params = design.in_use, design.params
+    if all(isinstance(p, Prism) for b in scene.bodies for p in b.pieces):
+        return scene, 1.0
+    from sensorgen.scene.array import ArrayParams
+
+    if not isinstance(params, ArrayParams):
+        return scene, 1.0
+    one = replace(params, length_mm=params.period_mm, width_mm=params.period_mm)
+    cell = make(design.model_dump(exclude_defaults=True, mode="json") | {"parameters": asdict(one)})
+    return cell.in_use, params.cells()
 
 
 def _inside(design: Design, whole: Cells) -> Cells:

@@ -283,6 +283,15 @@ class Loft:
         )
         return Loft(lower, upper, self.bottom_mm, self.top_mm)
 
+    def faces(self) -> list[tuple[Place, ...]]:
+        """Corners of its flat faces, flanks first [mm]."""
+        ends = [[(x, y, z) for x, y in o] for o, z in ((self.lower, self.bottom_mm), (self.upper, self.top_mm))]
+        below, above = ends
+        flanks = [(below[k - 1], below[k], above[k], above[k - 1]) for k in range(len(below))]
+        caps = [end for end, o in zip(ends, (self.lower, self.upper), strict=True) if area_mm2(o) > SLIVER_MM**2]
+        corners = (tuple(dict.fromkeys(face)) for face in (*flanks, *caps))
+        return [face for face in corners if len(face) > 2]
+
     def polyhedron(self) -> Polyhedron:
         """It as a closed surface of triangles."""
         return _of_loft(self)

@@ -21,7 +21,7 @@ from sensorgen.scene.scene import (
     without_straight,
 )
 
-CHORD_MM = 1e-4  # largest distance of a round surface from the chords of its cuts and meshes
+CHORD_MM = 1e-3  # largest distance of a round surface from the chords of its cuts and meshes
 _ARC = pi / 12  # longest arc that a stretched one is made of
 
 
@@ -201,6 +201,10 @@ class Revolved:
         away, along = (self.x_mm, self.y_mm) if axis == "x" else (self.y_mm, self.x_mm)
         halves = _beside_axis(self.outline, self.bulges, rounded(abs(at_mm - away)))
         return [_moved(outline, along, 0.0) for outline in halves]
+
+    def sides(self) -> list[tuple[Point, Point, Point | None]]:
+        """Start and end of each side of the profile, and a point between them of each arc [mm]."""
+        return [(e.start, e.end, e.middle() if e.centre else None) for e in self._edges()]
 
     def profile(self, chord_mm: float) -> list[Point]:
         """Corners of the profile, with those of chords at most ``chord_mm`` from its arcs [mm]."""

@@ -443,10 +443,12 @@ def _material(name: str, folder: Path) -> material_files.Material:
 
 
 def _pairs(words: Sequence[str], form: str) -> list[tuple[str, str]]:
+    """Names and values; a body's own name goes after patterns, so that it decides."""
     for word in words:
         if not all(word.partition("=")[::2]):
             raise BadInput(f"{word!r}: expected {form}")
-    return [(word.partition("=")[0].strip(), word.partition("=")[2].strip()) for word in words]
+    pairs = [(word.partition("=")[0].strip(), word.partition("=")[2].strip()) for word in words]
+    return sorted(pairs, key=lambda pair: not set("*?[") & set(pair[0]))
 
 
 def _matching(pattern: str, names: Sequence[str]) -> list[str]:

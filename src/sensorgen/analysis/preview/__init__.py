@@ -14,7 +14,6 @@ from sensorgen.checks.review import Review, draw
 from sensorgen.core import document
 from sensorgen.core.document import Part
 from sensorgen.core.findings import SEVERITIES, Finding, grouped
-from sensorgen.design import materials
 from sensorgen.prediction.results import Prediction
 from sensorgen.scene.scene import SLIVER_MM
 
@@ -94,7 +93,7 @@ def _bodies(printed: Printed) -> Iterator[BodyShown]:
     """The bodies from the bed upwards, each in a shade of its material's colour."""
     before: list[str] = []
     for body in printed.design.printed.bodies:
-        material = materials.load(body.material)
+        material = printed.design.material(body.material)
         light, dark = shades.shades(material.colour, before.count(body.material))
         before.append(body.material)
         yield BodyShown(

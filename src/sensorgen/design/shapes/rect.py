@@ -11,9 +11,22 @@ cross: all of them are at the top electrode's potential.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from math import ceil
+from math import ceil, cos, floor, radians, sin
 
-from sensorgen.scene.scene import SLIVER_MM, Body, Envelope, Fill, Prism, Scene, box, rounded
+from sensorgen.scene.scene import (
+    SLIVER_MM,
+    Body,
+    Envelope,
+    Fill,
+    Outline,
+    Point,
+    Prism,
+    Scene,
+    area_mm2,
+    box,
+    rectangle,
+    rounded,
+)  # fmt: skip
 
 SHORT = "sq"  # as the thesis's specimens are named: sqXY, sqYX
 
@@ -40,6 +53,10 @@ class Params(Envelope):
         default="xy",
         metadata={"help": "Direction of the upper, then of the lower strips (xy: sqXY).", "choices": ("xy", "yx")},
     )
+    angle_deg: float = field(
+        default=90.0,
+        metadata={"help": "Angle from the lower to the upper strips [degree].", "range": (10.0, 170.0), "later": True},
+    )
 
     @property
     def period_mm(self) -> float:
@@ -64,14 +81,20 @@ def scene(p: Params, fill: Fill) -> Scene:
         return (box(0.0, p.length_mm, 0.0, p.width_mm, z0, z1),) if z1 - z0 > SLIVER_MM else ()
 
     def both(part: str) -> tuple[Prism, ...]:
-        return _strips(p, part, lower, film, middle) + _strips(p, part, upper, middle, roof)
+        return _strips(p, part, lower, film, middle) + upper_strips(part)
+
+    def upper_strips(part: str) -> tuple[Prism, ...]:
+        if p.angle_deg == 90:
+            return _strips(p, part, upper, middle, roof)
+        way = radians(90.0 - p.angle_deg if lower == "y" else p.angle_deg)
+        return tuple(Prism("z", outline, rounded(middle), rounded(roof)) for outline in _slanted(p, part, way))
 
     feet = _strips(p, "x60", lower, film, middle)
     bodies = [
         Body("bottom_electrode", fill.bottom_electrode, plate(0.0, low), "bottom"),
         *_lower(plate(low, film), feet, fill),
         Body("support", fill.support, both("air") if fill.support else ()),
-        Body("hanging_dielectric", fill.dielectric, _strips(p, "x60", upper, middle, roof)),
+        Body("hanging_dielectric", fill.dielectric, upper_strips("x60")),
         Body("top_electrode_with_cogs", fill.top_electrode, both("etpu") + plate(roof, top), "top"),
         Body("isolation", fill.isolation, plate(top, top + p.isolation_mm)),
     ]
@@ -92,16 +115,46 @@ def _strips(p: Params, part: str, direction: str, z0: float, z1: float) -> tuple
     return tuple(box(a, b, 0.0, p.width_mm, z0, z1) for a, b in _places(p, part, p.length_mm))
 
 
-def _places(p: Params, part: str, end_mm: float) -> Iterator[tuple[float, float]]:
-    """Where the strips of a part start and stop, the last one cut at the sensor's end [mm]."""
+def _slanted(p: Params, part: str, way: float) -> Iterator[Outline]:
+    """Outlines of the strips of a part that run at an angle from x, the first edge of one through the corner [mm]."""
+    across = (-sin(way), cos(way))
+    whole = rectangle(0.0, p.length_mm, 0.0, p.width_mm)
+    reach = [x * across[0] + y * across[1] for x, y in whole]
+    for k in range(floor(min(reach) / p.period_mm), ceil(max(reach) / p.period_mm)):
+        for start, stop in _runs(p, part):
+            outline = _beyond(whole, across, k * p.period_mm + start, 1.0)
+            outline = _beyond(outline, across, k * p.period_mm + stop, -1.0)
+            if len(outline) > 2 and area_mm2(outline) > SLIVER_MM:
+                yield outline
+
+
+def _beyond(outline: Outline, across: Point, at_mm: float, side: float) -> Outline:
+    """The part of a convex outline on one side of a line (Sutherland and Hodgman, 1974)."""
+    kept: list[Point] = []
+    away = [side * (x * across[0] + y * across[1] - at_mm) for x, y in outline]
+    for k, (x, y) in enumerate(outline):
+        (u, v), before = outline[k - 1], away[k - 1]
+        if (before > 0) != (away[k] > 0):
+            share = before / (before - away[k])
+            kept.append((rounded(u + share * (x - u)), rounded(v + share * (y - v))))
+        kept += [(x, y)] if away[k] > 0 else []
+    return tuple(point for k, point in enumerate(kept) if point != kept[k - 1])
+
+
+def _runs(p: Params, part: str) -> list[tuple[float, float]]:
+    """Where the strips of a part start and stop in the first period [mm]."""
     etpu, air, x60 = p.etpu_width_mm, p.air_width_mm, p.x60_width_mm
-    runs = {
+    return {
         "etpu": [(0.0, etpu)],
         "x60": [(etpu + air, etpu + air + x60)],
         "air": [(etpu, etpu + air), (etpu + air + x60, p.period_mm)],
-    }
+    }[part]
+
+
+def _places(p: Params, part: str, end_mm: float) -> Iterator[tuple[float, float]]:
+    """Where the strips of a part start and stop, the last one cut at the sensor's end [mm]."""
     for k in range(ceil(end_mm / p.period_mm - 1e-9)):
-        for start, stop in runs[part]:
+        for start, stop in _runs(p, part):
             a, b = rounded(k * p.period_mm + start), min(rounded(k * p.period_mm + stop), end_mm)
             if b - a > SLIVER_MM:
                 yield a, b

@@ -10,117 +10,24 @@ One period, seen along the prisms (e: conductor, x: dielectric, blank: air)::
     eeeeeeeeeeeeeeeeeeee   bottom electrode
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
-from math import ceil
+from dataclasses import dataclass
 
-from sensorgen.core.errors import OutOfRange
-from sensorgen.scene.scene import Body, Envelope, Fill, Outline, Point, Prism, Scene, clipped, rectangle, rounded
+from sensorgen.scene.scene import Body, Fill, Scene, rounded
+from sensorgen.scene.triangles import Frame, TriangleParams, layer_bodies
 
 
 @dataclass(frozen=True)
-class Params(Envelope):
+class Params(TriangleParams):
     """Parameters of the triangular microstructure."""
-
-    period_mm: float = field(default=2.0, metadata={"help": "Period of the pattern.", "range": (0.1, 100.0)})
-    hang_height_mm: float = field(
-        default=0.5, metadata={"help": "Height of the hanging triangles.", "range": (0.01, 10.0)}
-    )
-    lower_height_mm: float = field(
-        default=0.24, metadata={"help": "Height of the triangles on the film.", "range": (0.01, 10.0)}
-    )
-    dielectric_mm: float = field(
-        default=0.2, metadata={"help": "Thickness of the film under the apexes.", "range": (0.0, 10.0)}
-    )
-    along: str = field(
-        default="x",
-        metadata={"help": "Axis along which the pattern repeats (x: triX, y: triY).", "choices": ("x", "y")},
-    )
-
-    def __post_init__(self) -> None:
-        """Refuse triangles that would run into each other."""
-        if self.lower_height_mm >= self.hang_height_mm:
-            raise OutOfRange(
-                f"lower_height_mm {self.lower_height_mm:g} must stay below hang_height_mm "
-                f"{self.hang_height_mm:g}: the triangles would run into each other"
-            )
-
-    def cells(self) -> float:
-        """How many cells of the pattern the sensor holds [-]."""
-        return (self.length_mm if self.along == "x" else self.width_mm) / self.period_mm
 
 
 def scene(p: Params, fill: Fill) -> Scene:
     """Bodies of the triangular sensor."""
-    f = _Frame(p)
+    f = Frame(p, p.electrode_mm)
     bodies = [
         Body("bottom_electrode", fill.bottom_electrode, f.prisms([f.layer(0.0, f.low)]), "bottom"),
-        *_lower(f, fill),
-        Body("support", fill.support, f.prisms(f.air()) if fill.support else ()),
-        Body("hanging_dielectric", fill.dielectric, f.prisms(f.hanging())),
-        Body("top_electrode_with_cogs", fill.top_electrode, f.prisms([f.comb()]), "top"),
+        *layer_bodies(p, fill, f.low),
         Body("isolation", fill.isolation, f.prisms([f.layer(f.top, f.top + p.isolation_mm)]) if p.isolation_mm else ()),
     ]
     size_mm = (p.length_mm, p.width_mm, rounded(f.top + p.isolation_mm))
     return Scene(tuple(bodies), size_mm)
-
-
-def _lower(f: "_Frame", fill: Fill) -> list[Body]:
-    """Film and lower triangles: one body where they are of one material."""
-    if f.film == f.low:
-        return [Body("lower_dielectric", fill.dielectric, f.prisms(f.feet()))]
-    if fill.film == fill.dielectric:
-        return [Body("film_and_lower", fill.film, f.prisms([f.film_with_feet()]))]
-    film = Body("film", fill.film, f.prisms([f.layer(f.low, f.film)]))
-    return [film, Body("lower_dielectric", fill.dielectric, f.prisms(f.feet()))]
-
-
-class _Frame:
-    """Heights and places that the outlines share, and the outlines, not yet cut to the sensor's end [mm]."""
-
-    def __init__(self, p: Params) -> None:
-        self.low = p.electrode_mm
-        self.film = self.low + p.dielectric_mm
-        self.peak = self.film + p.lower_height_mm
-        self.roof = self.film + p.hang_height_mm
-        self.top = self.roof + p.electrode_mm
-        self.quarter = p.period_mm / 4
-        self.end, self.depth = (p.length_mm, p.width_mm) if p.along == "x" else (p.width_mm, p.length_mm)
-        self.axis = "y" if p.along == "x" else "x"
-        # Hanging apexes, first a cog's, then in turn; enough of them to go beyond the end.
-        self.apexes = [(k + 0.5) * p.period_mm / 2 for k in range(2 * ceil(p.cells() - 1e-9) + 1)]
-
-    def prisms(self, outlines: Iterable[Iterable[Point]]) -> tuple[Prism, ...]:
-        """Cut outlines to the sensor and extrude them; what lies beyond its end is left out."""
-        cut = (clipped(outline, self.end) for outline in outlines)
-        return tuple(Prism(self.axis, outline, 0.0, self.depth) for outline in cut if outline)
-
-    def layer(self, z0: float, z1: float) -> Outline:
-        return rectangle(0.0, self.end, z0, z1)
-
-    def triangle(self, apex: float) -> list[Point]:
-        """A hanging triangle."""
-        return [(apex - self.quarter, self.roof), (apex, self.film), (apex + self.quarter, self.roof)]
-
-    def hanging(self) -> list[list[Point]]:
-        return [self.triangle(apex) for apex in self.apexes[1::2]]
-
-    def comb(self) -> list[Point]:
-        """Top electrode with its cogs."""
-        beyond = max(self.end, self.apexes[-1] + self.quarter)
-        teeth = [point for apex in self.apexes[::2] for point in self.triangle(apex)]
-        return [(beyond, self.top), (0.0, self.top), (0.0, self.roof), *teeth, (beyond, self.roof)]
-
-    def feet(self) -> list[list[Point]]:
-        """Triangles on the film, each to the left of a hanging apex."""
-        q = self.quarter
-        return [[(a - 2 * q, self.film), (a, self.film), (a - q, self.peak)] for a in self.apexes]
-
-    def film_with_feet(self) -> list[Point]:
-        teeth = [point for a in reversed(self.apexes) for point in ((a + self.quarter, self.peak), (a, self.film))]
-        return [(0.0, self.low), (teeth[0][0], self.low), *teeth, (self.apexes[0] - self.quarter, self.peak)]
-
-    def air(self) -> list[list[Point]]:
-        """What is left open above each foot."""
-        q = self.quarter
-        return [[(a - 2 * q, self.film), (a - q, self.peak), (a, self.film), (a - q, self.roof)] for a in self.apexes]

@@ -76,6 +76,12 @@ def stacked(
 
 def halves(design: Design) -> list[Design]:
     """A double sensor as the two plates that share its middle electrode; any other design is its own only one."""
+    if design.shape == "double_tri":
+        data = design.model_dump(include={"printer", "quality", "tools", "material_values", "own", "materials"})
+        parameters = dataclasses.asdict(design.params) | {"isolation_mm": 0.0}
+        lower = make(data | {"shape": "tri", "parameters": parameters})
+        upper = data["materials"] | {"bottom_electrode": data["materials"]["top_electrode"]}
+        return [lower, make(data | {"shape": "tri", "parameters": parameters, "materials": upper})]
     if design.shape != "double":
         return [design]
     p = design.params

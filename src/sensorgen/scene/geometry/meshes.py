@@ -15,7 +15,7 @@ from sensorgen.scene.scene import PLANE, Body, Outline, Piece, Prism
 if TYPE_CHECKING:
     from sensorgen.scene.revolved import Revolved
 
-CHORD_MM = 0.005  # of a round body, from the middle of its triangles: less than half of what slicers resolve
+CHORD_MM = 0.01  # of a round body, from the middle of its triangles: less than slicers resolve
 
 
 @dataclass(frozen=True, eq=False)

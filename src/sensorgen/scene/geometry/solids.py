@@ -3,8 +3,8 @@
 Run as a program it is the far end of :class:`sensorgen.scene.geometry.cad.CadProcess`; build123d is imported where it
 is used, because that takes seconds.
 
-One extruded profile per prism, and no fuse: a body of several prisms is one product, a compound under one name and
-colour, even where its boxes touch. One rule for all sizes, exact, and linear in the number of prisms. Fusing a body's
+One solid per piece, and no fuse: a body of several pieces is one product, a compound under one name and
+colour, even where its boxes touch. One rule for all sizes, exact, and linear in the number of pieces. Fusing a body's
 boxes in one go, glued, is exact too and gives one valid solid, but cuts faces up wherever strips cross, for which all
 that follows pays. Crossed strips (``rect``, OCCT 8.0; solids and STEP file together):
 
@@ -34,7 +34,10 @@ from sensorgen.scene.scene import AXES, PLANE, Body, Piece, Point, Prism, Scene
 if TYPE_CHECKING:
     from build123d import Compound, Solid
 
-VOLUME_RATIO = 1e-9  # how far a solid's volume may be from its prism's; the kernel reaches 1e-13
+    from sensorgen.scene.polyhedra import Loft, Polyhedron
+    from sensorgen.scene.revolved import Revolved
+
+VOLUME_RATIO = 1e-9  # how far a solid's volume may be from its piece's; the kernel reaches 1e-13
 TIME_STAMP = "1980-01-01T00:00:00"  # the same in every file, so that a rebuilt file is the same to the byte
 
 _LABEL = re.compile(rb"'@(\d+)@'")
@@ -44,8 +47,8 @@ _ENTITY = re.compile(rb"#(\d+) = (.*?);\n", re.DOTALL)
 _REFERENCE = re.compile(rb"#(\d+)")
 
 
-def solid(prism: Piece) -> "Solid":
-    """The prism as a CAD solid in its place [mm].
+def solid(piece: Piece) -> "Solid":
+    """The piece as a CAD solid in its place [mm]: extruded, revolved with true arcs, or sewn of flat faces.
 
     For axis y the plane (x, z) is left-handed, so the face of an outline looks against its extrusion. The kernel turns
     all faces outwards either way; were they inside out, the volume would be negative.
@@ -55,44 +58,77 @@ def solid(prism: Piece) -> "Solid":
     CadFailed
         The kernel refuses the outline, or makes a solid of another volume of it.
     """
-    from build123d import Face, Solid, Wire
+    from sensorgen.scene.revolved import Revolved
 
-    if not isinstance(prism, Prism):
-        raise CadFailed(f"no CAD solid of a {type(prism).__name__} yet")
-    way = [0.0, 0.0, 0.0]
-    way[AXES.index(prism.axis)] = prism.end_mm - prism.start_mm
     try:
-        corners = [_corner(prism, point) for point in (*prism.outline, prism.outline[0])]
-        face = Face(Wire.make_polygon(corners, close=False))  # True leaves a last edge under 1e-6 mm open
-        made = Solid.extrude(face, tuple(way))
+        if isinstance(piece, Prism):
+            made = _extruded(piece)
+        elif isinstance(piece, Revolved):
+            made = _revolved(piece)
+        else:
+            made = _sewn(piece)
         volume = made.volume
     except Exception as error:  # whatever the kernel throws: Standard_Failure, StdFail_NotDone, ValueError
-        raise CadFailed(f"{_described(prism)}: {error or type(error).__name__}") from error
-    exact = prism.volume_mm3()
+        raise CadFailed(f"{_described(piece)}: {error or type(error).__name__}") from error
+    exact = piece.volume_mm3()
     if not (exact > 0 and abs(volume - exact) <= VOLUME_RATIO * exact):  # so that NaN is caught as well
         raise CadFailed(
-            f"{_described(prism)}: its solid holds {volume:.12g} mm3, its outline {exact:.12g} mm3; an outline runs"
+            f"{_described(piece)}: its solid holds {volume:.12g} mm3, its outline {exact:.12g} mm3; an outline runs"
             " counter-clockwise, does not cross itself, and is no thinner than 1e-7 mm"
         )
     return made
 
 
+def _extruded(prism: Prism) -> "Solid":
+    from build123d import Face, Solid, Wire
+
+    way = [0.0, 0.0, 0.0]
+    way[AXES.index(prism.axis)] = prism.end_mm - prism.start_mm
+    corners = [_corner(prism, point) for point in (*prism.outline, prism.outline[0])]
+    face = Face(Wire.make_polygon(corners, close=False))  # True leaves a last edge under 1e-6 mm open
+    return Solid.extrude(face, tuple(way))
+
+
+def _revolved(piece: "Revolved") -> "Solid":
+    from build123d import Axis, Edge, Face, Solid, Wire
+
+    edges = []
+    for start, end, middle in piece.sides():
+        a, b, between = ((piece.x_mm + r, piece.y_mm, z) for r, z in (start, end, middle or start))
+        edges.append(Edge.make_three_point_arc(a, between, b) if middle else Edge.make_line(a, b))
+    return Solid.revolve(Face(Wire(edges)), 360.0, Axis((piece.x_mm, piece.y_mm, 0.0), (0.0, 0.0, 1.0)))
+
+
+def _sewn(piece: "Loft | Polyhedron") -> "Solid":
+    from build123d import Face, Shell, Solid, Wire
+
+    from sensorgen.scene.polyhedra import Loft
+
+    if isinstance(piece, Loft):
+        rings = piece.faces()
+    else:
+        rings = [tuple(piece.vertices[number] for number in triangle) for triangle in piece.triangles]
+    faces = [Face(Wire.make_polygon((*ring, ring[0]), close=False)) for ring in rings]
+    made = Solid(Shell(faces))
+    return made if made.volume > 0 else Solid(made.wrapped.Reversed())
+
+
 def part(body: Body) -> "Solid | Compound":
-    """The body as one solid, or as a compound of the solids of its prisms; labelled with its name.
+    """The body as one solid, or as a compound of the solids of its pieces; labelled with its name.
 
     Raises
     ------
     CadFailed
-        One of its prisms cannot be made; the message names body and prism.
+        One of its pieces cannot be made; the message names body and piece.
     """
     from build123d import Compound
 
     solids = []
-    for number, prism in enumerate(body.pieces, 1):
+    for number, piece in enumerate(body.pieces, 1):
         try:
-            solids.append(solid(prism))
+            solids.append(solid(piece))
         except CadFailed as error:
-            place = f"prism {number} of {len(body.pieces)}"
+            place = f"{type(piece).__name__.lower()} {number} of {len(body.pieces)}"
             raise CadFailed(f"the CAD kernel cannot make {body.name} ({body.material}), {place}, {error}") from error
     made = solids[0] if len(solids) == 1 else Compound(solids)
     made.label = body.name
@@ -134,8 +170,9 @@ def write_step(scene: Scene, colours: Mapping[str, str], title: str, path: Path)
     assembly = Compound(children=parts, label=_label(0))
     try:
         path.write_bytes(b"")  # says why it cannot, which the kernel does not
-        # All faces are planes: curves in their parameters would say nothing new, in twice the time and the bytes.
-        export_step(assembly, path, write_pcurves=False, timestamp=TIME_STAMP)
+        # Where all faces are planes, curves in their parameters say nothing new, in twice the time and the bytes.
+        is_round = any(piece.is_round() for body in scene.bodies for piece in body.pieces)
+        export_step(assembly, path, write_pcurves=is_round, timestamp=TIME_STAMP)
         # What differs from run to run is made equal, and bodies get their real names.
         step = path.read_bytes()
         step = _PLACING.sub(rb"\1('\2','@\2@','',\3,\4,$)", step)
@@ -156,9 +193,11 @@ def _corner(prism: Prism, point: Point) -> tuple[float, float, float]:
     return place["x"], place["y"], place["z"]
 
 
-def _described(prism: Prism) -> str:
-    spans = ", ".join(f"{axis} {low:g} to {high:g}" for axis in AXES for low, high in [prism.span(axis)])
-    return f"{len(prism.outline)} corners along {prism.axis} at {spans} mm"
+def _described(piece: Piece) -> str:
+    spans = ", ".join(f"{axis} {low:g} to {high:g}" for axis in AXES for low, high in [piece.span(axis)])
+    if isinstance(piece, Prism):
+        return f"{len(piece.outline)} corners along {piece.axis} at {spans} mm"
+    return f"{type(piece).__name__.lower()} at {spans} mm"
 
 
 def _label(number: int) -> str:

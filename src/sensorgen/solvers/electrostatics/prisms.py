@@ -409,12 +409,12 @@ def _upper(mesh: Mesh, order: int, weight: Real) -> tuple[float, float, float]:
     import ngsolve as ng
 
     space, cell = mesh.netgen, mesh.cell
-    eps, held = _coefficients(mesh)
-    plain = ng.H1(space, order=order, dirichlet=held)
+    eps, names = _coefficients(mesh)
+    plain = ng.H1(space, order=order, dirichlet="|".join(names))
     above = ng.Periodic(plain) if any(cell.periodic) else plain
     u, v = above.TnT()
     form = ng.BilinearForm(eps * ng.grad(u) * ng.grad(v) * ng.dx, symmetric=True, condense=True)
-    upper, potential = _balanced(form, lambda f: f, cell.conductors)
+    upper, potential = balanced(form, lambda f: f, names)
     density = eps * ng.grad(potential) * ng.grad(potential)
     # What the grid may have moved the conductors' upright faces by, to first order
     normal = ng.specialcf.normal(3)
@@ -432,21 +432,21 @@ def _lower(mesh: Mesh, order: int) -> tuple[float, int]:
     import ngsolve as ng
 
     space, cell = mesh.netgen, mesh.cell
-    eps, held = _coefficients(mesh)
+    eps, names = _coefficients(mesh)
     normal = ng.specialcf.normal(3)
-    plain = ng.FacetFESpace(space, order=order - 1, dirichlet=held)
+    plain = ng.FacetFESpace(space, order=order - 1, dirichlet="|".join(names))
     facet = ng.Periodic(plain) if any(cell.periodic) else plain
     below = ng.HDiv(space, order=order - 1, discontinuous=True, hodivfree=True) * ng.L2(space, order=0) * facet
     (d, q, w), (e, r, z) = below.TnT()
     form = ng.BilinearForm(below, symmetric=True, condense=True)
     form += -(d * e / eps - q * ng.div(e) - r * ng.div(d)) * ng.dx
     form += -(w * (e * normal) + z * (d * normal)) * ng.dx(element_boundary=True)
-    lower, found = _balanced(form, lambda f: f.components[2], cell.conductors)
+    lower, found = balanced(form, lambda f: f.components[2], names)
     field = found.components[0]
     energy = ng.Integrate(field * field / eps, space, order=2 * order)
     charges = [
         -ng.Integrate(one.components[2] * (field * normal) * ng.dx(element_boundary=True), space)
-        for one in _indicators(below, lambda f: f.components[2], cell.conductors)
+        for one in indicators(below, lambda f: f.components[2], names)
     ]
     wrong = max(
         abs(energy - lower), abs(charges[TOP] - lower), abs(charges[BOTTOM] + lower), *map(abs, charges[2:]), 0.0
@@ -456,26 +456,36 @@ def _lower(mesh: Mesh, order: int) -> tuple[float, int]:
     return lower, facet.ndof
 
 
-def _coefficients(mesh: Mesh) -> tuple[Any, str]:
-    """Permittivity, and the boundaries at which the potential is held."""
+def _coefficients(mesh: Mesh) -> tuple[Any, list[str]]:
+    """Permittivity, and the boundaries of each conductor."""
     eps = mesh.netgen.MaterialCF({f"d{k}": value for k, value in enumerate(mesh.cell.permittivity)})
-    return eps, "|".join(f"c{k}" for k in range(mesh.cell.conductors))
+    return eps, [f"c{k}" for k in range(mesh.cell.conductors)]
 
 
-def _indicators(space: Any, part: Any, conductors: int) -> list[Any]:
+def indicators(space: Any, part: Any, conductors: Sequence[str]) -> list[Any]:
     """Functions that are 1 on one conductor each."""
     import ngsolve as ng
 
-    mesh, found = space.mesh, [ng.GridFunction(space) for _ in range(conductors)]
-    for k, one in enumerate(found):
-        part(one).Set(ng.CF(1), definedon=mesh.Boundaries(f"c{k}"))
+    mesh, found = space.mesh, [ng.GridFunction(space) for _ in conductors]
+    for name, one in zip(conductors, found, strict=True):
+        part(one).Set(ng.CF(1), definedon=mesh.Boundaries(name))
         values = one.vec.FV().NumPy()
         values[:] = values > _SET  # a constant is 1 in lowest order; where sides repeat, Set averages over too many
     return found
 
 
-def _balanced(form: Any, part: Any, conductors: int) -> tuple[float, Any]:
-    """Energy and function with 1 V on the top electrode, 0 V on the bottom one and no net charge on the others."""
+def balanced(form: Any, part: Any, conductors: Sequence[str]) -> tuple[float, Any]:
+    """Energy and function with 1 V on the top electrode, 0 V on the bottom one and no net charge on the others.
+
+    Parameters
+    ----------
+    form : BilinearForm
+        Of the energy; condensed.
+    part : callable
+        From a function of its space to the part of it that is held on conductors.
+    conductors : sequence of str
+        Boundaries of each.
+    """
     import ngsolve as ng
 
     space = form.space
@@ -483,7 +493,7 @@ def _balanced(form: Any, part: Any, conductors: int) -> tuple[float, Any]:
     with ng.TaskManager():
         form.Assemble()
         inverse = form.mat.Inverse(free, "sparsecholesky")  # slivers take CG with BDDC a thousand iterations
-        found = _indicators(space, part, conductors)[TOP:]
+        found = indicators(space, part, conductors)[TOP:]
         rest = found[0].vec.CreateVector()
         for f in found:
             for _ in range(2):

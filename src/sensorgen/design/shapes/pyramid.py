@@ -1,0 +1,55 @@
+r"""Square pyramids in a square array, apex down: cogs that touch the film at a blunt tip.
+
+One cell, cut through its middle (e: conductor, x: dielectric, blank: air)::
+
+    eeeeeeeeeeeeeeeeeeee   top electrode
+      \eeeeeeeeeeeeee/     pyramid, of the top electrode or of dielectric
+         \eeeeeeee/
+            \ee/           tip
+    xxxxxxxxxxxxxxxxxxxx   film
+    eeeeeeeeeeeeeeeeeeee   bottom electrode
+"""
+
+from dataclasses import dataclass, field
+
+from sensorgen.core.errors import OutOfRange
+from sensorgen.scene.array import ArrayParams, array_scene
+from sensorgen.scene.polyhedra import Loft
+from sensorgen.scene.scene import Fill, Outline, Piece, Scene, rectangle, rounded
+
+
+@dataclass(frozen=True)
+class Params(ArrayParams):
+    """Parameters of the pyramids."""
+
+    root_mm: float = field(
+        default=1.0, metadata={"help": "Side of a pyramid at the top electrode.", "range": (0.02, 100.0)}
+    )
+    tip_mm: float = field(
+        default=0.5, metadata={"help": "Side of its blunt tip; 0 for a sharp one.", "range": (0.0, 100.0)}
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse pyramids that would run into each other, or that grow towards the tip."""
+        self.refuse_wider(self.root_mm)
+        if self.tip_mm > self.root_mm:
+            raise OutOfRange(f"tip_mm {self.tip_mm:g} is wider than root_mm {self.root_mm:g}: expected at most that")
+
+
+def scene(p: Params, fill: Fill) -> Scene:
+    """Bodies of the array of pyramids."""
+
+    def square(x: float, y: float, side: float) -> Outline:
+        half = side / 2
+        return tuple((rounded(u), rounded(v)) for u, v in rectangle(x - half, x + half, y - half, y + half))
+
+    def pyramid(x: float, y: float, z: float) -> list[Piece]:
+        return [Loft(square(x, y, p.tip_mm), square(x, y, p.root_mm), z, rounded(z + p.height_mm))]
+
+    def around(x: float, y: float, z: float) -> list[Piece]:
+        tip, base, cell = (square(x, y, side) for side in (p.tip_mm, p.root_mm, p.period_mm))
+        sides = [((cell[k - 1], cell[k], low[k], low[k - 1]), (cell[k - 1], cell[k], high[k], high[k - 1]))
+                 for k in range(4) for low, high in [(tip, base)]]  # fmt: skip
+        return [Loft(low, high, z, rounded(z + p.height_mm)) for low, high in sides] if p.tip_mm < p.period_mm else []
+
+    return array_scene(p, fill, pyramid, around)

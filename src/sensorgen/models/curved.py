@@ -1,0 +1,181 @@
+"""Finite elements on curved tetrahedra: bounds for bumps, cones, pyramids and other bodies that no other model solves.
+
+The part of a scene between its mirrors is solved by :mod:`sensorgen.solvers.electrostatics.round_bodies` on finer and
+finer meshes. Needs NGSolve. See docs/curved.md.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.util import find_spec
+from itertools import pairwise
+
+import numpy as np
+import shapely
+
+from sensorgen.core.bounds import Interval
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.scene.repetition import Repeat, repeat
+from sensorgen.scene.scene import SLIVER_MM, Piece, Scene
+from sensorgen.solvers.electrostatics import bounds as fem
+from sensorgen.solvers.electrostatics.round_bodies import Cell, bounds
+
+SOURCE = "Dirichlet's and Thomson's principles; curved tetrahedra, H1 and hybrid H(div) by NGSolve"
+COST = 3
+
+WIDTH = 2e-3  # of the interval unless given
+
+_ENDS = ("bottom", "top")
+_CUTS = (0.07, 0.5, 0.93)  # of each layer: heights at which repetition is looked for
+_MOST = 60  # bodies of a cell: more would take hours
+
+
+def why_not_applicable(scene: Scene) -> str | None:
+    """Why the model does not apply to a scene, or None."""
+    if reason := fem.unmirrored(scene):
+        return reason
+    pieces = [piece for body in scene.bodies for piece in body.pieces]
+    if any(all(piece.is_constant(axis) for piece in pieces) for axis in "xyz"):
+        return "its bodies are prisms along one axis: solved by the models of those"
+    if find_spec("ngsolve") is None:
+        return "NGSolve is not installed: pip install 'sensorgen[fem]'"
+    try:
+        cell(scene)
+    except ValueError as error:
+        return str(error)
+    return None
+
+
+@dataclass(frozen=True)
+class Step:
+    """One mesh on the way to an accuracy.
+
+    Attributes
+    ----------
+    order : int
+        Of the potential's polynomials.
+    elements, unknowns : int
+        Tetrahedra and others, and the unknowns that they couple.
+    interval : Interval
+        Capacitance of the whole sensor [F].
+    """
+
+    order: int
+    elements: int
+    unknowns: int
+    interval: Interval
+
+
+def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:
+    """Bounds of the capacitance between the terminals, fringes at the sensor's edge left out.
+
+    Parameters
+    ----------
+    scene : Scene
+        As drawn, for which :func:`why_not_applicable` is None.
+    permittivity : mapping of str to float
+        Relative permittivity of each material that does not conduct, and of "air", above 0 [-].
+    width : float
+        Relative width of the interval; wider where the finest mesh is reached [-].
+
+    Returns
+    -------
+    Interval
+        Capacitance of the whole sensor [F].
+
+    Raises
+    ------
+    OutOfRange
+        A permittivity is not above 0, or the width is.
+    KeyError
+        A material between the electrodes has no permittivity.
+    ValueError
+        The model does not apply to the scene.
+    Unsolved
+        The electrodes touch, one does not cover the sensor, or bodies are too near each other for a mesh.
+    CrossedBounds
+        The lower bound lies above the upper one: a fault of the solver.
+    """
+    fem.check(permittivity, width)
+    return min((step.interval for step in steps(scene, permittivity, width)), key=Interval.width)
+
+
+def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[Step]:
+    """The meshes that :func:`capacitance` goes through, until the interval is narrow enough."""
+    own, x, y = cell(scene)
+    values = [float(permittivity[name]) for name in own.materials]
+    shares = np.outer(x.shares, y.shares)
+    plan = Cell(
+        own.low_mm,
+        own.high_mm,
+        own.pieces,
+        len(_ENDS),
+        values,
+        (x.places_mm[1:-1].tolist(), y.places_mm[1:-1].tolist()),
+        shares,
+    )
+    reached = False
+    try:
+        for level, elements, found in bounds(plan, width):
+            interval = fem.whole(found, shares.ravel().tolist())
+            reached = True
+            yield Step(level.order, elements, found.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
+            if interval.width() <= width:
+                return
+    except fem.Unsolved:
+        if not reached:  # else the mesh before it answers as well as it can
+            raise
+
+
+@dataclass(frozen=True)
+class Window:
+    """Pieces between the mirrors of a scene, as of :class:`Cell`, and the materials of its dielectrics."""
+
+    low_mm: tuple[float, float, float]
+    high_mm: tuple[float, float, float]
+    pieces: tuple[tuple[Piece, int], ...]
+    materials: tuple[str, ...]
+
+
+@lru_cache(maxsize=8)
+def cell(scene: Scene) -> tuple[Window, Repeat, Repeat]:
+    """The cell of a scene, and how it repeats along x and y.
+
+    Raises
+    ------
+    ValueError
+        An electrode is missing, the pattern has no mirrors, or the cell has too many bodies.
+    """
+    spans = {end: [p.span("z") for b in scene.bodies if b.terminal == end for p in b.pieces] for end in _ENDS}
+    if missing := [end for end in _ENDS if not spans[end]]:
+        raise ValueError(f"the scene has no {missing[0]} electrode")
+    levels = sorted(
+        {z for body in scene.bodies for piece in body.pieces for z in (*piece.levels_mm(), *piece.span("z"))}
+    )
+    looks = []
+    for bottom, top in pairwise(levels):
+        for share in _CUTS if top - bottom > SLIVER_MM else ():
+            z, outlines = bottom + share * (top - bottom), dict[tuple[str, str], list[shapely.Polygon]]()
+            for body in scene.bodies:
+                cut = [shapely.Polygon(outline) for piece in body.pieces for outline in piece.cut("z", z)]
+                outlines.setdefault((body.material, body.terminal), []).extend(cut)
+            looks += [shapely.union_all(own) for own in outlines.values() if own]
+    x, y = (repeat(looks, scene.size_mm[:2], axis) for axis in (0, 1))
+    if x.shifts or y.shifts:
+        raise ValueError("the pattern repeats by shifts, not by mirrors")
+    low = (x.low_mm, y.low_mm, min(z for z, _ in spans["bottom"]))
+    high = (x.high_mm, y.high_mm, max(z for _, z in spans["top"]))
+    near = [
+        (body, piece) for body in scene.bodies for piece in body.pieces
+        if all(piece.span(axis)[0] < end - SLIVER_MM and piece.span(axis)[1] > start + SLIVER_MM
+               for axis, start, end in zip("xyz", low, high, strict=True))
+    ]  # fmt: skip
+    if len(near) > _MOST:
+        raise ValueError(f"its cell has {len(near)} bodies; at most {_MOST} are solved")
+    found = {body.material for body, _ in near if not body.terminal} - {"air"}
+    materials = (*sorted(found), "air")
+    kinds = [
+        _ENDS.index(body.terminal) if body.terminal else len(_ENDS) + materials.index(body.material) for body, _ in near
+    ]
+    pieces = tuple((piece, kind) for (_, piece), kind in zip(near, kinds, strict=True))
+    return Window(low, high, pieces, materials), x, y

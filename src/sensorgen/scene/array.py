@@ -1,0 +1,104 @@
+"""Structures in a square array that hang from the top electrode, their tips on a film: what the shapes of it share."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from math import floor
+
+from sensorgen.core.errors import OutOfRange
+from sensorgen.scene.scene import Body, Envelope, Fill, Piece, Prism, Scene, box, rounded
+
+
+@dataclass(frozen=True)
+class ArrayParams(Envelope):
+    """Parameters of every such array."""
+
+    period_mm: float = field(default=1.25, metadata={"help": "Period of the array, both ways.", "range": (0.1, 100.0)})
+    height_mm: float = field(default=0.4, metadata={"help": "Height of a structure.", "range": (0.01, 10.0)})
+    dielectric_mm: float = field(
+        default=0.2, metadata={"help": "Thickness of the film under the tips.", "range": (0.0, 10.0)}
+    )
+    cog: str = field(
+        default="electrode",
+        metadata={"help": "What a structure extends: cogs of the electrode, or a dielectric that carries it.",
+                  "choices": ("electrode", "dielectric")},
+    )  # fmt: skip
+
+    def cells(self) -> float:
+        """How many cells of the pattern the sensor holds [-]."""
+        return self.length_mm * self.width_mm / self.period_mm**2
+
+    def refuse_wider(self, width_mm: float) -> None:
+        """Refuse structures that would run into each other."""
+        if width_mm > self.period_mm:
+            raise OutOfRange(
+                f"a structure {width_mm:g} mm wide does not fit period_mm {self.period_mm:g}: expected at most that"
+            )
+
+
+def array_scene(
+    p: ArrayParams,
+    fill: Fill,
+    structure: Callable[[float, float, float], Sequence[Piece]],
+    around: Callable[[float, float, float], Sequence[Piece]],
+) -> Scene:
+    """Bodies of an array of whole cells in the middle of the sensor; of no cell in one shorter than a period.
+
+    Parameters
+    ----------
+    p, fill
+        Of the shape.
+    structure, around : callable
+        Pieces of one structure, and of what is left open around it in its cell, from the middle of its tip, x, y and z
+        [mm].
+    """
+    low, film = p.electrode_mm, p.electrode_mm + p.dielectric_mm
+    roof, top = film + p.height_mm, film + p.height_mm + p.electrode_mm
+    counts = [floor(size / p.period_mm + 1e-9) for size in (p.length_mm, p.width_mm)]
+    starts = [(size - n * p.period_mm) / 2 for size, n in zip((p.length_mm, p.width_mm), counts, strict=True)]
+    places = [
+        (rounded(starts[0] + (i + 0.5) * p.period_mm), rounded(starts[1] + (j + 0.5) * p.period_mm))
+        for i in range(counts[0])
+        for j in range(counts[1])
+    ]
+
+    def plate(z0: float, z1: float) -> tuple[Prism, ...]:
+        return (box(0.0, p.length_mm, 0.0, p.width_mm, z0, z1),) if z1 > z0 else ()
+
+    cogs = tuple(piece for x, y in places for piece in structure(x, y, rounded(film)))
+    is_electrode = p.cog == "electrode"
+    support: list[Piece] = []
+    if fill.support:
+        support = [piece for x, y in places for piece in around(x, y, rounded(film))]
+        (x0, y0), (x1, y1) = starts, (p.length_mm - starts[0], p.width_mm - starts[1])
+        rims = (
+            (0.0, x0, 0.0, p.width_mm),
+            (x1, p.length_mm, 0.0, p.width_mm),
+            (x0, x1, 0.0, y0),
+            (x0, x1, y1, p.width_mm),
+        )
+        support += [box(*rim, film, roof) for rim in rims if rim[1] - rim[0] > 1e-9 and rim[3] - rim[2] > 1e-9]
+    bodies = (
+        Body("bottom_electrode", fill.bottom_electrode, plate(0.0, low), "bottom"),
+        Body("film", fill.film, plate(low, film)),
+        Body("support", fill.support, tuple(support)),
+        Body("hanging_dielectric", fill.dielectric, () if is_electrode else cogs),
+        Body("top_electrode_with_cogs" if is_electrode else "top_electrode", fill.top_electrode,
+             (cogs if is_electrode else ()) + plate(roof, top), "top"),
+        Body("isolation", fill.isolation, plate(top, top + p.isolation_mm)),
+    )  # fmt: skip
+    return Scene(bodies, (p.length_mm, p.width_mm, rounded(top + p.isolation_mm)))
+
+
+def beside_round(x_mm: float, y_mm: float, period_mm: float, z0: float, z1: float) -> list[Piece]:
+    """What of a square cell lies beyond the circle in it, as upright prisms with chords for arcs."""
+    from math import cos, pi, sin
+
+    half, quarter = period_mm / 2, 24
+    arc = [(half * sin(pi / 2 * k / quarter), half * cos(pi / 2 * k / quarter)) for k in range(quarter + 1)]
+    arc[0], arc[-1] = (0.0, half), (half, 0.0)
+    corner = [*arc[::-1], (half, half)]
+    return [
+        Prism("z", tuple((rounded(x_mm + i * u), rounded(y_mm + j * v)) for u, v in corner), z0, z1)
+        for i in (1.0, -1.0)
+        for j in (1.0, -1.0)
+    ]
