@@ -35,10 +35,10 @@ def test_a_death_costs_one_chunk(tmp_path):
 
 
 def test_a_chunk_that_kills_twice_is_divided():
-    twice = parallel._Chunk((1, 2, 3)).after(1)
-    assert [c.numbers for c in twice] == [(1, 2, 3)]
-    assert [c.numbers for c in twice[0].after(1)] == [(1,), (2,), (3,)]
-    assert twice[0].after(1)[0].after(1) == []
+    (twice,) = parallel._Chunk((1, 2, 3)).after_death()
+    assert twice.numbers == (1, 2, 3)
+    assert [c.numbers for c in twice.after_death()] == [(1,), (2,), (3,)]
+    assert twice.after_death()[0].after_death() == []
 
 
 def test_works_that_are_stopped_go_on_where_they_were(tmp_path, monkeypatch):

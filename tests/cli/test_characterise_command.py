@@ -277,6 +277,8 @@ def test_from_plate_to_prediction(planned, study, truth, tmp_path, run):
         ("    vernier_x: ~", "    vernier_x: 7", "whole number from -5 to 5"),
         ("    film_1_short: ~", "    film_1_short: maybe", "expected true, false or ~"),
         ("printer: diabase-h5", "printer: diabase-h6", "unknown printer 'diabase-h6'"),
+        ('{"etpu": 3, "x60": 4}', '{"etpu": 3, "x60": 9}', "has no tool 9"),
+        ('{"etpu": 3, "x60": 4}', "three", "expected each material's tool"),
         ("  resistance_percent: 1", "  resistance_percent: -1", "resistance_percent is -1"),
         ("", "", "no reading in the form"),
     ],

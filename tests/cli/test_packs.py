@@ -112,6 +112,15 @@ def test_what_is_wrong_is_said_in_one_line(run, words, expected):
     assert not list(Path().iterdir())
 
 
+def test_from_another_folder(run, unpressed):
+    """What is beside the design is not beside the working folder."""
+    put(Path("sub"), "material", "eel"), put(Path("sub"), "shape", "zig"), put(Path("sub"), "printer", "mine")
+    Path("sub/my.yaml").write_text(DESIGN)
+    for words in (["check"], ["predict", "--drawn"], ["build", "--no-cad"], ["draw", "-o", "d.svg"]):
+        said = run(words[0], "sub/my.yaml", *words[1:])
+        assert (said.code, said.err) == (0, ""), words
+
+
 def test_an_existing_file_stays(run):
     run("new", "material", "eel")
     Path("materials/eel.yaml").write_text("mine")

@@ -1,14 +1,14 @@
 """Design rule check: exact gap, valid bodies, and the findings of every rule about a design on its printer."""
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 from sensorgen import checks
 from sensorgen.checks import estimate
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Part, comma_separated
 from sensorgen.core.findings import Finding, counted, counts, listed, table
-from sensorgen.design.design import Design, fields
+from sensorgen.design.design import Design
 from sensorgen.design.tower import tower
 from sensorgen.design.walls import rule
 from sensorgen.scene import drawing
@@ -92,7 +92,7 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "") -> Revi
     found = checks.findings(
         scene, design.machine, design.layers, gap_mm, walls or rule("prusa", design.walls), estimate.lines(design)
     ) + _crowding(design)
-    found = [_advised(f, list(fields(design.shape))) for f in found]
+    found = [_advised(f, [p.name for p in fields(design.params)]) for f in found]
     if not any(f.severity == "error" and f.rule != LOST for f in found):
         step("validity")
         advice = "change the parameters; if they make sense, this is a fault of sensorgen: report it"

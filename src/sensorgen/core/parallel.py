@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 CHUNK_S = 1.0  # sending work to a process takes a millisecond, to another computer ten
 _SAFE = "PYTHONSAFEPATH"
-_POLL_S, _CONNECT_S = 1.0, 10.0
+_POLL_S, _CONNECT_S, _ALONE_S = 1.0, 10.0, 60.0
 _DIED = "a process ended before its answer, as when the memory is full: ask for less accuracy, or --jobs 1"
 Result = TypeVar("Result")
 Work = Callable[..., Result]
@@ -64,13 +64,17 @@ def in_parallel(
         spent, done = 0.0, 0
         while todo or again or running:
             while free and (todo or again):
-                size = int(CHUNK_S * done / spent) if spent else 1
-                size = max(1, min(size, len(todo) // (2 * len(lanes))))
-                chunk = again.popleft() if again else _Chunk(tuple(todo.popleft() for _ in range(min(size, len(todo)))))
+                if again and not (lanes[0].shared and (todo or running)):
+                    chunk = again.popleft()
+                elif todo:
+                    size = max(1, min(int(CHUNK_S * done / spent) if spent else 1, len(todo) // (2 * len(lanes))))
+                    chunk = _Chunk(tuple(todo.popleft() for _ in range(size)))
+                else:
+                    break
                 lane = free.pop()
                 running[lane.submit(work, [inputs[k] for k in chunk.numbers])] = lane, chunk
             finished = wait(running, _POLL_S, FIRST_COMPLETED).done
-            lanes[0].check()
+            lanes[0].check(idle=not finished)
             for future in finished:
                 lane, chunk = running.pop(future)
                 free.append(lane)
@@ -78,8 +82,8 @@ def in_parallel(
                     seconds, results = future.result()
                 except lane.deadly:
                     lane.renew()
-                    again.extend(chunk.after(lane.deaths))
-                    if len(chunk.numbers) == 1 and not chunk.after(lane.deaths):
+                    again.extend(chunk.after_death())
+                    if not chunk.after_death():
                         if lost is None:
                             raise SensorgenError(_DIED) from None
                         yield chunk.numbers[0], lost(chunk.numbers[0], _DIED)
@@ -145,11 +149,10 @@ class _Chunk:
     numbers: tuple[int, ...]
     deaths: int = 0
 
-    def after(self, deaths: int) -> "list[_Chunk]":
-        """What to send after more deaths: the same again, its works one by one, or nothing."""
-        deaths += self.deaths
-        if deaths < 2:
-            return [_Chunk(self.numbers, deaths)]
+    def after_death(self) -> "list[_Chunk]":
+        """What to send after another death: the same again, its works one by one, or nothing."""
+        if not self.deaths:
+            return [_Chunk(self.numbers, 1)]
         return [_Chunk((k,), 1) for k in self.numbers] if len(self.numbers) > 1 else []
 
 
@@ -197,7 +200,7 @@ class _Lane(Protocol):
 
     executor: "Executor"
     deadly: tuple[type[BaseException], ...]  # what a future raises whose process has died
-    deaths: int  # of processes, that such an error stands for
+    shared: bool  # whether its process also has other chunks, which die with it: what is sent again is sent alone
 
     def submit(self, work: Work[Result], inputs: Sequence[tuple[Any, ...]]) -> "Future[tuple[float, list[Result]]]":
         """Begin a chunk."""
@@ -205,14 +208,14 @@ class _Lane(Protocol):
     def renew(self) -> None:
         """Go on after a death."""
 
-    def check(self) -> None:
+    def check(self, *, idle: bool) -> None:
         """Raise SensorgenError where no results will come any more."""
 
 
 class _Process:
     """A fresh process, so that solver and CAD kernel never meet in one; alone in its pool, so that it dies alone."""
 
-    deaths = 1
+    shared = False
 
     def __init__(self) -> None:
         from concurrent.futures.process import BrokenProcessPool
@@ -239,7 +242,7 @@ class _Process:
         self.executor.shutdown()
         self.executor = self._made()
 
-    def check(self) -> None:
+    def check(self, *, idle: bool) -> None:
         """A process that has died says so itself."""
 
 
@@ -283,11 +286,12 @@ def _begin() -> None:
 class _Cluster:
     """One of the places of a Dask cluster."""
 
-    deaths = 2  # the scheduler has tried it several times itself
+    shared = True
 
     def __init__(self, client: Any, address: str) -> None:
         from distributed.scheduler import KilledWorker
 
+        self.seen_s = perf_counter()
         self.client, self.address, self.executor = client, address, client.get_executor(pure=False)
         self.deadly: tuple[type[BaseException], ...] = (KilledWorker,)
 
@@ -299,10 +303,19 @@ class _Cluster:
     def renew(self) -> None:
         """The cluster replaces its workers itself."""
 
-    def check(self) -> None:
-        """Raise SensorgenError where the scheduler has gone."""
+    def check(self, *, idle: bool) -> None:
+        """Raise SensorgenError where the scheduler, or for a while every worker, has gone."""
+        if not idle:
+            return
         if self.client.status not in ("running", "connecting"):
             raise gone(self.address)
+        if self.client.nthreads():
+            self.seen_s = perf_counter()
+        elif perf_counter() - self.seen_s > _ALONE_S:
+            raise SensorgenError(
+                f"the Dask cluster {self.address!r} has lost all its workers; results so far are kept: start some, "
+                "and run it again"
+            )
 
 
 def gone(address: str) -> SensorgenError:

@@ -46,9 +46,14 @@ class Filled(Strict):
 
 @dataclass(frozen=True)
 class Params(Envelope):
-    """Size of an imported sensor, and the period of its pattern: those of its bodies, never given."""
+    """Size of an imported sensor: that of its bodies, never given."""
 
-    period_mm: float | None = field(default=None, metadata={"help": "Period of the pattern.", "range": (0.0, 1000.0)})
+
+@dataclass(frozen=True)
+class Patterned(Params):
+    """Size of an imported sensor whose cross-section repeats, and its period."""
+
+    period_mm: float = field(default=0.0, metadata={"help": "Period of the pattern.", "range": (0.0, 1000.0)})
 
 
 @dataclass(frozen=True)
@@ -177,7 +182,7 @@ def params(geometry: str) -> Params:
         return Params(length, width)
     period = 2 * (piece.slices[-1].right_mm - piece.slices[0].left_mm)
     along = length if section.across == "x" else width
-    return Params(length, width, period_mm=round(period, 9) if period <= along / 2 else None)
+    return Patterned(length, width, period_mm=round(period, 9)) if period <= along / 2 else Params(length, width)
 
 
 def scene(geometry: str, filled: Mapping[str, Filled]) -> Scene:

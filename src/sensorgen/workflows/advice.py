@@ -122,7 +122,7 @@ class _Search:
         """Keep a change if its print can sense what the design's can, with no further doubt."""
         self.predicted += 1
         try:
-            made = trial(moves.changed(self.design, changes))
+            made = trial(moves.changed(self.design, changes), drawn=False)
         except SensorgenError:
             return False
         senses = all(min(old, 1) <= new for old, new in zip(grade(self.now), grade(made), strict=True))

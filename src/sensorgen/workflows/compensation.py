@@ -12,7 +12,7 @@ from sensorgen.checks.widths import GAP_CLOSES
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import OutOfRange, SensorgenError
 from sensorgen.design.body import Body
-from sensorgen.design.design import Design, fields, make, name_of
+from sensorgen.design.design import Design, make, name_of
 from sensorgen.scene.layers import faces_mm
 from sensorgen.scene.scene import SLIVER_MM, Envelope
 
@@ -369,7 +369,7 @@ def _heights(design: Design, gap_mm: float) -> list[tuple[dict[str, float], floa
 
 def _widths(design: Design) -> list[str]:
     """Parameters in the plane that may change: the period, else the widths."""
-    if "period_mm" in fields(design.shape):
+    if hasattr(design.params, "period_mm"):
         return ["period_mm"]
     return [name for name, _ in _of_shape(design, "_width_mm")]
 

@@ -24,6 +24,7 @@ from sensorgen.design import materials as material_files
 from sensorgen.scene.geometry import cad, mesh_files, surfaces
 from sensorgen.scene.geometry.mesh_files import FileBody
 from sensorgen.scene.geometry.meshes import Mesh
+from sensorgen.scene.scene import Piece
 
 if TYPE_CHECKING:
     import manifold3d
@@ -299,7 +300,7 @@ def _repaired(name: str, raw: FileBody) -> tuple[ReadBody, list[Finding]]:
         united = surfaces.united(made.shells)
         twice = body.volume_mm3() - sum(shell.volume_mm3() for shell in united)
         if twice > _OVERLAP_MM * float(np.ptp(body.box_mm, axis=0).max()) ** 2:
-            body = replace(body, shells=united)
+            body = replace(body, shells=united, given=replace(raw, revolved=None))
             text = f"parts that overlap by {twice:.3g} mm3 joined"
             findings.append(Finding("11-repaired", "info", name, text, "look whether this is meant"))
     return body, findings
@@ -350,7 +351,8 @@ def _apart(bodies: Sequence[ReadBody]) -> tuple[list[ReadBody], list[Finding]]:
             continue
         large, small = sorted((a, b), key=lambda name: -made[name].volume_mm3())
         solids[large] = solids[large] - solids[small]
-        made[large] = replace(made[large], shells=surfaces.shells_of(solids[large]))
+        cut = replace(made[large].given, revolved=None)
+        made[large] = replace(made[large], shells=surfaces.shells_of(solids[large]), given=cut)
         text = f"{words}, as the triangles of curved faces do: {small} has it"
         findings.append(Finding("11-repaired", "info", f"{a} / {b}", text, "nothing", place_mm=at))
     return list(made.values()), findings
@@ -441,10 +443,12 @@ def _material(name: str, folder: Path) -> material_files.Material:
 
 
 def _pairs(words: Sequence[str], form: str) -> list[tuple[str, str]]:
+    """Names and values; a body's own name goes after patterns, so that it decides."""
     for word in words:
         if not all(word.partition("=")[::2]):
             raise BadInput(f"{word!r}: expected {form}")
-    return [(word.partition("=")[0].strip(), word.partition("=")[2].strip()) for word in words]
+    pairs = [(word.partition("=")[0].strip(), word.partition("=")[2].strip()) for word in words]
+    return sorted(pairs, key=lambda pair: not set("*?[") & set(pair[0]))
 
 
 def _matching(pattern: str, names: Sequence[str]) -> list[str]:
@@ -510,15 +514,11 @@ def write(
         The design is refused, or a file cannot be written.
     """
     from sensorgen.models import capacitance_models
-    from sensorgen.scene.geometry.recognition import pieces
 
     low = np.array([body.box_mm[0] for body in assembly.bodies]).min(0)
     high = np.array([body.box_mm[1] for body in assembly.bodies]).max(0)
     by_height = sorted(assembly.bodies, key=lambda body: body.box_mm[::-1, 2].tolist())
-    found = {
-        b.name: pieces([Mesh(s.vertices_mm - low, s.triangles) for s in b.shells], b.given.rounding_mm)
-        for b in by_height
-    }
+    found = {body.name: _exact(body, low, high) or _flat(body, low) for body in by_height}
     length, width, height = (high - low).round(9).tolist()
     chord = max(body.given.chord_mm for body in assembly.bodies)
     content = imported.text(imported.Bodies(found, (length, width, height), chord, assembly.source))
@@ -540,6 +540,26 @@ def write(
         tuple(f for f in assembly.findings if f.severity != "error"),
         {key: model.why_not_applicable(design.in_use) or "" for key, model in capacitance_models().items()},
     )  # fmt: skip
+
+
+def _exact(body: ReadBody, low: Real, high: Real) -> tuple[Piece, ...]:
+    """A body of revolution in the sensor's coordinates; empty where it is none, or wider than the sensor's box."""
+    found = body.given.revolved
+    if found is None:
+        return ()
+    spans = np.array([found.span(axis) for axis in "xyz"])
+    if (spans[:, 0] < low - 1e-9).any() or (spans[:, 1] > high + 1e-9).any():
+        return ()
+    x, y, z = low.tolist()
+    outline = tuple((r, round(height - z, 9)) for r, height in found.outline)
+    return (replace(found, x_mm=round(found.x_mm - x, 9), y_mm=round(found.y_mm - y, 9), outline=outline),)
+
+
+def _flat(body: ReadBody, low: Real) -> tuple[Piece, ...]:
+    """A body as prisms or polyhedra in the sensor's coordinates."""
+    from sensorgen.scene.geometry.recognition import pieces
+
+    return pieces([Mesh(shell.vertices_mm - low, shell.triangles) for shell in body.shells], body.given.rounding_mm)
 
 
 def _words(design: designs.Design, name: str, own: Sequence[Any]) -> str:

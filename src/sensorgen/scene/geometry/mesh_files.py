@@ -11,6 +11,7 @@ import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.parsers import expat
 
 import numpy as np
@@ -18,6 +19,9 @@ import numpy as np
 from sensorgen.core.arrays import Real, Whole
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.core.files import reading
+
+if TYPE_CHECKING:
+    from sensorgen.scene.revolved import Revolved
 
 UNITS_MM = {"micron": 1e-3, "mm": 1.0, "cm": 10.0, "inch": 25.4, "foot": 304.8, "m": 1000.0}
 MOST_BYTES = 100_000_000  # of a file
@@ -47,6 +51,8 @@ class FileBody:
         Of the file's numbers [mm].
     chord_mm : float
         How far flat faces may lie from the file's curved ones; 0 where it has none [mm].
+    revolved : Revolved or None
+        The body exactly, where it is one of revolution about an upright axis.
     """
 
     name: str
@@ -55,6 +61,7 @@ class FileBody:
     colour: str = ""
     rounding_mm: float = 0.0
     chord_mm: float = 0.0
+    revolved: "Revolved | None" = None
 
 
 def check_size(path: Path) -> None:

@@ -11,6 +11,7 @@ from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
     from sensorgen.scene.geometry.mesh_files import FileBody
+    from sensorgen.scene.revolved import Revolved
 
 _NO_AREA_MM2 = 1e-9
 MOST_ANGLE = 0.3  # between neighbouring triangles of a curved face [rad]
@@ -103,8 +104,42 @@ def _body(shape: Any, name: str, colour: Any, chord_mm: float) -> "FileBody":
     paint = "#" + "".join(f"{round(255 * value):02x}" for value in tuple(colour)[:3]) if colour is not None else ""
     return FileBody(
         name, np.array(points, float).reshape(-1, 3), np.array(triangles, np.int64).reshape(-1, 3), paint, 1e-7,
-        chord_mm if curved else 0.0,
+        chord_mm if curved else 0.0, _revolved(shape) if curved else None,
     )  # fmt: skip
+
+
+def _revolved(shape: Any) -> "Revolved | None":
+    """A part as a body of revolution about an upright axis, where its profile of lines and arcs says that it is one."""
+    from build123d import Face, GeomType, Plane, Pos
+
+    from sensorgen.core.errors import SensorgenError
+    from sensorgen.scene.revolved import Revolved
+
+    box = shape.bounding_box()
+    middle, size = box.center(), box.size
+    if len(shape.solids()) != 1 or abs(size.X - size.Y) > 1e-6:
+        return None
+    half = Pos(middle.X + size.X, middle.Y, middle.Z) * Face.make_rect(2 * size.X, 2 * size.Z, Plane.XZ)
+    cut = shape.solids()[0].intersect(half)
+    faces = cut.faces() if cut is not None else []
+    if len(faces) != 1 or faces[0].inner_wires():
+        return None
+    outline, bulges = [], []
+    for edge in faces[0].outer_wire().order_edges():
+        if edge.geom_type not in (GeomType.LINE, GeomType.CIRCLE):
+            return None
+        ends = [(point.X - middle.X, point.Z) for point in (edge.position_at(k) for k in (0.0, 0.5, 1.0))]
+        (ra, za), (rm, zm), (rb, zb) = ends
+        chord = (rb - ra) ** 2 + (zb - za) ** 2
+        beside = (rb - ra) * (zm - za) - (zb - za) * (rm - ra)
+        outline.append((abs(round(ra, 9)), round(za, 9)))
+        bulges.append(-2 * beside / chord if edge.geom_type == GeomType.CIRCLE and chord > 0 else 0.0)
+    try:
+        made = Revolved(middle.X, middle.Y, tuple(outline), tuple(bulges))
+    except SensorgenError:
+        return None
+    exact = shape.solids()[0].volume
+    return made if abs(made.volume_mm3() - exact) < 1e-6 * exact else None
 
 
 def _refuse_missing(shape: Any, name: str, points: Any, triangles: Any, chord_mm: float) -> None:

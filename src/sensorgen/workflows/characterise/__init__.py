@@ -150,7 +150,8 @@ class Study:
     def head(self, plate: str) -> dict[str, str]:
         """First lines of a form."""
         return {"plate": plate, "printer": self.design.printer, "quality": self.design.quality,
-                "conductor": self.conductor, "dielectric": self.dielectric}  # fmt: skip
+                "conductor": self.conductor, "dielectric": self.dielectric,
+                "tools": json.dumps({m: self.design.tool(m) for m in (self.conductor, self.dielectric)})}  # fmt: skip
 
     def hours(self, chosen: Sequence[Coupon]) -> float:
         """Print time, from volumes, flow and tool changes [h]."""
@@ -391,7 +392,8 @@ def read(path: Path, source: str = "", *, keep: bool = True) -> Characterised:
     if not packs.is_name("sources", label):
         raise BadInput(f"--name {label!r}; expected lower-case letters, digits, '.' and '-', as in lab-spool7")
     try:
-        study = Study.of(form.printer, [form.conductor, form.dielectric], quality=form.quality)
+        names = [form.conductor, form.dielectric]
+        study = Study.of(form.printer, names, quality=form.quality, tools=form.tools)
         piece = forms.lines_of(form)
         observed = forms.observations(form, study.coupons, study.expected())
         found = posterior(observed, study.unknowns)

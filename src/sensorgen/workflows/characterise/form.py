@@ -20,7 +20,7 @@ from sensorgen.models.coupons import secant_stiffening
 from sensorgen.workflows.characterise.plate import COMBS, FILMS, STEP_MM, WALLS
 
 LINES = "lines"
-_HEAD = ("plate", "printer", "quality", "conductor", "dielectric", "meters", "coupons")
+_HEAD = ("plate", "printer", "quality", "conductor", "dielectric", "tools", "meters", "coupons")
 _UNITS = {
     "mm": LENGTH_MM,
     "n": FORCE_N,
@@ -61,6 +61,8 @@ class Form:
     ----------
     plate, printer, quality, conductor, dielectric : str
         As in the form's head.
+    tools : mapping of str to int
+        Material to tool, in the printer's own numbers.
     meters : Meters
         Of the lab.
     coupons : mapping
@@ -72,6 +74,7 @@ class Form:
     quality: str
     conductor: str
     dielectric: str
+    tools: Mapping[str, int]
     meters: Meters
     coupons: Mapping[str, Mapping[str, Any]]
 
@@ -82,7 +85,7 @@ def blank(head: Mapping[str, str], coupons: Sequence[Coupon], expected: Mapping[
     Parameters
     ----------
     head : mapping of str to str
-        Values of plate, printer, quality, conductor and dielectric.
+        Values of plate, printer, quality, conductor, dielectric and tools.
     coupons : sequence of Coupon
         In the order of the plate.
     expected : mapping
@@ -145,8 +148,11 @@ def read(path: Path) -> Form:
         if not isinstance(coupons, Mapping) or any(not isinstance(v, Mapping) for v in coupons.values()):
             raise BadInput("coupons: expected each coupon's name with its readings, as the plate's form has them")
         plate, printer, quality, conductor, dielectric = map(str, names)
+        tools = data.get("tools") or {}
+        if not isinstance(tools, Mapping) or any(type(number) is not int for number in tools.values()):
+            raise BadInput(f"tools is {shown(tools)}; expected each material's tool, as the plate's form has them")
         meters = _meters(data.get("meters") or {})
-        return Form(plate, printer, quality, conductor, dielectric, meters, coupons)
+        return Form(plate, printer, quality, conductor, dielectric, tools, meters, coupons)
     except SensorgenError as error:
         raise error.within(str(path)) from None
 
