@@ -34,7 +34,7 @@ FILES = {
     "huge code point": ('shape: "\\UFFFFFFFF"', "bad.yaml: "),
     "half a code point": ('shape: "\\ud800"', "bad.yaml: "),
     "NUL": ("shape: tri\0", "not YAML: unacceptable character #x0000"),
-    "no shape": ("quality: fine", "shape is missing; expected double, rect, reference, tri"),
+    "no shape": ("quality: fine", "shape is missing; expected bump, cog, cone, double"),
     "empty shape": ("shape:", "shape is None; expected text"),
     "list as shape": ("shape: [tri]", "shape is ['tri']; expected text"),
     "unknown shape": ("shape: trj", "unknown shape 'trj'; did you mean 'tri'?"),

@@ -46,7 +46,7 @@ def nearest(given: str, names: Iterable[str]) -> str:
     """
 
     def words(name: str) -> list[str]:
-        return [word for word in re.split("[^a-z0-9]+", name.lower()) if word]
+        return re.findall("[a-z]+", name.lower())
 
     for near in difflib.get_close_matches(given.lower(), list(names), n=3):
         pairs = list(zip(words(given), words(near), strict=False))
