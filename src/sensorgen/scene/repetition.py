@@ -69,6 +69,8 @@ def repeat(regions: Sequence[Region], size_mm: Sequence[float], axis: int) -> Re
         return Repeat.of(0.0, whole, False, whole)
     lines = _crossings(looks, axis, whole, wide)
     at, kind = max(lines, key=lambda line: len(line[0]))
+    if not len(at):  # a piece that lies between the lines
+        return Repeat.of(0.0, whole, False, whole)
     firsts = [at[kind == k] for k in np.unique(kind)]
     steps = np.unique(np.concatenate([own[1:] - own[0] for own in firsts]).round(9))
     for period in steps[(steps > _SAME_MM) & (steps < whole / 2 + _SAME_MM)].tolist():

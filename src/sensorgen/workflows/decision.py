@@ -243,7 +243,7 @@ def advised(design: Design, made: Trial, budget_s: float, step: Step = lambda _:
     """Changes of a design with findings, tried now or before; None where nothing is to be changed, or nothing known."""
     if made.verdict == "PRINT":
         return None
-    digest = sha256(json.dumps(_adapter(Trial).dump_python(made, mode="json"), sort_keys=True).encode()).hexdigest()
+    digest = sha256(_adapter(Trial).dump_json(made)).hexdigest()
     question = {"advice": _VERSION, "design": design.id(), "trial": digest}
     stored = answers.known(question)
     known: Advice | None = _adapter(Advice).validate_json(json.dumps(stored)) if stored else None
@@ -254,7 +254,7 @@ def advised(design: Design, made: Trial, budget_s: float, step: Step = lambda _:
     from sensorgen.workflows.advice import advise
 
     advice = advise(design, made, budget_s, step)
-    answers.keep(question, _adapter(Advice).dump_python(advice, mode="json"))
+    answers.keep(question, json.loads(_adapter(Advice).dump_json(advice)))
     return advice
 
 

@@ -90,10 +90,10 @@ def _robust(target: Target, row: Row, workers: Workers, *, keep: bool) -> dict[s
         if name.endswith("_mm") and name in target.parameters and target.tolerance_mm:
             if grid_mm(row.design, name) == row.design.layers.layer_mm:
                 continue
-            data = row.design.model_dump(mode="json", exclude_unset=True)
+            data = row.design.model_dump(mode="json", exclude_unset=True, exclude={"name"})
             for sign in (-1, 1):
                 parameters = data.get("parameters", {}) | {name: value + sign * target.tolerance_mm}
-                inputs.append((make(data | {"parameters": parameters, "name": ""}), rules(None)[0], target.query()))
+                inputs.append((make(data | {"parameters": parameters}), rules(None)[0], target.query()))
     attempt = partial(said, one_way, refused=(SensorgenError,))
     found = [
         n
