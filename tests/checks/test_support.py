@@ -21,7 +21,10 @@ def errors(**data):
 @pytest.mark.parametrize("shape", sorted(set(catalogue.shapes().entries) - {"bump", "cone"}))  # round: next test
 def test_with_support_every_shape_prints_either_way(shape, film_mm, orientation, quality):
     films = [f.name for f in fields(registry.load(shapes, shape).Params) if f.name.endswith("dielectric_mm")]
-    given = {"parameters": {**dict.fromkeys(films, film_mm), "length_mm": 12, "width_mm": 6}, "materials": {"support": "bvoh"}}
+    given = {
+        "parameters": {**dict.fromkeys(films, film_mm), "length_mm": 12, "width_mm": 6},
+        "materials": {"support": "bvoh"},
+    }
     assert errors(shape=shape, orientation=orientation, quality=quality, **given) == set()
 
 

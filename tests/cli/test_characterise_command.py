@@ -240,6 +240,9 @@ def test_from_plate_to_prediction(planned, study, truth, tmp_path, run):
     )
     text = text.replace("wall_2_mm: ~", "wall_2_mm: 0.91").replace("film_1_short: ~", "film_1_short: true")
     form.write_text(text.replace("film_2_short: ~", "film_2_short: false"), "utf-8")
+    refused = run("characterise", "read", form, "--name", "thesis-3.2")
+    assert (refused.code, refused.out) == (2, "")
+    assert "ships with sensorgen" in refused.err
     said = run("characterise", "read", form, "--name", "lab-spool7", "--picture", "after.svg")
     assert said.code == 0
     assert (tmp_path / "after.svg").read_text("utf-8").startswith("<svg")

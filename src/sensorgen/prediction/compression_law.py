@@ -44,7 +44,11 @@ _LANDING = f"feet land at negligible force: the rise of C up to {STRESS_PA[1] / 
 _SAME_RATIO = 1e-3  # difference of Poisson's ratios: 0.4999 and 0.5 are one cell, 0.45 deforms by 11 % more
 _ENOUGH = 0.5  # of the last of them: a curve that is known so far is extended [-]
 _ONSET = 0.25  # largest relative error of a curve's onset, on films of 0.02 to 0.2 mm from 0.5 kPa on
-_LIKE = {"press2d": "tri", "press3d": "rect", "press_stairs": "tri"}  # prototypes that other cells are assumed to resemble
+_LIKE = {
+    "press2d": "tri",
+    "press3d": "rect",
+    "press_stairs": "tri",
+}  # prototypes that other cells are assumed to resemble
 
 
 @dataclass(frozen=True)

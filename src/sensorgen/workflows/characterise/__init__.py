@@ -391,6 +391,8 @@ def read(path: Path, source: str = "", *, keep: bool = True) -> Characterised:
     label = source or "lab-" + "".join(c if c.isalnum() else "-" for c in form.plate.lower()).strip("-")
     if not packs.is_name("sources", label):
         raise BadInput(f"--name {label!r}; expected lower-case letters, digits, '.' and '-', as in lab-spool7")
+    if label in materials.shipped_citations():
+        raise BadInput(f"--name {label} is a source that ships with sensorgen; expected another, as lab-spool7")
     try:
         names = [form.conductor, form.dielectric]
         study = Study.of(form.printer, names, quality=form.quality, tools=form.tools)
