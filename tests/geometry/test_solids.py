@@ -55,6 +55,8 @@ def scenes() -> Iterator[Any]:
             label = "-".join((name, *choice.values()))
             yield pytest.param(made, id=label)
             yield pytest.param(made.turned_over(), id=f"{label}-turned")
+        if name == "porous":
+            continue  # its dielectric is whole layers of lines
         films = [f.name for f in fields(shape.Params) if f.name.endswith("dielectric_mm")]
         least = {f.name: f.metadata["range"][0] for f in fields(shape.Params) if f.name in films}
         bare = shape.Params(length_mm=5.3, width_mm=4.7, **least)  # tri: feet touch along edges
