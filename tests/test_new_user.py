@@ -73,7 +73,7 @@ def test_own_cad_to_gcode_and_page(sensorgen, tmp_path, program):
     sensorgen("new", "material", "eel")
     sensorgen("import", "filleted.step", "--map", "pad=x60@1", "--map", "*=eel@2")
     assert sensorgen("check", "filleted.yaml", "--budget", "0").startswith("PRINT")
-    assert "capacitance" in sensorgen("predict", "filleted.yaml")
+    sensorgen("predict", "filleted.yaml")  # no model bounds electrodes of different size: it says so
     sensorgen("slice", "filleted.yaml")
     sensorgen("show", "filleted.yaml", "--no-open", "-o", "own.html")
     assert len((work / "own.html").read_text("utf-8")) < 3_000_000
