@@ -181,6 +181,11 @@ def test_stl_files_are_repaired_and_walk_on(run, plates):
     assert said.code == 0
     assert "a flat opening" in said.words
     design = load(Path("three.yaml"))
+    exact_first = ["--map", "film=x60@1", "--map", "*w=etpu@2", "--map", "up=etpu@2", "--map", "*=x60@1"]
+    assert run("import", *files, "--unit", "mm", "--name", "other", *exact_first).code == 0
+    assert {b.name: b.material for b in load(Path("other.yaml")).drawn.bodies} == {
+        b.name: b.material for b in design.drawn.bodies
+    }
     assert [b.volume_mm3() for b in design.drawn.bodies] == pytest.approx([80.0, 40.0, 80.0])
     eps = {v.material: v.value for v in permittivities(design)}
     plate_f = 8.8541878128e-12 * eps["x60"] * 0.02 * 0.01 / 0.2e-3
@@ -199,6 +204,9 @@ def test_stl_files_are_repaired_and_walk_on(run, plates):
         (["--unit", "mm", *PLATES, "--map", "low=etpu@3"], "etpu is on tools 3 and 2; expected one tool"),
         (["--unit", "mm", *PLATES, "--map", "flim=x60"], "unknown body 'flim'; did you mean 'film'?"),
         (["--unit", "mm", *PLATES, "--map", "film=x60@99"], "tools.x60: diabase-h5 has no tool 99"),
+        (["--unit", "mm", "--map", "*=x60"], "no bottom and no top electrode; conductors: none"),
+        (["--unit", "mm", *PLATES, "--terminal", "film=top"], "--terminal film=top: x60 of film does not conduct"),
+        (["--unit", "mm", *PLATES, "--terminal", "up=bottom"], "no top electrode; conductors: low, up"),
         (["--unit", "mm", *PLATES, "--chord", "5"], "--chord 5: expected 0.0001 to 1 mm"),
     ],
 )

@@ -32,7 +32,7 @@ class Screen:
         """Let xdotool work; what it says."""
         done = subprocess.run(
             [self.xdotool, *map(str, words)], env={**os.environ, "DISPLAY": self.display}, capture_output=True,
-            text=True, check=False,
+            encoding="utf-8", errors="replace", check=False,
         )  # fmt: skip
         return done.stdout.strip()
 

@@ -375,6 +375,11 @@ def parameters(shape_name: str, given: Mapping[str, float | str], text: str | No
     return params
 
 
+def unit_of(parameter: str) -> str:
+    """Unit of a shape's parameter, in words."""
+    return "degrees" if parameter.endswith("_deg") else "mm"
+
+
 def _checked(field: dataclasses.Field[Any], value: float | str) -> float | str:
     choices = field.metadata.get("choices")
     if choices:
@@ -384,8 +389,8 @@ def _checked(field: dataclasses.Field[Any], value: float | str) -> float | str:
     low, high = field.metadata["range"]
     if isinstance(value, str) or not math.isfinite(value) or not low <= value <= high:
         shown = repr(value) if isinstance(value, str) else f"{value:g}"
-        unit = "degrees" if field.name.endswith("_deg") else "mm"
-        raise OutOfRange(f"{field.name} is {shown}; expected a number from {low:g} to {high:g} {unit}")
+        limits = f"{low:g} to {high:g} {unit_of(field.name)}"
+        raise OutOfRange(f"{field.name} is {shown}; expected a number from {limits}")
     return float(value)
 
 

@@ -407,7 +407,7 @@ def assigned(
     """
     names = [body.name for body in assembly.bodies]
     known: dict[str, bool] = {}  # whether each material conducts
-    chosen: dict[str, tuple[str, str]] = {}  # of each body, material with source, and tool; the last word counts
+    chosen: dict[str, tuple[str, str]] = {}  # of each body, material with source, and tool
     for pattern, value in _pairs(maps, "--map BODY=MATERIAL@TOOL"):
         parts = _MATERIAL.fullmatch(value)
         if not parts:
@@ -427,11 +427,19 @@ def assigned(
         colours = {body.name: body.given.colour for body in assembly.bodies}
         words = " ".join(f"--map {name}={_suggested(name, colours[name]) or 'MATERIAL'}" for name in missing)
         raise MissingValue(f"no material for {', '.join(missing)}: give {words}")
-    ends = _terminals(assembly, {n for n in names if known[materials[n].partition("@")[0]]})
+    conductors = {n for n in names if known[materials[n].partition("@")[0]]}
+    ends = _terminals(assembly, conductors)
     for pattern, value in _pairs(terminals, "--terminal BODY=TERMINAL"):
         if value not in ("top", "middle", "bottom", "none"):
             raise UnknownName("terminal", value, ("top", "middle", "bottom", "none"))
+        if idle := sorted(set(_matching(pattern, names)) - conductors):
+            raise BadInput(f"--terminal {pattern}={value}: {materials[idle[0]]} of {idle[0]} does not conduct")
         ends |= dict.fromkeys(_matching(pattern, names), "" if value == "none" else value)
+    if missing := [end for end in ("bottom", "top") if end not in ends.values()]:
+        raise BadInput(
+            f"no {' and no '.join(missing)} electrode; conductors: {', '.join(sorted(conductors)) or 'none'}; expected "
+            "two, by --map BODY=MATERIAL of one that conducts, or --terminal BODY=top"
+        )
     filled = {n: imported.Filled.model_validate({"material": materials[n], "terminal": ends.get(n, "")}) for n in names}
     return filled, tools
 
@@ -443,12 +451,12 @@ def _material(name: str, folder: Path) -> material_files.Material:
 
 
 def _pairs(words: Sequence[str], form: str) -> list[tuple[str, str]]:
-    """Names and values; a body's own name goes after patterns, so that it decides."""
+    """Names and values, the most exact last, so that it decides: a body's own name goes before any pattern."""
     for word in words:
         if not all(word.partition("=")[::2]):
             raise BadInput(f"{word!r}: expected {form}")
     pairs = [(word.partition("=")[0].strip(), word.partition("=")[2].strip()) for word in words]
-    return sorted(pairs, key=lambda pair: not set("*?[") & set(pair[0]))
+    return sorted(pairs, key=lambda pair: (not set("*?[") & set(pair[0]), len(pair[0].replace("*", ""))))
 
 
 def _matching(pattern: str, names: Sequence[str]) -> list[str]:

@@ -341,6 +341,12 @@ class Characterised:
         yield Table.of("values", "95 % intervals, before and after", self.rows)
         yield from (f"{name} is left out: dead with probability {share:.0%}" for name, share in self.dead.items())
         yield from self.findings
+        for row in self.rows:
+            if row.low > row.before_high or row.high < row.before_low:
+                yield (
+                    f"doubtful: {row.quantity} of {row.material} is {row.value:.3g}, outside what is known, "
+                    f"{row.before_low:.2g} to {row.before_high:.2g}: check the units of its readings"
+                )
         left = ", ".join(row.quantity for row in self.rows if not row.determined())
         if left:
             yield f"not determined: {left}"
