@@ -261,9 +261,7 @@ def test_from_plate_to_prediction(planned, study, truth, tmp_path, run):
     assert before["stiffness"]["at_least"]
     assert after["stiffness"]["changes"]["by_force"] < 0.15
     wrong = tmp_path / "wrong.yaml"  # the meter's range ten times too large
-    wrong.write_text(
-        re.sub(r"(_pf: )([\d.]+)", lambda m: f"{m[1]}{10 * float(m[2])}", form.read_text("utf-8"))
-    )
+    wrong.write_text(re.sub(r"(_pf: )([\d.]+)", lambda m: f"{m[1]}{10 * float(m[2])}", form.read_text("utf-8")))
     said = run("characterise", "read", wrong, "--dry-run")
     assert "doubtful: relative_permittivity of x60" in said.words
     assert "doubtful" not in run("characterise", "read", form, "--dry-run").words

@@ -205,7 +205,10 @@ def test_stl_files_are_repaired_and_walk_on(run, plates):
         (["--unit", "mm", *PLATES, "--map", "flim=x60"], "unknown body 'flim'; did you mean 'film'?"),
         (["--unit", "mm", *PLATES, "--map", "film=x60@99"], "tools.x60: diabase-h5 has no tool 99"),
         (["--unit", "mm", "--map", "*=x60"], "no bottom and no top electrode; conductors: none"),
-        (["--unit", "mm", *PLATES, "--terminal", "film=top"], "--terminal film=top: x60 of film does not conduct"),
+        (
+            ["--unit", "mm", *PLATES, "--terminal", "film=top"],
+            "--terminal film=top: the material of film does not conduct",
+        ),
         (["--unit", "mm", *PLATES, "--terminal", "up=bottom"], "no top electrode; conductors: low, up"),
         (["--unit", "mm", *PLATES, "--chord", "5"], "--chord 5: expected 0.0001 to 1 mm"),
     ],

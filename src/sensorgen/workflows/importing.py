@@ -428,20 +428,27 @@ def assigned(
         words = " ".join(f"--map {name}={_suggested(name, colours[name]) or 'MATERIAL'}" for name in missing)
         raise MissingValue(f"no material for {', '.join(missing)}: give {words}")
     conductors = {n for n in names if known[materials[n].partition("@")[0]]}
+    ends = _electrodes(assembly, conductors, terminals)
+    filled = {n: imported.Filled.model_validate({"material": materials[n], "terminal": ends.get(n, "")}) for n in names}
+    return filled, tools
+
+
+def _electrodes(assembly: Assembly, conductors: set[str], terminals: Sequence[str]) -> dict[str, str]:
+    """Terminal of each conductor: by its place, unless ``--terminal`` names it."""
     ends = _terminals(assembly, conductors)
     for pattern, value in _pairs(terminals, "--terminal BODY=TERMINAL"):
         if value not in ("top", "middle", "bottom", "none"):
             raise UnknownName("terminal", value, ("top", "middle", "bottom", "none"))
-        if idle := sorted(set(_matching(pattern, names)) - conductors):
-            raise BadInput(f"--terminal {pattern}={value}: {materials[idle[0]]} of {idle[0]} does not conduct")
-        ends |= dict.fromkeys(_matching(pattern, names), "" if value == "none" else value)
+        matching = _matching(pattern, [body.name for body in assembly.bodies])
+        if idle := sorted(set(matching) - conductors):
+            raise BadInput(f"--terminal {pattern}={value}: the material of {idle[0]} does not conduct")
+        ends |= dict.fromkeys(matching, "" if value == "none" else value)
     if missing := [end for end in ("bottom", "top") if end not in ends.values()]:
         raise BadInput(
             f"no {' and no '.join(missing)} electrode; conductors: {', '.join(sorted(conductors)) or 'none'}; expected "
             "two, by --map BODY=MATERIAL of one that conducts, or --terminal BODY=top"
         )
-    filled = {n: imported.Filled.model_validate({"material": materials[n], "terminal": ends.get(n, "")}) for n in names}
-    return filled, tools
+    return ends
 
 
 def _material(name: str, folder: Path) -> material_files.Material:

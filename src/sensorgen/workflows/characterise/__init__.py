@@ -344,7 +344,7 @@ class Characterised:
         for row in self.rows:
             if row.low > row.before_high or row.high < row.before_low:
                 yield (
-                    f"doubtful: {row.quantity} of {row.material} is {row.value:.3g}, outside what is known, "
+                    f"doubtful: {row.quantity} of {row.material} is {row.value:.3g}, outside the known range, "
                     f"{row.before_low:.2g} to {row.before_high:.2g}: check the units of its readings"
                 )
         left = ", ".join(row.quantity for row in self.rows if not row.determined())
