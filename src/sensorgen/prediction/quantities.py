@@ -12,7 +12,7 @@ from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
-from sensorgen.design.values import material_value
+from sensorgen.design.values import ENDS, material_value
 from sensorgen.models import line
 from sensorgen.models.compression import Compression
 from sensorgen.models.sensor import Sensor
@@ -30,6 +30,7 @@ from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.prediction.results import SCHEMA, Impedance, Prediction
 from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
 from sensorgen.prediction.spread import spread
+from sensorgen.scene.slabs import is_open
 
 Otherwise = tuple[Sequence[Sensor | None], Sequence[Sensor | None]]  # by other walls; with other films
 
@@ -85,6 +86,8 @@ def _gap(body: Body) -> Bounds | None:
 def _at_rest(found: Prediction, body: Body, rest: RestState, frequency_hz: tuple[float, ...]) -> Prediction:
     """Capacitance, resistance, corner frequency and impedance without a load."""
     resistance, c, gone = rest.resistance, rest.capacitance, lost(body.design)
+    if set(resistance) != set(ENDS):
+        return replace(found, capacitance=c, resistance=resistance)
     r = _in_series(resistance["top"], resistance["bottom"])
     corner = _of_line(r, c, lambda ohm, farad: line.corner_frequency_hz(ohm, farad), "Hz")
     return replace(
@@ -314,7 +317,10 @@ def _moduli(model: SensorModel) -> list[Compression]:
 
 def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
     """What is taken for granted."""
-    yield "electrodes are equipotential for the capacitance, and the field has no fringe at the sensor's edge"
+    if is_open(body.cells.first()):
+        yield "electrodes are equipotential for the capacitance, and the fringe at their edges is in free air"
+    else:
+        yield "electrodes are equipotential for the capacitance, and the field has no fringe at the sensor's edge"
     yield "electrode resistance from end face to end face, cogs included"
     if not body.is_drawn:
         yield "contacts between extruded lines cost no resistance: no source gives their resistivity"
