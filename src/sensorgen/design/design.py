@@ -5,7 +5,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
@@ -312,6 +312,25 @@ _LIMITS: dict[str, Any] = {
 def _covers(waiver: Waiver, finding: Finding) -> bool:
     same_rule = finding.rule == waiver.rule or finding.rule.partition("-")[0] == waiver.rule
     return same_rule and waiver.body in ("", finding.body)
+
+
+def own_texts(materials: Iterable[str], folder: Path | None = None) -> Mapping[Kind, Mapping[str, str]]:
+    """Texts of those materials that do not ship: of packs beside a folder, the working one if not given, or the user's.
+
+    Raises
+    ------
+    UnknownName, BadInput
+        A name that no pack has, or a file that cannot be read.
+    """
+    texts: Mapping[Kind, Mapping[str, str]] = packs.with_files(
+        {"tools": dict.fromkeys(materials, 0)}, folder or Path()
+    ).get("own", {})
+    return texts
+
+
+def material(name: str, folder: Path | None = None) -> material_files.Material:
+    """A material that ships, or of the packs that :func:`own_texts` looks in."""
+    return material_files.load(name, (), own_texts([name], folder))
 
 
 def shape(name: str) -> "Shape":

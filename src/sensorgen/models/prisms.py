@@ -322,8 +322,9 @@ def _surrounded(
             ends.append((sides[-1].low_mm < 0, True))
     thick = _SHELL * air
     low, high = levels_mm[0] - air, levels_mm[-1] + air
-    inside = _within(slabs, *sides)
-    found = _numbered([low - thick, low, *levels_mm, high, high + thick], [{}, {}, *inside, {}, {}], *sides, air)
+    inside = _within(slabs, sides[0], sides[1])
+    heights = [low - thick, low, *levels_mm, high, high + thick]
+    found = _numbered(heights, [{}, {}, *inside, {}, {}], sides[0], sides[1], air)
     return replace(found, open_sides=(ends[0], ends[1]))
 
 

@@ -308,5 +308,6 @@ def _of_plain(data: dict[str, Any]) -> Answer:
 
 
 def is_plate(answer: Answer) -> bool:
-    """Whether a capacitance is that of a solid plate, which has no other bounds than itself."""
-    return answer.capacitance_f.width() < _EXACT
+    """Whether a capacitance is that of a solid plate: its cell has no other bounds than itself, whatever cuts it."""
+    widths = [c.width for c in answer.plan if c.model == answer.model and c.width is not None]
+    return min(widths, default=answer.capacitance_f.width()) < _EXACT
