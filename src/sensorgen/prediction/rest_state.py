@@ -106,7 +106,7 @@ def _resistance(body: Body, scene: Scene) -> tuple[dict[str, Bounds], list[str]]
     """Of both electrodes; where one does not cover the sensor, of those from end to end, and what is left."""
     if not is_open(scene):
         return electrode_resistance(body), []
-    found, said = {}, []
+    found, said = dict[str, Bounds](), list[str]()
     for end in ENDS:
         try:
             found |= electrode_resistance(body, (end,))

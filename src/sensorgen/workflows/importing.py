@@ -505,17 +505,18 @@ def _terminals(
     """
     bodies = sorted((b for b in assembly.bodies if b.name in conductors), key=lambda b: float(b.box_mm[:, 2].mean()))
     solids, boxes = {body.name: body.solid() for body in bodies}, {body.name: body.box_mm for body in bodies}
-    groups = {body.name: {body.name} for body in bodies}
+    groups = {body.name: frozenset([body.name]) for body in bodies}
     for a, b in combinations(groups, 2):
         if (_shared_mm(boxes[a], boxes[b]) > -_CONTACT_MM).all() and solids[a].min_gap(solids[b], 1.0) < _CONTACT_MM:
             joined = groups[a] | groups[b]
             groups |= dict.fromkeys(joined, joined)
-    every = [[name for name in groups if groups[name] == own] for own in dict.fromkeys(map(frozenset, groups.values()))]
+    every = [[name for name in groups if groups[name] == own] for own in dict.fromkeys(groups.values())]
     if len(every) == 1 and len(bodies) > 1:  # its lowest and its highest body are shorted
-        ends = dict.fromkeys(groups, "") | {bodies[0].name: "bottom", bodies[-1].name: "top"} | given
+        ends = {**dict.fromkeys(groups, ""), bodies[0].name: "bottom", bodies[-1].name: "top", **given}
         return ends, tuple(_shorts(every, ends))
     decided = {k: {given[name] for name in group if name in given} for k, group in enumerate(every)}
-    ends = {name: end for k, group in enumerate(every) for name in group for end in decided[k]} | given
+    ends = {name: end for k, group in enumerate(every) for name in group for end in decided[k]}
+    ends.update(given)
     left = [k for k, named in decided.items() if not named]
     by_height = sorted(
         (k for k, named in decided.items() if named != {""}),
