@@ -81,7 +81,7 @@ def test_parameters_and_materials_go_before_those_of_the_file(plan, tmp_path):
 WRONG = {
     "": "holds nothing",
     "iteration: 26\n": "designs is missing",
-    "iteration: 26\ndesigns: []\n": "at least 1 entries",
+    "iteration: 26\ndesigns: []\n": "at least one entry",
     HEAD + "  - {}\n": "designs.0: neither of design and shape",
     HEAD + "  - {shape: tri, design: x.yaml}\n": "designs.0: both of design and shape",
     HEAD + "  - {shape: trj}\n": "did you mean 'tri'",
