@@ -95,7 +95,7 @@ WRONG = {
     HEAD + "  - {shape: tri}\nlayout: {kind: round}\n": "expected 'column' or 'packed'",
     HEAD + "  - {shape: tri}\nlayout: {spacing_mm: .nan}\n": "spacing_mm",
     HEAD + "  - {shape: tri}\nslicers: [cure]\n": "'prusa' or 'cura'",
-    HEAD + "  - {shape: tri}\nslicers: []\n": "at least 1",
+    HEAD + "  - {shape: tri}\nslicers: []\n": "at least one",
     HEAD + "  - {shape: tri}\nname: ../../etc\n": "expected text such as 26 or film-study",
     HEAD + "  - {shape: tri}\nfilaments: {etpv: {lot: A}}\n": "did you mean 'etpu'",
     HEAD + "  - {shape: tri}\nfilaments: {etpu: {lot: \"a\\nb\"}}\n": "one line",
