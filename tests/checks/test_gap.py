@@ -2,7 +2,9 @@
 
 import pytest
 
+from sensorgen.checks.review import review
 from sensorgen.checks.slices import Layers
+from sensorgen.design.design import make
 from sensorgen.design.shapes import rect, tri
 from sensorgen.scene.scene import Body, Fill, Scene, box
 
@@ -154,3 +156,11 @@ def test_another_nozzle_prints_another_gap(findings, printer):
     (found,) = findings(tri_scene(0.1), "2-printed-gap", printer=small)
     assert "0.2 mm (classic walls or plain Cura)" in found.message
     assert "0.1 mm (Arachne, Cura filling outline gaps)" in found.message
+
+
+def test_a_film_below_one_layer_has_one_size_in_its_advice():
+    """No whole layers are below 0.07 mm: planted, "use 0.1 or 0.1 mm"."""
+    design = make({"shape": "reference", "quality": "fine", "parameters": {"dielectric_mm": 0.07}})
+    assert design.layers.layer_mm == 0.1
+    (advice,) = {f.advice for f in review(design).findings if "layers of" in f.message}
+    assert advice == "use 0.1 mm"

@@ -59,11 +59,11 @@ def _film(
         return
     if abs(printed_mm - gap_mm) > TOUCH_MM:
         count = gap_mm / layer
-        below, above = max(1, int(count)) * layer, (int(count) + 1) * layer
+        sizes = dict.fromkeys(f"{max(1, whole) * layer:g}" for whole in (int(count), int(count) + 1))
         yield Finding(
             "2-film", "warning", names,
             f"the film of {gap_mm:g} mm is {count:.3g} layers of {layer:g} mm: it will print {printed_mm:g} mm thick",
-            f"use {below:g} or {above:g} mm", round(gap_mm, 9), printed_mm, place_mm=place,
+            f"use {' or '.join(sizes)} mm", round(gap_mm, 9), printed_mm, place_mm=place,
         )  # fmt: skip
     if printed_mm < 2 * layer - TOUCH_MM:
         yield Finding(
