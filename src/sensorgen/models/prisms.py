@@ -23,6 +23,7 @@ from sensorgen.scene.layers import Region, parts
 from sensorgen.scene.raster import raster
 from sensorgen.scene.repetition import Repeat, repeat, widened
 from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene, seen_from_above
+from sensorgen.scene.slabs import is_open, slabs
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.enclosed import enclosing
 from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, Layers, Mesh, solved
@@ -39,6 +40,7 @@ _RUNGS = (  # distances of lines from outlines, in electrode gaps; order of the 
     ((2.0, 0.4, 0.08), 3, 2.5e-3),
     ((2.0, 0.5, 0.12), 4, 1e-3),
 )
+_SLANTED = ((2.0,), 2, 0.2)  # for slanted bodies first, as all slabs have such lines
 _GRID_MM = 1e-6  # to which corners are rounded
 _COARSER_MM = (1e-4, 3e-4, 1e-3, 3e-3)  # where outlines nearly coincide
 _SLENDER_MM = 2e-5  # height of a triangle below which a coarser grid is better
@@ -132,7 +134,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     layers = cell.layers([permittivity[name] for name in cell.dielectrics])
     first = sum(reach > 2 * width for *_, reach in _RUNGS[:-1])
     failed, reached = None, False
-    for factors, order, _ in _RUNGS[first:]:
+    for factors, order, _ in (*((_SLANTED,) if cell.outer else ()), *_RUNGS[first:]):
         beside = [factor * cell.gap_mm for factor in (*(_AROUND if cell.air_mm else ()), *factors)]
         try:
             inner, outer, enclosed = _meshes(cell, layers, beside)
@@ -142,6 +144,9 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
             found = solved(inner, outer, order, cell.shares(outer), enclosed=enclosed)
         except fem.Unsolved as error:
             failed = error
+            continue
+        except shapely.errors.GEOSException as error:  # outlines that rounding makes invalid
+            failed = fem.Unsolved(str(error))
             continue
         interval = fem.whole(found, np.outer(cell.x.shares, cell.y.shares).ravel().tolist())
         reached = True
@@ -158,13 +163,14 @@ def _meshes(cell: "_Cell", layers: Layers, beside_mm: Sequence[float]) -> tuple[
     With air around it, the flux stays in that air, and the potential is constant beyond: a conductor that floats.
     """
     far_mm, loose_mm = np.inf if cell.air_mm else _FAR * cell.gap_mm, _LOOSE * cell.gap_mm
-    exact = Mesh.of(layers, beside_mm, _GRID_MM, far_mm)
-    if exact.plan.slenderness_mm() > _SLENDER_MM:
+    exact = None if cell.outer else Mesh.of(layers, beside_mm, _GRID_MM, far_mm)
+    if exact and exact.plan.slenderness_mm() > _SLENDER_MM:
         return exact, Mesh.of(cell.inside_shell(layers), beside_mm, _GRID_MM, far_mm) if cell.air_mm else exact, False
     found = []
     for outwards, least_mm in ((False, _SLENDER_MM), (True, _SLENDER_MM / 10)):  # a potential bears more than a flux
         for grid_mm in _COARSER_MM:
-            near = enclosing(layers, grid_mm, far_mm, loose_mm, outwards=outwards)
+            some = replace(layers, regions=cell.outer) if outwards and cell.outer else layers
+            near = enclosing(some, grid_mm, far_mm, loose_mm, outwards=outwards)
             if outwards and cell.air_mm:
                 near = cell.inside_shell(near)
             mesh = Mesh.of(near, beside_mm, grid_mm, far_mm)
@@ -196,6 +202,8 @@ class _Cell:
         Air around the sensor, where an electrode does not cover it; else 0 [mm].
     open_sides : tuple of (bool, bool)
         Whether that air is beyond the low and the high end, along x and along y.
+    outer : list of dict of int to Region
+        What fills each layer at any of its heights, where bodies are slanted: ``regions`` is what fills it at all.
     """
 
     x: Repeat
@@ -207,6 +215,7 @@ class _Cell:
     gap_mm: float
     air_mm: float = 0.0
     open_sides: tuple[tuple[bool, bool], tuple[bool, bool]] = ((False, False), (False, False))
+    outer: list[dict[int, Region]] | None = None
 
     def inside_shell(self, layers: Layers) -> Layers:
         """Layers of it in a shell that conducts and floats: any potential in there goes on as a constant outside."""
@@ -245,6 +254,8 @@ class _Cell:
 def _cell(scene: Scene) -> _Cell:
     """The cell of a scene; raises ValueError where it is none of upright prisms between two electrodes."""
     slanted = next((b for b in scene.bodies for p in b.pieces if not p.is_constant("z")), None)
+    if slanted and is_open(scene) and not any(scene.repeats):
+        return _enclosed(scene)
     if slanted:
         raise ValueError(f"{slanted.name} is slanted or curved in elevation: its layers are no prisms")
     levels = np.unique(np.array([z for b in scene.bodies for p in b.pieces for z in p.span("z")]).round(9))
@@ -326,6 +337,50 @@ def _surrounded(
     heights = [low - thick, low, *levels_mm, high, high + thick]
     found = _numbered(heights, [{}, {}, *inside, {}, {}], sides[0], sides[1], air)
     return replace(found, open_sides=(ends[0], ends[1]))
+
+
+def _enclosed(scene: Scene) -> _Cell:
+    """A scene with slanted bodies whose electrodes do not cover it: what each slab has at all heights, and at any."""
+    layers = slabs(scene)
+    floating = [body for body in scene.bodies if body.terminal == FLOATING]
+    names = [*sorted({b.material for b in scene.bodies if not b.terminal} - {"air"}), "air"]
+    ends, conductors = {"bottom": BOTTOM, "top": TOP}, 2 + len(floating)
+
+    def kind(body: Body) -> int:
+        if body.terminal == FLOATING:
+            return 2 + floating.index(body)
+        return ends[body.terminal] if body.terminal else conductors + names.index(body.material)
+
+    def numbered(own: dict[Body, Region]) -> dict[int, Region]:
+        found: dict[int, list[Region]] = defaultdict(list)
+        for body, region in own.items():
+            if body.material != "air" and not region.is_empty:
+                found[kind(body)].append(translate(region, -x.low_mm, -y.low_mm))
+        return {k: shapely.union_all(regions) for k, regions in found.items()}
+
+    every = [region for slab in layers for own in (slab.inner, slab.outer) for region in own.values()]
+    heights = [layers[0].low_mm, *(slab.high_mm for slab in layers)]
+    x = y = Repeat.of(0.0, 1.0, False, 1.0)
+    gap_mm = _gap_mm([numbered(slab.outer) for slab in layers], heights, conductors)
+    if not SLIVER_MM < gap_mm < np.inf:
+        raise ValueError("slanted electrodes are nearer than the slabs that they are cut into")
+    air = _AIR * gap_mm
+    x, y = (widened([r for r in every if not r.is_empty], scene.size_mm, axis, air) for axis in (0, 1))
+    window = shapely.box(0.0, 0.0, x.high_mm - x.low_mm, y.high_mm - y.low_mm)
+
+    def clipped(own: dict[int, Region]) -> dict[int, Region]:
+        return {
+            k: shapely.multipolygons(parts(shapely.intersection(r, window, grid_size=1e-9))) for k, r in own.items()
+        }
+
+    inner, outer = (
+        [{}, {}, *map(clipped, some), {}, {}]
+        for some in ([numbered(slab.inner) for slab in layers], [numbered(slab.outer) for slab in layers])
+    )
+    thick = _SHELL * air
+    around = (heights[0] - air - thick, heights[0] - air, *heights, heights[-1] + air, heights[-1] + air + thick)
+    sides = ((x.low_mm < 0, True), (y.low_mm < 0, True))
+    return _Cell(x, y, around, inner, conductors, names, gap_mm, air, sides, outer)
 
 
 def _mirrored(planes: Real, shares: Real) -> Repeat:
