@@ -151,7 +151,7 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
         if law.bounded:
             others = list(_printed_otherwise(model, load, query)), list(_other_films(model, load, query))
         beyond = law.compression.doubt(float(model.sensor.stress_pa(load.force_n, load.position_m)))
-        pressed = (beyond, _few_periods(model.body, query))
+        pressed = (beyond, _few_periods(model.body, query), _free_sides(model.body))
         found = replace(
             found, identifiability=made, sensitivity=_sensitivity(model, load, query, others),
             doubts=(*found.doubts, *filter(None, pressed)),
@@ -160,6 +160,13 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
         return _resolution(found, model, load, query, others)
     except SensorgenError as error:
         return replace(found, reason=str(error))
+
+
+def _free_sides(body: Body) -> str:
+    """That the law of compression holds for a cell of a larger sensor."""
+    if not is_open(body.cells.first()):
+        return ""
+    return "compressed as a cell that its neighbours hold: the sides of this sensor are free, so that it deforms more"
 
 
 def _few_periods(body: Body, query: Query) -> str:
