@@ -385,6 +385,10 @@ def test_the_whole_walk_in_an_empty_folder(run, models, program):
     assert run("check", "filleted.yaml").code == 0
     predicted = run("predict", "filleted.yaml", "--json")
     assert predicted.code == 0, predicted.err
+    found, plate_f = json.loads(predicted.out), 8.8541878128e-12 * 4.68 * 9.4e-3 * 30e-3 / 0.8e-3
+    for one in (found, found["drawn"]):  # fringes at the narrower plate's edges, a fillet beside them
+        assert plate_f < one["capacitance"]["value"] < 1.12 * plate_f
+        assert one["capacitance"]["certified"]
     assert run("build", "filleted.yaml", "--no-cad").code == 0
     made = {path.name for path in Path("out/filleted").iterdir()}
     assert {"filleted.prusa.3mf", "filleted.cura.3mf", "filleted.svg", "design.json"} <= made

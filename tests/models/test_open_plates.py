@@ -115,6 +115,25 @@ def test_serpentines_are_the_areas_that_overlap_where_the_film_is_thin():
     assert ratios[3] < ratios[0] < ratios[1] < 1.25
 
 
+@solver
+def test_a_slanted_pad_lies_between_the_boxes_that_enclose_it():
+    plate, lid = box(0, 30, 0, 10, 0, 0.4), box(0, 30, 0.3, 9.7, 1.2, 1.6)
+    pad = Prism("x", ((0, 0.4), (10, 0.4), (10, 0.9), (9.7, 1.2), (0.3, 1.2), (0, 0.9)), 0, 30)
+    less, more = (box(0, 30, side, 10 - side, 0.4, 1.2) for side in (0.3, 0.0))
+    found = []
+    for piece in (less, pad, more):
+        bodies = (
+            Body("low", "etpu", (plate,), "bottom"),
+            Body("pad", "x60", (piece,)),
+            Body("up", "etpu", (lid,), "top"),
+        )
+        found.append(prisms.capacitance(Scene(bodies, (30, 10, 1.6)), EPS, 1e-2))
+    assert all(one.width() < 1e-2 for one in found)
+    assert found[0].lower < found[1].upper
+    assert found[1].lower < found[2].upper
+    assert found[0].middle() < found[1].middle() < found[2].middle()
+
+
 def test_covering_plates_stay_with_the_other_models():
     bodies = (Body("low", "etpu", (box(0, 3, 0, 3, 0, 0.25),), "bottom"),
               Body("up", "etpu", (box(0, 3, 0, 3, 0.5, 0.75),), "top"))  # fmt: skip
