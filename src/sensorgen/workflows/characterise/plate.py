@@ -6,6 +6,7 @@ The lines of bars and ladders run along x of the bed, without walls, in every la
 import html
 from collections.abc import Iterator, Mapping, Sequence
 from math import cos, pi, radians, sin, sqrt
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import shapely
@@ -50,15 +51,16 @@ _TAB_MM = (2.0, 4.0)  # of a bar for a voltage probe
 _CORNERS = 96
 
 
-def carrier(conductor: str, dielectric: str, printer: str, quality: str, tools: Mapping[str, int]) -> Design:
-    """A design that gives the plate its printer, layers, tools and profile."""
-    from sensorgen.design.design import make
+def carrier(
+    conductor: str, dielectric: str, printer: str, quality: str, tools: Mapping[str, int], folder: Path
+) -> Design:
+    """A design that gives the plate its printer, layers, tools and profile; names as seen from a folder."""
+    from sensorgen.design.design import make, with_own_files
 
     slots = dict.fromkeys(("film", "dielectric", "isolation"), dielectric)
     slots |= dict.fromkeys(("top_electrode", "bottom_electrode"), conductor)
-    return make({
-        "shape": "reference", "materials": slots, "printer": printer, "quality": quality, "tools": dict(tools)
-    })  # fmt: skip
+    data = {"shape": "reference", "materials": slots, "printer": printer, "quality": quality, "tools": dict(tools)}
+    return make(with_own_files(data, folder))
 
 
 def bodies(coupon: Coupon, conductor: str, dielectric: str) -> tuple[Body, ...]:
