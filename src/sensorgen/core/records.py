@@ -23,6 +23,7 @@ _EXPECTED = {
     "greater_than_equal": "{ge:g} or more",
     "int_from_float": _WHOLE,
     "int_parsing": _WHOLE,
+    "int_parsing_size": "a smaller whole number",
     "int_type": _WHOLE,
     "invalid_key": "text as its keys",
     "json_invalid": "JSON",
