@@ -187,7 +187,8 @@ class Meters:
 
 def _range(material: Material, quantity: str, low: float, high: float) -> tuple[float, float]:
     """Mean and standard deviation of ln: all plausible sources within one, or a usual range where there is none."""
-    given = [v.value for v in material.properties.get(quantity, []) if not v.implausible and v.value > 0]
+    values = [v for v in material.properties.get(quantity, []) if not v.implausible]
+    given = [number for v in values for number in (v.value, v.low, v.high) if number is not None and number > 0]
     if given:
         low, high = min(given) / 1.5, max(given) * 1.5
     return (log(low) + log(high)) / 2, (log(high) - log(low)) / 2

@@ -120,8 +120,8 @@ class Study:
         loaded = [materials.load(name, texts=given.get("own", {})) for name in given["materials"].values()]
         pairs = [m for m in loaded if m.conductor], [m for m in loaded if not m.conductor]
         if [len(kind) for kind in pairs] != [1, 1]:
-            given = ", ".join(f"{m.name} ({'conducts' if m.conductor else 'does not conduct'})" for m in loaded)
-            raise BadInput(f"materials are {given or 'none'}; expected one that conducts and one that does not")
+            said = ", ".join(f"{m.name} ({'conducts' if m.conductor else 'does not conduct'})" for m in loaded)
+            raise BadInput(f"materials are {said or 'none'}; expected one that conducts and one that does not")
         conductor, dielectric = pairs[0][0].name, pairs[1][0].name
         return cls(plates.carrier(conductor, dielectric, printer, quality, tools or {}, folder), conductor, dielectric)
 
@@ -223,7 +223,9 @@ class Planned:
             if row.half_width > row.goal * 1.0005:
                 yield f"goal missed: {row.quantity} of {row.material}: {row.half_width:.2g} %, goal {row.goal:g} %"
         yield from (f"rests on {coupon} alone: {quantities}" for coupon, quantities in self.exposed)
-        yield f"{self.folder}: {len(self.files)} files; fill in form.yaml, then: sensorgen characterise read FORM"
+        yield f"{self.folder}: {len(self.files)} files; print {self.name}.prusa.3mf (.cura, .orca) as plate.svg shows,"
+        yield "measure, fill in form.yaml, then:"
+        yield f"sensorgen characterise read {self.folder / 'form.yaml'}"
 
 
 def plan(
@@ -359,7 +361,10 @@ class Characterised:
         """Values, coupons that are left out, findings, and how a design takes the values."""
         yield f"{self.source}: {self.readings} readings of {self.coupons} coupons"
         yield Table.of("values", "95 % intervals, before and after", self.rows)
-        yield from (f"{name} is left out: dead with probability {share:.0%}" for name, share in self.dead.items())
+        yield from (
+            f"{name} is left out: dead with probability {share:.0%}, against the others or the sources' values"
+            for name, share in self.dead.items()
+        )
         yield from self.findings
         for row in self.rows:
             if row.low > row.before_high or row.high < row.before_low:
@@ -367,7 +372,7 @@ class Characterised:
                     f"doubtful: {row.quantity} of {row.material} is {row.value:.3g}, outside the known range, "
                     f"{row.before_low:.2g} to {row.before_high:.2g}: check the units of its readings"
                 )
-        left = ", ".join(row.quantity for row in self.rows if not row.determined())
+        left = ", ".join(f"{row.quantity} of {row.material}" for row in self.rows if not row.determined())
         if left:
             yield f"not determined: {left}"
         if self.file:
