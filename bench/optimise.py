@@ -108,8 +108,8 @@ def engine():
         "The gain by CPU is that of all works over that of the worker with most of them and of this process: what a "
         f"machine that does nothing else allows. A process begins with {begin_s:.1f} s of CPU, once for a search.\n"
         f"One design of triX costs, of CPU: {costs}. So 1500 designs, of which {PRESSED} pass the rules and {FRONT} "
-        f"are evaluated, take {total_s:.0f} s of CPU, {two_s / 60:.0f} minutes with two processes: an extrapolation, which "
-        "`python bench/optimise.py full` measures.\n"
+        f"are evaluated, take {total_s:.0f} s of CPU, {two_s / 60:.0f} minutes with two processes: extrapolated; "
+        "`python bench/optimise.py full` measures it.\n"
         f"`python bench/optimise.py engine` writes this section, in {(time.perf_counter() - begun) / 60:.1f} minutes."
     )
     yield "".join(f"\n{textwrap.fill(each, 130, break_on_hyphens=False)}\n" for each in words.splitlines())

@@ -34,7 +34,7 @@ def _optimise(
 
     with _progress() as step:
         found = optimise(
-            Path(target), Path(out), Workers(sweeps.at_once(jobs), cluster), count=sample, keep=not no_cache,
+            Path(target), Path(out), Workers(sweeps.at_once(jobs), cluster), count=sample or 0, keep=not no_cache,
             built=not no_build, sliced=not no_gcode, progress=step,
         )  # fmt: skip
     render.deliver(found)
@@ -70,7 +70,7 @@ command = click.Command(
         click.Argument(["target"], metavar="TARGET.yaml"),
         click.Option(["--out"], default="out", show_default=True, metavar="DIR", help="Folder of all files."),
         click.Option(
-            ["--sample"], type=click.IntRange(1, 20_000), default=0, metavar="N",
+            ["--sample"], type=click.IntRange(1, 20_000), default=None, metavar="N",
             help="Try N designs that NSGA-II chooses, of a space too large to try all; nothing is then proven.",
         ),
         *sweeps.workers(), options.no_cache(),
