@@ -98,8 +98,8 @@ def engine():
         cost_s = {name: mean(cpu for _, cpu, _ in each_of(some, two)) for name, some in cost_s.items()}
     cost_s["coarse mesh"] = median(r[1][1] for r in taken)
     gains = [median(r[0][0] / r[k][0] for r in taken) for k in range(3)]
-    yield f"## Engine\n\n{len(works)} designs pressed on the coarse mesh, and {WORKS} works of 0.5 s that only wait; medians "
-    yield f"of {ROUNDS} rounds; load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores.\n\n"
+    yield f"## Engine\n\n{len(works)} designs pressed on the coarse mesh, and {WORKS} works of 0.5 s that only wait; "
+    yield f"medians of {ROUNDS} rounds; load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores.\n\n"
     yield "| | wall | CPU of one design | gain | gain of waiting works | goal |\n|---|---|---|---|---|---|\n"
     for k, (name, goal) in enumerate((("one process", "–"), ("two processes", 1.8), ("Dask, two workers", 1.6))):
         wall_s, cpu_s_ = (median(r[k][n] for r in taken) for n in (0, 1))
@@ -108,8 +108,8 @@ def engine():
     costs = ", ".join(f"{name} {s:.2g} s" for name, s in cost_s.items())
     words = (
         "The gain of waiting works does not depend on the load: it is what sending works and collecting results leave. "
-        f"A process begins with {begin_s:.1f} s of CPU, once for a search, and has one thread of BLAS; one process alone "
-        "has one for each core, which take CPU and gain nothing.\n"
+        f"A process begins with {begin_s:.1f} s of CPU, once for a search, and has one thread of BLAS; one process "
+        "alone has one for each core, which take CPU and gain nothing.\n"
         f"One design of triX costs, of CPU: {costs}. So 1500 designs, of which {PRESSED} pass the rules and {FRONT} "
         f"are evaluated, take {total_s:.0f} s of CPU, {total_s / waited[1] / 60:.0f} minutes with two processes: "
         "extrapolated; "
