@@ -33,7 +33,7 @@ FILES = {
     "word at top": ("tri", "holds text; expected a mapping"),
     "huge code point": ('shape: "\\UFFFFFFFF"', "bad.yaml: "),
     "half a code point": ('shape: "\\ud800"', "bad.yaml: "),
-    "NUL": ("shape: tri\0", "not YAML: unacceptable character #x0000"),
+    "NUL": ("shape: tri\0", "control character #x0000 at position 10"),
     "no shape": ("quality: fine", "shape is missing; expected bump, cog, cone, double"),
     "empty shape": ("shape:", "shape is None; expected text"),
     "list as shape": ("shape: [tri]", "shape is ['tri']; expected text"),

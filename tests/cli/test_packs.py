@@ -321,6 +321,45 @@ def test_a_link_out_of_a_pack(run, here, tmp_path_factory):
     assert "secret" not in said.line
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
+def test_links_to_themselves_and_folders_that_are_links(run, here, tmp_path_factory):
+    outside = put(tmp_path_factory.mktemp("else"), "material", "eel").parent
+    (here / "materials").symlink_to(outside)
+    words = ("check", "tri", "--material", "electrode=eel", "--tool", "eel=1")
+    assert "a link that leads out of its pack; copy the file to its place" in run(*words).line
+    (here / "materials").unlink()
+    (here / "materials").mkdir()
+    (here / "materials" / "eel.yaml").symlink_to("eel.yaml")
+    for said in (run(*words), run("pack", "test", ".")):
+        assert said.code in (1, 2)
+        assert "a link that leads out of its pack" in said.words + said.err
+    whole = packs.place() / "lab"  # a pack itself may be a link
+    whole.parent.mkdir(parents=True, exist_ok=True)
+    whole.symlink_to(outside.parent)
+    assert packs.find("materials", "eel", whole.parent).text()
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (b"a: &a [x]\nb: *a\n", "line 2: aliases .* are not taken"), (b"\0" * 200_000, "200000 bytes; expected at"),
+        (b"\xff\xfe\0", "not UTF-8 at byte 0"), (b"a\0b: 1", "control character #x0000 at position 1"),
+        (b"[" * 5000, "nested deeper than 20 levels"), (b"", "holds nothing; expected a mapping"),
+        (b'title: "a\\e[31mb"\nabout: x\ncolour: "#ffffff"\nconductor: true\nproperties: {}\n', "title is .* one line"),
+    ],
+)  # fmt: skip
+def test_hostile_files_of_a_pack(run, here, content, expected):
+    (here / "materials").mkdir()
+    (here / "materials" / "eel.yaml").write_bytes(content)
+    said = run("check", "tri", "--material", "electrode=eel", "--tool", "eel=1")
+    assert said.code == 2
+    assert re.search(expected, said.line)
+    said = run("pack", "test", ".")
+    assert said.code == 1
+    assert re.search(expected, said.words)
+    assert len(list(here.rglob("*"))) == 2
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [

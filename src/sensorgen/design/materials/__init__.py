@@ -16,7 +16,7 @@ from pydantic import Field
 
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
-from sensorgen.core.records import Strict, checked
+from sensorgen.core.records import Line, Strict, checked
 from sensorgen.design import packs
 from sensorgen.design.packs import Kind
 
@@ -83,8 +83,8 @@ class Material(Strict):
     """A material with every value that its sources give."""
 
     name: str
-    title: str
-    about: str
+    title: Line
+    about: Line
     colour: Annotated[str, Field(pattern="^#[0-9a-f]{6}$")]
     conductor: bool
     properties: dict[str, list[Value]]
