@@ -459,6 +459,17 @@ def test_a_file_in_a_wrong_place_is_found(run, here, name, what, folder, expecte
     assert re.search(expected, f"{found[0]['body']}: {found[0]['message']} -> {found[0]['advice']}")
 
 
+def test_planted_faults_of_sources(run, here):
+    (here / "sources").mkdir()
+    text = "about: bars\nmaterials: {etpu: {youngs_modulus_pa: {value: VALUE, low: 1.0, high: 1.0e8}}}\n"
+    for value, code, expected in (("2.0e7", 1, "is 1; expected 100 to"), ("2.0e9", 1, "outside its own range of 1 to")):
+        (here / "sources" / "lab-1.yaml").write_text(text.replace("VALUE", value))
+        said = run("pack", "test", ".")
+        assert (said.code, expected in said.words) == (code, True)
+    (here / "sources" / "lab-1.yaml").write_text(text.replace("VALUE", "2.0e7").replace("1.0,", "1.0e6,"))
+    assert run("pack", "test", ".").code == 0
+
+
 def test_a_name_in_two_packs_is_found_with_both_places(run):
     for name in ("one", "two"):
         put(packs.place() / name, "material", "ink")
