@@ -51,7 +51,7 @@ FILES = {
     "not a number": ("shape: tri\nparameters: {period_mm: .nan}", "period_mm is nan; expected a number from 0.1"),
     "nothing": ("shape: tri\nparameters: {period_mm: }", "parameters.period_mm is None; expected a number"),
     "list of parameters": ("shape: tri\nparameters: [1]", "parameters is [1]; expected a mapping of names to values"),
-    "word for materials": ("shape: tri\nmaterials: x60", "materials is 'x60'; expected a mapping with top_electrode, bottom_electrode"),
+    "word for materials": ("shape: tri\nmaterials: x60", "materials is 'x60'; expected a mapping with top_electrode"),
     "waiver without reason": ("shape: tri\nwaivers: [{rule: 5-width}]", "waivers.0.reason is missing"),
     "waiver with excuse": ("shape: tri\nwaivers: [{rule: 5-width, reason: eh}]", "reason is 'eh'; expected at least 5"),
     "waiver of no rule": ("shape: tri\nwaivers: [{rule: width, reason: because}]", "expected text such as 5-width"),
