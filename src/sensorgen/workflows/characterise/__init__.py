@@ -167,7 +167,7 @@ class Study:
 
 
 def _height_mm(coupon: Coupon) -> float:
-    keys = [s.drawn for s in coupon.sizes if s.key == "height_mm" or s.key.startswith("film_")]
+    keys = [s.drawn for s in coupon.sizes if s.key.startswith(("height_", "film_"))]
     return max(keys)
 
 

@@ -14,7 +14,10 @@ from shapely import affinity
 from sensorgen.analysis.characterise.catalogue import (
     ELECTRODE_MM,
     LADDER_MM,
+    PAD_DIAMETER_MM,
     PAD_MM,
+    PAD_PITCH_MM,
+    PADS_IN_ROW,
     PLATE_RADIUS_MM,
     STRIP_MM,
     UPPER_MM,
@@ -69,6 +72,13 @@ def bodies(coupon: Coupon, conductor: str, dielectric: str) -> tuple[Body, ...]:
         )
     if coupon.kind == "plate":
         return _plates(coupon, conductor, dielectric)
+    if coupon.kind == "pads":
+        pads = []
+        for k in range(len(coupon.readings)):
+            row, column = divmod(k, PADS_IN_ROW)
+            pad = affinity.translate(_circle(PAD_DIAMETER_MM / 2), PAD_PITCH_MM * column, PAD_PITCH_MM * row)
+            pads.append(_prism(pad, 0.0, coupon.drawn(f"height_{k + 1}_mm")))
+        return (Body("pads", coupon.material, tuple(pads)),)
     disc = _circle(coupon.drawn("diameter_mm") / 2)
     return (Body("disc", coupon.material, (_prism(disc, 0.0, coupon.drawn("height_mm")),)),)
 

@@ -35,12 +35,14 @@ def optimise(
         A target that is none, or an empty or too large space; a cluster that goes away.
     """
     target, name = load(path), path.stem
-    found = search(target, candidates(target, path.parent), workers, keep=keep, progress=progress)
     chosen: tuple[Recommended, ...] = ()
-    if built and found.front:
-        chosen = recommended(
-            name, found, out, workers, keep=keep, sliced=sliced, step=lambda role: progress(role, 0, 1)
-        )  # fmt: skip
+    space = candidates(target, path.parent)
+    with workers.opened() as opened:
+        found = search(target, space, opened, keep=keep, progress=progress)
+        if built and found.front:
+            chosen = recommended(
+                name, found, out, opened, keep=keep, sliced=sliced, step=lambda role: progress(role, 0, 1)
+            )  # fmt: skip
     answer = result(name, found, chosen)
     store.replace(out / f"{name}.html", page(answer).encode())
     store.replace(out / f"{name}.json", document.to_json(answer).encode())
