@@ -30,7 +30,7 @@ OWN: list[click.Parameter] = [
     option("--top", OneOf(("even", "rigid")), "Even pressure, or a stiff plate.", default="even"),
     option("--contact", OneOf(("frictionless", "stick")), "What faces do that touch.", default="frictionless"),
     option(
-        "--model", OneOf(("press2d", "press3d", "press_stairs", "springs", "unconfined", "bonded")),
+        "--model", OneOf(("press2d", "press3d", "press_round", "springs", "unconfined", "bonded")),
         "Finite elements of a cross-section or of boxes, springs of columns, or laws of a plate, free to widen "
         "sideways (B.49) or bonded; the first that fits if not given.",
     ),

@@ -47,7 +47,7 @@ _ONSET = 0.25  # largest relative error of a curve's onset, on films of 0.02 to 
 _LIKE = {
     "press2d": "tri",
     "press3d": "rect",
-    "press_stairs": "tri",
+    "press_round": "tri",
 }  # prototypes that other cells are assumed to resemble
 
 
@@ -152,8 +152,6 @@ def options(design: Design, answer: Answer, name: str = "", *, printed: Piece | 
         return [known]
     piece, moduli = printed or drawn(design), of_all_materials(design, "youngs_modulus_pa")
     model = model_of(piece)
-    if model == "press_stairs" and not asked:  # a minute, for a rise known to a third
-        return [known]
     meshes = [
         Option(
             mesh.name, mesh.seconds, _cell(expected(design, mesh), moduli), partial(solved, design, printed, mesh.level)

@@ -1,7 +1,7 @@
 """Mesh of quadratic triangles of a cell's solid parts, refined at notches and where two of them meet in a point."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,6 +18,7 @@ Run = tuple[int, int]
 
 _SAME = 1e-9  # of the cell's size: places nearer than this are one
 _RINGS = 4  # around a notch
+_LEVEL = 0.1  # slope of the first chord of a dome, at most [-]
 _SIDES = ((0, 1), (1, 2), (2, 0))
 
 
@@ -145,8 +146,25 @@ def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
         if open_sides != (OUTSIDE, OUTSIDE):
             pieces |= dict.fromkeys(pairwise(places), open_sides)
     net = triangulated(pieces, fineness.coarse_mm, fineness.growth)
+    for place in sharp:
+        if cell.turned and _is_flat(cell, place):
+            net = _parted(net, nearest(net.points_m, place))
     tips = [nearest(net.points_m, place) for place in rings.notches(cell)]
     return of_triangles(*rings.ringed(net.points_m, net.corners, net.region, tips, _RINGS), turned=cell.turned)
+
+
+def _is_flat(cell: Cell, place: Point) -> bool:
+    """Whether a dome and a level face meet at a point of the axis."""
+    ends = [p if q == place else q for (p, q), sides in cell.edges.items() if place in (p, q) and cell.air in sides]
+    return place[0] == 0 and all(abs(z - place[1]) < _LEVEL * r for r, z in ends)
+
+
+def _parted(net: Net, node: int) -> Net:
+    """The same, where the triangles above a node have one of their own."""
+    corners = net.corners.copy()
+    above = net.points_m[corners].mean(axis=1)[:, 1] > net.points_m[node, 1]
+    corners[(corners == node) & above[:, None]] = len(net.points_m)
+    return replace(net, points_m=np.vstack([net.points_m, net.points_m[node]]), corners=corners)
 
 
 def triangulated(edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth: float, *, quick: bool = False) -> Net:

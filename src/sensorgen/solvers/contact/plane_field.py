@@ -96,7 +96,9 @@ def _energies(mesh: Mesh, inside: Whole) -> tuple[Real, Real]:
 def _squares(fields: Real, weight: Real) -> Real:
     """Integrals (m, n, n) of products of fields (m, q, d, n)."""
     flat = fields.reshape(*fields.shape[:1], -1, fields.shape[-1])
-    return np.asarray(np.matmul((flat * np.repeat(weight, fields.shape[2], axis=1)[..., None]).transpose(0, 2, 1), flat))
+    return np.asarray(
+        np.matmul((flat * np.repeat(weight, fields.shape[2], axis=1)[..., None]).transpose(0, 2, 1), flat)
+    )
 
 
 def _meshed(cell: Cell, coarse_mm: float, growth: float) -> Mesh:
