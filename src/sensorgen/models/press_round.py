@@ -120,15 +120,16 @@ class _Plan:
 
 def _outlines(pieces: Sequence[Piece], plan: _Plan, fineness: Fineness) -> list[list[Point]]:
     """Outlines of a body in radius and height [mm]."""
-    found, flat = [], []
+    found: list[list[Point]] = []
+    flat: list[Piece] = []
     for piece in pieces:
         if not isinstance(piece, Revolved):
             flat.append(piece)
             continue
         corners = [place for edge in profile(piece) for place in _chords(edge, fineness)]
         axis, reach = shapely.Point(piece.x_mm, piece.y_mm), max(corners)[0]
-        low, high = np.array(plan.box.bounds).reshape(2, 2)
-        room = np.maximum(high - plan.axis, plan.axis - low).min()
+        start, end = np.array(plan.box.bounds).reshape(2, 2)
+        room = np.maximum(end - plan.axis, plan.axis - start).min()
         if axis.distance(shapely.Point(plan.axis)) > _SAME_MM or reach > room + _SAME_MM:
             raise BadInput("a body of revolution is not about the cell's axis, or reaches beyond it")
         found.append(corners)
