@@ -101,8 +101,8 @@ def test_a_dask_cluster_gives_the_same(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_a_cluster_that_goes_away_is_one_line(monkeypatch):
-    """Works that are not sent yet can have no result; those that have come are kept."""
+def test_a_cluster_that_goes_away_is_one_line(monkeypatch, capfd):
+    """Works that are not sent yet can have no result; those that have come are kept. Dask itself prints nothing."""
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(parallel, "_CONNECT_S", 1.0)
     cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None)
@@ -112,3 +112,4 @@ def test_a_cluster_that_goes_away_is_one_line(monkeypatch):
     cluster.close()
     with pytest.raises(SensorgenError, match="no longer answers; results so far are kept"):
         list(results)
+    assert "Traceback" not in capfd.readouterr().err

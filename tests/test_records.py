@@ -33,9 +33,9 @@ TARGET = {"design": "a", "parameters": {"x": [1]}, "objectives": {"capacitance_p
          "mean 'near'? Known: near"),
         ({"objectives": {"capacitance_pf": {}}}, "objectives.capacitance_pf.near is missing"),
         ({"objectives": {"capacitance_pf": "best"}}, "objectives.capacitance_pf is 'best'; expected 'minimise' or "
-         "'maximise' or a mapping of names to values"),
+         "'maximise', or a mapping with near"),
         ({"parameters": {"x": {"from": "a", "to": 3}}}, "parameters.x.from is 'a'; expected a number"),
-        ({"parameters": {"x": [1, [2]]}}, "parameters.x.1 is [2]; expected a number or text"),
+        ({"parameters": {"x": [1, [2]]}}, "parameters.x.1 is [2]; expected a number, or text"),
         ({"parameters": {"x": {"from": 3, "to": 1}}}, "parameters.x: from 3 to 1 is empty; expected numbers that rise"),
         ({"load": {"pressures_kpa": [1, "a"]}}, "load.pressures_kpa.1 is 'a'; expected a number"),
         ({"slicer": 5}, "slicer is 5; expected '', 'prusa' or 'cura'"),

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from statistics import mean
 
 import pytest
 
@@ -16,8 +17,9 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.workflows.optimise import ladder, recommend, result
 from sensorgen.workflows.optimise.result import Recommended, Spread
+from sensorgen.workflows.optimise.sample import sample
 from sensorgen.workflows.optimise.search import Row, Searched, search
-from sensorgen.workflows.optimise.space import MOST, Candidate, candidates
+from sensorgen.workflows.optimise.space import MOST, Candidate, candidates, space
 from sensorgen.workflows.optimise.target import Target, load
 from sensorgen.workflows.optimise.ties import settled
 
@@ -276,6 +278,40 @@ def test_a_huge_space_is_refused_with_its_size():
     }
     with pytest.raises(BadInput, match=rf"9.73e\+08 designs; expected at most {MOST}"):
         candidates(target(parameters=parameters))
+
+
+def test_a_sample_of_a_huge_space_proves_nothing():
+    """Millions of plates; of those that were tried the one with the best C is the best, by the plate capacitor."""
+    pytest.importorskip("optuna")
+    wanted = target(
+        parameters={
+            "dielectric_mm": {"from": 0.1, "to": 2.0}, "electrode_mm": {"from": 0.2, "to": 1.0},
+            "length_mm": {"from": 20, "to": 100}, "width_mm": {"from": 5, "to": 20}, "orientation": ["as-drawn"],
+        },
+        objectives={"capacitance_pf": "maximise"},
+    )  # fmt: skip
+    whole = space(wanted)
+    assert whole.size > 4e6
+    first, again = (sample(wanted, whole, 72) for _ in range(2))
+    assert [row.candidate.values for row in first.rows] == [row.candidate.values for row in again.rows]
+
+    def plate_pf(row):
+        v = row.candidate.values
+        return 1e12 * EPS0 * EPS_X60 * v["length_mm"] * v["width_mm"] * 1e-3 / v["dielectric_mm"]
+
+    best = max(first.rows, key=plate_pf)
+    assert first.front[0] is best
+    drawn, bred = (mean(plate_pf(row) for row in some) for some in (first.rows[:24], first.rows[48:]))
+    assert bred > drawn  # the third generation learns from the first
+    assert "nothing is proven: of 72 designs tried of" in result.result("plates", first).proof()
+
+
+def test_a_sample_of_a_small_space_is_the_space():
+    pytest.importorskip("optuna")
+    wanted = target()
+    search_ = sample(wanted, space(wanted), 12)
+    assert {tuple(row.candidate.values.values()) for row in result.leads(search_)} == {(0.1, 0.2)}
+    assert len(search_.rows) == 12
 
 
 def test_the_example_of_the_page_is_a_target(tmp_path):

@@ -346,7 +346,9 @@ def _on_cluster(address: str) -> Iterator[Sequence[Lane]]:
         raise NotInstalled("--cluster needs Dask distributed: pip install 'sensorgen[cluster]'")
     from distributed import Client
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is said once, by us
+    loggers = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in ("distributed", "asyncio")]
+    for name in loggers:  # each has a level of its own
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what goes wrong is said once, by us
     where = {"scheduler_file": address} if Path(address).is_file() else {"address": address}
     try:
         client = Client(**where, timeout=_CONNECT_S)

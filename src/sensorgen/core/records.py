@@ -103,8 +103,8 @@ def problem(error: ValidationError, data: object, kind: type[Strict] | None = No
         inside = f" of {'.'.join(map(str, place[:-1]))}" if len(place) > 1 else ""
         if kind is None:
             return f"unknown key{inside} {str(place[-1])[:100]!r}"
-        return str(UnknownName(f"key{inside}", str(place[-1]), _record_at(kind, first["loc"][:-1]).model_fields))
-    words = " or ".join(dict.fromkeys(_expected(each, kind) for each in expected))
+        return str(UnknownName(f"key{inside}", str(place[-1]), _keys(_record_at(kind, first["loc"][:-1]))))
+    words = ", or ".join(dict.fromkeys(_expected(each, kind) for each in expected))
     return f"{key} is {shown(first['input'])}; expected {words}"
 
 
@@ -123,12 +123,12 @@ def _place(fault: Mapping[str, Any], data: object) -> list[str | int]:
 
 def _first(faults: Sequence[Mapping[str, Any]], data: object) -> tuple[Mapping[str, Any], list[Mapping[str, Any]]]:
     """The first fault, and all of its value: of the alternatives for one value, those of the one that fits farthest."""
-    alike = [fault for fault in faults if _branches(fault, faults[0], data)]
+    misspelt = (f for f in faults if f["type"] == "extra_forbidden" and f["loc"][:-1] == faults[0]["loc"][:-1])
+    first = next(misspelt, faults[0])  # before a key that is missing
+    alike = [fault for fault in faults if _branches(fault, first, data)]
     deepest = max(len(_place(fault, data)) for fault in alike)
     last = [fault for fault in alike if len(_place(fault, data)) == deepest]
-    best = next(
-        (fault for fault in last if fault["type"] == "extra_forbidden"), last[0]
-    )  # before a key that is missing
+    best = next((fault for fault in last if fault["type"] == "extra_forbidden"), last[0])
     place = _place(best, data)
     return best, [fault for fault in alike if _place(fault, data) == place]
 
@@ -146,14 +146,28 @@ def _branches(fault: Mapping[str, Any], first: Mapping[str, Any], data: object) 
 def _expected(fault: Mapping[str, Any], kind: type[Strict] | None) -> str:
     """What one fault asks for."""
     example = _example(kind, fault["loc"]) if kind else "others of its kind"
+    if fault["type"] == "model_type" and kind:
+        return f"a mapping with {', '.join(_keys(_record_at(kind, fault['loc'])))}"
+    if fault["type"] == "too_short" and fault["ctx"]["min_length"] == 1:
+        return "at least one entry"
     return _EXPECTED.get(fault["type"], _OTHERS).format(**dict(fault.get("ctx", {})) | {"example": example})
 
 
+def _keys(kind: type[Strict]) -> list[str]:
+    """Names of a record's keys, as a file has them."""
+    return [field.alias or name for name, field in kind.model_fields.items()]
+
+
 def _record_at(kind: type[Strict], place: tuple[Any, ...]) -> type[Strict]:
-    """The record at a place within a record."""
+    """The record at a place within a record; pydantic names the alternative where there are several."""
+    alternatives: dict[str, type[Strict]] = {}
     for part in place:
         field = kind.model_fields.get(part) if isinstance(part, str) else None
-        kind = next(_records(field.annotation), kind) if field else kind
+        if field:
+            alternatives = {each.__name__: each for each in _records(field.annotation)}
+            kind = next(iter(alternatives.values()), kind)
+        else:
+            kind = alternatives.get(part, kind)
     return kind
 
 

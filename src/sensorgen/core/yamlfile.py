@@ -104,7 +104,7 @@ def line(text: str, place: Iterable[str | int]) -> int:
         if inner is None:
             break
         node = inner
-    return int(node.start_mark.line) + 1
+    return int(node.start_mark.line) + 1 if node else 1
 
 
 def _refuse_tricks(text: str, where: str) -> None:

@@ -66,6 +66,28 @@ def digest(text: str) -> str:
     return sha256(text.encode()).hexdigest()
 
 
+def varies(name: str, text: str, fill: Mapping[str, str]) -> bool:
+    """Whether a file's scene differs between two questions with its default parameters, in one process or in two.
+
+    Raises
+    ------
+    BadInput
+        The file is no shape.
+    """
+    made = []
+    for _ in range(2):
+        process = _Process(name, text)
+        try:
+            defaults = {str(field["name"]): field["default"] for field in process.about["fields"]}
+            question = {"parameters": defaults, "fill": fill}
+            made += [process.ask(question), process.ask(question)]
+        except (KeyError, TypeError):
+            return False  # no parameters: what reads the file says so
+        finally:
+            process.close()
+    return any(each != made[0] for each in made)
+
+
 def is_trusted(text: str) -> bool:
     """Whether the user has trusted a file with this very content."""
     with suppress(OSError, UnicodeDecodeError):

@@ -25,6 +25,7 @@ PLATE_RADIUS_MM, ELECTRODE_MM, UPPER_MM = 10.0, 0.4, 0.2  # of plates: radius, a
 PAD_MM = 8.0  # of the lower electrode, for a probe
 _STRAIN = 0.04  # that the proposed load makes
 _MOST_N = 100.0  # of a usual stand
+_FRINGE = 0.97  # of the closed form of plates, whose film ends: 0.96 to 0.97 by finite volumes
 _FILL = 0.015  # coupons of one plate differ in how well they are filled [-]
 _TAPS_MM, _WIDTH_MM, _SENSOR_MM = 40.0, 6.0, 10.0  # between taps; width of ladders, and of bars, wide as sensors
 
@@ -186,7 +187,8 @@ class Meters:
 
 def _range(material: Material, quantity: str, low: float, high: float) -> tuple[float, float]:
     """Mean and standard deviation of ln: all plausible sources within one, or a usual range where there is none."""
-    given = [v.value for v in material.properties.get(quantity, []) if not v.implausible and v.value > 0]
+    values = [v for v in material.properties.get(quantity, []) if not v.implausible]
+    given = [number for v in values for number in (v.value, v.low, v.high) if number is not None and number > 0]
     if given:
         low, high = min(given) / 1.5, max(given) * 1.5
     return (log(low) + log(high)) / 2, (log(high) - log(low)) / 2
@@ -380,7 +382,7 @@ def _plate(material: str, thicknesses_mm: tuple[float, ...]) -> Coupon:
     ]
     return Coupon(
         "plate-" + "-".join(f"{thickness:g}" for thickness in thicknesses_mm), "plate", material,
-        (*measured, _millimetres("electrode_mm", ELECTRODE_MM), Size("fringe", 1.0, 0.03), Size("fill", 1.0, 0.005),
+        (*measured, _millimetres("electrode_mm", ELECTRODE_MM), Size("fringe", _FRINGE, 0.03), Size("fill", 1.0, 0.005),
          Size("stray_pf", 0.0, 0.02)),
         tuple(
             Reading(f"capacitance_{k}_pf", "capacitance", "LCR meter, 1 kHz, open circuit subtracted; probes on the "

@@ -156,6 +156,8 @@ class Optimised(Displayed):
         What keeps designs out, the constraints that alone keep most out first.
     remarks : tuple of str
         What of the target had no effect.
+    whole : int
+        Designs of the whole space where only a sample was tried, else 0 [-].
     """
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
@@ -173,6 +175,7 @@ class Optimised(Displayed):
     nearest: Chosen | None = None
     binding: tuple[Binding, ...] = ()
     remarks: tuple[str, ...] = ()
+    whole: int = 0
 
     def document(self) -> Iterator[Part]:
         """The proof, what was discarded, the front, and the designs to print."""
@@ -214,12 +217,18 @@ class Optimised(Displayed):
 
     def proof(self) -> str:
         """How good the front is, in words."""
+        tried = f"{self.size} designs tried of {self.whole} (NSGA-II)" if self.whole else f"{self.size} designs"
         if not self.front:
-            return f"{self.name}: none of {self.size} designs meets the target ({self.evaluated} evaluated)"
+            return f"{self.name}: none of {tried} meets the target ({self.evaluated} evaluated)"
         coarse = ""
         if any(r.why == "dominated" and not r.certified for r in self.reasons):
             seen = f", largest seen {self.largest:.3g}" if self.largest else ""
             coarse = f"; by the models, not certified: coarse meshes within a factor {self.margin:.3g}{seen}"
+        if self.whole:
+            return (
+                f"{self.name}: nothing is proven: of {tried}, {self.evaluated} evaluated as printed, none is "
+                f"better than these {len(self.front)}; untried designs may be{coarse}"
+            )
         return (
             f"{self.name}: no design in this space of {self.size} is better than these {len(self.front)} "
             f"({self.evaluated} evaluated as printed, {self.size - self.evaluated} discarded{coarse})"
@@ -301,6 +310,7 @@ def result(name: str, found: Searched, recommended: tuple[Recommended, ...] = ()
         tuple(Reason(*reason) for reason in found.reasons()), tuple(designs[row.number - 1] for row in found.front),
         designs, found.margin, found.largest, recommended, designs[nearest.number - 1] if nearest else None,
         () if front else tuple(Binding(*each) for each in found.binding()), tuple(_remarks(found)),
+        found.size,
     )  # fmt: skip
 
 

@@ -114,6 +114,8 @@ class Searched:
         Between a number on the coarse mesh and its best value, that was allowed for [-].
     largest : float or None
         The largest factor between both among the evaluated designs [-]; None where no coarse mesh was used.
+    size : int
+        Designs of the whole space where only a sample was tried, else 0 [-].
     """
 
     target: Target
@@ -121,6 +123,7 @@ class Searched:
     front: tuple[Row, ...]
     margin: float
     largest: float | None
+    size: int = 0
 
     @property
     def evaluated(self) -> tuple[Row, ...]:
@@ -189,22 +192,27 @@ def search(
         As :func:`sensorgen.core.parallel.in_parallel`.
     """
     rows = [Row(k, candidate) for k, candidate in enumerate(space, 1)]
-    _refuse_unmade(rows)
     with workers.opened() as opened:
-        margin, largest = _narrowed(target, rows, partial(_each, workers=opened, keep=keep, progress=progress))
+        each = partial(results, workers=opened, keep=keep, progress=progress)
+        return finished(target, rows, narrowed(target, rows, each))
+
+
+def finished(target: Target, rows: Sequence[Row], margins: tuple[float, float | None], size: int = 0) -> Searched:
+    """The front of designs that are all discarded or evaluated."""
     feasible = [row for row in rows if row.trial and not row.violated]
     worth = {row.number: badness(target, row) for row in feasible}
     front = [
         row for row in feasible if not any(_beats(worth[other.number], worth[row.number]) for other in feasible)
     ]  # fmt: skip
-    return Searched(target, tuple(rows), tuple(sorted(front, key=_compromise(target, front))), margin, largest)
+    return Searched(target, tuple(rows), tuple(sorted(front, key=_compromise(target, front))), *margins, size)
 
 
-def _narrowed(
+def narrowed(
     target: Target, rows: Sequence[Row], each: Callable[..., Iterator[tuple[Row, Any]]]
 ) -> tuple[float, float | None]:
-    """Check, bound and evaluate; the margin of the coarse meshes, and the largest factor that was seen."""
+    """Check, bound and evaluate those that are open; margin of coarse meshes, and the largest factor that was seen."""
     query = target.query()
+    _refuse_unmade(rows)
     for row, found in each("checks", ladder.rules, _open(rows), ()):
         refused = [found] if isinstance(found, str) else _refused(target, found)
         if refused:
@@ -228,7 +236,7 @@ def badness(target: Target, row: Row) -> dict[str, Interval]:
     return {key: target.badness(key, value.model) for key, value in values.items() if value}
 
 
-def _each(
+def results(
     step: str, work: Callable[..., Any], rows: Sequence[Row], given: tuple[Any, ...], *, workers: Workers, keep: bool,
     progress: Progress,
 ) -> Iterator[tuple[Row, Any]]:  # fmt: skip
@@ -276,7 +284,8 @@ def _evaluate(
     target: Target, rows: Sequence[Row], each: Callable[[list[Row]], Iterator[tuple[Row, Any]]]
 ) -> tuple[float, float | None]:
     """Evaluate in rounds, the most promising first; after each, discard what an evaluated design is better than."""
-    margin, largest, size = MARGIN, None, _FIRST_ROUND
+    largest = max(filter(None, (_factor(target, row) for row in rows)), default=None)
+    margin, size = max(MARGIN, 1.1 * (largest or 0.0)), _FIRST_ROUND
     while left := sorted(_open(rows), key=partial(_promise, target)):
         for row, found in each(left[:size]):
             if isinstance(found, str):
