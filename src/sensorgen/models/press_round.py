@@ -19,6 +19,7 @@ from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Piece, Point, Scene
 from sensorgen.solvers.contact.cell import AIR, Cell, Region, partition
 from sensorgen.solvers.contact.mesh import grown
+from sensorgen.solvers.electrostatics.bounds import third_conductor
 from sensorgen.solvers.electrostatics.round_cell import ProfileEdge, profile
 
 SOURCE = "axisymmetric cell of the same area; " + press2d.SOURCE
@@ -82,6 +83,8 @@ def cell(scene: Scene, fineness: Fineness = USUAL) -> Cell:
     BadInput
         Sections of a body, or the cell, are neither nearly square nor nearly round about one axis.
     """
+    if reason := third_conductor(scene):
+        raise BadInput(f"{_WANTED}: {reason}")
     try:
         window, _, _ = curved.cell(scene)
     except ValueError as error:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from sensorgen.models.press3d import Pieces
 
 MODELS = ("press2d", "press3d", "press_round")
+QUICK = ("press2d", "press_round", "press3d")
 USUAL = 0  # default mesh level; those below it are coarser
 COARSEST = -2  # level that serves for comparison only
 _TIMES = {-2: 2.0, -1: 1.5, USUAL: 1.0, 1: 0.7, 2: 0.5}  # size of triangles by level, over the usual one [-]
@@ -112,9 +113,10 @@ def why_not_applicable(piece: Piece, model: str) -> str | None:
     return said
 
 
-def model_of(piece: Piece) -> str:
-    """The first of ``MODELS`` that applies to a piece; where none does, the first of all."""
-    return next((model for model in MODELS if not why_not_applicable(piece, model)), MODELS[0])
+def model_of(piece: Piece, *, quick: bool = False) -> str:
+    """The first of ``MODELS``, or of ``QUICK``, that applies to a piece; where none does, the first of all."""
+    order = QUICK if quick else MODELS
+    return next((model for model in order if not why_not_applicable(piece, model)), MODELS[0])
 
 
 def mesh_levels(piece: Piece, model: str, loads: int) -> list[MeshLevel]:
