@@ -85,5 +85,6 @@ def _work(
 command = DesignGroup(
     _work, OWN, name="compress",
     help="Press a cell: displacement and capacitance over stress, by finite elements with contact; of a cross-section "
-    "in plane strain, of boxes in 3D, of round and tapered bodies about their axis. Exit code 1 where a check says that the answer is not to be trusted.",
+    "in plane strain, of boxes in 3D, of round and tapered bodies about their axis. Exit code 1 where a check says "
+    "that the answer is not to be trusted.",
 )  # fmt: skip

@@ -158,7 +158,7 @@ def options(design: Design, answer: Answer, name: str = "", *, printed: Piece | 
             mesh.seconds,
             _cell(expected(design, mesh), moduli),
             partial(solved, design, printed, mesh.level, model=model),
-        )  # fmt: skip
+        )
         for mesh in mesh_levels(piece, model, len(STRESS_PA) - 1)
     ]
     return meshes if asked else [known, *meshes]
@@ -280,7 +280,7 @@ def solved(
 def at_a_few_pressures(
     design: Design, printed: Piece, answer: Answer, stress_pa: float, name: str = ""
 ) -> Law | None:  # fmt: skip
-    """The stored law of a printed cell; else a cross-section or a round cell is solved at a few pressures on the coarsest mesh.
+    """The stored law of a printed cell; else a section or round cell solved at a few pressures on the coarsest mesh.
 
     Its own error is not known: it tells by how much ways to print differ, which is far more.
 
