@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.design import Design, make
-from sensorgen.models import compression, press2d
+from sensorgen.models import compression, press2d, press_round
 from sensorgen.prediction import compression_law as celllaw
 from sensorgen.prediction import cost_model as expectations
 from sensorgen.prediction import mesh_ladder as pressing
@@ -30,7 +30,11 @@ Real = NDArray[np.float64]
 HERE = Path(__file__).parent
 FILE = HERE.parent / "src" / "sensorgen" / "models" / expectations.FILE
 EPS = {"x60": 4.68, "air": 1.00059}
-PRESSED = {"press2d": [("tri", 0.1), ("tri", 0.2)], "press3d": [("rect", 0.1)]}  # the first is timed
+PRESSED = {  # the first is timed
+    "press2d": [("tri", 0.1), ("tri", 0.2)],
+    "press3d": [("rect", 0.1)],
+    "press_round": [("bump", 0.2), ("cone", 0.2), ("pyramid", 0.2)],
+}
 STRESS_PA = [1e4 * k for k in range(11)]
 FINEST = 0.35  # size of triangles over the usual one, whose own error is a tenth of a per cent
 BUDGET_S = 60.0  # a model is not asked for more where that would take longer
@@ -123,6 +127,9 @@ def truth(model: str, one: pressing.Case, of: tuple[str, float]) -> Real:
     if model == "press2d":
         cell = press2d.cell(one.piece.scene, one.piece.period_mm)
         return rises(press2d.press(cell, one.solids, STRESS_PA, EPS, one.boundary, press2d.Fineness().scaled(FINEST)))
+    if model == "press_round":
+        sizes = press_round.USUAL.scaled(FINEST)
+        return rises(press_round.press(one.piece.scene, one.solids, STRESS_PA, EPS, one.boundary, sizes))
     shape, film = of
     parameters = vars(make({"shape": shape, "parameters": {"dielectric_mm": film}}).params)
     moduli = {name: solid.youngs_modulus_pa for name, solid in one.solids.items()}

@@ -30,9 +30,9 @@ OWN: list[click.Parameter] = [
     option("--top", OneOf(("even", "rigid")), "Even pressure, or a stiff plate.", default="even"),
     option("--contact", OneOf(("frictionless", "stick")), "What faces do that touch.", default="frictionless"),
     option(
-        "--model", OneOf(("press2d", "press3d", "press_stairs", "springs", "unconfined", "bonded")),
-        "Finite elements of a cross-section or of boxes, springs of columns, or laws of a plate, free to widen "
-        "sideways (B.49) or bonded; the first that fits if not given.",
+        "--model", OneOf(("press2d", "press3d", "press_round", "springs", "unconfined", "bonded")),
+        "Finite elements of a cross-section, of boxes or of round bodies, springs of columns, or laws of a plate, "
+        "free to widen sideways (B.49) or bonded; the first that fits if not given.",
     ),
     options.accuracy(
         "Largest relative error of the rise C(p) - C(0), as 2e-2: the coarsest mesh within it. 1e-2 is the least."
@@ -85,5 +85,6 @@ def _work(
 command = DesignGroup(
     _work, OWN, name="compress",
     help="Press a cell: displacement and capacitance over stress, by finite elements with contact; of a cross-section "
-    "in plane strain, of boxes in 3D. Exit code 1 where a check says that the answer is not to be trusted.",
+    "in plane strain, of boxes in 3D, of round and tapered bodies about their axis. Exit code 1 where a check says "
+    "that the answer is not to be trusted.",
 )  # fmt: skip

@@ -47,7 +47,7 @@ _ONSET = 0.25  # largest relative error of a curve's onset, on films of 0.02 to 
 _LIKE = {
     "press2d": "tri",
     "press3d": "rect",
-    "press_stairs": "tri",
+    "press_round": "tri",
 }  # prototypes that other cells are assumed to resemble
 
 
@@ -151,12 +151,13 @@ def options(design: Design, answer: Answer, name: str = "", *, printed: Piece | 
     if at_once.bounded or name == "unconfined":
         return [known]
     piece, moduli = printed or drawn(design), of_all_materials(design, "youngs_modulus_pa")
-    model = model_of(piece)
-    if model == "press_stairs" and not asked:  # a minute, for a rise known to a third
-        return [known]
+    model = model_of(piece, quick=not asked)
     meshes = [
         Option(
-            mesh.name, mesh.seconds, _cell(expected(design, mesh), moduli), partial(solved, design, printed, mesh.level)
+            mesh.name,
+            mesh.seconds,
+            _cell(expected(design, mesh), moduli),
+            partial(solved, design, printed, mesh.level, model=model),
         )
         for mesh in mesh_levels(piece, model, len(STRESS_PA) - 1)
     ]
@@ -227,6 +228,7 @@ def solved(
     printed: Piece | None = None,
     level: int = USUAL,
     boundary: "BoundaryConditions | None" = None,
+    model: str = "",
 ) -> Law:
     """The law of a cell by finite elements on one mesh, its error by the next coarser one.
 
@@ -240,6 +242,8 @@ def solved(
         Of the mesh, as of :func:`sensorgen.prediction.mesh_ladder.pressed`.
     boundary : BoundaryConditions, optional
         Boundary and contact conditions.
+    model : str, optional
+        One that applies to the cell; the first if not given.
 
     Raises
     ------
@@ -250,7 +254,7 @@ def solved(
 
     moduli, ratios = of_all_materials(design, "youngs_modulus_pa"), of_all_materials(design, "poisson_ratio")
     piece = printed or drawn(design)
-    model = model_of(piece)
+    model = model or model_of(piece)
     case = _case(design, piece, model, boundary or BoundaryConditions())
     estimate = estimated(case, STRESS_PA, level, sound=True)
     found = estimate.found
@@ -276,7 +280,7 @@ def solved(
 def at_a_few_pressures(
     design: Design, printed: Piece, answer: Answer, stress_pa: float, name: str = ""
 ) -> Law | None:  # fmt: skip
-    """The stored law of a printed cell; else a cross-section is solved at a few pressures on the coarsest mesh.
+    """The stored law of a printed cell; else a section or round cell solved at a few pressures on the coarsest mesh.
 
     Its own error is not known: it tells by how much ways to print differ, which is far more.
 
@@ -295,10 +299,11 @@ def at_a_few_pressures(
     from sensorgen.models.press2d import BoundaryConditions
 
     known = law_of(design, answer, name, printed=printed)
-    if known.bounded or model_of(printed) != "press2d":
+    model = model_of(printed, quick=True)
+    if known.bounded or model == "press3d":
         return known if known.bounded else None
     try:
-        case = _case(design, printed, "press2d", BoundaryConditions())
+        case = _case(design, printed, model, BoundaryConditions())
         found = pressed(case, [stress_pa * part for part in (0, 0.5, 1, 1.25)], COARSEST)
         curve = curve_of(found)
     except SensorgenError:

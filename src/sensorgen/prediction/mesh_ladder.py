@@ -25,9 +25,9 @@ from sensorgen.scene.sections import overlap
 if TYPE_CHECKING:
     from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness, Pressed
     from sensorgen.models.press3d import Pieces
-    from sensorgen.models.press_stairs import Columns
 
-MODELS = ("press2d", "press3d", "press_stairs")
+MODELS = ("press2d", "press3d", "press_round")
+QUICK = ("press2d", "press_round", "press3d")
 USUAL = 0  # default mesh level; those below it are coarser
 COARSEST = -2  # level that serves for comparison only
 _TIMES = {-2: 2.0, -1: 1.5, USUAL: 1.0, 1: 0.7, 2: 0.5}  # size of triangles by level, over the usual one [-]
@@ -113,9 +113,10 @@ def why_not_applicable(piece: Piece, model: str) -> str | None:
     return said
 
 
-def model_of(piece: Piece) -> str:
-    """The first of ``MODELS`` that applies to a piece; where none does, the first of all."""
-    return next((model for model in MODELS if not why_not_applicable(piece, model)), MODELS[0])
+def model_of(piece: Piece, *, quick: bool = False) -> str:
+    """The first of ``MODELS``, or of ``QUICK``, that applies to a piece; where none does, the first of all."""
+    order = QUICK if quick else MODELS
+    return next((model for model in order if not why_not_applicable(piece, model)), MODELS[0])
 
 
 def mesh_levels(piece: Piece, model: str, loads: int) -> list[MeshLevel]:
@@ -130,13 +131,10 @@ def mesh_levels(piece: Piece, model: str, loads: int) -> list[MeshLevel]:
     loads : int
         Pressures above 0 that are asked for.
     """
-    from sensorgen.models import press_stairs
-
-    stairs = model == "press_stairs"
-    points = list(press_stairs.POINTS) if stairs else expectations.points(model, piece.scene)
-    share = loads / _MEASURED_LOADS
+    points, share = expectations.points(model, piece.scene), loads / _MEASURED_LOADS
+    area = _area_error(model)
     return [
-        MeshLevel(_name(model, level), model, level, SAFETY * rise, (seconds + before) * share)
+        MeshLevel(_name(model, level), model, level, SAFETY * rise + area, (seconds + before) * share)
         for level, ((_, before), (rise, seconds)) in enumerate(pairwise(points), COARSEST + 1)
     ]
 
@@ -145,33 +143,36 @@ def _name(model: str, level: int) -> str:
     """Name of a mesh: triangles by their size over the usual one, bricks by the number that a box is cut into."""
     if level == USUAL:
         return model
-    if model == "press_stairs":
-        return f"{model}, {level:+d} column{'s' * (abs(level) > 1)}"
-    if model == "press2d":
-        return f"press2d, mesh x {_TIMES[level]:g}"
-    return f"{model}, {level:+d} piece{'s' * (abs(level) > 1)}"
+    if model == "press3d":
+        return f"{model}, {level:+d} piece{'s' * (abs(level) > 1)}"
+    return f"{model}, mesh x {_TIMES[level]:g}"
 
 
-def fineness(model: str, level: int) -> "Fineness | Pieces | Columns":
-    """The mesh of a level: triangles of another size, boxes of more or fewer pieces, or more or fewer columns."""
-    from sensorgen.models import press2d, press3d, press_stairs
+def _area_error(model: str) -> float:
+    """Error of the rise, and of the displacement, by a round cell in place of a square one [-]."""
+    from sensorgen.models import press_round
 
-    if model == "press_stairs":
-        return press_stairs.Columns(press_stairs.USUAL + level)
+    return press_round.AREA_ERROR if model == "press_round" else 0.0
+
+
+def fineness(model: str, level: int) -> "Fineness | Pieces":
+    """The mesh of a level: triangles of another size, or boxes of more or fewer pieces."""
+    from sensorgen.models import press2d, press3d, press_round
 
     if model == "press3d":
         pieces = press3d.Pieces()
         return replace(pieces, pieces=pieces.pieces + level)
-    return press2d.Fineness().scaled(_TIMES[level])
+    usual = press_round.USUAL if model == "press_round" else press2d.Fineness()
+    return usual.scaled(_TIMES[level])
 
 
 def _size(model: str, level: int) -> float:
     """Size of the elements over those of the usual mesh; infinite where there is no such mesh."""
-    from sensorgen.models import press3d, press_stairs
+    from sensorgen.models import press3d
 
-    if model == "press2d":
+    if model != "press3d":
         return _TIMES[level]
-    usual = press_stairs.USUAL if model == "press_stairs" else press3d.Pieces().pieces
+    usual = press3d.Pieces().pieces
     return usual / (usual + level) if usual + level > 0 else inf
 
 
@@ -305,8 +306,7 @@ def _errors(case: Case, fine: "Pressed", coarse: "Pressed", level: int) -> Estim
     Differences of two meshes scatter, and are small by chance at some loads: what was seen at a lower load counts on.
     """
     n = len(fine.stress_pa)
-    alike = case.model == "press_stairs"
-    (rise, spread), (other, _) = _rise(fine, alike), _rise(coarse, alike)
+    (rise, spread), (other, _) = _rise(fine), _rise(coarse)
     at = np.searchsorted(fine.stress_pa, coarse.stress_pa)
     factor = _GRID / ((_size(case.model, level - 1) / _size(case.model, level)) ** _ORDER - 1)
     down = fine.displacement_m - fine.fall_m
@@ -322,34 +322,32 @@ def _errors(case: Case, fine: "Pressed", coarse: "Pressed", level: int) -> Estim
     # At least
     apex = np.array(fine.apex_m) if fine.apex_m else np.zeros(n)
     small = _AT_APEX * (apex / np.where(down > 0, down, np.inf)) ** _AT_APEX_POWER
-    least = max(_expected(case, level), VERIFIED) * (1 + small)
-    moved = np.maximum(index[0], _OF_DISPLACEMENT * least * down)
-    rises = np.maximum(index[1], least * np.abs(rise)) + spread
+    area = _area_error(case.model)
+    least = max(_expected(case, level) - area, VERIFIED) * (1 + small)
+    moved = np.maximum(index[0], _OF_DISPLACEMENT * least * down) + area * down
+    rises = np.maximum(index[1], least * np.abs(rise)) + spread + area * np.abs(rise)
     moved[0] = rises[0] = 0.0
     return Estimate(fine, moved, rise, rises)
 
 
-def _rise(found: "Pressed", alike: bool) -> tuple[Real, Real]:
+def _rise(found: "Pressed") -> tuple[Real, Real]:
     """Rise of the capacitance, and by how much its field's bounds leave it open [F/m2].
 
-    Where the air is meshed anew at each pressure, bounds are independent; those of one mesh that is deformed err
-    ``alike``, and half of the difference of their rises counts.
+    The air is meshed anew at each pressure: bounds are independent.
     """
     bounds = [(c.lower, c.upper) if c else (np.nan, np.nan) for c in found.capacitance_f_per_m2]
     lower, upper = np.array(bounds).reshape(-1, 2).T
     middle = (lower + upper) / 2
-    if alike:
-        return middle - middle[:1], np.abs((upper - upper[:1]) - (lower - lower[:1])) / 2
     return middle - middle[:1], (upper - lower + (upper - lower)[:1]) / 2
 
 
 def _press(case: Case) -> "tuple[Callable[..., Pressed], str]":
     """The solver of a case, and its cell as text."""
-    from sensorgen.models import press2d, press3d, press_stairs
+    from sensorgen.models import press2d, press3d, press_round
 
     scene = case.piece.scene
-    if case.model == "press_stairs":
-        return partial(press_stairs.press, scene), repr([(b.material, b.terminal, b.pieces) for b in scene.bodies])
+    if case.model == "press_round":
+        return partial(press_round.press, scene), repr([(b.material, b.terminal, b.pieces) for b in scene.bodies])
     if case.model == "press3d":
         boxes = press3d.cell(case.piece.scene)
         return partial(press3d.press, boxes), boxes.written()

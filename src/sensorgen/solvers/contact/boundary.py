@@ -93,11 +93,12 @@ def free_of(
 def top_load(points_m: Real, faces: Whole, measure: Real) -> Real:
     """Forces of a unit pressure on the top, downwards, in its first direction and area (d n,) [m^(d - 1)].
 
-    ``faces`` (k, 3^(d - 1)) are the nodes of each face of the top, from line to line, ``measure`` (k,) its area.
+    ``faces`` (k, 3^(d - 1)) are the nodes of each face of the top, from line to line, ``measure`` its area (k, 1), or
+    of a ring 2 pi r times its width at each node (k, 3).
     """
     d = points_m.shape[1]
     shares, force = np.array([1.0]), np.zeros(points_m.size)
     for _ in range(d - 1):
         shares = np.outer(shares, [1 / 6, 2 / 3, 1 / 6]).ravel()
-    np.add.at(force, d * faces + d - 1, -shares * measure[:, None])
+    np.add.at(force, d * faces + d - 1, -shares * measure)
     return force

@@ -111,9 +111,9 @@ class BrickMesh(ElementMesh):
         return np.column_stack([np.diff(p)[self.boxes[:, a]] for a, p in enumerate(self.bricks.planes_m)])
 
     def top(self) -> tuple[Whole, Real]:
-        """Faces on the top, from line to line (k, 9), and their areas [m2]."""
+        """Faces on the top, from line to line (k, 9), and their areas (k, 1) [m2]."""
         on_top = self.boxes[:, 2] == self.bricks.fill.shape[2] - 1
-        return self.nodes[on_top].reshape(-1, 9, 3)[..., 2], self.edges_m[on_top, :2].prod(axis=1)
+        return self.nodes[on_top].reshape(-1, 9, 3)[..., 2], self.edges_m[on_top, :2].prod(axis=1, keepdims=True)
 
     def all_nodes(self, u_m: Real, inner_m: Real) -> Real:
         """Displacements of all nodes (n, 3) from those of the outer ones (3n,) and of the inner ones (m, 3) [m]."""

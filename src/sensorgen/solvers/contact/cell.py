@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
+import shapely
+
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Point, Scene
 from sensorgen.scene.sections import Column, columns, sections
@@ -38,6 +40,8 @@ class Cell:
         Where it begins and ends [mm].
     mirrored : bool
         Both sides are mirrors; else the cell repeats.
+    turned : bool
+        Whether it is turned about its left side, where x is 0.
     """
 
     edges: Mapping[Edge, tuple[int, int]]
@@ -45,6 +49,7 @@ class Cell:
     left_mm: float
     right_mm: float
     mirrored: bool
+    turned: bool = False
 
     def width_mm(self) -> float:
         """Its width [mm]."""
@@ -167,6 +172,25 @@ def _cell(whole: list[Column], left: float, right: float, *, mirrored: bool) -> 
         _uprights(edges, before, after, number)
     kept = {edge: sides for edge, sides in edges.items() if sides[0] != sides[1]}
     return Cell(kept, tuple(regions), left, right, mirrored)
+
+
+def partition(bodies: Mapping[Region, shapely.Geometry], whole: shapely.Polygon, *, turned: bool) -> Cell:
+    """A mirrored cell of regions that are polygons [mm], with air where they leave some of the whole."""
+    air = whole - shapely.union_all([*bodies.values()])
+    filled = {**bodies, **({Region(AIR, ""): air} if air.area > _SLIVER_MM else {})}
+    regions = tuple(filled)
+    lines = shapely.union_all([region.boundary for region in (*filled.values(), whole)])
+    edges: dict[Edge, tuple[int, int]] = {}
+    for face in shapely.polygonize([lines]).geoms:
+        inside = face.representative_point()
+        number = 1 + next(k for k, region in enumerate(filled.values()) if region.contains(inside))
+        for ring in (shapely.orient_polygons(face).exterior, *face.interiors):
+            for a, b in pairwise(_rounded(place) for place in ring.coords):
+                if a != b:
+                    _add(edges, *((a, b, (number, OUTSIDE)) if a < b else (b, a, (OUTSIDE, number))))
+    left, _, right, _ = (round(v, _DIGITS) for v in whole.bounds)
+    kept = {edge: sides for edge, sides in edges.items() if sides[0] != sides[1]}
+    return Cell(kept, regions, left, right, mirrored=True, turned=turned)
 
 
 def _add(edges: dict[Edge, tuple[int, int]], a: Point, b: Point, sides: tuple[int, int]) -> None:

@@ -98,11 +98,14 @@ class Faces:
         Of each face, from line to line; its normal points out of the body.
     mirrors : tuple of (int, int, int)
         Axis, direction and a node of each mirror.
+    turned : bool
+        Whether lines are sections of rings about the axis x = 0.
     """
 
     points_m: Real
     nodes: Whole
     mirrors: tuple[tuple[int, int, int], ...]
+    turned: bool = False
 
     @property
     def _ways(self) -> int:
@@ -198,6 +201,8 @@ class Faces:
         edges, length = self._edges_m[own], self._edges_m[own].min(axis=1)
         weights = np.array([np.prod(w) for w in product(_LINE_WEIGHTS / 2, repeat=self._ways)])
         stiffness = penalty_pa * weights[at] * edges.prod(axis=1) / length
+        if self.turned:
+            stiffness *= 2 * np.pi * (self.shapes @ self.points_m[self.nodes, 0][..., None])[own, at, 0]
         still = np.zeros((len(point), self._ways))
         return Pairs(gap, slips, stiffness, length, first + point, np.zeros(len(point), bool), still)
 
@@ -220,7 +225,7 @@ def faces_of(mesh: Mesh) -> Faces:
     """Sides of triangles with nothing behind them, those on the straight border of the cell left out."""
     x = mesh.points_m[:, 0]
     mirrors = ((0, -1, int(x.argmin())), (0, 1, int(x.argmax())))
-    return Faces(mesh.points_m, mesh.rim[~at_border(mesh)][:, [0, 2, 1]], mirrors)
+    return Faces(mesh.points_m, mesh.rim[~at_border(mesh)][:, [0, 2, 1]], mirrors, mesh.turned)
 
 
 def brick_faces_of(mesh: BrickMesh) -> Faces:

@@ -7,6 +7,8 @@ Quadratic displacement with an inner node, linear pressure that is discontinuous
 condensed element by element. Stationary in p the energy is mu/2 (tr C - d) - mu ln J + lambda/2 (J - 1)^2; for
 nu = 1/2 the last term vanishes and J = 1 on average. All derivatives are with respect to the reference coordinates, so
 that one table of shape functions serves every element.
+
+Around an axis elements are rings: the hoop stretch t = 1 + u / r enters, tr C + t^2 - 3 and J = t det F.
 """
 
 from collections.abc import Iterator
@@ -34,11 +36,14 @@ class Reference:
         Of the quadrature.
     pressures : (q, d + 1) array
         Functions of the pressure.
+    values : (q, n) array
+        Functions of the displacement; none for bricks, which are not turned about an axis.
     """
 
     gradients: Real
     weights: Real
     pressures: Real
+    values: Real
 
 
 def triangle_gradients(at: Real) -> Real:
@@ -49,6 +54,13 @@ def triangle_gradients(at: Real) -> Real:
     sides = 4 * (share[..., None] * slope[after] + share[:, after, None] * slope)
     bubble = 27 * (share[:, after] * share[:, last]) @ slope
     return np.concatenate([corners, sides, bubble[:, None]], axis=1)
+
+
+def triangle_values(at: Real) -> Real:
+    """The six nodal functions and the bubble of a triangle at places (p, 2): (p, 7)."""
+    share = np.column_stack([1 - at.sum(axis=1), at])
+    sides = 4 * share * share[:, [1, 2, 0]]
+    return np.column_stack([share * (2 * share - 1), sides, 27 * share.prod(axis=1)])
 
 
 def line_values(s: Real) -> Real:
@@ -72,12 +84,17 @@ BRICK_INNER, BRICK_CORNERS = 13, np.array([0, 2, 6, 8, 18, 20, 24, 26])
 BRICK_OUTER = np.delete(np.arange(27), BRICK_INNER)
 
 
-def _triangle() -> Reference:
-    """Six points, exact to degree 4 (Strang and Fix; Cowper 1973): barycentric a, a, 1 - 2a, and weight."""
+def triangle_points() -> tuple[Real, Real]:
+    """Six points (6, 2) with their weights, exact to degree 4 (Strang and Fix; Cowper 1973)."""
     orbits = ((0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322))
     at = np.array([p for a, _ in orbits for p in ((a, a), (1 - 2 * a, a), (a, 1 - 2 * a))])
-    weights = np.repeat([w / 2 for _, w in orbits], 3)
-    return Reference(triangle_gradients(at), weights, np.column_stack([np.ones(6), at - 1 / 3]))
+    return at, np.repeat([w / 2 for _, w in orbits], 3)
+
+
+def _triangle() -> Reference:
+    at, weights = triangle_points()
+    pressures = np.column_stack([np.ones(6), at - 1 / 3])
+    return Reference(triangle_gradients(at), weights, pressures, triangle_values(at))
 
 
 def _brick() -> Reference:
@@ -87,7 +104,7 @@ def _brick() -> Reference:
     gradients[:, BRICK_CORNERS] += gradients[:, [BRICK_INNER]] / 8
     weights = np.einsum("a,b,c->abc", weight, weight, weight).ravel()
     pressures = np.column_stack([np.ones(27), np.array(list(product(at, repeat=3)))])
-    return Reference(gradients[:, [*BRICK_OUTER, BRICK_INNER]], weights, pressures)
+    return Reference(gradients[:, [*BRICK_OUTER, BRICK_INNER]], weights, pressures, np.empty((27, 0)))
 
 
 TRIANGLE, BRICK = _triangle(), _brick()
@@ -107,12 +124,15 @@ class ElementMesh:
         Nodes of each element but the inner one, as in the reference.
     region : (m,) array
         Region of each element, from 1 on.
+    turned : bool
+        Whether triangles are sections of rings about the axis x = 0.
     """
 
     reference: Reference
     points_m: Real
     outer: Whole
     region: Whole
+    turned: bool = field(default=False, kw_only=True)
 
     @cached_property
     def jacobians_m(self) -> Real:
@@ -205,8 +225,20 @@ class Elements:
 
     @cached_property
     def _weights(self) -> Real:
-        """Of each quadrature point (m, q) [m^d]."""
-        return np.asarray(self._volumes[:, None] * self.mesh.reference.weights)
+        """Of each quadrature point (m, q) [m^d], of rings [m3]."""
+        flat = np.asarray(self._volumes[:, None] * self.mesh.reference.weights)
+        return 2 * np.pi * self._radii_m * flat if self.mesh.turned else flat
+
+    @cached_property
+    def _radii_m(self) -> Real:
+        """Distance of each quadrature point from the axis (m, q) [m]."""
+        return np.asarray(self.mesh.points_m[self.mesh.outer, 0] @ self.mesh.reference.values[:, :-1].T)
+
+    def _hoops(self, u: Real, inner: Inner, which: slice) -> tuple[Real, Real]:
+        """Hoop stretch at each quadrature point (m, q), and its derivative to the nodes' distance (m, q, n) [1/m]."""
+        rates = self.mesh.reference.values / self._radii_m[which, :, None]
+        outwards = np.column_stack([u.reshape(-1, 2)[self.mesh.outer[which], 0], inner.bubble[which, 0]])
+        return 1 + np.matmul(rates, outwards[..., None])[..., 0], rates
 
     def start(self) -> Inner:
         """Unloaded."""
@@ -223,13 +255,16 @@ class Elements:
 
     def volume_ratio(self, u: Real, inner: Inner) -> Real:
         """J at each quadrature point (m, q)."""
-        return np.asarray(determinant(self._stretch(u, inner, slice(None))) / self._volumes[:, None])
+        j = np.asarray(determinant(self._stretch(u, inner, slice(None))) / self._volumes[:, None])
+        return j * self._hoops(u, inner, slice(None))[0] if self.mesh.turned else j
 
     def energy_j(self, u: Real, inner: Inner) -> float:
-        """Energy stored [J], per depth in two dimensions [J/m]."""
+        """Energy stored [J], per depth in plane strain [J/m]."""
         h, reference = self._stretch(u, inner, slice(None)), self.mesh.reference
-        j, p = determinant(h) / self._volumes[:, None], inner.pressure @ reference.pressures.T
+        j, p = self.volume_ratio(u, inner), inner.pressure @ reference.pressures.T
         squares = ((h @ self._metric[:, None]) * h).sum((-1, -2))
+        if self.mesh.turned:
+            squares += self._hoops(u, inner, slice(None))[0] ** 2 - 1
         shape = self.law.mu_pa[:, None] * (0.5 * (squares - h.shape[-1]) - np.log(j))
         return float((self._weights * (shape + p * (j - 1) - 0.5 * p**2 * self.law.compliance_per_pa[:, None])).sum())
 
@@ -268,8 +303,9 @@ class Elements:
         g = np.ascontiguousarray(table.gradients.transpose(0, 2, 1))  # (q, d, n)
         flat, size = g.reshape(-1, n), d * n
         mu, p = self.law.mu_pa[which, None], inner.pressure[which] @ table.pressures.T
-        j, rate = determinant(h) / volume, cofactor(h) / volume[..., None, None]  # J and its derivative to h
-        hydro = p - mu / j
+        j, rate = determinant(h) / volume, cofactor(h) / volume[..., None, None]  # det F and its derivative to h
+        t, hoops = self._hoops(u, inner, which) if self.mesh.turned else (np.ones_like(j), None)
+        hydro = p * t - mu / j
         stress = (w * mu)[..., None, None] * (h @ metric) + (w * hydro)[..., None, None] * rate
         residual, matrix = np.empty((m, size + d + 1)), np.zeros((m, size + d + 1, size + d + 1))
         forces = np.matmul(stress.transpose(0, 2, 1, 3).reshape(m, d, -1), flat)
@@ -285,12 +321,22 @@ class Elements:
                 matrix[:, i:size:d, k:size:d] = found
                 matrix[:, k:size:d, i:size:d] = found.transpose(0, 2, 1)
         along = np.matmul(table.gradients, rate.transpose(0, 1, 3, 2)).reshape(m, -1, size)  # dJ to the displacements
+        if hoops is not None:
+            out = slice(0, size, d)
+            forces = (w * (mu * t + p * j - mu / t))[..., None] * hoops
+            residual[:, out] += forces.sum(axis=1)
+            matrix[:, out, out] += np.matmul(hoops.transpose(0, 2, 1), (w * mu * (1 + t**-2))[..., None] * hoops)
+            both = np.matmul(hoops.transpose(0, 2, 1), (w * p)[..., None] * along)
+            matrix[:, out, :size] += both
+            matrix[:, :size, out] += both.transpose(0, 2, 1)
+            along *= t[..., None]
+            along[..., out] += j[..., None] * hoops
         coupling = np.matmul((along * w[..., None]).transpose(0, 2, 1), table.pressures)
         matrix[:, :size, size:], matrix[:, size:, :size] = coupling, coupling.transpose(0, 2, 1)
         mass = np.einsum("mq,qi,qk->mik", w, table.pressures, table.pressures)
         compliance = self.law.compliance_per_pa[which, None]
         matrix[:, size:, size:] = -mass * np.maximum(compliance, 1 / (_STIFF * mu))[..., None]
-        residual[:, size:] = (w * (j - 1)) @ table.pressures - compliance * np.einsum(
+        residual[:, size:] = (w * (j * t - 1)) @ table.pressures - compliance * np.einsum(
             "mik,mk->mi", mass, inner.pressure[which]
         )
         return residual, matrix

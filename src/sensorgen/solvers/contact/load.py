@@ -102,9 +102,9 @@ class Problem:
         return replace(state, u_m=u, pairs=self.project(u))
 
     def fall_m(self, state: State) -> float:
-        """Displacement of the top before anything carries it [m]."""
-        _, drop = self._drops_m(state)
-        return float(drop.min()) if drop.size else 0.0
+        """Displacement of the top before anything carries it; none for domes that touch at a point [m]."""
+        pairs, drop = self._drops_m(state)
+        return float(drop.min()) if (drop > _FLAT * pairs.length_m).all() and drop.size else 0.0
 
     def _drops_m(self, state: State) -> tuple[Pairs, Real]:
         """Pairs of unsupported parts with what is below them, and the fall until each touches [m]."""

@@ -1,7 +1,7 @@
 """Mesh of quadratic triangles of a cell's solid parts, refined at notches and where two of them meet in a point."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,6 +18,7 @@ Run = tuple[int, int]
 
 _SAME = 1e-9  # of the cell's size: places nearer than this are one
 _RINGS = 4  # around a notch
+_LEVEL = 0.1  # slope of the first chord of a dome, at most [-]
 _SIDES = ((0, 1), (1, 2), (2, 0))
 
 
@@ -43,9 +44,10 @@ class Mesh(ElementMesh):
         return np.concatenate([self.rim[:, [0, 2]], self.rim[:, [2, 1]]])
 
     def top(self) -> tuple[Whole, Real]:
-        """Sides on the top, start, middle and end (k, 3), and their lengths [m]."""
+        """Sides on the top, start, middle and end (k, 3), and what each node has of the length [m], or area [m2]."""
         on_top = (self.points_m[self.rim, 1] == self.points_m[:, 1].max()).all(axis=1)
-        return self.rim[on_top][:, [0, 2, 1]], self.lengths_m()[on_top]
+        nodes, lengths = self.rim[on_top][:, [0, 2, 1]], self.lengths_m()[on_top, None]
+        return nodes, 2 * np.pi * self.points_m[nodes, 0] * lengths if self.turned else lengths
 
     def lengths_m(self) -> Real:
         """Length of each side of the rim [m]."""
@@ -63,7 +65,7 @@ class Net:
     marked: Mapping[int, list[Run]]
 
 
-def of_triangles(points_m: Real, corners: Whole, region: Whole) -> Mesh:
+def of_triangles(points_m: Real, corners: Whole, region: Whole, *, turned: bool = False) -> Mesh:
     """A mesh with middles on the sides of given triangles, which are counter-clockwise."""
     sides = np.concatenate([corners[:, side] for side in _SIDES])
     unique, back, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
@@ -72,7 +74,7 @@ def of_triangles(points_m: Real, corners: Whole, region: Whole) -> Mesh:
     numbers = len(points_m) + back
     rim = np.column_stack([sides, numbers])[count[back] == 1]
     triangles = np.concatenate([corners, numbers.reshape(3, -1).T], axis=1)
-    return Mesh(TRIANGLE, np.concatenate([points_m, middles]), triangles, region, rim)
+    return Mesh(TRIANGLE, np.concatenate([points_m, middles]), triangles, region, rim, turned=turned)
 
 
 def at_border(mesh: Mesh) -> Mask:
@@ -144,8 +146,25 @@ def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
         if open_sides != (OUTSIDE, OUTSIDE):
             pieces |= dict.fromkeys(pairwise(places), open_sides)
     net = triangulated(pieces, fineness.coarse_mm, fineness.growth)
+    for place in sharp:
+        if cell.turned and _is_flat(cell, place):
+            net = _parted(net, nearest(net.points_m, place))
     tips = [nearest(net.points_m, place) for place in rings.notches(cell)]
-    return of_triangles(*rings.ringed(net.points_m, net.corners, net.region, tips, _RINGS))
+    return of_triangles(*rings.ringed(net.points_m, net.corners, net.region, tips, _RINGS), turned=cell.turned)
+
+
+def _is_flat(cell: Cell, place: Point) -> bool:
+    """Whether a dome and a level face meet at a point of the axis."""
+    ends = [p if q == place else q for (p, q), sides in cell.edges.items() if place in (p, q) and cell.air in sides]
+    return place[0] == 0 and all(abs(z - place[1]) < _LEVEL * r for r, z in ends)
+
+
+def _parted(net: Net, node: int) -> Net:
+    """The same, where the triangles above a node have one of their own."""
+    corners = net.corners.copy()
+    above = net.points_m[corners].mean(axis=1)[:, 1] > net.points_m[node, 1]
+    corners[(corners == node) & above[:, None]] = len(net.points_m)
+    return replace(net, points_m=np.vstack([net.points_m, net.points_m[node]]), corners=corners)
 
 
 def triangulated(edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth: float, *, quick: bool = False) -> Net:
@@ -188,12 +207,12 @@ def cuts(length_mm: float, first_mm: float, last_mm: float, fineness: Fineness) 
     [0.186, 0.5, 0.814]
     """
     half = length_mm / 2
-    ahead, behind = (_grown(half, size, fineness) / length_mm for size in (first_mm, last_mm))
+    ahead, behind = (grown(half, size, fineness) / length_mm for size in (first_mm, last_mm))
     found = [*ahead[:-1], 0.5, *(1 - behind[-2::-1])] if len(ahead) + len(behind) > 2 else []
     return [float(t) for t in found]
 
 
-def _grown(reach: float, size: float, fineness: Fineness) -> Real:
+def grown(reach: float, size: float, fineness: Fineness) -> Real:
     """Ends of pieces that begin with ``size`` and grow up to the coarse size, the last at ``reach`` [mm]."""
     growth = fineness.growth
     size = min(size, fineness.coarse_mm)

@@ -2,7 +2,8 @@
 
 Any admissible potential bounds it from above (Dirichlet); any divergence-free flux from below
 (Thomson). In the plane such a flux is the curl of a stream function, which turns the lower bound into the same problem
-with 1/eps, its values given on the sides of the cell in place of the electrodes.
+with 1/eps, its values given on the sides of the cell in place of the electrodes. Around an axis (Stokes) the stream
+function psi = r phi has the energy (phi / r e_r + grad phi)^2 r / (2 pi eps), and phi is the unknown.
 """
 
 from collections import defaultdict
@@ -20,7 +21,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.solvers.contact import rings
 from sensorgen.solvers.contact.cell import OUTSIDE, Cell, Edge
-from sensorgen.solvers.contact.element import triangle_gradients
+from sensorgen.solvers.contact.element import triangle_gradients, triangle_points, triangle_values
 from sensorgen.solvers.contact.factors import solved_by_lu
 from sensorgen.solvers.contact.mesh import Mesh, Net, Unmeshed, nearest, of_triangles, triangulated
 from sensorgen.solvers.contact.wedge import Wedge, filled, wedges
@@ -30,7 +31,6 @@ Edges = Mapping[Edge, tuple[int, int]]
 _ROUNDING = 1e-9
 _RINGS = 6
 _HOLE = 1e-6  # area that a mesh may miss, as a share
-_MIDS = np.array([[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])  # middles of the sides: exact to degree 2
 
 
 def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float, growth: float) -> Interval:
@@ -67,15 +67,38 @@ def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float,
     eps = np.array([permittivity.get(r.material, np.nan) for r in cell.regions])[mesh.region[inside] - 1]
     x = mesh.points_m[:, 0]
     width = float(np.ptp(x))
+    area = np.pi * width**2 if cell.turned else width
     sides = [abs(x - end) < _ROUNDING * width for end in (x.min(), x.max())]
-    gradients = np.einsum("qnk,mki->mqni", triangle_gradients(_MIDS)[:, :6], np.linalg.inv(mesh.jacobians_m[inside]))
-    flat = gradients.transpose(0, 2, 1, 3).reshape(len(gradients), 6, 6)
-    stiffness = np.matmul(flat, flat.transpose(0, 2, 1)) * (np.linalg.det(mesh.jacobians_m[inside]) / 6)[:, None, None]
-    upper = _energy(mesh.outer[inside], stiffness * eps[:, None, None], *ends) / width
-    lower = 1 / (_energy(mesh.outer[inside], stiffness / eps[:, None, None], *sides) * width)
+    potentials, streams = _energies(mesh, inside)
+    upper = _energy(mesh.outer[inside], potentials * eps[:, None, None], *ends) / area
+    flux = width if cell.turned else 1.0  # psi of a phi that is 1 at the outer side
+    lower = flux**2 / (_energy(mesh.outer[inside], streams / eps[:, None, None], *sides) * area)
     if not lower <= upper * (1 + _ROUNDING):
         raise Unmeshed(f"bounds in the wrong order, {lower} above {upper}")
     return Interval(lower, upper).times(EPS0_F_PER_M)
+
+
+def _energies(mesh: Mesh, inside: Whole) -> tuple[Real, Real]:
+    """Quadratic forms (m, 6, 6) of some triangles: of potentials, and of stream functions."""
+    at, weights = triangle_points()
+    gradients = np.einsum("qnk,mki->mqin", triangle_gradients(at)[:, :6], np.linalg.inv(mesh.jacobians_m[inside]))
+    weight = np.linalg.det(mesh.jacobians_m[inside])[:, None] * weights
+    if not mesh.turned:
+        found = _squares(gradients, weight)
+        return found, found
+    values = triangle_values(at)[:, :6]
+    r = mesh.points_m[mesh.outer[inside], 0] @ values.T
+    streams = gradients.copy()
+    streams[:, :, 0] += values / r[..., None]
+    return _squares(gradients, 2 * np.pi * r * weight), _squares(streams, r / (2 * np.pi) * weight)
+
+
+def _squares(fields: Real, weight: Real) -> Real:
+    """Integrals (m, n, n) of products of fields (m, q, d, n)."""
+    flat = fields.reshape(*fields.shape[:1], -1, fields.shape[-1])
+    return np.asarray(
+        np.matmul((flat * np.repeat(weight, fields.shape[2], axis=1)[..., None]).transpose(0, 2, 1), flat)
+    )
 
 
 def _meshed(cell: Cell, coarse_mm: float, growth: float) -> Mesh:
@@ -105,7 +128,7 @@ def _meshed(cell: Cell, coarse_mm: float, growth: float) -> Mesh:
         raise Unmeshed("the mesh has holes or folds")
     region = np.concatenate([net.region, np.full(len(new), cell.air)])
     tips = [nearest(net.points_m, place) for place in rings.corners(edges, cell.left_mm, cell.right_mm)]
-    return of_triangles(*rings.ringed(net.points_m, corners, region, tips, _RINGS))
+    return of_triangles(*rings.ringed(net.points_m, corners, region, tips, _RINGS), turned=cell.turned)
 
 
 def _refuse_crossings(edges: Real) -> None:

@@ -129,7 +129,11 @@ class ProfileEdge(NamedTuple):
 
     def places(self, count: int) -> Real:
         """Points along it (count + 1, 2)."""
-        share, a = np.linspace(0.0, 1.0, count + 1)[:, None], np.array(self.start)
+        return self.at(np.linspace(0.0, 1.0, count + 1))
+
+    def at(self, shares: Real) -> Real:
+        """Points at shares of its length (n, 2)."""
+        share, a = shares[:, None], np.array(self.start)
         if not self.bulge:
             return np.asarray(a + share * np.subtract(self.end, self.start))
         centre, turn = np.array(self.circle()[0]), 4 * atan(self.bulge) * share

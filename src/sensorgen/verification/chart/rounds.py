@@ -1,16 +1,17 @@
-"""A soft cylinder on a stiff flat, against Hertz's line contact: how wide it touches.
+"""A soft cylinder or sphere on a stiff flat, against Hertz's contact: how wide it touches.
 
-Johnson, Contact Mechanics (1985), Eq. 4.43; sides of a polygon about the circle grow from where it touches.
+Johnson, Contact Mechanics (1985), Eqs. 4.43 and 4.22; sides of a polygon about the circle grow from where it touches.
 """
 
 from functools import partial
-from math import pi
+from math import pi, tan
 
 import numpy as np
 
 from sensorgen.core.units import M_PER_MM
-from sensorgen.models import press2d, pressure
+from sensorgen.models import press2d, press_round, pressure
 from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
+from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Body, Prism, Scene, box
 from sensorgen.solvers.contact.cell import Cell
 from sensorgen.verification.chart.measured import DIGITS, Ladder, Point, climbed, relative
@@ -22,7 +23,8 @@ _SOLIDS = {"soft": Elastic(6e6, 0.3), "stiff": Elastic(6e11, 0.3)}
 _PLANE_PA = 6e6 / (1 - 0.3**2)
 _SIDES_MM = (8e-3, 4e-3, 2e-3)  # where it touches
 
-STANDARD = {"cylinder on a flat": 2 * _HALF_MM * M_PER_MM}  # length of the contact [m]
+SPHERE = "sphere on a flat"
+STANDARD = dict.fromkeys(("cylinder on a flat", SPHERE), 2 * _HALF_MM * M_PER_MM)  # length of the contact [m]
 
 
 def points(name: str, budget_s: float) -> list[Point]:
@@ -36,15 +38,28 @@ def points(name: str, budget_s: float) -> list[Point]:
         A finer mesh is not tried where that would take longer, estimated as ten times the last one [s].
     """
     levels = [(f"sides of {1e3 * side:g} µm, ", partial(_solved, side)) for side in _SIDES_MM if has_mesher()]
+    turned = [(f"sides of {1e3 * side:g} µm, ", partial(_turned, side)) for side in _SIDES_MM if has_mesher()]
     ladders: list[Ladder] = [("pressure: hertz", [("", _formula)]), ("press2d", levels)]
+    ladders = [("press_round", turned)] if name == SPHERE else ladders
     return list(climbed(name, ladders, relative(STANDARD[name], DIGITS, "off by {:+.3g}"), budget_s))
 
 
-def why_not_applicable(_: str) -> dict[str, str]:
+def why_not_applicable(name: str) -> dict[str, str]:
     """Why models of compression do not apply to it."""
-    no_film = "it gives the displacement of the top, and not where bodies touch"
-    return {"press2d": "the mesher is not installed (extra fem)", "press3d": "a prism is no box",
-            "springs": no_film, "compression": no_film}  # fmt: skip
+    no_film, missing = (
+        "it gives the displacement of the top, and not where bodies touch",
+        "the mesher is not installed (extra fem)",
+    )
+    found = {
+        "press2d": missing,
+        "press_round": missing,
+        "press3d": "a round body is no box",
+        "springs": no_film,
+        "compression": no_film,
+    }
+    if name == SPHERE:
+        return found | {"press2d": "a sphere is no prism", "pressure": "its contacts are as long as the sensor is wide"}
+    return found | {"press_round": "a cylinder that lies has no upright axis"}
 
 
 def _load_n_per_m() -> float:
@@ -59,17 +74,37 @@ def _formula() -> float:
 
 def _solved(side_mm: float) -> float:
     """Length of a half ellipse of pressure that has the second moment of what the faces push."""
-    stress = [0.0, _load_n_per_m() / (2 * _RADIUS_MM * M_PER_MM)]
-    fineness = Fineness(side_mm, 0.1, 0.1, 0.3)
-    _, run = press2d._solved(
-        _cylinder(side_mm), _SOLIDS, stress, BoundaryConditions(top="rigid"), fineness, lambda _: None
+    stress_pa = _load_n_per_m() / (2 * _RADIUS_MM * M_PER_MM)
+    moment = _moment_m2(_cylinder(side_mm), stress_pa, Fineness(side_mm, 0.1, 0.1, 0.3))
+    return float(4 * np.sqrt(moment))
+
+
+def _turned(side_mm: float) -> float:
+    """Diameter of a half ellipsoid of pressure, likewise."""
+    width, high, cut = 3 * _RADIUS_MM, _RADIUS_MM / 2, _RADIUS_MM * 0.75**0.5
+    corners = ((0.0, _FLAT_MM), (cut, _FLAT_MM + high), (0.0, _FLAT_MM + high))
+    dome = Revolved(width / 2, width / 2, corners, (tan(pi / 12), 0.0, 0.0))
+    top = _FLAT_MM + high + 2 * _RADIUS_MM
+    bodies = (
+        Body("flat", "stiff", (box(0, width, 0, width, 0, _FLAT_MM),), "bottom"),
+        Body("sphere", "soft", (dome, box(0, width, 0, width, _FLAT_MM + high, top)), "top"),
     )
+    fineness = Fineness(side_mm, 0.05, 0.3, 0.25)
+    stress_pa = 4 / 3 * _PLANE_PA * (_HALF_MM * M_PER_MM) ** 3 / (_RADIUS_MM * M_PER_MM * (width * M_PER_MM) ** 2)
+    moment = _moment_m2(press_round.cell(Scene(bodies, (width, width, top)), fineness), stress_pa, fineness)
+    return float(2 * np.sqrt(2.5 * moment))
+
+
+def _moment_m2(cell: Cell, stress_pa: float, fineness: Fineness) -> float:
+    """Mean square of the distance from the middle, weighted with what the faces push [m2]."""
+    boundary = BoundaryConditions(top="rigid")
+    _, run = press2d._solved(cell, _SOLIDS, [0.0, stress_pa], boundary, fineness, lambda _: None)
     state = run.states[-1]
     places = run.problem.places(state.u_m)
     here = run.problem.faces.rays(places).here_m
     push = np.maximum(-run.problem.gaps(state.pairs, state.u_m), 0) * state.pairs.stiffness_pa
-    x = here[state.pairs.point % len(here), 0] - places[:, 0].max()
-    return float(4 * np.sqrt((push * x**2).sum() / push.sum()))
+    x = here[state.pairs.point % len(here), 0] - (0.0 if cell.turned else places[:, 0].max())
+    return float((push * x**2).sum() / push.sum())
 
 
 def _cylinder(side_mm: float) -> Cell:
