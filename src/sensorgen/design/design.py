@@ -494,7 +494,7 @@ def _check_names(design: Design) -> None:
     """Look up every name that a design uses, so that a wrong one is reported before any work."""
     packs.check_texts(design.own)
     _ = design.params, design.machine, design.layers
-    for part in Slots.model_fields:
+    for part in ("dielectric", *Slots.model_fields):  # whose material may be that of others
         if getattr(design.materials, part):
             material, source = design.slot(part)
             if source and source not in material.sources():
