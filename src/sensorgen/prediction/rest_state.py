@@ -80,9 +80,10 @@ def rest_state(body: Body, width: float | None = None) -> RestState:
         raise Unpredictable("; ".join((*said, str(error)))) from None
     c = answer.capacitance_f
     found, doubts, unbounded = [c.middle()], list(said), False
+    coarse = 2 * wanted if is_open(scene) else wanted  # whole sensors take long
     for other in () if rough else others:
         try:
-            found.append(capacitance(other, eps, wanted).capacitance_f.middle() * cells.count)
+            found.append(capacitance(other, eps, coarse).capacitance_f.middle() * cells.count)
         except Unpredictable as error:
             unbounded = unbounded or cells.gap_mm.get(_rule(cells, other)) == 0
             rule = _rule(cells, other)
