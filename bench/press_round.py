@@ -36,7 +36,6 @@ CELLS: Sequence[tuple[str, dict[str, float]]] = (
     ("cone", {"tip_mm": 0.2}),
     ("cone", {"period_mm": 2.0}),
     ("pyramid", {}),
-    ("pyramid", {"tip_mm": 0.2}),
 )
 HEAD = """# Round cells in place of square ones
 
