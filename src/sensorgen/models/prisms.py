@@ -21,11 +21,11 @@ from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import Region, parts
 from sensorgen.scene.raster import raster
-from sensorgen.scene.repetition import Repeat, repeat
+from sensorgen.scene.repetition import Repeat, are_mirrored, repeat
 from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene, seen_from_above
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.enclosed import enclosing
-from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, Layers, Mesh, solved
+from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, Layers, Mesh, plan, solved
 
 SOURCE = "Dirichlet's and Thomson's principles; prisms of triangles, H1 and hybrid H(div) by NGSolve"
 COST = 3
@@ -35,13 +35,14 @@ WIDTH = 1e-2  # of the interval unless given
 _RUNGS = (  # distances of lines from outlines, in electrode gaps; order of the potential; width that it often reaches
     ((2.0, 0.5), 2, 2.5e-2),
     ((2.0, 0.4, 0.1), 2, 1e-2),
-    ((1.5, 0.3), 3, 5e-3),
+    ((0.5, 0.1), 3, 5e-3),
     ((2.0, 0.4, 0.08), 3, 2.5e-3),
     ((2.0, 0.5, 0.12), 4, 1e-3),
 )
 _GRID_MM = 1e-6  # to which corners are rounded
 _COARSER_MM = (1e-4, 3e-4, 1e-3, 3e-3)  # where outlines nearly coincide
 _SLENDER_MM = 2e-5  # height of a triangle below which a coarser grid is better
+_STRETCHED = (1.0, 1.13, 0.89)  # distances of lines from outlines, where they come too near others
 _COVERS = 0.99  # of the plan, by an electrode's layers together: between round beads there may be holes
 _OVERLAP_MM2 = 1e-6
 _MOST_MB = 4000.0  # memory of a mesh: more would take too long as well
@@ -150,9 +151,11 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
 def _meshes(cell: "_Cell", layers: Layers, beside_mm: Sequence[float]) -> tuple[Mesh, Mesh]:
     """The mesh of a cell, twice; of two cells that enclose it where that has slivers."""
     far_mm, loose_mm = _FAR * cell.gap_mm, _LOOSE * cell.gap_mm
-    exact = Mesh.of(layers, beside_mm, _GRID_MM, far_mm)
-    if exact.plan.slenderness_mm() > _SLENDER_MM:
-        return exact, exact
+    bare = plan(layers, (), _GRID_MM)
+    for times in _STRETCHED if bare.slenderness_mm() > _SLENDER_MM else ():
+        exact = Mesh.of(layers, [times * far for far in beside_mm], _GRID_MM, far_mm)
+        if exact.plan.slenderness_mm() > _SLENDER_MM:
+            return exact, exact
     found = []
     for outwards, least_mm in ((False, _SLENDER_MM), (True, _SLENDER_MM / 10)):  # a potential bears more than a flux
         for grid_mm in _COARSER_MM:
@@ -249,7 +252,25 @@ def _cell(scene: Scene) -> _Cell:
         sum(r.area for r in own.values()) > shapely.union_all(list(own.values())).area + _OVERLAP_MM2 for own in inside
     ):
         raise ValueError("outlines overlap in plan")
+    x, y, inside = _halved(x, y, inside)
     return _numbered([*levels.tolist()], inside, x, y)
+
+
+def _halved(
+    x: Repeat, y: Repeat, inside: list[dict[Body, Region]]
+) -> tuple[Repeat, Repeat, list[dict[Body, Region]]]:
+    """Half of a cell, or a quarter, where its middle is a mirror: the field in the rest is its image."""
+    sides = [x, y]
+    looks = list({id(r): r for own in inside for r in own.values()}.values())
+    for axis, side in enumerate(sides):
+        if len(side.shares) > 1 or side.shifts or not are_mirrored(looks, axis, (side.high_mm - side.low_mm) / 2):
+            continue
+        half = (side.low_mm + side.high_mm) / 2
+        sides[axis] = Repeat(side.low_mm, half, False, np.array([side.low_mm, half]), 2 * side.shares)
+        window = [0.0, 0.0, *(s.high_mm - s.low_mm for s in sides)]
+        inside = [{body: shapely.clip_by_rect(r, *window) for body, r in own.items()} for own in inside]
+        looks = [shapely.clip_by_rect(r, *window) for r in looks]
+    return sides[0], sides[1], [{body: r for body, r in own.items() if not r.is_empty} for own in inside]
 
 
 def _mirrored(planes: Real, shares: Real) -> Repeat:

@@ -116,8 +116,8 @@ def capacitance(
     model : str
         The only model to ask, or "".
     keep : bool
-        Take an answer that is known from before, and keep a new one. Answers of any width are never kept: they take
-        milliseconds.
+        Take an answer that is known from before, and keep a new one. Answers of any width are not kept where a model
+        in milliseconds gives them; without such a model they are those of :func:`default_width`.
 
     Raises
     ------
@@ -136,7 +136,12 @@ def capacitance(
     """
     if not width > 0:
         raise OutOfRange(f"an accuracy of {width:g}; expected a number above 0, as 1e-4")
-    if not keep or (width == inf and not model):
+    if width == inf and not model:
+        kind = _kind(permittivity)
+        if any(m.COST <= _CHEAP and hasattr(m, kind) and not m.why_not_applicable(scene) for m in capacitance_models().values()):
+            return _asked(scene, permittivity, width, model)
+        width = default_width(scene)
+    if not keep:
         return _asked(scene, permittivity, width, model)
     question = _question(scene, permittivity, width, model)
     known = cached.known(question)

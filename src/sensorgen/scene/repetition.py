@@ -81,7 +81,7 @@ def repeat(regions: Sequence[Region], size_mm: Sequence[float], axis: int) -> Re
     near = at < at[0] + period + _SAME_MM
     mirrors = np.unique((((at[near][:, None] + at[near]) / 2)[kind[near][:, None] != kind[near]]).round(9))
     for mirror in mirrors.tolist():
-        if _is_mirrored(looks, axis, mirror, size_mm):
+        if are_mirrored([shapely.clip_by_rect(r, *_around(mirror, axis, size_mm)) for r in looks], axis, mirror):
             low = mirror % (period / 2)
             return Repeat.of(low, low + period / 2, False, whole)
     corners = np.unique(shapely.get_coordinates(looks)[:, axis] % period)  # no outline lies on the seam
@@ -137,13 +137,18 @@ def _is_shifted(looks: Sequence[Region], axis: int, period: float, size_mm: Sequ
     )  # fmt: skip
 
 
-def _is_mirrored(looks: Sequence[Region], axis: int, at: float, size_mm: Sequence[float]) -> bool:
-    reach = min(at, size_mm[axis] - at)
-    low, high = [0.0, 0.0], list(size_mm[:2])
-    low[axis], high[axis] = at - reach, at + reach
+def are_mirrored(regions: Sequence[Region], axis: int, at_mm: float) -> bool:
+    """Whether each of some regions is its own mirror image at a place along an axis."""
     ways = (-1.0, 1.0) if axis == 0 else (1.0, -1.0)
-    near = [shapely.clip_by_rect(r, *low, *high) for r in looks]
-    return all(_are_same(scale(r, *ways, origin=(at, at)), r) for r in near)
+    return all(_are_same(scale(r, *ways, origin=(at_mm, at_mm)), r) for r in regions)
+
+
+def _around(at_mm: float, axis: int, size_mm: Sequence[float]) -> tuple[float, ...]:
+    """What of a plan lies as far to one side of a place as to the other: x and y, low and high [mm]."""
+    reach = min(at_mm, size_mm[axis] - at_mm)
+    low, high = [0.0, 0.0], list(size_mm[:2])
+    low[axis], high[axis] = at_mm - reach, at_mm + reach
+    return (*low, *high)
 
 
 def _are_same(one: Region, other: Region) -> bool:
