@@ -21,7 +21,7 @@ from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import Region, parts
 from sensorgen.scene.raster import raster
-from sensorgen.scene.repetition import Repeat, are_mirrored, repeat
+from sensorgen.scene.repetition import Repeat, halved, repeat
 from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene, seen_from_above
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.enclosed import enclosing
@@ -243,6 +243,8 @@ def _cell(scene: Scene) -> _Cell:
         boxes = raster(scene, bodies.index, len(bodies), [(0.0, size) for size in scene.size_mm])
         x = _mirrored(boxes.planes_mm[0], boxes.shares[:, 0])
         y = _mirrored(boxes.planes_mm[1], boxes.shares[0] / boxes.shares[0, 0])
+    whole = shapely.box(x.low_mm, y.low_mm, x.high_mm, y.high_mm)
+    x, y = halved((x, y), [shapely.intersection(r, whole) for r in dict.fromkeys(patterned)])
     window = (x.low_mm, y.low_mm, x.high_mm, y.high_mm)
     inside = [
         {body: translate(shapely.clip_by_rect(r, *window), -x.low_mm, -y.low_mm) for body, r in own.items()}
@@ -252,25 +254,7 @@ def _cell(scene: Scene) -> _Cell:
         sum(r.area for r in own.values()) > shapely.union_all(list(own.values())).area + _OVERLAP_MM2 for own in inside
     ):
         raise ValueError("outlines overlap in plan")
-    x, y, inside = _halved(x, y, inside)
     return _numbered([*levels.tolist()], inside, x, y)
-
-
-def _halved(
-    x: Repeat, y: Repeat, inside: list[dict[Body, Region]]
-) -> tuple[Repeat, Repeat, list[dict[Body, Region]]]:
-    """Half of a cell, or a quarter, where its middle is a mirror: the field in the rest is its image."""
-    sides = [x, y]
-    looks = list({id(r): r for own in inside for r in own.values()}.values())
-    for axis, side in enumerate(sides):
-        if len(side.shares) > 1 or side.shifts or not are_mirrored(looks, axis, (side.high_mm - side.low_mm) / 2):
-            continue
-        half = (side.low_mm + side.high_mm) / 2
-        sides[axis] = Repeat(side.low_mm, half, False, np.array([side.low_mm, half]), 2 * side.shares)
-        window = [0.0, 0.0, *(s.high_mm - s.low_mm for s in sides)]
-        inside = [{body: shapely.clip_by_rect(r, *window) for body, r in own.items()} for own in inside]
-        looks = [shapely.clip_by_rect(r, *window) for r in looks]
-    return sides[0], sides[1], [{body: r for body, r in own.items() if not r.is_empty} for own in inside]
 
 
 def _mirrored(planes: Real, shares: Real) -> Repeat:

@@ -183,10 +183,10 @@ def _unfit(candidate: Candidate, scene: Scene, kind: str) -> str:
     return f"dielectric losses are solved by {able} alone: leave the losses out to use it"
 
 
-def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, float]:
-    """Models in milliseconds first, then those that should suffice by their cost, then the others by expected width."""
+def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, float, float]:
+    """Models in milliseconds first, then those that should suffice by cost and time, then others by expected width."""
     short = cost > _CHEAP and candidate.reach() > width
-    return short, candidate.reach() if short else 0.0, cost
+    return short, candidate.reach() if short else 0.0, cost, candidate.seconds or 0.0
 
 
 def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, model: str) -> Answer:

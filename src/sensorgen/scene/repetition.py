@@ -137,6 +137,24 @@ def _is_shifted(looks: Sequence[Region], axis: int, period: float, size_mm: Sequ
     )  # fmt: skip
 
 
+def halved(sides: tuple[Repeat, Repeat], regions: Sequence[Region]) -> tuple[Repeat, Repeat]:
+    """Half of a cell between mirrors, or a quarter, where its middle is a mirror too: the rest is its image.
+
+    Parameters
+    ----------
+    sides : (Repeat, Repeat)
+        Of the cell, along x and y.
+    regions : sequence of Region
+        All that lies in it.
+    """
+    found = list(sides)
+    for axis, side in enumerate(sides):
+        middle = (side.low_mm + side.high_mm) / 2
+        if len(side.shares) == 1 and not side.shifts and are_mirrored(regions, axis, middle):
+            found[axis] = Repeat(side.low_mm, middle, False, np.array([side.low_mm, middle]), 2 * side.shares)
+    return found[0], found[1]
+
+
 def are_mirrored(regions: Sequence[Region], axis: int, at_mm: float) -> bool:
     """Whether each of some regions is its own mirror image at a place along an axis."""
     ways = (-1.0, 1.0) if axis == 0 else (1.0, -1.0)
