@@ -6,6 +6,7 @@ The part of a scene between its mirrors, or one period of it, is solved by
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.util import find_spec
@@ -34,7 +35,7 @@ WIDTH = 1e-2  # of the interval unless given
 
 _RUNGS = (  # distances of lines from outlines, in electrode gaps; order of the potential; width that it often reaches
     ((2.0, 0.5), 2, 2.5e-2),
-    ((2.0, 0.4, 0.1), 2, 1e-2),
+    ((0.8, 0.25, 0.08), 2, 1e-2),
     ((0.5, 0.1), 3, 5e-3),
     ((2.0, 0.4, 0.08), 3, 2.5e-3),
     ((2.0, 0.5, 0.12), 4, 1e-3),
@@ -153,9 +154,10 @@ def _meshes(cell: "_Cell", layers: Layers, beside_mm: Sequence[float]) -> tuple[
     far_mm, loose_mm = _FAR * cell.gap_mm, _LOOSE * cell.gap_mm
     bare = plan(layers, (), _GRID_MM)
     for times in _STRETCHED if bare.slenderness_mm() > _SLENDER_MM else ():
-        exact = Mesh.of(layers, [times * far for far in beside_mm], _GRID_MM, far_mm)
-        if exact.plan.slenderness_mm() > _SLENDER_MM:
-            return exact, exact
+        with suppress(fem.Unsolved):
+            exact = Mesh.of(layers, [times * far for far in beside_mm], _GRID_MM, far_mm)
+            if exact.plan.slenderness_mm() > _SLENDER_MM:
+                return exact, exact
     found = []
     for outwards, least_mm in ((False, _SLENDER_MM), (True, _SLENDER_MM / 10)):  # a potential bears more than a flux
         for grid_mm in _COARSER_MM:
