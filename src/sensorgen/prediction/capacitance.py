@@ -16,7 +16,7 @@ from sensorgen.core import cache as cached
 from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.models import capacitance_models
-from sensorgen.prediction.cost_model import expected
+from sensorgen.prediction.cost_model import expected, measured
 from sensorgen.prediction.plan import Candidate
 from sensorgen.scene.scene import FLOATING, Scene, content
 from sensorgen.scene.sections import overlap, sections
@@ -186,7 +186,8 @@ def _unfit(candidate: Candidate, scene: Scene, kind: str) -> str:
 def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, float, float]:
     """Models in milliseconds first, then those that should suffice by cost and time, then others by expected width."""
     short = cost > _CHEAP and candidate.reach() > width
-    return short, candidate.reach() if short else 0.0, cost, candidate.seconds or 0.0
+    loading = measured()[candidate.model].loading if candidate.model in measured() else 0.0
+    return short, candidate.reach() if short else 0.0, cost, (candidate.expected_seconds or 0.0) + loading
 
 
 def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, model: str) -> Answer:
