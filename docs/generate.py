@@ -38,9 +38,10 @@ def sensorgen(*words: str, folder: str = ".") -> str:
         "PYTHONIOENCODING": "utf-8",
         "PATH": "",
         "SENSORGEN_BUDGET": "0",
+        "SENSORGEN_CACHE": str(Path(tempfile.gettempdir()) / "sensorgen-docs"),  # without advice of other builds
     }
     environment["PYTHONPATH"] = os.environ.get("PYTHONPATH", "")
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, cwd=folder)
+    done = subprocess.run(command, capture_output=True, encoding="utf-8", env=environment, cwd=folder)
     if done.returncode not in (0, 1) or "Traceback" in done.stderr:  # 1: the design has findings
         raise SystemExit(f"{' '.join(words)}: {done.stderr}")
     return done.stdout

@@ -14,15 +14,27 @@ with suppress(ValueError):  # not in the main thread
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job would hand down a deaf ear
 
 
-@pytest.fixture(autouse=True)
-def _cache(monkeypatch, tmp_path_factory):
-    """No test finds what another one, or the user, has kept."""
+def _own_folders(monkeypatch, tmp_path_factory):
+    """Whatever the user, or another test, has kept is out of sight."""
     monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path_factory.mktemp("cache")))
     monkeypatch.setenv("SENSORGEN_LOG", str(tmp_path_factory.mktemp("log") / "log.db"))
     monkeypatch.setenv("BROWSER", "true")  # opens nothing
     monkeypatch.setenv("SENSORGEN_BUDGET", "0")  # changes of designs are tried by the tests of that alone
     monkeypatch.setenv("SENSORGEN_MATERIALS", str(tmp_path_factory.mktemp("materials")))
     monkeypatch.setenv("SENSORGEN_PACKS", str(tmp_path_factory.mktemp("packs")))
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _session(tmp_path_factory):
+    """For fixtures of modules, which are made before those of a test."""
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        _own_folders(monkeypatch, tmp_path_factory)
+        yield
+
+
+@pytest.fixture(autouse=True)
+def _cache(monkeypatch, tmp_path_factory):
+    _own_folders(monkeypatch, tmp_path_factory)
 
 
 @pytest.fixture(scope="session")

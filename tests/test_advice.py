@@ -12,7 +12,7 @@ from sensorgen.core.findings import Finding, grouped
 from sensorgen.design.design import load, make
 from sensorgen.prediction.results import resolved
 from sensorgen.workflows import moves
-from sensorgen.workflows.advice import advise
+from sensorgen.workflows.advice import _Search, advise
 from sensorgen.workflows.decision import advised, decision
 from sensorgen.workflows.trial import trial
 
@@ -106,6 +106,17 @@ def test_a_change_that_senses_nothing_is_not_advice(plate, monkeypatch):
 ])  # fmt: skip
 def test_extremes_are_words(error, words):
     assert resolved(error, 0.1, "cannot locate") == words
+
+
+def test_a_change_that_is_not_needed_is_dropped(plate):
+    """Planted: the whole layer that removes the warnings, with a length and a width that do nothing."""
+    design, made, _ = plate
+    search = _Search(design, made, 1e9, lambda _: None)
+    idle = {("parameters", "length_mm"): 27.0, ("parameters", "width_mm"): 9.0}
+    assert search._is_kept(idle | {("parameters", "dielectric_mm"): 0.6}, (0, 0))
+    assert [[(c.key, c.after) for c in one.changes] for one in search.kept] == [[("parameters.dielectric_mm", 0.6)]]
+    assert search._is_kept({("parameters", "dielectric_mm"): 0.6}, (0, 0))
+    assert len(search.kept) == 1
 
 
 def test_seven_layers_of_one_sentence_are_one_finding():

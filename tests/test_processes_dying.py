@@ -7,7 +7,7 @@ import pytest
 
 from sensorgen.core import cache, parallel
 from sensorgen.core.errors import SensorgenError
-from sensorgen.core.parallel import in_parallel, remembered
+from sensorgen.core.parallel import in_parallel, open_lanes, remembered
 
 
 def fatal(number, folder, deaths):
@@ -32,6 +32,25 @@ def test_a_death_costs_one_chunk(tmp_path):
     assert found == {k: k**2 for k in range(6) if k != 3} | {3: "3: a process ended"}
     with pytest.raises(SensorgenError, match="a process ended before its answer"):
         dict(in_parallel(fatal, works, 2))
+
+
+def where(number):
+    return os.getpid(), os.environ["OPENBLAS_NUM_THREADS"]
+
+
+def test_lanes_stay_for_several_rounds(tmp_path, monkeypatch):
+    """Two rounds, a death between them; each process has one thread for linear algebra, and this one its own."""
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "7")
+    with open_lanes(2) as lanes:
+        first = dict(in_parallel(where, [(k,) for k in range(8)], 2, lanes=lanes))
+        again = dict(in_parallel(where, [(k,) for k in range(8)], 2, lanes=lanes))
+        assert {pid for pid, _ in again.values()} <= {pid for pid, _ in first.values()}
+        assert {threads for _, threads in first.values()} == {"1"}
+        assert os.getpid() not in {pid for pid, _ in first.values()}
+        works = [(k, str(tmp_path), 1) for k in range(6)]
+        assert dict(in_parallel(fatal, works, 2, lanes=lanes)) == {k: k**2 for k in range(6)}
+        assert len(dict(in_parallel(where, [(k,) for k in range(8)], 2, lanes=lanes))) == 8
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "7"
 
 
 def test_a_chunk_that_kills_twice_is_divided():
@@ -82,8 +101,8 @@ def test_a_dask_cluster_gives_the_same(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_a_cluster_that_goes_away_is_one_line(monkeypatch):
-    """Works that are not sent yet can have no result; those that have come are kept."""
+def test_a_cluster_that_goes_away_is_one_line(monkeypatch, capfd):
+    """Works that are not sent yet can have no result; those that have come are kept. Dask itself prints nothing."""
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(parallel, "_CONNECT_S", 1.0)
     cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None)
@@ -93,3 +112,4 @@ def test_a_cluster_that_goes_away_is_one_line(monkeypatch):
     cluster.close()
     with pytest.raises(SensorgenError, match="no longer answers; results so far are kept"):
         list(results)
+    assert "Traceback" not in capfd.readouterr().err

@@ -81,7 +81,7 @@ def test_parameters_and_materials_go_before_those_of_the_file(plan, tmp_path):
 WRONG = {
     "": "holds nothing",
     "iteration: 26\n": "designs is missing",
-    "iteration: 26\ndesigns: []\n": "at least 1 entries",
+    "iteration: 26\ndesigns: []\n": "at least one entry",
     HEAD + "  - {}\n": "designs.0: neither of design and shape",
     HEAD + "  - {shape: tri, design: x.yaml}\n": "designs.0: both of design and shape",
     HEAD + "  - {shape: trj}\n": "did you mean 'tri'",
@@ -95,7 +95,7 @@ WRONG = {
     HEAD + "  - {shape: tri}\nlayout: {kind: round}\n": "expected 'column' or 'packed'",
     HEAD + "  - {shape: tri}\nlayout: {spacing_mm: .nan}\n": "spacing_mm",
     HEAD + "  - {shape: tri}\nslicers: [cure]\n": "'prusa' or 'cura'",
-    HEAD + "  - {shape: tri}\nslicers: []\n": "at least 1",
+    HEAD + "  - {shape: tri}\nslicers: []\n": "at least one",
     HEAD + "  - {shape: tri}\nname: ../../etc\n": "expected text such as 26 or film-study",
     HEAD + "  - {shape: tri}\nfilaments: {etpv: {lot: A}}\n": "did you mean 'etpu'",
     HEAD + "  - {shape: tri}\nfilaments: {etpu: {lot: \"a\\nb\"}}\n": "one line",

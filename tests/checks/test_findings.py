@@ -1,9 +1,12 @@
 """What holds for the findings of all rules: order, form, merging, waivers, and clean sensors."""
 
 import json
+import re
+from pathlib import Path
 
 import pytest
 
+from sensorgen import checks
 from sensorgen.checks.review import report, review
 from sensorgen.core.document import to_json
 from sensorgen.core.findings import SEVERITIES, Finding
@@ -98,3 +101,10 @@ def test_the_quality_decides_which_faces_are_off_the_grid():
     assert review(make(plate | {"quality": "extrafine"})).findings == []  # 0.3 and 0.6 are whole layers of both
     found = review(make(plate | {"quality": "extrafine", "parameters": {"dielectric_mm": 0.7}})).findings
     assert {f.rule for f in found} == {"2-film", "2-printed-gap", "3-grid", "4-unsampled"}
+
+
+def test_every_rule_has_a_name_that_a_target_may_refuse():
+    """Rules are names such as 2-film in the source; RULES lists them all."""
+    source = Path(checks.__file__).parents[1]
+    written = {name for file in source.rglob("*.py") for name in re.findall(r'"(\d+-[a-z-]+)"', file.read_text())}
+    assert written == set(checks.RULES)

@@ -2,9 +2,11 @@
 
 import pytest
 
+from sensorgen.checks.review import review
 from sensorgen.checks.slices import Layers
+from sensorgen.design.design import make
 from sensorgen.design.shapes import rect, tri
-from sensorgen.scene.scene import Fill
+from sensorgen.scene.scene import Body, Fill, Scene, box
 
 HAIR = 1e-6
 
@@ -50,6 +52,23 @@ def test_a_film_under_half_a_layer_is_an_error(sensor, findings, film_mm, severi
 def test_films_that_are_never_sampled_are_errors(findings, shape, film_mm):
     scene = shape.scene(shape.Params(length_mm=8.0, width_mm=4.0, dielectric_mm=film_mm), Fill())
     assert [f.severity for f in findings(scene, "2-film")] == ["error"]
+
+
+def side_by_side(gap_mm: float) -> Scene:
+    """Two electrodes on one bed, with a film between them that stands on its edge."""
+    far = 9.0 + gap_mm
+    bodies = (
+        Body("left", "etpu", (box(0, 9, 0, 8, 0, 1.0),), "bottom"),
+        Body("right", "etpu", (box(far, 20, 0, 8, 0, 1.0),), "top"),
+    )
+    film = [Body("film", "x60", (box(9, far, 0, 8, 0, 1.0),))] if gap_mm else []
+    return Scene((*bodies, *film), (20.0, 8.0, 1.0))
+
+
+def test_a_film_on_edge_is_made_of_lines_not_of_layers(findings):
+    assert [f.severity for f in findings(side_by_side(0.0), "1-")] == ["error"]
+    assert not findings(side_by_side(0.85), "2-")  # 8.5 layers, two lines
+    assert {f.body for f in findings(side_by_side(0.1), "5-")} == {"film"}
 
 
 def test_a_film_under_half_a_layer_is_an_error_though_a_sample_meets_it(sensor, findings):
@@ -137,3 +156,11 @@ def test_another_nozzle_prints_another_gap(findings, printer):
     (found,) = findings(tri_scene(0.1), "2-printed-gap", printer=small)
     assert "0.2 mm (classic walls or plain Cura)" in found.message
     assert "0.1 mm (Arachne, Cura filling outline gaps)" in found.message
+
+
+def test_a_film_below_one_layer_has_one_size_in_its_advice():
+    """No whole layers are below 0.07 mm: planted, "use 0.1 or 0.1 mm"."""
+    design = make({"shape": "reference", "quality": "fine", "parameters": {"dielectric_mm": 0.07}})
+    assert design.layers.layer_mm == 0.1
+    (advice,) = {f.advice for f in review(design).findings if "layers of" in f.message}
+    assert advice == "use 0.1 mm"

@@ -19,8 +19,8 @@ from sensorgen.workflows.characterise import Study, plan, read
 
 METERS = Meters()
 NAMES = (
-    "bar-45-1.6", "bar-90-1.6", "ladder-0-0.8", "ladder-print-0.8", "plate-0.4-2.8", "disc-x60-8x6", "disc-x60-8x6-b",
-    "disc-etpu-8x6", "disc-etpu-12x2", "disc-etpu-16x0.4",
+    "bar-45-1.6", "bar-90-1.6", "ladder-0-0.8", "ladder-print-0.8", "plate-0.4-2", "plate-0.4-2.8", "disc-x60-8x6",
+    "disc-x60-8x6-b", "disc-etpu-8x6", "disc-etpu-12x2", "pads-4x0.4-2x2.4",
 )  # fmt: skip
 
 
@@ -72,7 +72,7 @@ def test_goals_of_the_issue_are_expected_within_four_hours(study):
     chosen = selection.select(found, 11, lambda s: study.hours([study.coupons[k] for k in s]) <= 4)
     expected = found.expected(chosen, study.unknowns)
     missed = {t.quantity for t in study.targets if t.goal and expected.interval(t).half_width() > t.goal}
-    assert missed <= {"terminal_contact_ohm_m2"}  # 12 %: contacts of one kind differ by 5 %
+    assert not missed
 
 
 def test_posterior_against_importance_sampling(study, coupons, truth):
@@ -270,6 +270,50 @@ def test_from_plate_to_prediction(planned, study, truth, tmp_path, run):
     for row in found.rows:
         value = values["conductor" if row.material == "etpu" else "dielectric", row.quantity]
         assert row.low - 0.3 * (row.high - row.low) <= value <= row.high + 0.3 * (row.high - row.low), row.title
+
+
+def test_an_existing_source_is_replaced_on_request_alone(planned, study, truth, tmp_path, run):
+    (tmp_path / "form.yaml").write_text(filled(planned, study, truth), "utf-8")
+    assert run("characterise", "read", "form.yaml", "--name", "lab-1").code == 0
+    kept = tmp_path / "materials" / "lab-1.yaml"
+    kept.write_text("mine", "utf-8")
+    said = run("characterise", "read", "form.yaml", "--name", "lab-1")
+    assert said.code == 2
+    assert "lab-1.yaml: there is a source lab-1 already; choose another --name, or --force replaces it" in said.line
+    assert kept.read_text("utf-8") == "mine"
+    assert run("characterise", "read", "form.yaml", "--name", "lab-1", "--dry-run").code == 0
+    assert run("characterise", "read", "form.yaml", "--name", "lab-1", "--force").code == 0
+    assert kept.read_text("utf-8").startswith("about:")
+
+
+def test_own_materials_and_printer_from_plate_to_values(run, tmp_path, monkeypatch, truth):
+    """The form is read where nothing of the packs is, as the plate's folder keeps what it needs."""
+    for words in (("printer", "mine"), ("material", "eel"), ("material", "gel")):
+        assert run("new", *words).code == 0
+    gel, mine = tmp_path / "materials" / "gel.yaml", tmp_path / "printers" / "mine.yaml"
+    gel.write_text(gel.read_text("utf-8").replace("conductor: true", "conductor: false"), "utf-8")
+    mine.write_text(mine.read_text("utf-8").replace("{etpu: 0, x60: 1}", "{eel: 0, gel: 1}"), "utf-8")
+    said = run("characterise", "mine", "eel", "gel", "--name", "own")
+    assert (said.code, said.err) == (0, "")
+    plate = tmp_path / "out" / "own"
+    form = (plate / "form.yaml").read_text("utf-8")
+    assert "e+0" not in form
+    picture = (plate / "plate.svg").read_text("utf-8")
+    assert 'fill="#404448"' in picture
+    assert 'fill="#f2c14e"' in picture  # both templates have the same colour
+    own = Study.of("mine", ["eel", "gel"], folder=tmp_path)
+    known = {c.name: c for c in own.coupons}
+    names = [name for name in re.findall(r"(?m)^  ([a-z][^:]*):$", form) if name != "lines"]
+    coupons = [dataclasses.replace(known[re.sub("-[bcd]$", "", name)], name=name) for name in names]
+    near = dataclasses.replace(truth, bulk_ohm_m=0.1, through_ohm_m=0.2, conductor_pa=2e7, dielectric_pa=2e7)
+    (plate / "form.yaml").write_text(virtual_lab.filled(form, coupons, near, METERS, np.random.default_rng(1)), "utf-8")
+    for folder in ("materials", "printers"):
+        (tmp_path / folder).rename(tmp_path / f"was-{folder}")
+    monkeypatch.chdir(tmp_path.parent)
+    said = run("characterise", "read", plate / "form.yaml", "--name", "lab-2")
+    assert (said.code, said.err) == (0, "")
+    for wrong in ("doubtful", "left out", "not determined"):
+        assert wrong not in said.words
 
 
 @pytest.mark.parametrize(

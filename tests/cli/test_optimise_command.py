@@ -1,20 +1,27 @@
 """``sensorgen optimise``: the front against a plain loop, a planted optimum, doubts, limits, bad targets."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from statistics import mean
 
 import pytest
 
 from sensorgen.core import cache
+from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
+from sensorgen.core.findings import Finding
 from sensorgen.core.records import checked
 from sensorgen.design.design import make
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.workflows.optimise import ladder, result
-from sensorgen.workflows.optimise.search import search
-from sensorgen.workflows.optimise.space import MOST, candidates
+from sensorgen.workflows.optimise import ladder, recommend, result
+from sensorgen.workflows.optimise.result import Recommended, Spread
+from sensorgen.workflows.optimise.sample import sample
+from sensorgen.workflows.optimise.search import Row, Searched, search
+from sensorgen.workflows.optimise.space import MOST, Candidate, candidates, space
 from sensorgen.workflows.optimise.target import Target, load
+from sensorgen.workflows.optimise.ties import settled
 
 EPS0, EPS_X60 = 8.8541878128e-12, 4.68  # thesis, Table 3.2
 PLATES = {
@@ -146,6 +153,14 @@ def test_discards_on_a_coarse_mesh_hold_or_are_taken_back(monkeypatch):
         ({"objectives": {"capacitance": "maximise"}}, BadInput, "did you mean 'capacitance_pf'"),
         ({"objectives": {"hysteresis": "minimise"}}, BadInput, "no material file has the viscoelastic data"),
         ({"objectives": {"print_time_min": "minimise"}}, BadInput, "add slicer: prusa"),
+        ({"refuse_warnings": ["2-flim"]}, BadInput, "unknown rule '2-flim'; did you mean '2-film'"),
+        ({"parameters": {"dielectric_mm": 5}}, BadInput, "is 5; expected a mapping with from, to, step, or"),
+        ({"parameters": {"dielectric_mm": {"from": 1, "too": 2}}}, BadInput, "Known: from, step, to"),
+        ({"parameters": {"dielectric_mm": [None]}}, BadInput, "dielectric_mm.0 is None; expected a number, or text"),
+        ({"objectives": {"capacitance_pf": "min"}}, BadInput, "or 'maximise', or a mapping with near"),
+        ({"objectives": {"capacitance_pf": {"near": "x"}}}, BadInput, "capacitance_pf.near is 'x'; expected a number"),
+        ({"objectives": {}}, BadInput, "expected at least one entry"),
+        ({"design": 5}, BadInput, "design is 5; expected a mapping of names to values, or text"),
         ({"limits": {"capacitance_pf": {"least": 9, "most": 1}}}, BadInput, "contradict"),
         (
             {"objectives": {"capacitance_pf": {"near": 50}}, "limits": {"capacitance_pf": {"most": 20}}}, BadInput,
@@ -165,12 +180,138 @@ def test_a_bad_target_is_one_line(changes, error, words):
     assert "\n" not in str(said.value)
 
 
+def test_a_length_in_the_plane_is_varied_in_half_lines():
+    """C of plates is proportional to their length: the planted one of the half lines from 40 to 41 mm is found."""
+    line_mm = make({"shape": "reference"}).machine.line_mm()
+    lengths = [k * line_mm / 2 for k in range(300) if 40 <= k * line_mm / 2 <= 41]
+    wanted = 1e15 * EPS0 * EPS_X60 * lengths[2] * 1e-3 * 10e-3 / 0.3
+    search_ = found(
+        design={"shape": "reference", "parameters": {"dielectric_mm": 0.3}},
+        parameters={"length_mm": {"from": 40, "to": 41}}, objectives={"capacitance_pf": {"near": wanted}},
+    )  # fmt: skip
+    assert [row.candidate.values["length_mm"] for row in search_.rows] == pytest.approx(lengths)
+    row = search_.front[0]
+    assert row.candidate.values["length_mm"] == pytest.approx(lengths[2])
+    wider = [design.params.length_mm for design in recommend.within_tolerance(search_.target, row.design)]
+    assert wider == pytest.approx([lengths[2] - 0.05, lengths[2] + 0.05])
+
+
+def test_a_design_that_cannot_be_made_has_its_reason():
+    search_ = found(parameters={"dielectric_mm": [0.2, -1, -2]})
+    (why,) = [r for r in search_.reasons() if r[0].startswith("cannot be made")]
+    assert why[1:] == (True, 2)
+    assert "dielectric_mm" in why[0]
+    assert "-1" in why[0]
+
+
+def test_an_accepted_doubt_that_nothing_has_is_named():
+    answer = result.result("plates", found(parameters={"dielectric_mm": [0.2]}, accept_doubts=["plate free", "plaet"]))
+    assert [remark[:30] for remark in answer.remarks] == ["accept_doubts: 'plaet' is part"]
+    assert any("plaet" in str(part) for part in answer.document())
+
+
+@pytest.fixture(scope="module")
+def plate(tmp_path_factory):
+    """A plate and its trial."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(cache.PLACE, str(tmp_path_factory.mktemp("cache")))
+        design = make({"shape": "reference", "parameters": {"dielectric_mm": 0.2}})
+        return design, ladder.trial(design, drawn=False)
+
+
+def planted(plate, numbers, objectives):
+    """A search whose evaluated designs have force and place with an error of 10 %, so many warnings and this gap."""
+    design, tried = plate
+    rows = []
+    for number, (force_n, place_mm, warnings, gap_mm) in enumerate(numbers, 1):
+        value = {
+            "force_resolution": Bounds.of(force_n, "N", model=Interval(0.9 * force_n, 1.1 * force_n)),
+            "position_resolution": Bounds.of(place_mm / 1e3, "m", model=Interval(0.9e-3 * place_mm, 1.1e-3 * place_mm)),
+            "gap": Bounds.of(gap_mm / 1e3, "m"),
+        }
+        warning = tuple(Finding(f"{k}-x", "warning", "a", f"finding {k}", "b") for k in range(warnings))
+        trial = replace(tried, printed=replace(tried.printed, **value), findings=warning)
+        rows.append(Row(number, Candidate({"a": float(number)}, design), trial=trial))
+    return Searched(target(objectives=objectives), tuple(rows), tuple(rows), 1.5, None)
+
+
+FORCE = {"force_resolution_n": "minimise"}
+BOTH = FORCE | {"position_resolution_mm": "minimise"}
+
+
+@pytest.mark.parametrize(
+    ("numbers", "objectives", "chosen", "others"),
+    [
+        ([(0.1, 1, 2, 0.1), (0.100006, 1, 1, 0.1), (0.2, 1, 0, 0.9)], FORCE, 2, [1]),  # 0.006 % better, more warnings
+        ([(0.1, 1, 1, 0.1), (0.101, 1, 1, 0.2), (0.102, 1, 1, 0.2)], FORCE, 2, [1, 3]),  # more layers
+        ([(0.1, 1, 2, 0.1), (0.115, 1, 0, 0.1)], FORCE, 1, []),  # beyond 10 %
+        ([(0.1, 9, 0, 0.1), (0.101, 1, 2, 0.1)], BOTH, 2, []),  # equal in force, far better in place
+    ],
+)
+def test_ties_are_settled_by_a_rule(plate, numbers, objectives, chosen, others):
+    search_ = planted(plate, numbers, objectives)
+    row, ties = settled(search_, search_.rows[0], "force_resolution_n")
+    assert (row.number, [other.number for other in ties]) == (chosen, others)
+
+
+def test_ties_and_what_cannot_be_sensed_are_shown(plate):
+    """0.5 N beside 6 N is known, 50 mm on 100 mm holds no information."""
+    search_ = planted(plate, [(0.5, 50, 0, 0.1), (0.51, 51, 0, 0.1)], BOTH)
+    answer = result.result("planted", search_)
+    assert [(c.leads, c.tied) for c in answer.front] == [(True, ()), (False, (1,))]
+    assert [cells[1:] for cells in answer.table().cells] == [
+        (">", 1.0, 0.5, "cannot locate", *answer.table().cells[0][5:]),
+        ("=", 2.0, 0.51, "cannot locate", *answer.table().cells[1][5:]),
+    ]
+    (first,) = [
+        Recommended("best force", answer.front[0], ties=(2,), robust={"position_resolution_mm": Spread(20, 20, 50, 60)})
+    ]
+    words = " ".join(word for _, word in result._facts(first))
+    assert "position_resolution_mm cannot locate" in words
+    assert "median 20, worst cannot locate; with material ranges cannot locate" in words
+    assert "tied with 2 within what the models leave open; chosen by fewest warnings" in words
+
+
 def test_a_huge_space_is_refused_with_its_size():
     parameters = {
         name: {"from": 0.1, "to": 10, "step": 0.01} for name in ("dielectric_mm", "electrode_mm", "length_mm")
     }
     with pytest.raises(BadInput, match=rf"9.73e\+08 designs; expected at most {MOST}"):
         candidates(target(parameters=parameters))
+
+
+def test_a_sample_of_a_huge_space_proves_nothing():
+    """Millions of plates; of those that were tried the one with the best C is the best, by the plate capacitor."""
+    pytest.importorskip("optuna")
+    wanted = target(
+        parameters={
+            "dielectric_mm": {"from": 0.1, "to": 2.0}, "electrode_mm": {"from": 0.2, "to": 1.0},
+            "length_mm": {"from": 20, "to": 100}, "width_mm": {"from": 5, "to": 20}, "orientation": ["as-drawn"],
+        },
+        objectives={"capacitance_pf": "maximise"},
+    )  # fmt: skip
+    whole = space(wanted)
+    assert whole.size > 4e6
+    first, again = (sample(wanted, whole, 72) for _ in range(2))
+    assert [row.candidate.values for row in first.rows] == [row.candidate.values for row in again.rows]
+
+    def plate_pf(row):
+        v = row.candidate.values
+        return 1e12 * EPS0 * EPS_X60 * v["length_mm"] * v["width_mm"] * 1e-3 / v["dielectric_mm"]
+
+    best = max(first.rows, key=plate_pf)
+    assert first.front[0] is best
+    drawn, bred = (mean(plate_pf(row) for row in some) for some in (first.rows[:24], first.rows[48:]))
+    assert bred > drawn  # the third generation learns from the first
+    assert "nothing is proven: of 72 designs tried of" in result.result("plates", first).proof()
+
+
+def test_a_sample_of_a_small_space_is_the_space():
+    pytest.importorskip("optuna")
+    wanted = target()
+    search_ = sample(wanted, space(wanted), 12)
+    assert {tuple(row.candidate.values.values()) for row in result.leads(search_)} == {(0.1, 0.2)}
+    assert len(search_.rows) == 12
 
 
 def test_the_example_of_the_page_is_a_target(tmp_path):

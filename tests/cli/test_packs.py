@@ -367,8 +367,22 @@ PLANTED = [
     ("shape", "(0.05, 5.0)})\n    film_mm", "(0.5, 5.0)})\n    film_mm", "read: .*default 0.4 is outside its range"),
     ("shape", '"range": (0.5, 50.0)', '"choices": (1, 2)', "read: .*default 4.0 is not among its choices"),
     ("printer", "  G28\n", "  M999 S1\n", "gcode-command: start and end code, line 3: x has no M999|has no M999"),
-    ("printer", "min_layer_mm: 0.05", "min_layer_mm: 0.3", "profile: no profile"),
+    ("printer", "min_layer_mm: 0.05", "min_layer_mm: 0.5", "read: .*min_layer_mm 0.5 is above nozzle_mm 0.4"),
+    ("printer", "max_nozzle_c: 250.0", "max_nozzle_c: 200.0", "profile: no profile for etpu and x60 in 0.1 mm layers"),
     ("printer", "{etpu: 0, x60: 1}", "{etpy: 0}", "tools: .*unknown material 'etpy'"),
+    ("material", "low: 0.05, high: 0.5", "low: 0.5, high: 0.05",
+     "read: it.yaml, line 12: resistivity_ohm_m of it-sheet has low 0.5 above high 0.05"),
+    ("material", "{value: 0.1,", "{value: 0.9,", "line 12: .* is 0.9, outside its own range of 0.05 to 0.5"),
+    ("material", "value: 220.0", "value: 280.0", "line 23: nozzle_temperature_c of .* outside its own range of 210"),
+    ("material", "20.0e6", "20.0", r"line 16: youngs_modulus_pa of it-sheet is 20; .*1 MPa is 1.0e6 Pa.*implausible"),
+    ("material", "20.0e6", "6.0e12", r"line 16: youngs_modulus_pa of it-sheet is 6e\+12; expected 100 to 2e\+12"),
+    ("material", "value: 5.0,", "value: 0.5,", "line 14: relative_permittivity of it-sheet is 0.5; expected 1 to"),
+    ("shape", "    low = p.electrode_mm", "    import random\n    low = p.electrode_mm * random.uniform(0.9, 1)",
+     "random: the same parameters give different bodies"),
+    ("shape", "    low = p.electrode_mm", "    low = p.electrode_mm * (1 + hash('a') % 10**9 / 1e10)",
+     "random: the same parameters"),
+    ("shape", "    low = p.electrode_mm", "    import time\n    low = p.electrode_mm + time.time_ns() % 10**9 / 1e10",
+     "random: the same parameters"),
     ("quality", "layer_mm: 0.15  ", "layer_mm: 0.9  ", "profile: no printer that ships can print it"),
 ]  # fmt: skip
 
@@ -380,6 +394,60 @@ def test_planted_faults_are_found(run, here, what, old, new, expected):
     assert said.code == 1
     findings = json.loads(said.out)["findings"]
     assert any(re.search(expected, f"{f['rule']}: {f['message']}") for f in findings), findings
+
+
+@pytest.mark.parametrize(
+    ("name", "what", "folder", "expected"),
+    [
+        ("eel.yml", "material", "materials", "materials/eel.yml: nothing reads this file -> rename it to eel.yaml"),
+        ("My Eel.yaml", "material", "materials", "nothing reads this file -> rename it to my-eel.yaml"),
+        ("eel.yaml", "material", "shapes", "shapes/eel.yaml: nothing .* -> move it to materials, as eel.yaml"),
+        ("zig.py", "shape", "materials", "materials/zig.py: nothing .* -> move it to shapes, as zig.py"),
+        ("mine.yaml", "printer", "materials", "mine.yaml: .* -> it holds a printer: move it to printers"),
+        ("eel.yaml", "material", "material", "material/: nothing reads this folder -> rename it to materials"),
+        ("eel.yaml", "material", ".", "eel.yaml: nothing reads this material here -> move it to materials"),
+    ],
+)
+def test_a_file_in_a_wrong_place_is_found(run, here, name, what, folder, expected):
+    text = put(here / "else", what, "it").read_text("utf-8")
+    (here / "pack" / folder).mkdir(parents=True, exist_ok=True)
+    (here / "pack" / folder / name).write_text(text)
+    (here / "pack" / "pack.yaml").write_text("version: '1'\n")
+    said = run("pack", "test", "pack", "--json")
+    assert said.code == 1
+    found = json.loads(said.out)["findings"]
+    assert len(found) == 1
+    assert re.search(expected, f"{found[0]['body']}: {found[0]['message']} -> {found[0]['advice']}")
+
+
+def test_a_name_in_two_packs_is_found_with_both_places(run):
+    for name in ("one", "two"):
+        put(packs.place() / name, "material", "ink")
+    said = run("pack", "test", "one")
+    assert said.code == 1
+    assert "pack two has a material 'ink' too" in said.words
+    assert str(packs.place() / "two" / "materials" / "ink.yaml") in said.out.replace("\n       ", "")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("  G28\n", "  M999 S1\n", "start and end code, line 3: mine has no M999"),
+        ("max_nozzle_c: 250.0", "max_nozzle_c: 200.0", "no profile for "),
+        ("{etpu: 0, x60: 1}", "{etpy: 0, x60: 1}", "default_tools: tool 0 has unknown material 'etpy'"),
+    ],
+)
+def test_check_and_build_refuse_a_printer_that_pack_test_refuses(run, here, old, new, expected):
+    put(here, "printer", "mine")
+    words = ("reference", "--printer", "mine", "--tool", "etpu=0")
+    assert run("check", *words).code == 0
+    put(here, "printer", "mine", (old, new))
+    assert expected in run("pack", "test", ".").words
+    for command in (("check",), ("build", "--no-cad"), ("slice", "--slicer", "prusa")):
+        said = run(command[0], *words, *command[1:])
+        assert said.code in (1, 2)
+        assert expected in said.words + said.err
+    assert not Path("out").exists()
 
 
 @pytest.mark.parametrize(
@@ -406,9 +474,12 @@ def test_packs_that_ship_have_no_findings(run):
 
 def test_an_own_dielectric(run, unpressed):
     put(Path(), "material", "gel", ("conductor: true", "conductor: false"))
-    taken = ["--material", "dielectric=gel", "--material", "film=gel", "--tool", "gel=1"]
-    said = run("predict", "tri", *taken, "--drawn", "--json")
+    put(Path(), "printer", "mine")
+    taken = ["--material", "dielectric=gel", "--tool", "gel=1", "--tool", "etpu=0", "--printer", "mine"]
+    said = run("predict", "tri", *taken, "--drawn", "--json")  # film and isolation too, as the printer has two tools
     assert (said.code, said.err) == (0, "")
+    found = design.make({"shape": "tri", "materials": {"dielectric": "gel", "film": "x60"}, "tools": {"gel": 1}})
+    assert (found.materials.film, found.materials.isolation) == ("x60", "gel")
     values = {(v["material"], v["quantity"]): v for v in json.loads(said.out)["values"]}
     assert values["gel", "relative_permittivity"]["value"] == 5.0
 

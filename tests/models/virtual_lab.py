@@ -331,6 +331,13 @@ def _true(coupon, actual, truth, rng):
             larger = (actual[f"top_{k}_diameter_mm"] / 2 / catalogue.PLATE_RADIUS_MM) ** 2
             found.append(c * larger * (1 + rng.normal(0, 0.003)) + stray)
         return found
+    if coupon.kind == "pads":
+        found = []
+        for k in range(1, len(coupon.readings) + 1):
+            area = pi * (actual[f"diameter_{k}_mm"] / 2e3) ** 2 * fill * (1 - abs(rng.normal(0, 0.01)))
+            ends = truth.terminal_ohm_m2 * np.exp(rng.normal(0, 0.05, 2)).sum()
+            found.append((truth.through_ohm_m * actual[f"height_{k}_mm"] * 1e-3 + ends) / area)
+        return found
     role = "conductor" if coupon.readings[0].key == "through_ohm" else "dielectric"
     e, q = getattr(truth, f"{role}_pa"), getattr(truth, f"{role}_1_2nu")
     a, h = actual["diameter_mm"] / 2, actual["height_mm"]

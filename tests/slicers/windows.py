@@ -37,9 +37,9 @@ class Screen:
         return done.stdout.strip()
 
     def windows(self):
-        """Titles of the windows that are shown, by their numbers; those without a title are parts of others."""
+        """Titles of the windows that are shown, by their numbers; neither parts of others nor bars of progress."""
         found = {number: self.do("getwindowname", number) for number in self.do("search", "--onlyvisible", "").split()}
-        return {number: title for number, title in found.items() if title}
+        return {number: title for number, title in found.items() if title and not title.startswith("Loading")}
 
     def picture(self):
         """What the screen shows: Xvfb keeps it as an X window dump (XWDFile.h)."""

@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from itertools import pairwise
 
+import shapely
+
 from sensorgen.checks.slices import TOUCH_MM, Slices
 from sensorgen.checks.widths import VANISHES
 from sensorgen.core.findings import Finding
@@ -22,10 +24,23 @@ def check(slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> 
     for low, high in pairs:
         top = max(p.span("z")[1] for p in low.pieces)
         apart = gap_mm if len(pairs) == 1 else round(min(p.span("z")[0] for p in high.pieces) - top, 9)
-        film = list(_film((low, high), (0.0, 0.0, top), slices, quality.layer_mm, apart))
-        yield from film
-        if not any(f.severity == "error" for f in film):
-            yield from _printed((low, high), (0.0, 0.0, top), slices, printer, apart)
+        place = (0.0, 0.0, top)
+        if apart <= TOUCH_MM:
+            yield Finding(
+                "1-short", "error", f"{low.name} / {high.name}", "the electrodes touch: a short by design",
+                "give the film a thickness (dielectric_mm)", round(apart, 9), 0.0, place_mm=place,
+            )  # fmt: skip
+        elif not _on_edge((low, high), slices, apart):
+            film = list(_film((low, high), place, slices, quality.layer_mm, apart))
+            yield from film
+            if not any(f.severity == "error" for f in film):
+                yield from _printed((low, high), place, slices, printer, apart)
+
+
+def _on_edge(pair: Pair, slices: Slices, gap_mm: float) -> bool:
+    """Whether the electrodes are nearest beside each other: lines make such a film (rules 5 and 6), layers do not."""
+    regions = ([slices.body(body, k) for body in pair] for k in range(len(slices.layers)))
+    return any(float(shapely.distance(*each)) <= gap_mm + TOUCH_MM for each in regions)
 
 
 def _film(
@@ -33,12 +48,6 @@ def _film(
 ) -> Iterator[Finding]:
     """The film's thickness, drawn and printed."""
     names = f"{pair[0].name} / {pair[1].name}"
-    if gap_mm <= TOUCH_MM:
-        yield Finding(
-            "1-short", "error", names, "the electrodes touch: a short by design",
-            "give the film a thickness (dielectric_mm)", round(gap_mm, 9), 0.0, place_mm=place,
-        )  # fmt: skip
-        return
     printed_mm = round(slices.layers.printed_mm(place[2] + gap_mm) - slices.layers.printed_mm(place[2]), 9)
     if gap_mm < layer / 2 + TOUCH_MM or printed_mm <= 0:
         yield Finding(
@@ -50,11 +59,11 @@ def _film(
         return
     if abs(printed_mm - gap_mm) > TOUCH_MM:
         count = gap_mm / layer
-        below, above = max(1, int(count)) * layer, (int(count) + 1) * layer
+        sizes = dict.fromkeys(f"{max(1, whole) * layer:g}" for whole in (int(count), int(count) + 1))
         yield Finding(
             "2-film", "warning", names,
             f"the film of {gap_mm:g} mm is {count:.3g} layers of {layer:g} mm: it will print {printed_mm:g} mm thick",
-            f"use {below:g} or {above:g} mm", round(gap_mm, 9), printed_mm, place_mm=place,
+            f"use {' or '.join(sizes)} mm", round(gap_mm, 9), printed_mm, place_mm=place,
         )  # fmt: skip
     if printed_mm < 2 * layer - TOUCH_MM:
         yield Finding(

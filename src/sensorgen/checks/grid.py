@@ -29,7 +29,7 @@ def _faces(body: Body, layers: Layers) -> Iterator[Finding]:
         effect += "; at mid-height of a layer: the estimate assumes that the body below takes it, which is not certain"
     yield Finding(
         "3-grid", "warning", body.name, f"faces at {named} mm lie between layer boundaries{effect}",
-        f"move them to {', '.join(f'{layers.printed_mm(z):g}' for z in off[:3])} mm",
+        f"move them to {', '.join(dict.fromkeys(f'{layers.printed_mm(z):g}' for z in off[:3]))} mm",
         round(off[0], 9), round(layers.printed_mm(off[0]), 9),
         place_mm=_place(body, off[0]), count=len(off),
     )  # fmt: skip

@@ -60,11 +60,11 @@ def _work(
 
 def _refuse(design: "Design", error: Unprintable, budget: float, apply_change: int | None) -> None:
     """Deliver why a design is not built, and the changes that were tried."""
-    from sensorgen.checks.review import review
     from sensorgen.workflows.decision import STEPS, RefusedBuild, decision
+    from sensorgen.workflows.reviewed import reviewed
 
     with show.progress(STEPS) as step:
-        advice = decision(design, review(design), budget, predict=budget > 0, step=step).advice
+        advice = decision(design, reviewed(design), budget, predict=budget > 0, step=step).advice
     render.deliver(RefusedBuild(design.name, tuple(error.findings), len(error.stopping), advice=advice))
     settings.applied(design, advice, apply_change)
 

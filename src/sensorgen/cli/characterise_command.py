@@ -56,7 +56,7 @@ def _plan(
     render.deliver(made)
 
 
-def _read(form: str, name: str, picture: str | None, *, dry_run: bool) -> None:
+def _read(form: str, name: str, picture: str | None, *, dry_run: bool, force: bool) -> None:
     """Evaluate a form that was filled in: values with 95 % intervals, kept as a source that designs can name.
 
     Gaps are allowed. A coupon that contradicts the others is left out, with the probability that it is broken.
@@ -65,7 +65,7 @@ def _read(form: str, name: str, picture: str | None, *, dry_run: bool) -> None:
     from sensorgen.workflows.characterise import read
     from sensorgen.workflows.characterise.intervals import svg
 
-    found = read(Path(form), name, keep=not dry_run)
+    found = read(Path(form), name, keep=not dry_run, force=force)
     if picture:
         files.replace(Path(picture), svg(found.source, found.rows).encode())
     render.deliver(found)
@@ -80,6 +80,7 @@ command = _PrinterGroup(
                 click.Argument(["form"]),
                 click.Option(["--name"], default="", metavar="SOURCE", help="As in etpu@SOURCE; else from the plate."),
                 click.Option(["--picture"], metavar="FILE", help="Draw the intervals before and after, as SVG."),
+                click.Option(["--force"], is_flag=True, help="Replace a source of that name."),
                 click.Option(["--dry-run"], is_flag=True, help="Write no file."),
                 *render.options(file=False),
             ],

@@ -18,11 +18,12 @@ OWN: list[click.Parameter] = [
 
 
 def _work(design: "Design", *, strict: bool, budget: float, apply_change: int | None) -> int:
-    from sensorgen.checks.review import STEPS, review
+    from sensorgen.checks.review import STEPS
     from sensorgen.workflows import decision
+    from sensorgen.workflows.reviewed import reviewed
 
     with show.progress((*STEPS, *decision.STEPS)) as step:
-        held = review(design, step)
+        held = reviewed(design, step)
         decided = decision.decision(design, held, budget, predict=budget > 0, step=step)
     render.deliver(decided)
     settings.applied(design, decided.advice, apply_change)

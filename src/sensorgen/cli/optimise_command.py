@@ -13,7 +13,15 @@ from sensorgen.core.units import si
 
 
 def _optimise(
-    target: str, *, out: str, jobs: int | None, cluster: str, no_cache: bool, no_build: bool, no_gcode: bool
+    target: str,
+    *,
+    out: str,
+    sample: int,
+    jobs: int | None,
+    cluster: str,
+    no_cache: bool,
+    no_build: bool,
+    no_gcode: bool,
 ) -> int:
     """Find the designs of a space that no other is better than, as printed, and write the files of up to three.
 
@@ -26,8 +34,8 @@ def _optimise(
 
     with _progress() as step:
         found = optimise(
-            Path(target), Path(out), Workers(sweeps.at_once(jobs), cluster), keep=not no_cache, built=not no_build,
-            sliced=not no_gcode, progress=step,
+            Path(target), Path(out), Workers(sweeps.at_once(jobs), cluster), count=sample or 0, keep=not no_cache,
+            built=not no_build, sliced=not no_gcode, progress=step,
         )  # fmt: skip
     render.deliver(found)
     return render.verdict(*(() if found.front else ("no design meets the target",)))
@@ -61,6 +69,10 @@ command = click.Command(
     params=[
         click.Argument(["target"], metavar="TARGET.yaml"),
         click.Option(["--out"], default="out", show_default=True, metavar="DIR", help="Folder of all files."),
+        click.Option(
+            ["--sample"], type=click.IntRange(1, 20_000), default=None, metavar="N",
+            help="Try N designs that NSGA-II chooses, of a space too large to try all; nothing is then proven.",
+        ),
         *sweeps.workers(), options.no_cache(),
         click.Option(["--no-build"], is_flag=True, help="Do not build the recommended designs."),
         click.Option(["--no-gcode"], is_flag=True, help="Do not slice them."),

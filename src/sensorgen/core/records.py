@@ -1,33 +1,49 @@
 """Plain data from a file, validated against a record type; faults become our errors."""
 
 import reprlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import zip_longest
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from sensorgen.core.errors import BadInput, UnknownName
 
+_MAPPING, _LIST, _WHOLE, _TEXT = "a mapping of names to values", "a list", "a whole number", "text"
 _EXPECTED = {
+    "bool_parsing": "true or false",
     "bool_type": "true or false",
+    "dataclass_type": _MAPPING,
+    "dict_type": _MAPPING,
+    "enum": "{expected}",
     "finite_number": "a finite number",
+    "float_parsing": "a number",
     "float_type": "a number",
     "greater_than": "a number above {gt:g}",
     "greater_than_equal": "{ge:g} or more",
-    "int_type": "a whole number",
+    "int_from_float": _WHOLE,
+    "int_parsing": _WHOLE,
+    "int_parsing_size": "a smaller whole number",
+    "int_type": _WHOLE,
+    "invalid_key": "text as its keys",
+    "json_invalid": "JSON",
     "less_than": "a number below {lt:g}",
     "less_than_equal": "{le:g} or less",
-    "list_type": "a list",
+    "list_type": _LIST,
     "literal_error": "{expected}",
+    "mapping_type": _MAPPING,
+    "model_type": _MAPPING,
+    "multiple_of": "a multiple of {multiple_of:g}",
+    "none_required": "nothing, or ~",
     "string_pattern_mismatch": "text such as {example}",
+    "string_too_long": "at most {max_length} characters",
     "string_too_short": "at least {min_length} characters",
-    "string_type": "text",
-    "dict_type": "a mapping of names to values",
-    "model_type": "a mapping of names to values",
-    "too_long": "{max_length} entries",
+    "string_type": _TEXT,
+    "too_long": "at most {max_length} entries",
     "too_short": "at least {min_length} entries",
-    "tuple_type": "a list",
+    "tuple_type": _LIST,
 }
+_OTHERS = "another kind of value"  # that no file of ours can have
 
 
 class Strict(BaseModel):
@@ -47,10 +63,11 @@ def checked(kind: type[_Record], data: object) -> _Record:
     BadInput
         The first thing that is wrong: which key, what it is, and what was expected.
     """
+    plain = dict(data) if isinstance(data, Mapping) else data
     try:
-        return kind.model_validate(dict(data) if isinstance(data, Mapping) else data)
+        return kind.model_validate(plain)
     except ValidationError as error:
-        raise BadInput(_plain(kind, error.errors()[0])) from None
+        raise BadInput(problem(error, plain, kind)) from None
 
 
 def shown(value: object) -> str:
@@ -63,27 +80,94 @@ def shown(value: object) -> str:
         return "a huge number"
 
 
-def _plain(kind: type[Strict], first: Mapping[str, Any]) -> str:
-    """Pydantic's faults as our error."""
-    place = [str(part) for part in first["loc"] if part not in ("float", "str")]
-    key, error = ".".join(place) or f"a {kind.__name__.lower()}", first["type"]
-    if error == "value_error":
+def problem(error: ValidationError, data: object, kind: type[Strict] | None = None) -> str:
+    """The first fault that pydantic sees: which key, what it is, and what was expected.
+
+    Parameters
+    ----------
+    error : ValidationError
+        Of validating ``data``.
+    data : object
+        Plain data.
+    kind : type, optional
+        The record, for near names of keys and for examples.
+    """
+    first, expected = _first(error.errors(), data)
+    place = _place(first, data)
+    key = ".".join(map(str, place)) or (f"a {kind.__name__.lower()}" if kind else "all of it")
+    if first["type"] in ("value_error", "assertion_error"):
         return f"{key}: {first['ctx']['error']}"
-    if error == "missing":
+    if first["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
         return f"{key} is missing"
-    if error == "extra_forbidden":
-        inside = f" of {'.'.join(place[:-1])}" if len(place) > 1 else ""
-        return str(UnknownName(f"key{inside}", place[-1], _record_at(kind, first["loc"][:-1]).model_fields))
-    limits = dict(first.get("ctx", {})) | {"example": _example(kind, first["loc"])}
-    expected = _EXPECTED[error].format(**limits) if error in _EXPECTED else str(first["msg"]).lower()
-    return f"{key} is {shown(first['input'])}; expected {expected}"
+    if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+        inside = f" of {'.'.join(map(str, place[:-1]))}" if len(place) > 1 else ""
+        if kind is None:
+            return f"unknown key{inside} {str(place[-1])[:100]!r}"
+        return str(UnknownName(f"key{inside}", str(place[-1]), _keys(_record_at(kind, first["loc"][:-1]))))
+    words = ", or ".join(dict.fromkeys(_expected(each, kind) for each in expected))
+    return f"{key} is {shown(first['input'])}; expected {words}"
+
+
+def _place(fault: Mapping[str, Any], data: object) -> list[str | int]:
+    """Keys and positions that lead to a fault, without pydantic's names of types."""
+    place: list[str | int] = []
+    for part in fault["loc"]:
+        known = range(len(data)) if isinstance(data, list | tuple) else data if isinstance(data, Mapping) else ()
+        if part in known:
+            data = data[part]  # type: ignore[index]
+        elif part != fault["loc"][-1] or fault["type"] not in ("missing", "missing_argument"):
+            continue
+        place.append(part)
+    return place
+
+
+def _first(faults: Sequence[Mapping[str, Any]], data: object) -> tuple[Mapping[str, Any], list[Mapping[str, Any]]]:
+    """The first fault, and all of its value: of the alternatives for one value, those of the one that fits farthest."""
+    misspelt = (f for f in faults if f["type"] == "extra_forbidden" and f["loc"][:-1] == faults[0]["loc"][:-1])
+    first = next(misspelt, faults[0])  # before a key that is missing
+    alike = [fault for fault in faults if _branches(fault, first, data)]
+    deepest = max(len(_place(fault, data)) for fault in alike)
+    last = [fault for fault in alike if len(_place(fault, data)) == deepest]
+    best = next((fault for fault in last if fault["type"] == "extra_forbidden"), last[0])
+    place = _place(best, data)
+    return best, [fault for fault in alike if _place(fault, data) == place]
+
+
+def _branches(fault: Mapping[str, Any], first: Mapping[str, Any], data: object) -> bool:
+    """Whether two faults are of alternatives for one value: their ways part at the name of a type."""
+    if fault is first:
+        return True
+    pairs = enumerate(zip_longest(fault["loc"], first["loc"]))
+    same = next((k for k, (one, other) in pairs if one != other), len(fault["loc"]))
+    parted = [_place({"loc": each["loc"][: same + 1], "type": ""}, data) for each in (fault, first)]
+    return all(place == _place({"loc": fault["loc"][:same], "type": ""}, data) for place in parted)
+
+
+def _expected(fault: Mapping[str, Any], kind: type[Strict] | None) -> str:
+    """What one fault asks for."""
+    example = _example(kind, fault["loc"]) if kind else "others of its kind"
+    if fault["type"] == "model_type" and kind:
+        return f"a mapping with {', '.join(_keys(_record_at(kind, fault['loc'])))}"
+    if fault["type"] == "too_short" and fault["ctx"]["min_length"] == 1:
+        return "at least one entry"
+    return _EXPECTED.get(fault["type"], _OTHERS).format(**dict(fault.get("ctx", {})) | {"example": example})
+
+
+def _keys(kind: type[Strict]) -> list[str]:
+    """Names of a record's keys, as a file has them."""
+    return [field.alias or name for name, field in kind.model_fields.items()]
 
 
 def _record_at(kind: type[Strict], place: tuple[Any, ...]) -> type[Strict]:
-    """The record at a place within a record."""
+    """The record at a place within a record; pydantic names the alternative where there are several."""
+    alternatives: dict[str, type[Strict]] = {}
     for part in place:
         field = kind.model_fields.get(part) if isinstance(part, str) else None
-        kind = next(_records(field.annotation), kind) if field else kind
+        if field:
+            alternatives = {each.__name__: each for each in _records(field.annotation)}
+            kind = next(iter(alternatives.values()), kind)
+        else:
+            kind = alternatives.get(part, kind)
     return kind
 
 

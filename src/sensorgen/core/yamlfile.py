@@ -3,6 +3,7 @@
 import os
 import re
 import stat
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -86,6 +87,24 @@ def parse(text: str, where: str) -> dict[str, Any]:
         kind = _KINDS.get(type(data), "something else")
         raise BadInput(f"{where}: holds {kind}; expected a mapping of names to values")
     return data
+
+
+def line(text: str, place: Iterable[str | int]) -> int:
+    r"""Line of the value at a place of a text that :func:`parse` has read, or of the last part that is there.
+
+    >>> line("a: 1\nb:\n  - {c: 2}\n  - {c: 3}\n", ("b", 1, "c"))
+    4
+    """
+    node = yaml.compose(text, Loader=_Loader)
+    for part in place:
+        if isinstance(node, yaml.MappingNode):
+            inner = next((value for key, value in node.value if key.value == part), None)
+        else:
+            inner = node.value[part] if isinstance(node, yaml.SequenceNode) and isinstance(part, int) else None
+        if inner is None:
+            break
+        node = inner
+    return int(node.start_mark.line) + 1 if node else 1
 
 
 def _refuse_tricks(text: str, where: str) -> None:

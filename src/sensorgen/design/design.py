@@ -49,7 +49,7 @@ class Slots(Strict):
     top_electrode: Slot = "etpu@thesis-c.1-top"
     bottom_electrode: Slot = "etpu@thesis-c.1-bottom"
     film: Slot = "x60"
-    dielectric: Slot = "x60"
+    dielectric: Slot = Field(default="x60", description="Of film and isolation too, unless they are given.")
     isolation: Slot = "x60"
     support: Slot | None = Field(default=None, description="Fills the air while printing; left empty when not given.")
 
@@ -415,6 +415,8 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
         if design.shape == imported.SHAPE or design.geometry or design.bodies:
             design = _imported(design)
         _check_names(design)
+        if "own" not in data and design.own.keys() & {"printers"}:  # a record needs no materials that it does not use
+            design.machine.check_tools(Path(where).parent)
     except SensorgenError as error:
         raise error.within(where) from None
     return design if design.name else design.model_copy(update={"name": name_of(design)})
@@ -422,7 +424,17 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
 
 def with_own_files(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     """A design's data with the content of all files in place of their names, relative to a folder."""
-    return borders.with_border(imported.with_geometry(packs.with_files(with_own(data, folder), folder), folder), folder)
+    data = packs.with_files(with_own(_one_dielectric(data), folder), folder)
+    return borders.with_border(imported.with_geometry(data, folder), folder)
+
+
+def _one_dielectric(data: dict[str, Any]) -> dict[str, Any]:
+    """A design's data whose film and isolation are of an own dielectric too, unless they are given."""
+    given = data.get("materials")
+    word = given.get("dielectric") if isinstance(given, dict) and "bodies" not in data else None
+    if not isinstance(given, dict) or not isinstance(word, str) or word.partition("@")[0] == Slots().dielectric:
+        return data
+    return data | {"materials": {"film": word, "isolation": word} | given}
 
 
 def _imported(design: Design) -> Design:

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self, TypeVar, cast
 from pydantic import Field, model_validator
 
 from sensorgen.core import yamlfile
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.core.records import Strict, checked
 from sensorgen.design import packs
 
@@ -83,6 +83,22 @@ class Printer(Strict):
     start_gcode: str
     end_gcode: str
     control: Control = Control()
+
+    @model_validator(mode="after")
+    def _prints_layers(self) -> Self:
+        if self.min_layer_mm > self.nozzle_mm:
+            raise ValueError(f"min_layer_mm {self.min_layer_mm:g} is above nozzle_mm {self.nozzle_mm:g}; no layer fits")
+        return self
+
+    def check_tools(self, folder: Path) -> None:
+        """Raise BadInput where ``default_tools`` names a material that no pack has, as seen from a folder."""
+        for name, tool in self.default_tools.items():
+            try:
+                packs.find("materials", name, folder)
+            except SensorgenError as error:
+                raise BadInput(
+                    f"printer {self.name}: default_tools: tool {tool} has {error}; or leave it out"
+                ) from None
 
     @model_validator(mode="after")
     def _tools_exist(self) -> Self:

@@ -19,9 +19,12 @@ from hashlib import sha256
 from pathlib import Path
 from typing import IO, Any, Protocol, cast
 
+from pydantic import ValidationError
+
 from sensorgen.core import cache as answers
 from sensorgen.core import files
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, Unwritable
+from sensorgen.core.records import problem
 from sensorgen.design import packs, shape_process
 from sensorgen.scene.scene import FLOATING, Body, Envelope, Fill, Scene
 
@@ -61,6 +64,28 @@ def load(name: str, text: str) -> Shape:
 def digest(text: str) -> str:
     """SHA-256 of a shape's file."""
     return sha256(text.encode()).hexdigest()
+
+
+def varies(name: str, text: str, fill: Mapping[str, str]) -> bool:
+    """Whether a file's scene differs between two questions with its default parameters, in one process or in two.
+
+    Raises
+    ------
+    BadInput
+        The file is no shape.
+    """
+    made = []
+    for _ in range(2):
+        process = _Process(name, text)
+        try:
+            defaults = {str(field["name"]): field["default"] for field in process.about["fields"]}
+            question = {"parameters": defaults, "fill": fill}
+            made += [process.ask(question), process.ask(question)]
+        except (KeyError, TypeError):
+            return False  # no parameters: what reads the file says so
+        finally:
+            process.close()
+    return any(each != made[0] for each in made)
 
 
 def is_trusted(text: str) -> bool:
@@ -138,10 +163,8 @@ class _Foreign:
         data = self._ask({"parameters": dataclasses.asdict(p), "fill": dataclasses.asdict(fill)})
         try:
             return _checked(self._name, _adapter().validate_python(data), fill)
-        except ValueError as error:
-            first = error.errors()[0] if hasattr(error, "errors") else {"loc": (), "msg": str(error)}
-            place = ".".join(map(str, first["loc"]))
-            raise BadInput(f"{self._name}.py: scene() gives no scene: {place}: {first['msg']}") from None
+        except ValidationError as error:
+            raise BadInput(f"{self._name}.py: scene() gives no scene: {problem(error, data)}") from None
 
     def _ask(self, question: Mapping[str, Any]) -> Any:
         """What the file answers, or answered before."""

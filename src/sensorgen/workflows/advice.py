@@ -74,7 +74,7 @@ class _Search:
             if findings is None:
                 continue
             left = finding_counts(findings)
-            if changes and self._improves(left, changes) and self._is_kept(changes):
+            if changes and self._improves(left, changes) and self._is_kept(changes, left):
                 continue  # a further step on the same way changes more
             if left >= least and changes and moves.is_choice(list(changes)[-1]):
                 continue  # another way to print that improves nothing
@@ -122,21 +122,36 @@ class _Search:
         known = [one.counts() for one in self.kept]
         return all(left < one.counts() for one in same) and (len(known) < SHOWN or left < min(known))
 
-    def _is_kept(self, changes: Changes) -> bool:
-        """Keep a change if its print can sense what the design's can, with no further doubt."""
-        self.predicted += 1
-        try:
-            made = trial(moves.changed(self.design, changes), drawn=False)
-        except SensorgenError:
+    def _is_kept(self, changes: Changes, left: tuple[int, int]) -> bool:
+        """Keep a change if it is good, without the parts that are not needed: each is left out and all tried again."""
+        made = self._good(changes)
+        if made is None:
             return False
-        senses = all(min(old, 1) <= new for old, new in zip(grade(self.now), grade(made), strict=True))
-        if made.status != "predicted" or made.errors() or not senses or len(made.doubts) > len(self.now.doubts):
-            return False
+        for key in list(changes):
+            fewer = {k: v for k, v in changes.items() if k != key}
+            if not fewer or self._over():
+                break
+            findings = self._reviewed(fewer)
+            if findings is not None and finding_counts(findings) <= left and (smaller := self._good(fewer)):
+                changes, made = fewer, smaller
         listed = tuple(Change(".".join(k), self._own(k), v) for k, v in changes.items())
+        if any(set(one.changes) == set(listed) for one in self.kept):
+            return True
         self.kept.append(TriedChange(listed, moves.distance(self.design, changes), made))
         if len(self.kept) > SHOWN:  # the last one leaves the fewest warnings, and takes the place of the farthest
             del self.kept[-2]
         return True
+
+    def _good(self, changes: Changes) -> Trial | None:
+        """The changed design tried, if its print can sense what the design's can, with no further doubt."""
+        self.predicted += 1
+        try:
+            made = trial(moves.changed(self.design, changes), drawn=False)
+        except SensorgenError:
+            return None
+        senses = all(min(old, 1) <= new for old, new in zip(grade(self.now), grade(made), strict=True))
+        is_worse = made.status != "predicted" or made.errors() or len(made.doubts) > len(self.now.doubts)
+        return made if senses and not is_worse else None
 
     def _neighbours(self, changes: Changes, findings: Sequence[Finding]) -> Iterator[tuple[Key, Value]]:
         """Steps that can satisfy what is left; of errors alone, as long as there are any."""

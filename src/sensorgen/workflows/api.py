@@ -12,7 +12,7 @@ from sensorgen.analysis.calibration import Bench
 from sensorgen.analysis.comparison import Comparison, of_iteration
 from sensorgen.analysis.fit import Fit
 from sensorgen.analysis.fit import fit as fit_values
-from sensorgen.checks.review import Review, review
+from sensorgen.checks.review import Review
 from sensorgen.core.errors import BadInput
 from sensorgen.design import design as designs
 from sensorgen.design.body import Body
@@ -30,6 +30,7 @@ from sensorgen.workflows import build as builds
 from sensorgen.workflows import display as display
 from sensorgen.workflows import slice as slicing
 from sensorgen.workflows.build import Built
+from sensorgen.workflows.reviewed import reviewed
 from sensorgen.workflows.slice import Printed
 
 
@@ -76,7 +77,7 @@ def check(design: Design) -> Review:
     >>> check(Design(shape="reference")).counts()["error"]
     0
     """
-    return review(_named(design))
+    return reviewed(_named(design))
 
 
 def predict(

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from sensorgen.asprinted.printed import body as estimate
-from sensorgen.checks.review import Review, Step, draw, report, review
+from sensorgen.checks.review import Review, Step, draw, report
 from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.document import Part
@@ -32,6 +32,7 @@ from sensorgen.prediction.results import Prediction, timeless, to_json
 from sensorgen.workflows import compensation, decision, sealed
 from sensorgen.workflows.compensation import Change
 from sensorgen.workflows.decision import Advice, Decision
+from sensorgen.workflows.reviewed import reviewed
 from sensorgen.workflows.trial import Trial
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
@@ -159,7 +160,7 @@ def build(
             from sensorgen.scene.geometry.cad import CadProcess
 
             kernel = stack.enter_context(CadProcess())  # its import runs beside everything below
-        held = review(design, step)
+        held = reviewed(design, step)
         if held.errors(strict) and not force:
             raise Unprintable(held.findings, held.errors(strict))
         held = held.with_meshes(design)

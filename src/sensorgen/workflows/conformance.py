@@ -1,21 +1,23 @@
 """Whether the files of a pack are what sensorgen needs: values with sources, valid scenes, profiles, code that runs."""
 
 import ast
+import dataclasses
 import math
+import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+from sensorgen.core import yamlfile
 from sensorgen.core.document import Part, comma_separated
-from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
+from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName, nearest
 from sensorgen.core.findings import Finding, counted, counts, listed, table
 from sensorgen.design import design as designs
 from sensorgen.design import materials, packs, printer, shape_files
 from sensorgen.design.packs import File, Kind, Pack
-from sensorgen.export.gcode.check import check
-from sensorgen.export.slicers import cura, orca, prusa
+from sensorgen.export import machine
 from sensorgen.export.slicers.loads import Load
 from sensorgen.measure import accuracy
 from sensorgen.scene.geometry import meshes, validity
@@ -24,7 +26,6 @@ from sensorgen.scene.scene import Envelope, Fill, Scene
 _SMALL = {"length_mm": 12.0, "width_mm": 5.0}  # of a test's sensor, where the shape's ranges hold it
 _IMPORTS = ("sensorgen.scene", "sensorgen.core.errors")
 _NEEDED = {True: ("resistivity_ohm_m",), False: ("relative_permittivity", "youngs_modulus_pa", "poisson_ratio")}
-_EMPTY = ("the file prints nothing", "no command for the bed: it stays as it is")  # of start and end code alone
 Step = Callable[[str], None]
 
 
@@ -69,18 +70,36 @@ def chosen(word: str) -> list[File]:
     UnknownName
         No pack goes by that name.
     """
-    path = Path(word)
-    if path.is_file():
-        kind = next((kind for kind in packs.SINGULAR if path.absolute().parent.name == kind), None)
-        if kind is None or path.suffix != packs.suffix(kind) or not packs.is_name(kind, path.stem):
-            folders = ", ".join(packs.SINGULAR)
-            raise BadInput(f"{word}: expected a file in a folder of its kind ({folders}), named by small letters")
-        return [File(kind, path.stem, packs.beside(path.parent.parent))]
-    pack = packs.beside(path) if path.is_dir() else _named(word)
-    files = [File(kind, name, pack) for kind in packs.SINGULAR for name in pack.names(kind)]
+    if Path(word).is_file():
+        return [_one(word)]
+    files = _files(_pack(word))
     if not files:
-        raise BadInput(f"{word}: no files of a pack; expected folders as {', '.join(packs.SINGULAR)}")
+        raise _nothing(word)
     return files
+
+
+def _one(word: str) -> File:
+    path = Path(word)
+    kind = next((kind for kind in packs.SINGULAR if path.absolute().parent.name == kind), None)
+    if kind is None or path.suffix != packs.suffix(kind) or not packs.is_name(kind, path.stem):
+        folders = ", ".join(packs.SINGULAR)
+        raise BadInput(
+            f"{word}: expected a file in a folder of its kind ({folders}), named by small letters, digits and '-', "
+            "ending in .yaml (shapes: .py)"
+        )
+    return File(kind, path.stem, packs.beside(path.parent.parent))
+
+
+def _pack(word: str) -> Pack:
+    return packs.beside(Path(word)) if Path(word).is_dir() else _named(word)
+
+
+def _files(pack: Pack) -> list[File]:
+    return [File(kind, name, pack) for kind in packs.SINGULAR for name in pack.names(kind)]
+
+
+def _nothing(word: str) -> BadInput:
+    return BadInput(f"{word}: no files of a pack; expected folders as {', '.join(packs.SINGULAR)}")
 
 
 def _named(word: str) -> Pack:
@@ -92,11 +111,17 @@ def _named(word: str) -> Pack:
 
 def conformance(word: str, step: Step = lambda _: None) -> PackReport:
     """Test the files of a pack; ``word`` as of :func:`chosen`, ``step`` gets the name of each file."""
-    files, findings = chosen(word), list[Finding]()
+    pack = None if Path(word).is_file() else _pack(word)
+    files, findings = _files(pack) if pack else [_one(word)], list[Finding]()
     try:
-        packs.check_requires(files[0].pack)
+        packs.check_requires(pack or files[0].pack)
     except SensorgenError as error:
         findings.append(_finding("requires", packs.MANIFEST, str(error), "install it, or correct 'requires'"))
+    if pack and pack.where != "shipped":
+        findings += [_finding("place", *words) for words in _misplaced(pack)]
+        findings += [_finding("name", *words) for words in _twice(pack, files)]
+    if not files and not findings:
+        raise _nothing(word)
     for file in files:
         step(file.name)
         where = f"{file.kind}/{file.path.name}"
@@ -108,7 +133,9 @@ def conformance(word: str, step: Step = lambda _: None) -> PackReport:
                 continue
             findings += [_finding(rule, where, *words) for rule, *words in _TESTS[file.kind](file)]
         except SensorgenError as error:
-            findings.append(_finding("read", where, str(error), "correct the file"))
+            kind = _kind_of(file.path)
+            advice = f"it holds a {packs.SINGULAR[kind]}: move it to {kind}" if kind and kind != file.kind else ""
+            findings.append(_finding("read", where, str(error), advice or "correct the file"))
     return PackReport(word, len(files), counts(findings), tuple(findings))
 
 
@@ -116,7 +143,71 @@ def _finding(rule: str, where: str, message: str, advice: str) -> Finding:
     return Finding(rule, "error", where, message, advice)
 
 
-Faults = Iterator[tuple[str, str, str]]  # rule, message, advice
+Faults = Iterator[tuple[str, str, str]]  # rule, message, advice; or file, message, advice
+
+_KEYS: dict[Kind, set[str]] = {
+    "materials": {"conductor", "properties"}, "sources": {"about", "materials"}, "qualities": {"layer_mm"},
+    "printers": {"tool_numbers", "bed_mm"}, "instruments": {"least_ohm", "most_ohm"},
+}  # fmt: skip
+
+
+def _kind_of(path: Path) -> Kind | Literal[""]:
+    """The kind of a file by its content; "" where that does not say."""
+    if path.suffix == ".py":
+        return "shapes"
+    try:
+        keys = yamlfile.read(path).keys()
+    except SensorgenError:
+        return ""
+    return next((kind for kind, needed in _KEYS.items() if needed <= keys), "")
+
+
+def _misplaced(pack: Pack) -> Faults:
+    """Files that nothing reads: of another ending or name than those of their folder, or in no folder of a kind."""
+    for kind in packs.SINGULAR:
+        read = {f"{name}{packs.suffix(kind)}" for name in pack.names(kind)}
+        for path in _listed(pack.place(kind)):
+            if path.name not in read and path.suffix in (".yaml", ".yml", ".py") and path.name != "__init__.py":
+                yield f"{kind}/{path.name}", "nothing reads this file", _where_to(path, kind)
+    for folder in _listed(pack.folder):
+        near = nearest(folder.name, packs.SINGULAR)
+        if near and folder.is_dir() and folder.name not in packs.SINGULAR:
+            yield f"{folder.name}/", "nothing reads this folder", f"rename it to {near}"
+    if (pack.folder / packs.MANIFEST).exists():  # else a folder with designs, whose files are named by their paths
+        for path in _listed(pack.folder):
+            kind_of = _kind_of(path) if path.suffix in (".yaml", ".yml") and path.name != packs.MANIFEST else ""
+            if kind_of:
+                yield path.name, f"nothing reads this {packs.SINGULAR[kind_of]} here", f"move it to {kind_of}"
+
+
+def _listed(folder: Path) -> list[Path]:
+    try:
+        return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+    except OSError:
+        return []
+
+
+def _where_to(path: Path, kind: Kind) -> str:
+    """What to do with a file that nothing reads."""
+    found = _kind_of(path) or kind
+    name = re.sub("[^a-z0-9]+", "-", path.stem.lower()).strip("-") or "own"
+    folder = "" if found == kind else f"move it to {found}, as "
+    return f"{folder or 'rename it to '}{name}{packs.suffix(found)}"
+
+
+def _twice(pack: Pack, files: Sequence[File]) -> Faults:
+    """Names that another pack of the same rank has, too: a design that uses one of them is refused."""
+    ranks = {"own": packs.own(), "installed": packs.installed()}
+    rank = next(
+        (rank for rank, known in ranks.items() if pack.folder.resolve() in {p.folder.resolve() for p in known}), ""
+    )
+    for other in ranks.get(rank, ()):
+        if other.folder.resolve() != pack.folder.resolve():
+            for file in files:
+                if file.name in other.names(file.kind):
+                    what = f"pack {other.name} has a {packs.SINGULAR[file.kind]} {file.name!r} too: "
+                    where = f"{file.kind}/{file.path.name}"
+                    yield where, f"{what}{other.path(file.kind, file.name)}", "rename or remove one of them"
 
 
 def _material(file: File) -> Faults:
@@ -145,6 +236,10 @@ def _shape(file: File) -> Faults:
     for name in _imported(text, file):
         if not name.startswith(_IMPORTS) and name.partition(".")[0] not in sys.stdlib_module_names:
             yield "imports", f"imports {name}", "a shape imports sensorgen.scene and the standard library only"
+    if file.pack.where != "shipped" and shape_files.varies(file.name, text, dataclasses.asdict(Fill())):
+        message = "the same parameters give different bodies from run to run"
+        yield "random", message, "compute from the parameters alone: no random numbers, no time, no order of a set"
+        return
     form = shape_files.load(file.name, text) if file.pack.where != "shipped" else designs.shape(file.name)
     if not (form.__doc__ or "").strip():
         yield "about", "the file does not say what the shape is", "begin with a docstring: one sentence, and a picture"
@@ -205,36 +300,25 @@ def _scene_faults(about: str, scene: Scene, fill: Fill) -> Faults:
 
 
 def _printer(file: File) -> Faults:
-    machine = printer.load_printer(file.name, None if file.pack.where == "shipped" else file.text())
-    quality = printer.load_quality("fine")
-    loads = dict(zip(machine.tool_numbers, map(Load, map(materials.load, ("etpu", "x60"))), strict=False))
+    own_text = None if file.pack.where == "shipped" else file.text()
+    made, quality = printer.load_printer(file.name, own_text), printer.load_quality("fine")
+    layer_mm = max(quality.layer_mm, made.min_layer_mm)
+    quality = quality.model_copy(update={"layer_mm": layer_mm, "first_layer_mm": layer_mm})
+    loads = dict(zip(made.tool_numbers, map(Load, map(materials.load, ("etpu", "x60"))), strict=False))
+    yield from machine.faults(made, quality, loads)
     try:
-        prusa.profile(machine, quality, loads)
-        cura.profiles(machine, quality, loads)
-        orca.profiles(machine, quality, loads)
+        made.check_tools(file.pack.folder)
     except SensorgenError as error:
-        yield "profile", f"no profile for etpu and x60 in 0.1 mm layers: {error}", "correct the printer's limits"
-    for name, tool in machine.default_tools.items():
-        try:
-            packs.find("materials", name, file.pack.folder)
-        except SensorgenError as error:
-            yield "tools", f"default_tools: tool {tool} has {error}", "correct the name, or leave it out"
-    code = f"{machine.start_gcode}\n{machine.end_gcode}".splitlines()
-    for fault in check(code, machine).findings:
-        if fault.message not in _EMPTY:
-            yield f"gcode-{fault.rule}", f"start and end code, line {fault.line}: {fault.message}", fault.advice
+        yield "tools", str(error), "correct the name, or leave it out"
 
 
 def _quality(file: File) -> Faults:
     quality = printer.load_quality(file.name, None if file.pack.where == "shipped" else file.text())
     errors = []
     for name in printer.printer_names():
-        machine = printer.load_printer(name)
-        loads = {machine.tool_numbers[0]: Load(materials.load("etpu"))}
-        try:
-            prusa.profile(machine, quality, loads)
-        except SensorgenError as error:
-            errors.append(str(error))
+        made = printer.load_printer(name)
+        loads = {made.tool_numbers[0]: Load(materials.load("etpu"))}
+        errors += [message for rule, message, _ in machine.faults(made, quality, loads) if rule == "profile"][:1]
     if len(errors) == len(printer.printer_names()):
         yield "profile", f"no printer that ships can print it: {errors[0]}", "correct layers and speeds"
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
     from sensorgen.prediction.results import Prediction
 
-_VERSION = 3  # of the search for changes: stored advice of another one is not read
+_VERSION = 4  # of the search for changes: stored advice of another one is not read
 STEPS = ("prediction", "changes", "done")
 Step = Callable[[str], None]
 

@@ -4,11 +4,12 @@ from pathlib import Path
 
 from sensorgen.asprinted.printed import body
 from sensorgen.checks.review import STEPS as CHECKS
-from sensorgen.checks.review import Step, review
+from sensorgen.checks.review import Step
 from sensorgen.design.design import Design
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.workflows.decision import decision
+from sensorgen.workflows.reviewed import reviewed
 
 STEPS = (*CHECKS, "prediction", "page", "done")
 
@@ -30,7 +31,7 @@ def page_of(design: Design, *, folder: Path | None = None, step: Step = lambda _
     SensorgenError
         A name or value of the design is missing.
     """
-    held = review(design, step)
+    held = reviewed(design, step)
     decided = decision(design, held, 0.0, folder=folder, step=step)
     predicted = evaluate(bodies.default_body(design, folder))
     step("page")

@@ -10,7 +10,6 @@ from sensorgen.analysis.plots import layers as pages
 from sensorgen.asprinted import agreement, pinholes
 from sensorgen.asprinted.printed import nominal
 from sensorgen.checks import volumes
-from sensorgen.checks.review import review
 from sensorgen.checks.volumes import Row
 from sensorgen.core import document
 from sensorgen.core import files as store
@@ -26,6 +25,7 @@ from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 from sensorgen.export.slicing import Step, alone, sliced
 from sensorgen.workflows import compensation
 from sensorgen.workflows.compensation import Change
+from sensorgen.workflows.reviewed import reviewed
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ def slice_design(
         The place cannot be written to, or the disk is full.
     """
     step("checks")
-    held = review(design, walls=rule(slicer, design.walls) if slicer in SLICERS else "")
+    held = reviewed(design, walls=rule(slicer, design.walls) if slicer in SLICERS else "")
     if held.errors(strict) and not force:
         raise Unprintable(held.findings, held.errors(strict))
     with tempfile.TemporaryDirectory() as stage:

@@ -12,6 +12,7 @@ from sensorgen.core.bounds import Bounds
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.findings import Finding, Verdict, counted, counts, listed, most_severe, verdict
+from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.walls import rule
@@ -19,7 +20,7 @@ from sensorgen.export.slicers import SLICERS
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import DEFAULT, Query
-from sensorgen.prediction.results import Prediction
+from sensorgen.prediction.results import Prediction, resolved
 
 if TYPE_CHECKING:
     from sensorgen.export.gcode.drags import OfTool
@@ -122,6 +123,8 @@ class Trial(Displayed):
         Of the drawing and of the print, those left out that the design waives.
     force_n, position_m : float
         The reference load [N], [m].
+    length_m : float
+        Of the sensor [m].
     drawn, printed : Numbers
         Of the drawing, and of the print.
     doubts : tuple of str
@@ -141,6 +144,7 @@ class Trial(Displayed):
     findings: tuple[Finding, ...]
     force_n: float
     position_m: float
+    length_m: float
     drawn: Numbers
     printed: Numbers
     doubts: tuple[str, ...] = ()
@@ -155,7 +159,7 @@ class Trial(Displayed):
         yield f"{self.verdict}  {self.name}: {counted(counts(self.findings))}"
         yield ""
         rows = (
-            (f.name.replace("_", " "), *(_shown(f.name, getattr(n, f.name)) for n in (self.drawn, self.printed)))
+            (f.name.replace("_", " "), *(self._shown(f.name, n) for n in (self.drawn, self.printed)))
             for f in fields(Numbers)
         )  # fmt: skip
         yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
@@ -171,11 +175,16 @@ class Trial(Displayed):
         yield from (f"doubtful: {doubt}" for doubt in self.doubts)
         yield from listed(most_severe(self.findings, 3))
 
-
-def _shown(name: str, value: Bounds | float | None) -> str:
-    if isinstance(value, float):
-        value = Bounds.of(value, UNITS[name])
-    return value.words() if value else "–"
+    def _shown(self, name: str, numbers: Numbers) -> str:
+        """A number in words; what the sensor cannot do where an error holds no information."""
+        value: Bounds | float | None = getattr(numbers, name)
+        if isinstance(value, float):
+            value = Bounds.of(value, UNITS[name])
+        if name.startswith("position"):
+            return resolved(value, self.length_m, "cannot locate")
+        if name in ("force_resolution", "force_calibrated"):
+            return resolved(value, self.force_n, "cannot sense force")
+        return value.words() if value else "–"
 
 
 def trial(
@@ -222,8 +231,8 @@ def trial(
     findings = tuple(f for f in predicted.with_short(found) if not f.waiver)
     return Trial(
         design.name, design.id(), body.provenance, predicted.status, predicted.reason, verdict(findings), findings,
-        predicted.force_n, predicted.position_m, Numbers.of(predicted.drawn) if predicted.drawn else Numbers(),
-        Numbers.of(predicted), predicted.doubts, path,
+        predicted.force_n, predicted.position_m, design.params.length_mm * M_PER_MM,
+        Numbers.of(predicted.drawn) if predicted.drawn else Numbers(), Numbers.of(predicted), predicted.doubts, path,
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ A coupon's sizes are uncertain too: those that calipers measure by the calipers,
 error of the model, as the field at a rim, is such a size: a factor of 1 that is never measured.
 """
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import hypot, log, pi
@@ -18,11 +19,13 @@ from sensorgen.models import coupons as closed
 LEVEL_SIGMA = 1.959964  # half of a 95 % interval in standard deviations
 LADDER_MM = (3.0, 6.0, 12.0, 24.0)  # between neighbouring strips
 STRIP_MM = 3.0  # each strip of the ladder, along the bar
+PADS_MM = ((0.4, 0.4, 1.6), (0.4, 0.4, 0.4, 1.6, 1.6, 1.6), (0.4, 0.4, 0.4, 0.4, 2.4, 2.4))  # heights of pads
+PAD_DIAMETER_MM, PAD_PITCH_MM, PADS_IN_ROW = 10.0, 13.0, 3
 PLATE_RADIUS_MM, ELECTRODE_MM, UPPER_MM = 10.0, 0.4, 0.2  # of plates: radius, and thickness of both electrodes
 PAD_MM = 8.0  # of the lower electrode, for a probe
-_LOWEST_MM = 1.5  # of a disc that is compressed: a thinner one moves less than a gauge resolves
 _STRAIN = 0.04  # that the proposed load makes
 _MOST_N = 100.0  # of a usual stand
+_FRINGE = 0.97  # of the closed form of plates, whose film ends: 0.96 to 0.97 by finite volumes
 _FILL = 0.015  # coupons of one plate differ in how well they are filled [-]
 _TAPS_MM, _WIDTH_MM, _SENSOR_MM = 40.0, 6.0, 10.0  # between taps; width of ladders, and of bars, wide as sensors
 
@@ -127,7 +130,7 @@ class Coupon:
     Attributes
     ----------
     name, kind : str
-        Name on plate and form; "bar", "ladder", "plate" or "disc".
+        Name on plate and form; "bar", "ladder", "plate", "disc" or "pads".
     material : str
         What it is made of; of a plate the film's.
     sizes : tuple of Size
@@ -184,7 +187,8 @@ class Meters:
 
 def _range(material: Material, quantity: str, low: float, high: float) -> tuple[float, float]:
     """Mean and standard deviation of ln: all plausible sources within one, or a usual range where there is none."""
-    given = [v.value for v in material.properties.get(quantity, []) if not v.implausible and v.value > 0]
+    values = [v for v in material.properties.get(quantity, []) if not v.implausible]
+    given = [number for v in values for number in (v.value, v.low, v.high) if number is not None and number > 0]
     if given:
         low, high = min(given) / 1.5, max(given) * 1.5
     return (log(low) + log(high)) / 2, (log(high) - log(low)) / 2
@@ -271,8 +275,9 @@ def catalogue(conductor: Material, dielectric: Material, line_mm: float) -> tupl
     plates = [_plate(dielectric.name, heights) for heights in steps]
     shapes = ((8.0, 6.0), (8.0, 4.0), (10.0, 5.0), (10.0, 3.0), (12.0, 2.0))
     discs = [_disc(dielectric, "dielectric", *shape) for shape in shapes]
-    discs += [_disc(conductor, "conductor", *shape) for shape in (*shapes, (16.0, 1.2), (16.0, 0.6), (16.0, 0.4))]
-    return (*bars, *ladders, *plates, *discs)
+    discs += [_disc(conductor, "conductor", *shape) for shape in shapes]
+    pads = [_pads(conductor.name, *heights) for heights in PADS_MM]
+    return (*bars, *ladders, *plates, *discs, *pads)
 
 
 def _millimetres(key: str, drawn: float) -> Size:
@@ -377,7 +382,7 @@ def _plate(material: str, thicknesses_mm: tuple[float, ...]) -> Coupon:
     ]
     return Coupon(
         "plate-" + "-".join(f"{thickness:g}" for thickness in thicknesses_mm), "plate", material,
-        (*measured, _millimetres("electrode_mm", ELECTRODE_MM), Size("fringe", 1.0, 0.03), Size("fill", 1.0, 0.005),
+        (*measured, _millimetres("electrode_mm", ELECTRODE_MM), Size("fringe", _FRINGE, 0.03), Size("fill", 1.0, 0.005),
          Size("stray_pf", 0.0, 0.02)),
         tuple(
             Reading(f"capacitance_{k}_pf", "capacitance", "LCR meter, 1 kHz, open circuit subtracted; probes on the "
@@ -402,7 +407,7 @@ def _disc(material: Material, role: str, diameter: float, height: float) -> Coup
             return pressed
         ends = values["terminal_ohm_m2"] * (sizes["lower_face"] + sizes["upper_face"])
         through = (values["through_ohm_m"] * h + ends) / (pi * a**2 * sizes["fill"])
-        return (through, *pressed) if height >= _LOWEST_MM else (through,)
+        return through, *pressed
 
     centre, _ = _range(material, "youngs_modulus_pa", 1e6, 1e8)
     a, h = diameter / 2 * M_PER_MM, height * M_PER_MM
@@ -417,8 +422,40 @@ def _disc(material: Material, role: str, diameter: float, height: float) -> Coup
         f"disc-{material.name}-{diameter:g}x{height:g}", "disc", material.name,
         (_millimetres("diameter_mm", diameter), _millimetres("height_mm", height), Size("fill", 1.0, _FILL),
          Size("bonded", 1.0, 0.05), Size("lower_face", 1.0, 0.05), Size("upper_face", 1.0, 0.05)),
-        (*([through] if conducts else []), *(presses if height >= _LOWEST_MM else ())),
+        (*([through] if conducts else []), *presses),
         expected, pi * diameter**2 / 4 * height, (diameter, diameter),
+    )  # fmt: skip
+
+
+def _pads(material: str, *heights: float) -> Coupon:
+    """Round pads of several heights between terminals over both faces: a ladder through the layers."""
+    count = len(heights)
+
+    def expected(values: Values, sizes: Values) -> tuple[Real, ...]:
+        return tuple(
+            (values["through_ohm_m"] * sizes[f"height_{k}_mm"] * M_PER_MM + values["terminal_ohm_m2"] * (
+                sizes[f"lower_face_{k}"] + sizes[f"upper_face_{k}"]))
+            / (pi * (sizes[f"diameter_{k}_mm"] * M_PER_MM / 2) ** 2 * sizes["fill"])
+            for k in range(1, count + 1)
+        )  # fmt: skip
+
+    measured = [
+        size for k, height in enumerate(heights, 1) for size in (
+            _millimetres(f"diameter_{k}_mm", PAD_DIAMETER_MM), _millimetres(f"height_{k}_mm", height),
+        )
+    ]  # fmt: skip
+    faces = [Size(f"{face}_face_{k}", 1.0, 0.05) for k in range(1, count + 1) for face in ("lower", "upper")]
+    columns, rows = min(count, PADS_IN_ROW), -(-count // PADS_IN_ROW)
+    return Coupon(
+        "pads-" + "-".join(f"{count}x{height:g}" for height, count in Counter(heights).items()), "pads", material,
+        (*measured, Size("fill", 1.0, _FILL), *faces),
+        tuple(
+            Reading(f"through_{k}_ohm", "resistance", f"pad of {height:g} mm between terminals over both faces, two "
+                    "leads to each, DC")
+            for k, height in enumerate(heights, 1)
+        ),
+        expected, sum(pi * PAD_DIAMETER_MM**2 / 4 * height for height in heights),
+        (PAD_PITCH_MM * (columns - 1) + PAD_DIAMETER_MM, PAD_PITCH_MM * (rows - 1) + PAD_DIAMETER_MM),
     )  # fmt: skip
 
 

@@ -239,7 +239,8 @@ def _quantiles(means: Real, sigmas: Real, weights: Real, *, linear: bool) -> Int
             middle = (low + high) / 2
             below = weights @ ndtr((middle - means) / sigmas) < level
             low, high = (middle, high) if below else (low, middle)
-        found.append(float(high if linear else np.exp(high)))
+        value = float(high if linear else np.exp(high))
+        found.append(0.0 if linear and abs(value) < 1e-9 * float(sigmas.max()) else value)
     return Interval95(*found)
 
 

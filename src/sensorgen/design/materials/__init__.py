@@ -29,6 +29,26 @@ _RANGES = {  # finite ends belong to it; anything else is above 0
     "loss_tangent": (0.0, 1e6),
     PIEZORESISTANCE: (-inf, inf),
 }
+_PLAUSIBLE = {  # of any solid, foam or gel, and of any print; what is beyond has another unit
+    "resistivity_ohm_m": (1e-8, inf),
+    "relative_permittivity": (1.0, 1e5),
+    "loss_tangent": (0.0, 100.0),
+    "youngs_modulus_pa": (1e2, 2e12),
+    "tensile_strength_pa": (1e2, 1e11),
+    "density_kg_m3": (1.0, 23e3),
+    "elongation_at_break": (0.0, 50.0),
+    "hardness_shore_a": (0.0, 100.0),
+    "hardness_shore_d": (0.0, 100.0),
+    "nozzle_temperature_c": (20.0, 600.0),
+    "bed_temperature_c": (0.0, 300.0),
+    "speed_mm_s": (0.1, 2000.0),
+    "fan_percent": (0.0, 100.0),
+    "infill_percent": (0.0, 100.0),
+    "wall_lines": (0.0, 1000.0),
+    "flow_percent": (10.0, 300.0),
+    "max_flow_mm3_s": (0.01, 1000.0),
+    "retraction_mm": (0.0, 100.0),
+}
 
 
 class Value(Strict):
@@ -228,6 +248,9 @@ def own_source(source: str, text: str | None = None, texts: Texts = NO_TEXTS) ->
             raise BadInput(f"{source} is the name of a source that ships with sensorgen; expected another name")
         for name, values in made.materials.items():
             _check_values(name, {key: value.value for key, value in values.items()}, texts)
+            for quantity, value in values.items():
+                if fault := disorder(value):
+                    raise OutOfRange(f"{quantity} of {name} {fault}")
     except (BadInput, UnknownName, OutOfRange) as error:
         raise error.within(f"{source}.yaml") from None
     return made
@@ -282,15 +305,41 @@ def parse(name: str, text: str) -> Material:
         made = checked(Material, {**yamlfile.parse(text, file), "name": name})
     except BadInput as error:
         raise error if str(error).startswith(file) else error.within(file) from None
-    for quantity, values in made.properties.items():
-        low, high = _RANGES.get(quantity, (0.0, inf))
-        for each in values:
-            if not low <= each.value <= high or (isinf(each.value) and each.default):
-                expected = _said(low, high, "a number from 0 on")
-                raise OutOfRange(f"{file}: {quantity} of {each.source} is {each.value:g}; expected {expected}")
-        if sum(each.default for each in values) > 1:
-            raise BadInput(f"{file}: {quantity} has two values with default: true; expected one")
+    for group, values in (("properties", made.properties), ("print", made.print)):
+        for quantity, several in values.items():
+            for k, each in enumerate(several):
+                if fault := _fault(quantity, each):
+                    line = yamlfile.line(text, (group, quantity, k))
+                    raise OutOfRange(f"{file}, line {line}: {quantity} of {each.source} {fault}")
+            if sum(each.default for each in several) > 1:
+                raise BadInput(f"{file}: {quantity} has two values with default: true; expected one")
     return made
+
+
+def _fault(quantity: str, given: Value) -> str:
+    """What is wrong with a value of a material's file, or ""."""
+    low, high = _RANGES.get(quantity, (0.0, inf))
+    if not low <= given.value <= high or (isinf(given.value) and given.default):
+        return f"is {given.value:g}; expected {_said(low, high, 'a number from 0 on')}"
+    if fault := disorder(given):
+        return fault
+    low, high = _PLAUSIBLE.get(quantity, (-inf, inf))
+    for number in (given.value, given.low, given.high):
+        if number is not None and not low <= number <= high and not given.implausible:
+            expected = f"{low:g} to {high:g}" if high < inf else f"{low:g} or more"
+            unit = "1 MPa is 1.0e6 Pa" if quantity.endswith("_pa") else "in the unit at the end of its name"
+            return f"is {number:g}; expected {expected} ({unit}): convert it, or mark the value 'implausible: true'"
+    return ""
+
+
+def disorder(given: Value | OwnValue) -> str:
+    """What is wrong with the ends of a value's range, or ""."""
+    low, high = (-inf if given.low is None else given.low), (inf if given.high is None else given.high)
+    if not low <= high:
+        return f"has low {low:g} above high {high:g}; exchange them"
+    if not low <= given.value <= high:
+        return f"is {given.value:g}, outside its own range of {low:g} to {high:g}; correct one of them"
+    return ""
 
 
 def citations() -> dict[str, str]:

@@ -1,5 +1,6 @@
 """Summary of a recording as it was logged: samples, marks, frequencies and clocks; JSON in the field ``facts``."""
 
+import json
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -7,6 +8,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput
+from sensorgen.core.records import problem
 from sensorgen.core.units import si
 
 if TYPE_CHECKING:
@@ -135,10 +137,15 @@ def from_json(text: str) -> Facts:
     try:
         facts: Facts = _adapter().validate_json(text)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise BadInput(f"the facts of a recording are damaged: {where}: {first['msg']}") from None
+        raise BadInput(f"the facts of a recording are damaged: {problem(error, _plain(text))}") from None
     return facts
+
+
+def _plain(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
 
 
 @cache

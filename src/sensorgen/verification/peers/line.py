@@ -66,7 +66,8 @@ def ngspice(line: PressedLine, cells: int) -> Complex:
         file = Path(folder) / "ladder.cir"
         file.write_text(text, "utf-8")
         done = subprocess.run(  # noqa: S603
-            ["ngspice", "-b", str(file)], capture_output=True, text=True, cwd=folder, check=False,  # noqa: S607
+            ["ngspice", "-b", str(file)],  # noqa: S607
+            capture_output=True, encoding="utf-8", errors="replace", cwd=folder, check=False,
         )  # fmt: skip
     found = re.findall(r"v\(n0\) = ([-+.e\d]+),([-+.e\d]+)", done.stdout)
     if len(found) != len(frequency):

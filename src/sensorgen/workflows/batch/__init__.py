@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from sensorgen.checks.review import Review, Step, lost, review
+from sensorgen.checks.review import Review, Step, lost
 from sensorgen.core import files as store
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import BadInput, OutOfRange, Unprintable
@@ -24,6 +24,7 @@ from sensorgen.workflows.batch.pieces import Piece, pieces, shuffled, texts, too
 from sensorgen.workflows.batch.plan import Plan, load
 from sensorgen.workflows.batch.record import Record, ResolvedDesign, SlicedPlate
 from sensorgen.workflows.build import json_bytes, versions
+from sensorgen.workflows.reviewed import reviewed
 
 STEPS = ("plan", "checks", "predictions", "3MF", "slicing", "as printed", "record", "done")
 
@@ -187,7 +188,7 @@ def make(
     step("plan")
     found = arranged(path)
     step("checks")
-    held = {key: review(design) for key, design in found.designs.items()}
+    held = {key: reviewed(design) for key, design in found.designs.items()}
     _refuse_unprintable(found, held, force=force, strict=strict)
     step("predictions")
     prints = [(bodies.estimated(design),) for design in found.designs.values()]

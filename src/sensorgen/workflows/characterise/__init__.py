@@ -1,6 +1,7 @@
 """From a printer and two materials to a plate of coupons, and from its readings to values that designs can name."""
 
 import json
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -28,6 +29,7 @@ from sensorgen.core.version import __version__
 from sensorgen.design import materials, packs
 from sensorgen.design.design import Design
 from sensorgen.design.materials import own
+from sensorgen.export import machine
 from sensorgen.export.slicers.loads import load, recipe
 from sensorgen.workflows.build import json_bytes, profiles, versions
 from sensorgen.workflows.characterise import form as forms
@@ -102,9 +104,10 @@ class Study:
 
     @classmethod
     def of(
-        cls, printer: str, names: Sequence[str], *, quality: str = "fine", tools: Mapping[str, int] | None = None
-    ) -> "Study":
-        """Look everything up.
+        cls, printer: str, names: Sequence[str], *, quality: str = "fine", tools: Mapping[str, int] | None = None,
+        folder: Path = Path(),
+    ) -> "Study":  # fmt: skip
+        """Look everything up, as seen from a folder.
 
         Raises
         ------
@@ -113,19 +116,22 @@ class Study:
         SensorgenError
             A name that is not known, a material without a tool, or one that the printer cannot print.
         """
-        loaded = [materials.load(name) for name in names]
+        given = packs.with_files({"materials": {str(k): name for k, name in enumerate(names)}}, folder)
+        loaded = [materials.load(name, texts=given.get("own", {})) for name in given["materials"].values()]
         pairs = [m for m in loaded if m.conductor], [m for m in loaded if not m.conductor]
         if [len(kind) for kind in pairs] != [1, 1]:
-            given = ", ".join(f"{m.name} ({'conducts' if m.conductor else 'does not conduct'})" for m in loaded)
-            raise BadInput(f"materials are {given or 'none'}; expected one that conducts and one that does not")
+            said = ", ".join(f"{m.name} ({'conducts' if m.conductor else 'does not conduct'})" for m in loaded)
+            raise BadInput(f"materials are {said or 'none'}; expected one that conducts and one that does not")
         conductor, dielectric = pairs[0][0].name, pairs[1][0].name
-        return cls(plates.carrier(conductor, dielectric, printer, quality, tools or {}), conductor, dielectric)
+        return cls(plates.carrier(conductor, dielectric, printer, quality, tools or {}, folder), conductor, dielectric)
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
         """With what the materials' sources say."""
-        pair = materials.load(self.conductor), materials.load(self.dielectric)
-        return unknowns(*pair, self.design.machine.line_mm())
+        return unknowns(*self._pair(), self.design.machine.line_mm())
+
+    def _pair(self) -> tuple[materials.Material, materials.Material]:
+        return self.design.material(self.conductor), self.design.material(self.dielectric)
 
     @cached_property
     def targets(self) -> tuple[Target, ...]:
@@ -135,8 +141,7 @@ class Study:
     @cached_property
     def coupons(self) -> tuple[Coupon, ...]:
         """All that can be printed."""
-        pair = materials.load(self.conductor), materials.load(self.dielectric)
-        return catalogue(*pair, self.design.machine.line_mm())
+        return catalogue(*self._pair(), self.design.machine.line_mm())
 
     def expected(self) -> dict[str, list[float]]:
         """Readings at the middle of what the sources say, by coupon [ohm, F, N/m]."""
@@ -149,9 +154,16 @@ class Study:
 
     def head(self, plate: str) -> dict[str, str]:
         """First lines of a form."""
-        return {"plate": plate, "printer": self.design.printer, "quality": self.design.quality,
+        return {"plate": plate, "printer": _beside(self.design.printer), "quality": _beside(self.design.quality),
                 "conductor": self.conductor, "dielectric": self.dielectric,
                 "tools": json.dumps({m: self.design.tool(m) for m in (self.conductor, self.dielectric)})}  # fmt: skip
+
+    def files(self) -> dict[str, str]:
+        """Files of the user's own, for the plate's folder: a form is read without the packs that they came from."""
+        return {
+            _beside(word) if packs.is_path(kind, word) else f"{kind}/{word}{packs.suffix(kind)}": text
+            for kind, texts in self.design.own.items() for word, text in texts.items()
+        }  # fmt: skip
 
     def hours(self, chosen: Sequence[Coupon]) -> float:
         """Print time, from volumes, flow and tool changes [h]."""
@@ -166,8 +178,13 @@ class Study:
         return (_SLOWER * volume / min(flows) + _CHANGE_S * tallest / layers.layer_mm) / 3600
 
 
+def _beside(word: str) -> str:
+    """A name; of a path, the file's name in the plate's folder."""
+    return f"./{Path(word).name}" if packs.is_path("printers", word) else word
+
+
 def _height_mm(coupon: Coupon) -> float:
-    keys = [s.drawn for s in coupon.sizes if s.key == "height_mm" or s.key.startswith("film_")]
+    keys = [s.drawn for s in coupon.sizes if s.key.startswith(("height_", "film_"))]
     return max(keys)
 
 
@@ -206,7 +223,9 @@ class Planned:
             if row.half_width > row.goal * 1.0005:
                 yield f"goal missed: {row.quantity} of {row.material}: {row.half_width:.2g} %, goal {row.goal:g} %"
         yield from (f"rests on {coupon} alone: {quantities}" for coupon, quantities in self.exposed)
-        yield f"{self.folder}: {len(self.files)} files; fill in form.yaml, then: sensorgen characterise read FORM"
+        yield f"{self.folder}: {len(self.files)} files; print {self.name}.prusa.3mf (.cura, .orca) as plate.svg shows,"
+        yield "measure, fill in form.yaml, then:"
+        yield f"sensorgen characterise read {self.folder / 'form.yaml'}"
 
 
 def plan(
@@ -239,6 +258,9 @@ def plan(
     """
     if not 2 <= count <= MOST or not 0 < hours < np.inf:
         raise OutOfRange(f"{count} coupons in {hours:g} h; expected 2 to {MOST} coupons, and a time above 0")
+    faults = machine.of_design(study.design) if study.design.own.keys() & {"printers", "qualities"} else []
+    if faults:
+        raise BadInput(f"{faults[0].body}: {faults[0].text}")
     step("catalogue")
     found = selection.candidates(study.coupons, study.unknowns, study.targets, Meters())
     step("selection")
@@ -272,7 +294,7 @@ def plan(
             "form.yaml": forms.blank(study.head(label), coupons, expected),
             "intervals.svg": svg(f"{label}: expected", result),
         }
-        store.write(stage, {file: text.encode() for file, text in texts.items()})
+        store.write(stage, {file: text.encode() for file, text in (study.files() | texts).items()})
         made = Planned(label, folder, tuple(sorted(store.hashes(stage))), (*(c.name for c in coupons), "lines"),
                        study.hours(coupons), result, tuple(_exposed(found, chosen, coupons, study)))  # fmt: skip
         content = {"files": store.hashes(stage), "versions": versions(), "coupons": list(made.coupons)}
@@ -339,7 +361,10 @@ class Characterised:
         """Values, coupons that are left out, findings, and how a design takes the values."""
         yield f"{self.source}: {self.readings} readings of {self.coupons} coupons"
         yield Table.of("values", "95 % intervals, before and after", self.rows)
-        yield from (f"{name} is left out: dead with probability {share:.0%}" for name, share in self.dead.items())
+        yield from (
+            f"{name} is left out: dead with probability {share:.0%}, against the others or the sources' values"
+            for name, share in self.dead.items()
+        )
         yield from self.findings
         for row in self.rows:
             if row.low > row.before_high or row.high < row.before_low:
@@ -347,7 +372,7 @@ class Characterised:
                     f"doubtful: {row.quantity} of {row.material} is {row.value:.3g}, outside the known range, "
                     f"{row.before_low:.2g} to {row.before_high:.2g}: check the units of its readings"
                 )
-        left = ", ".join(row.quantity for row in self.rows if not row.determined())
+        left = ", ".join(f"{row.quantity} of {row.material}" for row in self.rows if not row.determined())
         if left:
             yield f"not determined: {left}"
         if self.file:
@@ -376,7 +401,7 @@ class Characterised:
         return "\n".join(lines) + "\n"
 
 
-def read(path: Path, source: str = "", *, keep: bool = True) -> Characterised:
+def read(path: Path, source: str = "", *, keep: bool = True, force: bool = False) -> Characterised:
     """Evaluate a filled-in form, and keep the values as a source.
 
     Parameters
@@ -387,11 +412,13 @@ def read(path: Path, source: str = "", *, keep: bool = True) -> Characterised:
         Name of the source; the plate's with "lab-" before it unless given.
     keep : bool
         Write the source's file.
+    force : bool
+        Replace a source of that name.
 
     Raises
     ------
     SensorgenError
-        The form or a name in it is wrong; nothing was written.
+        The form or a name in it is wrong, or there is a source of that name; nothing was written.
     """
     form = forms.read(path)
     label = source or "lab-" + "".join(c if c.isalnum() else "-" for c in form.plate.lower()).strip("-")
@@ -399,9 +426,13 @@ def read(path: Path, source: str = "", *, keep: bool = True) -> Characterised:
         raise BadInput(f"--name {label!r}; expected lower-case letters, digits, '.' and '-', as in lab-spool7")
     if label in materials.shipped_citations():
         raise BadInput(f"--name {label} is a source that ships with sensorgen; expected another, as lab-spool7")
+    file = own.path(label)
+    if keep and not force and os.path.lexists(file):
+        raise BadInput(f"{file}: there is a source {label} already; choose another --name, or --force replaces it")
     try:
         names = [form.conductor, form.dielectric]
-        study = Study.of(form.printer, names, quality=form.quality, tools=form.tools)
+        folder = path.parent if (path.parent / store.MANIFEST).exists() else Path()  # a plate keeps what it needs
+        study = Study.of(form.printer, names, quality=form.quality, tools=form.tools, folder=folder)
         piece = forms.lines_of(form)
         observed = forms.observations(form, study.coupons, study.expected())
         found = posterior(observed, study.unknowns)
@@ -414,7 +445,6 @@ def read(path: Path, source: str = "", *, keep: bool = True) -> Characterised:
     )  # fmt: skip
     if not keep:
         return made
-    file = own.path(label)
     store.replace(file, made.text().encode())
     return replace(made, file=str(file))
 

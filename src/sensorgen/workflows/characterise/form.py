@@ -94,6 +94,7 @@ def blank(head: Mapping[str, str], coupons: Sequence[Coupon], expected: Mapping[
     lines = [
         "# Readings of the plate. Leave ~ where nothing was measured; a coupon that is broken or leaks may stay in.",
         "# Numbers are in the unit at the end of a key, or have a unit of their own, as in 1.2 kohm.",
+        "# plate.svg shows each coupon, its strips, films and pads by number, and where terminals are to be made.",
         *(f"{key}: {value}" for key, value in head.items()),
         "meters:  # standard deviations of one reading",
         "  resistance_percent: 1", "  capacitance_percent: 1", "  force_percent: 1",
@@ -107,11 +108,12 @@ def blank(head: Mapping[str, str], coupons: Sequence[Coupon], expected: Mapping[
             if reading.kind == "stiffness":
                 lines.append(f"    {reading.key}_load_n: {reading.load_n:g}  # change it to the load that was used")
                 lines.append(
-                    f"    {reading.key}_mm: ~  # {reading.how}, under this load; {reading.load_n / value * 1e3:.2g}?"
+                    f"    {reading.key}_mm: ~  # {reading.how}, under this load; expected about "
+                    f"{_about(reading.load_n / value * 1e3)}"
                 )
             else:
                 scale = 1e12 if reading.kind == "capacitance" else 1.0
-                lines.append(f"    {reading.key}: ~  # {reading.how}; {value * scale:.2g}?")
+                lines.append(f"    {reading.key}: ~  # {reading.how}; expected about {_about(value * scale)}")
     lines.append(f"  {LINES}:")
     several = [(k, f"{k} line{'s' * (k > 1)}") for k in range(1, WALLS + 1)]
     lines += [f"    wall_{k}_mm: ~  # calipers, wall of {words}; 0 if it is not there" for k, words in several]
@@ -119,12 +121,18 @@ def blank(head: Mapping[str, str], coupons: Sequence[Coupon], expected: Mapping[
         lines.append(f"    vernier_{axis}: ~  # number of the pair of lines that meet, -5 to 5 {way}; 0 is the middle")
     films = range(1, FILMS + 1)
     lines += [
-        f"    film_{k}_short: ~  # {k} layers: true or false; ohmmeter from strip to pad, below 1 Mohm" for k in films
+        f"    film_{k}_short: ~  # {k} layer{'s' * (k > 1)}: true or false; ohmmeter from strip to pad, below 1 Mohm"
+        for k in films
     ]
     lines += [
         f"    comb_{k}_short: ~  # true or false: between the tracks {words} apart" for k, words in several[:COMBS]
     ]
     return "\n".join(lines) + "\n"
+
+
+def _about(value: float) -> str:
+    """Two digits, as people write them."""
+    return f"{float(f'{value:.2g}'):.12g}"
 
 
 def read(path: Path) -> Form:

@@ -23,7 +23,10 @@ def svg(title: str, rows: "Sequence[Row]") -> str:
     """
     shown = [row for row in rows if row.low > 0 and row.before_low > 0]
     height = 70 + _ROW * len(shown)
-    parts = [_text(10, 20, f"{title} (95 % intervals; grey before, blue after)", 14)]
+    parts = [
+        _text(10, 20, f"{title} (95 % intervals; grey before, blue after)", 14),
+        _text(10, height - 8, "times the value after"),
+    ]
     for factor in (0.01, 0.1, 0.5, 1, 2, 10, 100):
         x = _at(factor)
         parts.append(f'<path d="M{x:.1f} 34V{height - 24}" stroke="#ccc"/>' + _text(x - 8, height - 8, f"x {factor:g}"))
@@ -39,7 +42,8 @@ def svg(title: str, rows: "Sequence[Row]") -> str:
                 f'height="{thick}" fill="{colour}"/>'
             )
         half = (row.high - row.low) / 2 / row.value
-        parts.append(_text(_LEFT + _WIDE + 12, y + 14, f"{row.value:.3g} +- {100 * half:.2g} %"))
+        words = f"{row.value:.3g} +- {100 * half:.2g} %" if row.determined() else "not determined"
+        parts.append(_text(_LEFT + _WIDE + 12, y + 14, words))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_LEFT + _WIDE + 150} {height}" '
         f'width="{_LEFT + _WIDE + 150}" height="{height}">\n<rect width="100%" height="100%" fill="#fff"/>\n'

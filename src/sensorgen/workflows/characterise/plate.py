@@ -6,6 +6,7 @@ The lines of bars and ladders run along x of the bed, without walls, in every la
 import html
 from collections.abc import Iterator, Mapping, Sequence
 from math import cos, pi, radians, sin, sqrt
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import shapely
@@ -14,7 +15,10 @@ from shapely import affinity
 from sensorgen.analysis.characterise.catalogue import (
     ELECTRODE_MM,
     LADDER_MM,
+    PAD_DIAMETER_MM,
     PAD_MM,
+    PAD_PITCH_MM,
+    PADS_IN_ROW,
     PLATE_RADIUS_MM,
     STRIP_MM,
     UPPER_MM,
@@ -43,19 +47,26 @@ ALIGNED = {
 LINES_BOX_MM = (76.0, 52.0)
 SPACING_MM = 4.0
 WALLS, FILMS, COMBS, PITCH_MM, STEP_MM = 4, 4, 3, 2.0, 0.1  # of the piece for lines and shorts
+_NOTES = (
+    "bars: current through both ends, voltage between the tabs; discs and pads: terminals over both faces",
+    "red: terminals of 3 mm across the bar, of the material of your sensors' terminals; strip 1 is the left one",
+    "small numbers: films and pads as in the form",
+)
+_OTHER_COLOUR = "#f2c14e"  # of the dielectric where both materials have the same
 _TAB_MM = (2.0, 4.0)  # of a bar for a voltage probe
 _CORNERS = 96
 
 
-def carrier(conductor: str, dielectric: str, printer: str, quality: str, tools: Mapping[str, int]) -> Design:
-    """A design that gives the plate its printer, layers, tools and profile."""
-    from sensorgen.design.design import make
+def carrier(
+    conductor: str, dielectric: str, printer: str, quality: str, tools: Mapping[str, int], folder: Path
+) -> Design:
+    """A design that gives the plate its printer, layers, tools and profile; names as seen from a folder."""
+    from sensorgen.design.design import make, with_own_files
 
     slots = dict.fromkeys(("film", "dielectric", "isolation"), dielectric)
     slots |= dict.fromkeys(("top_electrode", "bottom_electrode"), conductor)
-    return make({
-        "shape": "reference", "materials": slots, "printer": printer, "quality": quality, "tools": dict(tools)
-    })  # fmt: skip
+    data = {"shape": "reference", "materials": slots, "printer": printer, "quality": quality, "tools": dict(tools)}
+    return make(with_own_files(data, folder))
 
 
 def bodies(coupon: Coupon, conductor: str, dielectric: str) -> tuple[Body, ...]:
@@ -69,6 +80,13 @@ def bodies(coupon: Coupon, conductor: str, dielectric: str) -> tuple[Body, ...]:
         )
     if coupon.kind == "plate":
         return _plates(coupon, conductor, dielectric)
+    if coupon.kind == "pads":
+        pads = []
+        for k in range(len(coupon.readings)):
+            row, column = divmod(k, PADS_IN_ROW)
+            pad = affinity.translate(_circle(PAD_DIAMETER_MM / 2), PAD_PITCH_MM * column, PAD_PITCH_MM * row)
+            pads.append(_prism(pad, 0.0, coupon.drawn(f"height_{k + 1}_mm")))
+        return (Body("pads", coupon.material, tuple(pads)),)
     disc = _circle(coupon.drawn("diameter_mm") / 2)
     return (Body("disc", coupon.material, (_prism(disc, 0.0, coupon.drawn("height_mm")),)),)
 
@@ -190,6 +208,25 @@ def threemfs(
         yield f"{name}.{family}.3mf", content
 
 
+def _marks(coupon: Coupon, pieces: Sequence[Body], shift: tuple[float, float]) -> list[str]:
+    """Where terminals of a ladder are to be made, and the numbers of films and pads."""
+    if coupon.kind == "ladder":
+        starts = [sum(LADDER_MM[:k]) + STRIP_MM * k for k in range(len(LADDER_MM) + 1)]
+        high = coupon.drawn("width_mm")
+        return [
+            f'<rect x="{u + shift[0]:.4g}" y="{shift[1] - high:.4g}" width="{STRIP_MM}" height="{high:g}" '
+            'fill="none" stroke="#b00" stroke-dasharray="1 .5"/>'
+            for u in starts
+        ]
+    if coupon.kind not in ("plate", "pads"):
+        return []
+    middles = [[sum(piece.span(axis)) / 2 for axis in "xy"] for piece in pieces[-1].pieces]
+    return [
+        f'<text x="{u + shift[0]:.4g}" y="{shift[1] - v + 4:.4g}" font-size="3" text-anchor="middle">{k}</text>'
+        for k, (u, v) in enumerate(middles, 1)
+    ]
+
+
 def picture(
     name: str, coupons: Sequence[Coupon], design: Design, plate: Plate, names: tuple[str, str]
 ) -> str:  # fmt: skip
@@ -197,6 +234,8 @@ def picture(
     (x, y), (wide, deep) = design.machine.bed_centre_mm(), design.machine.bed_mm
     bed = Rect(x - wide / 2, y - deep / 2, x + wide / 2, y + deep / 2)
     colour = {material: design.material(material).colour for material in names}
+    if len(set(colour.values())) < len(names):
+        colour[names[1]] = _OTHER_COLOUR
     shown, legend = [], []
     for order, (number, place) in enumerate(sorted(plate.items()), 1):
         own = number < len(coupons)
@@ -208,26 +247,23 @@ def picture(
         for outline, material in outlines:
             points = " ".join(f"{u + shift[0]:.4g},{shift[1] - v:.4g}" for u, v in outline)
             shown.append(f'<polygon points="{points}" fill="{colour[material]}" fill-opacity=".55"/>')
-        if own and coupons[number].kind == "ladder":
-            starts = [sum(LADDER_MM[:k]) + STRIP_MM * k for k in range(len(LADDER_MM) + 1)]
-            high = coupons[number].drawn("width_mm")
-            shown += [
-                f'<rect x="{u + shift[0]:.4g}" y="{shift[1] - high:.4g}" width="{STRIP_MM}" height="{high:g}" '
-                'fill="none" stroke="#b00" stroke-dasharray="1 .5"/>'
-                for u in starts
-            ]
+        shown += _marks(coupons[number], pieces, shift) if own else []
         x_label, y_label = place.centre_mm[0] - bed.x0, bed.y1 - place.centre_mm[1] + 1.6
         shown.append(f'<text x="{x_label:.4g}" y="{y_label:.4g}" font-size="4.6" text-anchor="middle">{order}</text>')
         column, row = divmod(order - 1, 4)
         label = html.escape(coupons[number].name if own else "lines and shorts")
         legend.append(f'<text x="{column * 60 + 2}" y="{deep + 6 + 6 * row:g}" font-size="4">{order}: {label}</text>')
-    shown += [*legend, f'<text x="182" y="{deep + 6:g}" font-size="4">red: terminals of 3 mm, made by hand</text>']
+    shown += [
+        *legend,
+        *(f'<text x="2" y="{deep + 32 + 6 * k:g}" font-size="4">{note}</text>' for k, note in enumerate(_NOTES)),
+    ]
     title = html.escape(f"{name}: {len(plate)} coupons on {design.machine.title}")
-    size = f'width="{wide + 8:g}mm" height="{deep + 42:g}mm"'
+    size = f'width="{wide + 8:g}mm" height="{deep + 60:g}mm"'
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-4 -12 {wide + 8:g} {deep + 42:g}" {size}>\n'
-        "<style>text { font-family: sans-serif; fill: #111 } polygon { stroke: #222; stroke-width: .15 }</style>\n"
-        f'<rect x="-4" y="-12" width="{wide + 8:g}" height="{deep + 42:g}" fill="#fff"/>\n'
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-4 -12 {wide + 8:g} {deep + 60:g}" {size}>\n'
+        "<style>text { font-family: sans-serif; fill: #111; stroke: #fff; stroke-width: .8; paint-order: stroke } "
+        "polygon { stroke: #222; stroke-width: .15 }</style>\n"
+        f'<rect x="-4" y="-12" width="{wide + 8:g}" height="{deep + 60:g}" fill="#fff"/>\n'
         f'<rect x="0" y="0" width="{wide:g}" height="{deep:g}" fill="none" stroke="#555" stroke-width=".3"/>\n'
         f'<text x="0" y="-4" font-size="5">{title}: x to the right, y up; lines of bars run along x</text>\n'
         + "\n".join(shown)

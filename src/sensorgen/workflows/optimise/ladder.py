@@ -31,6 +31,7 @@ AT_REST = frozenset({"gap_mm", "capacitance_pf", "top_electrode_ohm", "bottom_el
 COARSE = AT_REST | {"force_resolution_n", "position_resolution_mm", "sensitivity_per_kpa"}
 _NO_FOLDER = Path("/dev/null")  # holds no G-code: the print is estimated
 _PA_PER_KPA = 1e3
+_TRIAL = 2  # version of the stored trials
 
 
 @dataclass(frozen=True)
@@ -114,6 +115,7 @@ def everything(design: Design, query: Query, slicer: str) -> Trial:
     """The design tried: estimated, or sliced now."""
     question: dict[str, Any] = {
         "what": "trial",
+        "version": _TRIAL,
         "design": design.id(),
         "name": design.name,
         "query": asdict(query),

@@ -1,6 +1,7 @@
 """The designs to print: the best of the first two objectives and the best compromise, built, checked and sliced."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 from sensorgen.core import files as store
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import SensorgenError, Unprintable
-from sensorgen.core.parallel import remembered, said
+from sensorgen.core.parallel import in_parallel
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design, make
 from sensorgen.design.walls import rules
@@ -24,6 +25,7 @@ from sensorgen.workflows.optimise.result import Recommended, Spread, chosen, lea
 from sensorgen.workflows.optimise.search import HERE, Row, Searched, Workers
 from sensorgen.workflows.optimise.space import grid_mm
 from sensorgen.workflows.optimise.target import NUMBERS, Target
+from sensorgen.workflows.optimise.ties import settled, worth
 from sensorgen.workflows.slice import slice_design
 from sensorgen.workflows.trial import Numbers, trial
 
@@ -51,65 +53,82 @@ def recommended(
     step : callable
         Called with the next step.
     """
-    made: dict[int, Recommended] = {}
-    rows = leads(found)
-    worth = {row.number: _worth(found.target, row) for row in rows}
-    keys = list(found.target.objectives)
-    roles = {
-        f"best {key.rpartition('_')[0]}": next(r for r in rows if worth[r.number][key] == least)
-        for key, least in ((key, min(each[key] for each in worth.values())) for key in keys[:2])
+    target, rows = found.target, leads(found)
+    best = {
+        f"best {key.rpartition('_')[0]}": (min(rows, key=partial(worth, target, key)), key)
+        for key in list(target.objectives)[:2]
     }
-    roles["balanced"] = rows[0]
-    for role, row in roles.items():
+    made: dict[int, tuple[Row, Recommended]] = {}
+    for role, (row, key) in (best | {"balanced": (rows[0], "")}).items():
+        row, others = settled(found, row, key)
         if row.number in made:
-            made[row.number] = replace(made[row.number], role=f"{made[row.number].role}, {role}")
+            before = made[row.number][1]
+            ties = tuple(dict.fromkeys((*before.ties, *(other.number for other in others))))
+            made[row.number] = row, replace(before, role=f"{before.role}, {role}", ties=ties)
             continue
-        step(role)
-        design = _named(row.design, f"{name}-{role.replace('best ', '').replace('_', '-')}")
-        one = Recommended(role, replace(chosen(found.target, row, leads=True), name=design.name))
-        one = replace(one, robust=_robust(found.target, row, workers, keep=keep))
-        made[row.number] = _built(one, found.target, design, out, sliced=sliced)
-    return tuple(made.values())
+        name_ = f"{name}-{role.replace('best ', '').replace('_', '-')}"
+        one = Recommended(role, replace(chosen(target, row, leads=True), name=name_))
+        made[row.number] = row, replace(one, ties=tuple(other.number for other in others))
+    with workers.opened() as opened:
+        step("tolerances")
+        robust = _robust(target, [row for row, _ in made.values()], opened, keep=keep)
+        works = [
+            (replace(one, robust=robust[number]), target, _named(row.design, one.design.name), out, sliced)
+            for number, (row, one) in made.items()
+        ]
+        step("files")
+        lanes = () if opened.cluster else opened.lanes  # files are written by this computer
+        lost = partial(_unbuilt, [one for one, *_ in works])
+        written = dict(in_parallel(_built, works, opened.jobs, lost=lost, lanes=lanes))
+    return tuple(written[k] for k in range(len(works)))
 
 
-def _worth(target: Target, row: Row) -> dict[str, float]:
-    trial_ = row.trial
-    numbers = {k: NUMBERS[k].of(trial_.printed, trial_.toolpath) for k in target.objectives} if trial_ else {}
-    return {key: target.worth(key, b.value) for key, b in numbers.items() if b}
+def _unbuilt(each: Sequence[Recommended], k: int, reason: str) -> Recommended:
+    return replace(each[k], slicer=reason)
 
 
 def _named(design: Design, name: str) -> Design:
     return make(design.model_dump(mode="json", exclude_defaults=True) | {"name": name})
 
 
-def _robust(target: Target, row: Row, workers: Workers, *, keep: bool) -> dict[str, Spread]:
-    """Objectives that an estimate has, over walls of slicers and lengths in the plane."""
-    keys = [key for key in target.objectives if not NUMBERS[key].of_path]
-    inputs: list[tuple[Any, ...]] = [(row.design, rule, target.query()) for rule in rules(None)]
-    for name, value in asdict(row.design.params).items():
-        if name.endswith("_mm") and name in target.parameters and target.tolerance_mm:
-            if grid_mm(row.design, name) == row.design.layers.layer_mm:
-                continue
-            data = row.design.model_dump(mode="json", exclude_unset=True, exclude={"name"})
+def _robust(target: Target, rows: Sequence[Row], workers: Workers, *, keep: bool) -> dict[int, dict[str, Spread]]:
+    """Of designs by number: objectives that an estimate has, over walls of slicers and lengths in the plane."""
+    keys, query = [key for key in target.objectives if not NUMBERS[key].of_path], target.query()
+    inputs: list[tuple[Any, ...]] = []
+    owners: list[Row] = []
+    for row in rows:
+        variants = [(row.design, rule, query) for rule in rules(None)]
+        variants += [(design, rules(None)[0], query) for design in within_tolerance(target, row.design)]
+        inputs += variants
+        owners += [row] * len(variants)
+    numbers: dict[int, list[Numbers]] = {row.number: [] for row in rows}
+    for k, one in workers.results(one_way, inputs, "lost", keep=keep):
+        if isinstance(one, Numbers):
+            numbers[owners[k].number].append(one)
+    return {row.number: dict(_spreads(target, keys, row, numbers[row.number])) for row in rows}
+
+
+def within_tolerance(target: Target, design: Design) -> Iterator[Design]:
+    """The design with each length in the plane that is varied changed by the tolerance to both sides."""
+    data = design.model_dump(mode="json", exclude_unset=True, exclude={"name"})
+    for name, value in asdict(design.params).items():
+        if not (name.endswith("_mm") and name in target.parameters and target.tolerance_mm):
+            continue
+        if grid_mm(design, name) != design.layers.layer_mm:
             for sign in (-1, 1):
                 parameters = data.get("parameters", {}) | {name: value + sign * target.tolerance_mm}
-                inputs.append((make(data | {"parameters": parameters}), rules(None)[0], target.query()))
-    attempt = partial(said, one_way, refused=(SensorgenError,))
-    found = [
-        n
-        for _, n in remembered(
-            attempt, inputs, workers.jobs, cluster=workers.cluster, keep=keep, lost=lambda *_: "lost"
-        )
-    ]
-    made = {}
+                with suppress(SensorgenError):  # no such design
+                    yield make(data | {"parameters": parameters})
+
+
+def _spreads(target: Target, keys: Sequence[str], row: Row, numbers: Sequence[Numbers]) -> Iterator[tuple[str, Spread]]:
     for key in keys:
         own = NUMBERS[key].of(row.trial.printed) if row.trial else None
-        values = [b.value for n in found if isinstance(n, Numbers) and (b := NUMBERS[key].of(n))]
+        values = [b.value for n in numbers if (b := NUMBERS[key].of(n))]
         if own and values:
             worst = max((*values, own.value), key=partial(target.worth, key))
             ends = max((own.lower, own.upper), key=partial(target.worth, key))
-            made[key] = Spread(own.value, median(values), worst, ends)
-    return made
+            yield key, Spread(own.value, median(values), worst, ends)
 
 
 def one_way(design: Design, rule: str, query: Query) -> Numbers:
@@ -118,7 +137,7 @@ def one_way(design: Design, rule: str, query: Query) -> Numbers:
     return Numbers.of(evaluate(body, query, beside=False))
 
 
-def _built(one: Recommended, target: Target, design: Design, out: Path, *, sliced: bool) -> Recommended:
+def _built(one: Recommended, target: Target, design: Design, out: Path, sliced: bool) -> Recommended:
     """With its files, and its numbers by a real slicer."""
     folder = out / design.name
     try:

@@ -1,16 +1,19 @@
 """The answer to a target: how many designs there are and why they are out, the front, and the designs to print."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import inf
 from typing import ClassVar
 
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.display import Displayed
-from sensorgen.core.document import Cell, Column, Facts, Part, Table, comma_separated
+from sensorgen.core.document import Cell, Column, Facts, Part, Table, comma_separated, shown
 from sensorgen.core.findings import Verdict
 from sensorgen.workflows.optimise.search import Row, Searched
 from sensorgen.workflows.optimise.target import NUMBERS, Target
+from sensorgen.workflows.optimise.ties import RULE, tied
 
+_LISTED = 8  # designs, of those that are tied
 _SAME = 1e-9  # relative difference of numbers that are equal but for rounding
 
 
@@ -54,6 +57,10 @@ class Chosen:
         As printed, in the unit of the name.
     leads : bool
         Whether no design has better best values; else it is on the front since its interval reaches theirs.
+    tied : tuple of int
+        Leading designs that equal it in every objective, within what the models leave open; of others than these.
+    uninformed : dict of str to float
+        Of numbers that are errors: the error without any reading, of a uniform distribution.
     """
 
     number: int
@@ -65,6 +72,16 @@ class Chosen:
     verdict: Verdict | str
     numbers: dict[str, Bounds]
     leads: bool = False
+    tied: tuple[int, ...] = ()
+    uninformed: dict[str, float] = field(default_factory=dict)
+
+    def cell(self, name: str, value: float | None = None) -> Cell:
+        """A number, or another value of it, for people: what is not sensed where an error holds no information."""
+        if value is None:
+            value = self.numbers[name].value if name in self.numbers else None
+        if value is None or value < self.uninformed.get(name, inf):
+            return value
+        return "cannot locate" if name.startswith("position") else "cannot sense force"
 
 
 @dataclass(frozen=True)
@@ -97,6 +114,8 @@ class Recommended:
         Objectives by the G-code of a real slicer.
     slicer : str
         Its name and version; or why nothing was sliced.
+    ties : tuple of int
+        Designs that equal it within what the models leave open; :data:`.ties.RULE` chose it.
     """
 
     role: str
@@ -106,6 +125,7 @@ class Recommended:
     robust: dict[str, Spread] | None = None
     sliced: dict[str, Bounds] | None = None
     slicer: str = ""
+    ties: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -134,6 +154,10 @@ class Optimised(Displayed):
         Where nothing meets the target.
     binding : tuple of Binding
         What keeps designs out, the constraints that alone keep most out first.
+    remarks : tuple of str
+        What of the target had no effect.
+    whole : int
+        Designs of the whole space where only a sample was tried, else 0 [-].
     """
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
@@ -150,10 +174,13 @@ class Optimised(Displayed):
     recommended: tuple[Recommended, ...] = ()
     nearest: Chosen | None = None
     binding: tuple[Binding, ...] = ()
+    remarks: tuple[str, ...] = ()
+    whole: int = 0
 
     def document(self) -> Iterator[Part]:
         """The proof, what was discarded, the front, and the designs to print."""
         yield self.proof()
+        yield from self.remarks
         yield ""
         if self.reasons:
             columns = (Column("designs"), Column("out since"), Column("proof"))
@@ -173,29 +200,35 @@ class Optimised(Displayed):
         keys = [k for k in self.front[0].values if len({c.values[k] for c in self.designs}) > 1]
         names = list(dict.fromkeys((*self.objectives, *self.front[0].numbers)))[: len(self.objectives) + 2]
         columns = (
-            Column("", key="leads"), *(Column(k.removesuffix("_mm"), key=k) for k in keys),
+            Column("", key="number"), Column("", key="leads"), *(Column(k.removesuffix("_mm"), key=k) for k in keys),
             *(Column(n, digits=3, key=n) for n in names), Column("verdict"),
         )  # fmt: skip
         cells = (
-            (">" if c.leads else "", *(c.values[k] for k in keys),
-             *(c.numbers[n].value if n in c.numbers else None for n in names), c.verdict)
+            (c.number, ">" if c.leads else "=" if c.tied else "", *(c.values[k] for k in keys),
+             *(c.cell(n) for n in names), c.verdict)
             for c in self.front
         )  # fmt: skip
         return Table(
             "front",
-            "Front, as printed; > leads by best values, the others by intervals that overlap",
+            "Front, as printed: > leads by best values, = ties with a leading one, the others overlap",
             columns,
             tuple(cells),
         )
 
     def proof(self) -> str:
         """How good the front is, in words."""
+        tried = f"{self.size} designs tried of {self.whole} (NSGA-II)" if self.whole else f"{self.size} designs"
         if not self.front:
-            return f"{self.name}: none of {self.size} designs meets the target ({self.evaluated} evaluated)"
+            return f"{self.name}: none of {tried} meets the target ({self.evaluated} evaluated)"
         coarse = ""
         if any(r.why == "dominated" and not r.certified for r in self.reasons):
             seen = f", largest seen {self.largest:.3g}" if self.largest else ""
             coarse = f"; by the models, not certified: coarse meshes within a factor {self.margin:.3g}{seen}"
+        if self.whole:
+            return (
+                f"{self.name}: nothing is proven: of {tried}, {self.evaluated} evaluated as printed, none is "
+                f"better than these {len(self.front)}; untried designs may be{coarse}"
+            )
         return (
             f"{self.name}: no design in this space of {self.size} is better than these {len(self.front)} "
             f"({self.evaluated} evaluated as printed, {self.size - self.evaluated} discarded{coarse})"
@@ -238,21 +271,21 @@ class Optimised(Displayed):
 
 
 def _facts(one: Recommended) -> Iterator[tuple[str, str]]:
-    numbers = ", ".join(f"{key} {b.value:.3g}" for key, b in one.design.numbers.items())
-    yield one.role, f"{one.design.name}: {numbers}"
+    def words(key: str, value: float | None = None) -> str:
+        return shown(one.design.cell(key, value), 3)
+
+    yield one.role, f"{one.design.name}: " + ", ".join(f"{key} {words(key)}" for key in one.design.numbers)
+    if one.ties:
+        others = ", ".join(map(str, one.ties[:_LISTED])) + ", ..." * (len(one.ties) > _LISTED)
+        yield "", f"design {one.design.number}, tied with {others} within what the models leave open; chosen by {RULE}"
     for key, s in (one.robust or {}).items():
-        yield (
-            "",
-            (
-                f"{key} over walls and tolerance: median {s.median:.3g}, worst {s.worst:.3g}; with material ranges "
-                f"{s.with_materials:.3g}"
-            ),
-        )
+        median, worst, wide = (words(key, each) for each in (s.median, s.worst, s.with_materials))
+        yield "", f"{key} over walls and tolerance: median {median}, worst {worst}; with material ranges {wide}"
     if one.folder:
         yield "", f"{one.verdict}, {one.folder}"
     for key, b in (one.sliced or {}).items():
         change = b.value / one.design.numbers[key].value - 1 if one.design.numbers[key].value else 0.0
-        yield "", f"{key} by {one.slicer}: {b.value:.3g} ({change:+.1%} to the estimate)"
+        yield "", f"{key} by {one.slicer}: {words(key, b.value)} ({change:+.1%} to the estimate)"
     if one.slicer and not one.sliced:
         yield "", one.slicer
 
@@ -260,27 +293,49 @@ def _facts(one: Recommended) -> Iterator[tuple[str, str]]:
 def result(name: str, found: Searched, recommended: tuple[Recommended, ...] = ()) -> Optimised:
     """A search as its answer."""
     front = {row.number for row in found.front}
-    leading = {row.number for row in leads(found)}
-    designs = tuple(chosen(found.target, row, leads=row.number in leading) for row in found.rows)
+    ahead, keys = leads(found), list(found.target.objectives)
+    leading = {row.number for row in ahead}
+    ties = {
+        row.number: tuple(each.number for each in ahead if tied(each, row, keys))
+        for row in found.front
+        if row.number not in leading
+    }
+    designs = tuple(
+        chosen(found.target, row, leads=row.number in leading, ties=ties.get(row.number, ())) for row in found.rows
+    )
     nearest = None if front else found.nearest()
     return Optimised(
         name, len(found.rows), len(found.evaluated),
         {k: goal if isinstance(goal, str) else f"near {goal.near:g}" for k, goal in found.target.objectives.items()},
         tuple(Reason(*reason) for reason in found.reasons()), tuple(designs[row.number - 1] for row in found.front),
         designs, found.margin, found.largest, recommended, designs[nearest.number - 1] if nearest else None,
-        () if front else tuple(Binding(*each) for each in found.binding()),
+        () if front else tuple(Binding(*each) for each in found.binding()), tuple(_remarks(found)),
+        found.size,
     )  # fmt: skip
 
 
-def chosen(target: Target, row: Row, *, leads: bool = False) -> Chosen:
+def _remarks(found: Searched) -> Iterator[str]:
+    """Accepted doubts that no evaluated design has."""
+    doubts = list(dict.fromkeys(doubt for row in found.evaluated if row.trial for doubt in row.trial.doubts))
+    for part in found.target.accept_doubts:
+        if not any(part in doubt for doubt in doubts):
+            known = "; ".join(f"{doubt:.60}" for doubt in doubts[:3]) or "none"
+            yield (
+                f"accept_doubts: {part!r} is part of no doubt about the {len(found.evaluated)} evaluated designs; "
+                f"correct or remove it (their doubts: {known})"
+            )
+
+
+def chosen(target: Target, row: Row, *, leads: bool = False, ties: tuple[int, ...] = ()) -> Chosen:
     """A design of the space as plain data."""
     trial, design = row.trial, row.candidate.design
     wanted = dict.fromkeys((*target.objectives, *target.limits, "capacitance_pf"))
     values = {k: NUMBERS[k].of(trial.printed, trial.toolpath) for k in wanted} if trial else {}
+    uninformed = {k: limit for k in values if trial and (limit := NUMBERS[k].uninformed(trial)) < inf}
     return Chosen(
         row.number, row.candidate.values, design.name if design else "", design.id() if design else "",
-        row.discarded or row.candidate.reason, tuple(row.violated), trial.verdict if trial else "",
-        {key: value for key, value in values.items() if value}, leads,
+        row.discarded, tuple(row.violated), trial.verdict if trial else "",
+        {key: value for key, value in values.items() if value}, leads, ties, uninformed,
     )  # fmt: skip
 
 

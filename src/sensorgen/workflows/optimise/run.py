@@ -7,14 +7,15 @@ from sensorgen.core import files as store
 from sensorgen.workflows.optimise.page import page
 from sensorgen.workflows.optimise.recommend import recommended
 from sensorgen.workflows.optimise.result import Optimised, Recommended, result
+from sensorgen.workflows.optimise.sample import sample
 from sensorgen.workflows.optimise.search import HERE, Progress, Workers, search
-from sensorgen.workflows.optimise.space import candidates
+from sensorgen.workflows.optimise.space import Space, candidates, space
 from sensorgen.workflows.optimise.target import load
 
 
 def optimise(
-    path: Path, out: Path, workers: Workers = HERE, *, keep: bool = True, built: bool = True, sliced: bool = True,
-    progress: Progress = lambda *_: None,
+    path: Path, out: Path, workers: Workers = HERE, *, count: int = 0, keep: bool = True, built: bool = True,
+    sliced: bool = True, progress: Progress = lambda *_: None,
 ) -> Optimised:  # fmt: skip
     """The best printable designs for a target; page, JSON and CSV are written into ``out``.
 
@@ -24,6 +25,8 @@ def optimise(
         The target.
     out : Path
         Folder of all files.
+    count : int
+        Designs to try, chosen by :func:`sensorgen.workflows.optimise.sample.sample`; 0 for all of the space.
     workers, keep, progress
         As of :func:`sensorgen.workflows.optimise.search.search`.
     built, sliced : bool
@@ -35,12 +38,17 @@ def optimise(
         A target that is none, or an empty or too large space; a cluster that goes away.
     """
     target, name = load(path), path.stem
-    found = search(target, candidates(target, path.parent), workers, keep=keep, progress=progress)
     chosen: tuple[Recommended, ...] = ()
-    if built and found.front:
-        chosen = recommended(
-            name, found, out, workers, keep=keep, sliced=sliced, step=lambda role: progress(role, 0, 1)
-        )  # fmt: skip
+    designs = space(target, path.parent) if count else candidates(target, path.parent)
+    with workers.opened() as opened:
+        if isinstance(designs, Space):
+            found = sample(target, designs, count, opened, keep=keep, progress=progress)
+        else:
+            found = search(target, designs, opened, keep=keep, progress=progress)
+        if built and found.front:
+            chosen = recommended(
+                name, found, out, opened, keep=keep, sliced=sliced, step=lambda role: progress(role, 0, 1)
+            )  # fmt: skip
     answer = result(name, found, chosen)
     store.replace(out / f"{name}.html", page(answer).encode())
     store.replace(out / f"{name}.json", document.to_json(answer).encode())

@@ -1,15 +1,17 @@
 """Branch and bound over a space of designs: each is discarded for a reason, or evaluated; what is left is the front."""
 
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf, log
 from typing import Any
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, SensorgenError
-from sensorgen.core.parallel import remembered, said
+from sensorgen.core.parallel import Lane, open_lanes, remembered, said
 from sensorgen.design.design import Design
 from sensorgen.workflows.optimise import ladder
 from sensorgen.workflows.optimise.ladder import AT_REST, COARSE, Known
@@ -19,16 +21,36 @@ from sensorgen.workflows.trial import Trial
 
 MARGIN = 1.5  # between a number on the coarse mesh and its best value; widened where a design shows more
 _FIRST_ROUND = 8
+_NUMBER = re.compile(r"\d+(\.\d+)?")
 
 Progress = Callable[[str, int, int], None]  # step, how many are done, how many there are
 
 
 @dataclass(frozen=True)
 class Workers:
-    """Where works run: so many processes of this computer, or a Dask cluster."""
+    """Where works run: so many processes of this computer, or a Dask cluster; ``lanes`` are those that are open."""
 
     jobs: int = 1
     cluster: str = ""
+    lanes: tuple[Lane, ...] = ()
+
+    @contextmanager
+    def opened(self) -> "Iterator[Workers]":
+        """The same, which stay for several rounds of works: a process that begins anew imports the solvers again."""
+        if self.lanes or (self.jobs < 2 and not self.cluster):
+            yield self
+            return
+        with open_lanes(self.jobs, self.cluster) as lanes:
+            yield replace(self, lanes=tuple(lanes))
+
+    def results(
+        self, work: Callable[..., Any], inputs: Sequence[tuple[Any, ...]], lost: str, *, keep: bool
+    ) -> Iterator[tuple[int, Any]]:
+        """Number and result of each work as they come; in place of a result the reason why there is none."""
+        attempt = partial(said, work, refused=(SensorgenError,))
+        return remembered(
+            attempt, inputs, self.jobs, cluster=self.cluster, keep=keep, lost=lambda *_: lost, lanes=self.lanes
+        )
 
 
 HERE = Workers()
@@ -92,6 +114,8 @@ class Searched:
         Between a number on the coarse mesh and its best value, that was allowed for [-].
     largest : float or None
         The largest factor between both among the evaluated designs [-]; None where no coarse mesh was used.
+    size : int
+        Designs of the whole space where only a sample was tried, else 0 [-].
     """
 
     target: Target
@@ -99,6 +123,7 @@ class Searched:
     front: tuple[Row, ...]
     margin: float
     largest: float | None
+    size: int = 0
 
     @property
     def evaluated(self) -> tuple[Row, ...]:
@@ -106,16 +131,19 @@ class Searched:
         return tuple(row for row in self.rows if row.trial)
 
     def reasons(self) -> list[tuple[str, bool, int]]:
-        """Why designs are out, whether that is proven, and how many."""
+        """Why designs are out, whether that is proven, and how many; of reasons that differ in numbers the first."""
         found: Counter[tuple[str, bool]] = Counter()
+        words: dict[str, str] = {}
+        front = {row.number for row in self.front}
         for row in self.rows:
-            if row.discarded:
-                found[row.discarded, row.certified] += 1
-            elif row.violated:
-                found[f"violates {min(row.violated)}", False] += 1
-            elif row not in self.front:
-                found["evaluated; another is better in every objective", False] += 1
-        return [(why, certified, count) for (why, certified), count in found.most_common()]
+            why = row.discarded or (f"violates {min(row.violated)}" if row.violated else "")
+            if not why and row.number not in front:
+                why = "evaluated; another is better in every objective"
+            if why:
+                alike = _NUMBER.sub("#", why)
+                words.setdefault(alike, why)
+                found[alike, row.certified and bool(row.discarded)] += 1
+        return [(words[alike], certified, count) for (alike, certified), count in found.most_common()]
 
     def best(self, key: str) -> Row:
         """Of the front, the one with the best value of an objective."""
@@ -164,7 +192,26 @@ def search(
         As :func:`sensorgen.core.parallel.in_parallel`.
     """
     rows = [Row(k, candidate) for k, candidate in enumerate(space, 1)]
-    query, each = target.query(), partial(_each, workers=workers, keep=keep, progress=progress)
+    with workers.opened() as opened:
+        each = partial(results, workers=opened, keep=keep, progress=progress)
+        return finished(target, rows, narrowed(target, rows, each))
+
+
+def finished(target: Target, rows: Sequence[Row], margins: tuple[float, float | None], size: int = 0) -> Searched:
+    """The front of designs that are all discarded or evaluated."""
+    feasible = [row for row in rows if row.trial and not row.violated]
+    worth = {row.number: badness(target, row) for row in feasible}
+    front = [
+        row for row in feasible if not any(_beats(worth[other.number], worth[row.number]) for other in feasible)
+    ]  # fmt: skip
+    return Searched(target, tuple(rows), tuple(sorted(front, key=_compromise(target, front))), *margins, size)
+
+
+def narrowed(
+    target: Target, rows: Sequence[Row], each: Callable[..., Iterator[tuple[Row, Any]]]
+) -> tuple[float, float | None]:
+    """Check, bound and evaluate those that are open; margin of coarse meshes, and the largest factor that was seen."""
+    query = target.query()
     _refuse_unmade(rows)
     for row, found in each("checks", ladder.rules, _open(rows), ()):
         refused = [found] if isinstance(found, str) else _refused(target, found)
@@ -177,15 +224,7 @@ def search(
         for row, found in each("bounds", ladder.known, _open(rows), (query, solve)):
             row.known = {} if isinstance(found, str) else found
             _limit(target, row)
-    margin, largest = _evaluate(
-        target, rows, lambda some: each("evaluation", ladder.everything, some, (query, target.slicer))
-    )
-    feasible = [row for row in rows if row.trial and not row.violated]
-    worth = {row.number: badness(target, row) for row in feasible}
-    front = [
-        row for row in feasible if not any(_beats(worth[other.number], worth[row.number]) for other in feasible)
-    ]  # fmt: skip
-    return Searched(target, tuple(rows), tuple(sorted(front, key=_compromise(target, front))), margin, largest)
+    return _evaluate(target, rows, lambda some: each("evaluation", ladder.everything, some, (query, target.slicer)))
 
 
 def badness(target: Target, row: Row) -> dict[str, Interval]:
@@ -197,18 +236,15 @@ def badness(target: Target, row: Row) -> dict[str, Interval]:
     return {key: target.badness(key, value.model) for key, value in values.items() if value}
 
 
-def _each(
+def results(
     step: str, work: Callable[..., Any], rows: Sequence[Row], given: tuple[Any, ...], *, workers: Workers, keep: bool,
     progress: Progress,
 ) -> Iterator[tuple[Row, Any]]:  # fmt: skip
     """Results of a work for each design as they come; the reason in place of one that has none."""
-    attempt = partial(said, work, refused=(SensorgenError,))
-    inputs = [(row.design, *given) for row in rows]
     lost = f"{step}: the process ended, as when the memory is full"
-    for done, (k, found) in enumerate(
-        remembered(attempt, inputs, workers.jobs, cluster=workers.cluster, keep=keep, lost=lambda *_: lost), 1
-    ):
-        yield rows[k], found
+    found = workers.results(work, [(row.design, *given) for row in rows], lost, keep=keep)
+    for done, (k, one) in enumerate(found, 1):
+        yield rows[k], one
         progress(step, done, len(rows))
 
 
@@ -221,8 +257,8 @@ def _refuse_unmade(rows: Sequence[Row]) -> None:
     seen: set[str] = set()
     for row in rows:
         if row.candidate.design is None:
-            row.violated = {"a design": 1.0}
-            row.discard("cannot be made")
+            row.violated = {"cannot be made": 1.0}
+            row.discard(f"cannot be made: {row.candidate.reason}")
             continue
         identity = row.design.id()
         if identity in seen:
@@ -248,7 +284,8 @@ def _evaluate(
     target: Target, rows: Sequence[Row], each: Callable[[list[Row]], Iterator[tuple[Row, Any]]]
 ) -> tuple[float, float | None]:
     """Evaluate in rounds, the most promising first; after each, discard what an evaluated design is better than."""
-    margin, largest, size = MARGIN, None, _FIRST_ROUND
+    largest = max(filter(None, (_factor(target, row) for row in rows)), default=None)
+    margin, size = max(MARGIN, 1.1 * (largest or 0.0)), _FIRST_ROUND
     while left := sorted(_open(rows), key=partial(_promise, target)):
         for row, found in each(left[:size]):
             if isinstance(found, str):

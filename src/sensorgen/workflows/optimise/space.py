@@ -37,6 +37,45 @@ class Candidate:
     reason: str = ""
 
 
+@dataclass(frozen=True)
+class Space:
+    """Every combination of the values of a target.
+
+    Attributes
+    ----------
+    base : dict
+        The design that is varied, as data.
+    folder : Path
+        From which files of materials, printers and shapes are seen.
+    lengths : frozenset of str
+        Parameters of the shape.
+    parts : tuple
+        Choices, and the values of the shape's parameters that they leave.
+    """
+
+    base: Data
+    folder: Path
+    lengths: frozenset[str]
+    parts: tuple[tuple[dict[str, Value], dict[str, list[Value]]], ...]
+
+    @property
+    def size(self) -> int:
+        """How many designs it has."""
+        return sum(prod(len(values) for values in inside.values()) for _, inside in self.parts)
+
+    def candidate(self, values: dict[str, Value]) -> Candidate:
+        """The design with these values."""
+        try:
+            return Candidate(values, make(with_own_files(_with(self.base, self.lengths, values), self.folder)))
+        except SensorgenError as error:
+            return Candidate(values, None, str(error))
+
+    def at(self, part: int, shares: Mapping[str, float]) -> Candidate:
+        """The design of a part, by the share of each range that lies below its value, from 0 to below 1."""
+        chosen, inside = self.parts[part]
+        return self.candidate(chosen | {k: values[int(shares[k] * len(values))] for k, values in inside.items()})
+
+
 def candidates(target: Target, folder: Path = Path()) -> list[Candidate]:
     """Every design of a target.
 
@@ -54,39 +93,44 @@ def candidates(target: Target, folder: Path = Path()) -> list[Candidate]:
     BadInput
         No design at all, or more than ``MOST``.
     """
+    whole = space(target, folder)
+    if whole.size > MOST:
+        longest = max(((len(v), k) for _, inside in whole.parts for k, v in inside.items()), default=(0, ""))
+        raise BadInput(
+            f"{whole.size:.3g} designs; expected at most {MOST}: give a larger step, narrower ranges or fewer choices "
+            f"({longest[1]} alone has {longest[0]} values), or --sample 400, which proves nothing"
+        )
+    return [whole.candidate(chosen | values) for chosen, inside in whole.parts for values in _combinations(inside)]
+
+
+def space(target: Target, folder: Path = Path()) -> Space:
+    """The space of a target, of any size; raises as :func:`candidates`."""
     base = dict(target.design) if isinstance(target.design, Mapping) else {}
     base = with_own_files({k: v for k, v in base.items() if k != "name"}, folder)
-    known = asdict(make(base).params)
-    for key in target.parameters:
+    known = frozenset(asdict(make(base).params))
+    for key, given in target.parameters.items():
         if key not in known and key.partition(".")[0] not in Design.model_fields:
             raise UnknownName(
                 "parameter to vary", key, [*known, "quality", "materials.film", "orientation", "nozzle_mm"]
             )
-        if isinstance(target.parameters[key], Range) and key not in known and target.parameters[key].step is None:  # type: ignore[union-attr]
+        if isinstance(given, Range) and key not in known and given.step is None:
             raise BadInput(f"parameters.{key}: a range without a step; only lengths of the shape have a printable grid")
     # the grid of a length follows from quality, printer and nozzle: those are chosen first
     outer = {k: v for k, v in target.parameters.items() if k not in known}
     inner = {k: v for k, v in target.parameters.items() if k in known}
-    spaces = [(chosen, {k: _values(k, v, with_own_files(_with(base, known, chosen), folder)) for k, v in inner.items()})
-              for chosen in _combinations({k: _listed(v) for k, v in outer.items()})]  # fmt: skip
-    size = sum(prod(len(values) for values in space.values()) for _, space in spaces)
-    if size > MOST:
-        longest = max(((len(v), k) for _, space in spaces for k, v in space.items()), default=(0, ""))
-        raise BadInput(
-            f"{size:.3g} designs; expected at most {MOST}: give a larger step, narrower ranges or fewer choices "
-            f"({longest[1]} alone has {longest[0]} values)"
-        )
-    if not size:
+    whole = Space(base, folder, known, tuple(
+        (chosen, {k: _values(k, v, with_own_files(_with(base, known, chosen), folder)) for k, v in inner.items()})
+        for chosen in _combinations({k: _listed(v) for k, v in outer.items()})
+    ))  # fmt: skip
+    if not whole.size:
         empty = sorted(
-            {k for _, space in spaces for k, values in space.items() if not values}
+            {k for _, inside in whole.parts for k, values in inside.items() if not values}
             | {k for k, v in outer.items() if not _listed(v)}
         )
         raise BadInput(
             f"no printable value of {', '.join(empty)} in its range: expected a whole layer or half line in it"
         )
-    return [
-        _candidate(base, known, chosen | inside, folder) for chosen, space in spaces for inside in _combinations(space)
-    ]
+    return whole
 
 
 def _combinations(space: Mapping[str, list[Value]]) -> Iterator[dict[str, Value]]:
@@ -94,14 +138,7 @@ def _combinations(space: Mapping[str, list[Value]]) -> Iterator[dict[str, Value]
         yield dict(zip(space, values, strict=True))
 
 
-def _candidate(base: Data, known: Mapping[str, Any], values: dict[str, Value], folder: Path) -> Candidate:
-    try:
-        return Candidate(values, make(with_own_files(_with(base, known, values), folder)))
-    except SensorgenError as error:
-        return Candidate(values, None, str(error))
-
-
-def _with(base: Data, known: Mapping[str, Any], values: Mapping[str, Value]) -> Data:
+def _with(base: Data, known: frozenset[str], values: Mapping[str, Value]) -> Data:
     """The base design as data with other values."""
     made: Data = {k: dict(v) if isinstance(v, dict) else v for k, v in base.items() if k != "name"}
     for key, value in values.items():

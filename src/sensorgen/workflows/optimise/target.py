@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from sensorgen.checks import RULES
 from sensorgen.core import yamlfile
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
@@ -14,35 +15,58 @@ from sensorgen.core.records import Strict, checked
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import with_own_files
 from sensorgen.export.slicers import SLICERS
+from sensorgen.prediction.identifiability.results import GUESS
 from sensorgen.prediction.query import DEFAULT, FORCE_N, NOISE, TIP_M, Query, Tip
 from sensorgen.workflows.trial import Numbers, Toolpath, Trial
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number that a target may name: its place in a trial, and its unit there over the one in its name."""
+    """A number that a target may name.
+
+    Attributes
+    ----------
+    field, unit : str
+        Its place in a trial, and the unit in its name.
+    size : float
+        That unit in the trial's.
+    of_path : bool
+        Whether it is known of G-code alone.
+    like : str
+        Of a best value alone: the number that its models leave open as much of.
+    """
 
     field: str
     unit: str
     size: float = 1.0
     of_path: bool = False
+    like: str = ""
 
     def of(self, found: Numbers, path: Toolpath | None = None) -> Bounds | None:
         """Its value with its range, in the unit of its name; None where unknown."""
         value = getattr(path, self.field, None) if self.of_path else getattr(found, self.field)
         if value is None:
             return None
-        bounds = Bounds.of(value, self.unit) if isinstance(value, float) else value
-        return bounds.times(1 / self.size, self.unit)
+        if isinstance(value, float):
+            wide = getattr(found, self.like) if self.like else None
+            value = Bounds.of(value, self.unit, model=wide.model.times(value / wide.value) if wide else None)
+        bounds: Bounds = value.times(1 / self.size, self.unit)
+        return bounds
+
+    def uninformed(self, trial: Trial) -> float:
+        """The error without any reading, length or load over sqrt(12) [unit of the name]; infinite of other numbers."""
+        if self.field.startswith("position"):
+            return GUESS * trial.length_m / self.size
+        return GUESS * trial.force_n if self.field in ("force_resolution", "force_calibrated") else inf
 
 
 NUMBERS = {
     "force_resolution_n": Number("force_resolution", "N"),
     "position_resolution_mm": Number("position_resolution", "mm", M_PER_MM),
-    "force_calibrated_n": Number("force_calibrated", "N"),
-    "position_calibrated_mm": Number("position_calibrated", "mm", M_PER_MM),
-    "force_typical_n": Number("force_typical", "N"),
-    "position_typical_mm": Number("position_typical", "mm", M_PER_MM),
+    "force_calibrated_n": Number("force_calibrated", "N", like="force_resolution"),
+    "position_calibrated_mm": Number("position_calibrated", "mm", M_PER_MM, like="position_resolution"),
+    "force_typical_n": Number("force_typical", "N", like="force_resolution"),
+    "position_typical_mm": Number("position_typical", "mm", M_PER_MM, like="position_resolution"),
     "sensitivity_per_kpa": Number("sensitivity", "1/kPa"),
     "capacitance_pf": Number("capacitance", "pF", 1e-12),
     "gap_mm": Number("gap", "mm", M_PER_MM),
@@ -51,7 +75,10 @@ NUMBERS = {
     "print_time_min": Number("time_s", "min", 60.0, of_path=True),
     "exposure_mm": Number("exposure_mm", "mm", of_path=True),
 }
-_NOT_PREDICTED = {"hysteresis": "no material file has the viscoelastic data that a model of hysteresis needs"}
+_NOT_PREDICTED = {
+    "hysteresis": "cannot be predicted: no material file has the viscoelastic data (loss factor or relaxation times) "
+    "that a model of it needs; leave it out, and measure the printed designs (sensorgen bench hysteresis)"
+}
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -138,11 +165,14 @@ class Target(Strict):
         for key in (*self.objectives, *self.limits):
             word = next((w for w in _NOT_PREDICTED if key.startswith(w)), None)
             if word:
-                raise ValueError(f"{key}: {_NOT_PREDICTED[word]}; leave it out")
+                raise ValueError(f"{key} {_NOT_PREDICTED[word]}")
             if key not in NUMBERS:
                 raise ValueError(str(UnknownName("number", key, NUMBERS)))
             if NUMBERS[key].of_path and not self.slicer:
                 raise ValueError(f"{key} is known of G-code alone: add slicer: prusa")
+        for name in self.refuse_warnings:
+            if name not in RULES:
+                raise ValueError(f"refuse_warnings: {UnknownName('rule', name, RULES)}")
         for key, goal in self.objectives.items():
             limit = self.limits.get(key, Limit())
             if isinstance(goal, Near) and limit.beyond(goal.near):
