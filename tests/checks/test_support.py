@@ -9,8 +9,7 @@ from sensorgen.cli import catalogue
 from sensorgen.core import plugins as registry
 from sensorgen.design import design, shapes
 
-
-SIZES = dict.fromkeys(("bump", "cone"), {"length_mm": 1.25, "width_mm": 1.25})  # one round body
+SIZES = {shape: {"length_mm": 1.25, "width_mm": 1.25} for shape in ("bump", "cone")}  # one round body
 
 
 def errors(**data):

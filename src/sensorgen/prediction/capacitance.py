@@ -138,7 +138,10 @@ def capacitance(
         raise OutOfRange(f"an accuracy of {width:g}; expected a number above 0, as 1e-4")
     if width == inf and not model:
         kind = _kind(permittivity)
-        if any(m.COST <= _CHEAP and hasattr(m, kind) and not m.why_not_applicable(scene) for m in capacitance_models().values()):
+        if any(
+            m.COST <= _CHEAP and hasattr(m, kind) and not m.why_not_applicable(scene)
+            for m in capacitance_models().values()
+        ):
             return _asked(scene, permittivity, width, model)
         width = default_width(scene)
     if not keep:

@@ -56,7 +56,7 @@ class _Search:
     now: Trial
     budget_s: float
     step: Step
-    start_s: float
+    start_s: float = field(default_factory=time.process_time)
     kept: list[TriedChange] = field(default_factory=list, init=False)
     checked: int = field(default=0, init=False)
     predicted: int = field(default=0, init=False)
