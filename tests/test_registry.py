@@ -77,4 +77,4 @@ def test_modules_are_found_by_what_they_define(tmp_path):
     package = type("Package", (), {"__path__": [str(tmp_path)]})
     assert registry.stating(package, "def answer(") == ("two",)
     assert registry.stating(package, "def answ(") == ()
-    assert tuple(models.capacitance_models()) == ("columns", "curved", "fem2d", "fem3d", "prisms")
+    assert tuple(models.capacitance_models()) == ("columns", "curved", "fem2d", "fem3d", "overlap", "prisms")

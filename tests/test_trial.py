@@ -16,6 +16,7 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import DEFAULT, Query, Tip
 from sensorgen.workflows.build import build
+from sensorgen.workflows.decision import decision
 from sensorgen.workflows.trial import Trial, trial
 
 
@@ -48,6 +49,20 @@ def test_a_short_print_changes_the_verdict():
     known = (Finding("1-short", "error", "a", "b", "c"),)
     assert short.with_short(known) == known
     assert found.with_short(()) == ()
+
+
+def test_without_electrical_numbers_no_design_is_plainly_printed():
+    """A film of PLA, whose permittivity nobody states: the verdict was PRINT."""
+    design = make({"shape": "reference", "materials": {"dielectric": "pla"}})
+    tried = trial(design)
+    assert tried.printed.capacitance is None
+    assert tried.verdict == "PRINT WITH WARNINGS"
+    assert [f.rule for f in tried.findings if f.severity == "warning"] == ["12-numbers"]
+    said = " ".join(" ".join(text(decision(design, review(design), 0.0).document())).split())
+    assert said.startswith("PRINT WITH WARNINGS")
+    assert "not predicted: pla has no default relative_permittivity" in said
+    alone = " ".join(text(decision(design, review(design), 0.0, predict=False).document()))
+    assert "not predicted: checks alone" in alone
 
 
 def test_waived_findings_do_not_count():

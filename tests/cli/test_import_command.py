@@ -11,6 +11,7 @@ import trimesh
 
 import cad_models
 from sensorgen.cli import WRONG_INPUT
+from sensorgen.design import packs
 from sensorgen.design.design import load, make
 from sensorgen.design.values import permittivities
 from sensorgen.prediction.capacitance import capacitance
@@ -246,6 +247,102 @@ def test_a_step_of_500_mb_is_refused_at_once(run, tmp_path):
     assert "500 MB; expected at most 100 MB" in run("import", "big.step").line
 
 
+FOUR = {"low": (0.0, 0.2), "one": (0.4, 0.6), "two": (0.8, 1.0), "up": (1.2, 1.4)}
+FILMS = {"a": (0.2, 0.4), "b": (0.6, 0.8), "c": (1.0, 1.2)}
+
+
+def stacked(folder, **heights):
+    for name, (z0, z1) in heights.items():
+        trimesh.creation.box(bounds=[(0, 0, z0), (20, 10, z1)]).export(folder / f"{name}.stl")
+    return [*(f"{name}.stl" for name in heights), "--unit", "mm"]
+
+
+@pytest.mark.parametrize("given", [{"low": "bottom", "one": "none", "two": "none", "up": "top"}, {"one": "none"}])
+def test_terminals_that_are_given_need_no_height(run, tmp_path, given):
+    """With more than three separate conductors each was asked for, even where each was given."""
+    files = stacked(tmp_path, **FOUR, **FILMS)
+    words = [*(w for name in FILMS for w in ("--map", f"{name}=x60@1")), "--map", "*=etpu@2", "--name", "four"]
+    said = run("import", *files, *words, *(w for name, end in given.items() for w in ("--terminal", f"{name}={end}")))
+    assert (said.code, said.err) == (0, "")
+    ends = {b.name: b.terminal for b in load(Path("four.yaml")).drawn.bodies if b.name in FOUR}
+    two = given.get("two", "middle").replace("none", "")
+    assert ends == {"low": "bottom", "one": "", "two": two, "up": "top"}
+
+
+def test_too_many_conductors_are_asked_for_by_name(run, tmp_path):
+    files = stacked(tmp_path, **FOUR, **FILMS)
+    words = [*(w for name in FILMS for w in ("--map", f"{name}=x60@1")), "--map", "*=etpu@2", "--terminal", "up=top"]
+    line = run("import", *files, *words).line
+    assert "4 electrodes that do not touch: low, one, two, up" in line
+    assert "give --terminal low=END --terminal one=END --terminal two=END, END top" in line
+
+
+def test_a_conductor_between_both_electrodes_is_a_short(run, tmp_path):
+    """It was called a middle electrode."""
+    files = stacked(tmp_path, low=(0.0, 0.4), block=(0.4, 0.6), up=(0.6, 1.0))
+    said = run("import", *files, "--map", "*=etpu@2", "--name", "short")
+    assert said.code == 0
+    assert "1-short low / block / up conductors that touch are both electrodes" in said.words
+    assert "middle" not in said.words
+    assert {b.name: b.terminal for b in load(Path("short.yaml")).drawn.bodies} == {
+        "low": "bottom", "block": "", "up": "top"
+    }  # fmt: skip
+    checked = run("check", "short.yaml", "--budget", "1")
+    assert checked.code == 1
+    assert checked.words.startswith("CHANGE")
+    assert "block and up touch" in checked.words
+
+
+def test_without_a_map_nothing_is_imported(run, plates):
+    files = plates()
+    before = sorted(Path().iterdir())
+    said = run("import", *files, "--unit", "mm")
+    assert said.code == WRONG_INPUT
+    assert "expected sensorgen import low.stl film.stl up.stl --map low=MATERIAL --map film=x60" in said.line
+    assert said.out == run("import", *files, "--unit", "mm", "--list").out
+    assert sorted(Path().iterdir()) == before
+
+
+def test_a_list_writes_no_picture(run, plates):
+    files = plates(up=(0.5, 1.0))
+    before = sorted(Path().iterdir())
+    said = run("import", *files, "--unit", "mm", "--list")
+    assert said.code == WRONG_INPUT
+    assert "overlap" in said.line
+    assert sorted(Path().iterdir()) == before
+    assert run("import", *files, "--unit", "mm", *PLATES).code == WRONG_INPUT
+    assert [p.name for p in Path().iterdir() if p not in before] == ["low-faults.svg"]
+
+
+def test_a_replaced_design_leaves_no_bodies_behind(run, plates):
+    words = ["--unit", "mm", "--name", "a", *PLATES]
+    assert run("import", *plates(), *words).code == 0
+    (first,) = Path().glob("*.bodies.json")
+    Path("other-12345678.bodies.json").write_text("{}")
+    assert run("import", *plates(film=(0.4, 0.61), up=(0.61, 1.0)), *words, "--force").code == 0
+    (second,) = (path for path in Path().glob("a-*.bodies.json"))
+    assert second != first
+    assert Path("other-12345678.bodies.json").exists()
+    Path("copy.yaml").write_text(Path("a.yaml").read_text())  # which needs the same bodies
+    assert run("import", *plates(), *words, "--force").code == 0
+    assert second.exists()
+    assert load(Path("copy.yaml")).shape == "imported"
+
+
+def test_materials_of_a_pack_beside_the_design_are_suggested_and_taken(run, plates, tmp_path):
+    text = (Path(packs.__file__).parent / "templates" / "material.yaml").read_text("utf-8").replace("NAME", "eel")
+    (tmp_path / "materials").mkdir()
+    (tmp_path / "materials" / "eel.yaml").write_text(text, "utf-8")
+    files = [Path(name).rename(f"{name[:-4]}-eel.stl" if name != "film.stl" else name).name for name in plates()]
+    listed = json.loads(run("import", *files, "--unit", "mm", "--list", "--json").out)["bodies"]
+    assert [body["material"] for body in listed] == ["eel", "x60", "eel"]
+    said = run("import", *files, "--unit", "mm", "--name", "own", "--map", "film=x60@1", "--map", "*=eel@2")
+    assert (said.code, said.err) == (0, "")
+    Path("a.gcode").write_text("G90\nM83\n")
+    assert run("gcode", "check", "a.gcode", "--material", "2=eel").code != WRONG_INPUT
+    assert "unknown material 'eal'; did you mean 'eel'?" in run("gcode", "check", "a.gcode", "--material", "2=eal").line
+
+
 def test_geometry_is_part_of_the_design(run, plates, tmp_path):
     assert run("import", *plates(), "--unit", "mm", "--name", "a", *PLATES).code == 0
     first = load(Path("a.yaml"))
@@ -288,6 +385,10 @@ def test_the_whole_walk_in_an_empty_folder(run, models, program):
     assert run("check", "filleted.yaml").code == 0
     predicted = run("predict", "filleted.yaml", "--json")
     assert predicted.code == 0, predicted.err
+    found, plate_f = json.loads(predicted.out), 8.8541878128e-12 * 4.68 * 9.4e-3 * 30e-3 / 0.8e-3
+    for one in (found, found["drawn"]):  # fringes at the narrower plate's edges, a fillet beside them
+        assert plate_f < one["capacitance"]["value"] < 1.12 * plate_f
+        assert one["capacitance"]["certified"]
     assert run("build", "filleted.yaml", "--no-cad").code == 0
     made = {path.name for path in Path("out/filleted").iterdir()}
     assert {"filleted.prusa.3mf", "filleted.cura.3mf", "filleted.svg", "design.json"} <= made

@@ -321,6 +321,45 @@ def test_a_link_out_of_a_pack(run, here, tmp_path_factory):
     assert "secret" not in said.line
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
+def test_links_to_themselves_and_folders_that_are_links(run, here, tmp_path_factory):
+    outside = put(tmp_path_factory.mktemp("else"), "material", "eel").parent
+    (here / "materials").symlink_to(outside)
+    words = ("check", "tri", "--material", "electrode=eel", "--tool", "eel=1")
+    assert "a link that leads out of its pack; copy the file to its place" in run(*words).line
+    (here / "materials").unlink()
+    (here / "materials").mkdir()
+    (here / "materials" / "eel.yaml").symlink_to("eel.yaml")
+    for said in (run(*words), run("pack", "test", ".")):
+        assert said.code in (1, 2)
+        assert "a link that leads out of its pack" in said.words + said.err
+    whole = packs.place() / "lab"  # a pack itself may be a link
+    whole.parent.mkdir(parents=True, exist_ok=True)
+    whole.symlink_to(outside.parent)
+    assert packs.find("materials", "eel", whole.parent).text()
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (b"a: &a [x]\nb: *a\n", "line 2: aliases .* are not taken"), (b"\0" * 200_000, "200000 bytes; expected at"),
+        (b"\xff\xfe\0", "not UTF-8 at byte 0"), (b"a\0b: 1", "control character #x0000 at position 1"),
+        (b"[" * 5000, "nested deeper than 20 levels"), (b"", "holds nothing; expected a mapping"),
+        (b'title: "a\\e[31mb"\nabout: x\ncolour: "#ffffff"\nconductor: true\nproperties: {}\n', "title is .* one line"),
+    ],
+)  # fmt: skip
+def test_hostile_files_of_a_pack(run, here, content, expected):
+    (here / "materials").mkdir()
+    (here / "materials" / "eel.yaml").write_bytes(content)
+    said = run("check", "tri", "--material", "electrode=eel", "--tool", "eel=1")
+    assert said.code == 2
+    assert re.search(expected, said.line)
+    said = run("pack", "test", ".")
+    assert said.code == 1
+    assert re.search(expected, said.words)
+    assert len(list(here.rglob("*"))) == 2
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -418,6 +457,17 @@ def test_a_file_in_a_wrong_place_is_found(run, here, name, what, folder, expecte
     found = json.loads(said.out)["findings"]
     assert len(found) == 1
     assert re.search(expected, f"{found[0]['body']}: {found[0]['message']} -> {found[0]['advice']}")
+
+
+def test_planted_faults_of_sources(run, here):
+    (here / "sources").mkdir()
+    text = "about: bars\nmaterials: {etpu: {youngs_modulus_pa: {value: VALUE, low: 1.0, high: 1.0e8}}}\n"
+    for value, code, expected in (("2.0e7", 1, "is 1; expected 100 to"), ("2.0e9", 1, "outside its own range of 1 to")):
+        (here / "sources" / "lab-1.yaml").write_text(text.replace("VALUE", value))
+        said = run("pack", "test", ".")
+        assert (said.code, expected in said.words) == (code, True)
+    (here / "sources" / "lab-1.yaml").write_text(text.replace("VALUE", "2.0e7").replace("1.0,", "1.0e6,"))
+    assert run("pack", "test", ".").code == 0
 
 
 def test_a_name_in_two_packs_is_found_with_both_places(run):

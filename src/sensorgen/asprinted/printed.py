@@ -81,11 +81,14 @@ class Printed:
     @cached_property
     def cells(self) -> dict[str, Cell]:
         """The unit cell by every convention."""
-        from sensorgen.asprinted.window import inside, window
+        from sensorgen.asprinted.window import Window, inside, window
+        from sensorgen.scene.slabs import is_open
 
         whole = self.design.unbordered.printed
         boundaries = self.design.layers.boundaries_mm(whole.size_mm[2])
-        plan = window(drawn(whole, boundaries), whole)
+        plan = Window((0.0, whole.size_mm[0]), (0.0, whole.size_mm[1]))
+        if not is_open(self.design.unbordered.in_use):  # else its fringe is part of the capacitance
+            plan = window(drawn(whole, boundaries), whole)
         if self.design.border:
             plan = inside(plan, whole, drawn(self.design.printed, boundaries))
         return {name: cell(self.design, found.layers, found.bodies, plan) for name, found in self._connected.items()}

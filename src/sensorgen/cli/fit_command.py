@@ -44,10 +44,10 @@ def _work(
 
 def _taken(made: "Fit") -> str:
     """How the next design takes the values."""
-    from sensorgen.design import materials
+    from sensorgen.design.design import material
 
     named = dict.fromkeys(value.material for value in made.values)
-    parts = {name: "electrode" if materials.load(name).conductor else "dielectric" for name in named}
+    parts = {name: "electrode" if material(name).conductor else "dielectric" for name in named}
     return " ".join(f"--material {part}={name}@{made.source}" for name, part in parts.items())
 
 

@@ -31,14 +31,17 @@ def _check(file: str, design: str | None, printer: str | None, materials: tuple[
     from pathlib import Path
 
     from sensorgen.core.errors import BadInput
+    from sensorgen.design.design import own_texts
     from sensorgen.export.gcode.check import CheckedFile, check_motion
     from sensorgen.export.gcode.motion import follow
 
     drawn, machine = _subject(design, printer)
     loaded = {drawn.tool(name): name for name in drawn.used()} if drawn else {}
-    loaded |= _loaded(materials, machine.tool_numbers)
+    named = _loaded(materials, machine.tool_numbers)
+    loaded |= named
     motion = follow(Path(file), machine.control.prime_macro)
-    texts = drawn.own if drawn else {}
+    own = drawn.own if drawn else {}
+    texts = {**own, "materials": {**own_texts(named.values()).get("materials", {}), **own.get("materials", {})}}
     found = check_motion(motion, machine, loaded, others_empty=drawn is not None, texts=texts)
     if drawn:
         from sensorgen.asprinted import agreement
@@ -121,7 +124,7 @@ def _loaded(words: tuple[str, ...], tools: tuple[int, ...]) -> dict[int, str]:
     """Material of each tool that was named."""
     from sensorgen.cli.settings import pairs
     from sensorgen.core.errors import BadInput
-    from sensorgen.design import materials
+    from sensorgen.design.design import material
 
     found = {}
     for tool, name in pairs(words, "--material"):
@@ -129,7 +132,7 @@ def _loaded(words: tuple[str, ...], tools: tuple[int, ...]) -> dict[int, str]:
             raise BadInput(
                 f"--material {tool}={name}: {tool!r} is no tool; the printer has {', '.join(map(str, tools))}"
             )
-        found[int(tool)] = materials.load(name).name
+        found[int(tool)] = material(name).name
     return found
 
 

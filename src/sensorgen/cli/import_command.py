@@ -41,20 +41,23 @@ def command(
         raise BadInput(f"--chord {chord:g}: expected 0.0001 to 1 mm")
     assembly = importing.read([Path(file) for file in files], unit, chord)
     name = name or Path(files[0]).stem
+    listing = importing.Listing.of(assembly, Path(out))
+    if only_list or assembly.errors or not maps:
+        render.deliver(listing)
     if assembly.errors:
-        drawing = Path(out) / f"{name}-faults.svg"
-        store.replace(drawing, importing.picture(assembly).encode())
-        render.deliver(importing.Listing.of(assembly))
-        first = assembly.errors[0]
-        raise BadInput(f"{first.body}: {first.text}; nothing was imported, {drawing} shows where")
-    if only_list or not maps:
-        render.deliver(importing.Listing.of(assembly))
+        first, shown = assembly.errors[0], "nothing is imported"
+        if not only_list:
+            drawing = Path(out) / f"{name}-faults.svg"
+            store.replace(drawing, importing.picture(assembly).encode())
+            shown = f"nothing was imported, {drawing} shows where"
+        raise BadInput(f"{first.body}: {first.text}; {shown}")
+    if only_list:
         return 0
-    filled, tools = importing.assigned(assembly, maps, terminals, Path(out))
+    if not maps:
+        raise BadInput(f"no --map: nothing was imported; expected {listing.words()}")
+    chosen = importing.assign(assembly, maps, terminals, Path(out))
     more = {key: value for key, value in (("printer", printer), ("quality", quality)) if value}
-    made = importing.write(
-        assembly, filled, tools, name=name, folder=Path(out), more=more, replace_existing=force
-    )  # fmt: skip
+    made = importing.write(assembly, chosen, name=name, folder=Path(out), more=more, replace_existing=force)
     render.deliver(made)
     return 0
 

@@ -3,9 +3,9 @@
 import reprlib
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import zip_longest
-from typing import Any, TypeVar, get_args
+from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sensorgen.core.errors import BadInput, UnknownName
 
@@ -44,6 +44,9 @@ _EXPECTED = {
     "tuple_type": _LIST,
 }
 _OTHERS = "another kind of value"  # that no file of ours can have
+
+
+Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]*$", examples=["one line without control characters"])]
 
 
 class Strict(BaseModel):
@@ -181,5 +184,6 @@ def _records(annotation: Any) -> Iterator[type[Strict]]:
 
 def _example(kind: type[Strict], place: tuple[Any, ...]) -> str:
     """An example of the field at a place, as the field itself has it."""
-    field = _record_at(kind, place[:-1]).model_fields.get(str(place[-1])) if place else None
+    place = tuple(part for part in place if isinstance(part, str))  # without positions in lists
+    field = _record_at(kind, place[:-1]).model_fields.get(place[-1]) if place else None
     return " or ".join(map(str, field.examples)) if field and field.examples else "others of its kind"

@@ -81,6 +81,11 @@ def parse(text: str, where: str) -> dict[str, Any]:
         mark = error.problem_mark or error.context_mark
         place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
         raise BadInput(f"{where}: {place}{', '.join(filter(None, (error.context, error.problem)))}") from None
+    except yaml.reader.ReaderError as error:
+        shown = f"#x{error.character:04x}" if isinstance(error.character, int) else repr(error.character)
+        raise BadInput(
+            f"{where}: control character {shown} at position {error.position}; expected plain text"
+        ) from None
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise BadInput(f"{where}: not YAML: {' '.join(str(error).split())}") from None
     if not isinstance(data, dict):

@@ -5,7 +5,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
@@ -314,6 +314,25 @@ def _covers(waiver: Waiver, finding: Finding) -> bool:
     return same_rule and waiver.body in ("", finding.body)
 
 
+def own_texts(materials: Iterable[str], folder: Path | None = None) -> Mapping[Kind, Mapping[str, str]]:
+    """Texts of those materials that do not ship: of packs beside a folder, the working one if not given, or the user's.
+
+    Raises
+    ------
+    UnknownName, BadInput
+        A name that no pack has, or a file that cannot be read.
+    """
+    texts: Mapping[Kind, Mapping[str, str]] = packs.with_files(
+        {"tools": dict.fromkeys(materials, 0)}, folder or Path()
+    ).get("own", {})
+    return texts
+
+
+def material(name: str, folder: Path | None = None) -> material_files.Material:
+    """A material that ships, or of the packs that :func:`own_texts` looks in."""
+    return material_files.load(name, (), own_texts([name], folder))
+
+
 def shape(name: str) -> "Shape":
     """A shape by its name; raises UnknownName with the nearest one."""
     if name in packs.shipped_names("shapes"):
@@ -475,7 +494,7 @@ def _check_names(design: Design) -> None:
     """Look up every name that a design uses, so that a wrong one is reported before any work."""
     packs.check_texts(design.own)
     _ = design.params, design.machine, design.layers
-    for part in Slots.model_fields:
+    for part in ("dielectric", *Slots.model_fields):  # whose material may be that of others
         if getattr(design.materials, part):
             material, source = design.slot(part)
             if source and source not in material.sources():

@@ -27,7 +27,7 @@ from sensorgen.scene.sections import sections
 SHAPE = "imported"
 MOST_BYTES = 200_000_000  # of a file of bodies
 _START = "data:application/zlib;base64,"
-_HASHED = re.compile(r"-([0-9a-f]{8})\.bodies\.json")
+HASHED = r"-([0-9a-f]{8})\.bodies\.json"  # end of a file's name
 
 
 def _kinds() -> "dict[str, type[Piece]]":
@@ -121,7 +121,7 @@ def with_geometry(data: dict[str, Any], folder: Path) -> dict[str, Any]:
         if path.stat().st_size > MOST_BYTES:
             raise BadInput(f"{path}: {path.stat().st_size / 1e6:.0f} MB; expected at most {MOST_BYTES / 1e6:.0f} MB")
         content = path.read_text("utf-8")
-    own = _HASHED.search(path.name)
+    own = re.search(HASHED, path.name)
     if own and own[1] != sha256(content.encode()).hexdigest()[:8]:
         raise BadInput(f"{path}: its content is not that of its name: it was changed or damaged; import it again")
     return {**data, "geometry": packed(content)}

@@ -48,7 +48,7 @@ class Manifest(Strict):
 
     version: str = ""
     about: str = ""
-    requires: Annotated[tuple[_PackName, ...], Field(strict=False)] = ()
+    requires: Annotated[tuple[_PackName, ...], Field(strict=False, examples=["lab-filaments"])] = ()
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class File:
 
     def text(self) -> str:
         """Content; raises BadInput where it cannot be read, is too large, or a link leads out of the pack."""
-        return _text(self.path, self.pack.place(self.kind))
+        return _text(self.path, dict(self.pack.moved).get(self.kind, self.pack.folder))
 
 
 def suffix(kind: Kind) -> str:
@@ -146,7 +146,11 @@ def is_path(kind: Kind, word: str) -> bool:
 
 
 def _text(path: Path, folder: Path) -> str:
-    if not path.resolve().is_relative_to(folder.resolve()):
+    try:
+        inside = path.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError):  # a link to itself
+        inside = False
+    if not inside:
         raise BadInput(f"{path}: a link that leads out of its pack; copy the file to its place")
     return yamlfile.text(path)
 

@@ -11,14 +11,12 @@ from pydantic import Field, model_validator
 
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, SensorgenError
-from sensorgen.core.records import Strict, checked
+from sensorgen.core.records import Line, Strict, checked
 from sensorgen.design import packs
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Pattern = Literal["rectilinear", "grid", "concentric", "honeycomb", "triangles", "gyroid"]  # of infill
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-# Titles stand on one line of a slicer's profile.
-Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]*$", examples=["one line without control characters"])]
 
 
 class MaxSpeed(Strict):

@@ -279,10 +279,14 @@ class _Process:
         with suppress(OSError):
             pipe.write(f"{json.dumps(question)}\n".encode())
             pipe.flush()
+        wait_s = 5 + 3 * SECONDS  # as other programs may run
         try:
-            line = self._lines.get(timeout=5 + 3 * SECONDS)
+            line = self._lines.get(timeout=wait_s)
         except queue.Empty:
-            line = b""
+            self.close()
+            raise BadInput(
+                f"{self.name}.py: no answer within {wait_s} s; a shape takes milliseconds: look for a loop without end"
+            ) from None
         try:
             reply = json.loads(line, parse_constant=_refuse) if line else None
         except ValueError:

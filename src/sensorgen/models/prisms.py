@@ -7,7 +7,7 @@ The part of a scene between its mirrors, or one period of it, is solved by
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.util import find_spec
 from itertools import pairwise, product
@@ -22,8 +22,9 @@ from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import Region, parts
 from sensorgen.scene.raster import raster
-from sensorgen.scene.repetition import Repeat, halved, repeat
+from sensorgen.scene.repetition import Repeat, halved, repeat, widened
 from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene, seen_from_above
+from sensorgen.scene.slabs import is_open, slabs
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.enclosed import enclosing
 from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, Layers, Mesh, plan, solved
@@ -40,6 +41,7 @@ _RUNGS = (  # distances of lines from outlines, in electrode gaps; order of the 
     ((2.0, 0.4, 0.08), 3, 2.5e-3),
     ((2.0, 0.5, 0.12), 4, 1e-3),
 )
+_SLANTED = ((2.0,), 2, 0.2)  # for slanted bodies first, as all slabs have such lines
 _GRID_MM = 1e-6  # to which corners are rounded
 _COARSER_MM = (1e-4, 3e-4, 1e-3, 3e-3)  # where outlines nearly coincide
 _SLENDER_MM = 2e-5  # height of a triangle below which a coarser grid is better
@@ -49,6 +51,10 @@ _OVERLAP_MM2 = 1e-6
 _MOST_MB = 4000.0  # memory of a mesh: more would take too long as well
 _FAR = 1.25  # in electrode gaps: from other conductors, where outlines are drawn together
 _LOOSE = 0.03  # in electrode gaps: by how much
+_AIR = 40.0  # in electrode gaps: air around electrodes that do not cover the sensor
+_AROUND = (6.0, 20.0)  # distances of lines from outlines there, in electrode gaps
+_SHELL = 0.1  # of that air: thickness of the floating conductor around it
+_OPEN_MB = 1500.0  # memory of a mesh with that air: a minute
 
 
 def why_not_applicable(scene: Scene) -> str | None:
@@ -130,15 +136,19 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     layers = cell.layers([permittivity[name] for name in cell.dielectrics])
     first = sum(reach > 2 * width for *_, reach in _RUNGS[:-1])
     failed, reached = None, False
-    for factors, order, _ in _RUNGS[first:]:
-        beside = [factor * cell.gap_mm for factor in factors]
+    for factors, order, _ in (*((_SLANTED,) if cell.outer else ()), *_RUNGS[first:]):
+        beside = [factor * cell.gap_mm for factor in (*(_AROUND if cell.air_mm else ()), *factors)]
         try:
-            inner, outer = _meshes(cell, layers, beside)
-            if outer.memory_mb(order) > _MOST_MB:
-                raise fem.Unsolved(f"{outer.memory_mb(order):.0f} MB; meshes of up to {_MOST_MB:g} MB are solved")
-            found = solved(inner, outer, order, cell.shares(outer))
+            inner, outer, enclosed = _meshes(cell, layers, beside)
+            most = _OPEN_MB if cell.air_mm else _MOST_MB
+            if outer.memory_mb(order) > most:
+                raise fem.Unsolved(f"{outer.memory_mb(order):.0f} MB; meshes of up to {most:g} MB are solved")
+            found = solved(inner, outer, order, cell.shares(outer), enclosed=enclosed)
         except fem.Unsolved as error:
             failed = error
+            continue
+        except shapely.errors.GEOSException as error:  # outlines that rounding makes invalid
+            failed = fem.Unsolved(str(error))
             continue
         interval = fem.whole(found, np.outer(cell.x.shares, cell.y.shares).ravel().tolist())
         reached = True
@@ -149,24 +159,32 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
         raise failed
 
 
-def _meshes(cell: "_Cell", layers: Layers, beside_mm: Sequence[float]) -> tuple[Mesh, Mesh]:
-    """The mesh of a cell, twice; of two cells that enclose it where that has slivers."""
-    far_mm, loose_mm = _FAR * cell.gap_mm, _LOOSE * cell.gap_mm
-    bare = plan(layers, (), _GRID_MM)
-    for times in _STRETCHED if bare.slenderness_mm() > _SLENDER_MM else ():
+def _meshes(cell: "_Cell", layers: Layers, beside_mm: Sequence[float]) -> tuple[Mesh, Mesh, bool]:
+    """The mesh of a cell for the flux, that for the potential, and whether their outlines enclose the cell's.
+
+    With air around it, the flux stays in that air, and the potential is constant beyond: a conductor that floats.
+    """
+    far_mm, loose_mm = np.inf if cell.air_mm else _FAR * cell.gap_mm, _LOOSE * cell.gap_mm
+    is_sound = not cell.outer and plan(layers, (), _GRID_MM).slenderness_mm() > _SLENDER_MM
+    for times in _STRETCHED if is_sound else ():
         with suppress(fem.Unsolved):
-            exact = Mesh.of(layers, [times * far for far in beside_mm], _GRID_MM, far_mm)
+            beside = [times * far for far in beside_mm]
+            exact = Mesh.of(layers, beside, _GRID_MM, far_mm)
             if exact.plan.slenderness_mm() > _SLENDER_MM:
-                return exact, exact
+                other = Mesh.of(cell.inside_shell(layers), beside, _GRID_MM, far_mm) if cell.air_mm else exact
+                return exact, other, False
     found = []
     for outwards, least_mm in ((False, _SLENDER_MM), (True, _SLENDER_MM / 10)):  # a potential bears more than a flux
         for grid_mm in _COARSER_MM:
-            near = enclosing(layers, grid_mm, far_mm, loose_mm, outwards=outwards)
+            some = replace(layers, regions=cell.outer) if outwards and cell.outer else layers
+            near = enclosing(some, grid_mm, far_mm, loose_mm, outwards=outwards)
+            if outwards and cell.air_mm:
+                near = cell.inside_shell(near)
             mesh = Mesh.of(near, beside_mm, grid_mm, far_mm)
             if mesh.plan.slenderness_mm() > least_mm:
                 break
         found.append(mesh)
-    return found[0], found[1]
+    return found[0], found[1], True
 
 
 @dataclass(frozen=True)
@@ -187,6 +205,12 @@ class _Cell:
         Their materials, air last.
     gap_mm : float
         Smallest distance of two conductors [mm].
+    air_mm : float
+        Air around the sensor, where an electrode does not cover it; else 0 [mm].
+    open_sides : tuple of (bool, bool)
+        Whether that air is beyond the low and the high end, along x and along y.
+    outer : list of dict of int to Region
+        What fills each layer at any of its heights, where bodies are slanted: ``regions`` is what fills it at all.
     """
 
     x: Repeat
@@ -196,6 +220,24 @@ class _Cell:
     conductors: int
     dielectrics: list[str]
     gap_mm: float
+    air_mm: float = 0.0
+    open_sides: tuple[tuple[bool, bool], tuple[bool, bool]] = ((False, False), (False, False))
+    outer: list[dict[int, Region]] | None = None
+
+    def inside_shell(self, layers: Layers) -> Layers:
+        """Layers of it in a shell that conducts and floats: any potential in there goes on as a constant outside."""
+        (x0, x1), (y0, y1) = self.open_sides
+        thick, (x, y) = _SHELL * self.air_mm, layers.size_mm
+        inner = shapely.box(thick * x0, thick * y0, x - thick * x1, y - thick * y1)
+        whole, own = shapely.box(0.0, 0.0, x, y), layers.conductors
+        ring = whole.difference(inner)
+        regions = [
+            {kind + (kind >= own): region for kind, region in layer.items()}
+            | ({own: ring} if not ring.is_empty else {})
+            for layer in layers.regions
+        ]
+        regions[0] = regions[-1] = {own: whole}
+        return replace(layers, regions=regions, conductors=own + 1, in_shell=True)
 
     def layers(self, permittivity: Sequence[float]) -> Layers:
         """For the solver."""
@@ -219,6 +261,8 @@ class _Cell:
 def _cell(scene: Scene) -> _Cell:
     """The cell of a scene; raises ValueError where it is none of upright prisms between two electrodes."""
     slanted = next((b for b in scene.bodies for p in b.pieces if not p.is_constant("z")), None)
+    if slanted and is_open(scene) and not any(scene.repeats):
+        return _enclosed(scene)
     if slanted:
         raise ValueError(f"{slanted.name} is slanted or curved in elevation: its layers are no prisms")
     levels = np.unique(np.array([z for b in scene.bodies for p in b.pieces for z in p.span("z")]).round(9))
@@ -246,7 +290,26 @@ def _cell(scene: Scene) -> _Cell:
         x = _mirrored(boxes.planes_mm[0], boxes.shares[:, 0])
         y = _mirrored(boxes.planes_mm[1], boxes.shares[0] / boxes.shares[0, 0])
     whole = shapely.box(x.low_mm, y.low_mm, x.high_mm, y.high_mm)
-    x, y = halved((x, y), [shapely.intersection(r, whole) for r in dict.fromkeys(patterned)])
+    half = halved((x, y), [shapely.intersection(r, whole) for r in dict.fromkeys(patterned)])
+    try:
+        return _numbered(levels.tolist(), _within(slabs, *half), *half)
+    except _Uncovered as error:
+        return _surrounded(scene, levels.tolist(), slabs, x, y, error.gap_mm)
+
+
+class _Uncovered(ValueError):
+    """An electrode that does not cover the sensor, and the electrode gap [mm]."""
+
+    def __init__(self, end: str, gap_mm: float) -> None:
+        super().__init__(f"the {end} electrode does not cover the whole sensor")
+        self.gap_mm = gap_mm
+
+
+_Slab = tuple[float, float, dict[Body, Region]]
+
+
+def _within(slabs: Sequence[_Slab], x: Repeat, y: Repeat) -> list[dict[Body, Region]]:
+    """Regions of slabs inside a cell, from its corner; raises ValueError where they overlap."""
     window = (x.low_mm, y.low_mm, x.high_mm, y.high_mm)
     inside = [
         {body: translate(shapely.clip_by_rect(r, *window), -x.low_mm, -y.low_mm) for body, r in own.items()}
@@ -256,7 +319,77 @@ def _cell(scene: Scene) -> _Cell:
         sum(r.area for r in own.values()) > shapely.union_all(list(own.values())).area + _OVERLAP_MM2 for own in inside
     ):
         raise ValueError("outlines overlap in plan")
-    return _numbered([*levels.tolist()], inside, x, y)
+    return inside
+
+
+def _surrounded(
+    scene: Scene, levels_mm: list[float], slabs: Sequence[_Slab], x: Repeat, y: Repeat, gap_mm: float
+) -> _Cell:
+    """A scene whose electrodes do not cover it, whole or by half, with air around, as its ends are not those of a cell.
+
+    Above and below, that air ends in a layer more, which the flux may use and the potential may not.
+    """
+    if gap_mm <= SLIVER_MM:
+        raise ValueError("the electrodes touch: the capacitance grows without bound")
+    air, regions = _AIR * gap_mm, [region for *_, own in slabs for region in own.values()]
+    sides, ends = [], []
+    for axis, side in enumerate((x, y)):
+        if scene.repeats[axis]:
+            sides.append(side)
+            ends.append((False, False))
+        else:
+            sides.append(widened(regions, scene.size_mm, axis, air))
+            ends.append((sides[-1].low_mm < 0, True))
+    thick = _SHELL * air
+    low, high = levels_mm[0] - air, levels_mm[-1] + air
+    inside = _within(slabs, sides[0], sides[1])
+    heights = [low - thick, low, *levels_mm, high, high + thick]
+    found = _numbered(heights, [{}, {}, *inside, {}, {}], sides[0], sides[1], air)
+    return replace(found, open_sides=(ends[0], ends[1]))
+
+
+def _enclosed(scene: Scene) -> _Cell:
+    """A scene with slanted bodies whose electrodes do not cover it: what each slab has at all heights, and at any."""
+    layers = slabs(scene)
+    floating = [body for body in scene.bodies if body.terminal == FLOATING]
+    names = [*sorted({b.material for b in scene.bodies if not b.terminal} - {"air"}), "air"]
+    ends, conductors = {"bottom": BOTTOM, "top": TOP}, 2 + len(floating)
+
+    def kind(body: Body) -> int:
+        if body.terminal == FLOATING:
+            return 2 + floating.index(body)
+        return ends[body.terminal] if body.terminal else conductors + names.index(body.material)
+
+    def numbered(own: dict[Body, Region]) -> dict[int, Region]:
+        found: dict[int, list[Region]] = defaultdict(list)
+        for body, region in own.items():
+            if body.material != "air" and not region.is_empty:
+                found[kind(body)].append(translate(region, -x.low_mm, -y.low_mm))
+        return {k: shapely.union_all(regions) for k, regions in found.items()}
+
+    every = [region for slab in layers for own in (slab.inner, slab.outer) for region in own.values()]
+    heights = [layers[0].low_mm, *(slab.high_mm for slab in layers)]
+    x = y = Repeat.of(0.0, 1.0, False, 1.0)
+    gap_mm = _gap_mm([numbered(slab.outer) for slab in layers], heights, conductors)
+    if not SLIVER_MM < gap_mm < np.inf:
+        raise ValueError("slanted electrodes are nearer than the slabs that they are cut into")
+    air = _AIR * gap_mm
+    x, y = (widened([r for r in every if not r.is_empty], scene.size_mm, axis, air) for axis in (0, 1))
+    window = shapely.box(0.0, 0.0, x.high_mm - x.low_mm, y.high_mm - y.low_mm)
+
+    def clipped(own: dict[int, Region]) -> dict[int, Region]:
+        return {
+            k: shapely.multipolygons(parts(shapely.intersection(r, window, grid_size=1e-9))) for k, r in own.items()
+        }
+
+    inner, outer = (
+        [{}, {}, *map(clipped, some), {}, {}]
+        for some in ([numbered(slab.inner) for slab in layers], [numbered(slab.outer) for slab in layers])
+    )
+    thick = _SHELL * air
+    around = (heights[0] - air - thick, heights[0] - air, *heights, heights[-1] + air, heights[-1] + air + thick)
+    sides = ((x.low_mm < 0, True), (y.low_mm < 0, True))
+    return _Cell(x, y, around, inner, conductors, names, gap_mm, air, sides, outer)
 
 
 def _mirrored(planes: Real, shares: Real) -> Repeat:
@@ -266,7 +399,9 @@ def _mirrored(planes: Real, shares: Real) -> Repeat:
     return Repeat(float(places[0]), float(places[-1]), False, places, shares[[0, *change]])
 
 
-def _numbered(levels_mm: list[float], inside: list[dict[Body, Region]], x: Repeat, y: Repeat) -> _Cell:
+def _numbered(
+    levels_mm: list[float], inside: list[dict[Body, Region]], x: Repeat, y: Repeat, air_mm: float = 0.0
+) -> _Cell:
     """A cell with a number for each conductor, those that touch one, and each dielectric."""
     pieces = [(k, body.terminal, part) for k, own in enumerate(inside) for body, region in own.items() if body.terminal
               for part in parts(region)]  # fmt: skip
@@ -288,11 +423,10 @@ def _numbered(levels_mm: list[float], inside: list[dict[Body, Region]], x: Repea
         numbers.setdefault(piece, len({*numbers.values(), BOTTOM, TOP}))
     conductors = len({*numbers.values(), BOTTOM, TOP})
     kinds = np.array([numbers[piece] for piece in label.tolist()])
-    for end, name in ((BOTTOM, "bottom"), (TOP, "top")):
-        cover = shapely.union_all(plans[kinds == end]).area if (kinds == end).any() else 0.0
-        if cover < _COVERS * sizes[0] * sizes[1]:
-            raise ValueError(f"the {name} electrode does not cover the whole sensor")
+    uncovered = _uncovered(plans, kinds, sizes)
     low, high = int(slab[kinds == BOTTOM].min()), int(slab[kinds == TOP].max())
+    if uncovered:  # the field leaves the electrodes
+        low, high = 0, len(inside) - 1
     names = [*sorted({b.material for own in inside[low : high + 1] for b in own if not b.terminal} - {"air"}), "air"]
     regions = []
     for k in range(low, high + 1):
@@ -306,7 +440,19 @@ def _numbered(levels_mm: list[float], inside: list[dict[Body, Region]], x: Repea
                 here[kind] = shapely.union_all([here.get(kind, region), region])
         regions.append(here)
     heights = tuple(levels_mm[low : high + 2])
-    return _Cell(x, y, heights, regions, conductors, names, _gap_mm(regions, heights, conductors))
+    gap_mm = _gap_mm(regions, heights, conductors)
+    if uncovered and not air_mm:
+        raise _Uncovered(uncovered, gap_mm)
+    return _Cell(x, y, heights, regions, conductors, names, gap_mm, air_mm)
+
+
+def _uncovered(plans: np.ndarray, kinds: np.ndarray, sizes_mm: tuple[float, float]) -> str:
+    """The electrode that does not cover the whole cell, or ""; raises ValueError where there is none."""
+    own = {name: plans[kinds == end] for end, name in ((BOTTOM, "bottom"), (TOP, "top"))}
+    if missing := [name for name, region in own.items() if not len(region)]:
+        raise ValueError(f"the scene has no {missing[0]} electrode")
+    whole = _COVERS * sizes_mm[0] * sizes_mm[1]
+    return next((name for name, region in own.items() if shapely.union_all(region).area < whole), "")
 
 
 def _gap_mm(regions: Sequence[dict[int, Region]], heights_mm: Sequence[float], conductors: int) -> float:

@@ -20,8 +20,10 @@ from sensorgen.prediction.cost_model import expected, measured
 from sensorgen.prediction.plan import Candidate
 from sensorgen.scene.scene import FLOATING, Scene, content
 from sensorgen.scene.sections import overlap, sections
+from sensorgen.scene.slabs import is_open
 
-PLANE, SPATIAL = 1e-3, 1e-2  # relative width of a capacitance's bounds where none is asked for: a cross-section, 3D
+# Relative width of a capacitance's bounds where none is asked for: a cross-section, 3D, electrodes that do not cover
+PLANE, SPATIAL, OPEN = 1e-3, 1e-2, 2.5e-2
 _EXACT = 1e-9  # relative width of a capacitance's bounds below which the scene is a plate
 _LOSSLESS, _LOSSY = "capacitance", "lossy"  # functions of a model
 _CHEAP = 1  # up to this cost, a model is asked before it is weighed
@@ -37,6 +39,8 @@ class Contradiction(SensorgenError):
 
 def default_width(scene: Scene) -> float:
     """Relative width of a capacitance's bounds where none is asked for [-]."""
+    if is_open(scene):
+        return OPEN
     if any(body.terminal == FLOATING for body in scene.bodies):
         return SPATIAL
     try:
@@ -313,5 +317,6 @@ def _of_plain(data: dict[str, Any]) -> Answer:
 
 
 def is_plate(answer: Answer) -> bool:
-    """Whether a capacitance is that of a solid plate, which has no other bounds than itself."""
-    return answer.capacitance_f.width() < _EXACT
+    """Whether a capacitance is that of a solid plate: its cell has no other bounds than itself, whatever cuts it."""
+    widths = [c.width for c in answer.plan if c.model == answer.model and c.width is not None]
+    return min(widths, default=answer.capacitance_f.width()) < _EXACT

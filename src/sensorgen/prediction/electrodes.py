@@ -1,21 +1,25 @@
 """Resistance of the electrodes of a body, end to end, cogs included."""
 
+from collections.abc import Sequence
+
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.body import Body
-from sensorgen.design.values import resistivities
+from sensorgen.design.values import ENDS, resistivities
 from sensorgen.models import conduction
 from sensorgen.prediction.spread import spread
 from sensorgen.scene.scene import Scene
 
 
-def electrode_resistance(body: Body) -> dict[str, Bounds]:
+def electrode_resistance(body: Body, ends: Sequence[str] = ENDS) -> dict[str, Bounds]:
     """Resistance of the top and the bottom electrode from end to end [ohm].
 
     Parameters
     ----------
     body : Body
         Drawn or printed; a print is solid where it is printed, as contacts between lines cost nothing.
+    ends : sequence of str
+        Which electrodes.
 
     Raises
     ------
@@ -25,7 +29,7 @@ def electrode_resistance(body: Body) -> dict[str, Bounds]:
         An electrode that does not reach from end to end.
     """
     design, found = body.design, {}
-    for end, rho in resistivities(design).items():
+    for end, rho in ((end, rho) for end, rho in resistivities(design).items() if end in ends):
         scene, *others = dict.fromkeys(body.cells.scenes.values())
         solid = _of_cell(body, scene, end, rho.value)
         printed = [solid.middle()]

@@ -12,7 +12,7 @@ from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
-from sensorgen.design.values import material_value
+from sensorgen.design.values import ENDS, material_value
 from sensorgen.models import line
 from sensorgen.models.compression import Compression
 from sensorgen.models.sensor import Sensor
@@ -30,6 +30,7 @@ from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.prediction.results import SCHEMA, Impedance, Prediction
 from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
 from sensorgen.prediction.spread import spread
+from sensorgen.scene.slabs import is_open
 
 Otherwise = tuple[Sequence[Sensor | None], Sequence[Sensor | None]]  # by other walls; with other films
 
@@ -85,6 +86,8 @@ def _gap(body: Body) -> Bounds | None:
 def _at_rest(found: Prediction, body: Body, rest: RestState, frequency_hz: tuple[float, ...]) -> Prediction:
     """Capacitance, resistance, corner frequency and impedance without a load."""
     resistance, c, gone = rest.resistance, rest.capacitance, lost(body.design)
+    if set(resistance) != set(ENDS):
+        return replace(found, capacitance=c, resistance=resistance)
     r = _in_series(resistance["top"], resistance["bottom"])
     corner = _of_line(r, c, lambda ohm, farad: line.corner_frequency_hz(ohm, farad), "Hz")
     return replace(
@@ -148,7 +151,7 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
         if law.bounded:
             others = list(_printed_otherwise(model, load, query)), list(_other_films(model, load, query))
         beyond = law.compression.doubt(float(model.sensor.stress_pa(load.force_n, load.position_m)))
-        pressed = (beyond, _few_periods(model.body, query))
+        pressed = (beyond, _few_periods(model.body, query), _free_sides(model.body))
         found = replace(
             found, identifiability=made, sensitivity=_sensitivity(model, load, query, others),
             doubts=(*found.doubts, *filter(None, pressed)),
@@ -157,6 +160,13 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
         return _resolution(found, model, load, query, others)
     except SensorgenError as error:
         return replace(found, reason=str(error))
+
+
+def _free_sides(body: Body) -> str:
+    """That the law of compression holds for a cell of a larger sensor."""
+    if not is_open(body.cells.first()):
+        return ""
+    return "compressed as a cell that its neighbours hold: the sides of this sensor are free, so that it deforms more"
 
 
 def _few_periods(body: Body, query: Query) -> str:
@@ -314,7 +324,10 @@ def _moduli(model: SensorModel) -> list[Compression]:
 
 def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
     """What is taken for granted."""
-    yield "electrodes are equipotential for the capacitance, and the field has no fringe at the sensor's edge"
+    if is_open(body.cells.first()):
+        yield "electrodes are equipotential for the capacitance, and the fringe at their edges is in free air"
+    else:
+        yield "electrodes are equipotential for the capacitance, and the field has no fringe at the sensor's edge"
     yield "electrode resistance from end face to end face, cogs included"
     if not body.is_drawn:
         yield "contacts between extruded lines cost no resistance: no source gives their resistivity"

@@ -5,13 +5,15 @@ from dataclasses import dataclass
 from math import inf, prod
 
 from sensorgen.core.bounds import Bounds, Interval
+from sensorgen.core.errors import OutOfRange
 from sensorgen.design.body import Body, Cells
 from sensorgen.design.design import Design
-from sensorgen.design.values import MaterialValue, permittivities, resistivities
+from sensorgen.design.values import ENDS, MaterialValue, permittivities, resistivities
 from sensorgen.prediction.capacitance import PLANE, Answer, Unpredictable, capacitance, default_width
 from sensorgen.prediction.electrodes import electrode_resistance
 from sensorgen.prediction.spread import spread
 from sensorgen.scene.scene import Scene
+from sensorgen.scene.slabs import is_open
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,8 @@ class RestState:
     capacitance : Bounds
         Of the sensor, with models, print and materials [F].
     resistance : dict of str to Bounds
-        Of the top and the bottom electrode, end to end, cogs included [ohm].
+        Of the top and the bottom electrode, end to end, cogs included [ohm]; without those that do not cover the sensor
+        and do not reach from end to end.
     resistivity_ohm_m : (float, float)
         Of the top and the bottom electrode [ohm m].
     values : tuple of MaterialValue
@@ -94,8 +97,22 @@ def rest_state(body: Body, width: float | None = None) -> RestState:
         material=Interval(c.middle(), c.middle()) if rough else _permittivity_range(body.design, scene, c.middle()),
     )  # fmt: skip
     ends = (rho["top"].value, rho["bottom"].value)
-    resistance = electrode_resistance(body)
+    resistance, unknown = _resistance(body, scene)
+    doubts += unknown
     return RestState(answer, bounds, resistance, ends, (*values, *rho.values()), by_width, by_film, tuple(doubts))
+
+
+def _resistance(body: Body, scene: Scene) -> tuple[dict[str, Bounds], list[str]]:
+    """Of both electrodes; where one does not cover the sensor, of those from end to end, and what is left."""
+    if not is_open(scene):
+        return electrode_resistance(body), []
+    found, said = dict[str, Bounds](), list[str]()
+    for end in ENDS:
+        try:
+            found |= electrode_resistance(body, (end,))
+        except OutOfRange as error:
+            said.append(f"no resistance: {error}")
+    return found, said
 
 
 def _rule(cells: Cells, scene: Scene) -> str:

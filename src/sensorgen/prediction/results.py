@@ -19,6 +19,7 @@ from sensorgen.prediction.plan import Plan, without_times
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
+UNPREDICTED = "12-numbers"  # rule of the finding that there are none
 SCHEMA = 3  # 1 was a JSON of the drawing alone, of version 0.1.0; 2 had resolutions without their range
 
 
@@ -262,17 +263,18 @@ class Prediction(Displayed):
             for name, b in quantities.items() if b.value
         )  # fmt: skip
         yield Table("ranges", "", tuple(map(Column, heads)), tuple(ranges))
-        yield f"corner frequency {_words(self.corner_frequency) or 'undefined'}"
-        yield ""
-        columns = (
-            Column("at rest", "Hz", si=True), Column("Re", "ohm", digits=5), Column("range"),
-            Column("Im", "ohm", digits=5), Column("range"),
-        )  # fmt: skip
-        z = (
-            (row.frequency_hz, *(cell for part in (row.re, row.im) for cell in (part.value, _range(part))))
-            for row in self.impedance
-        )
-        yield Table("impedance", "", columns, tuple(z))
+        if self.impedance:
+            yield f"corner frequency {_words(self.corner_frequency) or 'undefined'}"
+            yield ""
+            columns = (
+                Column("at rest", "Hz", si=True), Column("Re", "ohm", digits=5), Column("range"),
+                Column("Im", "ohm", digits=5), Column("range"),
+            )  # fmt: skip
+            z = (
+                (row.frequency_hz, *(cell for part in (row.re, row.im) for cell in (part.value, _range(part))))
+                for row in self.impedance
+            )
+            yield Table("impedance", "", columns, tuple(z))
         yield ""
         yield from self.judgement()
         yield ""
@@ -298,7 +300,9 @@ class Prediction(Displayed):
         return json.dumps(json.loads(to_json(self)), indent=2, ensure_ascii=False) + "\n"
 
     def with_short(self, found: Sequence[Finding]) -> tuple[Finding, ...]:
-        """Findings about a drawing, and an error where its print is a short."""
+        """Findings about a drawing, an error where its print is a short, a warning where it has no capacitance."""
+        if self.status == "not predicted":
+            return (unpredicted(self.reason), *found)
         if self.status != "short" or any(f.rule == "1-short" for f in found):
             return tuple(found)
         advice = "widen narrow parts to a line, or draw the electrodes further apart"
@@ -313,6 +317,12 @@ class Prediction(Displayed):
             return ()
         best = "error unknown" if reached in (None, inf) else f"{reached:.2g}"
         return ("; ".join((f"accuracy {accuracy:g} not reached: {best}", *(self.plan.shares() if self.plan else ()))),)
+
+
+def unpredicted(reason: str) -> Finding:
+    """That a sensor's verdict rests on its checks alone."""
+    advice = "see what is missing; until then the verdict is that of the checks alone"
+    return Finding(UNPREDICTED, "warning", "sensor", f"no electrical numbers: {reason}", advice)
 
 
 def resolved(error: Bounds | None, most: float, cannot: str) -> str:

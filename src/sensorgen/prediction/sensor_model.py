@@ -1,9 +1,9 @@
 """The line-sensor model of a body: what the line and all that rests on it need, in numbers."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
 from sensorgen.design.values import ENDS, MaterialValue, of_all_materials, piezoresistance
@@ -15,6 +15,8 @@ from sensorgen.prediction.losses import Lost, lost
 from sensorgen.prediction.mesh_ladder import Piece
 from sensorgen.prediction.query import FLAT, Tip
 from sensorgen.prediction.rest_state import RestState, rest_state
+from sensorgen.scene.sections import square_to
+from sensorgen.scene.slabs import is_open
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,8 @@ def build_sensor(
         A radius of a flat tip.
     """
     rest = rest or rest_state(body)
+    if reason := _no_line(body, rest):
+        raise OutOfRange(reason)
     p, gone, rises = body.design.params, lost(body.design), piezoresistance(body.design)
     pressed = piece(body)
     if not isinstance(law, Law):
@@ -107,6 +111,19 @@ def build_sensor(
         piezoresistance_per_pa=tuple(rises[end].value if end in rises else 0.0 for end in ENDS),  # type: ignore[arg-type]
     )
     return SensorModel(body, sensor, rest, law, gone, rises)
+
+
+def _no_line(body: Body, rest: RestState) -> str:
+    """Why electrodes that do not cover the sensor are no line of equal cells, or ""."""
+    scene = body.cells.first()
+    if not is_open(scene):
+        return ""
+    if set(rest.resistance) != set(ENDS):
+        return "an electrode does not run from end to end: the sensor at rest is predicted, not its response"
+    ends = [replace(scene, bodies=tuple(b for b in scene.bodies if b.terminal == end)) for end in ENDS]
+    if all(len(square_to(electrode, "x")) == 1 for electrode in ends):
+        return ""
+    return "an electrode changes along the sensor: the sensor at rest is predicted, not its response"
 
 
 def _thickness_m(body: Body, rest: RestState) -> tuple[float, float]:

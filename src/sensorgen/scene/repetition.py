@@ -90,6 +90,14 @@ def repeat(regions: Sequence[Region], size_mm: Sequence[float], axis: int) -> Re
     return Repeat.of(low, low + period, True, whole)
 
 
+def widened(regions: Sequence[Region], size_mm: Sequence[float], axis: int, by_mm: float) -> Repeat:
+    """All of some regions along an axis with what is beyond their ends; half of it where its middle is a mirror."""
+    whole = size_mm[axis]
+    if are_mirrored(regions, axis, whole / 2):
+        return Repeat(whole / 2, whole + by_mm, False, np.array([whole / 2, whole + by_mm]), np.array([2.0]))
+    return Repeat(-by_mm, whole + by_mm, False, np.array([-by_mm, whole + by_mm]), np.array([1.0]))
+
+
 def _is_plain(region: Region, size_mm: Sequence[float], axis: int) -> bool:
     """Whether a region does not change along an axis."""
     slab = shapely.bounds(shapely.get_parts(region))

@@ -16,7 +16,7 @@ from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.document import Part
 from sensorgen.core.errors import Unprintable
-from sensorgen.core.findings import Finding, counted, counts, grouped, listed, most_severe
+from sensorgen.core.findings import Finding, listed, most_severe
 from sensorgen.core.version import __version__
 from sensorgen.design import printer
 from sensorgen.design.design import Design
@@ -97,7 +97,8 @@ class Built:
     def _head(self) -> Iterator[Part]:
         yield from self.replaced
         yield from compensation.document(self.compensated)
-        yield f"{self.verdict}  {self.name}: {counted(counts(grouped(self.findings)))}"
+        reason = self.prediction.reason if self.prediction.status == "not predicted" else ""
+        yield decision.headline(self.verdict, self.name, self.findings, reason)
         yield ""
 
 

@@ -343,8 +343,11 @@ def _instrument(file: File) -> Faults:
 
 
 def _source(file: File) -> Faults:
-    yield from ()
-    materials.own_source(file.name, file.text())
+    made = materials.own_source(file.name, file.text())
+    for name, values in made.materials.items():
+        for quantity, value in values.items():
+            if wrong := materials.fault(quantity, materials.Value(source=file.name, **dict(value))):
+                yield "value", f"{quantity} of {name} {wrong}", "correct the number or its unit"
 
 
 _TESTS: dict[Kind, Callable[[File], Faults]] = {

@@ -17,7 +17,7 @@ from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Finding, Refused, Verdict, counted, counts, grouped, listed, verdict
 from sensorgen.design.design import Design
 from sensorgen.prediction.identifiability.results import FORCE_SHARE, GUESS
-from sensorgen.prediction.results import resolved
+from sensorgen.prediction.results import UNPREDICTED, resolved, unpredicted
 from sensorgen.workflows.trial import Numbers, Trial, trial
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from sensorgen.prediction.results import Prediction
 
 _VERSION = 4  # of the search for changes: stored advice of another one is not read
+_OF_PRINT = ("1-short", UNPREDICTED)  # rules whose findings are of the prediction
 STEPS = ("prediction", "changes", "done")
 Step = Callable[[str], None]
 
@@ -159,8 +160,9 @@ class Decision(CheckReport):
 
     def document(self) -> Iterator[Part]:
         """Verdict, numbers, findings and changes."""
-        yield f"{self.verdict}  {self.name}: {counted(counts(grouped(self.findings)))}"
-        yield from ("", *self.numbers())
+        yield headline(self.verdict, self.name, self.findings, self.reason)
+        if self.trial:
+            yield from ("", *self.numbers())
         if self.findings:
             yield ""
             yield from listed(grouped(self.findings))
@@ -199,6 +201,11 @@ class RefusedBuild(Refused):
             yield from self.advice.document()
 
 
+def headline(said: str, name: str, findings: Sequence[Finding], reason: str) -> str:
+    """Verdict and counts, and why there are no electrical numbers."""
+    return f"{said}  {name}: {counted(counts(grouped(findings)))}{reason and f'; not predicted: {reason}'}"
+
+
 def decision(
     design: Design,
     held: Review,
@@ -225,15 +232,17 @@ def decision(
     step : callable
         Called with the next step, for a progress display.
     """
-    findings, made, reason, advice, start_s = tuple(held.findings), None, "", None, time.process_time()
+    findings, made, advice, start_s = tuple(held.findings), None, None, time.process_time()
+    reason = "" if predict else "checks alone (--budget 0)"
     if predict and held.meshes:
         step("prediction")
         try:
             made = trial(design, folder=folder)
         except SensorgenError as error:
-            reason = str(error)
+            reason, findings = str(error), (unpredicted(str(error)), *findings)
     if made:
-        findings = (*(f for f in made.findings if f.rule == "1-short" and f not in findings), *findings)
+        reason = made.reason if made.status == "not predicted" else ""
+        findings = (*(f for f in made.findings if f.rule in _OF_PRINT and f not in findings), *findings)
         step("changes")
         advice = advised(design, made, budget_s, step, time.process_time() - start_s)
     return Decision(
@@ -249,7 +258,7 @@ def advised(
 
     What its own prediction has ``spent_s`` counts as spent.
     """
-    if made.verdict == "PRINT":
+    if verdict([f for f in made.findings if f.rule != UNPREDICTED]) == "PRINT":
         return None
     digest = sha256(_adapter(Trial).dump_json(made)).hexdigest()
     question = {"advice": _VERSION, "design": design.id(), "trial": digest}
@@ -304,7 +313,7 @@ def table(tried: Trial) -> Iterator[Part]:
         rows.append(("print time", "", f"at least {tried.toolpath.time_s / 60:.0f} min"))
     yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
     yield f"(resolution at {tried.force_n:g} N and {tried.position_m * 1e3:g} mm; {tried.body})"
-    if tried.reason:
+    if tried.reason and tried.status != "not predicted":
         yield tried.reason
 
 

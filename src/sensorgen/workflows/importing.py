@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cache, cached_property
@@ -16,11 +16,11 @@ import yaml
 from sensorgen.core import files
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Facts, Part, Table
-from sensorgen.core.errors import BadInput, MissingValue, UnknownName
+from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding, listed
 from sensorgen.design import design as designs
 from sensorgen.design import imported, packs
-from sensorgen.design import materials as material_files
+from sensorgen.prediction.bodies import drawn as drawn_body
 from sensorgen.scene.geometry import cad, mesh_files, surfaces
 from sensorgen.scene.geometry.mesh_files import FileBody
 from sensorgen.scene.geometry.meshes import Mesh
@@ -34,6 +34,7 @@ _LEAST_MM, _MOST_MM = (1.0, 1.0, 0.05), 1000.0  # of a sensor's edges, in x, y a
 _MOST_BODIES = 300
 _CONTACT_MM = 1e-4  # conductors nearer than this are one electrode
 _OVERLAP_MM = 1e-6  # mean depth up to which bodies overlap by rounding
+_BY_HEIGHT = ("bottom", "middle", "top")
 _FORMATS = (".step", ".stp", ".3mf", ".stl")
 _MATERIAL = re.compile(r"(?P<material>[^@]+?)(?:@(?P<source>[^@]*[^@0-9][^@]*))?(?:@(?P<tool>[0-9]+))?")
 _ROLES = (("support", "bvoh"), ("electrode", "etpu"), ("conduct", "etpu"), ("dielectric", "x60"), ("film", "x60"))
@@ -132,14 +133,14 @@ class Listing:
     findings: tuple[Finding, ...]
 
     @classmethod
-    def of(cls, assembly: Assembly) -> "Listing":
-        """The listing of an assembly."""
+    def of(cls, assembly: Assembly, folder: Path) -> "Listing":
+        """The listing of an assembly, with materials that ship, are beside a folder, or the user's."""
         rows = []
         for body in assembly.bodies:
             x, y, z = (f"{low:g} to {high:g}" for low, high in (body.box_mm.round(6) + 0.0).T.tolist())
             chord = body.given.chord_mm
             faces = f"curved, met to {chord:g} mm" if chord else "flat"
-            material = _suggested(body.name, body.given.colour) or "?"
+            material = _suggested(body.name, body.given.colour, folder) or "?"
             rows.append(ListedBody(body.name, body.volume_mm3(), x, y, z, body.given.colour, faces, material))
         return cls(assembly.source, tuple(rows), assembly.findings)
 
@@ -150,8 +151,12 @@ class Listing:
             yield ""
             yield from listed(self.findings)
         yield ""
-        words = " ".join(f"--map {body.name}={body.material.replace('?', 'MATERIAL')}" for body in self.bodies)
-        yield f"To import it: sensorgen import {self.source} {words}"
+        yield f"To import it: {self.words()}"
+
+    def words(self) -> str:
+        """What to type to import it."""
+        maps = " ".join(f"--map {body.name}={body.material.replace('?', 'MATERIAL')}" for body in self.bodies)
+        return f"sensorgen import {self.source} {maps}"
 
 
 @dataclass(frozen=True)
@@ -170,8 +175,8 @@ class Imported:
         What its coordinates were moved by, so that its corner is the origin.
     bodies : mapping of str to str
         Of each body, material, terminal, tool and pieces, in words.
-    repairs : tuple of Finding
-        What was put right.
+    findings : tuple of Finding
+        Electrodes that touch, and what was put right.
     models : mapping of str to str
         Of each model of capacitance, "" where it applies to the sensor as drawn, or why not.
     """
@@ -181,7 +186,7 @@ class Imported:
     size_mm: tuple[float, float, float]
     moved_mm: tuple[float, float, float]
     bodies: Mapping[str, str]
-    repairs: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...] = ()
     models: Mapping[str, str] = field(default_factory=dict)
 
     def document(self) -> Iterator[Part]:
@@ -199,9 +204,28 @@ class Imported:
             ("next", f"sensorgen check {self.design}"),
         ]
         yield Facts(tuple(rows))
-        if self.repairs:
+        if self.findings:
             yield ""
-            yield from listed(self.repairs)
+            yield from listed(self.findings)
+
+
+@dataclass(frozen=True)
+class Assigned:
+    """What the bodies of files are printed of, and which are electrodes.
+
+    Attributes
+    ----------
+    filled : mapping of str to Filled
+        Material and terminal of each body.
+    tools : mapping of str to int
+        Tool of each material that one was given for.
+    shorts : tuple of Finding
+        Conductors that touch and are both electrodes.
+    """
+
+    filled: Mapping[str, imported.Filled]
+    tools: Mapping[str, int]
+    shorts: tuple[Finding, ...] = ()
 
 
 def read(paths: Sequence[Path], unit: str = "", chord_mm: float = CHORD_MM) -> Assembly:
@@ -363,11 +387,15 @@ def _shared_mm(one: Real, other: Real) -> Real:
     return np.asarray(np.minimum(one[1], other[1]) - np.maximum(one[0], other[0]))
 
 
-def _suggested(name: str, colour: str) -> str:
+def _suggested(name: str, colour: str, folder: Path) -> str:
     """A material whose name, colour or usual part a body's name or colour shows; "" for none."""
-    known, word = material_files.names(), name.lower()
-    named = [material for material in known if material in re.split("[._-]", word)]
-    painted = [material for material in known if colour and material_files.load(material).colour.lower() == colour]
+    known, word = packs.names("materials", folder), name.lower()
+    words = set(re.split("[._-]", word))
+    named = [material for material in known if material in words or ("-" in material and material in word)]
+    painted = []
+    for material in known if colour else ():
+        with suppress(SensorgenError):  # a material that is damaged is no suggestion
+            painted += [material] if designs.material(material, folder).colour.lower() == colour else []
     by_role = [material for role, material in _ROLES if role in word and material in known]
     return next(iter((*named, *painted, *by_role)), "")
 
@@ -380,9 +408,7 @@ def picture(assembly: Assembly) -> str:
     return places.svg(meshes, [(f.place_mm, f"{f.body}: {f.message}") for f in assembly.errors if f.place_mm])
 
 
-def assigned(
-    assembly: Assembly, maps: Sequence[str], terminals: Sequence[str], folder: Path
-) -> tuple[dict[str, imported.Filled], dict[str, int]]:
+def assign(assembly: Assembly, maps: Sequence[str], terminals: Sequence[str], folder: Path) -> "Assigned":
     """Material and terminal of each body, and the tools, from what a user has typed.
 
     Parameters
@@ -413,7 +439,7 @@ def assigned(
         if not parts:
             raise BadInput(f"--map {pattern}={value}: expected BODY=MATERIAL@TOOL, as base=etpu@1")
         material, tool = parts["material"], parts["tool"]
-        known[material] = _material(material, folder).conductor
+        known[material] = designs.material(material, folder).conductor
         for name in _matching(pattern, names):
             chosen[name] = (material + (f"@{parts['source']}" if parts["source"] else ""), tool or "")
     tools: dict[str, int] = {}
@@ -425,36 +451,33 @@ def assigned(
     materials = {name: slot for name, (slot, _) in chosen.items()}
     if missing := [name for name in names if name not in materials]:
         colours = {body.name: body.given.colour for body in assembly.bodies}
-        words = " ".join(f"--map {name}={_suggested(name, colours[name]) or 'MATERIAL'}" for name in missing)
+        words = " ".join(f"--map {name}={_suggested(name, colours[name], folder) or 'MATERIAL'}" for name in missing)
         raise MissingValue(f"no material for {', '.join(missing)}: give {words}")
     conductors = {n for n in names if known[materials[n].partition("@")[0]]}
-    ends = _electrodes(assembly, conductors, terminals)
+    ends, shorts = _electrodes(assembly, conductors, terminals)
     filled = {n: imported.Filled.model_validate({"material": materials[n], "terminal": ends.get(n, "")}) for n in names}
-    return filled, tools
+    return Assigned(filled, tools, shorts)
 
 
-def _electrodes(assembly: Assembly, conductors: set[str], terminals: Sequence[str]) -> dict[str, str]:
-    """Terminal of each conductor: by its place, unless ``--terminal`` names it."""
-    ends = _terminals(assembly, conductors)
+def _electrodes(
+    assembly: Assembly, conductors: set[str], terminals: Sequence[str]
+) -> tuple[dict[str, str], tuple[Finding, ...]]:
+    """Terminal of each conductor, by its place unless ``--terminal`` names it, and where they touch."""
+    given: dict[str, str] = {}
     for pattern, value in _pairs(terminals, "--terminal BODY=TERMINAL"):
         if value not in ("top", "middle", "bottom", "none"):
             raise UnknownName("terminal", value, ("top", "middle", "bottom", "none"))
         matching = _matching(pattern, [body.name for body in assembly.bodies])
         if idle := sorted(set(matching) - conductors):
             raise BadInput(f"--terminal {pattern}={value}: the material of {idle[0]} does not conduct")
-        ends |= dict.fromkeys(matching, "" if value == "none" else value)
+        given |= dict.fromkeys(matching, "" if value == "none" else value)
+    ends, shorts = _terminals(assembly, conductors, given)
     if missing := [end for end in ("bottom", "top") if end not in ends.values()]:
         raise BadInput(
             f"no {' and no '.join(missing)} electrode; conductors: {', '.join(sorted(conductors)) or 'none'}; expected "
             "two, by --map BODY=MATERIAL of one that conducts, or --terminal BODY=top"
         )
-    return ends
-
-
-def _material(name: str, folder: Path) -> material_files.Material:
-    """A material that ships, or of the packs beside a design and of the user's."""
-    texts = packs.with_files({"tools": {name: 0}}, folder).get("own", {})
-    return material_files.load(name, (), texts)
+    return ends, shorts
 
 
 def _pairs(words: Sequence[str], form: str) -> list[tuple[str, str]]:
@@ -473,33 +496,56 @@ def _matching(pattern: str, names: Sequence[str]) -> list[str]:
     return found
 
 
-def _terminals(assembly: Assembly, conductors: set[str]) -> dict[str, str]:
-    """Terminals by height: conductors that touch are one electrode; the lowest is the bottom, the highest the top."""
-    bodies = [body for body in assembly.bodies if body.name in conductors]
+def _terminals(
+    assembly: Assembly, conductors: set[str], given: Mapping[str, str]
+) -> tuple[dict[str, str], tuple[Finding, ...]]:
+    """Terminals by height: conductors that touch are one electrode; the lowest is the bottom, the highest the top.
+
+    Of conductors that touch and have two terminals, a finding says that they are a short.
+    """
+    bodies = sorted((b for b in assembly.bodies if b.name in conductors), key=lambda b: float(b.box_mm[:, 2].mean()))
     solids, boxes = {body.name: body.solid() for body in bodies}, {body.name: body.box_mm for body in bodies}
-    groups = {body.name: {body.name} for body in bodies}
+    groups = {body.name: frozenset([body.name]) for body in bodies}
     for a, b in combinations(groups, 2):
         if (_shared_mm(boxes[a], boxes[b]) > -_CONTACT_MM).all() and solids[a].min_gap(solids[b], 1.0) < _CONTACT_MM:
             joined = groups[a] | groups[b]
             groups |= dict.fromkeys(joined, joined)
-    every = list({frozenset(group) for group in groups.values()})
-    if len(every) == 1:  # a short: the check shows where
-        every = [frozenset([name]) for name in groups]
-    height = {body.name: float(body.box_mm[:, 2].mean()) for body in bodies}
-    every.sort(key=lambda group: sum(height[name] for name in group) / len(group))
-    if len(every) > 3:
+    every = [[name for name in groups if groups[name] == own] for own in dict.fromkeys(groups.values())]
+    if len(every) == 1 and len(bodies) > 1:  # its lowest and its highest body are shorted
+        ends = {**dict.fromkeys(groups, ""), bodies[0].name: "bottom", bodies[-1].name: "top", **given}
+        return ends, tuple(_shorts(every, ends))
+    decided = {k: {given[name] for name in group if name in given} for k, group in enumerate(every)}
+    ends = {name: end for k, group in enumerate(every) for name in group for end in decided[k]}
+    ends.update(given)
+    left = [k for k, named in decided.items() if not named]
+    by_height = sorted(
+        (k for k, named in decided.items() if named != {""}),
+        key=lambda k: sum(float(boxes[name][:, 2].mean()) for name in every[k]) / len(every[k]),
+    )
+    if left and len(by_height) > len(_BY_HEIGHT):
+        apart = ", ".join(sorted(every[k][0] for k in by_height))
+        words = " ".join(f"--terminal {every[k][0]}=END" for k in left)
         raise MissingValue(
-            f"{len(every)} electrodes that do not touch: {', '.join(sorted(min(group) for group in every))}; give "
-            "--terminal BODY=top, middle, bottom or none for each"
+            f"{len(by_height)} electrodes that do not touch: {apart}; give {words}, END top, middle, bottom or none"
         )
-    ends = ("bottom", "middle", "top") if len(every) == 3 else ("bottom", "top")
-    return {name: end for group, end in zip(every, ends, strict=False) for name in group}
+    places = _BY_HEIGHT if len(by_height) == len(_BY_HEIGHT) else ("bottom", "top")
+    ends |= {name: end for k, end in zip(by_height, places, strict=False) if k in left for name in every[k]}
+    return ends, tuple(_shorts(every, ends))
+
+
+def _shorts(groups: Sequence[Sequence[str]], ends: Mapping[str, str]) -> Iterator[Finding]:
+    """A finding for each group of touching conductors with several terminals."""
+    for group in groups:
+        if len({ends.get(name, "") for name in group} - {""}) > 1:
+            yield Finding(
+                "1-short", "error", " / ".join(group), "conductors that touch are both electrodes: a short",
+                "draw them apart in CAD, or map one to a material that does not conduct",
+            )  # fmt: skip
 
 
 def write(
     assembly: Assembly,
-    filled: Mapping[str, imported.Filled],
-    tools: Mapping[str, int],
+    assigned: Assigned,
     *,
     name: str,
     folder: Path,
@@ -512,8 +558,8 @@ def write(
     ----------
     assembly : Assembly
         Bodies without errors.
-    filled, tools : mapping
-        As of :func:`assigned`.
+    assigned : Assigned
+        As of :func:`assign`.
     name : str
         Of the design.
     folder : Path
@@ -539,7 +585,8 @@ def write(
     content = imported.text(imported.Bodies(found, (length, width, height), chord, assembly.source))
     data = {
         "name": name, "shape": imported.SHAPE, **more,
-        "bodies": {n: filled[n].model_dump(exclude_defaults=True) for n in found}, "tools": dict(tools),
+        "bodies": {n: assigned.filled[n].model_dump(exclude_defaults=True) for n in found},
+        "tools": dict(assigned.tools),
     }  # fmt: skip
     path, beside = folder / f"{name}.yaml", folder / imported.file_name(name, content)
     design = designs.make({**data, "geometry": imported.packed(content)}, str(path))
@@ -547,14 +594,31 @@ def write(
         raise BadInput(f"{path} exists; expected --force to replace it, or another --name")
     head = f"# imported from {assembly.source}; bodies are changed in CAD, then: sensorgen import\n"
     text = head + yaml.safe_dump({**data, "geometry": beside.name}, sort_keys=False, allow_unicode=True)
+    old, drawn = _bodies_of(path), drawn_body(design).cells.first()
     files.replace(beside, content.encode())
     files.replace(path, text.encode())
+    if (
+        old
+        and old != beside
+        and not any(old.name in other.read_text("utf-8", "replace") for other in folder.glob("*.yaml"))
+    ):
+        old.unlink(missing_ok=True)
     return Imported(
         str(path), str(beside), (length, width, height), tuple((-low.round(9) + 0.0).tolist()),
         {n: _words(design, n, own) for n, own in found.items()},
-        tuple(f for f in assembly.findings if f.severity != "error"),
-        {key: model.why_not_applicable(design.in_use) or "" for key, model in capacitance_models().items()},
+        (*assigned.shorts, *(f for f in assembly.findings if f.severity != "error")),
+        {key: model.why_not_applicable(drawn) or "" for key, model in capacitance_models().items()},
     )  # fmt: skip
+
+
+def _bodies_of(path: Path) -> Path | None:
+    """The file of bodies that a design names which is there, and that an import of its name wrote; None for others."""
+    try:
+        named = yaml.safe_load(path.read_text("utf-8"))["geometry"]
+    except (OSError, ValueError, yaml.YAMLError, KeyError, TypeError):
+        return None
+    own = isinstance(named, str) and re.fullmatch(re.escape(path.stem) + imported.HASHED, named)
+    return path.parent / named if own else None
 
 
 def _exact(body: ReadBody, low: Real, high: Real) -> tuple[Piece, ...]:

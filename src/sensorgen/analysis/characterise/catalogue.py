@@ -25,6 +25,10 @@ PLATE_RADIUS_MM, ELECTRODE_MM, UPPER_MM = 10.0, 0.4, 0.2  # of plates: radius, a
 PAD_MM = 8.0  # of the lower electrode, for a probe
 _STRAIN = 0.04  # that the proposed load makes
 _MOST_N = 100.0  # of a usual stand
+_ROOM, _ROOM_OF_ONE = (
+    1.5,
+    4.0,
+)  # beyond several sources' values, and beyond a single one: sources differ up to twelvefold
 _FRINGE = 0.97  # of the closed form of plates, whose film ends: 0.96 to 0.97 by finite volumes
 _FILL = 0.015  # coupons of one plate differ in how well they are filled [-]
 _TAPS_MM, _WIDTH_MM, _SENSOR_MM = 40.0, 6.0, 10.0  # between taps; width of ladders, and of bars, wide as sensors
@@ -190,7 +194,8 @@ def _range(material: Material, quantity: str, low: float, high: float) -> tuple[
     values = [v for v in material.properties.get(quantity, []) if not v.implausible]
     given = [number for v in values for number in (v.value, v.low, v.high) if number is not None and number > 0]
     if given:
-        low, high = min(given) / 1.5, max(given) * 1.5
+        room = _ROOM if max(given) > min(given) else _ROOM_OF_ONE
+        low, high = min(given) / room, max(given) * room
     return (log(low) + log(high)) / 2, (log(high) - log(low)) / 2
 
 

@@ -16,7 +16,7 @@ from pydantic import Field
 
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
-from sensorgen.core.records import Strict, checked
+from sensorgen.core.records import Line, Strict, checked
 from sensorgen.design import packs
 from sensorgen.design.packs import Kind
 
@@ -83,8 +83,8 @@ class Material(Strict):
     """A material with every value that its sources give."""
 
     name: str
-    title: str
-    about: str
+    title: Line
+    about: Line
     colour: Annotated[str, Field(pattern="^#[0-9a-f]{6}$")]
     conductor: bool
     properties: dict[str, list[Value]]
@@ -249,8 +249,8 @@ def own_source(source: str, text: str | None = None, texts: Texts = NO_TEXTS) ->
         for name, values in made.materials.items():
             _check_values(name, {key: value.value for key, value in values.items()}, texts)
             for quantity, value in values.items():
-                if fault := disorder(value):
-                    raise OutOfRange(f"{quantity} of {name} {fault}")
+                if wrong := disorder(value):
+                    raise OutOfRange(f"{quantity} of {name} {wrong}")
     except (BadInput, UnknownName, OutOfRange) as error:
         raise error.within(f"{source}.yaml") from None
     return made
@@ -308,21 +308,21 @@ def parse(name: str, text: str) -> Material:
     for group, values in (("properties", made.properties), ("print", made.print)):
         for quantity, several in values.items():
             for k, each in enumerate(several):
-                if fault := _fault(quantity, each):
+                if wrong := fault(quantity, each):
                     line = yamlfile.line(text, (group, quantity, k))
-                    raise OutOfRange(f"{file}, line {line}: {quantity} of {each.source} {fault}")
+                    raise OutOfRange(f"{file}, line {line}: {quantity} of {each.source} {wrong}")
             if sum(each.default for each in several) > 1:
                 raise BadInput(f"{file}: {quantity} has two values with default: true; expected one")
     return made
 
 
-def _fault(quantity: str, given: Value) -> str:
+def fault(quantity: str, given: Value) -> str:
     """What is wrong with a value of a material's file, or ""."""
     low, high = _RANGES.get(quantity, (0.0, inf))
     if not low <= given.value <= high or (isinf(given.value) and given.default):
         return f"is {given.value:g}; expected {_said(low, high, 'a number from 0 on')}"
-    if fault := disorder(given):
-        return fault
+    if wrong := disorder(given):
+        return wrong
     low, high = _PLAUSIBLE.get(quantity, (-inf, inf))
     for number in (given.value, given.low, given.high):
         if number is not None and not low <= number <= high and not given.implausible:

@@ -51,6 +51,8 @@ class Layers:
         Whether the cell repeats along x and along y; else its sides are mirrors.
     cuts_mm : (sequence of float, sequence of float)
         Where else along x and y outlines are cut, as by the end of a sensor [mm].
+    in_shell : bool
+        Whether the last conductor is a shell around the others, far from them.
     """
 
     size_mm: tuple[float, float]
@@ -60,6 +62,7 @@ class Layers:
     permittivity: Sequence[float]
     periodic: tuple[bool, bool] = (False, False)
     cuts_mm: tuple[Sequence[float], Sequence[float]] = ((), ())
+    in_shell: bool = False
 
 
 @dataclass(frozen=True)
@@ -116,12 +119,12 @@ def plan(cell: Layers, beside_mm: Sequence[float], grid_mm: float) -> Plan:
     sides = shapely.box(0.0, 0.0, x, y).exterior
     edges = shapely.boundary([region for layer in layers for region in layer.values()])
     metal = [
-        shapely.union_all([region for kind, region in layer.items() if kind < cell.conductors], grid_size=1)
+        shapely.union_all([r for kind, r in layer.items() if kind < cell.conductors - cell.in_shell], grid_size=1)
         for layer in layers
     ]
     lines = [sides, *edges]
     for far in np.array(beside_mm) / grid_mm:
-        near = [beyond(shapely.simplify(region, far / 5), (x, y), cell.periodic, 2 * far) for region in metal]
+        near = [beyond(_simpler(region, far / 5), (x, y), cell.periodic, np.ceil(2 * far)) for region in metal]
         wide, narrow = (
             shapely.buffer(near, way * far, join_style="mitre", mitre_limit=MITRE, quad_segs=2) for way in (1, -1)
         )
@@ -147,6 +150,12 @@ def plan(cell: Layers, beside_mm: Sequence[float], grid_mm: float) -> Plan:
     if np.abs(area).sum() != 2 * x * y or not area.all():
         raise Unsolved("the triangles of the plan do not fill it: outlines nearer than the grid; report this scene")
     return Plan(points * pitch, triangles, _filled(layers, faces, cell)[:, of_face])
+
+
+def _simpler(region: Any, by: float) -> Any:
+    """A region with fewer corners; itself where it is too narrow for that."""
+    found = shapely.simplify(region, by)
+    return found if shapely.area(found) > region.area / 2 else region
 
 
 def beyond(region: Any, size: Sequence[float], periodic: Sequence[bool], far: float) -> Any:
@@ -384,17 +393,20 @@ def _distinct(faces: Whole) -> Whole:
     return faces[np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]]
 
 
-def solved(inner: Mesh, outer: Mesh, order: int, weight: Real) -> Energies:
+def solved(inner: Mesh, outer: Mesh, order: int, weight: Real, *, enclosed: bool = False) -> Energies:
     """Both bounds over eps0 [mm], of a potential of an order and of a flux of one less.
 
     Parameters
     ----------
     inner, outer : Mesh
-        Of a cell, or of two that enclose it, as of :mod:`sensorgen.solvers.electrostatics.enclosed`.
+        Of a cell for the flux, and of the same or of one with more conductor for the potential.
     order : int
         Of the potential's polynomials.
     weight : (t,) array
         Of each triangle of the outer one in ``Energies.part``.
+    enclosed : bool
+        Whether both are of outlines that enclose the true ones, as of
+        :mod:`sensorgen.solvers.electrostatics.enclosed`; else the grid may have moved those.
 
     Raises
     ------
@@ -403,7 +415,7 @@ def solved(inner: Mesh, outer: Mesh, order: int, weight: Real) -> Energies:
     """
     upper, part, moved = _upper(outer, order, weight)
     lower, unknowns = _lower(inner, order)
-    return Energies(lower, upper, part, unknowns, moved / upper if outer is inner else 0.0, outer is not inner)
+    return Energies(lower, upper, part, unknowns, 0.0 if enclosed else moved / upper, outer is not inner)
 
 
 def _upper(mesh: Mesh, order: int, weight: Real) -> tuple[float, float, float]:

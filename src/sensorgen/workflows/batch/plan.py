@@ -9,11 +9,10 @@ from pydantic import Field
 
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
-from sensorgen.core.records import Strict, checked
+from sensorgen.core.records import Line, Strict, checked
 from sensorgen.design import design as design_files
 from sensorgen.design import packs
 from sensorgen.design.design import Design, Slot
-from sensorgen.design.printer import Line
 
 MOST = 1000  # specimens in one plan
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9._-]{0,58}[A-Za-z0-9])?$", examples=["26", "film-study"])]

@@ -158,6 +158,23 @@ class Study:
                 "conductor": self.conductor, "dielectric": self.dielectric,
                 "tools": json.dumps({m: self.design.tool(m) for m in (self.conductor, self.dielectric)})}  # fmt: skip
 
+    def fits(self, chosen: Sequence[int], hours: float) -> bool:
+        """Whether bed and print time have room for coupons, by their numbers."""
+        coupons = [self.coupons[k] for k in chosen]
+        if self.hours(coupons) > hours:
+            return False
+        try:
+            plates.arranged(coupons, self.design)
+        except OutOfRange:
+            return False
+        return True
+
+    def check_printer(self) -> None:
+        """Raise BadInput where the printer or the quality of the user's own has a fault."""
+        own_files = self.design.own.keys() & {"printers", "qualities"}
+        if faults := machine.of_design(self.design) if own_files else []:
+            raise BadInput(f"{faults[0].body}: {faults[0].text}")
+
     def files(self) -> dict[str, str]:
         """Files of the user's own, for the plate's folder: a form is read without the packs that they came from."""
         return {
@@ -258,24 +275,11 @@ def plan(
     """
     if not 2 <= count <= MOST or not 0 < hours < np.inf:
         raise OutOfRange(f"{count} coupons in {hours:g} h; expected 2 to {MOST} coupons, and a time above 0")
-    faults = machine.of_design(study.design) if study.design.own.keys() & {"printers", "qualities"} else []
-    if faults:
-        raise BadInput(f"{faults[0].body}: {faults[0].text}")
+    study.check_printer()
     step("catalogue")
     found = selection.candidates(study.coupons, study.unknowns, study.targets, Meters())
     step("selection")
-
-    def fits(chosen: tuple[int, ...]) -> bool:
-        coupons = [study.coupons[k] for k in chosen]
-        if study.hours(coupons) > hours:
-            return False
-        try:
-            plates.arranged(coupons, study.design)
-        except OutOfRange:
-            return False
-        return True
-
-    chosen = selection.select(found, count - 1, fits)
+    chosen = selection.select(found, count - 1, lambda chosen: study.fits(chosen, hours))
     coupons = named([study.coupons[k] for k in chosen])
     label = name or f"{study.design.machine.name}-{study.conductor}-{study.dielectric}"
     result = rows(prior(study.unknowns), found.expected(chosen, study.unknowns), study.targets)

@@ -1,0 +1,122 @@
+"""A scene as slabs between heights: what every body covers at all heights of a slab, and what it covers at some."""
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+import shapely
+
+from sensorgen.core.arrays import Real
+from sensorgen.scene.layers import EMPTY, Region
+from sensorgen.scene.scene import SLIVER_MM, Body, Piece, Scene, area_mm2, seen_from_above
+
+CUTS = 8  # slabs of a body that is slanted or curved in elevation
+_COVERS = 0.99  # of the plan: between round beads there may be holes
+
+
+@dataclass(frozen=True)
+class Slab:
+    """What lies between two heights.
+
+    Attributes
+    ----------
+    low_mm, high_mm : float
+        The heights [mm].
+    inner, outer : dict of Body to Region
+        What a body covers at all heights between them, and at any.
+    """
+
+    low_mm: float
+    high_mm: float
+    inner: dict[Body, Region]
+    outer: dict[Body, Region]
+
+
+@lru_cache(maxsize=8)
+def slabs(scene: Scene, cuts: int = CUTS) -> tuple[Slab, ...]:
+    """Slabs of a scene from below; bodies that are no upright prisms in so many at least.
+
+    Curved faces are those of the bodies' meshes, chords within 0.01 mm.
+    """
+    upright, slanted = list[tuple[Body, Piece]](), list[tuple[Body, Piece]]()
+    for body, piece in ((b, p) for b in scene.bodies for p in b.pieces):
+        (upright if piece.is_constant("z") else slanted).append((body, piece))
+    heights = [z for _, p in upright for z in p.span("z")]
+    for _, piece in slanted:
+        heights += [*np.linspace(*piece.span("z"), cuts + 1).tolist(), *piece.levels_mm()]
+    levels = np.unique(np.array(heights).round(9))
+    levels = levels[np.append(True, np.diff(levels) > SLIVER_MM)]
+    faces = [_faces(piece) for _, piece in slanted]
+    found = []
+    for low, high in pairwise(levels.tolist()):
+        inner, outer = defaultdict[Body, list[Region]](list), defaultdict[Body, list[Region]](list)
+        for body, piece in upright:
+            if piece.span("z")[0] < (low + high) / 2 < piece.span("z")[1]:
+                inner[body].append(shapely.Polygon(seen_from_above(piece)))
+                outer[body].append(inner[body][-1])
+        for (body, piece), triangles in zip(slanted, faces, strict=True):
+            if piece.span("z")[0] < (low + high) / 2 < piece.span("z")[1]:
+                least, most = _between(piece, triangles, low, high)
+                inner[body].append(least)
+                outer[body].append(most)
+        united = [{b: shapely.union_all(own) for b, own in some.items()} for some in (inner, outer)]
+        found.append(Slab(low, high, united[0], united[1]))
+    return tuple(found)
+
+
+def covered(scene: Scene, terminal: str) -> bool:
+    """Whether an electrode covers the whole plan of a scene, seen from above."""
+    whole = _COVERS * scene.size_mm[0] * scene.size_mm[1]
+    upright = (p for b in scene.bodies if b.terminal == terminal for p in b.pieces if p.is_constant("z"))
+    if any(abs(area_mm2(seen_from_above(piece))) >= whole for piece in upright):
+        return True
+    own = [region for slab in slabs(scene) for body, region in slab.outer.items() if body.terminal == terminal]
+    return bool(shapely.union_all(own).area >= whole)
+
+
+def is_open(scene: Scene) -> bool:
+    """Whether one of the two electrodes does not cover the whole plan, so that the field leaves the sensor."""
+    ends = {body.terminal for body in scene.bodies} & {"top", "bottom"}
+    return not all(covered(scene, end) for end in sorted(ends))
+
+
+def _faces(piece: Piece) -> Real:
+    """Triangles of its surface (n, 3, 3) [mm]."""
+    from sensorgen.scene.geometry.meshes import mesh
+
+    made = mesh(Body("", "", (piece,)))
+    return np.asarray(made.vertices_mm[made.triangles], float)
+
+
+def _between(piece: Piece, faces: Real, low_mm: float, high_mm: float) -> tuple[Region, Region]:
+    """What a piece covers at all heights between two, and at any: its surface in between decides where they differ."""
+    ends = [
+        shapely.union_all([shapely.Polygon(outline) for outline in piece.cut("z", at)])
+        for at in (low_mm + SLIVER_MM, high_mm - SLIVER_MM)
+    ]
+    near = faces[(faces[:, :, 2].min(1) < high_mm) & (faces[:, :, 2].max(1) > low_mm)]
+    surface = shapely.union_all(list(_projected(near, low_mm, high_mm)) or [EMPTY])
+    inner = shapely.difference(shapely.intersection(*ends), surface)
+    return inner, shapely.union_all([*ends, surface])
+
+
+def _projected(faces: Real, low_mm: float, high_mm: float) -> Iterator[shapely.Polygon]:
+    """The parts of triangles between two heights, seen from above."""
+    for triangle in faces.tolist():
+        corners = triangle
+        for sign, level in ((1.0, low_mm), (-1.0, high_mm)):
+            kept = []
+            for a, b in zip(corners, [*corners[1:], *corners[:1]], strict=True):
+                if sign * (a[2] - level) >= 0:
+                    kept.append(a)
+                if sign * (a[2] - level) * sign * (b[2] - level) < 0:
+                    share = (level - a[2]) / (b[2] - a[2])
+                    kept.append([u + share * (v - u) for u, v in zip(a, b, strict=True)])
+            corners = kept
+        if len(corners) > 2:
+            outline = shapely.Polygon([corner[:2] for corner in corners])
+            if outline.area > SLIVER_MM**2:
+                yield outline
