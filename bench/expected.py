@@ -84,7 +84,9 @@ def anew() -> Iterator[str]:
     for model, entry in expectations.measured().items():
         scene = cells.STANDARD[entry.scene]().scene
         yield f"{model}:\n  scene: {entry.scene}\n  counted: {entry.counted}"
-        yield f"  parts: {expectations.COUNTED[entry.counted](scene).parts}\n  power: {entry.power}\n  points:"
+        yield f"  parts: {expectations.COUNTED[entry.counted](scene).parts}\n  power: {entry.power}"
+        yield from (f"  loading: {entry.loading}",) if entry.loading else ()
+        yield "  points:"
         if NAMED and model not in NAMED:
             found = iter(entry.points)
         else:

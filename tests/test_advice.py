@@ -151,3 +151,11 @@ def test_a_value_is_changed_in_place(text, values, after):
 def test_what_cannot_be_changed_in_place_is_refused(text):
     with pytest.raises(BadInput):
         yamledit.changed(text, {("a",): 1.0}, "x.yaml")
+
+
+def test_the_budget_includes_what_the_prediction_took(plate):
+    design, made, _ = plate
+    late = advise(design, made, 30.0, spent_s=31.0)
+    assert (late.checked, late.complete, late.tried) == (0, False, ())
+    words = [part for part in late.document() if isinstance(part, str)]
+    assert words[0].startswith("no change was tried: the design's own prediction took the budget")

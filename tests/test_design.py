@@ -129,6 +129,14 @@ BAD = [
         OutOfRange,
         "period_mm is nan; expected a number from",
     ),
+    *(
+        (
+            {"shape": array, "parameters": {"period_mm": 30}},
+            OutOfRange,
+            "period_mm 30 is more than the sensor's shorter side, 10 mm",
+        )
+        for array in ("bump", "cone", "pillar", "pyramid")
+    ),
     ({"shape": "tri", "tools": {"x60": True}}, BadInput, "tools.x60 is True; expected a whole number"),
     ({"shape": "tri", "tools": {"x60": 10**5000}}, BadInput, "tools.x60 is a huge number; expected 99 or less"),
     ({"shape": "tri", "tools": {"bvoh": 7}}, BadInput, "diabase-h5 has no tool 7"),

@@ -354,7 +354,7 @@ def test_any_size_gives_a_page(shape: str, data: st.DataObject) -> None:
         "rect": {"etpu_width_mm": (0.3, 50.0), "air_width_mm": (0.02, 50.0), "upper_height_mm": (0.01, 10.0)},
     }.get(shape, {})
     if shape in ("bump", "cone", "pyramid", "pillar", "porous"):  # arrays of many pieces
-        own = {"length_mm": (1.0, 50.0), "width_mm": (1.0, 20.0)}
+        own = {"length_mm": (1.25, 50.0), "width_mm": (1.25, 20.0)}
     chosen: dict[str, float] = {
         name: data.draw(st.floats(low, high), name) for name, (low, high) in (envelope | own).items()
     }

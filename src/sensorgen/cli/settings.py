@@ -141,7 +141,7 @@ def advice_options() -> list[click.Parameter]:
         click.Option(
             ["--budget"], type=click.FloatRange(0, 3600), default=30.0, show_default=True, metavar="SECONDS",
             envvar="SENSORGEN_BUDGET",
-            help="Processor time for trying changes that remove findings; 0 tries none.",
+            help="Processor time for prediction and for changes to try; 0 tries none.",
         ),
         click.Option(
             ["--apply", "apply_change"], is_flag=False, flag_value=1, type=click.IntRange(1, 9), metavar="[K]",

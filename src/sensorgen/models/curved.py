@@ -15,7 +15,7 @@ import shapely
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
-from sensorgen.scene.repetition import Repeat, repeat
+from sensorgen.scene.repetition import Repeat, halved, repeat
 from sensorgen.scene.scene import SLIVER_MM, Piece, Scene
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.round_bodies import Cell, bounds
@@ -163,6 +163,7 @@ def cell(scene: Scene) -> tuple[Window, Repeat, Repeat]:
     x, y = (repeat(looks, scene.size_mm[:2], axis) for axis in (0, 1))
     if x.shifts or y.shifts:
         raise ValueError("the pattern repeats by shifts, not by mirrors")
+    x, y = halved((x, y), [shapely.clip_by_rect(r, x.low_mm, y.low_mm, x.high_mm, y.high_mm) for r in looks])
     low = (x.low_mm, y.low_mm, min(z for z, _ in spans["bottom"]))
     high = (x.high_mm, y.high_mm, max(z for _, z in spans["top"]))
     near = [

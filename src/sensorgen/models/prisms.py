@@ -6,6 +6,7 @@ The part of a scene between its mirrors, or one period of it, is solved by
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.util import find_spec
@@ -21,12 +22,12 @@ from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import Region, parts
 from sensorgen.scene.raster import raster
-from sensorgen.scene.repetition import Repeat, repeat, widened
+from sensorgen.scene.repetition import Repeat, halved, repeat, widened
 from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene, seen_from_above
 from sensorgen.scene.slabs import is_open, slabs
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.enclosed import enclosing
-from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, Layers, Mesh, solved
+from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, Layers, Mesh, plan, solved
 
 SOURCE = "Dirichlet's and Thomson's principles; prisms of triangles, H1 and hybrid H(div) by NGSolve"
 COST = 3
@@ -35,8 +36,8 @@ WIDTH = 1e-2  # of the interval unless given
 
 _RUNGS = (  # distances of lines from outlines, in electrode gaps; order of the potential; width that it often reaches
     ((2.0, 0.5), 2, 2.5e-2),
-    ((2.0, 0.4, 0.1), 2, 1e-2),
-    ((1.5, 0.3), 3, 5e-3),
+    ((0.8, 0.25, 0.08), 2, 1e-2),
+    ((0.5, 0.1), 3, 5e-3),
     ((2.0, 0.4, 0.08), 3, 2.5e-3),
     ((2.0, 0.5, 0.12), 4, 1e-3),
 )
@@ -44,6 +45,7 @@ _SLANTED = ((2.0,), 2, 0.2)  # for slanted bodies first, as all slabs have such 
 _GRID_MM = 1e-6  # to which corners are rounded
 _COARSER_MM = (1e-4, 3e-4, 1e-3, 3e-3)  # where outlines nearly coincide
 _SLENDER_MM = 2e-5  # height of a triangle below which a coarser grid is better
+_STRETCHED = (1.0, 1.13, 0.89)  # distances of lines from outlines, where they come too near others
 _COVERS = 0.99  # of the plan, by an electrode's layers together: between round beads there may be holes
 _OVERLAP_MM2 = 1e-6
 _MOST_MB = 4000.0  # memory of a mesh: more would take too long as well
@@ -163,9 +165,14 @@ def _meshes(cell: "_Cell", layers: Layers, beside_mm: Sequence[float]) -> tuple[
     With air around it, the flux stays in that air, and the potential is constant beyond: a conductor that floats.
     """
     far_mm, loose_mm = np.inf if cell.air_mm else _FAR * cell.gap_mm, _LOOSE * cell.gap_mm
-    exact = None if cell.outer else Mesh.of(layers, beside_mm, _GRID_MM, far_mm)
-    if exact and exact.plan.slenderness_mm() > _SLENDER_MM:
-        return exact, Mesh.of(cell.inside_shell(layers), beside_mm, _GRID_MM, far_mm) if cell.air_mm else exact, False
+    is_sound = not cell.outer and plan(layers, (), _GRID_MM).slenderness_mm() > _SLENDER_MM
+    for times in _STRETCHED if is_sound else ():
+        with suppress(fem.Unsolved):
+            beside = [times * far for far in beside_mm]
+            exact = Mesh.of(layers, beside, _GRID_MM, far_mm)
+            if exact.plan.slenderness_mm() > _SLENDER_MM:
+                other = Mesh.of(cell.inside_shell(layers), beside, _GRID_MM, far_mm) if cell.air_mm else exact
+                return exact, other, False
     found = []
     for outwards, least_mm in ((False, _SLENDER_MM), (True, _SLENDER_MM / 10)):  # a potential bears more than a flux
         for grid_mm in _COARSER_MM:
@@ -282,8 +289,10 @@ def _cell(scene: Scene) -> _Cell:
         boxes = raster(scene, bodies.index, len(bodies), [(0.0, size) for size in scene.size_mm])
         x = _mirrored(boxes.planes_mm[0], boxes.shares[:, 0])
         y = _mirrored(boxes.planes_mm[1], boxes.shares[0] / boxes.shares[0, 0])
+    whole = shapely.box(x.low_mm, y.low_mm, x.high_mm, y.high_mm)
+    half = halved((x, y), [shapely.intersection(r, whole) for r in dict.fromkeys(patterned)])
     try:
-        return _numbered(levels.tolist(), _within(slabs, x, y), x, y)
+        return _numbered(levels.tolist(), _within(slabs, *half), *half)
     except _Uncovered as error:
         return _surrounded(scene, levels.tolist(), slabs, x, y, error.gap_mm)
 

@@ -38,6 +38,9 @@ def _drawn_cells(design: Design) -> Cells:
         from sensorgen.scene.connections import connected_scene
 
         scene = connected_scene(scene, design.conducts)
+    if any(isinstance(p, Prism) and p.axis == "z" and not p.is_box() for b in scene.bodies for p in b.pieces):
+        scene, periods = _one_period(scene)
+        count *= periods
     return Cells({DRAWN: scene}, count, period, partial(_drawn_gap, design))
 
 
@@ -56,6 +59,31 @@ def _one_cell(design: Design) -> "tuple[Scene, float]":
     one = replace(params, length_mm=params.period_mm, width_mm=params.period_mm)
     cell = make(design.model_dump(exclude_defaults=True, mode="json") | {"parameters": asdict(one)})
     return cell.in_use, params.cells()
+
+
+def _one_period(scene: "Scene") -> "tuple[Scene, float]":
+    """One period of upright prisms of any outline, as of a print, and how many of it there are; else the whole."""
+    from shapely import clip_by_rect
+    from shapely.affinity import translate
+
+    from sensorgen.asprinted.window import window
+    from sensorgen.scene.layers import drawn as layers
+    from sensorgen.scene.layers import scene_of
+
+    pieces = [p for body in scene.bodies for p in body.pieces]
+    if not all(p.is_constant("z") for p in pieces):
+        return scene, 1.0
+    found = layers(scene, sorted({z for p in pieces for z in p.span("z")}))
+    plan, area = window(found, scene), scene.size_mm[0] * scene.size_mm[1]
+    if plan.area_mm2() > 0.99 * area:
+        return scene, 1.0
+    (x0, x1), (y0, y1) = plan.x_mm, plan.y_mm
+    inside = [
+        layer.mapped({n: translate(clip_by_rect(r, x0, y0, x1, y1), -x0, -y0) for n, r in layer.regions.items()})
+        for layer in found
+    ]
+    like = replace(scene, size_mm=(*plan.sides_mm(), scene.size_mm[2]), repeats=plan.repeats)
+    return scene_of(inside, like), area / plan.area_mm2()
 
 
 def _inside(design: Design, whole: Cells) -> Cells:

@@ -16,7 +16,7 @@ from sensorgen.core import cache as cached
 from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.models import capacitance_models
-from sensorgen.prediction.cost_model import expected
+from sensorgen.prediction.cost_model import expected, measured
 from sensorgen.prediction.plan import Candidate
 from sensorgen.scene.scene import FLOATING, Scene, content
 from sensorgen.scene.sections import overlap, sections
@@ -120,8 +120,8 @@ def capacitance(
     model : str
         The only model to ask, or "".
     keep : bool
-        Take an answer that is known from before, and keep a new one. Answers of any width are never kept: they take
-        milliseconds.
+        Take an answer that is known from before, and keep a new one. Answers of any width are not kept where a model
+        in milliseconds gives them; without such a model they are those of :func:`default_width`.
 
     Raises
     ------
@@ -140,7 +140,15 @@ def capacitance(
     """
     if not width > 0:
         raise OutOfRange(f"an accuracy of {width:g}; expected a number above 0, as 1e-4")
-    if not keep or (width == inf and not model):
+    if width == inf and not model:
+        kind = _kind(permittivity)
+        if any(
+            m.COST <= _CHEAP and hasattr(m, kind) and not m.why_not_applicable(scene)
+            for m in capacitance_models().values()
+        ):
+            return _asked(scene, permittivity, width, model)
+        width = default_width(scene)
+    if not keep:
         return _asked(scene, permittivity, width, model)
     question = _question(scene, permittivity, width, model)
     known = cached.known(question)
@@ -182,10 +190,11 @@ def _unfit(candidate: Candidate, scene: Scene, kind: str) -> str:
     return f"dielectric losses are solved by {able} alone: leave the losses out to use it"
 
 
-def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, float]:
-    """Models in milliseconds first, then those that should suffice by their cost, then the others by expected width."""
+def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, float, float]:
+    """Models in milliseconds first, then those that should suffice by cost and time, then others by expected width."""
     short = cost > _CHEAP and candidate.reach() > width
-    return short, candidate.reach() if short else 0.0, cost
+    loading = measured()[candidate.model].loading if candidate.model in measured() else 0.0
+    return short, candidate.reach() if short else 0.0, cost, (candidate.expected_seconds or 0.0) + loading
 
 
 def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, model: str) -> Answer:

@@ -21,7 +21,7 @@ class Measured(NamedTuple):
     """A model on one scene.
 
     ``points`` are the widths of its bounds that it reached [-], each with its time [s]; the time grows with a power of
-    the number of ``parts``, of the kind ``counted``.
+    the number of ``parts``, of the kind ``counted``. ``loading`` what it needs takes once [s].
     """
 
     scene: str
@@ -29,6 +29,7 @@ class Measured(NamedTuple):
     parts: int
     power: float
     points: list[tuple[float, float]]
+    loading: float = 0.0
 
 
 class Size(NamedTuple):

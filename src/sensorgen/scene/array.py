@@ -28,7 +28,13 @@ class ArrayParams(Envelope):
         return self.length_mm * self.width_mm / self.period_mm**2
 
     def refuse_wider(self, width_mm: float) -> None:
-        """Refuse structures that would run into each other."""
+        """Refuse structures that would run into each other, and a sensor without room for one cell."""
+        least = min(self.length_mm, self.width_mm)
+        if self.period_mm > least + 1e-9:
+            raise OutOfRange(
+                f"period_mm {self.period_mm:g} is more than the sensor's shorter side, {least:g} mm: the array has no "
+                "cell; expected at most that: shorten the period, or enlarge length_mm and width_mm"
+            )
         if width_mm > self.period_mm:
             raise OutOfRange(
                 f"a structure {width_mm:g} mm wide does not fit period_mm {self.period_mm:g}: expected at most that"
@@ -41,7 +47,7 @@ def array_scene(
     structure: Callable[[float, float, float], Sequence[Piece]],
     around: Callable[[float, float, float], Sequence[Piece]],
 ) -> Scene:
-    """Bodies of an array of whole cells in the middle of the sensor; of no cell in one shorter than a period.
+    """Bodies of an array of whole cells in the middle of the sensor.
 
     Parameters
     ----------

@@ -81,7 +81,7 @@ def repeat(regions: Sequence[Region], size_mm: Sequence[float], axis: int) -> Re
     near = at < at[0] + period + _SAME_MM
     mirrors = np.unique((((at[near][:, None] + at[near]) / 2)[kind[near][:, None] != kind[near]]).round(9))
     for mirror in mirrors.tolist():
-        if _is_mirrored(looks, axis, mirror, size_mm):
+        if are_mirrored([shapely.clip_by_rect(r, *_around(mirror, axis, size_mm)) for r in looks], axis, mirror):
             low = mirror % (period / 2)
             return Repeat.of(low, low + period / 2, False, whole)
     corners = np.unique(shapely.get_coordinates(looks)[:, axis] % period)  # no outline lies on the seam
@@ -93,7 +93,7 @@ def repeat(regions: Sequence[Region], size_mm: Sequence[float], axis: int) -> Re
 def widened(regions: Sequence[Region], size_mm: Sequence[float], axis: int, by_mm: float) -> Repeat:
     """All of some regions along an axis with what is beyond their ends; half of it where its middle is a mirror."""
     whole = size_mm[axis]
-    if _is_mirrored(regions, axis, whole / 2, size_mm):
+    if are_mirrored(regions, axis, whole / 2):
         return Repeat(whole / 2, whole + by_mm, False, np.array([whole / 2, whole + by_mm]), np.array([2.0]))
     return Repeat(-by_mm, whole + by_mm, False, np.array([-by_mm, whole + by_mm]), np.array([1.0]))
 
@@ -145,13 +145,36 @@ def _is_shifted(looks: Sequence[Region], axis: int, period: float, size_mm: Sequ
     )  # fmt: skip
 
 
-def _is_mirrored(looks: Sequence[Region], axis: int, at: float, size_mm: Sequence[float]) -> bool:
-    reach = min(at, size_mm[axis] - at)
-    low, high = [0.0, 0.0], list(size_mm[:2])
-    low[axis], high[axis] = at - reach, at + reach
+def halved(sides: tuple[Repeat, Repeat], regions: Sequence[Region]) -> tuple[Repeat, Repeat]:
+    """Half of a cell between mirrors, or a quarter, where its middle is a mirror too: the rest is its image.
+
+    Parameters
+    ----------
+    sides : (Repeat, Repeat)
+        Of the cell, along x and y.
+    regions : sequence of Region
+        All that lies in it.
+    """
+    found = list(sides)
+    for axis, side in enumerate(sides):
+        middle = (side.low_mm + side.high_mm) / 2
+        if len(side.shares) == 1 and not side.shifts and are_mirrored(regions, axis, middle):
+            found[axis] = Repeat(side.low_mm, middle, False, np.array([side.low_mm, middle]), 2 * side.shares)
+    return found[0], found[1]
+
+
+def are_mirrored(regions: Sequence[Region], axis: int, at_mm: float) -> bool:
+    """Whether each of some regions is its own mirror image at a place along an axis."""
     ways = (-1.0, 1.0) if axis == 0 else (1.0, -1.0)
-    near = [shapely.clip_by_rect(r, *low, *high) for r in looks]
-    return all(_are_same(scale(r, *ways, origin=(at, at)), r) for r in near)
+    return all(_are_same(scale(r, *ways, origin=(at_mm, at_mm)), r) for r in regions)
+
+
+def _around(at_mm: float, axis: int, size_mm: Sequence[float]) -> tuple[float, ...]:
+    """What of a plan lies as far to one side of a place as to the other: x and y, low and high [mm]."""
+    reach = min(at_mm, size_mm[axis] - at_mm)
+    low, high = [0.0, 0.0], list(size_mm[:2])
+    low[axis], high[axis] = at_mm - reach, at_mm + reach
+    return (*low, *high)
 
 
 def _are_same(one: Region, other: Region) -> bool:

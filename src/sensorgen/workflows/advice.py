@@ -23,7 +23,9 @@ NOT_TRIED = "other materials, shapes, real slicers; sensorgen optimise looks for
 Step = Callable[[str], None]
 
 
-def advise(design: Design, now: Trial, budget_s: float = BUDGET_S, step: Step = lambda _: None) -> Advice:
+def advise(
+    design: Design, now: Trial, budget_s: float = BUDGET_S, step: Step = lambda _: None, spent_s: float = 0.0
+) -> Advice:
     """The nearest changes that remove the errors of a design, then its warnings, and lose nothing that it senses.
 
     Changes are visited by distance (Dijkstra): each is checked, and predicted where fewer findings are left.
@@ -38,8 +40,10 @@ def advise(design: Design, now: Trial, budget_s: float = BUDGET_S, step: Step = 
         Processor time after which nothing more is tried [s].
     step : callable
         Called with what is tried next, for a progress display.
+    spent_s : float
+        Of the budget, by the prediction of the design itself [s].
     """
-    search = _Search(design, now, budget_s, step)
+    search = _Search(design, now, budget_s, step, time.process_time() - spent_s)
     search.run()
     return search.advice
 
@@ -52,12 +56,12 @@ class _Search:
     now: Trial
     budget_s: float
     step: Step
+    start_s: float = field(default_factory=time.process_time)
     kept: list[TriedChange] = field(default_factory=list, init=False)
     checked: int = field(default=0, init=False)
     predicted: int = field(default=0, init=False)
     reached: float = field(default=0.0, init=False)
     complete: bool = field(default=False, init=False)
-    start_s: float = field(default_factory=time.process_time, init=False)
 
     def run(self) -> None:
         """Visit designs until none is left, or the budget is used up."""

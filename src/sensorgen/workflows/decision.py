@@ -1,6 +1,7 @@
 """Whether to print a design: verdict, the numbers that decide, each finding once, and changes that were tried."""
 
 import json
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -126,6 +127,8 @@ class Advice:
             rows = ((f"{k}.", one.words()) for k, one in enumerate(self.tried, 1))
             yield f"changes that were tried, the smallest first (now {self.now}):"
             yield Facts(tuple(rows))
+        elif not self.checked and not self.complete:
+            yield "no change was tried: the design's own prediction took the budget; a second run reads it from disk"
         else:
             yield "no change was found that removes findings and keeps what the sensor senses"
         limit = "" if self.complete else f"; ended by the budget of {self.budget_s:g} s (--budget)"
@@ -221,7 +224,7 @@ def decision(
     held : Review
         Its findings.
     budget_s : float
-        Processor time for trying changes; at 0, advice that is stored is given [s].
+        Processor time for the prediction and for trying changes; at 0, advice that is stored is given [s].
     predict : bool
         Also predict drawing and print, without which no change is tried.
     folder : Path, optional
@@ -229,7 +232,7 @@ def decision(
     step : callable
         Called with the next step, for a progress display.
     """
-    findings, made, advice = tuple(held.findings), None, None
+    findings, made, advice, start_s = tuple(held.findings), None, None, time.process_time()
     reason = "" if predict else "checks alone (--budget 0)"
     if predict and held.meshes:
         step("prediction")
@@ -241,15 +244,20 @@ def decision(
         reason = made.reason if made.status == "not predicted" else ""
         findings = (*(f for f in made.findings if f.rule in _OF_PRINT and f not in findings), *findings)
         step("changes")
-        advice = advised(design, made, budget_s, step)
+        advice = advised(design, made, budget_s, step, time.process_time() - start_s)
     return Decision(
         design.name, design.id(), design.machine.name, design.layers.name, counts(findings), findings,
         verdict(findings), made, reason, advice,
     )  # fmt: skip
 
 
-def advised(design: Design, made: Trial, budget_s: float, step: Step = lambda _: None) -> Advice | None:
-    """Changes of a design with findings, tried now or before; None where nothing is to be changed, or nothing known."""
+def advised(
+    design: Design, made: Trial, budget_s: float, step: Step = lambda _: None, spent_s: float = 0.0
+) -> Advice | None:
+    """Changes of a design with findings, tried now or before; None where nothing is to be changed, or nothing known.
+
+    What its own prediction has ``spent_s`` counts as spent.
+    """
     if verdict([f for f in made.findings if f.rule != UNPREDICTED]) == "PRINT":
         return None
     digest = sha256(_adapter(Trial).dump_json(made)).hexdigest()
@@ -262,7 +270,9 @@ def advised(design: Design, made: Trial, budget_s: float, step: Step = lambda _:
         return None
     from sensorgen.workflows.advice import advise
 
-    advice = advise(design, made, budget_s, step)
+    advice = advise(design, made, budget_s, step, spent_s)
+    if not advice.checked:
+        return advice
     answers.keep(question, json.loads(_adapter(Advice).dump_json(advice)))
     return advice
 

@@ -6,6 +6,7 @@ floats: its potential is the one at which its net charge is zero, for each bound
 """
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -25,6 +26,7 @@ _BALANCE = 1e-8  # relative: by which energy and the charges of both electrodes 
 _SAME_MM = 1e-9
 _FAR = 1e9  # beyond all lines
 _SET = 0.01
+_MANY = 100_000  # unknowns from which threads are used: on fewer they wait, at ten times the processor time
 MITRE = 2.0  # of lines beside outlines, in their distance
 
 
@@ -502,7 +504,7 @@ def balanced(form: Any, part: Any, conductors: Sequence[str]) -> tuple[float, An
 
     space = form.space
     free = space.FreeDofs(True)
-    with ng.TaskManager():
+    with ng.TaskManager() if free.NumSet() > _MANY else nullcontext():
         form.Assemble()
         inverse = form.mat.Inverse(free, "sparsecholesky")  # slivers take CG with BDDC a thousand iterations
         found = indicators(space, part, conductors)[TOP:]

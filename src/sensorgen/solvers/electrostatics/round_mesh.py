@@ -96,7 +96,8 @@ def mesh_of(cell: Cell, order: int, layers: int, closed: float) -> RoundMesh:
     sizes += [size for touch, gap in cusps for size in touch.sizes(cell, gap, _CUSP)]
     growth = 0.5
     for _ in range(_TRIES):
-        wanted = MeshingParameters(maxh=longest, grading=growth)
+        # Threads that wait for each other would take ten times the processor time
+        wanted = MeshingParameters(maxh=longest, grading=growth, parallel_meshing=False, nthreads=1)
         for size in sizes:
             wanted.RestrictH(*size)
         try:
