@@ -5,13 +5,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
-import numpy as np
-import shapely
+from sensorgen.scene.scene import SLIVER_MM, Body, Outline, Piece, Prism, Scene, area_mm2, rectangle, seen_from_above
 
-from sensorgen.core.arrays import Real
-from sensorgen.scene.layers import EMPTY, Region
-from sensorgen.scene.scene import SLIVER_MM, Body, Piece, Scene, area_mm2, seen_from_above
+if TYPE_CHECKING:  # a stored answer loads no numbers
+    import shapely
+
+    from sensorgen.core.arrays import Real
+    from sensorgen.scene.layers import Region
 
 CUTS = 8  # slabs of a body that is slanted or curved in elevation
 _COVERS = 0.99  # of the plan: between round beads there may be holes
@@ -31,8 +33,8 @@ class Slab:
 
     low_mm: float
     high_mm: float
-    inner: dict[Body, Region]
-    outer: dict[Body, Region]
+    inner: "dict[Body, Region]"
+    outer: "dict[Body, Region]"
 
 
 @lru_cache(maxsize=8)
@@ -41,6 +43,9 @@ def slabs(scene: Scene, cuts: int = CUTS) -> tuple[Slab, ...]:
 
     Curved faces are those of the bodies' meshes, chords within 0.01 mm.
     """
+    import numpy as np
+    import shapely
+
     upright, slanted = list[tuple[Body, Piece]](), list[tuple[Body, Piece]]()
     for body, piece in ((b, p) for b in scene.bodies for p in b.pieces):
         (upright if piece.is_constant("z") else slanted).append((body, piece))
@@ -52,7 +57,7 @@ def slabs(scene: Scene, cuts: int = CUTS) -> tuple[Slab, ...]:
     faces = [_faces(piece) for _, piece in slanted]
     found = []
     for low, high in pairwise(levels.tolist()):
-        inner, outer = defaultdict[Body, list[Region]](list), defaultdict[Body, list[Region]](list)
+        inner, outer = defaultdict[Body, "list[Region]"](list), defaultdict[Body, "list[Region]"](list)
         for body, piece in upright:
             if piece.span("z")[0] < (low + high) / 2 < piece.span("z")[1]:
                 inner[body].append(shapely.Polygon(seen_from_above(piece)))
@@ -70,11 +75,18 @@ def slabs(scene: Scene, cuts: int = CUTS) -> tuple[Slab, ...]:
 def covered(scene: Scene, terminal: str) -> bool:
     """Whether an electrode covers the whole plan of a scene, seen from above."""
     whole = _COVERS * scene.size_mm[0] * scene.size_mm[1]
-    upright = (p for b in scene.bodies if b.terminal == terminal for p in b.pieces if p.is_constant("z"))
-    if any(abs(area_mm2(seen_from_above(piece))) >= whole for piece in upright):
+    prisms = [p for b in scene.bodies if b.terminal == terminal for p in b.pieces if isinstance(p, Prism)]
+    if any(abs(area_mm2(_from_above(prism))) >= whole for prism in prisms):
         return True
+    import shapely
+
     own = [region for slab in slabs(scene) for body, region in slab.outer.items() if body.terminal == terminal]
     return bool(shapely.union_all(own).area >= whole)
+
+
+def _from_above(prism: Prism) -> Outline:
+    """Its shadow in plan: a rectangle where it lies."""
+    return prism.outline if prism.axis == "z" else rectangle(*prism.span("x"), *prism.span("y"))
 
 
 def is_open(scene: Scene) -> bool:
@@ -83,16 +95,22 @@ def is_open(scene: Scene) -> bool:
     return not all(covered(scene, end) for end in sorted(ends))
 
 
-def _faces(piece: Piece) -> Real:
+def _faces(piece: Piece) -> "Real":
     """Triangles of its surface (n, 3, 3) [mm]."""
+    import numpy as np
+
     from sensorgen.scene.geometry.meshes import mesh
 
     made = mesh(Body("", "", (piece,)))
     return np.asarray(made.vertices_mm[made.triangles], float)
 
 
-def _between(piece: Piece, faces: Real, low_mm: float, high_mm: float) -> tuple[Region, Region]:
+def _between(piece: Piece, faces: "Real", low_mm: float, high_mm: float) -> "tuple[Region, Region]":
     """What a piece covers at all heights between two, and at any: its surface in between decides where they differ."""
+    import shapely
+
+    from sensorgen.scene.layers import EMPTY
+
     ends = [
         shapely.union_all([shapely.Polygon(outline) for outline in piece.cut("z", at)])
         for at in (low_mm + SLIVER_MM, high_mm - SLIVER_MM)
@@ -103,8 +121,10 @@ def _between(piece: Piece, faces: Real, low_mm: float, high_mm: float) -> tuple[
     return inner, shapely.union_all([*ends, surface])
 
 
-def _projected(faces: Real, low_mm: float, high_mm: float) -> Iterator[shapely.Polygon]:
+def _projected(faces: "Real", low_mm: float, high_mm: float) -> "Iterator[shapely.Polygon]":
     """The parts of triangles between two heights, seen from above."""
+    import shapely
+
     for triangle in faces.tolist():
         corners = triangle
         for sign, level in ((1.0, low_mm), (-1.0, high_mm)):
