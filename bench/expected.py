@@ -82,7 +82,8 @@ def anew() -> Iterator[str]:
     """The file with points and parts as measured now, its comment and its choices as they are."""
     yield from (line for line in FILE.read_text("utf-8").splitlines() if line.startswith("#"))
     for model, entry in expectations.measured().items():
-        scene = cells.STANDARD[entry.scene]().scene
+        name, film = entry.scene.removesuffix(" mm").split(", ")
+        scene = shape(name, dielectric_mm=float(film))
         yield f"{model}:\n  scene: {entry.scene}\n  counted: {entry.counted}"
         yield f"  parts: {expectations.COUNTED[entry.counted](scene).parts}\n  power: {entry.power}"
         yield from (f"  loading: {entry.loading}",) if entry.loading else ()

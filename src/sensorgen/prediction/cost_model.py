@@ -114,4 +114,5 @@ COUNTED: dict[str, Callable[[Scene], Size]] = {
     "bands": _bands,
     "pieces": lambda scene: _bands(scene)._replace(is_cut=False),  # of a cell that is pressed by itself
     "boxes": _boxes,
+    "cells": lambda _: Size(1, is_cut=False),  # a round one
 }
