@@ -158,6 +158,12 @@ def test_what_is_held_back_is_for_another_to_keep():
     assert new == []
 
 
+def test_where_nothing_is_kept_each_answer_is_worked_out_anew():
+    with cached.nothing_kept():
+        assert [cached.answer(QUESTION, lambda n=n: n) for n in (3, 4)] == [3, 4]
+    assert entries() == []
+
+
 def test_where_only_what_is_known_counts_nothing_is_worked_out():
     with pytest.raises(cached.Unknown), cached.only_known():
         cached.answer(QUESTION, never)

@@ -106,5 +106,7 @@ def test_the_quality_decides_which_faces_are_off_the_grid():
 def test_every_rule_has_a_name_that_a_target_may_refuse():
     """Rules are names such as 2-film in the source; RULES lists them all."""
     source = Path(checks.__file__).parents[1]
-    written = {name for file in source.rglob("*.py") for name in re.findall(r'"(\d+-[a-z-]+)"', file.read_text())}
+    written = {
+        name for file in source.rglob("*.py") for name in re.findall(r'"(\d+-[a-z-]+)"', file.read_text("utf-8"))
+    }
     assert written == set(checks.RULES)

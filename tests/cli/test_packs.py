@@ -412,7 +412,7 @@ PLANTED = [
     ("material", "low: 0.05, high: 0.5", "low: 0.5, high: 0.05",
      "read: it.yaml, line 12: resistivity_ohm_m of it-sheet has low 0.5 above high 0.05"),
     ("material", "{value: 0.1,", "{value: 0.9,", "line 12: .* is 0.9, outside its own range of 0.05 to 0.5"),
-    ("material", "value: 220.0", "value: 280.0", "line 23: nozzle_temperature_c of .* outside its own range of 210"),
+    ("material", "value: 220.0", "value: 2200.0", "line 23: nozzle_temperature_c of .* is 2200; expected 20 to 600"),
     ("material", "20.0e6", "20.0", r"line 16: youngs_modulus_pa of it-sheet is 20; .*1 MPa is 1.0e6 Pa.*implausible"),
     ("material", "20.0e6", "6.0e12", r"line 16: youngs_modulus_pa of it-sheet is 6e\+12; expected 100 to 2e\+12"),
     ("material", "value: 5.0,", "value: 0.5,", "line 14: relative_permittivity of it-sheet is 0.5; expected 1 to"),

@@ -5,7 +5,8 @@ a new version of either asks anew. Deleting the folder costs time only.
 """
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, MutableSequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
@@ -33,7 +34,7 @@ _SOURCES = (
 
 JSON = Any  # None, bool, int, float, str, and lists and string-keyed dicts of these
 
-_HELD_BACK: ContextVar[list[tuple[Mapping[str, JSON], JSON]] | None] = ContextVar("_HELD_BACK", default=None)
+_HELD_BACK: ContextVar[MutableSequence[tuple[Mapping[str, JSON], JSON]] | None] = ContextVar("_HELD_BACK", default=None)
 _ONLY_KNOWN: ContextVar[bool] = ContextVar("_ONLY_KNOWN", default=False)
 
 
@@ -86,6 +87,16 @@ def held_back() -> Iterator[list[tuple[Mapping[str, JSON], JSON]]]:
     before = _HELD_BACK.set(entries)
     try:
         yield entries
+    finally:
+        _HELD_BACK.reset(before)
+
+
+@contextmanager
+def nothing_kept() -> Iterator[None]:
+    """Within it no answer is kept, so that each is worked out anew."""
+    before = _HELD_BACK.set(deque(maxlen=0))
+    try:
+        yield
     finally:
         _HELD_BACK.reset(before)
 

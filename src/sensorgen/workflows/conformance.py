@@ -346,7 +346,8 @@ def _source(file: File) -> Faults:
     made = materials.own_source(file.name, file.text())
     for name, values in made.materials.items():
         for quantity, value in values.items():
-            if wrong := materials.fault(quantity, materials.Value(source=file.name, **dict(value))):
+            given, advised = materials.Value(source=file.name, **dict(value)), quantity in materials.print_quantities()
+            if wrong := materials.fault(quantity, given, advised=advised):
                 yield "value", f"{quantity} of {name} {wrong}", "correct the number or its unit"
 
 

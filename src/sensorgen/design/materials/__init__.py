@@ -249,7 +249,7 @@ def own_source(source: str, text: str | None = None, texts: Texts = NO_TEXTS) ->
         for name, values in made.materials.items():
             _check_values(name, {key: value.value for key, value in values.items()}, texts)
             for quantity, value in values.items():
-                if wrong := disorder(value):
+                if wrong := disorder(value, advised=quantity in print_quantities()):
                     raise OutOfRange(f"{quantity} of {name} {wrong}")
     except (BadInput, UnknownName, OutOfRange) as error:
         raise error.within(f"{source}.yaml") from None
@@ -308,7 +308,7 @@ def parse(name: str, text: str) -> Material:
     for group, values in (("properties", made.properties), ("print", made.print)):
         for quantity, several in values.items():
             for k, each in enumerate(several):
-                if wrong := fault(quantity, each):
+                if wrong := fault(quantity, each, advised=group == "print"):
                     line = yamlfile.line(text, (group, quantity, k))
                     raise OutOfRange(f"{file}, line {line}: {quantity} of {each.source} {wrong}")
             if sum(each.default for each in several) > 1:
@@ -316,12 +316,12 @@ def parse(name: str, text: str) -> Material:
     return made
 
 
-def fault(quantity: str, given: Value) -> str:
-    """What is wrong with a value of a material's file, or ""."""
+def fault(quantity: str, given: Value, *, advised: bool = False) -> str:
+    """What is wrong with a value of a material's file, or ""; its range may be ``advised``, as of printing."""
     low, high = _RANGES.get(quantity, (0.0, inf))
     if not low <= given.value <= high or (isinf(given.value) and given.default):
         return f"is {given.value:g}; expected {_said(low, high, 'a number from 0 on')}"
-    if wrong := disorder(given):
+    if wrong := disorder(given, advised=advised):
         return wrong
     low, high = _PLAUSIBLE.get(quantity, (-inf, inf))
     for number in (given.value, given.low, given.high):
@@ -332,12 +332,12 @@ def fault(quantity: str, given: Value) -> str:
     return ""
 
 
-def disorder(given: Value | OwnValue) -> str:
-    """What is wrong with the ends of a value's range, or ""."""
+def disorder(given: Value | OwnValue, *, advised: bool = False) -> str:
+    """What is wrong with the ends of a value's range, or ""; advice need not be followed."""
     low, high = (-inf if given.low is None else given.low), (inf if given.high is None else given.high)
     if not low <= high:
         return f"has low {low:g} above high {high:g}; exchange them"
-    if not low <= given.value <= high:
+    if not advised and not low <= given.value <= high:
         return f"is {given.value:g}, outside its own range of {low:g} to {high:g}; correct one of them"
     return ""
 

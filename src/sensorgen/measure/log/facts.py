@@ -8,7 +8,6 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput
-from sensorgen.core.records import problem
 from sensorgen.core.units import si
 
 if TYPE_CHECKING:
@@ -133,6 +132,8 @@ def from_json(text: str) -> Facts:
         Not the JSON that :func:`to_json` writes.
     """
     from pydantic import ValidationError
+
+    from sensorgen.core.records import problem
 
     try:
         facts: Facts = _adapter().validate_json(text)

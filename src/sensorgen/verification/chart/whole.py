@@ -68,7 +68,7 @@ def points(name: str, budget_s: float) -> list[Point]:
 def nothing_stored() -> Iterator[None]:
     """Within it, no prediction is read from what was stored, and none is kept."""
     before = os.environ.get(cache.PLACE)
-    with tempfile.TemporaryDirectory() as folder, cache.held_back():
+    with tempfile.TemporaryDirectory() as folder, cache.nothing_kept():
         os.environ[cache.PLACE] = folder
         try:
             yield
