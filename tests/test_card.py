@@ -435,7 +435,7 @@ def test_it_goes_to_json_and_back():
 
 def test_it_needs_neither_scipy_nor_matplotlib():
     program = "import sys, sensorgen.prediction.identifiability; print({'scipy', 'matplotlib'} & set(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, encoding="utf-8", check=True)
     assert done.stdout.strip() == "set()"
 
 

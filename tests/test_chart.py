@@ -549,7 +549,7 @@ def test_the_page_in_a_browser(measured, tmp_path):
             "--virtual-time-budget=10000", f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom",
             (tmp_path / "page.html").as_uri(),
         ],
-        capture_output=True, text=True, timeout=300, env={**os.environ, "HOME": str(tmp_path)},
+        capture_output=True, encoding="utf-8", timeout=300, env={**os.environ, "HOME": str(tmp_path)},
     )  # fmt: skip
     found = re.search('<pre id="probe">(.*?)</pre>', done.stdout, re.DOTALL)
     assert found, done.stderr[-2000:]

@@ -70,7 +70,7 @@ def test_a_new_version_of_sensorgen_changes_no_id():
         "import sensorgen.core.version as v; v.__version__ = '99.0'; from sensorgen.design.design import make; "
         "print(make({'shape': 'tri'}).id())"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, encoding="utf-8", check=True)
     assert done.stdout.strip() == tri().id()
 
 

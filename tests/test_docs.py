@@ -90,7 +90,7 @@ def test_every_command_of_the_pages_works(words, tmp_path, program, kept, monkey
         specimen_on_a_bench(words[0], tmp_path)
     extra = ["--no-cad"] if words[0] == "build" else []
     done = subprocess.run(
-        [sys.executable, "-m", "sensorgen", *words, *extra], cwd=tmp_path, capture_output=True, text=True
+        [sys.executable, "-m", "sensorgen", *words, *extra], cwd=tmp_path, capture_output=True, encoding="utf-8"
     )
     finds_faults = words[0] in ("build", "check", "slice", "batch")  # and says so by its exit code
     assert done.returncode in ({0, 1} if finds_faults else {0}), done.stderr

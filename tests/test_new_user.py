@@ -39,7 +39,7 @@ def sensorgen(site, tmp_path):
     def run(*words, code=0):
         command = [sys.executable, "-m", "sensorgen", *map(str, words)]
         done = subprocess.run(
-            command, cwd=tmp_path / "work", env=os.environ | home, capture_output=True, text=True, check=False
+            command, cwd=tmp_path / "work", env=os.environ | home, capture_output=True, encoding="utf-8", check=False
         )
         assert done.returncode == code, f"{words}: {done.stdout}{done.stderr}"
         assert "Traceback" not in done.stderr

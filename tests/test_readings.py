@@ -204,7 +204,7 @@ def test_files_that_cannot_be_read(tmp_path):
 def test_a_block_of_the_standard_input_is_what_has_come(monkeypatch):
     reader, writer = os.pipe()
     with os.fdopen(reader, "rb") as end, os.fdopen(writer, "wb", buffering=0) as pipe:
-        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(end))
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(end, encoding="utf-8"))
         pipe.write(b"\xef\xbb\xbf" + (HEAD + ROW).encode())
         with readings("-") as source:
             blocks = source.blocks()

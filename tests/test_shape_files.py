@@ -192,7 +192,7 @@ def test_its_process_ends_with_this_one():
         "import sys; from sensorgen.design import shape_files\n"
         "p = shape_files._process('zig', sys.argv[1]); print(p._process.pid, flush=True); p._process.wait()"
     )
-    parent = subprocess.Popen([sys.executable, "-c", code, TEMPLATE], stdout=subprocess.PIPE, text=True)
+    parent = subprocess.Popen([sys.executable, "-c", code, TEMPLATE], stdout=subprocess.PIPE, encoding="utf-8")
     child = int(parent.stdout.readline())
     os.kill(child, 0)
     parent.send_signal(signal.SIGKILL)
@@ -201,7 +201,7 @@ def test_its_process_ends_with_this_one():
     while True:  # ends when the system has ended it; the suite's own time limit is the other way out
         try:
             os.kill(child, 0)
-            if Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()[0] == "Z":
+            if Path(f"/proc/{child}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] == "Z":
                 break
         except (ProcessLookupError, FileNotFoundError):
             break

@@ -21,7 +21,7 @@ def built(tmp_path):
     def build(page):
         (tmp_path / "docs" / "index.md").write_text(page, "utf-8")
         command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-c", "docs", ".", "site"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, encoding="utf-8")
         return done, tmp_path / "site" / "docs" / "index.html"
 
     return build

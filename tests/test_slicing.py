@@ -199,7 +199,7 @@ def assert_gone(process):
     state = Path(f"/proc/{process}/stat")
     for _ in range(500):
         try:
-            if state.read_text().rpartition(")")[2].split()[0] == "Z":
+            if state.read_text(encoding="utf-8").rpartition(")")[2].split()[0] == "Z":
                 return
         except OSError:
             return

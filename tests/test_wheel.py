@@ -25,7 +25,7 @@ def test_the_wheel_works_without_the_repository(tmp_path):
         "from sensorgen.cli import main; "
         "sys.argv = ['sensorgen', 'build', 'tri', '--length', '6', '--no-cad', '--force']; main()"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, encoding="utf-8")
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "out" / "trix-d0.2-length6" / "manifest.json").exists()
 

@@ -141,7 +141,7 @@ def work(kind, numbers, seed, folder, results):
         results.put((number, *outcome(read, file)))
         file.unlink()
     status = Path("/proc/self/status")  # getrusage counts the parent's memory too
-    peak = int(re.search(r"VmHWM:\s+(\d+)", status.read_text())[1]) >> 10 if status.exists() else 0
+    peak = int(re.search(r"VmHWM:\s+(\d+)", status.read_text(encoding="utf-8"))[1]) >> 10 if status.exists() else 0
     results.put((-1, "peak", str(peak)))
 
 

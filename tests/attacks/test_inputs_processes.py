@@ -43,7 +43,7 @@ def waiting(condition, seconds=20.0):
 def state(pid):
     """State and parent of a process; none where it has ended."""
     try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
         return fields[0], int(fields[1])
     except OSError:
         return "", 0

@@ -29,7 +29,7 @@ def test_killed_at_calls_inside_commits(tmp_path):
     shim = tmp_path / "fault.so"
     subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", shim, HERE / "fault.c", "-ldl"], check=True)
     done = subprocess.run(
-        [sys.executable, HERE / "commit_kills.py", tmp_path, str(EVERY)], capture_output=True, text=True,
+        [sys.executable, HERE / "commit_kills.py", tmp_path, str(EVERY)], capture_output=True, encoding="utf-8",
         env={**os.environ, "LD_PRELOAD": str(shim)},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

@@ -170,7 +170,7 @@ def test_the_order_does_not_hang_on_pythons_own_hashes():
         subprocess.run(
             [sys.executable, "-c", code],
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             check=True,
             env={**os.environ, "PYTHONHASHSEED": seed},
         ).stdout

@@ -66,7 +66,7 @@ def start(tmp_path):
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            text=True,
+            encoding="utf-8",
             cwd=cwd,
             env={**os.environ, "COLUMNS": "80", **environment},
         )
@@ -95,7 +95,7 @@ def disk(tmp_path):
         place = tmp_path / "disk"
         place.mkdir()
         done = subprocess.run(
-            ["mount", "-t", "tmpfs", "-o", f"size={size}", "none", place], capture_output=True, text=True
+            ["mount", "-t", "tmpfs", "-o", f"size={size}", "none", place], capture_output=True, encoding="utf-8"
         )
         if done.returncode:
             pytest.skip(f"cannot mount a small disk here: {done.stderr.strip()}")

@@ -31,7 +31,7 @@ def test_a_batch_and_its_verification(run, plan):
     assert max(map(len, said.out.splitlines())) <= 120
     said = run("batch", "verify", "out/plan")
     assert (said.code, said.out, said.err) == (0, "as recorded\n", "")
-    Path("out/plan/plate.svg").write_text("other")
+    Path("out/plan/plate.svg").write_text("other", encoding="utf-8")
     Path("out/plan/plan.yaml").unlink()
     said = run("batch", "verify", "out/plan")
     assert said.code == 1
@@ -61,7 +61,7 @@ def test_json(run, plan):
     ],
 )
 def test_wrong_words(run, plan, words, said):
-    Path("empty.yaml").write_text("")
+    Path("empty.yaml").write_text("", encoding="utf-8")
     found = run(*words)
     assert found.code == 2
     assert said.casefold() in (found.out + found.err).casefold()
@@ -69,7 +69,9 @@ def test_wrong_words(run, plan, words, said):
 
 
 def test_findings_of_severity_error_stop_it(run, plan):
-    Path("short.yaml").write_text("iteration: 26\ndesigns: [{shape: tri, parameters: {dielectric_mm: 0}}]\n")
+    Path("short.yaml").write_text(
+        "iteration: 26\ndesigns: [{shape: tri, parameters: {dielectric_mm: 0}}]\n", encoding="utf-8"
+    )
     said = run("batch", "short.yaml", "--no-gcode")
     assert said.code == 1
     assert "1-short" in said.out

@@ -133,7 +133,9 @@ def test_a_stream_is_answered_row_by_row(run, tmp_path, monkeypatch):
     import io
     import sys
 
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"re_ohm_1kHz,im_ohm_1kHz\n5,1\n,\n5,1\n")))
+    monkeypatch.setattr(
+        sys, "stdin", io.TextIOWrapper(io.BytesIO(b"re_ohm_1kHz,im_ohm_1kHz\n5,1\n,\n5,1\n"), encoding="utf-8")
+    )
     said = run("bench", "live", "-", "--rate", "140")
     assert (said.code, said.out) == (0, "re_ohm_1kHz,im_ohm_1kHz\n5,1\n,\n5,1\n")
     assert "a cut-off of 80 Hz at 140 samples/s" in run("bench", "live", "-", "--rate", "140", "--cutoff", "80").line

@@ -280,7 +280,7 @@ def test_a_point_at_which_a_model_fails_leaves_the_others(run, monkeypatch):
 def test_a_file_is_written_whole(run, contents, tmp_path):
     assert run("cell", "reference", "--json", "-o", "answer.json").out == "answer.json\n"
     assert list(contents(tmp_path)) == ["answer.json"]
-    assert json.loads(Path("answer.json").read_text())["model"] == "columns"
+    assert json.loads(Path("answer.json").read_text(encoding="utf-8"))["model"] == "columns"
 
 
 def test_ctrl_c_leaves_nothing_half_written(start, contents, tmp_path):
@@ -319,7 +319,7 @@ def alive(pid):
 
 def stat(pid):
     try:
-        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+        lines = Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines()
     except OSError:
         return {}
     return {key: value.strip() for key, _, value in (line.partition(":") for line in lines)}

@@ -87,7 +87,7 @@ def test_version(run):
 
 def test_python_dash_m(tmp_path):
     done = subprocess.run(
-        [sys.executable, "-m", "sensorgen", "--version"], capture_output=True, text=True, cwd=tmp_path
+        [sys.executable, "-m", "sensorgen", "--version"], capture_output=True, encoding="utf-8", cwd=tmp_path
     )
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -204,7 +204,7 @@ def complete(tmp_path):
     def words(*typed):
         done = subprocess.run(
             [bash, "-c", COMPLETE, "complete", "sensorgen", *typed],
-            capture_output=True, text=True, cwd=tmp_path, env={"PATH": f"{tmp_path}:/usr/bin:/bin"},
+            capture_output=True, encoding="utf-8", cwd=tmp_path, env={"PATH": f"{tmp_path}:/usr/bin:/bin"},
         )  # fmt: skip
         assert done.stderr == ""
         return set(done.stdout.split())
@@ -234,7 +234,7 @@ def test_bash_completes(complete, typed, offered):
 @pytest.mark.parametrize("words", [[], ["build"], ["build", "tri"], ["build", "rect"], ["completion"], ["list"]])
 def test_no_mark_of_the_help_formatter_is_seen(words):
     done = subprocess.run(
-        [sys.executable, "-m", "sensorgen", *words, "--help"], capture_output=True, text=True, check=True
+        [sys.executable, "-m", "sensorgen", *words, "--help"], capture_output=True, encoding="utf-8", check=True
     )
     assert "\b" not in done.stdout
     assert "\\b" not in done.stdout

@@ -166,7 +166,7 @@ def test_bodies_that_overlap_are_refused_with_place_and_picture(run, models):
     assert "overlap by 5 mm3, 0.0971 mm deep" in said.words
     assert "x 10, y 4.5, z 0.65 mm" in said.line
     assert [path.name for path in Path().iterdir()] == ["colliding-faults.svg"]
-    text = Path("colliding-faults.svg").read_text()
+    text = Path("colliding-faults.svg").read_text(encoding="utf-8")
     assert text.count("<circle") == 3
     assert "from above" in text
 
@@ -318,12 +318,14 @@ def test_a_replaced_design_leaves_no_bodies_behind(run, plates):
     words = ["--unit", "mm", "--name", "a", *PLATES]
     assert run("import", *plates(), *words).code == 0
     (first,) = Path().glob("*.bodies.json")
-    Path("other-12345678.bodies.json").write_text("{}")
+    Path("other-12345678.bodies.json").write_text("{}", encoding="utf-8")
     assert run("import", *plates(film=(0.4, 0.61), up=(0.61, 1.0)), *words, "--force").code == 0
     (second,) = (path for path in Path().glob("a-*.bodies.json"))
     assert second != first
     assert Path("other-12345678.bodies.json").exists()
-    Path("copy.yaml").write_text(Path("a.yaml").read_text())  # which needs the same bodies
+    Path("copy.yaml").write_text(
+        Path("a.yaml").read_text(encoding="utf-8"), encoding="utf-8"
+    )  # which needs the same bodies
     assert run("import", *plates(), *words, "--force").code == 0
     assert second.exists()
     assert load(Path("copy.yaml")).shape == "imported"
@@ -338,7 +340,7 @@ def test_materials_of_a_pack_beside_the_design_are_suggested_and_taken(run, plat
     assert [body["material"] for body in listed] == ["eel", "x60", "eel"]
     said = run("import", *files, "--unit", "mm", "--name", "own", "--map", "film=x60@1", "--map", "*=eel@2")
     assert (said.code, said.err) == (0, "")
-    Path("a.gcode").write_text("G90\nM83\n")
+    Path("a.gcode").write_text("G90\nM83\n", encoding="utf-8")
     assert run("gcode", "check", "a.gcode", "--material", "2=eel").code != WRONG_INPUT
     assert "unknown material 'eal'; did you mean 'eel'?" in run("gcode", "check", "a.gcode", "--material", "2=eal").line
 
@@ -406,7 +408,7 @@ ELLIPSE = (
 def test_a_sensor_cut_to_an_outline_is_sliced_and_predicted(run, program):
     """The skirt follows the outline into the corners of its box, which is no collision."""
     program("prusa-slicer", "prusa-slicer")
-    Path("oval.svg").write_text(ELLIPSE)
+    Path("oval.svg").write_text(ELLIPSE, encoding="utf-8")
     words = ("reference", "--border", "oval.svg", "--name", "oval")
     sliced = run("slice", *words)
     assert (sliced.code, sliced.err) == (0, "")

@@ -188,7 +188,7 @@ LIVE = (
 def test_a_pipe_is_answered_line_by_line(tmp_path):
     head, *rows = table().splitlines(keepends=True)
     process = subprocess.Popen(
-        [sys.executable, "-c", LIVE, "invert", *DESIGN, "-"], cwd=tmp_path, text=True, bufsize=1,
+        [sys.executable, "-c", LIVE, "invert", *DESIGN, "-"], cwd=tmp_path, encoding="utf-8", bufsize=1,
         env={k: v for k, v in os.environ.items() if k != "PYTHONUNBUFFERED"},
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip

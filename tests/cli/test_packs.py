@@ -59,7 +59,7 @@ def test_from_an_empty_folder_to_files_for_a_print(run, unpressed):
         assert run("new", *words).code == 0
     assert run("pack", "test", ".").out == ".: 4 files, no findings\n"
     assert run("check", "my.yaml").out.startswith("PRINT  my: no findings")
-    Path("my.yaml").write_text(DESIGN)
+    Path("my.yaml").write_text(DESIGN, encoding="utf-8")
     assert run("check", "my.yaml").code == 0
     said = run("predict", "my.yaml", "--json")
     values = {(v["material"], v["quantity"]): v for v in json.loads(said.out)["values"]}
@@ -67,7 +67,7 @@ def test_from_an_empty_folder_to_files_for_a_print(run, unpressed):
     assert run("build", "my.yaml", "--no-cad").code == 0
     assert materials.citations()["eel-sheet"].startswith("example numbers")
     assert {"my.prusa.3mf", "prediction.json", "design.json"} <= {file.name for file in Path("out/my").iterdir()}
-    assert "eel" in Path("out/my/design.json").read_text()
+    assert "eel" in Path("out/my/design.json").read_text(encoding="utf-8")
 
 
 def test_by_options_alone(run):
@@ -115,7 +115,7 @@ def test_what_is_wrong_is_said_in_one_line(run, words, expected):
 def test_from_another_folder(run, unpressed):
     """What is beside the design is not beside the working folder."""
     put(Path("sub"), "material", "eel"), put(Path("sub"), "shape", "zig"), put(Path("sub"), "printer", "mine")
-    Path("sub/my.yaml").write_text(DESIGN)
+    Path("sub/my.yaml").write_text(DESIGN, encoding="utf-8")
     for words in (["check"], ["predict", "--drawn"], ["build", "--no-cad"], ["draw", "-o", "d.svg"]):
         said = run(words[0], "sub/my.yaml", *words[1:])
         assert (said.code, said.err) == (0, ""), words
@@ -123,9 +123,9 @@ def test_from_another_folder(run, unpressed):
 
 def test_an_existing_file_stays(run):
     run("new", "material", "eel")
-    Path("materials/eel.yaml").write_text("mine")
+    Path("materials/eel.yaml").write_text("mine", encoding="utf-8")
     assert run("new", "material", "eel").line.startswith("sensorgen: 'materials/eel.yaml' exists; choose another name")
-    assert Path("materials/eel.yaml").read_text() == "mine"
+    assert Path("materials/eel.yaml").read_text(encoding="utf-8") == "mine"
 
 
 def test_a_parameter_with_the_name_of_an_option(run, recwarn, unpressed):
@@ -159,7 +159,7 @@ def test_where_each_comes_from(run, here, monkeypatch, tmp_path_factory):
 
 def test_one_damaged_file_does_not_hide_the_others(run):
     run("new", "material", "eel")
-    Path("materials/bad.yaml").write_text("title: [")
+    Path("materials/bad.yaml").write_text("title: [", encoding="utf-8")
     said = run("list", "materials")
     assert said.code == 0
     assert "bad cannot be used: bad.yaml: line" in said.words
@@ -289,7 +289,7 @@ def test_designs_of_a_batch_have_the_files_beside_them(here):
     "own", ["{shapes: {zig: 5}}", "{shapes: [zig]}", "5", "{forms: {zig: a}}", "{shapes: {zig: ''}}"]
 )
 def test_what_a_design_brings_is_checked(run, own):
-    Path("d.yaml").write_text(f"shape: zig\nown: {own}\n")
+    Path("d.yaml").write_text(f"shape: zig\nown: {own}\n", encoding="utf-8")
     said = run("check", "d.yaml")
     assert said.code == 2
     assert said.line
@@ -512,7 +512,9 @@ def test_planted_faults_of_instruments(run, old, new, rule):
     run("new", "instrument", "m-100")
     file = Path("instruments/m-100.yaml")
     assert run("pack", "test", str(file)).code == 0
-    file.write_text(file.read_text().replace(old, new).replace("leads_ohm: 0.2", "leads_ohm: 0.0"))
+    file.write_text(
+        file.read_text(encoding="utf-8").replace(old, new).replace("leads_ohm: 0.2", "leads_ohm: 0.0"), encoding="utf-8"
+    )
     said = run("pack", "test", str(file), "--json")
     assert (said.code, json.loads(said.out)["findings"][0]["rule"]) == (1, rule)
 

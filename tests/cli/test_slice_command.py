@@ -111,7 +111,7 @@ def test_asked_to_end_it_ends_the_slicer_too(start, slicer, tmp_path, number, co
 def lives(number):
     """Whether a process runs; one that ended may stand in the table until init has read how."""
     try:
-        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+        return Path(f"/proc/{number}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
     except (FileNotFoundError, ProcessLookupError):
         return False
 

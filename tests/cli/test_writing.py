@@ -176,10 +176,10 @@ def test_drawing_to_what_is_no_file(run, tmp_path, place):
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 def test_output_to_a_full_disk(tmp_path, start):
-    with Path("/dev/full").open("w") as full:
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
         process = start("list", "materials")
         process.communicate()
-        done = subprocess.run([*process.args], stdout=full, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
+        done = subprocess.run([*process.args], stdout=full, stderr=subprocess.PIPE, encoding="utf-8", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (2, "sensorgen: cannot write the output: No space left on device\n")
 
 

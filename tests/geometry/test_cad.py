@@ -47,7 +47,9 @@ def pretend(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], 
 
 
 def fresh(code: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, encoding="utf-8", check=False
+    )
 
 
 def gone(pid: int, within_s: float = 20.0) -> bool:
@@ -56,7 +58,7 @@ def gone(pid: int, within_s: float = 20.0) -> bool:
     while time.monotonic() < end:
         try:
             os.kill(pid, 0)
-            if Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z":
+            if Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] == "Z":
                 return True
         except (ProcessLookupError, FileNotFoundError):
             return True
@@ -235,7 +237,9 @@ with CadProcess() as process:
 def parent(path: Path, state: str) -> tuple[subprocess.Popen[str], int]:
     """Someone who uses a CAD process, in a group of its own as at a terminal; and that process."""
     command = [sys.executable, "-c", PARENT, str(path), state]
-    made = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    made = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8", start_new_session=True
+    )
     assert made.stdout is not None
     return made, int(made.stdout.readline())
 

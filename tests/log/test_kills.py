@@ -22,7 +22,9 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals and limits of P
 
 
 def seen(program, folder, count):
-    done = subprocess.run([sys.executable, HERE / program, folder, str(count), "7"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, HERE / program, folder, str(count), "7"], capture_output=True, encoding="utf-8"
+    )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -53,7 +55,9 @@ main()
 
 def command(path, *words, limit):
     return subprocess.run(
-        [sys.executable, "-c", FULL, str(limit), "log", *map(str, words), "--log", path], capture_output=True, text=True
+        [sys.executable, "-c", FULL, str(limit), "log", *map(str, words), "--log", path],
+        capture_output=True,
+        encoding="utf-8",
     )
 
 
@@ -93,7 +97,9 @@ def test_no_room_for_a_new_log_or_a_raw_file(tmp_path):
 def test_a_disk_that_is_really_full(tmp_path):
     place = tmp_path / "disk"
     place.mkdir()
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=400k", "none", place], capture_output=True, text=True)
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=400k", "none", place], capture_output=True, encoding="utf-8"
+    )
     if mounted.returncode:
         pytest.skip(f"cannot mount a small disk here: {mounted.stderr.strip()}")
     try:

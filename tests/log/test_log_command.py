@@ -258,7 +258,7 @@ def test_a_long_list_loads_little(tmp_path):
     done = subprocess.run(
         [sys.executable, "-X", "importtime", "-m", "sensorgen", "log", "list", "--log", path],
         capture_output=True,
-        text=True,
+        encoding="utf-8",
     )
     assert "100000 readings" in done.stdout
     assert len(done.stdout.splitlines()) == 45

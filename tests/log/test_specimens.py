@@ -155,11 +155,11 @@ def test_a_name_on_a_bed_is_bound_to_the_place_on_it(log):
 def test_an_export_of_the_first_version_is_read_and_quantities_come_back(run, own, path, tmp_path):
     run("add", "S1", "--design", own, "--y", "4.5k", "--C", "25/26±0.1pF@1kHz", "--temperature", "21", "--unbaked")
     run("export", "new")
-    with Path("new/readings.csv").open(newline="") as file:
+    with Path("new/readings.csv").open(encoding="utf-8", newline="") as file:
         (row,) = csv.DictReader(file)
     assert (row["quantity"], row["temperature_c"]) == ('["Cp", "Cp"]', "21.0")
     first = list(row)[: list(row).index("quantity")]
-    with Path("old.csv").open("w", newline="") as file:
+    with Path("old.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, first, extrasaction="ignore")
         writer.writeheader()
         writer.writerow(row)

@@ -270,7 +270,7 @@ def test_a_file_system_without_locks_is_refused_with_the_way_out(tmp_path):
         pytest.skip("bindfs is not installed")
     (tmp_path / "real").mkdir()
     (tmp_path / "mount").mkdir()
-    mounted = subprocess.run(["bindfs", tmp_path / "real", tmp_path / "mount"], capture_output=True, text=True)
+    mounted = subprocess.run(["bindfs", tmp_path / "real", tmp_path / "mount"], capture_output=True, encoding="utf-8")
     if mounted.returncode:
         pytest.skip(f"cannot mount through FUSE here: {mounted.stderr.strip()}")
     try:

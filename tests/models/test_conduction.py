@@ -240,7 +240,7 @@ def test_no_field_solver_is_loaded_where_none_is_needed():
         "    if parameters: electrode_resistance(scene, 'top', 0.07)\n"
         "print([m for m in sys.modules if '.solvers' in m or 'fem' in m or m == 'scipy'])"
     )
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True)
     assert found.stdout.strip() == "[]"
 
 

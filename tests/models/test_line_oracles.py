@@ -70,7 +70,7 @@ def through_ngspice(ngspice: str, inputs, cells: int, folder) -> complex:
     """Z of the ladder, from the voltage that 1 A drives."""
     file = folder / "ladder.cir"
     file.write_text(netlist(inputs, cells), "utf-8")
-    done = subprocess.run([ngspice, "-b", str(file)], capture_output=True, text=True, timeout=60, cwd=folder)
+    done = subprocess.run([ngspice, "-b", str(file)], capture_output=True, encoding="utf-8", timeout=60, cwd=folder)
     found = re.search(r"v\(n0\) = ([-+.e\d]+),([-+.e\d]+)", done.stdout)
     assert found, done.stdout + done.stderr
     return complex(float(found[1]), float(found[2]))

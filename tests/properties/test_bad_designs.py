@@ -194,7 +194,10 @@ def test_some_in_processes_of_their_own(tmp_path):
     for text in ("{", "- 1", "shape: trj", "shape: tri\nparameters: {period_mm: .nan}", "\0", '"\\UFFFFFFFF": 1'):
         (tmp_path / "bad.yaml").write_text(text)
         done = subprocess.run(
-            [sys.executable, "-m", "sensorgen", "build", "bad.yaml"], capture_output=True, text=True, cwd=tmp_path
+            [sys.executable, "-m", "sensorgen", "build", "bad.yaml"],
+            capture_output=True,
+            encoding="utf-8",
+            cwd=tmp_path,
         )
         assert (done.returncode, done.stdout) == (2, "")
         assert done.stderr.startswith("sensorgen: bad.yaml: ")

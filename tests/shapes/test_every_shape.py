@@ -63,7 +63,7 @@ def test_it_imports_the_scene_and_the_standard_library_only(name):
         "import json, sys; before = set(sys.modules); "
         f"import sensorgen.design.shapes.{name}; print(json.dumps(sorted(set(sys.modules) - before)))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True)
     loaded = set(json.loads(done.stdout))
     ours = {m for m in loaded if m.partition(".")[0] == "sensorgen"}
     assert ours <= {

@@ -103,7 +103,7 @@ def usual(printer: Printer, **dielectric: object) -> dict[int, Load]:
 
 
 def read(path: Path, printer: Printer) -> extruded.Extruded:
-    with path.open() as lines:
+    with path.open(encoding="utf-8") as lines:
         return extruded.read(lines, printer.filament_mm)
 
 
@@ -115,7 +115,7 @@ def fullness(found: extruded.Extruded, heights_mm: dict[int, float]) -> dict[int
 def towers(path: Path, kind: str) -> list[tuple[float, float]]:
     """Where lines of a type end [mm]."""
     here, at, points = "", {"X": 0.0, "Y": 0.0}, []
-    for line in path.read_text().splitlines():
+    for line in path.read_text(encoding="utf-8").splitlines():
         if line.startswith(";TYPE:"):
             here = line.removeprefix(";TYPE:").strip().lower()
         words = line.partition(";")[0].split()

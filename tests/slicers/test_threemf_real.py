@@ -77,7 +77,7 @@ def printed(program: str, packed: bytes, folder: Path) -> dict[int, list[tuple[f
     source.write_bytes(packed)
     settings.write_text(INI)
     command = [program, "--export-gcode", "--load", settings, "--dont-arrange", "--output", target, source]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    run = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
     assert run.returncode == 0, run.stderr[-2000:]
     return moves(target.read_text())
 
@@ -156,7 +156,7 @@ def test_cura_parser_finds_bodies_names_and_tools(tmp_path):
         pytest.skip("Cura's parser is not here: apt install python3-savitar")
     source = tmp_path / "a.3mf"
     source.write_bytes(content("cura", "two", stacked(), (195, 85)))
-    run = subprocess.run([python, "-c", SAVITAR, source], capture_output=True, text=True, check=True)
+    run = subprocess.run([python, "-c", SAVITAR, source], capture_output=True, encoding="utf-8", check=True)
     (group,) = json.loads(run.stdout)
     assert group["name"] == "two"
     assert group["transform"].split()[9:] == ["185", "80", "0"]

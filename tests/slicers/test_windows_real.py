@@ -60,7 +60,7 @@ def newer(newer_program, tmp_path):
         english.symlink_to("C.utf8")
     enter = 'mount --bind /proc "$0/proc" && mount --bind "$1" "$0/mnt" && shift && exec chroot "$0" "$@"'
     command = ["unshare", "--mount", "sh", "-c", enter, str(root), str(tmp_path)]
-    tried = subprocess.run([*command, "true"], capture_output=True, text=True, check=False)
+    tried = subprocess.run([*command, "true"], capture_output=True, encoding="utf-8", check=False)
     if tried.returncode:
         pytest.skip(f"the window of Debian 13's PrusaSlicer needs mounts: {tried.stderr.strip()}")
     return [*command, "/usr/bin/prusa-slicer"], tmp_path, Path("/mnt")
@@ -151,7 +151,7 @@ def test_curas_window_opens_the_sensor_on_our_printer(program, screen, monkeypat
     """The printer's profiles, of which Cura finds all, and the bodies, without its assistant of the first start."""
     command, machine, layers = program("cura", "cura"), SENSOR.machine, SENSOR.layers
     version = Path("/usr/lib/python3/dist-packages/cura/CuraVersion.py")
-    if not version.exists() or '"4.13' not in version.read_text():
+    if not version.exists() or '"4.13' not in version.read_text(encoding="utf-8"):
         pytest.skip("settings of Cura 4.13, as Debian 12 has it, are written here")
     monkeypatch.setattr(windows, "PATIENCE_S", 240.0)
     loads = slicing.plate_loads([slicing.alone(SENSOR)])

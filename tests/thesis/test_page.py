@@ -96,6 +96,6 @@ def test_filters_in_a_browser(asked, fits, text, rows, program, tmp_path):
         program("chromium", "chromium", "chromium-browser", "google-chrome"), "--headless", "--no-sandbox",
         "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", file.as_uri() + asked,
     ]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, capture_output=True, encoding="utf-8", timeout=120)
     shown = {tr["id"] for tr in Page(done.stdout).of("tr") if "data-verdict" in tr and "hidden" not in tr}
     assert shown == {f"{r.kind}-{r.item.number}" for r in rows if fits(r)}
