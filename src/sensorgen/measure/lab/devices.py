@@ -1,0 +1,188 @@
+"""Devices of the laboratory: what a run asks of each, whoever made it.
+
+No method waits for longer than a message takes: what takes time, a move or a sweep, is begun by one call and followed
+by ``read``, once in every period of the control loop. Before a device has said that it is the expected one, a driver
+sends it nothing but that question. Any failure is a :class:`DeviceFault`.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from sensorgen.core.arrays import Complex, Mask, Real
+from sensorgen.core.errors import InstrumentFailed
+
+
+class DeviceFault(InstrumentFailed):
+    """A device that does not answer, answers nonsense, or reports an error."""
+
+
+class WrongDevice(DeviceFault):
+    """Something answers, but it is not the expected device; it was sent no command."""
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What a device says that it is.
+
+    Attributes
+    ----------
+    model : str
+        Maker and model.
+    serial, firmware : str
+        Its number and version; "" if it does not say.
+    """
+
+    model: str
+    serial: str = ""
+    firmware: str = ""
+
+
+@dataclass(frozen=True)
+class Extension:
+    """A reading of the actuator.
+
+    Attributes
+    ----------
+    time_s : float
+        By the run's clock [s].
+    force_n : float
+        Force of the tip on what is below it, by the motor's current and the weight of the piston [N].
+    position_mm : float
+        How far the piston is out, downwards from its upper end [mm].
+    """
+
+    time_s: float
+    force_n: float
+    position_mm: float
+
+
+class Actuator(Protocol):
+    """Presses the tip down, by force or to a position. Forces are those on the specimen, downwards positive."""
+
+    def identify(self) -> Identity:
+        """Ask what it is; :class:`WrongDevice` if it is another."""
+
+    def start(self, limit_n: float) -> None:
+        """Set the device's own limit of force, switch the motor on, and begin to go to the upper end [N]."""
+
+    def move(self, position_mm: float, speed_mm_s: float, force_n: float) -> None:
+        """Begin to go to a position with at most a force: the soft landing [mm], [mm/s], [N]."""
+
+    def push(self, force_n: float) -> None:
+        """Press with a force, from now on [N]."""
+
+    def read(self) -> Extension:
+        """Force and position now."""
+
+    def lift(self) -> None:
+        """Begin to go to the upper end, whatever was before."""
+
+    def off(self) -> None:
+        """Switch the motor off."""
+
+    def close(self) -> None:
+        """Give the connection back; never raises."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A reading of the stage.
+
+    Attributes
+    ----------
+    time_s : float
+        By the run's clock [s].
+    position_mm : float
+        Of the tip's centre along the specimen [mm].
+    height_mm : float
+        By which the actuator is raised [mm].
+    moving : bool
+        Whether a move has not ended yet.
+    """
+
+    time_s: float
+    position_mm: float
+    height_mm: float
+    moving: bool
+
+
+class Stage(Protocol):
+    """Carries the actuator along the specimen, and raises it."""
+
+    def identify(self) -> Identity:
+        """Ask what it is; :class:`WrongDevice` if it is another."""
+
+    def start(self) -> None:
+        """Begin to find its own zero; the actuator is raised first."""
+
+    def move(self, position_mm: float, speed_mm_s: float) -> None:
+        """Begin to go to a place; never while the tip is down, which is the run's duty [mm], [mm/s]."""
+
+    def lower(self) -> None:
+        """Begin to lower the actuator to its working height."""
+
+    def lift(self) -> None:
+        """Begin to raise the actuator, so far that its piston reaches nothing."""
+
+    def read(self) -> Place:
+        """Place now, and whether it moves."""
+
+    def stop(self) -> None:
+        """Stop at once, as far as the device can."""
+
+    def close(self) -> None:
+        """Give the connection back; never raises."""
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Impedances since the last call.
+
+    Attributes
+    ----------
+    time_s : (n,) array
+        Middle of each, by the instrument's clock, from any moment on [s].
+    impedance_ohm : (n, m) array
+        At m frequencies; nan where there is none [ohm].
+    clipped : (n,) array
+        Whether an input was beyond its range.
+    lost : int
+        How many are missing before the first.
+    """
+
+    time_s: Real
+    impedance_ohm: Complex
+    clipped: Mask
+    lost: int = 0
+
+
+class ImpedanceMeter(Protocol):
+    """Measures the impedance at several frequencies, again and again."""
+
+    def identify(self) -> Identity:
+        """Ask what it is; :class:`WrongDevice` if it is another."""
+
+    def start(self, tones_hz: Real, voltage_v: float) -> None:
+        """Begin to measure at (m,) frequencies with an amplitude [Hz], [V]."""
+
+    def read(self) -> Readings:
+        """What has been measured since the last call; nothing is an answer."""
+
+    def stop(self) -> None:
+        """End the measurement and switch the output off."""
+
+    def close(self) -> None:
+        """Give the connection back; never raises."""
+
+
+class Meter(Protocol):
+    """Measures a resistance."""
+
+    def identify(self) -> Identity:
+        """Ask what it is; :class:`WrongDevice` if it is another."""
+
+    def resistance(self, *, wires: int) -> str:
+        """One reading as the meter sends it, with 2 leads or 4 [ohm]."""
+
+    def close(self) -> None:
+        """Give the connection back; never raises."""
