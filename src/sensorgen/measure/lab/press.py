@@ -1,0 +1,160 @@
+"""Motions of the rig: lift, travel, rest, land and press, each period by period."""
+
+from math import isfinite, nan
+
+from sensorgen.core.arrays import Complex
+from sensorgen.measure.lab.devices import DeviceFault
+from sensorgen.measure.lab.loop import Loop, Paused
+from sensorgen.measure.lab.plans import Step
+from sensorgen.measure.lab.safety import RAISED_MM, UP_MM, Ended
+
+_UP_S, _TRAVEL_S, _LAND_S = 10.0, 120.0, 60.0  # longest lift, move of the stage, and landing
+_ABOVE_MM, _EARLY_MM = 1.5, 3.0  # where the soft landing begins, and how far from the last one it may end
+_REST_S, _STILL_MM = 0.15, 0.02  # a landed tip comes down no further
+_THERE_MM = 0.05  # of the place
+
+
+def lift(loop: Loop) -> None:
+    """Lift the tip, and return when it is up."""
+    loop.set_n = nan
+    loop.rig.actuator.lift()
+    until = loop.clock.now() + _UP_S
+    while not loop.extension.position_mm <= UP_MM:
+        loop.period()
+        if loop.clock.now() > until:
+            raise DeviceFault(f"actuator: not up {_UP_S:g} s after the command; at {loop.extension.position_mm:.2f} mm")
+    loop.down_mm = nan
+
+
+def travel(loop: Loop, place_mm: float) -> None:
+    """Move the stage along the specimen; the tip is up by the actuator's own reading before, and stays so.
+
+    Raises
+    ------
+    DeviceFault
+        The tip is down, or comes down meanwhile; the stage does not arrive.
+    """
+    loop.extension = loop.rig.actuator.read()
+    if not loop.extension.position_mm <= UP_MM:
+        raise DeviceFault(f"actuator: at {loop.extension.position_mm:.2f} mm, not up: no move along the specimen")
+    low, high = loop.experiment.limits.travel_mm
+    if not low <= place_mm <= high:
+        raise DeviceFault(f"stage: {place_mm:g} mm is beyond limits.travel_mm, {low:g} to {high:g} mm")
+    loop.wanted_mm = place_mm
+    loop.rig.stage.move(place_mm, loop.experiment.approach.travel_mm_s)
+    settle(loop, f"at {place_mm:g} mm")
+    if abs(loop.place.position_mm - place_mm) > _THERE_MM:
+        raise DeviceFault(f"stage: at {loop.place.position_mm:.3f} mm instead of {place_mm:.3f} mm")
+
+
+def settle(loop: Loop, where: str) -> None:
+    """Wait until the stage rests; stop it at once if the tip comes down meanwhile."""
+    until = loop.clock.now() + _TRAVEL_S
+    loop.period()
+    while loop.read_stage().moving:
+        loop.period()
+        if loop.extension.position_mm > 2 * UP_MM:
+            loop.rig.stage.stop()
+            raise DeviceFault(f"actuator: the tip came down to {loop.extension.position_mm:.2f} mm while the stage moved")
+        if loop.clock.now() > until:
+            raise DeviceFault(f"stage: not {where} after {_TRAVEL_S:g} s")
+
+
+def raised(loop: Loop) -> None:
+    """Raise the stage, and return when it rests."""
+    loop.rig.stage.lift()
+    settle(loop, "raised")
+
+
+def lowered(loop: Loop) -> None:
+    """Lower the stage to its working height, tip up."""
+    loop.rig.stage.lower()
+    settle(loop, "lowered")
+    loop.rig.working_mm = loop.place.height_mm
+
+
+def land(loop: Loop) -> None:
+    """Bring the tip down gently, and return when it rests on the specimen.
+
+    Raises
+    ------
+    DeviceFault
+        It finds nothing down to the deepest position, or something far above where it landed last.
+    """
+    approach, deepest, begun = loop.experiment.approach, loop.experiment.limits.deepest_mm, loop.clock.now()
+    loop.read_stage()
+    if loop.place.moving or loop.place.height_mm > loop.rig.working_mm + RAISED_MM:
+        raise DeviceFault("stage: moving or raised; expected it at rest and lowered before the tip comes down")
+    if isfinite(loop.contact_mm):
+        above = max(loop.contact_mm - _ABOVE_MM, 0.0)
+        loop.rig.actuator.move(above, approach.speed_mm_s, approach.contact_n)
+        while loop.extension.position_mm < above - _STILL_MM and not _rests(loop, begun):
+            loop.period()
+    loop.rig.actuator.move(deepest, approach.landing_mm_s, approach.contact_n)
+    begun = loop.clock.now()
+    while not _rests(loop, begun):
+        loop.period()
+    at = loop.extension.position_mm
+    if at <= UP_MM:
+        raise DeviceFault(f"actuator: still at {at:.2f} mm after the command to come down; check motor and power")
+    if at > deepest - _STILL_MM:
+        raise DeviceFault(f"no contact down to {at:.2f} mm (limits.deepest_mm); check specimen, place and height")
+    if isfinite(loop.contact_mm) and at < loop.contact_mm - _EARLY_MM:
+        raise DeviceFault(f"contact at {at:.2f} mm, {loop.contact_mm - at:.1f} mm above the last; check what lies there")
+    loop.down_mm = loop.contact_mm = at
+
+
+def _rests(loop: Loop, begun_s: float) -> bool:
+    """Whether the piston has come to rest: the same position for a while."""
+    now, at = loop.clock.now(), loop.extension.position_mm
+    if now - begun_s > _LAND_S:
+        raise DeviceFault(f"actuator: still on its way down after {_LAND_S:g} s, at {at:.2f} mm")
+    until = now + _REST_S
+    while loop.clock.now() < until:
+        loop.period()
+        if abs(loop.extension.position_mm - at) > _STILL_MM:
+            return False
+    return True
+
+
+def press(loop: Loop, step: Step) -> tuple[Complex, Complex]:
+    """Rest, land, follow the course of the force, and lift.
+
+    Returns
+    -------
+    before_ohm, pressed_ohm : (m,) array
+        Means over the last second of the rest, and of the press [ohm].
+    """
+    loop.message = f"rest before press {step.number}"
+    loop.wait(step.rest_s)
+    before = loop.watch.mean()
+    _drift(loop)
+    loop.message = f"press {step.number}, {step.kind}"
+    land(loop)
+    begun = loop.clock.now()
+    while (time_s := loop.clock.now() - begun) < step.seconds:
+        loop.set_n = step.force_at(time_s)
+        loop.period()
+    pressed = loop.watch.mean()
+    lift(loop)
+    loop.presses += 1
+    return before, pressed
+
+
+def _drift(loop: Loop) -> None:
+    drift, allowed = loop.watch.drift(), loop.experiment.stop.drift
+    if allowed and drift > allowed:
+        raise Ended("rule", f"stop.drift: abs(Z) at rest has changed by {drift:.2%} since the begin; {allowed:.2%} allowed")
+
+
+def pause(loop: Loop) -> None:
+    """Lift the tip and wait until somebody lets the run go on."""
+    loop.recorder.journal.note("paused", step=loop.step)
+    loop.message = "paused"
+    lift(loop)
+    while loop.paused:
+        try:
+            loop.period()
+        except Paused:  # asked for twice
+            continue
+    loop.recorder.journal.note("resumed", step=loop.step)

@@ -1,0 +1,106 @@
+"""Watch the impedances of a run: means at rest and under a press, drift, short and open circuits, silence."""
+
+from collections import deque
+from dataclasses import dataclass, field
+from math import nan
+
+import numpy as np
+
+from sensorgen.core.arrays import Complex, Real
+from sensorgen.measure.lab.devices import DeviceFault, Readings
+from sensorgen.measure.signal.presses import WINDOW_S
+
+SILENT_S = 5.0  # without a sound reading, a fault
+_OPEN_F = 0.3e-12  # less than any specimen with its leads
+_SHORT_S = 0.3  # for which a short lasts, to be one
+_MOST = 1 << 14  # readings of a window, whatever the rate
+
+
+def circuit(tones_hz: Real, impedance_ohm: Complex) -> str:
+    """What a specimen at rest is not: "short", "open", or "".
+
+    At the lowest frequency an intact specimen is a capacitor: its reactance exceeds its resistance, and its
+    capacitance is that of an open circuit no longer.
+    """
+    k = int(np.argmin(tones_hz))
+    z = complex(impedance_ohm[k])
+    if not np.isfinite(z):
+        return ""
+    if z.real > -z.imag:
+        return "short"
+    return "open" if 1 / (2 * np.pi * tones_hz[k] * abs(z)) < _OPEN_F else ""
+
+
+@dataclass
+class Watch:
+    """Impedances of the last second, and what they say of specimen and instrument.
+
+    Attributes
+    ----------
+    tones_hz : (m,) array
+        Frequencies [Hz].
+    latest_ohm : (m,) array
+        The last sound reading; nan before [ohm].
+    count, lost, clipped, invalid : int
+        Readings so far, and of them lost, clipped and not finite.
+    sound_s : float
+        When a sound reading came last, by the run's clock [s].
+    """
+
+    tones_hz: Real
+    latest_ohm: Complex = field(init=False)
+    count: int = 0
+    lost: int = 0
+    clipped: int = 0
+    invalid: int = 0
+    sound_s: float = nan
+    _recent: deque[tuple[float, Complex]] = field(default_factory=lambda: deque(maxlen=_MOST))
+    _first_rest: Complex | None = None
+    _conducts_s: float = nan
+
+    def __post_init__(self) -> None:
+        self.latest_ohm = np.full(len(self.tones_hz), complex(nan, nan))
+
+    def take(self, found: Readings, now_s: float) -> None:
+        """Take readings that came just now.
+
+        Raises
+        ------
+        DeviceFault
+            No sound reading for :data:`SILENT_S`.
+        """
+        sound = np.isfinite(found.impedance_ohm).all(axis=1) & (found.impedance_ohm != 0).all(axis=1)
+        self.count += len(sound)
+        self.lost += found.lost
+        self.clipped += int(np.count_nonzero(found.clipped))
+        self.invalid += int(np.count_nonzero(~sound))
+        for row in found.impedance_ohm[sound & ~found.clipped]:
+            self.latest_ohm = row
+            self._recent.append((now_s, row))
+            self.sound_s = now_s
+        while self._recent and self._recent[0][0] < now_s - WINDOW_S:
+            self._recent.popleft()
+        if now_s - self.sound_s > SILENT_S:
+            what = "clipped" if found.clipped.any() else "no"
+            raise DeviceFault(f"impedance meter: {what} readings for {SILENT_S:g} s; check cables, range and specimen")
+        if circuit(self.tones_hz, self.latest_ohm) != "short":
+            self._conducts_s = nan
+        elif np.isnan(self._conducts_s):
+            self._conducts_s = now_s
+
+    def short(self, now_s: float) -> bool:
+        """Whether the specimen has conducted for some readings."""
+        return now_s - self._conducts_s >= _SHORT_S
+
+    def mean(self) -> Complex:
+        """Mean over the last second; nan of nothing [ohm]."""
+        if not self._recent:
+            return np.full(len(self.tones_hz), complex(nan, nan))
+        return np.asarray(np.mean([row for _, row in self._recent], axis=0))
+
+    def drift(self) -> float:
+        """Change of abs(Z) at rest since the first call, at the frequency where it is largest [-]."""
+        now = np.abs(self.mean())
+        if self._first_rest is None and np.isfinite(now).all():
+            self._first_rest = now
+        return 0.0 if self._first_rest is None else float(np.max(np.abs(now / self._first_rest - 1)))
