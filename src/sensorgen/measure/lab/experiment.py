@@ -34,7 +34,7 @@ class Device(Strict):
 
     kind: Name
     address: Line = ""
-    settings: dict[str, bool | float | Line | tuple[float, ...]] = {}
+    settings: dict[str, bool | float | Line | tuple[float, ...]] = Field(default_factory=dict)
 
 
 class Devices(Strict):
@@ -361,8 +361,8 @@ def _check_part(key: str, part: Kind, limit_n: float, places_mm: tuple[float, fl
         largest, name = max(forces), "force_n"
     if largest > _ROOM * limit_n:
         raise OutOfRange(
-            f"{key}.{name}: {largest:g} N; expected up to {_ROOM * limit_n:.4g} N, {_ROOM:.0%} of limits.force_n: above "
-            "the limit itself the tip is lifted"
+            f"{key}.{name}: {largest:g} N; expected up to {_ROOM * limit_n:.4g} N, {_ROOM:.0%} of limits.force_n, "
+            "above which the tip is lifted"
         )
     if isinstance(part, Random | Next):
         _rising(f"{key}.hold_s", part.hold_s)
@@ -389,4 +389,3 @@ def _inside(key: str, place_mm: float, allowed_mm: tuple[float, float]) -> None:
     if not allowed_mm[0] <= place_mm <= allowed_mm[1]:
         raise OutOfRange(f"{key}: {place_mm:g} mm; expected {allowed_mm[0]:g} to {allowed_mm[1]:g} mm, where the whole "
                          "tip is on the specimen and limits.places_mm allows it")  # fmt: skip
-

@@ -75,6 +75,8 @@ class Loop:
         For the view.
     paused : bool
         Whether a pause was asked for.
+    travels : bool
+        Whether the stage was sent somewhere, and has not come to rest.
     late : int
         Periods that began more than one period late.
     presses : int
@@ -100,6 +102,7 @@ class Loop:
     steps: int = 0
     message: str = ""
     paused: bool = False
+    travels: bool = False
     late: int = 0
     presses: int = 0
     count: int = 0
@@ -190,6 +193,10 @@ class Loop:
         if at.force_n > limits.force_n:
             self.rig.actuator.lift()
             raise DeviceFault(f"force {at.force_n:.2f} N is above the limit of {limits.force_n:g} N: lifted")
+        if self.travels and at.position_mm > 2 * UP_MM:
+            self.rig.actuator.lift()
+            self.rig.stage.stop()
+            raise DeviceFault(f"actuator: the tip came down to {at.position_mm:.2f} mm while the stage moved: lifted")
         deepest = min(limits.deepest_mm + _DEEP_MM, self.down_mm + _SUNK_MM if self.down else limits.deepest_mm + 1)
         if at.position_mm > deepest:
             self.rig.actuator.lift()

@@ -6,7 +6,7 @@ from math import inf, nan, pi, sin
 
 import numpy as np
 
-from sensorgen.core.arrays import Complex
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.measure.lab.experiment import Approach, Experiment, Hold, Next, Ramp, Random, Sine, Sweep
 from sensorgen.measure.signal.presses import GUARD_S, WINDOW_S
 from sensorgen.measure.signal.schedule import Plan
@@ -100,11 +100,14 @@ class Pressed:
         What it was to be.
     before_ohm, pressed_ohm : (m,) array
         Mean at rest before it, and over the last second of its hold [ohm].
+    noise : (m,) array
+        Standard error of their ratio, of its real and imaginary part [-].
     """
 
     step: Step
     before_ohm: Complex
     pressed_ohm: Complex
+    noise: Real
 
 
 @dataclass(frozen=True)
@@ -128,8 +131,8 @@ class Choice:
     interval: float = inf
 
 
-NextPress = Callable[[Next, Sequence[Pressed]], Choice]
-"""The best next press, by the part of the plan that asks and all presses so far."""
+NextPress = Callable[[Next, Sequence[Pressed], Complex], Choice]
+"""The best next press, by the part of the plan that asks, all presses so far, and the mean at rest (m,) [ohm]."""
 
 
 def steps(experiment: Experiment, length_mm: float) -> list[Step]:
@@ -183,7 +186,8 @@ def _random(part: Random, approach: Approach, places: tuple[float, float]) -> It
     """Forces and places of a seeded plan; holds even in their logarithm, and a share reached from a higher force."""
     plan = Plan(part.seed, part.presses, part.force_n, places, 1.0, 0.0, part.repeats).steps()
     rng = np.random.default_rng([part.seed, 1])
-    holds = np.exp(rng.uniform(*np.log(part.hold_s), len(plan))).round(2).tolist()
+    short, long = np.log(part.hold_s).tolist()
+    holds = np.exp(rng.uniform(short, long, len(plan))).round(2).tolist()
     above = rng.permutation(len(plan)) < round(part.from_above * len(plan))
     shares = rng.uniform(0.2, 1.0, len(plan)).tolist()
     for press, hold, higher, share in zip(plan, holds, above.tolist(), shares, strict=True):

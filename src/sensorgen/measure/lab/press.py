@@ -2,16 +2,18 @@
 
 from math import isfinite, nan
 
-from sensorgen.core.arrays import Complex
+import numpy as np
+
 from sensorgen.measure.lab.devices import DeviceFault
 from sensorgen.measure.lab.loop import Loop, Paused
-from sensorgen.measure.lab.plans import Step
+from sensorgen.measure.lab.plans import Pressed, Step
 from sensorgen.measure.lab.safety import RAISED_MM, UP_MM, Ended
 
 _UP_S, _TRAVEL_S, _LAND_S = 10.0, 120.0, 60.0  # longest lift, move of the stage, and landing
 _ABOVE_MM, _EARLY_MM = 1.5, 3.0  # where the soft landing begins, and how far from the last one it may end
 _REST_S, _STILL_MM = 0.15, 0.02  # a landed tip comes down no further
 _THERE_MM = 0.05  # of the place
+_LOOK_S = 0.05  # from one reading of the moving stage to the next
 
 
 def lift(loop: Loop) -> None:
@@ -55,7 +57,9 @@ def settle(loop: Loop, where: str) -> None:
         loop.period()
         if loop.extension.position_mm > 2 * UP_MM:
             loop.rig.stage.stop()
-            raise DeviceFault(f"actuator: the tip came down to {loop.extension.position_mm:.2f} mm while the stage moved")
+            raise DeviceFault(
+                f"actuator: the tip came down to {loop.extension.position_mm:.2f} mm while the stage moved"
+            )
         if loop.clock.now() > until:
             raise DeviceFault(f"stage: not {where} after {_TRAVEL_S:g} s")
 
@@ -100,7 +104,7 @@ def land(loop: Loop) -> None:
     if at > deepest - _STILL_MM:
         raise DeviceFault(f"no contact down to {at:.2f} mm (limits.deepest_mm); check specimen, place and height")
     if isfinite(loop.contact_mm) and at < loop.contact_mm - _EARLY_MM:
-        raise DeviceFault(f"contact at {at:.2f} mm, {loop.contact_mm - at:.1f} mm above the last; check what lies there")
+        raise DeviceFault(f"contact at {at:.2f} mm, {loop.contact_mm - at:.1f} mm above the last; is something there?")
     loop.down_mm = loop.contact_mm = at
 
 
@@ -117,17 +121,11 @@ def _rests(loop: Loop, begun_s: float) -> bool:
     return True
 
 
-def press(loop: Loop, step: Step) -> tuple[Complex, Complex]:
-    """Rest, land, follow the course of the force, and lift.
-
-    Returns
-    -------
-    before_ohm, pressed_ohm : (m,) array
-        Means over the last second of the rest, and of the press [ohm].
-    """
+def press(loop: Loop, step: Step) -> Pressed:
+    """Rest, land, follow the course of the force, and lift."""
     loop.message = f"rest before press {step.number}"
     loop.wait(step.rest_s)
-    before = loop.watch.mean()
+    before, noise = loop.watch.mean(), loop.watch.noise()
     _drift(loop)
     loop.message = f"press {step.number}, {step.kind}"
     land(loop)
@@ -135,16 +133,16 @@ def press(loop: Loop, step: Step) -> tuple[Complex, Complex]:
     while (time_s := loop.clock.now() - begun) < step.seconds:
         loop.set_n = step.force_at(time_s)
         loop.period()
-    pressed = loop.watch.mean()
+    pressed = Pressed(step, before, loop.watch.mean(), np.hypot(noise, loop.watch.noise()))
     lift(loop)
     loop.presses += 1
-    return before, pressed
+    return pressed
 
 
 def _drift(loop: Loop) -> None:
     drift, allowed = loop.watch.drift(), loop.experiment.stop.drift
     if allowed and drift > allowed:
-        raise Ended("rule", f"stop.drift: abs(Z) at rest has changed by {drift:.2%} since the begin; {allowed:.2%} allowed")
+        raise Ended("rule", f"stop.drift: abs(Z) at rest has changed by {drift:.2%}; {allowed:.2%} are allowed")
 
 
 def pause(loop: Loop) -> None:

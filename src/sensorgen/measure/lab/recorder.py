@@ -127,8 +127,8 @@ class Recorder:
         if not len(found.time_s):
             return
         stamp = f"{self._clock.epoch():.6f}"
-        valid = np.isfinite(found.impedance_ohm).all(axis=1).tolist()
-        columns = found.impedance_ohm.view(float).tolist()
+        valid: list[bool] = np.isfinite(found.impedance_ohm).all(axis=1).tolist()
+        columns: list[list[float]] = np.ascontiguousarray(found.impedance_ohm).view(float).tolist()
         rows = zip(found.time_s.tolist(), columns, found.clipped.tolist(), valid, strict=True)
         self.impedance.write(
             "".join(
@@ -295,6 +295,7 @@ def log_attempts(log: "Log", folder: Path, clock: Clock) -> "list[BenchRun]":
 
 
 def _logged(log: "Log", folder: Path, attempt: dict[str, Any]) -> "tuple[list[BenchRun], str]":
+    from sensorgen.measure.log import BenchRun
     from sensorgen.measure.log.bench import log_recording
 
     recording, rig = folder / f"{attempt['stem']}.csv", folder / f"{attempt['stem']}-rig.csv"
@@ -307,7 +308,7 @@ def _logged(log: "Log", folder: Path, attempt: dict[str, Any]) -> "tuple[list[Be
         except BadInput as error:
             problem = str(error)
         else:
-            return [row for row in rows if row.file], problem  # type: ignore[attr-defined]
+            return [row for row in rows if isinstance(row, BenchRun)], problem
     return [], problem
 
 

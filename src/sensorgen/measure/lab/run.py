@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import BadInput, SensorgenError, within
 from sensorgen.core.version import __version__
@@ -230,7 +231,7 @@ class _Attempt:
             end, reason = error.end, str(error)
         except SensorgenError as error:
             end, reason = "fault", str(error)
-        except BaseException as error:  # noqa: BLE001 - whatever it is, the tip goes up first
+        except BaseException as error:  # whatever it is, the tip goes up first
             end, reason, fault = "fault", f"{type(error).__name__}: {error}", error
         up, problems = safety.made_safe(self.rig, self.clock, lambda: None if end == "fault" else loop.beat())
         safety.close(self.rig)
@@ -255,7 +256,7 @@ class _Attempt:
         self.identities = preflight.identified(self.rig)
         loop.recorder.journal.note("identified", **{role: asdict(who) for role, who in self.identities.items()})
         experiment = self.plan.experiment
-        low, high = experiment.places_mm(self.plan.length_mm)
+        low, high = self._places_mm
         middle = experiment.approach.place_mm
         preflight.prepared(loop, (low + high) / 2 if middle is None else middle)
         for step in self.plan.steps:
@@ -269,6 +270,10 @@ class _Attempt:
         loop.wait(plans.AVERAGED_S)
         return "done", "all presses are done"
 
+    @property
+    def _places_mm(self) -> tuple[float, float]:
+        return self.plan.experiment.places_mm(self.plan.length_mm)
+
     def _step(self, loop: Loop, step: Step) -> bool:
         """One press, again after a pause; False where no further one is worth it."""
         while True:
@@ -279,13 +284,14 @@ class _Attempt:
                 loop.message = f"to {chosen.place_mm:g} mm"
                 loop.recorder.journal.note("step", step=step.number, place_mm=chosen.place_mm, force_n=chosen.force_n)
                 press.travel(loop, chosen.place_mm)
-                before, pressed = press.press(loop, chosen)
+                pressed = press.press(loop, chosen)
             except Paused:
                 press.pause(loop)
                 continue
-            self.pressed.append(Pressed(chosen, before, pressed))
             self.done.add(step.number)
-            loop.recorder.journal.note("done", step=step.number, **_kept(chosen, before, pressed))
+            loop.recorder.journal.note("done", step=step.number, **_kept(pressed))
+            if all(np.isfinite(values).all() for values in (pressed.before_ohm, pressed.pressed_ohm, pressed.noise)):
+                self.pressed.append(pressed)
             return True
 
     def _chosen(self, loop: Loop, step: Step) -> Step | None:
@@ -294,7 +300,9 @@ class _Attempt:
         if step.course or not isinstance(part, Next) or self.next_press is None:
             return step
         loop.message = f"choosing press {step.number}"
-        choice = _beside(loop, lambda choose=self.next_press: choose(part, self.pressed))
+        part = part.model_copy(update={"position_mm": part.position_mm or self._places_mm})
+        choose, so_far, rest = self.next_press, tuple(self.pressed), loop.watch.mean()
+        choice = _beside(loop, lambda: choose(part, so_far, rest))
         interval = self.plan.experiment.stop.interval
         if interval and choice.interval <= interval:
             return None
@@ -346,16 +354,19 @@ def _beside(loop: Loop, choose: Callable[[], Choice]) -> Choice:
         return future.result()
 
 
-def _kept(step: Step, before: Any, pressed: Any) -> dict[str, Any]:
+def _kept(pressed: Pressed) -> dict[str, Any]:
     """What the journal keeps of a press."""
+    step = pressed.step
     return {
         "place_mm": step.place_mm, "force_n": step.force_n, "peak_n": step.peak_n, "hold_s": step.hold_s,
-        "before_ohm": _pairs(before), "pressed_ohm": _pairs(pressed),
+        "noise": _numbers(pressed.noise),
+        **{name: _numbers(getattr(pressed, name).view(float)) for name in ("before_ohm", "pressed_ohm")},
     }  # fmt: skip
 
 
-def _pairs(z: Any) -> list[list[float]] | None:
-    return [[float(one.real), float(one.imag)] for one in z] if np.isfinite(z).all() else None
+def _numbers(values: Real) -> list[float] | None:
+    """For JSON, which has no nan."""
+    return values.tolist() if np.isfinite(values).all() else None
 
 
 def _pressed(before: Run, steps: Sequence[Step]) -> list[Pressed]:
@@ -364,8 +375,8 @@ def _pressed(before: Run, steps: Sequence[Step]) -> list[Pressed]:
     found = []
     for event in before.of("done"):
         step = by_number.get(event["step"])
-        if step and event["before_ohm"] and event["pressed_ohm"]:
+        if step and all(event[name] for name in ("before_ohm", "pressed_ohm", "noise")):
             values = {name: event[name] for name in ("place_mm", "force_n", "peak_n", "hold_s")}
-            z = (np.array(event[name]) @ [1, 1j] for name in ("before_ohm", "pressed_ohm"))
-            found.append(Pressed(replace(step, **values), *z))
+            at_rest, after = (np.array(event[name]).view(complex) for name in ("before_ohm", "pressed_ohm"))
+            found.append(Pressed(replace(step, **values), at_rest, after, np.array(event["noise"])))
     return found

@@ -62,7 +62,7 @@ class _Attempts:
         try:
             self.beat()
             call()
-        except Exception as error:  # noqa: BLE001 - also errors of a driver's own must not keep the tip down
+        except Exception as error:  # also errors of a driver's own must not keep the tip down
             kind = "" if isinstance(error, SensorgenError) else f"{type(error).__name__}: "
             problem = f"{what}: {kind}{error}"
             if problem not in self.problems:

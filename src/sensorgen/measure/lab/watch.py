@@ -13,6 +13,7 @@ from sensorgen.measure.signal.presses import WINDOW_S
 SILENT_S = 5.0  # without a sound reading, a fault
 _OPEN_F = 0.3e-12  # less than any specimen with its leads
 _SHORT_S = 0.3  # for which a short lasts, to be one
+_FEW = 3  # readings, from which their noise can be told
 _MOST = 1 << 14  # readings of a window, whatever the rate
 
 
@@ -97,6 +98,13 @@ class Watch:
         if not self._recent:
             return np.full(len(self.tones_hz), complex(nan, nan))
         return np.asarray(np.mean([row for _, row in self._recent], axis=0))
+
+    def noise(self) -> Real:
+        """Standard error of real and imaginary part of the mean, relative to abs(Z), of each frequency; nan of few."""
+        rows = np.array([row for _, row in self._recent])
+        if len(rows) < _FEW:
+            return np.full(len(self.tones_hz), nan)
+        return np.asarray(rows.std(axis=0) / np.abs(rows.mean(axis=0)) / np.sqrt(2 * len(rows)))
 
     def drift(self) -> float:
         """Change of abs(Z) at rest since the first call, at the frequency where it is largest [-]."""
