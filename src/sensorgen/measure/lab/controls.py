@@ -36,8 +36,8 @@ class Controls:
         return [*given, "abort"] if self.signal else given
 
     @contextmanager
-    def signals(self) -> Iterator[None]:
-        """Take signals that ask to end as a command, so that none interrupts a message to a device."""
+    def listening(self) -> Iterator[None]:
+        """Take keys, and signals that ask to end, as commands, so that none interrupts a message to a device."""
         before: dict[int, Any] = {}
 
         def take(number: int, _: FrameType | None) -> None:
@@ -48,14 +48,17 @@ class Controls:
                 if number := getattr(signal, name, None):
                     before[number] = signal.signal(number, take)
         try:
-            yield
+            with _keys() as keys:
+                self._sources.append(keys)
+                yield
+                self._sources.remove(keys)
         finally:
             for which, handler in before.items():
                 signal.signal(which, handler)
 
 
 @contextmanager
-def terminal() -> Iterator[Callable[[], list[str]]]:
+def _keys() -> Iterator[Callable[[], list[str]]]:
     """Keys of the terminal as a source of commands; none where the input is no terminal."""
     if sys.stdin is None or not sys.stdin.isatty():
         yield list
@@ -70,12 +73,12 @@ def terminal() -> Iterator[Callable[[], list[str]]]:
     before = termios.tcgetattr(file)
     try:
         tty.setcbreak(file)
-        yield lambda: _keys(file)
+        yield lambda: _commands(file)
     finally:
         termios.tcsetattr(file, termios.TCSADRAIN, before)
 
 
-def _keys(file: int) -> list[str]:
+def _commands(file: int) -> list[str]:
     """Commands of the keys that were pressed."""
     import select
 

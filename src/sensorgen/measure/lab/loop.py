@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from typing import Protocol
 
 import numpy as np
@@ -77,6 +77,8 @@ class Loop:
         Whether a pause was asked for.
     travels : bool
         Whether the stage was sent somewhere, and has not come to rest.
+    homed : bool
+        Whether the actuator has found its upper end: before, its positions mean nothing.
     late : int
         Periods that began more than one period late.
     presses : int
@@ -103,6 +105,7 @@ class Loop:
     message: str = ""
     paused: bool = False
     travels: bool = False
+    homed: bool = False
     late: int = 0
     presses: int = 0
     count: int = 0
@@ -186,26 +189,30 @@ class Loop:
         self._last_s = due if now - due < PERIOD_S else now
 
     def _check_actuator(self) -> None:
-        at, limits = self.extension, self.experiment.limits
+        """Lift at once, in the same period, what leaves the limits."""
+        if wrong := self._wrong():
+            self.rig.actuator.lift()
+            if self.travels:
+                self.rig.stage.stop()
+            raise DeviceFault(f"{wrong}: lifted")
+
+    def _wrong(self) -> str:
+        """What is wrong with the actuator's reading; "" if nothing is."""
+        at, limits, now = self.extension, self.experiment.limits, self.clock.now()
         if not (isfinite(at.force_n) and isfinite(at.position_mm)):
-            self.rig.actuator.lift()
-            raise DeviceFault("actuator: a force or position that is no number; check its connection")
+            return "actuator: a force or position that is no number"
         if at.force_n > limits.force_n:
-            self.rig.actuator.lift()
-            raise DeviceFault(f"force {at.force_n:.2f} N is above the limit of {limits.force_n:g} N: lifted")
+            return f"force {at.force_n:.2f} N is above the limit of {limits.force_n:g} N"
         if self.travels and at.position_mm > 2 * UP_MM:
-            self.rig.actuator.lift()
-            self.rig.stage.stop()
-            raise DeviceFault(f"actuator: the tip came down to {at.position_mm:.2f} mm while the stage moved: lifted")
-        deepest = min(limits.deepest_mm + _DEEP_MM, self.down_mm + _SUNK_MM if self.down else limits.deepest_mm + 1)
-        if at.position_mm > deepest:
-            self.rig.actuator.lift()
-            raise DeviceFault(f"actuator: at {at.position_mm:.2f} mm, deeper than {deepest:.2f} mm: lifted")
+            return f"actuator: the tip came down to {at.position_mm:.2f} mm while the stage moved"
+        deepest = min(limits.deepest_mm + _DEEP_MM, self.down_mm + _SUNK_MM if self.down else inf)
+        if self.homed and at.position_mm > deepest:
+            return f"actuator: at {at.position_mm:.2f} mm, deeper than {deepest:.2f} mm"
         if not isfinite(self.set_n) or abs(at.force_n - self.set_n) < _FOLLOW_N + _FOLLOW_SHARE * self.set_n:
-            self._follows_s = self.clock.now()
-        elif self.clock.now() - self._follows_s > _FOLLOW_S:
-            self.rig.actuator.lift()
-            raise DeviceFault(f"actuator: {at.force_n:.2f} N instead of {self.set_n:.2f} N for {_FOLLOW_S:g} s: lifted")
+            self._follows_s = now
+        if now - self._follows_s > _FOLLOW_S:
+            return f"actuator: {at.force_n:.2f} N instead of {self.set_n:.2f} N for {_FOLLOW_S:g} s"
+        return ""
 
     def _record(self) -> None:
         """A row of the rig; free of the specimen there is no force on it, whatever friction makes the motor do."""

@@ -54,6 +54,7 @@ def prepared(loop: Loop, middle_mm: float) -> None:
         loop.period()
         if loop.clock.now() > until:
             raise DeviceFault(f"actuator: not at its upper end {press._UP_S:g} s after its start")
+    loop.homed = True
     loop.message = "zero of the stage"
     rig.started.add("stage")
     rig.stage.start()

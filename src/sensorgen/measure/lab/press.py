@@ -52,16 +52,13 @@ def travel(loop: Loop, place_mm: float) -> None:
 def settle(loop: Loop, where: str) -> None:
     """Wait until the stage rests; stop it at once if the tip comes down meanwhile."""
     until = loop.clock.now() + _TRAVEL_S
-    loop.period()
+    loop.travels = True
+    loop.wait(_LOOK_S)
     while loop.read_stage().moving:
-        loop.period()
-        if loop.extension.position_mm > 2 * UP_MM:
-            loop.rig.stage.stop()
-            raise DeviceFault(
-                f"actuator: the tip came down to {loop.extension.position_mm:.2f} mm while the stage moved"
-            )
+        loop.wait(_LOOK_S)
         if loop.clock.now() > until:
             raise DeviceFault(f"stage: not {where} after {_TRAVEL_S:g} s")
+    loop.travels = False
 
 
 def raised(loop: Loop) -> None:

@@ -127,7 +127,7 @@ class Recorder:
         if not len(found.time_s):
             return
         stamp = f"{self._clock.epoch():.6f}"
-        valid: list[bool] = np.isfinite(found.impedance_ohm).all(axis=1).tolist()
+        valid = [bool(np.isfinite(row).all()) for row in found.impedance_ohm]
         columns: list[list[float]] = np.ascontiguousarray(found.impedance_ohm).view(float).tolist()
         rows = zip(found.time_s.tolist(), columns, found.clipped.tolist(), valid, strict=True)
         self.impedance.write(

@@ -1,10 +1,11 @@
 """Run an experiment: prepare the rig, press, record into the log, and leave the tip up whatever happens."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
-from math import isfinite
+from math import ceil, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,8 @@ from sensorgen.measure.log.entries import BenchRun
 if TYPE_CHECKING:
     from sensorgen.measure.log import Log
 
+Confirm = Callable[["Planned", dict[str, Identity]], bool]
+"""Whether the rig may move, by what is planned and what each device said that it is."""
 USUAL_MM = 100.0  # length of a specimen whose design is unknown
 
 
@@ -115,6 +118,17 @@ class Planned:
     steps: tuple[Step, ...]
     seconds: float
 
+    def summary(self) -> str:
+        """One line."""
+        kinds = Counter(step.kind for step in self.steps)
+        presses = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+        hours, minutes = divmod(ceil(self.seconds / 60), 60)
+        limits = self.experiment.limits
+        return (
+            f"{self.experiment.specimen}, {self.length_mm:g} mm: presses {presses}; about {hours} h {minutes} min; tip "
+            f"{self.experiment.pressing.length_mm:g} mm; limits {limits.force_n:g} N, {limits.deepest_mm:g} mm deep"
+        )
+
 
 def planned(experiment: Experiment, log: "Log | None" = None) -> Planned:
     """Check an experiment against its specimen, and make its presses; nothing moves.
@@ -151,7 +165,7 @@ def _length_mm(experiment: Experiment, log: "Log | None") -> float:
 def run(
     experiment: Experiment, *, clock: Clock, log: "Log", rig: Rig, simulated: bool, view: View | None = None,
     controls: Controls | None = None, guardian: Alive | None = None, next_press: NextPress | None = None,
-    predicted: Predicted | None = None, resume: Path | None = None,
+    predicted: Predicted | None = None, resume: Path | None = None, confirm: Confirm = lambda *_: True,
 ) -> RunResult:  # fmt: skip
     """Run an experiment.
 
@@ -173,6 +187,8 @@ def run(
         Chooses the presses of ``next`` parts.
     resume : Path, optional
         Folder of a run of this experiment that ended early: the steps not done are done.
+    confirm : callable
+        Asked when all devices are identified, and before any moves, whether they may.
 
     Raises
     ------
@@ -188,11 +204,10 @@ def run(
     with ExitStack() as stack:
         if not stack.enter_context(recorder.alone(folder)):
             raise BadInput(f"{str(folder)!r} is a run that goes on in another process; expected one that has ended")
-        attempt = _Attempt(plan, clock, log, rig, folder, simulated, next_press)
+        attempt = _Attempt(plan, clock, log, rig, folder, simulated, next_press, confirm)
         controls = controls or Controls()
         if view:
             controls.add(view.commands)
-        stack.enter_context(controls.signals())
         return attempt.result(view, controls, guardian, predicted)
 
 
@@ -201,10 +216,10 @@ class _Attempt:
 
     def __init__(
         self, plan: Planned, clock: Clock, log: "Log", rig: Rig, folder: Path, simulated: bool,
-        next_press: NextPress | None,
+        next_press: NextPress | None, confirm: Confirm,
     ) -> None:  # fmt: skip
         self.plan, self.clock, self.log, self.rig, self.folder = plan, clock, log, rig, folder
-        self.simulated, self.next_press = simulated, next_press
+        self.simulated, self.next_press, self.confirm = simulated, next_press, confirm
         before = Run.read(folder) if (folder / recorder.JOURNAL).exists() else Run(folder, ())
         self.number, self.done = before.attempts + 1, before.done
         self.pressed = _pressed(before, plan.steps)
@@ -225,16 +240,17 @@ class _Attempt:
             steps=len(self.plan.steps),
         )  # fmt: skip
         fault: BaseException | None = None
-        try:
-            end, reason = self._worked(loop)
-        except Ended as error:
-            end, reason = error.end, str(error)
-        except SensorgenError as error:
-            end, reason = "fault", str(error)
-        except BaseException as error:  # whatever it is, the tip goes up first
-            end, reason, fault = "fault", f"{type(error).__name__}: {error}", error
-        up, problems = safety.made_safe(self.rig, self.clock, lambda: None if end == "fault" else loop.beat())
-        safety.close(self.rig)
+        with ExitStack() as listening:  # signals are held back until the tip is up
+            try:
+                end, reason = self._worked(loop, listening)
+            except Ended as error:
+                end, reason = error.end, str(error)
+            except SensorgenError as error:
+                end, reason = "fault", str(error)
+            except BaseException as error:  # whatever it is, the tip goes up first
+                end, reason, fault = "fault", f"{type(error).__name__}: {error}", error
+            up, problems = safety.made_safe(self.rig, self.clock, loop.beat)
+            safety.close(self.rig)
         found = self._ended(loop, kept, end, reason, up, problems)
         if fault:
             raise fault
@@ -251,10 +267,17 @@ class _Attempt:
             steps=len(self.plan.steps),
         )  # fmt: skip
 
-    def _worked(self, loop: Loop) -> tuple[str, str]:
-        """All presses that are not done."""
+    def _worked(self, loop: Loop, listening: ExitStack) -> tuple[str, str]:
+        """All of the run, but for its end."""
         self.identities = preflight.identified(self.rig)
         loop.recorder.journal.note("identified", **{role: asdict(who) for role, who in self.identities.items()})
+        if not self.confirm(self.plan, self.identities):
+            raise Ended("abort", "not confirmed; nothing has moved")
+        listening.enter_context(loop.controls.listening())
+        return self._presses(loop)
+
+    def _presses(self, loop: Loop) -> tuple[str, str]:
+        """Prepare the rig, then all presses that are not done."""
         experiment = self.plan.experiment
         low, high = self._places_mm
         middle = experiment.approach.place_mm

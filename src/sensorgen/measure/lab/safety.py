@@ -1,6 +1,7 @@
 """Make the rig safe, whatever has failed: lift the actuator, raise the stage, switch off."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from math import inf
 
@@ -10,7 +11,8 @@ from sensorgen.measure.lab.devices import Actuator, ImpedanceMeter, Stage
 
 UP_MM = 1.0  # of its upper end, within which the piston counts as up
 RAISED_MM = 1.0  # above its working height, from which on the stage counts as raised, when it has come to rest
-_LIFT_S, _POLL_S, _AGAIN_S = 8.0, 0.05, 0.5
+_FALLEN_MM, _HELD_S = 1.0, 1.0  # what a piston falls without a motor, if it falls, and in which time it shows
+_LIFT_S, _POLL_S, _AGAIN_S = 15.0, 0.05, 0.5
 
 
 class Ended(Exception):
@@ -59,8 +61,9 @@ class _Attempts:
 
     def __call__(self, what: str, call: Callable[[], object]) -> bool:
         """Whether it worked."""
-        try:
+        with suppress(SensorgenError):  # a dead guardian must not keep the tip down
             self.beat()
+        try:
             call()
         except Exception as error:  # also errors of a driver's own must not keep the tip down
             kind = "" if isinstance(error, SensorgenError) else f"{type(error).__name__}: "
@@ -86,23 +89,26 @@ def made_safe(rig: Rig, clock: Clock, beat: Callable[[], None] = lambda: None) -
     Returns
     -------
     up : bool
-        Whether actuator or stage says that the tip is up, or nothing had been started.
+        Whether actuator or stage said that the tip is up, or nothing had been started.
     problems : tuple of str
         What failed meanwhile.
     """
     attempt = _Attempts(beat)
-    up = _lift(rig, clock, attempt) or not rig.started & {"actuator", "stage"}
+    safe = _lift(rig, clock, attempt)
     if "actuator" in rig.started:
         attempt("motor off", rig.actuator.off)
+        if safe.get("actuator") and not safe.get("stage"):
+            _held(rig, clock, attempt)
+    up = any(safe.values()) or not safe
     if "impedance" in rig.started:
         attempt("impedance meter off", rig.impedance.stop)
     return up, tuple(attempt.problems)
 
 
-def _lift(rig: Rig, clock: Clock, attempt: _Attempts) -> bool:
-    """Lift by both, again where one does not follow; whether one says that the tip is up."""
+def _lift(rig: Rig, clock: Clock, attempt: _Attempts) -> dict[str, bool]:
+    """Lift by both, again where one does not follow; which of them say that the tip is up."""
     until, again = clock.now() + _LIFT_S, -inf
-    up = {role: False for role in ("actuator", "stage") if role in rig.started}
+    up: dict[str, bool] = {role: False for role in ("actuator", "stage") if role in rig.started}
 
     def look_actuator() -> None:
         up["actuator"] = rig.actuator.read().position_mm <= UP_MM
@@ -123,7 +129,27 @@ def _lift(rig: Rig, clock: Clock, attempt: _Attempts) -> bool:
             attempt("actuator", look_actuator)
         if not up.get("stage", True):
             attempt("stage", look_stage)
-    return any(up.values())
+    return up
+
+
+def _held(rig: Rig, clock: Clock, attempt: _Attempts) -> None:
+    """See that friction holds the piston up, where the stage does not keep it away; else its motor has to."""
+    fallen = False
+
+    def look() -> None:
+        nonlocal fallen
+        fallen = rig.actuator.read().position_mm > UP_MM + _FALLEN_MM
+
+    until = clock.now() + _HELD_S
+    while not fallen and clock.now() < until:
+        clock.wait_until(clock.now() + _POLL_S)
+        attempt("actuator", look)
+    if fallen:
+        attempt("lift of the actuator", rig.actuator.lift)
+        attempt.problems.append(
+            "the stage is not raised, and the piston falls when its motor is off: the motor holds it up; secure the "
+            "piston before you switch it off"
+        )
 
 
 def close(rig: Rig) -> None:

@@ -1,0 +1,237 @@
+"""A second process that lifts the tip when the run dies or hangs.
+
+The run sends it signs of life through a pipe. When the pipe closes, as it does however the run dies, or when no sign
+comes for the dead man's time, it ends the run for good, opens the lines of actuator and stage anew, lifts both, and
+switches the motor off. It has a session of its own, so that what ends the run's terminal does not end it. It tells the
+run that it lives; when it dies, the run notices, lifts the tip, and ends.
+
+As a program, ``python -m sensorgen.measure.lab.guardian`` takes its orders as the first line of its input, as JSON.
+"""
+
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any, Self, cast
+
+from sensorgen.core.errors import SensorgenError
+from sensorgen.measure.lab.devices import DeviceFault
+from sensorgen.measure.lab.experiment import Device
+
+REPORT = "guardian.jsonl"
+_ARM, _BEAT, _RELEASE, _ALIVE = b"A", b".", b"R", b"+"
+_TELL_S, _DEAF_S, _BEGIN_S = 0.2, 3.0, 30.0  # from one sign of the guardian to the next, until it is missed, to begin
+_TRIES_S, _AGAIN_S = 10.0, 0.1  # for which a line that cannot be opened is tried
+_STALL = 2.0  # of the guardian itself, in its own periods: a stalled judge judges nobody
+
+
+@dataclass(frozen=True)
+class Orders:
+    """What a guardian is to do.
+
+    Attributes
+    ----------
+    devices : dict of str to Device
+        "actuator" and "stage", those that have a line that can be opened anew.
+    dead_man_s : float
+        Without a sign of life for this long the run counts as hung [s].
+    folder : Path
+        Of the run, for its report.
+    """
+
+    devices: dict[str, Device]
+    dead_man_s: float
+    folder: Path
+
+    def to_json(self) -> str:
+        """One line."""
+        devices = {role: device.model_dump(mode="json") for role, device in self.devices.items()}
+        return json.dumps({"devices": devices, "dead_man_s": self.dead_man_s, "folder": str(self.folder)}) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """What :meth:`to_json` wrote."""
+        data = json.loads(text)
+        devices = {role: Device.model_validate_json(json.dumps(each)) for role, each in data["devices"].items()}
+        return cls(devices, data["dead_man_s"], Path(data["folder"]))
+
+
+class Guardian:
+    """The guardian as its run sees it; use it in a ``with`` statement.
+
+    Parameters
+    ----------
+    orders : Orders
+        What to do.
+
+    Raises
+    ------
+    DeviceFault
+        It does not start.
+    """
+
+    def __init__(self, orders: Orders) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "sensorgen.measure.lab.guardian"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            bufsize=0, start_new_session=True,
+        )  # fmt: skip
+        self._pipes = cast(IO[bytes], self._process.stdin), cast(IO[bytes], self._process.stdout)
+        self._to, self._from = (pipe.fileno() for pipe in self._pipes)
+        self._heard_s = time.monotonic()
+        try:
+            os.write(self._to, orders.to_json().encode())
+            if not select.select([self._from], [], [], _BEGIN_S)[0] or not os.read(self._from, 1):
+                raise DeviceFault("guardian: it does not start")
+        except BaseException as error:
+            self._process.kill()
+            self._process.wait()
+            if isinstance(error, OSError):
+                raise DeviceFault(f"guardian: it does not start: {error.strerror}") from None
+            raise
+        os.set_blocking(self._to, False)
+        os.set_blocking(self._from, False)
+
+    @property
+    def pid(self) -> int:
+        """Number of its process."""
+        return self._process.pid
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+    def arm(self) -> None:
+        """From now on it lifts the tip when the signs of life end."""
+        self._send(_ARM)
+
+    def beat(self) -> None:
+        """A sign of life; DeviceFault where the guardian gives none itself."""
+        self._send(_BEAT)
+        now = time.monotonic()
+        with suppress(BlockingIOError):
+            if os.read(self._from, 4096):
+                self._heard_s = now
+            else:
+                raise DeviceFault("guardian: it has died")
+        if now - self._heard_s > _DEAF_S:
+            raise DeviceFault(f"guardian: no sign of life for {_DEAF_S:g} s")
+
+    def release(self) -> None:
+        """The tip is up by the run's own doing: end without lifting. Never raises."""
+        with suppress(DeviceFault):
+            self._send(_RELEASE)
+        with suppress(OSError):
+            self._pipes[0].close()
+        try:
+            self._process.wait(_DEAF_S)
+        except subprocess.TimeoutExpired:  # hung: it must not wake up later and lift by itself
+            self._process.kill()
+            self._process.wait()
+        self._pipes[1].close()
+
+    def _send(self, sign: bytes) -> None:
+        try:
+            os.write(self._to, sign)
+        except OSError as error:
+            raise DeviceFault(f"guardian: it has died or hangs ({error.strerror})") from None
+
+
+def watch(orders: Orders, run: int) -> str:
+    """Wait for signs of life on the standard input until they end; why the tip has to be lifted, or "".
+
+    Parameters
+    ----------
+    orders : Orders
+        What to do.
+    run : int
+        Number of the run's process; it is killed when it hangs, so that it does not wake up and press.
+    """
+    armed, last, told, looked = False, time.monotonic(), 0.0, time.monotonic()
+    period = min(_TELL_S, orders.dead_man_s / 4)
+    while True:
+        ready = bool(select.select([0], [], [], period)[0])
+        now = time.monotonic()
+        signs = os.read(0, 4096) if ready else b""
+        if ready and not signs:
+            return "the run has died" if armed else ""
+        if _RELEASE in signs:
+            return ""
+        armed |= _ARM in signs
+        if signs or now - looked > _STALL * period + period:
+            last = now
+        looked = now
+        if armed and now - last > orders.dead_man_s:
+            if os.getppid() == run:
+                os.kill(run, signal.SIGKILL)
+            return f"the run has given no sign of life for {now - last:.2f} s and was killed"
+        if now - told > _TELL_S:
+            told = now
+            with suppress(OSError):
+                os.write(1, _ALIVE)
+
+
+def rescued(orders: Orders, rescue: Callable[[str, Device], None]) -> dict[str, str]:
+    """Lift by every device at once, none waiting for another; what became of each."""
+    found: dict[str, str] = {}
+
+    def one(role: str, device: Device) -> None:
+        until = time.monotonic() + _TRIES_S
+        while True:
+            try:
+                rescue(role, device)
+            except (SensorgenError, OSError) as error:  # as a line that the dead run still has
+                found[role] = str(error)
+                if time.monotonic() > until:
+                    return
+                time.sleep(_AGAIN_S)
+            else:
+                found[role] = "lifted"
+                return
+
+    threads = [threading.Thread(target=one, args=pair, daemon=True) for pair in orders.devices.items()]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(_TRIES_S + _DEAF_S)
+    return {role: found.get(role, "no answer") for role in orders.devices}
+
+
+def main() -> None:
+    """Take orders, watch, and lift if need be."""
+    run = os.getppid()
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if number := getattr(signal, name, None):
+            signal.signal(number, signal.SIG_IGN)
+    orders = Orders.from_json(_line())
+    from sensorgen.measure.lab import rigs
+
+    os.write(1, _ALIVE)
+    reason = watch(orders, run)
+    if reason:
+        begun = time.monotonic()
+        done: dict[str, Any] = {"reason": reason, "devices": rescued(orders, rigs.rescue)}
+        done |= {"at": round(time.time(), 3), "took_s": round(time.monotonic() - begun, 3)}
+        with suppress(OSError), (orders.folder / REPORT).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(done) + "\n")
+
+
+def _line() -> str:
+    """The first line of the input, and no byte more."""
+    text = b""
+    while not text.endswith(b"\n") and (more := os.read(0, 1)):
+        text += more
+    return text.decode()
+
+
+if __name__ == "__main__":
+    main()
