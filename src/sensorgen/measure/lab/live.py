@@ -60,7 +60,7 @@ class LiveView:
     Attributes
     ----------
     url : str
-        Address of the page, with the secret word without which it answers nobody.
+        Address of the page, with the secret token that every request needs.
     """
 
     def __init__(self, title: str, tones_hz: ArrayLike) -> None:
