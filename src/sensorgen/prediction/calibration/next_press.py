@@ -1,13 +1,13 @@
-"""The next press of a calibration: the one that is expected to tell most of what is asked (sequential optimal design).
+"""The next press of a calibration, by sequential optimal design.
 
 A press of known force and place, held for a known time, some of them after a higher force, has a ratio of readings with
 the slopes J by the parameters and the covariance S. It changes the covariance C of the parameters to
 
-.. math:: C' = C - C J^T (S + J C J^T)^{-1} J C,
+.. math:: C' = C - C J^T (S + J C J^T)^{-1} J C
 
-known before the press, in the model linearised at what is known so far. The aim ``values`` minimises the determinant
-of C' among the specimen's values, whatever the other parameters are (D_s-optimality; Atkinson, Donev and Tobias,
-Optimum Experimental Designs, 2007, chapter 10); the aim ``presses`` the variance that C' leaves in the ratios of
+in the model linearised at the posterior's mean, whatever it will read. The aim ``values`` minimises the determinant of
+C' among the specimen's values, all other parameters integrated out (D_s-optimality; Atkinson, Donev and Tobias, Optimum
+Experimental Designs, 2007, chapter 10); the aim ``presses`` minimises the variance that C' leaves in the ratios of
 presses anywhere, over their own (V-optimality), which is what an inversion needs.
 """
 
@@ -123,7 +123,7 @@ class NextPress:
         return Presses(force, near + (far - near) * share[1], unloading, hold[0] + (hold[1] - hold[0]) * share[3])
 
     def best(self, known: Posterior) -> KnownPress:
-        """The most informative press after what is known."""
+        """The most informative next press."""
         k = int(np.argmin(self.left(known, self.tried)))
         force, position, unloading, decades = (float(column[k]) for column in vars(self.tried).values())
         return KnownPress(force, position, force / (1 - unloading), 10**decades)
