@@ -1,0 +1,311 @@
+"""The simulated rig: piston with weight and friction, tip, stage, and the specimen below, as one mechanism."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import copysign, exp, inf, sqrt
+
+import numpy as np
+
+from sensorgen.core.arrays import Complex, Real
+from sensorgen.core.errors import BadInput
+from sensorgen.measure.virtual.specimen import Line, Specimen
+
+STEP_S = 2e-3  # of the mechanism
+OPEN_OHM = 1e12  # what is read with the cable out
+_CREEP_S = tuple(0.1 * 10 ** (k / 2) for k in range(9))  # relaxation times, half a decade apart
+_PER_TIME = 0.5  # decades that each of them stands for
+_RESTING_N = 1e-3  # a force below which the specimen has forgotten its peak
+_PRESLIDE_MM = 0.02  # in which friction turns round (Dahl, 1968)
+_NEAR_MM = 0.2  # of the set position, where the position loop integrates its error
+_INTEGRAL_PER_S = 10.0
+_SECONDS_OF_DRIFT = 1.0  # between steps of the drift
+
+
+@dataclass(frozen=True)
+class Mechanics:
+    """What the rig is made of.
+
+    Attributes
+    ----------
+    weight_n : float
+        Of the moving part [N]; 0.9 N in the thesis (5.1.2).
+    friction_n : float
+        Of its guide, either way [N]; up to 1 N.
+    lag_s : float
+        Of the motor's current behind its set value [s].
+    damping_n_s_mm : float
+        Of the guide [N s/mm].
+    servo_n_mm : float
+        Force of the position loop per error [N/mm].
+    stiffness_n_mm : float
+        Of tip, frame and specimen in series [N/mm]: some 40 with a tip of PLA, 3 with one of soft TPU 10 mm thick.
+    clearance_mm : float
+        Extension at which the tip touches, at the stage's working height [mm].
+    stroke_mm : float
+        Of the piston [mm].
+    force_limit_n : float
+        Force on the specimen above which a violation is noted [N].
+    clock_skew, latency_s : float
+        Of the instruments' clocks, relative, and time after which their readings come [-], [s]; for the simulators.
+    """
+
+    weight_n: float = 0.9
+    friction_n: float = 0.2
+    lag_s: float = 2e-3
+    damping_n_s_mm: float = 0.02
+    servo_n_mm: float = 4.0
+    stiffness_n_mm: float = 40.0
+    clearance_mm: float = 30.0
+    stroke_mm: float = 50.0
+    force_limit_n: float = 8.0
+    clock_skew: float = 0.0
+    latency_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse a mechanism that cannot move."""
+        above = ("lag_s", "damping_n_s_mm", "servo_n_mm", "stiffness_n_mm", "stroke_mm", "force_limit_n")
+        for name in above:
+            if not getattr(self, name) > 0:
+                raise BadInput(f"{name} of a virtual rig is {getattr(self, name):g}; expected a number above 0")
+        if not (self.weight_n >= 0 and self.friction_n >= 0 and self.latency_s >= 0):
+            raise BadInput("weight, friction and latency of a virtual rig; expected numbers from 0 on")
+
+
+@dataclass
+class Violation:
+    """Something that must not happen on a rig.
+
+    Attributes
+    ----------
+    time_s : float
+        Its begin [s].
+    what : str
+        "sideways", a move of the stage with the tip down, or "force", above the limit.
+    value : float
+        The largest force meanwhile [N].
+    duration_s : float
+        How long it lasted [s].
+    """
+
+    time_s: float
+    what: str
+    value: float
+    duration_s: float = 0.0
+
+
+@dataclass
+class _Axis:
+    """One axis of the stage."""
+
+    at_mm: float
+    target_mm: float
+    speed_mm_s: float = 0.0
+
+    @property
+    def moves(self) -> bool:
+        return self.at_mm != self.target_mm
+
+    def step(self, dt: float) -> None:
+        left = self.target_mm - self.at_mm
+        most = self.speed_mm_s * dt
+        self.at_mm = self.target_mm if abs(left) <= most else self.at_mm + copysign(most, left)
+
+
+@dataclass
+class Rig:
+    """A :class:`sensorgen.measure.virtual.plant.Plant`.
+
+    Attributes
+    ----------
+    specimen : Specimen
+        Below the tip.
+    mechanics : Mechanics
+        Of piston, tip and stage.
+    seed : int
+        Of the drift.
+    force_n : float
+        On the specimen now [N].
+    peak_n : float
+        Largest force so far [N].
+    violations : list of Violation
+        So far, in the order of their begin.
+    fault : str
+        Name of a fault of the mechanism or of the cables, see :mod:`sensorgen.measure.virtual.faults`; "" for none.
+    """
+
+    specimen: Specimen
+    mechanics: Mechanics = field(default_factory=Mechanics)
+    seed: int = 0
+    time_s: float = 0.0
+    extension_mm: float = 0.0
+    motor_n: float = 0.0
+    force_n: float = 0.0
+    peak_n: float = 0.0
+    fault: str = ""
+    violations: list[Violation] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """At rest, raised."""
+        self._axes: Mapping[str, _Axis] = {"x": _Axis(0.0, 0.0), "z": _Axis(20.0, 20.0)}
+        self._on, self._limit_n = False, inf
+        self._sought: tuple[float, float, float] | None = None  # extension, speed, force
+        self._wanted_n = self._friction_n = self._reference_mm = self._against_n = 0.0
+        self._press_peak_n = 0.0
+        self._crept = np.zeros(len(_CREEP_S))
+        self._open: dict[str, Violation] = {}
+        self._rng = np.random.default_rng([self.seed, 1])
+        self._drift, self._drifted_s = self._rng.standard_normal(2), self.time_s
+        self._lines: dict[bytes, Line] = {}
+
+    def advance(self, time_s: float) -> None:
+        """Let the mechanism move on to a time [s]; one that is past changes nothing."""
+        while time_s - self.time_s > 1e-12:
+            dt = min(STEP_S, time_s - self.time_s)
+            moved = self._axes["x"].moves
+            for axis in self._axes.values():
+                if axis.moves:
+                    axis.step(dt)
+            self._motor(dt)
+            self._piston(dt)
+            self._memory(dt)
+            self.time_s += dt
+            self._watch("sideways", moved and self.force_n > 0, dt)
+            self._watch("force", self.force_n > self.mechanics.force_limit_n, dt)
+
+    def switch(self, *, on: bool) -> None:
+        """Motor on or off; off, nothing but friction holds the piston. It goes on with no force."""
+        self._on, self._sought, self._wanted_n = on, None, 0.0
+
+    def limit(self, motor_n: float) -> None:
+        """Largest force of the motor, either way [N]."""
+        self._limit_n = abs(motor_n)
+
+    def drive(self, motor_n: float) -> None:
+        """Force mode: a force of the motor, downwards positive [N]."""
+        self._sought, self._wanted_n = None, motor_n
+
+    def seek(self, extension_mm: float, speed_mm_s: float, motor_n: float) -> None:
+        """Position mode: go to an extension with at most a force of the motor downwards, which may be negative.
+
+        Upwards it may use all that :meth:`limit` allows.
+        """
+        self._reference_mm, self._against_n = self.extension_mm, 0.0
+        self._sought = extension_mm, abs(speed_mm_s), motor_n
+
+    def travel(self, axis: str, position_mm: float, speed_mm_s: float) -> None:
+        """Begin a move of the stage along "x", or "z", which raises the actuator."""
+        self._axes[axis].target_mm, self._axes[axis].speed_mm_s = position_mm, abs(speed_mm_s)
+
+    def axis(self, axis: str) -> tuple[float, bool]:
+        """Position of an axis [mm], and whether it moves."""
+        return self._axes[axis].at_mm, self._axes[axis].moves
+
+    @property
+    def tip_mm(self) -> float:
+        """Height of the tip above the specimen; negative where it presses [mm]."""
+        return self.mechanics.clearance_mm + self._axes["z"].at_mm - self.extension_mm
+
+    def impedance(self, frequency_hz: Real) -> Complex:
+        """What an ideal instrument at the end of the leads would read now, of (m,) frequencies [ohm]."""
+        frequency = np.atleast_1d(np.asarray(frequency_hz, float))
+        if self.fault == "cable-out":
+            return np.full(len(frequency), OPEN_OHM, complex)
+        key = frequency.tobytes()
+        if key not in self._lines:
+            self._lines[key] = self.specimen.line(frequency)
+        truth, ends = self.specimen.truth, (0.0, 0.0)
+        lift = 0.0
+        if self.force_n > 0:
+            ends = self.specimen.patch(self._axes["x"].at_mm * 1e-3)
+            lift = self._lift(ends[1] - ends[0])
+        shorted = self.force_n <= truth.short_opens_n
+        c, r = self._drift * (truth.drift_c, truth.drift_r)
+        return self._lines[key].impedance(lift, ends if lift else (0.0, 0.0), c, r, shorted=shorted)
+
+    def resistance(self, *, wires: int) -> float:
+        """What an ideal multimeter would read across the bottom electrode [ohm]."""
+        truth = self.specimen.truth
+        if self.fault == "cable-out":
+            return OPEN_OHM
+        strip = self.specimen.track_ohm_per_m[1] * self.specimen.length_m * exp(truth.drift_r * self._drift[1])
+        return float(strip + (truth.lead_ohm if wires == 2 else 0.0))
+
+    def _lift(self, covered_m: float) -> float:
+        """Rise of C under the tip, with what the specimen remembers."""
+        unloading = 1 - self.force_n / max(self._press_peak_n, self.force_n)
+        crept = float(self._crept.sum()) * _PER_TIME / self.force_n - _CREPT_AT_1_S
+        return self.specimen.rise(self.force_n, covered_m, unloading, crept)
+
+    def _motor(self, dt: float) -> None:
+        wanted = self._wanted_n
+        if self._sought is not None:
+            extension, speed, force = self._sought
+            if abs(self._reference_mm - self.extension_mm) < 1.0:
+                left = extension - self._reference_mm
+                most = speed * dt
+                self._reference_mm = extension if abs(left) <= most else self._reference_mm + copysign(most, left)
+            off = self._reference_mm - self.extension_mm
+            if abs(off) < _NEAR_MM:
+                most = self.mechanics.friction_n + _NEAR_MM * self.mechanics.servo_n_mm
+                self._against_n = min(
+                    max(self._against_n + _INTEGRAL_PER_S * self.mechanics.servo_n_mm * off * dt, -most), most
+                )
+            wanted = min(self.mechanics.servo_n_mm * off + self._against_n - self.mechanics.weight_n, force)
+        wanted = min(max(wanted, -self._limit_n), self._limit_n) if self._on else 0.0
+        self.motor_n += (wanted - self.motor_n) * (1 - exp(-dt / self.mechanics.lag_s))
+
+    def _piston(self, dt: float) -> None:
+        """Damped motion with friction of Dahl's kind, both implicit, so that a stiff contact stays stable."""
+        m = self.mechanics
+        depth = -self.tip_mm
+        k = m.stiffness_n_mm
+        contact = k * depth if depth > 0 else 0.0
+        net = self.motor_n + m.weight_n - contact - self._friction_n
+        slide = 0.0
+        if m.friction_n:
+            against = 1 - self._friction_n / m.friction_n * (1.0 if net > 0 else -1.0)
+            slide = m.friction_n / _PRESLIDE_MM * max(against, 0.0)
+        speed = net / (m.damping_n_s_mm + (slide + (k if depth > 0 else 0.0)) * dt)
+        if depth <= 0 < depth + speed * dt:  # touches within this step
+            speed = (net - k * depth) / (m.damping_n_s_mm + (slide + k) * dt)
+        before = self.extension_mm
+        self.extension_mm = min(max(before + speed * dt, 0.0), m.stroke_mm)
+        moved = self.extension_mm - before
+        self._friction_n = min(max(self._friction_n + slide * moved, -m.friction_n), m.friction_n)
+        self.force_n = max(-self.tip_mm, 0.0) * k
+        self.peak_n = max(self.peak_n, self.force_n)
+
+    def _memory(self, dt: float) -> None:
+        """Peak of this press, what creeps, and the drift."""
+        if self.force_n < _RESTING_N:
+            self._press_peak_n = 0.0
+        elif self.force_n > self._press_peak_n:
+            self._press_peak_n = self.force_n
+        if self.force_n > 0 or self._crept[0] > 0:
+            self._crept += (self.force_n - self._crept) * _relaxed(dt)
+        if self.time_s - self._drifted_s >= _SECONDS_OF_DRIFT:
+            keep = exp(-(self.time_s - self._drifted_s) / self.specimen.truth.drift_s)
+            self._drift = keep * self._drift + sqrt(1 - keep**2) * self._rng.standard_normal(2)
+            self._drifted_s = self.time_s
+
+    def _watch(self, what: str, wrong: bool, dt: float) -> None:
+        if not wrong:
+            self._open.pop(what, None)
+            return
+        if what not in self._open:
+            self._open[what] = Violation(self.time_s, what, self.force_n)
+            self.violations.append(self._open[what])
+        found = self._open[what]
+        found.value, found.duration_s = max(found.value, self.force_n), found.duration_s + dt
+
+
+def _relaxed(dt: float) -> Real:
+    if dt not in _RELAXED:
+        if len(_RELAXED) > 256:
+            _RELAXED.clear()
+        _RELAXED[dt] = 1 - np.exp(-dt / np.array(_CREEP_S))
+    return _RELAXED[dt]
+
+
+_RELAXED: dict[float, Real] = {}
+_CREPT_AT_1_S = _PER_TIME * float(np.sum(1 - np.exp(-1 / np.array(_CREEP_S))))

@@ -1,0 +1,334 @@
+"""A print of a design, as it might be: geometry as printed, materials drawn from their ranges, and all that drifts.
+
+Written apart from what analyses it: an own solver of the cell (:mod:`.cell`), and an own line, a chain of short pieces.
+"""
+
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from math import exp, log
+
+import numpy as np
+
+from sensorgen.core.arrays import Complex, Real
+from sensorgen.core.errors import BadInput
+from sensorgen.core.units import M_PER_MM
+from sensorgen.design.design import Design
+from sensorgen.design.values import film
+from sensorgen.measure.virtual.blank import Blank, blank
+
+PIECES = 60  # of the chain that the line is
+_SHORTEST_S = 0.1  # of a hold, as its logarithm counts
+_RANGE = 2 * 1.959963984540054  # width of a material's range, in standard deviations of its logarithm
+SPREAD = {"resistivity_ohm_m": 0.5, "relative_permittivity": 0.1, "youngs_modulus_pa": 0.25}
+"""Standard deviations of ln where a material's value has no range: sources of resistivity differ by a factor of 12
+(etpu.yaml), those of permittivity from 4.68 to 6.33 (x60.yaml); moduli of printed elastomers by some 25 %."""
+_GEOMETRY = 0.02  # of ln R and ln C: width and thickness of printed tracks and films
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What one specimen, its leads and its rig really are; all errors 0 by default.
+
+    Attributes
+    ----------
+    resistivity, permittivity, modulus : float
+        Ln of the material's value over that of the design: of the electrodes, of the dielectric, of the dielectric [-].
+    tracks, cells : float
+        Ln of R and C over those of the body, for sizes that are not as printed [-].
+    profile : tuple of float
+        Of ln resistivity: amplitudes of 1, 2, ... half waves along the strip [-].
+    law : tuple of float
+        Of ln of the rise of C: amplitudes of 1, 2, ... half waves over ln force from 0.2 to 13 N [-].
+    leak : float
+        Conductance of the film over its susceptance at 1 kHz [-].
+    dispersion : float
+        Exponent with which C falls with frequency, from 1 kHz on [-].
+    hysteresis : float
+        Relative rise of the response to a force that was much higher [-].
+    creep : float
+        Relative rise of the response per decade of time; 0 at 1 s [-].
+    drift_c, drift_r, drift_s : float
+        Standard deviations of ln C and ln R over a session, and the time after which they are forgotten [-], [s].
+    lead_ohm, stray_f : float
+        In series with, and beside, the specimen [ohm], [F].
+    force_n, position_m : float
+        By which force and place are off [N], [m].
+    short_ohm, short_share, short_opens_n : float
+        A bridge between the electrodes, at a share of the length, and the force above which it opens; none if infinite.
+    """
+
+    resistivity: float = 0.0
+    permittivity: float = 0.0
+    modulus: float = 0.0
+    tracks: float = 0.0
+    cells: float = 0.0
+    profile: tuple[float, ...] = ()
+    law: tuple[float, ...] = ()
+    leak: float = 0.0
+    dispersion: float = 0.0
+    hysteresis: float = 0.0
+    creep: float = 0.0
+    drift_c: float = 0.0
+    drift_r: float = 0.0
+    drift_s: float = 300.0
+    lead_ohm: float = 0.0
+    stray_f: float = 0.0
+    force_n: float = 0.0
+    position_m: float = 0.0
+    short_ohm: float = np.inf
+    short_share: float = 0.5
+    short_opens_n: float = np.inf
+
+    def __post_init__(self) -> None:
+        """Refuse what no specimen is."""
+        above = ("leak", "drift_c", "drift_r", "lead_ohm", "stray_f", "short_ohm", "short_opens_n")
+        for one in fields(self):
+            value = np.atleast_1d(getattr(self, one.name))
+            if np.isnan(value).any() or (one.name in above and (value < 0).any()):
+                raise BadInput(f"{one.name} of a virtual specimen is {getattr(self, one.name)}; expected 0 or more")
+        if not self.drift_s > 0 or not 0 <= self.short_share <= 1:
+            raise BadInput(
+                f"drift_s {self.drift_s:g}, short_share {self.short_share:g}; expected a time above 0 and a share"
+            )
+
+
+def spreads(design: Design) -> dict[str, tuple[float, float]]:
+    """Mean and standard deviation of ln of the materials' values over the design's, by quantity.
+
+    A value with a range gets a logarithmic normal distribution with 95 % in it; others get ``SPREAD``.
+    """
+    electrode = design.materials.bottom_electrode.partition("@")
+    names = {"resistivity_ohm_m": electrode[::2], "youngs_modulus_pa": None, "relative_permittivity": None}
+    found = {}
+    for quantity, named in names.items():
+        name, source = named or design.materials.dielectric.partition("@")[::2]
+        value = design.material(name).value(quantity, source)
+        found[quantity] = 0.0, SPREAD[quantity]
+        if value.low and value.high and value.low < value.high:
+            middle = log(value.low * value.high) / 2 - log(value.value)
+            found[quantity] = middle, log(value.high / value.low) / _RANGE
+    return found
+
+
+def drawn(design: Design, seed: int) -> Truth:
+    """A random specimen of a design; equal for equal seeds."""
+    rng = np.random.default_rng(seed)
+    by = {name: float(rng.normal(*normal)) for name, normal in sorted(spreads(design).items())}
+
+    def waves(sd: float) -> tuple[float, ...]:
+        return tuple((rng.normal(0.0, sd, 3) / np.arange(1, 4)).tolist())
+
+    def normal(sd: float) -> float:
+        return float(rng.normal(0.0, sd))
+
+    return Truth(
+        resistivity=by["resistivity_ohm_m"], permittivity=by["relative_permittivity"], modulus=by["youngs_modulus_pa"],
+        tracks=normal(_GEOMETRY), cells=normal(_GEOMETRY), profile=waves(0.1), law=waves(0.05),
+        leak=float(np.exp(rng.normal(np.log(1e-3), 1.0))), dispersion=float(rng.uniform(0.0, 0.02)),
+        hysteresis=float(rng.uniform(0.03, 0.07)), creep=float(rng.uniform(0.01, 0.03)), drift_c=1e-3, drift_r=1e-3,
+        lead_ohm=float(rng.uniform(0.0, 60.0)), stray_f=float(rng.uniform(0.0, 1e-12)), force_n=normal(0.05),
+        position_m=normal(0.5e-3),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Specimen:
+    """A specimen that can be pressed.
+
+    Attributes
+    ----------
+    design : Design
+        What it was printed of.
+    truth : Truth
+        In what it differs from that.
+    tip_m : float
+        Length of the tip along the strip [m].
+    pieces : int
+        Of the chain that its line is.
+    """
+
+    design: Design
+    truth: Truth = field(default_factory=Truth)
+    tip_m: float = 5e-3
+    pieces: int = PIECES
+
+    def __post_init__(self) -> None:
+        """Refuse a tip that is none."""
+        if not 0 < self.tip_m <= self.length_m:
+            raise BadInput(
+                f"a tip of {self.tip_m * 1e3:g} mm on {self.length_m * 1e3:g} mm; expected one no longer than the strip"
+            )
+
+    @cached_property
+    def blank(self) -> Blank:
+        """The body that it was printed as, with the materials' values by the design."""
+        return blank(self.design)
+
+    @property
+    def length_m(self) -> float:
+        """Along the strip [m]."""
+        return self.design.params.length_mm * M_PER_MM
+
+    @property
+    def width_m(self) -> float:
+        """Across the strip [m]."""
+        return self.design.params.width_mm * M_PER_MM
+
+    def values(self) -> dict[str, float]:
+        """True values of the materials, by quantity: of the bottom electrode and of the dielectric."""
+        d, t = self.design, self.truth
+        electrode, source = d.slot("bottom_electrode")
+        material, by = d.material(film(d)), d.used().get(film(d), "")
+        return {
+            "resistivity_ohm_m": electrode.value("resistivity_ohm_m", source).value * exp(t.resistivity),
+            "relative_permittivity": material.value("relative_permittivity", by).value * exp(t.permittivity),
+            "youngs_modulus_pa": material.value("youngs_modulus_pa", by).value * exp(t.modulus),
+        }
+
+    @cached_property
+    def capacitance_f_per_m(self) -> float:
+        """With nothing on it, at 1 kHz [F/m]."""
+        return self.blank.capacitance_f_per_m(self.truth.permittivity) * exp(self.truth.cells)
+
+    @cached_property
+    def track_ohm_per_m(self) -> tuple[float, float]:
+        """Of the top and the bottom electrode, mean over the length of an even profile [ohm/m]."""
+        top, bottom = self.blank.track_ohm_per_m
+        factor = exp(self.truth.resistivity + self.truth.tracks)
+        return top * factor, bottom * factor
+
+    @cached_property
+    def _curve(self) -> tuple[Real, Real]:
+        return self.blank.rise(self.truth.permittivity, self.truth.modulus)
+
+    def patch(self, position_m: float) -> tuple[float, float]:
+        """Ends of the part of the strip that is under the tip [m]."""
+        at = position_m + self.truth.position_m
+        low, high = max(at - self.tip_m / 2, 0.0), min(at + self.tip_m / 2, self.length_m)
+        return (low, high) if high > low else (low, low)
+
+    def rise(self, force_n: float, covered_m: float, unloading: float = 0.0, decades: float = 0.0) -> float:
+        """Relative rise of the capacitance under the tip.
+
+        Parameters
+        ----------
+        force_n : float
+            That the rig says; the specimen feels it with its offset [N].
+        covered_m : float
+            Length under the tip [m].
+        unloading, decades : float
+            Share by which an earlier force was higher; logarithm of the time at this force over 1 s [-].
+        """
+        felt = force_n + self.truth.force_n
+        if force_n <= 0 or felt <= 0 or covered_m <= 0:
+            return 0.0
+        pressure, rise = self._curve
+        p = felt / (self.width_m * covered_m)
+        found = float(np.interp(p, pressure, rise))
+        if p > pressure[-1]:
+            found += (p - pressure[-1]) * float((rise[-1] - rise[-3]) / (pressure[-1] - pressure[-3]))
+        if self.truth.law:
+            at = min(max(log(felt / 0.2) / log(13 / 0.2), 0.0), 1.0)
+            found *= exp(sum(k * np.cos((n + 1) * np.pi * at) for n, k in enumerate(self.truth.law)))
+        found *= 1 + self.truth.hysteresis * unloading
+        return found * (1 + self.truth.creep * decades)
+
+    def line(self, frequency_hz: Real) -> "Line":
+        """Its line at (m,) frequencies [Hz]."""
+        return Line(self, frequency_hz)
+
+
+class Line:
+    """The strip at some frequencies: a chain of short pieces of constant values, open at its far end.
+
+    What lies left and right of the tip is worked out once for every place.
+    """
+
+    _STEP = 1e-3
+
+    def __init__(self, specimen: Specimen, frequency_hz: Real) -> None:
+        self._of = specimen
+        truth = specimen.truth
+        self.frequency_hz: Real = np.array(frequency_hz, float)
+        omega = 2 * np.pi * self.frequency_hz
+        change = self._STEP * np.eye(3)[:, 1:]  # of ln C and ln R: none, one, the other
+        c = specimen.capacitance_f_per_m * np.exp(change[:, :1])
+        bend = (1j * omega / (2 * np.pi * 1e3)) ** -truth.dispersion
+        self._loose: Complex = 1j * omega * c * bend
+        self._leak: Real = truth.leak * 2 * np.pi * 1e3 * c * np.ones(len(omega))
+        self._track: Real = sum(specimen.track_ohm_per_m) * np.exp(change[:, 1:])
+        self._omega = omega
+        self._short_m = truth.short_share * specimen.length_m if np.isfinite(truth.short_ohm) else np.inf
+        self._sides: dict[tuple[float, float, bool], tuple[Complex, Complex]] = {}
+
+    def impedance(
+        self, lift: float, ends_m: tuple[float, float], ln_c: float = 0.0, ln_r: float = 0.0, *, shorted: bool = True,
+    ) -> Complex:  # fmt: skip
+        """Impedance at the ends of the leads (m,) [ohm].
+
+        Parameters
+        ----------
+        lift : float
+            Rise of the capacitance under the tip [-].
+        ends_m : (float, float)
+            Of the part under the tip [m].
+        ln_c, ln_r : float
+            Drift of ln C and ln R since the beginning [-].
+        shorted : bool
+            Whether a short of the specimen's is closed.
+        """
+        key = (*ends_m, shorted)
+        if key not in self._sides:
+            if len(self._sides) > 64:
+                self._sides.clear()
+            far = self._chain(ends_m[1], self._of.length_m, shorted=shorted)
+            self._sides[key] = self._chain(0.0, ends_m[0], shorted=shorted), far[1, 0] / far[0, 0]
+        near, y = self._sides[key]
+        if ends_m[1] > ends_m[0]:
+            under = self._chain(*ends_m, lift, shorted=shorted)
+            y = (under[1, 0] + under[1, 1] * y) / (under[0, 0] + under[0, 1] * y)
+        whole = (near[1, 0] + near[1, 1] * y) / (near[0, 0] + near[0, 1] * y)
+        z = np.log(self._of.truth.lead_ohm + 1 / (whole + 1j * self._omega * self._of.truth.stray_f))
+        by = (z[1:] - z[0]) / self._STEP
+        return np.asarray(np.exp(z[0] + ln_c * by[0] + ln_r * by[1]))
+
+    def _chain(self, start_m: float, end_m: float, lift: float = 0.0, *, shorted: bool) -> Complex:
+        """Matrix of a part of the strip (2, 2, 3, m)."""
+        length, truth = self._of.length_m, self._of.truth
+        count = max(int(np.ceil((end_m - start_m) / length * self._of.pieces - 1e-9)), 1)
+        edges = np.linspace(start_m, end_m, count + 1)
+        total = np.zeros((2, 2, *self._loose.shape), complex)
+        total[0, 0] = total[1, 1] = 1.0
+        y = self._loose * (1 + lift) + self._leak
+        bridge = (
+            int(np.searchsorted(edges, self._short_m, side="right")) - 1 if start_m <= self._short_m <= end_m else -1
+        )
+        for k, at in enumerate((edges[1:] + edges[:-1]) / 2):
+            size = edges[k + 1] - edges[k]
+            if size > 0:
+                bent = sum(a * np.cos((n + 1) * np.pi * at / length) for n, a in enumerate(truth.profile))
+                total = _joined(total, _piece(self._track * np.exp(bent) * size, y * size))
+            if shorted and k == min(bridge, count - 1):
+                shunt = np.zeros_like(total)
+                shunt[0, 0] = shunt[1, 1] = 1.0
+                shunt[1, 0] = 1 / truth.short_ohm
+                total = _joined(total, shunt)
+        return total
+
+
+def _piece(series: Real, shunt: Complex) -> Complex:
+    """Matrix of a piece with its resistance and admittance [ohm], [S]."""
+    s = np.sqrt(series * shunt)
+    ch, z0 = np.cosh(s), np.sqrt(series / shunt)
+    sh = np.sinh(s)
+    return np.array([[ch, z0 * sh], [sh / z0, ch]])
+
+
+def _joined(left: Complex, right: Complex) -> Complex:
+    """Product of two matrices over all further axes."""
+    return np.asarray(np.einsum("ij...,jk...->ik...", left, right))
+
+
+def decades(hold_s: float) -> float:
+    """Logarithm of a time over 1 s, as creep counts it."""
+    return float(np.log10(max(hold_s, _SHORTEST_S)))
