@@ -1,13 +1,15 @@
 """An experiment as it is written, in a YAML file: specimen, devices, plan, tip, limits and rules that end it early."""
 
+import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from sensorgen.core import yamlfile
-from sensorgen.core.errors import OutOfRange, within
-from sensorgen.core.records import Line, Strict, checked
+from sensorgen.core.errors import BadInput, OutOfRange, within
+from sensorgen.core.records import Line, Strict, checked, problem
+from sensorgen.measure.virtual.faults import VirtualSpecimen
 from sensorgen.prediction.query import TONES_HZ
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -256,7 +258,7 @@ class Experiment(Strict):
         Its name in the log.
     length_mm : float or None
         Of the specimen; of its design if None [mm].
-    virtual : mapping or None
+    virtual : VirtualSpecimen or None
         The virtual specimen and rig of ``--simulate``.
     devices : Devices or None
         None for a simulated run alone.
@@ -268,7 +270,7 @@ class Experiment(Strict):
 
     specimen: Name
     length_mm: Positive | None = None
-    virtual: dict[str, Any] | None = None
+    virtual: VirtualSpecimen | None = None
     devices: Devices | None = None
     tip: Literal["flat", "soft"] | Tip = "flat"
     readout: Readout = Readout()
@@ -304,6 +306,20 @@ def read(path: Path) -> Experiment:
 def parse(data: Any) -> Experiment:
     """An experiment from plain data; errors as :func:`read`."""
     return checked(Experiment, data)
+
+
+def from_json(data: Any) -> Experiment:
+    """An experiment out of a journal.
+
+    Raises
+    ------
+    BadInput
+        Not what a journal has.
+    """
+    try:
+        return Experiment.model_validate_json(json.dumps(data))
+    except ValidationError as error:
+        raise BadInput(f"the journal's experiment is damaged: {problem(error, data)}") from None
 
 
 def check(experiment: Experiment, length_mm: float, seconds: float) -> None:

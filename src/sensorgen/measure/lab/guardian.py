@@ -16,20 +16,23 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Self, cast
 
 from sensorgen.core.errors import SensorgenError
+from sensorgen.measure.lab import rigs
+from sensorgen.measure.lab.clock import RealClock
 from sensorgen.measure.lab.devices import DeviceFault
 from sensorgen.measure.lab.experiment import Device
 
 REPORT = "guardian.jsonl"
 _ARM, _BEAT, _RELEASE, _ALIVE = b"A", b".", b"R", b"+"
 _TELL_S, _DEAF_S, _BEGIN_S = 0.2, 3.0, 30.0  # from one sign of the guardian to the next, until it is missed, to begin
-_TRIES_S, _AGAIN_S = 10.0, 0.1  # for which a line that cannot be opened is tried
+_TRIES_S, _AGAIN_S = 10.0, 0.1  # for which a call that fails is tried again, and how often
+_UP_S, _RAISE_S = 1.5, 20.0  # that the piston, and the stage after a move that goes on, take at most
 _STALL = 2.0  # of the guardian itself, in its own periods: a stalled judge judges nobody
 
 
@@ -85,7 +88,7 @@ class Guardian:
         )  # fmt: skip
         self._pipes = cast(IO[bytes], self._process.stdin), cast(IO[bytes], self._process.stdout)
         self._to, self._from = (pipe.fileno() for pipe in self._pipes)
-        self._heard_s = time.monotonic()
+        self._heard_s, self._armed = time.monotonic(), False
         try:
             os.write(self._to, orders.to_json().encode())
             if not select.select([self._from], [], [], _BEGIN_S)[0] or not os.read(self._from, 1):
@@ -108,11 +111,18 @@ class Guardian:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.release()
+        self.close()
 
     def arm(self) -> None:
         """From now on it lifts the tip when the signs of life end."""
         self._send(_ARM)
+        self._armed = True
+
+    def disarm(self) -> None:
+        """The tip is up by the run's own doing. Never raises."""
+        self._armed = False
+        with suppress(DeviceFault):
+            self._send(_RELEASE)
 
     def beat(self) -> None:
         """A sign of life; DeviceFault where the guardian gives none itself."""
@@ -126,14 +136,12 @@ class Guardian:
         if now - self._heard_s > _DEAF_S:
             raise DeviceFault(f"guardian: no sign of life for {_DEAF_S:g} s")
 
-    def release(self) -> None:
-        """The tip is up by the run's own doing: end without lifting. Never raises."""
-        with suppress(DeviceFault):
-            self._send(_RELEASE)
+    def close(self) -> None:
+        """End it; one that is still armed lifts the tip first. Never raises."""
         with suppress(OSError):
             self._pipes[0].close()
         try:
-            self._process.wait(_DEAF_S)
+            self._process.wait(_TRIES_S + _RAISE_S + 2 * _DEAF_S if self._armed else _DEAF_S)
         except subprocess.TimeoutExpired:  # hung: it must not wake up later and lift by itself
             self._process.kill()
             self._process.wait()
@@ -180,30 +188,74 @@ def watch(orders: Orders, run: int) -> str:
                 os.write(1, _ALIVE)
 
 
-def rescued(orders: Orders, rescue: Callable[[str, Device], None]) -> dict[str, str]:
-    """Lift by every device at once, none waiting for another; what became of each."""
-    found: dict[str, str] = {}
+class Rescue:
+    """Lift by actuator and stage at once, neither waiting for the other; the motor goes off when the stage is up.
 
-    def one(role: str, device: Device) -> None:
+    Without the stage raised a piston whose weight exceeds its friction would come down again: then its motor stays on.
+
+    Parameters
+    ----------
+    devices : mapping of str to Device
+        "actuator" and "stage".
+    """
+
+    def __init__(self, devices: Mapping[str, Device]) -> None:
+        self._devices, self._clock = devices, RealClock()
+        self._raised = threading.Event()
+        self.found = dict.fromkeys(devices, "no answer")
+
+    def run(self) -> None:
+        """Return when both are done, or the time is over; ``found`` says what became of each."""
+        ways = {"actuator": self._actuator, "stage": self._stage}
+        threads = [threading.Thread(target=ways[role], args=(each,), daemon=True) for role, each in self._devices.items()]
+        for thread in threads:
+            thread.start()
+        until = time.monotonic() + _TRIES_S + _RAISE_S + _DEAF_S
+        for thread in threads:
+            thread.join(max(0.0, until - time.monotonic()))
+
+    def _actuator(self, device: Device) -> None:
+        driver = self._opened("actuator", device)
+        if driver is None or not self._tried("actuator", driver.lift):
+            return
+        self.found["actuator"] = "lifted, motor on"
+        time.sleep(_UP_S)
+        if self._raised.wait(_TRIES_S + _RAISE_S) and self._tried("actuator", driver.off):
+            self.found["actuator"] = "lifted, motor off"
+
+    def _stage(self, device: Device) -> None:
+        driver = self._opened("stage", device)
+        if driver is None or not (self._tried("stage", driver.identify) and self._tried("stage", driver.lift)):
+            return
+        self.found["stage"] = "lifting"
+        until = time.monotonic() + _RAISE_S
+        while time.monotonic() < until:
+            time.sleep(_AGAIN_S)
+            with suppress(SensorgenError):
+                if not driver.read().moving:
+                    self.found["stage"] = "raised"
+                    self._raised.set()
+                    return
+
+    def _opened(self, role: str, device: Device) -> Any:
+        """A driver on a line that is opened anew; None where it cannot be in time, as while a dying run still has it."""
+        made: list[Any] = []
+        self._tried(role, lambda: made.append(rigs.opened(device, self._clock)))
+        return made[0] if made else None
+
+    def _tried(self, role: str, call: Callable[[], object]) -> bool:
+        """Whether a call worked, tried again until the time is over."""
         until = time.monotonic() + _TRIES_S
         while True:
             try:
-                rescue(role, device)
-            except (SensorgenError, OSError) as error:  # as a line that the dead run still has
-                found[role] = str(error)
+                call()
+            except (SensorgenError, OSError) as error:
+                self.found[role] = str(error)
                 if time.monotonic() > until:
-                    return
+                    return False
                 time.sleep(_AGAIN_S)
             else:
-                found[role] = "lifted"
-                return
-
-    threads = [threading.Thread(target=one, args=pair, daemon=True) for pair in orders.devices.items()]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(_TRIES_S + _DEAF_S)
-    return {role: found.get(role, "no answer") for role in orders.devices}
+                return True
 
 
 def main() -> None:
@@ -213,14 +265,15 @@ def main() -> None:
         if number := getattr(signal, name, None):
             signal.signal(number, signal.SIG_IGN)
     orders = Orders.from_json(_line())
-    from sensorgen.measure.lab import rigs
-
+    rigs.check(orders.devices)  # imports the drivers, so that nothing has to be imported when it counts
     os.write(1, _ALIVE)
+    os.set_blocking(1, False)
     reason = watch(orders, run)
     if reason:
-        begun = time.monotonic()
-        done: dict[str, Any] = {"reason": reason, "devices": rescued(orders, rigs.rescue)}
-        done |= {"at": round(time.time(), 3), "took_s": round(time.monotonic() - begun, 3)}
+        begun, rescue = time.monotonic(), Rescue(orders.devices)
+        rescue.run()
+        took = round(time.monotonic() - begun, 3)
+        done = {"at": round(time.time(), 3), "reason": reason, "devices": rescue.found, "took_s": took}
         with suppress(OSError), (orders.folder / REPORT).open("a", encoding="utf-8") as file:
             file.write(json.dumps(done) + "\n")
 

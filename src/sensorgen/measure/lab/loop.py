@@ -37,7 +37,13 @@ class View(Protocol):
 
 
 class Alive(Protocol):
-    """What is told that the run lives, and lives itself."""
+    """What lifts the tip when the run gives no sign of life, as :class:`sensorgen.measure.lab.guardian.Guardian`."""
+
+    def arm(self) -> None:
+        """From now on."""
+
+    def disarm(self) -> None:
+        """No longer: the tip is up."""
 
     def beat(self) -> None:
         """Tell; raise :class:`DeviceFault` where it has died."""
@@ -115,6 +121,10 @@ class Loop:
     _operator_s: float = field(init=False)
 
     def __post_init__(self) -> None:
+        self.begin()
+
+    def begin(self) -> None:
+        """Time counts from now on."""
         self.begun_s = self._last_s = self._operator_s = self.clock.now()
 
     @property

@@ -15,6 +15,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import BadInput, SensorgenError, within
 from sensorgen.core.version import __version__
+from sensorgen.design.design import Design, load, make
 from sensorgen.measure.lab import experiment as experiments
 from sensorgen.measure.lab import plans, preflight, press, recorder, safety
 from sensorgen.measure.lab.clock import Clock, SimulatedClock
@@ -140,7 +141,7 @@ def planned(experiment: Experiment, log: "Log | None" = None) -> Planned:
     """
     with within("specimen"):
         notes.specimen(experiment.specimen, log)
-    length = experiment.length_mm or _length_mm(experiment, log)
+    length = experiment.length_mm or _length_mm(design_of(experiment, log))
     experiments.check(experiment, length, 0.0)  # its places, before presses are made of them
     steps = plans.steps(experiment, length)
     holds = [part.content.hold_s[1] for part in experiment.plan if isinstance(part.content, Next)]
@@ -149,16 +150,23 @@ def planned(experiment: Experiment, log: "Log | None" = None) -> Planned:
     return Planned(experiment, length, tuple(steps), seconds)
 
 
-def _length_mm(experiment: Experiment, log: "Log | None") -> float:
-    """Length of the specimen by its design in the log, else by its name."""
+def design_of(experiment: Experiment, log: "Log | None") -> Design | None:
+    """Design of the specimen: the virtual one's own, else that in the log, else the one that its name stands for."""
     from sensorgen.measure.log import batches
 
+    if experiment.virtual and experiment.virtual.design:
+        named = experiment.virtual.design
+        with within("virtual.design"):
+            return load(Path(named)) if Path(named).suffix else make({"shape": named})
     design_id, _ = notes.design_fields(experiment.specimen, log)
-    design = batches.designs(log).get(design_id) if log else None
+    found = batches.designs(log).get(design_id) if log else None
     try:
-        design = design or notes.design_of(experiment.specimen)
+        return found or notes.design_of(experiment.specimen)
     except BadInput:
-        return USUAL_MM
+        return None
+
+
+def _length_mm(design: Design | None) -> float:
     return float(design.params.length_mm) if design else USUAL_MM
 
 
@@ -251,6 +259,8 @@ class _Attempt:
                 end, reason, fault = "fault", f"{type(error).__name__}: {error}", error
             up, problems = safety.made_safe(self.rig, self.clock, loop.beat)
             safety.close(self.rig)
+            if up and guardian:
+                guardian.disarm()
         found = self._ended(loop, kept, end, reason, up, problems)
         if fault:
             raise fault
@@ -274,6 +284,9 @@ class _Attempt:
         if not self.confirm(self.plan, self.identities):
             raise Ended("abort", "not confirmed; nothing has moved")
         listening.enter_context(loop.controls.listening())
+        if loop.guardian:
+            loop.guardian.arm()
+        loop.begin()
         return self._presses(loop)
 
     def _presses(self, loop: Loop) -> tuple[str, str]:
