@@ -1,4 +1,4 @@
-"""Faults on demand of a simulated laboratory, by name, and the settings of a virtual specimen in an experiment's file."""
+"""Faults on demand of a simulated laboratory, by name, and the section ``virtual`` of an experiment's file."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
@@ -12,6 +12,7 @@ from sensorgen.design.design import Design
 from sensorgen.measure.virtual.mechanics import Mechanics, Rig
 from sensorgen.measure.virtual.specimen import Specimen, Truth, drawn
 
+Waves = Annotated[tuple[float, ...], Field(strict=False)]
 Strikes = Literal["actuator", "stage", "analyser", "lcr-meter", "multimeter", "rig"]
 
 
@@ -129,7 +130,7 @@ class VirtualSpecimen(Strict):
 
     design: str | None = None
     seed: Annotated[int, Field(ge=0)] = 0
-    truth: dict[str, float | tuple[float, ...]] = Field(default={}, strict=False)
+    truth: dict[str, float | Waves] = Field(default={})
     rig: dict[str, float] = Field(default={})
     noise: Annotated[float, Field(gt=0)] | None = None
     faults: tuple[Planted, ...] = Field(default=(), strict=False)
