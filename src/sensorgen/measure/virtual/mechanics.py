@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import copysign, exp, inf, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,7 +11,12 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.virtual.specimen import Line, Specimen
 
+if TYPE_CHECKING:
+    from sensorgen.measure.virtual.faults import Schedule
+
 STEP_S = 2e-3  # of the mechanism
+_OWN_MM_S = 2.0  # of a stage that moves by itself
+_SHORT_OHM, _OPENS_N = 1e3, 2.0  # of a planted short
 OPEN_OHM = 1e12  # what is read with the cable out
 _CREEP_S = tuple(0.1 * 10 ** (k / 2) for k in range(9))  # relaxation times, half a decade apart
 _PER_TIME = 0.5  # decades that each of them stands for
@@ -131,6 +137,8 @@ class Rig:
         So far, in the order of their begin.
     fault : str
         Name of a fault of the mechanism or of the cables, see :mod:`sensorgen.measure.virtual.faults`; "" for none.
+    planted : Schedule or None
+        Faults to come; those that strike the rig set ``fault``, others that of the simulators attached to it.
     """
 
     specimen: Specimen
@@ -143,6 +151,7 @@ class Rig:
     peak_n: float = 0.0
     fault: str = ""
     violations: list[Violation] = field(default_factory=list)
+    planted: "Schedule | None" = None
 
     def __post_init__(self) -> None:
         """At rest, raised."""
@@ -161,7 +170,12 @@ class Rig:
         """Let the mechanism move on to a time [s]; one that is past changes nothing."""
         while time_s - self.time_s > 1e-12:
             dt = min(STEP_S, time_s - self.time_s)
-            moved = self._axes["x"].moves
+            if self.planted:
+                self.planted.attach("rig", self)
+                self.planted.update(self.time_s, self.force_n)
+            moved = self._axes["x"].moves or self.fault == "stage moves"
+            if self.fault == "stage moves":
+                self._axes["x"].at_mm += _OWN_MM_S * dt
             for axis in self._axes.values():
                 if axis.moves:
                     axis.step(dt)
@@ -208,7 +222,7 @@ class Rig:
     def impedance(self, frequency_hz: Real) -> Complex:
         """What an ideal instrument at the end of the leads would read now, of (m,) frequencies [ohm]."""
         frequency = np.atleast_1d(np.asarray(frequency_hz, float))
-        if self.fault == "cable-out":
+        if self.fault == "cable out":
             return np.full(len(frequency), OPEN_OHM, complex)
         key = frequency.tobytes()
         if key not in self._lines:
@@ -220,12 +234,15 @@ class Rig:
             lift = self._lift(ends[1] - ends[0])
         shorted = self.force_n <= truth.short_opens_n
         c, r = self._drift * (truth.drift_c, truth.drift_r)
-        return self._lines[key].impedance(lift, ends if lift else (0.0, 0.0), c, r, shorted=shorted)
+        found = self._lines[key].impedance(lift, ends if lift else (0.0, 0.0), c, r, shorted=shorted)
+        if self.fault == "short" and self.force_n < _OPENS_N:
+            found = np.asarray(found * _SHORT_OHM / (found + _SHORT_OHM))
+        return found
 
     def resistance(self, *, wires: int) -> float:
         """What an ideal multimeter would read across the bottom electrode [ohm]."""
         truth = self.specimen.truth
-        if self.fault == "cable-out":
+        if self.fault == "cable out":
             return OPEN_OHM
         strip = self.specimen.track_ohm_per_m[1] * self.specimen.length_m * exp(truth.drift_r * self._drift[1])
         return float(strip + (truth.lead_ohm if wires == 2 else 0.0))
@@ -251,7 +268,7 @@ class Rig:
                     max(self._against_n + _INTEGRAL_PER_S * self.mechanics.servo_n_mm * off * dt, -most), most
                 )
             wanted = min(self.mechanics.servo_n_mm * off + self._against_n - self.mechanics.weight_n, force)
-        wanted = min(max(wanted, -self._limit_n), self._limit_n) if self._on else 0.0
+        wanted = min(max(wanted, -self._limit_n), self._limit_n) if self._on and self.fault != "power loss" else 0.0
         self.motor_n += (wanted - self.motor_n) * (1 - exp(-dt / self.mechanics.lag_s))
 
     def _piston(self, dt: float) -> None:
@@ -268,6 +285,7 @@ class Rig:
         speed = net / (m.damping_n_s_mm + (slide + (k if depth > 0 else 0.0)) * dt)
         if depth <= 0 < depth + speed * dt:  # touches within this step
             speed = (net - k * depth) / (m.damping_n_s_mm + (slide + k) * dt)
+        speed = 0.0 if self.fault == "jammed" else speed
         before = self.extension_mm
         self.extension_mm = min(max(before + speed * dt, 0.0), m.stroke_mm)
         moved = self.extension_mm - before

@@ -1,0 +1,223 @@
+"""Faults on demand of a simulated laboratory, by name, and the section ``virtual`` of an experiment's file."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Any, Literal, Protocol
+
+from pydantic import Field, model_validator
+
+from sensorgen.core.errors import UnknownName
+from sensorgen.core.records import Strict
+from sensorgen.design.design import Design
+from sensorgen.measure.virtual.mechanics import Mechanics, Rig
+from sensorgen.measure.virtual.specimen import Specimen, Truth, drawn
+
+Waves = Annotated[tuple[float, ...], Field(strict=False)]
+Strikes = Literal["actuator", "stage", "analyser", "lcr-meter", "multimeter", "rig"]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something that goes wrong.
+
+    Attributes
+    ----------
+    strikes : str
+        Which simulator.
+    sets : str
+        Value of its attribute ``fault``.
+    about : str
+        What happens, in one line.
+    """
+
+    strikes: Strikes
+    sets: str
+    about: str
+
+
+_LINES = {
+    "silent": "obeys, but sends no answers",
+    "hung": "neither answers nor acts; what was set before goes on",
+    "garbage": "answers with bytes that mean nothing",
+    "identity": "says that it is another device",
+    "truncated": "loses the second half of each answer",
+    "cut": "its cable is pulled out: every message fails",
+    "error": "reports an error of its own",
+    "stuck": "accepts set points and ignores them",
+}
+_OWN: dict[Strikes, dict[str, str]] = {
+    "actuator": _LINES
+    | {
+        "error": "switches its motor off and sets the error bit of its status",
+        "echo": "sends each command back before its answer",
+        "runaway": "pushes with the largest force that its limit allows",
+    },
+    "stage": _LINES,
+    "lcr-meter": _LINES | {"overload": "is beyond its range"},
+    "multimeter": _LINES | {"overload": "is beyond its range"},
+    "analyser": {
+        "unplugged": "its cable is pulled out",
+        "hung": "sends no more samples",
+        "data loss": "loses samples between two blocks",
+        "clipped": "its inputs saturate",
+        "nan": "sends no numbers",
+        "silent": "measures zero volt",
+        "generator off": "puts out no signal",
+        "in use": "is held by another program",
+        "wrong device": "says that it is another device",
+    },
+    "rig": {
+        "cable out": "the specimen's cable is pulled out: an open circuit",
+        "power loss": "the actuator's motor gives no force; weight and friction remain",
+        "jammed": "the piston moves no more",
+        "stage moves": "the stage moves along the specimen by itself",
+        "short": "1 kohm between the electrodes, as long as the force is below 2 N",
+    },
+}
+FAULTS: Mapping[str, Fault] = {
+    f"{device} {name}": Fault(device, name, about) for device, own in _OWN.items() for name, about in own.items()
+}
+"""All of them, by name: the simulator and what happens to it."""
+
+
+class Planted(Strict):
+    """A fault of an experiment.
+
+    Attributes
+    ----------
+    what : str
+        One of ``FAULTS``, as "actuator hung".
+    at_s : float or None
+        When it strikes, by the rig's clock [s].
+    at_force_n : float or None
+        Or as soon as the force on the specimen is so high [N].
+    for_s : float or None
+        How long it lasts; for good if None [s].
+    """
+
+    what: str
+    at_s: Annotated[float, Field(ge=0)] | None = None
+    at_force_n: Annotated[float, Field(gt=0)] | None = None
+    for_s: Annotated[float, Field(gt=0)] | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> "Planted":
+        if self.what not in FAULTS:
+            raise ValueError(str(UnknownName("fault", self.what, list(FAULTS))))
+        if (self.at_s is None) == (self.at_force_n is None):
+            raise ValueError("a fault needs one of at_s and at_force_n")
+        return self
+
+
+class VirtualSpecimen(Strict):
+    """The section ``virtual`` of an experiment: what a simulated run presses, and what goes wrong.
+
+    Attributes
+    ----------
+    design : str or None
+        File or shape; the design of the specimen in the log if None.
+    seed : int
+        Of materials, errors and drift.
+    truth : mapping
+        Values of :class:`sensorgen.measure.virtual.specimen.Truth` in place of drawn ones.
+    rig : mapping
+        Values of :class:`sensorgen.measure.virtual.mechanics.Mechanics` in place of its defaults.
+    noise : float or None
+        Relative noise of a reading; that of the simulated instrument if None [-].
+    faults : sequence of Planted
+        What goes wrong, and when.
+    """
+
+    design: str | None = None
+    seed: Annotated[int, Field(ge=0)] = 0
+    truth: dict[str, float | Waves] = Field(default={})
+    rig: dict[str, float] = Field(default={})
+    noise: Annotated[float, Field(gt=0)] | None = None
+    faults: tuple[Planted, ...] = Field(default=(), strict=False)
+
+    @model_validator(mode="after")
+    def _known(self) -> "VirtualSpecimen":
+        for given, kind in ((self.truth, Truth), (self.rig, Mechanics)):
+            known = [one.name for one in fields(kind)]
+            for name in given:
+                if name not in known:
+                    raise ValueError(str(UnknownName(f"value of a virtual {kind.__name__.lower()}", name, known)))
+        return self
+
+
+def rig_of(settings: VirtualSpecimen, design: Design, tip_m: float) -> Rig:
+    """The simulated rig of an experiment, with its faults planted.
+
+    Parameters
+    ----------
+    settings : VirtualSpecimen
+        Of the experiment's file.
+    design : Design
+        What the specimen was printed of.
+    tip_m : float
+        Length of the tip along the strip [m].
+
+    Raises
+    ------
+    BadInput, OutOfRange, MissingValue
+        A truth, rig or body that cannot be.
+    """
+    changes: dict[str, Any] = dict(settings.truth)
+    specimen = Specimen(design, replace(drawn(design, settings.seed), **changes), tip_m)
+    rig = Rig(specimen, Mechanics(**settings.rig), settings.seed)
+    rig.planted = Schedule(settings.faults)
+    return rig
+
+
+class Faulty(Protocol):
+    """A simulator that faults strike.
+
+    Attributes
+    ----------
+    fault : str
+        Name of its fault, "" for none.
+    """
+
+    fault: str
+
+
+class Schedule:
+    """Faults that wait for their time, and those that last.
+
+    Parameters
+    ----------
+    planted : iterable of Planted
+        What goes wrong.
+    """
+
+    def __init__(self, planted: Iterable[Planted]) -> None:
+        self._waiting = list(planted)
+        self._lasting: list[tuple[float, Fault]] = []
+        self._targets: dict[str, Faulty] = {}
+
+    def attach(self, strikes: Strikes, simulator: Faulty) -> None:
+        """Name the simulator that faults of a kind of device strike."""
+        self._targets[strikes] = simulator
+
+    def update(self, time_s: float, force_n: float) -> None:
+        """Let faults begin and end that are due [s], [N]."""
+        for one in [p for p in self._waiting if self._due(p, time_s, force_n)]:
+            self._waiting.remove(one)
+            fault = FAULTS[one.what]
+            if fault.strikes in self._targets:
+                self._targets[fault.strikes].fault = fault.sets
+            if one.for_s is not None:
+                self._lasting.append((time_s + one.for_s, fault))
+        for end_s, fault in [(t, f) for t, f in self._lasting if time_s >= t]:
+            self._lasting.remove((end_s, fault))
+            target = self._targets.get(fault.strikes)
+            if target and target.fault == fault.sets:
+                target.fault = ""
+
+    @staticmethod
+    def _due(one: Planted, time_s: float, force_n: float) -> bool:
+        return time_s >= one.at_s if one.at_s is not None else force_n >= (one.at_force_n or 0.0)
+
+    def __bool__(self) -> bool:
+        """Whether anything is to come."""
+        return bool(self._waiting or self._lasting)
