@@ -10,10 +10,12 @@ No package is imported before one of its kinds is asked for.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
 
 from sensorgen.core.errors import BadInput, UnknownName
-from sensorgen.core.records import Strict, checked
+from sensorgen.core.records import Line, Strict, checked
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import Actuator, ImpedanceMeter, Meter, Stage
 from sensorgen.measure.virtual.plant import Plant
@@ -62,6 +64,15 @@ class Kind:
 
 class NoSettings(Strict):
     """A kind without settings."""
+
+
+class HandyscopeSettings(Strict):
+    """Bridge of a Handyscope: feedback [ohm], [F], range of its output [V], and file of its gain per tone."""
+
+    feedback_ohm: Annotated[float, Field(gt=0)] = 2610.0
+    feedback_f: Annotated[float, Field(ge=0)] = 3.9e-12
+    range_v: Annotated[float, Field(gt=0, le=80)] = 0.8
+    gains: Line = ""
 
 
 def names() -> list[str]:
@@ -201,6 +212,24 @@ def _reprap() -> Kind:
     return Kind("stage", reprap.Settings, real, simulate)
 
 
+def _handyscope() -> Kind:
+    from pathlib import Path
+
+    from sensorgen.measure.lab import handyscope
+    from sensorgen.measure.virtual.handyscope import Analyser, PhasorMeter
+
+    def simulate(plant: Plant, settings: HandyscopeSettings, clock: Clock) -> Simulated:
+        made = PhasorMeter(plant, clock, Analyser(settings.feedback_ohm, settings.feedback_f), range_v=settings.range_v)
+        return Simulated(made, made)
+
+    def real(address: str, settings: HandyscopeSettings, clock: Clock) -> Device:
+        gains = handyscope.gains(Path(settings.gains)) if settings.gains else ()
+        bridge = handyscope.Bridge(settings.feedback_ohm, settings.feedback_f, settings.range_v, gains)
+        return handyscope.Handyscope(address, clock, bridge=bridge)
+
+    return Kind("impedance", HandyscopeSettings, real, simulate)
+
+
 def _lcr(name: str) -> Kind:
     from sensorgen.measure.lab import lcr_meter
     from sensorgen.measure.lab.port import SimulatedPort, VisaPort
@@ -239,6 +268,7 @@ def _multimeter(name: str) -> Kind:
 _KINDS: dict[str, Callable[[], Kind]] = {
     "smac-lcc10": _smac,
     "reprapfirmware": _reprap,
+    "handyscope-hs5": _handyscope,
     "hp-4284a": lambda: _lcr("hp-4284a"),
     "keysight-e4980a": lambda: _lcr("keysight-e4980a"),
     "hp-34401a": lambda: _multimeter("hp-34401a"),

@@ -207,7 +207,9 @@ class Rescue:
     def run(self) -> None:
         """Return when both are done, or the time is over; ``found`` says what became of each."""
         ways = {"actuator": self._actuator, "stage": self._stage}
-        threads = [threading.Thread(target=ways[role], args=(each,), daemon=True) for role, each in self._devices.items()]
+        threads = [
+            threading.Thread(target=ways[role], args=(each,), daemon=True) for role, each in self._devices.items()
+        ]
         for thread in threads:
             thread.start()
         until = time.monotonic() + _TRIES_S + _RAISE_S + _DEAF_S
@@ -238,7 +240,7 @@ class Rescue:
                     return
 
     def _opened(self, role: str, device: Device) -> Any:
-        """A driver on a line that is opened anew; None where it cannot be in time, as while a dying run still has it."""
+        """A driver on a line that is opened anew; None where it cannot be in time, as while a dying run has it."""
         made: list[Any] = []
         self._tried(role, lambda: made.append(rigs.opened(device, self._clock)))
         return made[0] if made else None

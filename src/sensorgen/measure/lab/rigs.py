@@ -17,7 +17,10 @@ SIMULATED = Devices(
     actuator=Device(kind="smac-lcc10"), stage=Device(kind="reprapfirmware"), impedance=Device(kind="handyscope-hs5")
 )
 """The thesis's rig, where an experiment names no devices."""
-_STRIKES: Mapping[str, faults.Strikes] = {"actuator": "actuator", "stage": "stage"}
+_STRIKES: Mapping[str, faults.Strikes] = {
+    "smac-lcc10": "actuator", "reprapfirmware": "stage", "handyscope-hs5": "analyser", "hp-4284a": "lcr-meter",
+    "keysight-e4980a": "lcr-meter",
+}  # fmt: skip
 
 
 def real(devices: Devices, clock: Clock) -> Rig:
@@ -65,9 +68,8 @@ def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Rig
             _has_role(role, device)
             made = catalogue.simulated(device.kind, plant, settings, clock)
         found[role] = made.driver
-        scope = "analyser" if device.kind == SIMULATED.impedance.kind else "lcr-meter"
-        plant.planted.attach(_STRIKES.get(role, scope), made.simulator)
-    plant.planted.attach("rig", plant)
+        if plant.planted and device.kind in _STRIKES:
+            plant.planted.attach(_STRIKES[device.kind], made.simulator)
     return Rig(**found), plant
 
 

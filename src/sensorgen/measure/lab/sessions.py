@@ -141,7 +141,9 @@ class Session:
         self._rig = self._devices(experiment)
         self.url, views = "", list[LiveView | LiveText]()
         if page:
-            view = self._stack.enter_context(LiveView(f"{experiment.specimen}: {plan.summary()}", experiment.readout.tones_hz))
+            view = self._stack.enter_context(
+                LiveView(f"{experiment.specimen}: {plan.summary()}", experiment.readout.tones_hz)
+            )
             self.url = view.url
             views.append(view)
         if text:
