@@ -163,19 +163,29 @@ def impedance(
     u, i = (phasors(signal, rate_hz, tones_hz, size) for signal in (voltage, current))
     if not i.all():
         raise BadInput("a tone carries no current at all; expected the waveform of the current")
-    clipped = _clipped(voltage, range_v, size, len(u)) | _clipped(current, range_a, size, len(u))
-    return Demodulated(np.asarray((np.arange(len(u)) + 0.5) * size / rate_hz, float), u / i, clipped)
+    beyond = clipped(voltage, range_v, size, len(u)) | clipped(current, range_a, size, len(u))
+    return Demodulated(np.asarray((np.arange(len(u)) + 0.5) * size / rate_hz, float), u / i, beyond)
 
 
-def _clipped(signal: NDArray[Any], limit: float, size: int, count: int) -> NDArray[np.bool_]:
-    """Windows with consecutive samples at the end of the range; a single sample may be a crest."""
-    clipped, step = np.zeros(count, bool), _BATCH // size or 1
+def clipped(signal: NDArray[Any], limit: float, size: int, count: int) -> NDArray[np.bool_]:
+    """Windows with consecutive samples at the end of the range; a single sample may be a crest.
+
+    Parameters
+    ----------
+    signal : (n,) array
+        Waveform.
+    limit : float
+        End of the range, either way, in the unit of the signal.
+    size, count : int
+        Length of a window [samples], and number of windows.
+    """
+    beyond, step = np.zeros(count, bool), _BATCH // size or 1
     for i in range(0, count if np.isfinite(limit) else 0, step):
         some = signal[i * size : (i + step) * size]
         if some.max() >= limit or some.min() <= -limit:
             at = (np.abs(some[: (count - i) * size]) >= limit).reshape(-1, size)
-            clipped[i : i + step] = (at[:, 1:] & at[:, :-1]).any(axis=1)
-    return clipped
+            beyond[i : i + step] = (at[:, 1:] & at[:, :-1]).any(axis=1)
+    return beyond
 
 
 def coincidences(tones_hz: ArrayLike) -> list[tuple[float, str]]:
