@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.errors import OutOfRange
 
-AIR_PERMITTIVITY = 1.00059
 EPSILON_0 = 8.8541878128e-12
 _SOFT = 1e-5  # shear modulus of air over that of the softest solid
 _AIR_BULK = 5.0  # its second constant, over its shear modulus
@@ -61,6 +60,9 @@ class Solid:
     modulus_pa: float
     poisson: float
     permittivity: float
+
+
+AIR = Solid(0.0, 0.0, 1.00059)
 
 
 class Grid:
