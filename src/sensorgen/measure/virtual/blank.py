@@ -19,7 +19,7 @@ from sensorgen.measure.virtual.cell import AIR, Grid, Raster, Solid, capacitance
 from sensorgen.measure.virtual.section import FINE_MM, raster, section_of
 from sensorgen.scene.scene import Scene
 
-PRESSURES_PA = tuple(1e3 * p for p in (0, 2.5, 5, 10, 20, 30, 40, 60, 80, 100, 130, 160, 200, 250, 300, 400))
+PRESSURES_PA = tuple(1e3 * p for p in (0, 2.5, 5, 10, 20, 35, 60, 100, 150, 200, 300, 400))
 _LN_PERMITTIVITY = (-0.4, 0.0, 0.4)
 _LN_MODULUS = (-0.7, 0.0, 0.7)  # of the dielectric alone
 _ORDER = 4 / 3  # of convergence: energy of a field at a corner of 270 degrees
