@@ -46,6 +46,12 @@ def test_every_band_of_widths(sensor, findings, axis, width, severity, words, li
     assert found.place_mm == pytest.approx((5 + width / 2, 10.0, 1.25) if axis == "x" else (10.0, 5 + width / 2, 1.25))
 
 
+def test_a_width_just_below_a_line_is_written_with_the_digits_that_show_it(sensor, findings):
+    (found,) = findings(sensor(strip(0.43996)), "5-", "strip")
+    assert "a stretch 0.43996 mm wide" in found.message
+    assert "widen it to 0.44 mm" in found.advice
+
+
 @pytest.mark.parametrize("width", [0.70 + HAIR, 1.0])
 def test_wide_strips_are_fine(sensor, findings, width):
     assert findings(sensor(strip(width)), "5-", "strip") == []

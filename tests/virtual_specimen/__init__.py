@@ -133,16 +133,19 @@ def session(truth, count, seed, force_n=(0.1, 6.0)):
     place = truth.tip_m / 2 + (LENGTH_M - truth.tip_m) * spread()
     back = rng.permutation(count) < count // 2
     peak = np.where(back, force + (force_n[1] * 1.1 - force) * rng.random(count), force)
-    hold = 0.3 * 100 ** spread()
+    return measured(truth, force, place, peak, 0.3 * 100 ** spread(), rng)
+
+
+def measured(truth, force, place, peak, hold, rng):
+    """What a bench reads of given presses, and of the rest before each."""
+    count = len(force)
     time = np.cumsum(hold + 20.0)
     drift = np.stack([_walk(np.concatenate([time - hold - AGE_S, time]), truth, rng) for _ in range(2)])
     before, under = drift[:, :count], drift[:, count:]
-    nothing = np.zeros(count)
-    rest = truth.impedance(nothing, np.full(count, LENGTH_M / 2), ln_c=before[0], ln_r=before[1])
-    late = hold + truth.clock_s
+    rest = truth.impedance(np.zeros(count), np.full(count, LENGTH_M / 2), ln_c=before[0], ln_r=before[1])
     pressed = truth.impedance(
         np.maximum(force + truth.force_offset_n, 0), np.clip(place + truth.place_offset_m, 0, LENGTH_M),
-        peak + truth.force_offset_n, late, under[0], under[1],
+        peak + truth.force_offset_n, hold + truth.clock_s, under[0], under[1],
     )  # fmt: skip
     sigma = truth.noise * np.array(truth.noise_by_tone)
 

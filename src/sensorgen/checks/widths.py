@@ -135,12 +135,19 @@ def _findings(rule: str, body: Body, found: Sequence[_Narrow]) -> Iterator[Findi
             run = [each for _, each in group]
             worst = min(run, key=lambda each: each.stretches[0].width_mm)
             least, most = worst.stretches[0].width_mm, max(each.stretches[-1].width_mm for each in run)
-            wide = f"{least:.3g}" if f"{least:.3g}" == f"{most:.3g}" else f"{least:.3g} to {most:.3g}"
+            ends = [_below(width, band.upto_mm) for width in (least, most)]
+            wide = " to ".join(dict.fromkeys(ends))
             yield Finding(
                 rule, band.severity, body.name, f"a {band.noun} {wide} mm wide at mid-layer {band.effect}", band.advice,
                 least, round(band.upto_mm, 6), run[0].layer + 1, (*worst.stretches[0].middle_mm, worst.z_mm),
                 max(len(each.stretches) for each in run), run[-1].layer + 1 if len(run) > 1 else None,
             )  # fmt: skip
+
+
+def _below(width_mm: float, limit_mm: float) -> str:
+    """A width with three digits, or as many as show that it is below a limit."""
+    texts = [f"{width_mm:.{digits}g}" for digits in range(3, 8)]
+    return next((text for text in texts if float(text) < round(limit_mm, 6)), texts[0])
 
 
 def stretches(region: Region, limit_mm: float, *, gaps: bool = False) -> list[Stretch]:

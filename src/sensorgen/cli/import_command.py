@@ -35,29 +35,29 @@ def command(
 ) -> int:  # fmt: skip
     """Read, repair or refuse, and write."""
     from sensorgen.core import files as store
-    from sensorgen.workflows import importing
+    from sensorgen.workflows.importing import assigning, listing, reading, writing
 
     if not 1e-4 <= chord <= 1.0:
         raise BadInput(f"--chord {chord:g}: expected 0.0001 to 1 mm")
-    assembly = importing.read([Path(file) for file in files], unit, chord)
+    assembly = reading.read([Path(file) for file in files], unit, chord)
     name = name or Path(files[0]).stem
-    listing = importing.Listing.of(assembly, Path(out))
+    listed = listing.Listing.of(assembly, Path(out))
     if only_list or assembly.errors or not maps:
-        render.deliver(listing)
+        render.deliver(listed)
     if assembly.errors:
         first, shown = assembly.errors[0], "nothing is imported"
         if not only_list:
             drawing = Path(out) / f"{name}-faults.svg"
-            store.replace(drawing, importing.picture(assembly).encode())
+            store.replace(drawing, reading.picture(assembly).encode())
             shown = f"nothing was imported, {drawing} shows where"
         raise BadInput(f"{first.body}: {first.text}; {shown}")
     if only_list:
         return 0
     if not maps:
-        raise BadInput(f"no --map: nothing was imported; expected {listing.words()}")
-    chosen = importing.assign(assembly, maps, terminals, Path(out))
+        raise BadInput(f"no --map: nothing was imported; expected {listed.words()}")
+    chosen = assigning.assign(assembly, maps, terminals, Path(out))
     more = {key: value for key, value in (("printer", printer), ("quality", quality)) if value}
-    made = importing.write(assembly, chosen, name=name, folder=Path(out), more=more, replace_existing=force)
+    made = writing.write(assembly, chosen, name=name, folder=Path(out), more=more, replace_existing=force)
     render.deliver(made)
     return 0
 

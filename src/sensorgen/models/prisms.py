@@ -267,7 +267,7 @@ def _cell(scene: Scene) -> _Cell:
         raise ValueError(f"{slanted.name} is slanted or curved in elevation: its layers are no prisms")
     levels = np.unique(np.array([z for b in scene.bodies for p in b.pieces for z in p.span("z")]).round(9))
     levels = levels[np.append(True, np.diff(levels) > SLIVER_MM)]
-    slabs = []
+    parts = []
     for low, high in pairwise(levels.tolist()):
         middle = (low + high) / 2
         outlines: dict[Body, list[shapely.Polygon]] = defaultdict(list)
@@ -275,8 +275,8 @@ def _cell(scene: Scene) -> _Cell:
             for p in body.pieces:
                 if p.span("z")[0] < middle < p.span("z")[1]:
                     outlines[body].append(shapely.Polygon(seen_from_above(p)))
-        slabs.append((low, high, {body: shapely.union_all(own) for body, own in outlines.items()}))
-    patterned = [region for *_, own in slabs for region in own.values()]
+        parts.append((low, high, {body: shapely.union_all(own) for body, own in outlines.items()}))
+    patterned = [region for *_, own in parts for region in own.values()]
     if any(scene.repeats) or not all(p.is_box() for body in scene.bodies for p in body.pieces):
         x, y = (
             Repeat.of(0.0, scene.size_mm[axis], True, scene.size_mm[axis])
@@ -292,9 +292,9 @@ def _cell(scene: Scene) -> _Cell:
     whole = shapely.box(x.low_mm, y.low_mm, x.high_mm, y.high_mm)
     half = halved((x, y), [shapely.intersection(r, whole) for r in dict.fromkeys(patterned)])
     try:
-        return _numbered(levels.tolist(), _within(slabs, *half), *half)
+        return _numbered(levels.tolist(), _within(parts, *half), *half)
     except _Uncovered as error:
-        return _surrounded(scene, levels.tolist(), slabs, x, y, error.gap_mm)
+        return _surrounded(scene, levels.tolist(), parts, x, y, error.gap_mm)
 
 
 class _Uncovered(ValueError):
