@@ -188,6 +188,16 @@ def test_each_fault_is_reported(fault, kind):
     meter.close()
 
 
+def test_a_device_that_is_gone_may_only_say_so(monkeypatch):
+    """The library sets a flag, and calls fail; either is enough."""
+    clock, scope, meter = rig()
+    meter.start(TONES, 1.0)
+    monkeypatch.setattr(type(scope.oscilloscope), "_present", lambda part: None)
+    scope.fault = "unplugged"
+    with pytest.raises(DeviceFault, match="was unplugged"):
+        follow(clock, meter, 0.1)
+
+
 def test_phasors_lose_windows_too():
     clock = SimulatedClock()
     meter = PhasorMeter(Capacitor(), clock)
