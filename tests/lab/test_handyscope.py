@@ -188,6 +188,16 @@ def test_each_fault_is_reported(fault, kind):
     meter.close()
 
 
+def test_a_device_that_is_gone_may_only_say_so(monkeypatch):
+    """The library sets a flag, and calls fail; either is enough."""
+    clock, scope, meter = rig()
+    meter.start(TONES, 1.0)
+    monkeypatch.setattr(type(scope.oscilloscope), "_present", lambda part: None)
+    scope.fault = "unplugged"
+    with pytest.raises(DeviceFault, match="was unplugged"):
+        follow(clock, meter, 0.1)
+
+
 def test_phasors_lose_windows_too():
     clock = SimulatedClock()
     meter = PhasorMeter(Capacitor(), clock)
@@ -224,6 +234,34 @@ def test_a_reader_that_was_away_for_long_is_told_what_is_missing():
     assert (len(times), lost) == (80, 0)
     clock.wait_until(clock.now() + 5)  # more than the device keeps
     assert 450 <= follow(clock, meter, 0.2)[3] <= 520
+
+
+def test_a_loss_that_is_not_reported_is_found_by_the_clock():
+    clock, scope, meter = rig()
+    meter.start(TONES, 1.0)
+    follow(clock, meter, 1)
+    total = 0
+    for _ in range(20):
+        times, *_, lost = follow(clock, meter, 0.12)
+        total += lost
+        for _ in range(5):
+            scope.oscilloscope._sampled(scope.oscilloscope._windows)  # made, but not kept
+    assert 70 <= total <= 100
+    assert clock.now() - times[-1] < 0.4
+    assert follow(clock, meter, 20)[3] <= 30
+
+
+def test_a_call_that_is_late_itself_loses_nothing(monkeypatch):
+    """The process is held up between the last block and the look at the clock."""
+    clock, _, meter = rig()
+    meter.start(TONES, 1.0)
+    follow(clock, meter, 1)
+    count = meter._missing
+    for _ in range(20):
+        with monkeypatch.context() as held:
+            held.setattr(meter, "_missing", lambda heard: (clock.wait_until(clock.now() + 0.4), count(heard=heard))[1])
+            assert follow(clock, meter, 0.01)[3] == 0
+        assert follow(clock, meter, 0.2)[3] == 0
 
 
 def test_a_poll_does_not_wait():
