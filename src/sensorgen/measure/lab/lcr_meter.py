@@ -1,10 +1,10 @@
 """Impedance analysers HP (Agilent) 4284A and Keysight (Agilent) E4980A through VISA.
 
 One frequency after the other: ``FREQ``, ``TRIG``, and when the time of the measurement is over ``FETC?``, which
-answers resistance, reactance and a status (0 good; -1, 1, 2 no value, which reads 9.9E37; 3, 4 signal not as set). Each
-frequency is a row of its own, since a sweep of seven takes a second, in which a force changes. The level is an rms
-value for the instrument. Sources: manual of the 4284A, chapters 7 to 9 (its times, without averaging); data sheet of
-the E4980A.
+answers resistance, reactance and a status (0 good; -1, 1, 2 no value, which reads 9.9E37; 3, 4 signal not as set).
+``FREQ?`` says that the value is of this frequency, to which the nearest of the instrument's is set. Each frequency is a
+row of its own, since a sweep of seven takes a second, in which a force changes. The level is an rms value for the
+instrument. Sources: manual of the 4284A, chapters 7 to 9 (its times, without averaging); data sheet of the E4980A.
 
 ``FETC?`` is short for FETC:IMP?. The times of the E4980A are rounded up; one that takes longer answers later. Own code,
 since the drivers of PyMeasure and QCoDeS block until a value is there, and each brings a framework.
@@ -27,6 +27,7 @@ from sensorgen.measure.lab.port import Port
 _ANSWER_S = 3.0
 _OVERLOAD = 9e37
 _GOOD, _SIGNAL = 0, (3, 4)  # measured, but the source was overloaded or its level not reached
+_NEAR = 0.03  # relative, of a frequency; the 4284A has steps of up to 1.6 %
 _NUMBERS = re.compile(r"\s*([-+][0-9.]+E[-+]?[0-9]+)\s*,\s*([-+][0-9.]+E[-+]?[0-9]+)\s*,\s*([-+]?[0-9])(?:\s*,.*)?")
 
 
@@ -143,7 +144,7 @@ class LcrMeter:
         Raises
         ------
         DeviceFault
-            No answer, or none with two numbers and a status.
+            No answer, or none with two numbers and a status, or a value of another frequency.
         """
         count = len(self._tones_hz)
         k = self._next
@@ -153,6 +154,7 @@ class LcrMeter:
         found = _NUMBERS.fullmatch(said)
         if not found:
             raise DeviceFault(f"{self.model.name} at {self._port.address} answers {said!r:.60}; expected R,X,STATUS")
+        self._at(float(self._tones_hz[k]))
         resistance, reactance, status = float(found[1]), float(found[2]), int(found[3])
         row = np.full((1, count), complex(math.nan, math.nan))
         if (status == _GOOD or status in _SIGNAL) and max(abs(resistance), abs(reactance)) < _OVERLOAD:
@@ -171,6 +173,18 @@ class LcrMeter:
     def close(self) -> None:
         """Give the connection back."""
         self._port.close()
+
+    def _at(self, tone_hz: float) -> None:
+        """Refuse a value of another frequency."""
+        said = self._query("FREQ?")
+        try:
+            off = abs(float(said) / tone_hz - 1)
+        except ValueError:
+            off = math.inf
+        if not off <= _NEAR:
+            raise DeviceFault(
+                f"{self.model.name} at {self._port.address} measures at {said!r:.40} Hz, not {tone_hz:g} Hz"
+            )
 
     def _trigger(self) -> None:
         self._write(f"FREQ {self._tones_hz[self._next]:.10g}")

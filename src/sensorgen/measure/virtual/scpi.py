@@ -98,6 +98,8 @@ class LcrMeter(_Instrument):
                 self._later.append((max(time_s, self._ready_s), self._data))
             else:
                 self._errors.append('-230,"Data corrupt or stale"')
+        elif command == "FREQ?":
+            self._later.append((time_s, f"{self._frequency_hz:.5E}"))
         elif command in ("TRIG", "*TRG"):
             self._trigger(time_s)
         elif command == "ABOR":
