@@ -118,6 +118,20 @@ def test_a_planted_fault_is_seen(fault):
         lab.run(1.0)
 
 
+def test_readings_that_a_program_which_has_died_did_not_fetch_are_passed_over():
+    lab = Lab()
+    lab.meter.start(TONES, 1.0)
+    lab.clock.wait_until(1.0)
+    port = SimulatedPort(lab.instrument, lab.clock)
+    for command in (b"FETC?\n", b"FREQ?\n", b"SYST:ERR?\n"):
+        port.write(command)
+    other = lcr_meter.LcrMeter(port, lab.clock, lcr_meter.HP_4284A)
+    assert other.identify().serial == "2940J01234"
+    other.start(TONES, 1.0)
+    lab.clock.wait_until(2.0)
+    assert len(other.read().time_s) == 1
+
+
 def test_an_error_of_the_instrument_is_reported():
     lab = Lab()
     lab.instrument.fault = "error"

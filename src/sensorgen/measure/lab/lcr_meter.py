@@ -20,6 +20,7 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.records import Strict
+from sensorgen.measure.lab import scpi
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings, WrongDevice
 from sensorgen.measure.lab.port import Port
@@ -98,7 +99,7 @@ class LcrMeter:
         WrongDevice
             Another instrument answers.
         """
-        said = self._query("*IDN?")
+        said = scpi.identity(self._port, _ANSWER_S)
         fields = [field.strip() for field in said.split(",")]
         if len(fields) < 2 or fields[1].upper() not in (self.model.name, f"{self.model.name}L"):
             raise WrongDevice(f"{self._port.address} is {said!r:.80}; expected {self.model.name}")
@@ -197,12 +198,7 @@ class LcrMeter:
         return constant + periods / float(self._tones_hz[k])
 
     def _write(self, command: str) -> None:
-        self._port.write(command.encode() + b"\n")
+        scpi.write(self._port, command)
 
     def _query(self, command: str) -> str:
-        self._write(command)
-        line = self._port.read_until(b"\n", _ANSWER_S)
-        if not line.endswith(b"\n"):
-            said = f" to its end: {line!r:.60}" if line else ""
-            raise DeviceFault(f"{self._port.address} does not answer {command}{said}; check cable and power")
-        return line.decode("ascii", "replace").strip()
+        return scpi.query(self._port, command, _ANSWER_S)
