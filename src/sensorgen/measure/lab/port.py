@@ -173,8 +173,8 @@ class SimulatedPort:
         until = self._clock.now() + timeout_s
         with _faults(self.address):
             self._received += self._simulator.exchange(b"", self._clock.now())
-            while end not in self._received and (left := until - self._clock.now()) > 1e-9:
-                self._clock.wait_until(self._clock.now() + min(left, self._step_s))
+            while end not in self._received and self._clock.now() < until:
+                self._clock.wait_until(min(until, self._clock.now() + self._step_s))
                 self._received += self._simulator.exchange(b"", self._clock.now())
         return _taken(self._received, end)
 

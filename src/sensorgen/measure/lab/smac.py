@@ -51,7 +51,6 @@ _STATUS_S = 0.05  # until the status word is valid after the start of homing
 _LIFT, _RAMP = 30_000, 200_000  # counts/s, counts/s2
 _BURST = 3  # messages before an answer is waited for, where there is time: the controller's memory for them is unknown
 _MARGIN_N = 1.0  # of lifting and homing, above weight and friction
-_RESCUE_S = 1.5  # for the whole stroke at the least net force
 _ENCODER = (0x7305, 0x7306)
 _ERRORS = {
     0x2200: "peak current", 0x2201: "I2T current", 0x6320: "parameter", 0x7305: "encoder", 0x7306: "encoder wire",
@@ -103,6 +102,7 @@ class _State:
 
     known: bool = False
     on: bool = False
+    lifting: bool = False
     mode: int = 0
     homed: bool = False
     homing_s: float | None = None
@@ -244,13 +244,13 @@ class Actuator:
         return Extension(time_s, self._force(units, count), self._position(count))
 
     def lift(self) -> None:
-        """Begin to go to the upper end, whatever was before; nothing is asked, so that no answer is waited for.
+        """Begin to go to the upper end, whatever was before, also on a line opened anew; nothing is asked.
 
         By position at 150 mm/s if the upper end is known and the motor on, otherwise by a force of 1 N beyond weight
         and friction, after a reset of an error.
         """
         self._confirm = []
-        self._state.wanted_n = 0.0
+        self._state.wanted_n, self._state.lifting = 0.0, True
         if self._state.homed and self._state.on:
             self._set((_CONTROL, _ON))
             self._go(0.0, _LIFT)
@@ -264,7 +264,7 @@ class Actuator:
     def off(self) -> None:
         """Switch the motor off."""
         self._set((_CONTROL, _OFF), node=0)
-        self._state.on = False
+        self._state.on = self._state.lifting = False
         self._state.homing_s = None
 
     def close(self) -> None:
@@ -276,6 +276,7 @@ class Actuator:
             raise OutOfRange(f"force {force_n:g} N; the limit is {self._state.limit_n:g} N")
         if not (self._state.homed and self._state.on):
             raise DeviceFault(f"actuator at {self._port.address} has not found its upper end; wait, or start it again")
+        self._state.lifting = False
 
     def _go(self, position_mm: float, speed: int, most: int | None = None) -> int:
         """Begin a move to a position, which is given back in counts; the control word is 15 before and after."""
@@ -382,9 +383,9 @@ class Actuator:
         raise AssertionError
 
     def _given_up(self, fault: DeviceFault) -> DeviceFault:
-        """Motor off, unless it is unknown what would receive that."""
-        if not self._state.known:
-            return DeviceFault(f"{fault}; expected an LCC-10")
+        """Motor off, unless it is lifting, or it is unknown what would receive that."""
+        if self._state.lifting or not self._state.known:
+            return fault if self._state.lifting else DeviceFault(f"{fault}; expected an LCC-10")
         with suppress(DeviceFault):
             self.off()
         return DeviceFault(f"{fault}; motor off was sent")
@@ -410,26 +411,6 @@ class Actuator:
             if what != _STATUS:
                 raise DeviceFault(f"{asked} answers for 0x{what:X}: {line!r:.60}")
         raise DeviceFault(f"{asked} sends status words only")
-
-
-def rescue(port: Port, clock: Clock, settings: Settings | None = None) -> None:
-    """Lift the piston by force from any state of the controller, then switch the motor off; no answer is needed.
-
-    For a process that opens the line anew after the run has died. Takes 1.5 s: at the upper end the piston is held by
-    friction alone once the motor is off, so that the stage has to be raised as well.
-
-    Parameters
-    ----------
-    port : Port
-        Newly opened.
-    clock : Clock
-        For the time that the piston takes.
-    settings : Settings, optional
-        Of this actuator.
-    """
-    port.write(_writes(_raising(settings or Settings()), 0))
-    clock.wait_until(clock.now() + _RESCUE_S)
-    port.write(_writes([(_CONTROL, _OFF)], 0))
 
 
 def _raising(settings: Settings) -> list[tuple[int, int]]:
