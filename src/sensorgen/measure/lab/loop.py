@@ -5,8 +5,6 @@ from dataclasses import dataclass, field
 from math import inf, isfinite, nan
 from typing import Protocol
 
-import numpy as np
-
 from sensorgen.core.arrays import Complex
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.controls import Controls
@@ -73,6 +71,8 @@ class Loop:
         Set force; nan while the piston is moved by position [N].
     down_mm : float
         Extension at which the tip landed; nan while it is up [mm].
+    up_s : float
+        When it was last lifted [s].
     contact_mm : float
         Extension of the last landing; nan before the first [mm].
     wanted_mm : float
@@ -104,6 +104,7 @@ class Loop:
     place: Place = field(default=Place(nan, nan, nan, moving=False))
     set_n: float = nan
     down_mm: float = nan
+    up_s: float = -inf
     contact_mm: float = nan
     wanted_mm: float = nan
     step: int = 0
@@ -202,8 +203,6 @@ class Loop:
         """Lift at once, in the same period, what leaves the limits."""
         if wrong := self._wrong():
             self.rig.actuator.lift()
-            if self.travels:
-                self.rig.stage.stop()
             raise DeviceFault(f"{wrong}: lifted")
 
     def _wrong(self) -> str:
@@ -263,7 +262,8 @@ class Loop:
         stop, now = self.experiment.stop, self.clock.now()
         if stop.minutes and now - self.begun_s > stop.minutes * 60:
             raise Ended("rule", f"stop.minutes: {stop.minutes:g} min have passed")
-        if stop.short and self.watch.short(now):
-            z = complex(self.watch.latest_ohm[int(np.argmin(self.watch.tones_hz))])
-            raise Ended("rule", f"stop.short: the specimen conducts, Z = {z.real:.4g} {z.imag:+.4g}j ohm at the lowest "
-                                "frequency")  # fmt: skip
+        found = self.watch.circuit()
+        if found == "open":
+            raise DeviceFault("specimen: open circuit; check the cables to it")
+        if found and stop.short:
+            raise Ended("rule", "stop.short: at the lowest frequency the specimen conducts")
