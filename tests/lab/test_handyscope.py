@@ -181,13 +181,33 @@ def test_each_fault_is_reported(fault, kind):
     if fault in ("nan", "silent", "clipped"):
         _, impedance, clipped, _ = follow(clock, meter, 0.5)
         assert clipped[10:].all() if fault == "clipped" else np.isnan(impedance[10:]).all()
-    elif fault == "data loss" and kind == "phasors":
-        assert follow(clock, meter, 0.5)[3] == 50
     else:
         with pytest.raises(DeviceFault, match=FAULT_TEXT[fault]):
             follow(clock, meter, 2)
     meter.close()
     meter.close()
+
+
+def test_a_device_that_is_gone_may_only_say_so(monkeypatch):
+    """The library sets a flag, and calls fail; either is enough."""
+    clock, scope, meter = rig()
+    meter.start(TONES, 1.0)
+    monkeypatch.setattr(type(scope.oscilloscope), "_present", lambda part: None)
+    scope.fault = "unplugged"
+    with pytest.raises(DeviceFault, match="was unplugged"):
+        follow(clock, meter, 0.1)
+
+
+def test_phasors_lose_windows_too():
+    clock = SimulatedClock()
+    meter = PhasorMeter(Capacitor(), clock)
+    meter.start(TONES, 1.0)
+    before = follow(clock, meter, 1)[0]
+    meter.fault = "data loss"
+    clock.wait_until(clock.now() + 0.5)
+    assert meter.read().lost == 50
+    meter.fault = ""
+    assert follow(clock, meter, 1)[0][0] - before[-1] == pytest.approx(0.51)
 
 
 def test_lost_samples_are_counted_and_time_goes_on():
@@ -280,5 +300,6 @@ def test_the_vendors_demo_device_streams(vendor):
     meter.close()
     assert np.diff(times) == pytest.approx(0.01)
     assert np.isnan(np.array(impedance)[:, 0]).all()  # its inputs do not follow its generator
-    assert abs(np.array(impedance)[:, 1]) == pytest.approx(2610 * 2.000 / 6.472, rel=1e-3)
+    seen = abs(np.array(impedance)[:, 1])  # its channel 2 jumps in a few windows after the start
+    assert np.median(seen) == pytest.approx(2610 * 2.000 / 6.472, rel=1e-3)
     assert not any(clipped)

@@ -29,6 +29,7 @@ SERIAL = 28734
 _NAME, _PRODUCT = "Handyscope HS5-540XM", 22
 _KEPT = 100  # windows that the device keeps before it loses samples
 _TIMEOUT_S = 1.0
+_LOSSES = 3  # calls of read() one after the other
 _INPUT_LSB = 0.5  # noise of an input
 
 
@@ -361,7 +362,7 @@ class PhasorMeter:
         self._voltage = voltage_v * multisine(self._tones, RATE_HZ, round(WINDOW_S * RATE_HZ)).amplitude
         self._transimpedance = analyser.transimpedance(self._tones)
         self._windows = _Windows(self._plant, self._clock, analyser)
-        self._heard = self._clock.now()
+        self._heard, self._losses = self._clock.now(), 0
         ranges = (next(r for r in RANGES_V if r >= voltage_v), next(r for r in RANGES_V if r >= self._range_v))
         steps = np.array([2 * limit / 2**BITS for limit in ranges])
         samples = np.hypot(np.hypot(_INPUT_LSB, 1 / np.sqrt(12)) * steps, [0.0, analyser.output_noise_v()])
@@ -378,10 +379,13 @@ class PhasorMeter:
             raise DeviceFault(f"generator of Handyscope {SERIAL} has stopped")
         if self.fault == "hung" and now - self._heard > _TIMEOUT_S:
             raise DeviceFault(f"no samples from Handyscope {SERIAL} for {now - self._heard:.1f} s")
-        first, lost = self._windows.count, 0
         count = 0 if self.fault == "hung" else self._windows.due()
-        if self.fault == "data loss":
-            self._windows.count, lost, count = first + count, count, 0
+        lost, count = (count, 0) if self.fault == "data loss" else (0, count)
+        self._losses = self._losses + 1 if self.fault == "data loss" else 0
+        if self._losses > _LOSSES:
+            raise DeviceFault(f"Handyscope {SERIAL} loses samples again and again")
+        self._windows.count += lost
+        first = self._windows.count
         made = [self._measured(self._windows.impedance(self._tones)) for _ in range(count)]
         if count:
             self._heard = now

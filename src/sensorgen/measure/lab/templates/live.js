@@ -36,7 +36,7 @@ function addTone(name, k) {
 }
 
 function ticks(low, high) {
-  const raw = (high - low) / 3, power = 10 ** Math.floor(Math.log10(raw));
+  const raw = (high - low) / 4, power = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 5, 10].map(n => n * power).find(n => n >= raw);
   const made = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) made.push(k * step);
@@ -155,7 +155,7 @@ function buttons() {
   byId("abort").querySelector("span").textContent = over ? "Aborting" : "Abort";
   const notice = byId("notice"), silent = Date.now() - page.heard;
   const text = silent > LOST_MS ? `No answer from the run for ${Math.round(silent / 1000)} s: it has ended or stopped.`
-    : over ? "Abort requested: motor off, tip up." : paused ? "Pause requested." : "";
+    : over ? "Abort requested: the run lifts the tip and ends." : paused ? "Pause requested." : "";
   if (notice.textContent !== text) notice.textContent = text;
   notice.hidden = !text;
 }
