@@ -13,6 +13,7 @@ from sensorgen.measure.lab.experiment import Experiment
 from sensorgen.measure.lab.live import Sample
 from sensorgen.measure.lab.recorder import Recorder
 from sensorgen.measure.lab.safety import UP_MM, Ended, Rig
+from sensorgen.measure.lab.sweeps import Sweeps
 from sensorgen.measure.lab.watch import Watch
 
 PERIOD_S = 0.01
@@ -116,6 +117,7 @@ class Loop:
     late: int = 0
     presses: int = 0
     count: int = 0
+    sweeps: Sweeps = field(default_factory=Sweeps)
     _follows_s: float = nan
     begun_s: float = field(init=False)
     _last_s: float = field(init=False)
@@ -160,7 +162,7 @@ class Loop:
         if "stage" in self.rig.started and self.count % _STAGE == 0:
             self.read_stage()
         if "impedance" in self.rig.started:
-            readings = self.rig.impedance.read()
+            readings = self.sweeps.whole(self.rig.impedance.read())
             self.recorder.readings(readings)
             self.watch.take(readings, self.clock.now())
         if self.count % _RIG_ROW == 0:

@@ -12,7 +12,7 @@ from sensorgen.measure.signal.presses import WINDOW_S
 
 SILENT_S = 5.0  # without a sound reading, a fault
 _OPEN_F = 0.3e-12  # less than any specimen with its leads
-_COURSE = 15  # readings of which half have to say it
+_COURSE, _FEWEST_COURSE = 15, 5  # readings of which half have to say it
 _FEW = 3  # readings, from which their noise can be told
 _MOST = 1 << 14  # readings of a window, whatever the rate
 
@@ -90,7 +90,7 @@ class Watch:
 
         Clipped readings count: a short drives more current than an input takes.
         """
-        if len(self._course) < _COURSE:
+        if len(self._course) < _FEWEST_COURSE:
             return ""
         admittance = 1 / np.array(self._course)
         middle: Complex = np.median(admittance.real, axis=0) + 1j * np.median(admittance.imag, axis=0)
