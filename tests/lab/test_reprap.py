@@ -2,6 +2,7 @@
 
 import json
 import re
+from contextlib import suppress
 
 import pytest
 
@@ -122,6 +123,24 @@ def test_nothing_but_the_question_goes_to_another_device(way):
     with pytest.raises(WrongDevice, match=f"{said}.*expected RepRapFirmware"):
         lab.stage.start()
     assert lab.firmware.heard == [b"M115" if way == "serial" else b"/rr_connect?password=reprap"]
+
+
+def test_answers_to_a_program_that_has_died_are_not_those_to_this_one():
+    """It died while homing: the firmware answers M115 when the zeros are found, each time that it was asked."""
+    lab = Lab("serial").home()
+    lab.stage.move(100.0, 10.0)
+    lab.firmware.exchange(b'M409 K"state.status"\nG28\nM409 K"state.status"\n', lab.clock.now())
+    stage = reprap.Stage(reprap.SerialLink(SimulatedPort(lab.firmware, lab.clock), lab.clock), lab.clock)
+    for _ in range(3):
+        with pytest.raises(DeviceFault, match="asked M115, answers"):
+            stage.identify()
+    while lab.plant.axis("z")[0] or lab.plant.axis("x")[0]:
+        with suppress(DeviceFault):
+            stage.identify()
+    assert stage.identify().firmware == "3.5.3"
+    stage.lift()
+    lab.stage = stage
+    assert lab.run(4.0).height_mm == 30
 
 
 def test_older_firmware_has_no_object_model():

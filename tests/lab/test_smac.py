@@ -250,8 +250,26 @@ def test_after_a_fault_the_piston_is_lifted_and_the_motor_switched_off(fault):
     assert not lab.plant.on
 
 
+def test_a_piston_that_is_being_lifted_is_not_let_fall_by_a_silent_controller():
+    """It obeys, but cannot be heard: reading fails, and the motor stays on until it is switched off."""
+    lab = Lab().home()
+    lab.actuator.push(3.0)
+    lab.run(0.5)
+    lab.controller.fault = "silent"
+    with pytest.raises(DeviceFault, match="motor off was sent"):
+        lab.run(0.1)
+    assert not lab.plant.on
+    lab.actuator.lift()
+    with pytest.raises(DeviceFault, match=r"check cable and power$"):
+        lab.run(0.1)
+    lab.clock.wait_until(lab.clock.now() + 1.0)
+    lab.controller.exchange(b"", lab.clock.now())
+    assert (lab.plant.extension_mm, lab.plant.on) == (0, True)
+
+
 @pytest.mark.parametrize("state", ["pushing", "landing", "homing", "off", "error"])
-def test_rescue_lifts_from_any_state_on_a_line_opened_anew(state):
+def test_another_process_lifts_from_any_state_on_a_line_opened_anew(state):
+    """Without having asked anything, as it may not be answered."""
     lab = Lab()
     if state == "homing":
         lab.plant.extension_mm = 20.0
@@ -264,8 +282,13 @@ def test_rescue_lifts_from_any_state_on_a_line_opened_anew(state):
         lab.actuator.off()
     if state == "error":
         lab.controller.fault = "error"
-    smac.rescue(SimulatedPort(lab.controller, lab.clock), lab.clock)
-    assert (lab.plant.extension_mm, lab.plant.on) == (0, False)
+    other = smac.Actuator(SimulatedPort(lab.controller, lab.clock), lab.clock)
+    other.lift()
+    lab.clock.wait_until(lab.clock.now() + 1.5)
+    lab.controller.exchange(b"", lab.clock.now())
+    assert (lab.plant.extension_mm, lab.plant.on) == (0, True)
+    other.off()
+    assert not lab.plant.on
 
 
 def test_a_homing_that_does_not_end_is_a_fault():
@@ -311,11 +334,18 @@ def test_the_same_bytes_over_a_pseudo_terminal():
         while plant.force_n < 1.9:
             actuator.read()
         actuator.close()
-        again = SerialPort(path, smac.BAUD)
-        smac.rescue(again, clock)
+        again = smac.Actuator(SerialPort(path, smac.BAUD), clock)
+        again.lift()
+        while plant.extension_mm:
+            pass
+        again.off()
         while plant.on:
             pass
-        assert plant.extension_mm == 0
         again.close()
+        first = SerialPort(path, smac.BAUD)
+        with pytest.raises(DeviceFault, match="lock"):
+            SerialPort(path, smac.BAUD)
+        SerialPort(path, smac.BAUD, shared=True).close()
+        first.close()
     with pytest.raises(DeviceFault, match="connection to /dev/nothing failed"):
         SerialPort("/dev/nothing", smac.BAUD)

@@ -1,10 +1,10 @@
 """Impedance analysers HP (Agilent) 4284A and Keysight (Agilent) E4980A through VISA.
 
 One frequency after the other: ``FREQ``, ``TRIG``, and when the time of the measurement is over ``FETC?``, which
-answers resistance, reactance and a status (0 good; -1, 1, 2 no value, which reads 9.9E37; 3, 4 signal not as set). Each
-frequency is a row of its own, since a sweep of seven takes a second, in which a force changes. The level is an rms
-value for the instrument. Sources: manual of the 4284A, chapters 7 to 9 (its times, without averaging); data sheet of
-the E4980A.
+answers resistance, reactance and a status (0 good; -1, 1, 2 no value, which reads 9.9E37; 3, 4 signal not as set).
+``FREQ?`` says that the value is of this frequency, to which the nearest of the instrument's is set. Each frequency is a
+row of its own, since a sweep of seven takes a second, in which a force changes. The level is an rms value for the
+instrument. Sources: manual of the 4284A, chapters 7 to 9 (its times, without averaging); data sheet of the E4980A.
 
 ``FETC?`` is short for FETC:IMP?. The times of the E4980A are rounded up; one that takes longer answers later. Own code,
 since the drivers of PyMeasure and QCoDeS block until a value is there, and each brings a framework.
@@ -20,6 +20,7 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.records import Strict
+from sensorgen.measure.lab import scpi
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings, WrongDevice
 from sensorgen.measure.lab.port import Port
@@ -27,6 +28,7 @@ from sensorgen.measure.lab.port import Port
 _ANSWER_S = 3.0
 _OVERLOAD = 9e37
 _GOOD, _SIGNAL = 0, (3, 4)  # measured, but the source was overloaded or its level not reached
+_NEAR = 0.03  # relative, of a frequency; the 4284A has steps of up to 1.6 %
 _NUMBERS = re.compile(r"\s*([-+][0-9.]+E[-+]?[0-9]+)\s*,\s*([-+][0-9.]+E[-+]?[0-9]+)\s*,\s*([-+]?[0-9])(?:\s*,.*)?")
 
 
@@ -97,7 +99,7 @@ class LcrMeter:
         WrongDevice
             Another instrument answers.
         """
-        said = self._query("*IDN?")
+        said = scpi.identity(self._port, _ANSWER_S)
         fields = [field.strip() for field in said.split(",")]
         if len(fields) < 2 or fields[1].upper() not in (self.model.name, f"{self.model.name}L"):
             raise WrongDevice(f"{self._port.address} is {said!r:.80}; expected {self.model.name}")
@@ -143,7 +145,7 @@ class LcrMeter:
         Raises
         ------
         DeviceFault
-            No answer, or none with two numbers and a status.
+            No answer, or none with two numbers and a status, or a value of another frequency.
         """
         count = len(self._tones_hz)
         k = self._next
@@ -153,6 +155,7 @@ class LcrMeter:
         found = _NUMBERS.fullmatch(said)
         if not found:
             raise DeviceFault(f"{self.model.name} at {self._port.address} answers {said!r:.60}; expected R,X,STATUS")
+        self._at(float(self._tones_hz[k]))
         resistance, reactance, status = float(found[1]), float(found[2]), int(found[3])
         row = np.full((1, count), complex(math.nan, math.nan))
         if (status == _GOOD or status in _SIGNAL) and max(abs(resistance), abs(reactance)) < _OVERLOAD:
@@ -172,6 +175,18 @@ class LcrMeter:
         """Give the connection back."""
         self._port.close()
 
+    def _at(self, tone_hz: float) -> None:
+        """Refuse a value of another frequency."""
+        said = self._query("FREQ?")
+        try:
+            off = abs(float(said) / tone_hz - 1)
+        except ValueError:
+            off = math.inf
+        if not off <= _NEAR:
+            raise DeviceFault(
+                f"{self.model.name} at {self._port.address} measures at {said!r:.40} Hz, not {tone_hz:g} Hz"
+            )
+
     def _trigger(self) -> None:
         self._write(f"FREQ {self._tones_hz[self._next]:.10g}")
         self._write("TRIG")
@@ -183,12 +198,7 @@ class LcrMeter:
         return constant + periods / float(self._tones_hz[k])
 
     def _write(self, command: str) -> None:
-        self._port.write(command.encode() + b"\n")
+        scpi.write(self._port, command)
 
     def _query(self, command: str) -> str:
-        self._write(command)
-        line = self._port.read_until(b"\n", _ANSWER_S)
-        if not line.endswith(b"\n"):
-            said = f" to its end: {line!r:.60}" if line else ""
-            raise DeviceFault(f"{self._port.address} does not answer {command}{said}; check cable and power")
-        return line.decode("ascii", "replace").strip()
+        return scpi.query(self._port, command, _ANSWER_S)

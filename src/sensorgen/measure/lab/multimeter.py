@@ -6,6 +6,7 @@ Both use SCPI: ``MEAS:RES?`` with two leads, ``MEAS:FRES?`` with four; both send
 import re
 from collections.abc import Mapping
 
+from sensorgen.measure.lab import scpi
 from sensorgen.measure.lab.devices import DeviceFault, Identity, WrongDevice
 from sensorgen.measure.lab.port import Port
 
@@ -46,15 +47,15 @@ class Multimeter:
             Another instrument answers.
         """
         if self._port.address.upper().startswith("ASRL"):
-            self._write("SYST:REM")
-        said = self._query("*IDN?")
+            scpi.write(self._port, "SYST:REM")
+        said = scpi.identity(self._port, TIMEOUT_S)
         fields = re.sub(r"\s*,\s*", ",", said)
         name = next((name for model, name in self._models.items() if f",{model}," in fields.upper()), "")
         if not name:
             expected = " or ".join(self._models.values())
             raise WrongDevice(f"{self._port.address} is {said!r:.80}; expected {expected}: or type it with --y, --z")
         self.name = f"{name} ({said})"
-        self._write("*CLS")
+        scpi.write(self._port, "*CLS")
         serial, firmware = (*fields.split(",")[2:4], "", "")[:2]
         return Identity(name, serial, firmware)
 
@@ -85,12 +86,5 @@ class Multimeter:
         """Give the connection back."""
         self._port.close()
 
-    def _write(self, command: str) -> None:
-        self._port.write(command.encode() + b"\n")
-
     def _query(self, command: str) -> str:
-        self._write(command)
-        line = self._port.read_until(b"\n", TIMEOUT_S)
-        if not line.endswith(b"\n"):
-            raise DeviceFault(f"{self._port.address} does not answer {command} ({line!r:.40}); check cable and power")
-        return line.decode("utf-8", "replace").strip()
+        return scpi.query(self._port, command, TIMEOUT_S)

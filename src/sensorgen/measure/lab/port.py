@@ -101,6 +101,8 @@ class SerialPort:
         ``/dev/ttyUSB0``, ``COM3``.
     baud : int
         Bits per second.
+    shared : bool
+        Open it also if another program has it: to stop what that program has begun.
 
     Raises
     ------
@@ -110,7 +112,7 @@ class SerialPort:
         There is no such line, or another program has it.
     """
 
-    def __init__(self, address: str, baud: int) -> None:
+    def __init__(self, address: str, baud: int, *, shared: bool = False) -> None:
         try:
             import serial
         except ImportError:
@@ -118,7 +120,7 @@ class SerialPort:
         self.address = address
         self._received = bytearray()
         with _faults(address):
-            self._line = serial.Serial(address, baud, timeout=_POLL_S, write_timeout=1.0, exclusive=True)
+            self._line = serial.Serial(address, baud, timeout=_POLL_S, write_timeout=1.0, exclusive=not shared)
 
     def write(self, data: bytes) -> None:
         """Send; DeviceFault if the line is cut."""
@@ -171,8 +173,8 @@ class SimulatedPort:
         until = self._clock.now() + timeout_s
         with _faults(self.address):
             self._received += self._simulator.exchange(b"", self._clock.now())
-            while end not in self._received and (left := until - self._clock.now()) > 1e-9:
-                self._clock.wait_until(self._clock.now() + min(left, self._step_s))
+            while end not in self._received and self._clock.now() < until:
+                self._clock.wait_until(min(until, self._clock.now() + self._step_s))
                 self._received += self._simulator.exchange(b"", self._clock.now())
         return _taken(self._received, end)
 

@@ -118,17 +118,23 @@ class SerialLink:
         self._partial = b""
         self._status = ""
         self._report: Report | None = None
+        self._identifying = 0
 
     def identify(self) -> str:
-        """Answer to M115; nothing else was sent before."""
+        """Answer to M115, after those to what another program asked before; nothing else was sent before."""
         self._port.write(b"M115\n")
+        self._identifying += 1
         until = self._clock.now() + _ANSWER_S
         lines: list[str] = []
         while (left := until - self._clock.now()) > 0:
             line = self._port.read_until(b"\n", left).decode("ascii", "replace").strip()
-            if line == "ok":
-                return " ".join(lines)
-            lines.append(line)
+            if line != "ok":
+                lines.append(line)
+            elif _NAME in (said := " ".join(lines)):
+                lines = []
+                self._identifying -= 1
+                if not self._identifying:
+                    return said
         raise DeviceFault(
             f"{self.address}, asked M115, answers {' '.join(lines)!r:.80}; check cable, power and baud rate"
         )

@@ -32,9 +32,12 @@ _CONTROL, _STATUS, _MODE, _MODE_NOW = 0x6040, 0x6041, 0x6060, 0x6061
 _FORCE, _FORCE_NOW, _SLOPE = 0x6071, 0x6077, 0x6087
 _LARGEST, _LARGEST_DOWN, _LARGEST_UP = 0x6072, 0x60E0, 0x60E1
 _TARGET, _POSITION, _SPEED, _RISE, _FALL = 0x607A, 0x6064, 0x6081, 0x6083, 0x6084
-_HOMING = {0x6098: -1, 0x16099: 10_000, 0x26099: 500, 0x609A: 10_000, 0x12102: 15_000, 0x607C: 0}
-_HOMING_FORCE = 0x22102
-_SIGNED = {_FORCE: 16, _FORCE_NOW: 16, _LARGEST_DOWN: 16, _LARGEST_UP: 16, _TARGET: 32, _POSITION: 32, _MODE_NOW: 8}
+_METHOD, _OFFSET, _HOMING_FORCE = 0x6098, 0x607C, 0x22102
+_HOMING = {_METHOD: -1, 0x16099: 10_000, 0x26099: 500, 0x609A: 10_000, 0x12102: 15_000, _OFFSET: 0}
+_SIGNED = {
+    _FORCE: 16, _FORCE_NOW: 16, _LARGEST_DOWN: 16, _LARGEST_UP: 16, _TARGET: 32, _POSITION: 32, _OFFSET: 32,
+    _MODE_NOW: 8, _METHOD: 8,
+}  # fmt: skip
 _BY_POSITION, _BY_FORCE, _HOME = 1, 4, 6
 _FAULT, _ENABLED, _STATE = 0x08, 0x27, 0x6F  # of the status word: CiA 402
 _REACHED, _ACKNOWLEDGED, _FAILED = 0x0400, 0x1000, 0x2000  # bits 10, 12 and 13
@@ -43,11 +46,11 @@ _RESET = 128
 _PROFILE, _INGENIA = 0x00020192, 0x29C  # servo drive by CiA 402; maker of the controller's library, by the guide
 _UNITS = 1000  # per mille
 _TRIES = 3
-_SETTLED_S, _STRAY = 0.2, 30  # the current follows a set-point within milliseconds; per mille
+_SETTLED_S, _STRAY = 0.2, 50  # the current follows within milliseconds; per mille, of which its resolution is 20
 _STATUS_S = 0.05  # until the status word is valid after the start of homing
-_LIFT, _LIFT_RISE = 30_000, 200_000  # counts/s, counts/s2
+_LIFT, _RAMP = 30_000, 200_000  # counts/s, counts/s2
+_BURST = 3  # messages before an answer is waited for, where there is time: the controller's memory for them is unknown
 _MARGIN_N = 1.0  # of lifting and homing, above weight and friction
-_RESCUE_S = 1.5  # for the whole stroke at the least net force
 _ENCODER = (0x7305, 0x7306)
 _ERRORS = {
     0x2200: "peak current", 0x2201: "I2T current", 0x6320: "parameter", 0x7305: "encoder", 0x7306: "encoder wire",
@@ -99,6 +102,7 @@ class _State:
 
     known: bool = False
     on: bool = False
+    lifting: bool = False
     mode: int = 0
     homed: bool = False
     homing_s: float | None = None
@@ -168,10 +172,10 @@ class Actuator:
         up = self.settings.lifting()
         both = max(most, -up)
         self._set((_NOTIFY, 0), (_CONTROL, _OFF), (_CONTROL, _RESET), (_CONTROL, _OFF))
-        self._set((_LARGEST, both), (_LARGEST_DOWN, most), (_LARGEST_UP, -both), (_SLOPE, 100_000))
-        self._expect((_LARGEST, both), (_LARGEST_DOWN, most))
-        self._set(*_HOMING.items(), (_HOMING_FORCE, -up), (_MODE, _HOME))
-        self._set((_CONTROL, _READY), (_CONTROL, _ON), (_CONTROL, _BEGIN))
+        limits = [(_LARGEST, both), (_LARGEST_DOWN, most), (_LARGEST_UP, -both)]
+        self._configure([*limits, (_SLOPE, 100_000), (_RISE, _RAMP), (_FALL, _RAMP)])
+        self._configure([*_HOMING.items(), (_HOMING_FORCE, -up)])
+        self._set((_MODE, _HOME), (_CONTROL, _READY), (_CONTROL, _ON), (_CONTROL, _BEGIN))
         self._state.on = True
 
     def move(self, position_mm: float, speed_mm_s: float, force_n: float) -> None:
@@ -188,9 +192,10 @@ class Actuator:
         speed = max(1, round(speed_mm_s / self.settings.mm_per_count))
         most = self.settings.units(force_n - self.settings.weight_n + self.settings.friction_n)
         most = min(most, self.settings.units(self._state.limit_n - self.settings.weight_n))
-        self._go(position_mm, speed, max(10 * speed, 1000), most)
+        target = self._go(position_mm, speed, most)
         self._acknowledged()
         self._set((_CONTROL, _ON))
+        self._confirm = [(_LARGEST_DOWN, most), (_TARGET, target)]
 
     def push(self, force_n: float) -> None:
         """Press with a force, from now on [N].
@@ -239,16 +244,16 @@ class Actuator:
         return Extension(time_s, self._force(units, count), self._position(count))
 
     def lift(self) -> None:
-        """Begin to go to the upper end, whatever was before; nothing is asked, so that no answer is waited for.
+        """Begin to go to the upper end, whatever was before, also on a line opened anew; nothing is asked.
 
         By position at 150 mm/s if the upper end is known and the motor on, otherwise by a force of 1 N beyond weight
         and friction, after a reset of an error.
         """
         self._confirm = []
-        self._state.wanted_n = 0.0
+        self._state.wanted_n, self._state.lifting = 0.0, True
         if self._state.homed and self._state.on:
             self._set((_CONTROL, _ON))
-            self._go(0.0, _LIFT, _LIFT_RISE, self.settings.units(self._state.limit_n - self.settings.weight_n))
+            self._go(0.0, _LIFT)
             self._set((_CONTROL, _ON))
             return
         self._set(*_raising(self.settings))
@@ -259,7 +264,7 @@ class Actuator:
     def off(self) -> None:
         """Switch the motor off."""
         self._set((_CONTROL, _OFF), node=0)
-        self._state.on = False
+        self._state.on = self._state.lifting = False
         self._state.homing_s = None
 
     def close(self) -> None:
@@ -271,14 +276,16 @@ class Actuator:
             raise OutOfRange(f"force {force_n:g} N; the limit is {self._state.limit_n:g} N")
         if not (self._state.homed and self._state.on):
             raise DeviceFault(f"actuator at {self._port.address} has not found its upper end; wait, or start it again")
+        self._state.lifting = False
 
-    def _go(self, position_mm: float, speed: int, rise: int, most: int) -> None:
-        """Begin a move to a position at once; the control word is 15 before and after."""
+    def _go(self, position_mm: float, speed: int, most: int | None = None) -> int:
+        """Begin a move to a position, which is given back in counts; the control word is 15 before and after."""
         target = round(position_mm / self.settings.mm_per_count)
-        mode = () if self._state.mode == _BY_POSITION else ((_MODE, _BY_POSITION),)
-        self._set((_LARGEST_DOWN, most), (_SPEED, speed), (_RISE, rise), (_FALL, rise), (_TARGET, target), *mode)
-        self._set((_CONTROL, _NEW))
+        limit = [] if most is None else [(_LARGEST_DOWN, most)]
+        mode = [] if self._state.mode == _BY_POSITION else [(_MODE, _BY_POSITION)]
+        self._set(*limit, (_SPEED, speed), (_TARGET, target), *mode, (_CONTROL, _NEW))
         self._state.mode = _BY_POSITION
+        return target
 
     def _acknowledged(self) -> None:
         """Refuse a target that the trajectory generator has not taken."""
@@ -310,8 +317,12 @@ class Actuator:
                     f"actuator at {self._port.address} did not take object 0x{what:X}: set {value}, now {found}"
                 )
 
-    def _expect(self, *pairs: tuple[int, int]) -> None:
-        self._taken(pairs, self._ask(*(what for what, _ in pairs)))
+    def _configure(self, pairs: list[tuple[int, int]]) -> None:
+        """Set values a few at a time, and see that they were taken."""
+        for begin in range(0, len(pairs), _BURST):
+            some = pairs[begin : begin + _BURST]
+            self._set(*some)
+            self._taken(some, self._ask(*(what for what, _ in some)))
 
     def _follows(self, units: int, time_s: float) -> None:
         """Refuse a current that is not what was set."""
@@ -334,8 +345,7 @@ class Actuator:
         if status & _REACHED and status & _ACKNOWLEDGED:  # target reached, homing attained
             state.homing_s, state.homed = None, True
             self._set((_CONTROL, _ON))
-            most = self.settings.units(state.limit_n - self.settings.weight_n)
-            self._go(0.0, _LIFT, _LIFT_RISE, most)
+            self._go(0.0, _LIFT)
             self._set((_CONTROL, _ON))
 
     def _force(self, units: int, count: int) -> float:
@@ -373,9 +383,9 @@ class Actuator:
         raise AssertionError
 
     def _given_up(self, fault: DeviceFault) -> DeviceFault:
-        """Motor off, unless it is unknown what would receive that."""
-        if not self._state.known:
-            return DeviceFault(f"{fault}; expected an LCC-10")
+        """Motor off, unless it is lifting, or it is unknown what would receive that."""
+        if self._state.lifting or not self._state.known:
+            return fault if self._state.lifting else DeviceFault(f"{fault}; expected an LCC-10")
         with suppress(DeviceFault):
             self.off()
         return DeviceFault(f"{fault}; motor off was sent")
@@ -401,26 +411,6 @@ class Actuator:
             if what != _STATUS:
                 raise DeviceFault(f"{asked} answers for 0x{what:X}: {line!r:.60}")
         raise DeviceFault(f"{asked} sends status words only")
-
-
-def rescue(port: Port, clock: Clock, settings: Settings | None = None) -> None:
-    """Lift the piston by force from any state of the controller, then switch the motor off; no answer is needed.
-
-    For a process that opens the line anew after the run has died. Takes 1.5 s: at the upper end the piston is held by
-    friction alone once the motor is off, so that the stage has to be raised as well.
-
-    Parameters
-    ----------
-    port : Port
-        Newly opened.
-    clock : Clock
-        For the time that the piston takes.
-    settings : Settings, optional
-        Of this actuator.
-    """
-    port.write(_writes(_raising(settings or Settings()), 0))
-    clock.wait_until(clock.now() + _RESCUE_S)
-    port.write(_writes([(_CONTROL, _OFF)], 0))
 
 
 def _raising(settings: Settings) -> list[tuple[int, int]]:

@@ -50,8 +50,9 @@ class _Instrument:
             self.heard.append(line)
             if self.fault != "hung":
                 self._take(line.decode("ascii", "replace").strip(), time_s)
-        due = [text for at, text in self._later if at <= time_s]
-        self._later = [each for each in self._later if each[0] > time_s]
+        due = []
+        while self._later and self._later[0][0] <= time_s:  # in the order of the questions
+            due.append(self._later.pop(0)[1])
         return b"" if self.fault in ("silent", "hung") else b"".join(map(self._spoilt, due))
 
     def _take(self, line: str, time_s: float) -> None:
@@ -98,6 +99,8 @@ class LcrMeter(_Instrument):
                 self._later.append((max(time_s, self._ready_s), self._data))
             else:
                 self._errors.append('-230,"Data corrupt or stale"')
+        elif command == "FREQ?":
+            self._later.append((time_s, f"{self._frequency_hz:.5E}"))
         elif command in ("TRIG", "*TRG"):
             self._trigger(time_s)
         elif command == "ABOR":

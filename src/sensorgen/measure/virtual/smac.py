@@ -6,7 +6,18 @@ Written from the public notes that the driver names, but without the driver.
 from sensorgen.measure.virtual.plant import Plant
 
 FAULTS = ("silent", "hung", "garbage", "identity", "truncated", "echo", "cut", "error", "stuck", "runaway")
-_SIGNED = {0x6071: 16, 0x6077: 16, 0x60E0: 16, 0x60E1: 16, 0x607A: 32, 0x6064: 32, 0x60F4: 32, 0x6061: 8}
+_SIGNED = {
+    0x6071: 16,
+    0x6077: 16,
+    0x60E0: 16,
+    0x60E1: 16,
+    0x607A: 32,
+    0x6064: 32,
+    0x60F4: 32,
+    0x6061: 8,
+    0x6098: 8,
+    0x607C: 32,
+}
 _SWITCHED = {6: 0x21, 7: 0x23, 15: 0x27}  # status by control word
 _FROM = {7: (0x21, 0x23, 0x27), 15: (0x23, 0x27)}  # states from which a control word is obeyed
 _HOMED_MM, _REACHED_MM = 0.02, 0.02
