@@ -1,25 +1,28 @@
 """A body with the values of its design, solved once: capacitance, its rise under pressure, the tracks' resistances."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from hashlib import sha256
-from math import exp
+from math import exp, log
 from pathlib import Path
 
 import numpy as np
 
+from sensorgen.asprinted.film import thicker
 from sensorgen.core import cache as answers
 from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.values import film, of_all_materials, resistivities
-from sensorgen.measure.virtual.cell import AIR_PERMITTIVITY, Raster, Solid, capacitance, conductance, pressed
+from sensorgen.measure.virtual.cell import AIR, Grid, Raster, Solid, capacitance, conductance, pressed
 from sensorgen.measure.virtual.section import FINE_MM, raster, section_of
+from sensorgen.scene.scene import Scene
 
-PRESSURES_PA = tuple(1e3 * p for p in (0, 2.5, 5, 10, 20, 30, 40, 60, 80, 100, 130, 160, 200, 250, 300, 400))
+PRESSURES_PA = tuple(1e3 * p for p in (0, 2.5, 5, 10, 20, 35, 60, 100, 150, 200, 300, 400))
 _LN_PERMITTIVITY = (-0.4, 0.0, 0.4)
 _LN_MODULUS = (-0.7, 0.0, 0.7)  # of the dielectric alone
+_ORDER = 4 / 3  # of convergence: energy of a field at a corner of 270 degrees
 _POISSON = 0.4999  # of rubber, where no source gives it
 
 
@@ -33,10 +36,13 @@ class Blank:
         By ln of the dielectric's modulus, of its permittivity, and pressure over the modulus' factor [F/m].
     track_ohm_per_m : (float, float)
         Of the top and the bottom electrode [ohm/m].
+    by_film_per_mm : float
+        Derivative of ln C by the thickness of the film [1/mm].
     """
 
     table_f_per_m: tuple[tuple[tuple[float, ...], ...], ...]
     track_ohm_per_m: tuple[float, float]
+    by_film_per_mm: float
 
     @property
     def _table(self) -> Real:
@@ -67,6 +73,13 @@ def _between(values: Real, at: tuple[float, ...], x: float) -> Real:
 def blank(design: Design, fine_mm: float = FINE_MM) -> Blank:
     """The body of a design as printed, solved; kept on disk.
 
+    Parameters
+    ----------
+    design : Design
+        What is printed.
+    fine_mm : float
+        Edge of the finer raster's elements; the coarser one's are twice as long [mm].
+
     Raises
     ------
     OutOfRange
@@ -76,11 +89,12 @@ def blank(design: Design, fine_mm: float = FINE_MM) -> Blank:
     """
     question = {
         "what": "virtual blank", "design": design.id(), "fine_mm": fine_mm, "source": _source(),
-        "at": [*_LN_PERMITTIVITY, *_LN_MODULUS, *PRESSURES_PA],
+        "film_mm": design.machine.tool_height_error_mm,
     }  # fmt: skip
     found = answers.answer(question, lambda: asdict(_solved(design, fine_mm)))
     table = tuple(tuple(tuple(row) for row in of) for of in found["table_f_per_m"])
-    return Blank(table, tuple(found["track_ohm_per_m"]))
+    top, bottom = found["track_ohm_per_m"]
+    return Blank(table, (top, bottom), found["by_film_per_mm"])
 
 
 @cache
@@ -96,30 +110,54 @@ def _solved(design: Design, fine_mm: float) -> Blank:
 
     cell = printed.body(design).cell
     section = section_of(cell.scene)
-    used, dielectric = _solids(design), film(design)
-    names = {name: k + 1 for k, name in enumerate(used)}
-    grid = raster(cell.scene, names, fine_mm)
-    depth_m = section.depth_mm * M_PER_MM * cell.count
-    length_m = design.params.length_mm * M_PER_MM
-    table = []
-    for ln_modulus in _LN_MODULUS:
-        solids = [Solid(0.0, 0.0, AIR_PERMITTIVITY), *used.values()]
-        own = used[dielectric]
-        solids[names[dielectric]] = Solid(own.modulus_pa * exp(ln_modulus), own.poisson, own.permittivity)
-        places = pressed(grid, solids, [p * exp(ln_modulus) for p in PRESSURES_PA]).place_m
-        rows = []
-        for ln_eps in _LN_PERMITTIVITY:
-            eps = [s.permittivity for s in solids]
-            eps[names[dielectric]] *= exp(ln_eps)
-            rows.append(tuple(capacitance(grid, eps, place) * depth_m / length_m for place in places))
-        table.append(tuple(rows))
-    along = section.across == "x"
-    rho = resistivities(design)
+    depth_m, length_m = section.depth_mm * M_PER_MM, design.params.length_mm * M_PER_MM
+    per_length = depth_m * cell.count / length_m
+    coarse, fine = (_table(design, cell.scene, size) for size in (2 * fine_mm, fine_mm))
+    table = per_length * (fine + (fine - coarse) / (2**_ORDER - 1))
+    grid, rho = _raster(design, cell.scene, fine_mm), resistivities(design)
     top, bottom = (
-        rho[end].value / _conductor_m2(grid, number, section.depth_mm * M_PER_MM, cell.count, length_m, along=along)
+        rho[end].value / _conductor_m2(grid, number, depth_m, cell.count, length_m, along=section.across == "x")
         for end, number in (("top", 2), ("bottom", 1))
     )
-    return Blank(tuple(table), (top, bottom))
+    return Blank(tuple(tuple(map(tuple, of)) for of in table.tolist()), (top, bottom), _by_film(design, cell.scene))
+
+
+def _raster(design: Design, scene: Scene, fine_mm: float) -> Raster:
+    return raster(scene, {name: k + 1 for k, name in enumerate(_solids(design))}, fine_mm)
+
+
+def _table(design: Design, scene: Scene, fine_mm: float) -> Real:
+    """Capacitances per depth of a cell on one raster, in the order of ``Blank.table_f_per_m`` [F/m]."""
+    used, grid = _solids(design), _raster(design, scene, fine_mm)
+    number = list(used).index(film(design))
+    found = []
+    for ln_modulus in _LN_MODULUS:
+        solids = list(used.values())
+        solids[number] = replace(solids[number], modulus_pa=solids[number].modulus_pa * exp(ln_modulus))
+        loads = [p * exp(ln_modulus) for p in PRESSURES_PA]
+        places = pressed(grid, [AIR, *solids], loads).place_m
+        found.append([
+            [capacitance(grid, _permittivities(solids, number, ln), place) for place in places]
+            for ln in _LN_PERMITTIVITY
+        ])  # fmt: skip
+    return np.array(found)
+
+
+def _permittivities(solids: Sequence[Solid], number: int, ln: float) -> list[float]:
+    """Of air and all materials, that of one times a factor."""
+    return [AIR.permittivity, *(s.permittivity * (exp(ln) if k == number else 1.0) for k, s in enumerate(solids))]
+
+
+def _by_film(design: Design, scene: Scene) -> float:
+    """Derivative of ln C by the film's thickness [1/mm]; 0 where no film lies between the electrodes."""
+    by = design.machine.tool_height_error_mm
+    scenes = [thicker(scene, more) for more in (by, -by)]
+    if not by or None in scenes:
+        return 0.0
+    solids = list(_solids(design).values())
+    grids = [_raster(design, one, 2 * FINE_MM) for one in scenes if one]
+    ends = [capacitance(grid, _permittivities(solids, 0, 0.0), Grid(grid).at_m) for grid in grids]
+    return log(ends[0] / ends[1]) / (2 * by)
 
 
 def _conductor_m2(grid: Raster, electrode: int, depth_m: float, count: float, length_m: float, *, along: bool) -> float:

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.errors import OutOfRange
 
-AIR_PERMITTIVITY = 1.00059
 EPSILON_0 = 8.8541878128e-12
 _SOFT = 1e-5  # shear modulus of air over that of the softest solid
 _AIR_BULK = 5.0  # its second constant, over its shear modulus
@@ -61,6 +60,9 @@ class Solid:
     modulus_pa: float
     poisson: float
     permittivity: float
+
+
+AIR = Solid(0.0, 0.0, 1.00059)
 
 
 class Grid:
@@ -142,19 +144,21 @@ def pressed(raster: Raster, solids: Sequence[Solid], pressure_pa: Sequence[float
 
     grid = Grid(raster)
     body = _Body(grid, raster, solids)
-    u = np.zeros(2 * grid.count)
+    u, rate = np.zeros(2 * grid.count), np.zeros(2 * grid.count)
     sinks, places = [0.0], [grid.at_m]
     for before, after in pairwise(pressure_pa):
         at, step = before, after - before
         while at < after - 1e-9 * after:
             step = min(step, after - at)
-            found = body.settled(u, at + step, splu)
+            ahead = u + step * rate  # where the last step leads, if that is nearer
+            near = body.energy(ahead, at + step) < body.energy(u, at + step)
+            found = body.settled(ahead if near else u, at + step, splu)
             if found is None:
                 step /= 2
                 if step < _SMALLEST_STEP * (after - before):
                     raise OutOfRange(f"the cell has no equilibrium that the raster can find above {at / 1e3:.3g} kPa")
                 continue
-            u, at = found, at + step
+            u, rate, at = found, (found - u) / step, at + step
             step *= 1.5
         sinks.append(float(body.load @ u) / float(np.diff(raster.x_m).sum()))
         places.append(grid.at_m + u.reshape(-1, 2)[grid.nodes])

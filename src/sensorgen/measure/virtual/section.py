@@ -15,6 +15,7 @@ from sensorgen.scene.sections import Column, Section, columns, sections
 
 FINE_MM = 0.025
 _MOST_COLUMNS = 120  # of elements; the width of a cell with a larger one is cut evenly
+_GRADED = 0.7  # share of the cosine in the grading of elements
 _NONE_MM = 1e-9
 _TERMINALS = {"bottom": 1, "top": 2, FLOATING: 3}
 
@@ -70,15 +71,16 @@ def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM)
         )
     rows = [max(round(np.max([of[k + 1] - of[k] for of in lines]) / fine_mm), 1) for k in range(len(lines[0]) - 1)]
     pieces = [1] if len(found) == 1 else [max(int(np.ceil((b - a) / widest - 1e-6)), 1) for a, b in pairwise(sides)]
-    shares = np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in zip(rows_of(rows), rows, strict=True))])
+    shares = np.concatenate([[0.0], *(k + graded(n) for k, n in enumerate(rows))])
     x, material, electrode = [sides[0]], [], []
     z = list[Real]()
     for column, of, n in zip(found, lines, pieces, strict=True):
-        x += (column.left_mm + (column.right_mm - column.left_mm) * np.arange(1, n + 1) / n).tolist()
+        x += (column.left_mm + (column.right_mm - column.left_mm) * graded(n)).tolist()
         ends = [np.interp(shares, np.arange(len(of)), of[:, side]) for side in (0, 1)]
-        z += [ends[0] + (ends[1] - ends[0]) * k / n for k in range(0 if not z else 1, n + 1)]
-        for k in range(n):
-            kinds = _kinds(column, ends, (k + 0.5) / n, materials)
+        at = [0.0, *graded(n).tolist()]
+        z += [ends[0] + (ends[1] - ends[0]) * share for share in at[bool(z) :]]
+        for share in np.add(at[1:], at[:-1]) / 2:
+            kinds = _kinds(column, ends, share, materials)
             material.append(kinds[0])
             electrode.append(kinds[1])
     return Raster(
@@ -87,9 +89,10 @@ def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM)
     )  # fmt: skip
 
 
-def rows_of(rows: Sequence[int]) -> range:
-    """Numbers of the bands between lines."""
-    return range(len(rows))
+def graded(count: int) -> Real:
+    """Ends of parts of 1 that are smaller towards both its ends, where corners are."""
+    even = np.arange(1, count + 1) / count
+    return np.asarray(_GRADED * (1 - np.cos(np.pi * even)) / 2 + (1 - _GRADED) * even)
 
 
 def _levels(found: Sequence[Column]) -> list[float]:

@@ -13,16 +13,13 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
-from sensorgen.design.values import film
+from sensorgen.design.values import film, ln_spread, material_value, resistivities
 from sensorgen.measure.virtual.blank import Blank, blank
 
 PIECES = 60  # of the chain that the line is
+_THINNEST_M = 1e-12  # of a piece
 _SHORTEST_S = 0.1  # of a hold, as its logarithm counts
-_RANGE = 2 * 1.959963984540054  # width of a material's range, in standard deviations of its logarithm
-SPREAD = {"resistivity_ohm_m": 0.5, "relative_permittivity": 0.1, "youngs_modulus_pa": 0.25}
-"""Standard deviations of ln where a material's value has no range: sources of resistivity differ by a factor of 12
-(etpu.yaml), those of permittivity from 4.68 to 6.33 (x60.yaml); moduli of printed elastomers by some 25 %."""
-_GEOMETRY = 0.02  # of ln R and ln C: width and thickness of printed tracks and films
+_SIZES = 0.02, 0.01  # of ln R and ln C: thickness and width of printed tracks, width of cells
 
 
 @dataclass(frozen=True)
@@ -34,7 +31,9 @@ class Truth:
     resistivity, permittivity, modulus : float
         Ln of the material's value over that of the design: of the electrodes, of the dielectric, of the dielectric [-].
     tracks, cells : float
-        Ln of R and C over those of the body, for sizes that are not as printed [-].
+        Ln of R and C over those of the body, by widths and thicknesses that are not as printed [-].
+    film_mm : float
+        By which the film is thicker than as printed [mm].
     profile : tuple of float
         Of ln resistivity: amplitudes of 1, 2, ... half waves along the strip [-].
     law : tuple of float
@@ -62,6 +61,7 @@ class Truth:
     modulus: float = 0.0
     tracks: float = 0.0
     cells: float = 0.0
+    film_mm: float = 0.0
     profile: tuple[float, ...] = ()
     law: tuple[float, ...] = ()
     leak: float = 0.0
@@ -93,21 +93,13 @@ class Truth:
 
 
 def spreads(design: Design) -> dict[str, tuple[float, float]]:
-    """Mean and standard deviation of ln of the materials' values over the design's, by quantity.
-
-    A value with a range gets a logarithmic normal distribution with 95 % in it; others get ``SPREAD``.
-    """
-    electrode = design.materials.bottom_electrode.partition("@")
-    names = {"resistivity_ohm_m": electrode[::2], "youngs_modulus_pa": None, "relative_permittivity": None}
-    found = {}
-    for quantity, named in names.items():
-        name, source = named or design.materials.dielectric.partition("@")[::2]
-        value = design.material(name).value(quantity, source)
-        found[quantity] = 0.0, SPREAD[quantity]
-        if value.low and value.high and value.low < value.high:
-            middle = log(value.low * value.high) / 2 - log(value.value)
-            found[quantity] = middle, log(value.high / value.low) / _RANGE
-    return found
+    """Mean and standard deviation of ln of the materials' values over the design's, by quantity."""
+    electrode, dielectric = (
+        design.slot("bottom_electrode"),
+        (design.material(film(design)), design.used()[film(design)]),
+    )
+    of = {"resistivity_ohm_m": electrode, "relative_permittivity": dielectric, "youngs_modulus_pa": dielectric}
+    return {quantity: ln_spread(*slot, quantity) for quantity, slot in of.items()}
 
 
 def drawn(design: Design, seed: int) -> Truth:
@@ -123,7 +115,8 @@ def drawn(design: Design, seed: int) -> Truth:
 
     return Truth(
         resistivity=by["resistivity_ohm_m"], permittivity=by["relative_permittivity"], modulus=by["youngs_modulus_pa"],
-        tracks=normal(_GEOMETRY), cells=normal(_GEOMETRY), profile=waves(0.1), law=waves(0.05),
+        tracks=normal(_SIZES[0]), cells=normal(_SIZES[1]), film_mm=normal(design.machine.tool_height_error_mm / 1.96),
+        profile=waves(0.1), law=waves(0.05),
         leak=float(np.exp(rng.normal(np.log(1e-3), 1.0))), dispersion=float(rng.uniform(0.0, 0.02)),
         hysteresis=float(rng.uniform(0.03, 0.07)), creep=float(rng.uniform(0.01, 0.03)), drift_c=1e-3, drift_r=1e-3,
         lead_ohm=float(rng.uniform(0.0, 60.0)), stray_f=float(rng.uniform(0.0, 1e-12)), force_n=normal(0.05),
@@ -177,18 +170,18 @@ class Specimen:
     def values(self) -> dict[str, float]:
         """True values of the materials, by quantity: of the bottom electrode and of the dielectric."""
         d, t = self.design, self.truth
-        electrode, source = d.slot("bottom_electrode")
-        material, by = d.material(film(d)), d.used().get(film(d), "")
+        dielectric = d.material(film(d)), d.used()[film(d)]
         return {
-            "resistivity_ohm_m": electrode.value("resistivity_ohm_m", source).value * exp(t.resistivity),
-            "relative_permittivity": material.value("relative_permittivity", by).value * exp(t.permittivity),
-            "youngs_modulus_pa": material.value("youngs_modulus_pa", by).value * exp(t.modulus),
+            "resistivity_ohm_m": resistivities(d)["bottom"].value * exp(t.resistivity),
+            "relative_permittivity": material_value(*dielectric, "relative_permittivity").value * exp(t.permittivity),
+            "youngs_modulus_pa": material_value(*dielectric, "youngs_modulus_pa").value * exp(t.modulus),
         }
 
     @cached_property
     def capacitance_f_per_m(self) -> float:
         """With nothing on it, at 1 kHz [F/m]."""
-        return self.blank.capacitance_f_per_m(self.truth.permittivity) * exp(self.truth.cells)
+        by_size = self.truth.cells + self.blank.by_film_per_mm * self.truth.film_mm
+        return self.blank.capacitance_f_per_m(self.truth.permittivity) * exp(by_size)
 
     @cached_property
     def track_ohm_per_m(self) -> tuple[float, float]:
@@ -297,23 +290,25 @@ class Line:
         length, truth = self._of.length_m, self._of.truth
         count = max(int(np.ceil((end_m - start_m) / length * self._of.pieces - 1e-9)), 1)
         edges = np.linspace(start_m, end_m, count + 1)
-        total = np.zeros((2, 2, *self._loose.shape), complex)
-        total[0, 0] = total[1, 1] = 1.0
-        y = self._loose * (1 + lift) + self._leak
-        bridge = (
-            int(np.searchsorted(edges, self._short_m, side="right")) - 1 if start_m <= self._short_m <= end_m else -1
-        )
-        for k, at in enumerate((edges[1:] + edges[:-1]) / 2):
-            size = edges[k + 1] - edges[k]
-            if size > 0:
-                bent = sum(a * np.cos((n + 1) * np.pi * at / length) for n, a in enumerate(truth.profile))
-                total = _joined(total, _piece(self._track * np.exp(bent) * size, y * size))
-            if shorted and k == min(bridge, count - 1):
-                shunt = np.zeros_like(total)
-                shunt[0, 0] = shunt[1, 1] = 1.0
-                shunt[1, 0] = 1 / truth.short_ohm
-                total = _joined(total, shunt)
-        return total
+        middle, size = (edges[1:] + edges[:-1]) / 2, np.maximum(np.diff(edges), _THINNEST_M)
+        waves = np.arange(1, len(truth.profile) + 1)
+        bent = np.array(truth.profile) @ np.cos(waves[:, None] * np.pi * middle / length)
+        y = (self._loose * (1 + lift) + self._leak)[..., None] * size
+        pieces = _piece(self._track[..., None] * np.exp(bent) * size, y)
+        if shorted and start_m <= self._short_m <= end_m:
+            at = min(int(np.searchsorted(edges, self._short_m, side="right")), count) - 1
+            pieces[:, 0, ..., at] += pieces[:, 1, ..., at] / truth.short_ohm
+        return _product(pieces)
+
+
+def _product(matrices: Complex) -> Complex:
+    """Of all matrices along the last axis, in order; halves at a time."""
+    while matrices.shape[-1] > 1:
+        count = matrices.shape[-1]
+        even = count - count % 2
+        joined = np.einsum("ij...,jk...->ik...", matrices[..., :even:2], matrices[..., 1:even:2])
+        matrices = np.concatenate([joined, matrices[..., even:]], -1)
+    return matrices[..., 0]
 
 
 def _piece(series: Real, shunt: Complex) -> Complex:
@@ -322,11 +317,6 @@ def _piece(series: Real, shunt: Complex) -> Complex:
     ch, z0 = np.cosh(s), np.sqrt(series / shunt)
     sh = np.sinh(s)
     return np.array([[ch, z0 * sh], [sh / z0, ch]])
-
-
-def _joined(left: Complex, right: Complex) -> Complex:
-    """Product of two matrices over all further axes."""
-    return np.asarray(np.einsum("ij...,jk...->ik...", left, right))
 
 
 def decades(hold_s: float) -> float:
