@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def _work(
     specimens: tuple[str, ...], tip_mm: float, force_offset: str, recordings: tuple[int, ...], page: str | None,
-    file: str | None, *, again: bool, dry_run: bool,
+    source: str | None, file: str | None, *, again: bool, dry_run: bool,
 ) -> int:  # fmt: skip
     """Calibrate specimens by recordings with known presses, and by readings of meters, that the log has of them.
 
@@ -28,6 +28,8 @@ def _work(
     bench = options.bench_of(tip_mm, force_offset)
     if again and len(specimens) > 1:
         raise BadInput(f"--recheck of {len(specimens)} specimens; expected one")
+    if source and len(specimens) > 1:
+        raise BadInput(f"--source of {len(specimens)} specimens; expected one; 'sensorgen fit' takes several")
     given = click.get_current_context().get_parameter_source
     if again and any(given(name) is ParameterSource.COMMANDLINE for name in ("tip_mm", "force_offset")):
         raise BadInput("--recheck goes on with tip and offset of the calibration; expected no --tip, no --force-offset")
@@ -42,6 +44,11 @@ def _work(
         if not dry_run:
             log.add(calibration.rows(log, [one.calibration for one in made]))
     render.deliver(calibration.Together(tuple(made)))
+    if source:
+        from sensorgen.core import files as store
+
+        store.replace(Path(source), made[0].calibration.source().encode())
+        render.say(source)
     if page:
         from sensorgen.analysis.calibration.page import html
         from sensorgen.core import files as store
@@ -65,6 +72,10 @@ command = click.Command(
             help="Hold 3 to 5 new known presses against the calibration, as after a change of tip, and mend it.",
         ),
         click.Option(["--page"], metavar="FILE.html", help="Write pictures of the presses and of what was learnt."),
+        click.Option(
+            ["--source"], metavar="FILE.yaml",
+            help="Write the material values of the specimen as a source that designs can name.",
+        ),
         log_words.where(),
         *body_options.body_options(),
         click.Option(["--dry-run"], is_flag=True, help="Log nothing."),

@@ -23,6 +23,7 @@ from sensorgen.prediction.calibration.calibration import BEYOND, Calibration, fr
 from sensorgen.prediction.calibration.coverage import coverage_of, held_out
 from sensorgen.prediction.calibration.fitting import Data, calibrated, gain, shared, widened
 from sensorgen.prediction.calibration.inversion import Found
+from sensorgen.prediction.calibration.materials import links
 from sensorgen.prediction.calibration.rest import checked
 from sensorgen.prediction.calibration.specimen import SpecimenModel, Spread
 from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
@@ -282,6 +283,7 @@ def calibrate(
         calibration = Calibration(
             one.specimen, one.design.name, one.design.id(), one.model, posterior, most, held[0] if held else None,
             one.rows, tuple(gain(one.model, one.data, posterior.at).tolist()) if one.recorded else (), notes,
+            links(one.predicted),
         )  # fmt: skip
         made.append(Made(calibration, one.data, held[1] if held else None))
     return made

@@ -5,8 +5,6 @@ from dataclasses import dataclass, field
 from math import inf, isfinite, nan
 from typing import Protocol
 
-import numpy as np
-
 from sensorgen.core.arrays import Complex
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.controls import Controls
@@ -15,6 +13,7 @@ from sensorgen.measure.lab.experiment import Experiment
 from sensorgen.measure.lab.live import Sample
 from sensorgen.measure.lab.recorder import Recorder
 from sensorgen.measure.lab.safety import UP_MM, Ended, Rig
+from sensorgen.measure.lab.sweeps import Sweeps
 from sensorgen.measure.lab.watch import Watch
 
 PERIOD_S = 0.01
@@ -73,6 +72,8 @@ class Loop:
         Set force; nan while the piston is moved by position [N].
     down_mm : float
         Extension at which the tip landed; nan while it is up [mm].
+    up_s : float
+        When it was last lifted [s].
     contact_mm : float
         Extension of the last landing; nan before the first [mm].
     wanted_mm : float
@@ -104,6 +105,7 @@ class Loop:
     place: Place = field(default=Place(nan, nan, nan, moving=False))
     set_n: float = nan
     down_mm: float = nan
+    up_s: float = -inf
     contact_mm: float = nan
     wanted_mm: float = nan
     step: int = 0
@@ -115,6 +117,7 @@ class Loop:
     late: int = 0
     presses: int = 0
     count: int = 0
+    sweeps: Sweeps = field(default_factory=Sweeps)
     _follows_s: float = nan
     begun_s: float = field(init=False)
     _last_s: float = field(init=False)
@@ -159,7 +162,7 @@ class Loop:
         if "stage" in self.rig.started and self.count % _STAGE == 0:
             self.read_stage()
         if "impedance" in self.rig.started:
-            readings = self.rig.impedance.read()
+            readings = self.sweeps.whole(self.rig.impedance.read())
             self.recorder.readings(readings)
             self.watch.take(readings, self.clock.now())
         if self.count % _RIG_ROW == 0:
@@ -202,8 +205,6 @@ class Loop:
         """Lift at once, in the same period, what leaves the limits."""
         if wrong := self._wrong():
             self.rig.actuator.lift()
-            if self.travels:
-                self.rig.stage.stop()
             raise DeviceFault(f"{wrong}: lifted")
 
     def _wrong(self) -> str:
@@ -263,7 +264,8 @@ class Loop:
         stop, now = self.experiment.stop, self.clock.now()
         if stop.minutes and now - self.begun_s > stop.minutes * 60:
             raise Ended("rule", f"stop.minutes: {stop.minutes:g} min have passed")
-        if stop.short and self.watch.short(now):
-            z = complex(self.watch.latest_ohm[int(np.argmin(self.watch.tones_hz))])
-            raise Ended("rule", f"stop.short: the specimen conducts, Z = {z.real:.4g} {z.imag:+.4g}j ohm at the lowest "
-                                "frequency")  # fmt: skip
+        found = self.watch.circuit()
+        if found == "open":
+            raise DeviceFault("specimen: open circuit; check the cables to it")
+        if found and stop.short:
+            raise Ended("rule", "stop.short: at the lowest frequency the specimen conducts")

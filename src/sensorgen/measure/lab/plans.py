@@ -13,7 +13,8 @@ from sensorgen.measure.signal.schedule import Plan
 
 AVERAGED_S = WINDOW_S + GUARD_S  # end of every hold, over which the evaluation averages [s]
 _AT_PEAK_S = 0.5  # how long a higher force is held before the force of the press
-_LANDING_S = 3.0  # lift, move, approach and landing of one press, about
+_LANDING_S = 2.0  # lift, approach and landing of one press, about
+_TRAVEL_S = 8.0  # to another place, about: a part of the rest
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,7 @@ def steps(experiment: Experiment, length_mm: float) -> list[Step]:
 def seconds(planned: Sequence[Step], longest_hold_s: float = 30.0) -> float:
     """About how long a plan takes; one chosen during the run is taken as held for a third of the longest [s]."""
     chosen = longest_hold_s / 3 + AVERAGED_S
-    return sum(step.rest_s + _LANDING_S + (step.seconds if step.course else chosen) for step in planned)
+    return sum(max(step.rest_s, _TRAVEL_S) + _LANDING_S + (step.seconds if step.course else chosen) for step in planned)
 
 
 def chosen(step: Step, choice: Choice, approach: Approach) -> Step:

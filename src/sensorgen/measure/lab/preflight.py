@@ -6,10 +6,11 @@ from sensorgen.core.errors import within
 from sensorgen.measure.lab import press
 from sensorgen.measure.lab.devices import DeviceFault, Identity
 from sensorgen.measure.lab.loop import Loop
-from sensorgen.measure.lab.safety import UP_MM, Ended, Rig
-from sensorgen.measure.lab.watch import circuit
+from sensorgen.measure.lab.safety import UP_MM, Rig
 
-_FIRST_S = 10.0  # until the first sound reading
+_UP_S = 15.0  # to the upper end, with homing
+_GENTLE = 8.0  # times the force of the contact: limit of the actuator until the contact is known
+_FIRST_S, _FIRST_REST_S = 10.0, 1.0  # until the first sound reading, and from then on
 
 
 def identified(rig: Rig) -> dict[str, Identity]:
@@ -30,6 +31,8 @@ def identified(rig: Rig) -> dict[str, Identity]:
 def prepared(loop: Loop, middle_mm: float) -> None:
     """Zero the rig, check the specimen at rest, and find the height of the contact with a small force.
 
+    Until then the actuator's own limit is a small one, too.
+
     Parameters
     ----------
     loop : Loop
@@ -47,14 +50,7 @@ def prepared(loop: Loop, middle_mm: float) -> None:
     rig, experiment = loop.rig, loop.experiment
     loop.message = "lifting the tip"
     rig.started.add("actuator")
-    rig.actuator.start(experiment.limits.force_n)
-    until = loop.clock.now() + press._UP_S
-    loop.period()
-    while not loop.extension.position_mm <= UP_MM:
-        loop.period()
-        if loop.clock.now() > until:
-            raise DeviceFault(f"actuator: not at its upper end {press._UP_S:g} s after its start")
-    loop.homed = True
+    _started(loop, min(experiment.limits.force_n, _GENTLE * experiment.approach.contact_n))
     loop.message = "zero of the stage"
     rig.started.add("stage")
     rig.stage.start()
@@ -64,24 +60,31 @@ def prepared(loop: Loop, middle_mm: float) -> None:
     rig.impedance.start(np.array(experiment.readout.tones_hz), experiment.readout.voltage_v)
     _first_readings(loop)
     loop.message = "looking for the contact"
-    press.raised(loop)
     press.travel(loop, middle_mm)
-    press.lowered(loop)
     press.land(loop)
     press.lift(loop)
+    _started(loop, experiment.limits.force_n)
     loop.recorder.journal.note("contact", position_mm=loop.contact_mm, place_mm=middle_mm)
 
 
+def _started(loop: Loop, limit_n: float) -> None:
+    """Give the actuator its limit of force, and wait until it is at its upper end."""
+    loop.homed = False
+    loop.rig.actuator.start(limit_n)
+    until = loop.clock.now() + _UP_S
+    loop.period()
+    while not loop.extension.position_mm <= UP_MM:
+        loop.period()
+        if loop.clock.now() > until:
+            raise DeviceFault(f"actuator: not at its upper end {_UP_S:g} s after its start")
+    loop.homed = True
+
+
 def _first_readings(loop: Loop) -> None:
-    """Wait for a second of readings, and check what they say of the specimen."""
+    """Wait for a second of readings, in which the loop's rules look for short and open circuits."""
     until = loop.clock.now() + _FIRST_S
     while np.isnan(loop.watch.latest_ohm).any():
         loop.period()
         if loop.clock.now() > until:
             raise DeviceFault(f"impedance meter: no sound reading in {_FIRST_S:g} s; check cables, range and specimen")
-    loop.wait(1.0)
-    found = circuit(loop.watch.tones_hz, loop.watch.mean())
-    if found == "open":
-        raise DeviceFault("specimen: open circuit; check the cables to it")
-    if found and loop.experiment.stop.short:
-        raise Ended("rule", "stop.short: the specimen conducts at rest; check it, or set stop.short: false")
+    loop.wait(_FIRST_REST_S)

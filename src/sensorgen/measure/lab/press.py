@@ -6,10 +6,10 @@ import numpy as np
 
 from sensorgen.measure.lab.devices import DeviceFault
 from sensorgen.measure.lab.loop import Loop, Paused
-from sensorgen.measure.lab.plans import Pressed, Step
+from sensorgen.measure.lab.plans import AVERAGED_S, Pressed, Step
 from sensorgen.measure.lab.safety import RAISED_MM, UP_MM, Ended
 
-_UP_S, _TRAVEL_S, _LAND_S = 10.0, 120.0, 60.0  # longest lift, move of the stage, and landing
+_STUCK_S, _TRAVEL_S, _LAND_S = 0.5, 120.0, 60.0  # a piston that rises not at all; longest move and landing
 _ABOVE_MM, _EARLY_MM = 1.5, 3.0  # where the soft landing begins, and how far from the last one it may end
 _REST_S, _STILL_MM = 0.15, 0.02  # a landed tip comes down no further
 _THERE_MM = 0.05  # of the place
@@ -17,40 +17,64 @@ _LOOK_S = 0.05  # from one reading of the moving stage to the next
 
 
 def lift(loop: Loop) -> None:
-    """Lift the tip, and return when it is up."""
-    loop.set_n = nan
-    loop.rig.actuator.lift()
-    until = loop.clock.now() + _UP_S
-    while not loop.extension.position_mm <= UP_MM:
-        loop.period()
-        if loop.clock.now() > until:
-            raise DeviceFault(f"actuator: not up {_UP_S:g} s after the command; at {loop.extension.position_mm:.2f} mm")
-    loop.down_mm = nan
-
-
-def travel(loop: Loop, place_mm: float) -> None:
-    """Move the stage along the specimen; the tip is up by the actuator's own reading before, and stays so.
+    """Lift the tip, and return when it is up.
 
     Raises
     ------
     DeviceFault
-        The tip is down, or comes down meanwhile; the stage does not arrive.
+        The piston does not come up.
     """
-    loop.extension = loop.rig.actuator.read()
-    if not loop.extension.position_mm <= UP_MM:
-        raise DeviceFault(f"actuator: at {loop.extension.position_mm:.2f} mm, not up: no move along the specimen")
+    loop.set_n = nan
+    loop.rig.actuator.lift()
+    loop.period()
+    before, since = loop.extension.position_mm, loop.clock.now()
+    while not loop.extension.position_mm <= UP_MM:
+        loop.period()
+        at, now = loop.extension.position_mm, loop.clock.now()
+        if at < before - UP_MM:
+            before, since = at, now
+        if now - since > _STUCK_S:
+            raise DeviceFault(f"actuator: at {at:.2f} mm it does not come up, {_STUCK_S:g} s after the command")
+    loop.down_mm, loop.up_s = nan, loop.clock.now()
+
+
+def travel(loop: Loop, place_mm: float) -> None:
+    """Move the stage along the specimen: tip up by the actuator's own reading, and the stage raised.
+
+    Raised, so that the piston reaches nothing even if it comes down meanwhile.
+
+    Raises
+    ------
+    DeviceFault
+        The tip is down, or the stage not raised; the stage does not arrive.
+    """
+    if abs(loop.read_stage().position_mm - place_mm) < _THERE_MM and not loop.place.moving:
+        loop.wanted_mm = place_mm
+        return
     low, high = loop.experiment.limits.travel_mm
     if not low <= place_mm <= high:
         raise DeviceFault(f"stage: {place_mm:g} mm is beyond limits.travel_mm, {low:g} to {high:g} mm")
+    loop.rig.stage.lift()
+    settle(loop, "raised")
+    loop.extension = loop.rig.actuator.read()
+    if not loop.extension.position_mm <= UP_MM:
+        raise DeviceFault(f"actuator: at {loop.extension.position_mm:.2f} mm, not up: no move along the specimen")
+    if isfinite(loop.rig.working_mm) and loop.place.height_mm < loop.rig.working_mm + RAISED_MM:
+        raise DeviceFault(
+            f"stage: at a height of {loop.place.height_mm:.2f} mm, not raised: no move along the specimen"
+        )
     loop.wanted_mm = place_mm
     loop.rig.stage.move(place_mm, loop.experiment.approach.travel_mm_s)
     settle(loop, f"at {place_mm:g} mm")
     if abs(loop.place.position_mm - place_mm) > _THERE_MM:
         raise DeviceFault(f"stage: at {loop.place.position_mm:.3f} mm instead of {place_mm:.3f} mm")
+    loop.rig.stage.lower()
+    settle(loop, "lowered")
+    loop.rig.working_mm = loop.place.height_mm
 
 
 def settle(loop: Loop, where: str) -> None:
-    """Wait until the stage rests; stop it at once if the tip comes down meanwhile."""
+    """Wait until the stage rests; a tip that comes down meanwhile is a fault."""
     until = loop.clock.now() + _TRAVEL_S
     loop.travels = True
     loop.wait(_LOOK_S)
@@ -59,19 +83,6 @@ def settle(loop: Loop, where: str) -> None:
         if loop.clock.now() > until:
             raise DeviceFault(f"stage: not {where} after {_TRAVEL_S:g} s")
     loop.travels = False
-
-
-def raised(loop: Loop) -> None:
-    """Raise the stage, and return when it rests."""
-    loop.rig.stage.lift()
-    settle(loop, "raised")
-
-
-def lowered(loop: Loop) -> None:
-    """Lower the stage to its working height, tip up."""
-    loop.rig.stage.lower()
-    settle(loop, "lowered")
-    loop.rig.working_mm = loop.place.height_mm
 
 
 def land(loop: Loop) -> None:
@@ -119,9 +130,12 @@ def _rests(loop: Loop, begun_s: float) -> bool:
 
 
 def press(loop: Loop, step: Step) -> Pressed:
-    """Rest, land, follow the course of the force, and lift."""
+    """Rest, land, follow the course of the force, and lift.
+
+    The rest counts from the last lift on; at least what is averaged of it is at the place of the press.
+    """
     loop.message = f"rest before press {step.number}"
-    loop.wait(step.rest_s)
+    loop.wait(max(step.rest_s - (loop.clock.now() - loop.up_s), AVERAGED_S))
     before, noise = loop.watch.mean(), loop.watch.noise()
     _drift(loop)
     loop.message = f"press {step.number}, {step.kind}"

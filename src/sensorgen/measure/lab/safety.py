@@ -12,7 +12,7 @@ from sensorgen.measure.lab.devices import Actuator, ImpedanceMeter, Stage
 UP_MM = 1.0  # of its upper end, within which the piston counts as up
 RAISED_MM = 1.0  # above its working height, from which on the stage counts as raised, when it has come to rest
 _FALLEN_MM, _HELD_S = 1.0, 1.0  # what a piston falls without a motor, if it falls, and in which time it shows
-_LIFT_S, _POLL_S, _AGAIN_S = 15.0, 0.05, 0.5
+_LIFT_S, _DEAF_S, _POLL_S, _AGAIN_S = 15.0, 4.0, 0.05, 0.5  # for both; for the actuator when the stage is up
 
 
 class Ended(Exception):
@@ -117,7 +117,7 @@ def _lift(rig: Rig, clock: Clock, attempt: _Attempts) -> dict[str, bool]:
         place = rig.stage.read()
         up["stage"] = not place.moving and (rig.working_mm == inf or place.height_mm >= rig.working_mm + RAISED_MM)
 
-    while not all(up.values()) and clock.now() < until:
+    while not all(up.values()) and clock.now() < (until if not up.get("stage") else until - _LIFT_S + _DEAF_S):
         if clock.now() >= again:
             again = clock.now() + _AGAIN_S
             if not up.get("actuator", True):

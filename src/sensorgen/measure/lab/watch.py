@@ -12,24 +12,23 @@ from sensorgen.measure.signal.presses import WINDOW_S
 
 SILENT_S = 5.0  # without a sound reading, a fault
 _OPEN_F = 0.3e-12  # less than any specimen with its leads
-_SHORT_S = 0.3  # for which a short lasts, to be one
+_COURSE, _FEWEST_COURSE = 15, 5  # readings of which half have to say it
 _FEW = 3  # readings, from which their noise can be told
 _MOST = 1 << 14  # readings of a window, whatever the rate
 
 
 def circuit(tones_hz: Real, impedance_ohm: Complex) -> str:
-    """What a specimen at rest is not: "short", "open", or "".
+    """What a specimen is not, by its (m,) impedances: "short", "open", or "".
 
-    At the lowest frequency an intact specimen is a capacitor: its reactance exceeds its resistance, and its
-    capacitance is that of an open circuit no longer.
+    At the lowest frequency an intact specimen is a capacitor: its reactance exceeds its resistance. At the highest,
+    where the noise of a reading is least, an open circuit has a smaller capacitance than any specimen.
     """
-    k = int(np.argmin(tones_hz))
-    z = complex(impedance_ohm[k])
-    if not np.isfinite(z):
+    if not np.isfinite(impedance_ohm).all():
         return ""
-    if z.real > -z.imag:
-        return "short"
-    return "open" if 1 / (2 * np.pi * tones_hz[k] * abs(z)) < _OPEN_F else ""
+    low, high = complex(impedance_ohm[np.argmin(tones_hz)]), int(np.argmax(tones_hz))
+    if 1 / (2 * np.pi * tones_hz[high] * abs(impedance_ohm[high])) < _OPEN_F:
+        return "open"
+    return "short" if low.real > -low.imag else ""
 
 
 @dataclass
@@ -57,7 +56,7 @@ class Watch:
     sound_s: float = nan
     _recent: deque[tuple[float, Complex]] = field(default_factory=lambda: deque(maxlen=_MOST))
     _first_rest: Complex | None = None
-    _conducts_s: float = nan
+    _course: deque[Complex] = field(default_factory=lambda: deque(maxlen=_COURSE))
 
     def __post_init__(self) -> None:
         self.latest_ohm = np.full(len(self.tones_hz), complex(nan, nan))
@@ -75,6 +74,7 @@ class Watch:
         self.lost += found.lost
         self.clipped += int(np.count_nonzero(found.clipped))
         self.invalid += int(np.count_nonzero(~sound))
+        self._course.extend(found.impedance_ohm[sound])
         for row in found.impedance_ohm[sound & ~found.clipped]:
             self.latest_ohm = row
             self._recent.append((now_s, row))
@@ -84,14 +84,17 @@ class Watch:
         if now_s - self.sound_s > SILENT_S:
             what = "clipped" if found.clipped.any() else "no"
             raise DeviceFault(f"impedance meter: {what} readings for {SILENT_S:g} s; check cables, range and specimen")
-        if circuit(self.tones_hz, self.latest_ohm) != "short":
-            self._conducts_s = nan
-        elif np.isnan(self._conducts_s):
-            self._conducts_s = now_s
 
-    def short(self, now_s: float) -> bool:
-        """Whether the specimen has conducted for some readings."""
-        return now_s - self._conducts_s >= _SHORT_S
+    def circuit(self) -> str:
+        """What the specimen has not been for half of the last readings: "short", "open", or "".
+
+        Clipped readings count: a short drives more current than an input takes.
+        """
+        if len(self._course) < _FEWEST_COURSE:
+            return ""
+        admittance = 1 / np.array(self._course)
+        middle: Complex = np.median(admittance.real, axis=0) + 1j * np.median(admittance.imag, axis=0)
+        return circuit(self.tones_hz, np.asarray(1 / middle))
 
     def mean(self) -> Complex:
         """Mean over the last second; nan of nothing [ohm]."""

@@ -13,16 +13,12 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
-from sensorgen.design.values import film
+from sensorgen.design.values import film, ln_spread, material_value, resistivities
 from sensorgen.measure.virtual.blank import Blank, blank
 
 PIECES = 60  # of the chain that the line is
 _THINNEST_M = 1e-12  # of a piece
 _SHORTEST_S = 0.1  # of a hold, as its logarithm counts
-_RANGE = 2 * 1.959963984540054  # width of a material's range, in standard deviations of its logarithm
-SPREAD = {"resistivity_ohm_m": 0.5, "relative_permittivity": 0.1, "youngs_modulus_pa": 0.25}
-"""Standard deviations of ln where a material's value has no range: sources of resistivity differ by a factor of 12
-(etpu.yaml), those of permittivity from 4.68 to 6.33 (x60.yaml); moduli of printed elastomers by some 25 %."""
 _SIZES = 0.02, 0.01  # of ln R and ln C: thickness and width of printed tracks, width of cells
 
 
@@ -97,21 +93,13 @@ class Truth:
 
 
 def spreads(design: Design) -> dict[str, tuple[float, float]]:
-    """Mean and standard deviation of ln of the materials' values over the design's, by quantity.
-
-    A value with a range gets a logarithmic normal distribution with 95 % in it; others get ``SPREAD``.
-    """
-    electrode = design.materials.bottom_electrode.partition("@")
-    names = {"resistivity_ohm_m": electrode[::2], "youngs_modulus_pa": None, "relative_permittivity": None}
-    found = {}
-    for quantity, named in names.items():
-        name, source = named or design.materials.dielectric.partition("@")[::2]
-        value = design.material(name).value(quantity, source)
-        found[quantity] = 0.0, SPREAD[quantity]
-        if value.low and value.high and value.low < value.high:
-            middle = log(value.low * value.high) / 2 - log(value.value)
-            found[quantity] = middle, log(value.high / value.low) / _RANGE
-    return found
+    """Mean and standard deviation of ln of the materials' values over the design's, by quantity."""
+    electrode, dielectric = (
+        design.slot("bottom_electrode"),
+        (design.material(film(design)), design.used()[film(design)]),
+    )
+    of = {"resistivity_ohm_m": electrode, "relative_permittivity": dielectric, "youngs_modulus_pa": dielectric}
+    return {quantity: ln_spread(*slot, quantity) for quantity, slot in of.items()}
 
 
 def drawn(design: Design, seed: int) -> Truth:
@@ -182,12 +170,11 @@ class Specimen:
     def values(self) -> dict[str, float]:
         """True values of the materials, by quantity: of the bottom electrode and of the dielectric."""
         d, t = self.design, self.truth
-        electrode, source = d.slot("bottom_electrode")
-        material, by = d.material(film(d)), d.used().get(film(d), "")
+        dielectric = d.material(film(d)), d.used()[film(d)]
         return {
-            "resistivity_ohm_m": electrode.value("resistivity_ohm_m", source).value * exp(t.resistivity),
-            "relative_permittivity": material.value("relative_permittivity", by).value * exp(t.permittivity),
-            "youngs_modulus_pa": material.value("youngs_modulus_pa", by).value * exp(t.modulus),
+            "resistivity_ohm_m": resistivities(d)["bottom"].value * exp(t.resistivity),
+            "relative_permittivity": material_value(*dielectric, "relative_permittivity").value * exp(t.permittivity),
+            "youngs_modulus_pa": material_value(*dielectric, "youngs_modulus_pa").value * exp(t.modulus),
         }
 
     @cached_property

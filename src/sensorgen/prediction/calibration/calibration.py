@@ -17,6 +17,7 @@ from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.calibration.coverage import FEWEST, Coverage
 from sensorgen.prediction.calibration.fitting import Posterior
 from sensorgen.prediction.calibration.inversion import Inverter
+from sensorgen.prediction.calibration.materials import Link, MaterialEstimate, estimate, source_text
 from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, Spread
 from sensorgen.prediction.inverse.prior import Prior
 from sensorgen.prediction.inverse.verdict import NORMAL_90
@@ -63,6 +64,8 @@ class Calibration:
         Most probable ln of each tone's gain, phase as its imaginary part [-].
     notes : tuple of str
         What was left out, what is to be doubted.
+    links : tuple of Link
+        How values of materials hang together with the parameters.
     """
 
     specimen: str
@@ -75,6 +78,15 @@ class Calibration:
     rows: tuple[str, ...]
     gain: tuple[complex, ...] = ()
     notes: tuple[str, ...] = ()
+    links: tuple[Link, ...] = ()
+
+    def materials(self) -> list[MaterialEstimate]:
+        """Values of the materials that this specimen has, with intervals of 95 %."""
+        return [estimate(self.model, self.posterior, link) for link in self.links]
+
+    def source(self) -> str:
+        """A source of material values, as a design names it: those that the readings tell."""
+        return source_text(f"calibration of {self.specimen}, design {self.design}", self.materials())
 
     @property
     def limit_n(self) -> float:
@@ -168,6 +180,8 @@ class Calibration:
             f"{p.wander_r:.2%} between a reading at rest and its press"
         )
         yield Table.of("parameters", "", self.values())
+        if self.links:
+            yield Table.of("materials", "material values of this specimen, 95 %", self.materials())
         if self.gain:
             tones = self.model.frequency_hz.tolist()
             rows = tuple((f / 1e3, 100 * g.real, np.rad2deg(g.imag)) for f, g in zip(tones, self.gain, strict=True))
@@ -191,12 +205,14 @@ class Calibration:
             "posterior": {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in vars(p).items()},
             "force_n": self.force_n, "held_out": asdict(self.held_out) if self.held_out else None,
             "rows": self.rows, "gain": [[g.real, g.imag] for g in self.gain], "notes": self.notes,
+            "links": [asdict(link) for link in self.links],
         }  # fmt: skip
         return json.dumps(data, ensure_ascii=False)
 
     def shown_json(self, **more: Any) -> str:
-        """As JSON shows it: the record, its parameters in their units, and more."""
-        data = json.loads(self.to_json()) | {"values": [asdict(value) for value in self.values()]} | more
+        """As JSON shows it: the record, its parameters and its materials' values in their units, and more."""
+        own = {"values": [asdict(v) for v in self.values()], "materials": [asdict(v) for v in self.materials()]}
+        data = json.loads(self.to_json()) | own | more
         return json.dumps(data, ensure_ascii=False, indent=2) + "\n"
 
 
@@ -230,6 +246,7 @@ def from_json(text: str) -> Calibration:
             data["specimen"], data["design"], data["design_id"], model, posterior, float(data["force_n"]),
             Coverage(**data["held_out"]) if data["held_out"] else None, tuple(data["rows"]),
             tuple(complex(*pair) for pair in data["gain"]), tuple(data["notes"]),
+            tuple(Link(**link) for link in data.get("links", [])),
         )  # fmt: skip
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise BadInput(f"no calibration that can be read ({type(error).__name__}: {str(error)[:80]})") from None

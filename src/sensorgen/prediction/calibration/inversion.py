@@ -64,7 +64,7 @@ class Found:
     force_n, position_m : (n,) array
         Medians [N], [m]; nan where nothing was found.
     force_90_n, position_90_m : (n, 2) array
-        5 % and 95 % quantiles [N], [m].
+        5 % and 95 % quantiles, or those of the inverter's level [N], [m].
     chi2 : (n,) array
         Least squared distance of the reading from what a press makes, over its covariance [-].
     tones : (n,) array
@@ -106,17 +106,22 @@ class Inverter:
         On force and position; even if not given.
     force_limit_n : float
         Largest force to look for [N].
+    level : float
+        Probability of the intervals [-].
 
     Attributes
     ----------
     force_n, position_m : (f,), (x,) array
         The grid [N], [m].
+    level : float
+        Probability of the intervals that further readings get [-].
     """
 
     def __init__(
         self, model: SpecimenModel, posterior: Posterior, prior: Prior | None = None,
-        force_limit_n: float = FORCE_LIMIT_N,
+        force_limit_n: float = FORCE_LIMIT_N, level: float = LEVEL,
     ) -> None:  # fmt: skip
+        self.level = level
         self._posterior, self._length = posterior, model.sensor.length_m
         coarse = np.linspace(0, 1, _COARSE[0]) ** 2 * force_limit_n, np.linspace(0, self._length, _COARSE[1])
         mean, covariance = readings(model, posterior, *coarse)
@@ -208,7 +213,7 @@ class Inverter:
         ln -= ln.max(0)
         density = np.exp(ln).reshape(len(self.force_n), len(self.position_m), -1)
         force, position = density.sum(1), density.sum(0)
-        ends = [_quantiles(grid, d) for grid, d in ((self.force_n, force), (self.position_m, position))]
+        ends = [_quantiles(grid, d, self.level) for grid, d in ((self.force_n, force), (self.position_m, position))]
         return ends[0][:, 1], ends[1][:, 1], ends[0][:, ::2], ends[1][:, ::2], least
 
     def _table(self, tones: Mask) -> _Table:
@@ -318,13 +323,13 @@ def _steps(at: Real) -> Real:
     return np.diff(middles)
 
 
-def _quantiles(grid: Real, density: Real) -> Real:
-    """5 %, 50 % and 95 % quantiles (n, 3) of probabilities of a grid's points (k, n)."""
+def _quantiles(grid: Real, density: Real, level: float) -> Real:
+    """Ends of an interval and the median between them (n, 3), of probabilities of a grid's points (k, n)."""
     edges = np.concatenate([grid[:1], (grid[1:] + grid[:-1]) / 2, grid[-1:]])
     total = np.concatenate([np.zeros((1, density.shape[1])), np.cumsum(density, 0)])
     total /= total[-1]
     found = np.empty((density.shape[1], 3))
-    for k, share in enumerate(((1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2)):
+    for k, share in enumerate(((1 - level) / 2, 0.5, (1 + level) / 2)):
         at = np.clip((total < share).sum(0), 1, len(grid))
         low, high = total[at - 1, np.arange(len(found))], total[at, np.arange(len(found))]
         part = np.clip((share - low) / np.maximum(high - low, 1e-300), 0, 1)

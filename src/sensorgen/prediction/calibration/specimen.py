@@ -159,9 +159,14 @@ class SpecimenModel:
 
     @cached_property
     def _shapes(self) -> Real:
-        """Root of the covariance of the rise among ``FORCES_N``: smooth over ln force, correlated over a factor e."""
+        """Root of the covariance of the rise among ``FORCES_N``."""
+        return np.asarray(np.linalg.cholesky(self.law_likeness()))
+
+    @staticmethod
+    def law_likeness() -> Real:
+        """Correlation of the rise among ``FORCES_N`` (k, k): smooth over ln force, over a factor e."""
         distance = np.subtract.outer(np.log(FORCES_N), np.log(FORCES_N))
-        return np.asarray(np.linalg.cholesky(np.exp(-(distance**2) / 2) + 1e-6 * np.eye(len(FORCES_N))))
+        return np.asarray(np.exp(-(distance**2) / 2) + 1e-6 * np.eye(len(FORCES_N)))
 
     def law_weights(self) -> Real:
         """Ln of the factor on the rise at each of ``FORCES_N``, per standard deviation of each parameter (k, p)."""
