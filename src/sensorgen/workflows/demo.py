@@ -1,5 +1,6 @@
 """The whole loop with a virtual laboratory: design, as printed, print, run, calibration, inversion, report."""
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,11 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 from sensorgen.core import files as store
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
+from sensorgen.core.parallel import in_parallel
 
 if TYPE_CHECKING:
     from sensorgen.analysis.calibration import Made
     from sensorgen.measure.log import Log
 
+LOG = "lab.db"
 KNOWN, UNKNOWN = 30, 10  # presses that calibrate, and those that are found again
 _PLAN = """\
 # A column of {count} sensors of the same design.
@@ -37,8 +40,8 @@ class Found:
     """What a specimen was found to be, beside what it is."""
 
     specimen: Annotated[str, Column("specimen")]
+    material: Annotated[str, Column("material")]
     quantity: Annotated[str, Column("quantity")]
-    unit: Annotated[str, Column("unit")]
     truth: Annotated[float, Column("truth")]
     lower: Annotated[float, Column("from")]
     upper: Annotated[float, Column("to", about="95 % interval")]
@@ -117,14 +120,16 @@ def demo(folder: Path, *, count: int = 5, seed: int = 1, step: Callable[[str], N
     store.replace(plan, _PLAN.format(count=count).encode())
     step("print: batch column.yaml")
     made = batch.make(plan, folder, gcode=False, force=True)
-    with Log(folder / "lab.db", create=True) as log:
+    with Log(folder / LOG, create=True) as log:
         importing.import_file(log, made.folder / "batch.json", {})
-        truths = {}
-        for k, name in enumerate(sorted(made.record.specimens)):
-            for what, presses in (("known", KNOWN), ("unknown", UNKNOWN)):
-                step(f"run: {name}, {presses} presses")
-                truths[name] = _run(log, _experiment(folder, name, seed + k, presses, what))
-        return _evaluated(log, folder, truths, step)
+        names = sorted(made.record.specimens)
+        works = [(folder, name, seed + k) for k, name in enumerate(names)]
+        truths: dict[str, Mapping[str, float]] = {}
+        step(f"run: {count} prints, {KNOWN} and {UNKNOWN} presses each")
+        for k, truth in in_parallel(_pressed, works, min(count, os.cpu_count() or 1)):
+            truths[names[k]] = truth
+            step(f"run: {len(truths)} of {count} prints")
+        return _evaluated(log, folder, {name: truths[name] for name in names}, step)
 
 
 def _experiment(folder: Path, specimen: str, seed: int, presses: int, what: str) -> Path:
@@ -137,17 +142,21 @@ def _experiment(folder: Path, specimen: str, seed: int, presses: int, what: str)
     return path
 
 
-def _run(log: "Log", experiment: Path) -> Mapping[str, float]:
-    """Run an experiment on its virtual specimen; true values of the specimen's materials, by quantity."""
+def _pressed(folder: Path, specimen: str, seed: int) -> Mapping[str, float]:
+    """Both runs of a virtual print; the true values of its materials, by quantity."""
     from sensorgen.measure.lab import sessions
+    from sensorgen.measure.log import Log
 
-    with sessions.Session(sessions.new(experiment, simulate=True), log, text=False) as session:
-        result = session.run()
-        if result.end != "done" or session.mechanism is None:
-            raise BadInput(
-                f"{experiment}: the run ended early, {result.reason}; sensorgen bench run {experiment} --simulate"
-            )
-        return session.mechanism.specimen.values()
+    truth: Mapping[str, float] = {}
+    with Log(folder / LOG) as log:
+        for what, presses in (("known", KNOWN), ("unknown", UNKNOWN)):
+            experiment = _experiment(folder, specimen, seed, presses, what)
+            with sessions.Session(sessions.new(experiment, simulate=True), log, text=False) as session:
+                result = session.run()
+                if result.end != "done" or session.mechanism is None:
+                    raise BadInput(f"{experiment}: {result.end}, {result.reason}; sensorgen bench run --simulate tells")
+                truth = session.mechanism.specimen.values()
+    return truth
 
 
 def _evaluated(
@@ -170,7 +179,16 @@ def _evaluated(
     page = folder / "report.html"
     with store.replacing(page) as target:
         target.writelines(piece.encode() for piece in pieces(report(log, None, specimens=names), "html"))
-    return Demo(str(folder), str(page), (), inverted)
+    found = tuple(each for one in made for each in _found(one, truths[one.calibration.specimen]))
+    return Demo(str(folder), str(page), found, inverted)
+
+
+def _found(made: "Made", truth: Mapping[str, float]) -> Iterator[Found]:
+    """Values of a specimen's materials beside the true ones."""
+    for value in made.calibration.materials():
+        true = truth[value.quantity]
+        holds = "yes" if value.lower <= true <= value.upper else "no"
+        yield Found(made.calibration.specimen, value.material, value.quantity, true, value.lower, value.upper, holds)
 
 
 def _inverted(log: "Log", made: "Made", number: int) -> Inverted:
