@@ -35,7 +35,7 @@ def faults() -> list[str]:
     rows, total, failed = [], 0, 0
     for kind in KINDS:
         up, peak, above, wrong = [], [], [], []
-        for k, moment in enumerate(MOMENTS):
+        for moment in MOMENTS:
             with tempfile.TemporaryDirectory() as folder:
                 found, lab = outcome(Path(folder), (Planted(what=kind, **moment),))
             if kind in HARMLESS and found.end == "done":
@@ -65,8 +65,8 @@ def kills(seed: int, count: int) -> None:
 def all_kills(count: int) -> list[str]:
     """Several processes of kills at once."""
     each = [count // AT_ONCE + (k < count % AT_ONCE) for k in range(AT_ONCE)]
-    words = [sys.executable, __file__, "kills"]
-    running = [subprocess.Popen([*words, str(k), str(n)], stdout=subprocess.PIPE, text=True) for k, n in enumerate(each)]
+    words = [[sys.executable, __file__, "kills", str(k), str(n)] for k, n in enumerate(each)]
+    running = [subprocess.Popen(line, stdout=subprocess.PIPE, text=True) for line in words]
     lines = [json.loads(line) for process in running for line in process.communicate()[0].splitlines()]
     ends = [line for line in lines if "violations" in line]
     assert len(ends) == AT_ONCE, "a part of the kills has failed"
@@ -83,20 +83,23 @@ def all_kills(count: int) -> list[str]:
                     f"{sum(not each['raised'] for each in found)} |")  # fmt: skip
     violations = [v for end in ends for v in end["violations"]]
     return [
-        f"{sum(map(len, by_way.values()))} runs ended; every one was resumed until its plan was done, and its recordings"
-        f" read from the log. Dead man's time {killing.DEAD_MAN_S:g} s. Largest force"
+        f"{sum(map(len, by_way.values()))} runs ended; every one was resumed until its plan was done, and its"
+        f" recordings read from the log. Dead man's time {killing.DEAD_MAN_S:g} s. Largest force"
         f" {max(end['peak_n'] for end in ends):.2f} N; violations: {violations or 'none'}.", "", *rows,
     ]  # fmt: skip
 
 
 def memory() -> list[str]:
     """Peak memory of a process that runs a minute and one that runs an hour of simulated time."""
-    rows = []
+    rows = [
+        "| simulated [min] | wall time [s] | peak memory [MiB] | impedances | rig rows |",
+        "|---:|---:|---:|---:|---:|",
+    ]
     for minutes in (1, 10, 60):
         words = [sys.executable, __file__, "hour", str(minutes)]
         seconds, peak, count, rig = subprocess.run(words, check=True, capture_output=True, text=True).stdout.split()
         rows.append(f"| {minutes} | {float(seconds):.0f} | {float(peak):.0f} | {count} | {rig} |")
-    return ["| simulated [min] | wall time [s] | peak memory [MiB] | impedances | rig rows |", "|---:|---:|---:|---:|---:|", *rows]
+    return rows
 
 
 def hour(minutes: float) -> None:

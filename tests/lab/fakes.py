@@ -11,7 +11,7 @@ from sensorgen.measure.lab.devices import DeviceFault, Extension, Identity, Plac
 from sensorgen.measure.lab.safety import Rig
 
 CONTACT_MM, STIFF_N_MM, RAISED_MM, SPEED_MM_S = 20.0, 50.0, 30.0, 40.0
-STEP_S = 0.002
+STEP_S, STROKE_MM = 0.002, 40.0
 
 
 @dataclass
@@ -66,6 +66,7 @@ class Mechanism:
             motor = min(self.force_n, self.device_limit_n) + self.surge_n
             goal = self.surface_mm() + max(motor, 0.0) / STIFF_N_MM if motor > 0 else self.extension_mm
             self.extension_mm = _towards(self.extension_mm, goal, 50.0 * dt)
+        self.extension_mm = min(self.extension_mm, STROKE_MM)
         load = self.load_n()
         self.worst_n = max(self.worst_n, load)
         self.above_s += dt if load > self.limit_n * 1.001 else 0.0

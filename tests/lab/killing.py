@@ -86,9 +86,9 @@ class Started:
             return []
 
     def guardian(self) -> int:
-        """Number of the guardian's process."""
+        """Number of the guardian's process; 0 where there is none."""
         children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
-        return next(int(p) for p in children if b"guardian" in Path(f"/proc/{p}/cmdline").read_bytes())
+        return next((int(p) for p in children if b"guardian" in Path(f"/proc/{p}/cmdline").read_bytes()), 0)
 
 
 def start(file: Path, log: Path, *, resume: str = "") -> Started:
@@ -152,9 +152,9 @@ def readable(run: Started) -> int:
 class Killed:
     """What became of the rig.
 
-    ``way`` is how the run was stopped, ``down`` whether the tip was down then, ``up_s`` the time until the tip was up to
-    stay [s], ``raised`` whether the motor is off and the piston reaches nothing after the rescue, ``readings`` how many
-    impedances the files have.
+    ``way`` is how the run was stopped, ``down`` whether the tip was down then, ``up_s`` the time until the tip was up
+    to stay [s], ``raised`` whether the motor is off and the piston reaches nothing after the rescue, ``readings`` how
+    many impedances the files have.
     """
 
     way: str
@@ -171,7 +171,7 @@ def killed(rig: Served, run: Started, way: str = "kill") -> Killed:
     os.kill(run.process.pid, {"kill": signal.SIGKILL, "stop": signal.SIGSTOP}[way])
     up_s = seconds_to_tip_up(rig)
     run.process.communicate(timeout=60)
-    ended = gone(guardian)
+    ended = not guardian or gone(guardian)
     state = rig.state()
     return Killed(way, down, up_s, ended and state["tip_mm"] >= 1.0 and abs(state["motor_n"]) < 1e-3, readable(run))
 
@@ -182,7 +182,8 @@ def many(folder: Path, rig: Served, seed: int, kills: int, ways: tuple[str, ...]
     count = 0
     while count < kills:
         log = folder / f"{count}.db"
-        Log(log, create=True).__enter__()
+        with Log(log, create=True):
+            pass
         run = start(experiment(folder, rig.places, presses=4), log)
         for _ in range(100):
             if count < kills and _moment(run, rng):
@@ -190,6 +191,7 @@ def many(folder: Path, rig: Served, seed: int, kills: int, ways: tuple[str, ...]
                 count += 1
             elif run.process.wait(120) == 0:
                 break
+            run.process.communicate()
             run = start(folder, log, resume=run.folder.name)
         whole(run)
 
@@ -216,7 +218,7 @@ def whole(run: Started) -> None:
     assert json.loads(out)["done"] == 4
     with Log(run.log) as log:
         rows = log.recordings()
-        begun = [each for each in run.events("begun")]
+        begun = run.events("begun")
         assert {row.source for row in rows} <= {f"{each['stem']}.csv" for each in begun}
         assert rows
         for row in rows:

@@ -123,6 +123,6 @@ DEAF = ("actuator hung", "actuator cut", "actuator stuck", "rig jammed")
 """Faults after which the actuator's motor cannot be switched off from outside: the stage lifts."""
 HARMLESS = ("actuator identity", "stage identity", "analyser in use", "analyser wrong device")
 """What a device says when it is asked who it is, which it is at the begin only: later it works on."""
-MOMENTS = ({"at_s": 0.0}, {"at_s": 0.1}, {"at_s": 2.0}, {"at_s": 6.0}, {"at_force_n": 0.1}, {"at_force_n": 3.0}, {"at_s": 20.0})
-"""Before the run asks who is there, homing of the actuator, of the stage, first contact, landing, press, between presses."""
+MOMENTS = (*({"at_s": s} for s in (0.0, 0.1, 2.0, 6.0, 20.0)), {"at_force_n": 0.1}, {"at_force_n": 3.0})
+"""Before the run asks who is there, homing of actuator and stage, first contact, between presses, landing, press."""
 KINDS = [name for name, fault in FAULTS.items() if fault.strikes in ("actuator", "stage", "analyser", "rig")]

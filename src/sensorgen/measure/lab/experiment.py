@@ -105,7 +105,7 @@ class Limits(Strict):
 
 
 class Approach(Strict):
-    """How the tip comes down, and how fast the force changes.
+    """Approach of the tip, and rate of the force.
 
     Attributes
     ----------

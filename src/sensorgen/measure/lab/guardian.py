@@ -191,7 +191,7 @@ def watch(orders: Orders, run: int) -> str:
 class Rescue:
     """Lift by actuator and stage at once, neither waiting for the other; the motor goes off when the stage is up.
 
-    Without the stage raised a piston whose weight exceeds its friction would come down again: then its motor stays on.
+    Without the stage raised a piston whose weight exceeds its friction would fall again: then its motor stays on.
 
     Parameters
     ----------

@@ -215,7 +215,7 @@ class Loop:
         if at.force_n > limits.force_n:
             return f"force {at.force_n:.2f} N is above the limit of {limits.force_n:g} N"
         if self.travels and at.position_mm > 2 * UP_MM:
-            return f"actuator: the tip came down to {at.position_mm:.2f} mm while the stage moved"
+            return f"actuator: the tip has fallen to {at.position_mm:.2f} mm while the stage moved"
         deepest = min(limits.deepest_mm + _DEEP_MM, self.down_mm + _SUNK_MM if self.down else inf)
         if self.homed and at.position_mm > deepest:
             return f"actuator: at {at.position_mm:.2f} mm, deeper than {deepest:.2f} mm"

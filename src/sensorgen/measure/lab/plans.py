@@ -64,7 +64,7 @@ class Step:
     rest_s : float
         Rest before it, tip up [s].
     force_n, peak_n, hold_s : float
-        Force at which it is read, largest force before, and how long the force is held before the average [N], [s].
+        Force at which it is read, largest force before, and time at the force before the average [N], [s].
     """
 
     number: int
@@ -120,7 +120,7 @@ class Choice:
     force_n, position_mm : float
         Force and place [N], [mm].
     peak_n, hold_s : float
-        Higher force before, none if below ``force_n`` [N]; how long the force is held before the average [s].
+        Higher force before, none if below ``force_n`` [N]; time at the force before the average [s].
     interval : float
         Widest interval of what is sought, relative, by the presses so far; infinite if unknown [-].
     """

@@ -41,7 +41,7 @@ def lift(loop: Loop) -> None:
 def travel(loop: Loop, place_mm: float) -> None:
     """Move the stage along the specimen: tip up by the actuator's own reading, and the stage raised.
 
-    Raised, so that the piston reaches nothing even if it comes down meanwhile.
+    Raised, so that the piston reaches nothing even if it falls meanwhile.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def travel(loop: Loop, place_mm: float) -> None:
 
 
 def settle(loop: Loop, where: str) -> None:
-    """Wait until the stage rests; a tip that comes down meanwhile is a fault."""
+    """Wait until the stage rests; a tip that falls meanwhile is a fault."""
     until = loop.clock.now() + _TRAVEL_S
     loop.travels = True
     loop.wait(_LOOK_S)
@@ -96,7 +96,7 @@ def land(loop: Loop) -> None:
     approach, deepest, begun = loop.experiment.approach, loop.experiment.limits.deepest_mm, loop.clock.now()
     loop.read_stage()
     if loop.place.moving or loop.place.height_mm > loop.rig.working_mm + RAISED_MM:
-        raise DeviceFault("stage: moving or raised; expected it at rest and lowered before the tip comes down")
+        raise DeviceFault("stage: moving or raised; expected it at rest and lowered before a landing")
     if isfinite(loop.contact_mm):
         above = max(loop.contact_mm - _ABOVE_MM, 0.0)
         loop.rig.actuator.move(above, approach.speed_mm_s, approach.contact_n)
@@ -108,7 +108,7 @@ def land(loop: Loop) -> None:
         loop.period()
     at = loop.extension.position_mm
     if at <= UP_MM:
-        raise DeviceFault(f"actuator: still at {at:.2f} mm after the command to come down; check motor and power")
+        raise DeviceFault(f"actuator: still at {at:.2f} mm after the command to land; check motor and power")
     if at > deepest - _STILL_MM:
         raise DeviceFault(f"no contact down to {at:.2f} mm (limits.deepest_mm); check specimen, place and height")
     if isfinite(loop.contact_mm) and at < loop.contact_mm - _EARLY_MM:
