@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from math import inf, isfinite, nan
 from typing import Protocol
 
+import numpy as np
+
 from sensorgen.core.arrays import Complex
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.controls import Controls
@@ -52,8 +54,8 @@ class Paused(Exception):
     """Somebody asked for a pause; the step begins anew after it."""
 
 
-Predicted = Callable[[float, float], Complex]
-"""Expected impedances at a force and a place [N], [mm] -> (m,) [ohm]."""
+Predicted = Callable[[float, float, Complex], Complex]
+"""Expected impedances by force, place and what was read at rest [N], [mm], (m,) [ohm] -> (m,) [ohm]."""
 
 
 @dataclass
@@ -78,6 +80,8 @@ class Loop:
         Extension of the last landing; nan before the first [mm].
     wanted_mm : float
         Place that the stage was sent to [mm].
+    rest_ohm : (m,) array
+        Mean at rest before the press [ohm].
     step, steps, message
         For the view.
     paused : bool
@@ -108,6 +112,7 @@ class Loop:
     up_s: float = -inf
     contact_mm: float = nan
     wanted_mm: float = nan
+    rest_ohm: Complex = field(default_factory=lambda: np.full(1, complex(nan, nan)))
     step: int = 0
     steps: int = 0
     message: str = ""
@@ -238,7 +243,9 @@ class Loop:
         if self.view is None:
             return
         force, set_n = (self.extension.force_n, self.set_n) if isfinite(self.set_n) else (0.0, 0.0)
-        predicted = self.predicted(force, self._known_place()) if self.predicted and isfinite(self.set_n) else None
+        predicted = None
+        if self.predicted and isfinite(self.set_n) and force > 0:
+            predicted = self.predicted(force, self._known_place(), self.rest_ohm)
         self.view.update(
             Sample(
                 self.clock.now() - self.begun_s, self.step, self.steps, self.message, force,

@@ -137,6 +137,7 @@ def press(loop: Loop, step: Step) -> Pressed:
     loop.message = f"rest before press {step.number}"
     loop.wait(max(step.rest_s - (loop.clock.now() - loop.up_s), AVERAGED_S))
     before, noise = loop.watch.mean(), loop.watch.noise()
+    loop.rest_ohm = before
     _drift(loop)
     loop.message = f"press {step.number}, {step.kind}"
     land(loop)
