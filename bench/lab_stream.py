@@ -184,7 +184,8 @@ def main():
         memory.append(f"| {name} | {first:.1f} | {last:.1f} |")
         print(memory[-1], flush=True)
     text = [
-        f"Seven tones, 1 MS/s, two channels, one core, polled every 10 ms; goal: {GOAL} times real time.",
+        f"Seven tones, 1 MS/s, two channels, one core, polled every 10 ms; goal: {GOAL} times real time."
+        f" Programs that compete for {os.cpu_count()} cores: {os.getloadavg()[0]:.0f}.",
         "", f"| | times real time, median of {REPEATS} | range |", "|---|---|---|", *rows,
         "", "| memory [MB] | after 1 min | after 60 min |", "|---|---|---|", *memory, "", *demo_lines(), "",
     ]  # fmt: skip

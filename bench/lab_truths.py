@@ -44,6 +44,19 @@ def lines(found):
         yield f"| {words} | {' | '.join(cells)} |"
 
 
+def text(found):
+    """The page."""
+    head = (
+        f"{len(found)} random specimens of tri 0.2 mm as printed: materials, sizes, film, profile, law, leak, "
+        "dispersion, hysteresis, creep, drift, lead, stray, offsets and gains all drawn at once; "
+        f"{truths.KNOWN} known presses of 0.3 to 6 N calibrate each, {truths.NEW} others are inverted. Share of "
+        "intervals that hold the truth, with its standard error, and their median width (of material values: upper "
+        "over lower end, less 1).\n\n"
+        "| value | held at 90 % | width | held at 95 % | width |\n|---|---|---|---|---|\n"
+    )
+    return head + "\n".join(lines(found)) + "\n"
+
+
 def main():
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
     truths.model(), truths.outcome(0)  # so that both processes find the bodies solved
@@ -53,14 +66,8 @@ def main():
             found.append(each)
             if k % 50 == 0:
                 print(f"{k} of {count}, {time.perf_counter() - start:.0f} s", *lines(found), sep="\n", flush=True)
-    head = (
-        f"{count} random specimens of tri 0.2 mm as printed: materials, sizes, film, profile, law, leak, dispersion, "
-        f"hysteresis, creep, drift, lead, stray, offsets and gains all drawn at once; {truths.KNOWN} known presses of "
-        f"0.3 to 6 N calibrate each, {truths.NEW} others are inverted. Share of intervals that hold the truth, with its "
-        "standard error, and their median width (of material values: upper over lower end, less 1).\n\n"
-        "| value | held at 90 % | width | held at 95 % | width |\n|---|---|---|---|---|\n"
-    )
-    RESULTS.write_text(head + "\n".join(lines(found)) + "\n", "utf-8")
+                RESULTS.write_text(text(found), "utf-8")
+    RESULTS.write_text(text(found), "utf-8")
 
 
 if __name__ == "__main__":

@@ -236,6 +236,34 @@ def test_a_reader_that_was_away_for_long_is_told_what_is_missing():
     assert 450 <= follow(clock, meter, 0.2)[3] <= 520
 
 
+def test_a_loss_that_is_not_reported_is_found_by_the_clock():
+    clock, scope, meter = rig()
+    meter.start(TONES, 1.0)
+    follow(clock, meter, 1)
+    total = 0
+    for _ in range(20):
+        times, *_, lost = follow(clock, meter, 0.12)
+        total += lost
+        for _ in range(5):
+            scope.oscilloscope._sampled(scope.oscilloscope._windows)  # made, but not kept
+    assert 70 <= total <= 100
+    assert clock.now() - times[-1] < 0.4
+    assert follow(clock, meter, 20)[3] <= 30
+
+
+def test_a_call_that_is_late_itself_loses_nothing(monkeypatch):
+    """The process is held up between the last block and the look at the clock."""
+    clock, _, meter = rig()
+    meter.start(TONES, 1.0)
+    follow(clock, meter, 1)
+    count = meter._missing
+    for _ in range(20):
+        with monkeypatch.context() as held:
+            held.setattr(meter, "_missing", lambda heard: (clock.wait_until(clock.now() + 0.4), count(heard=heard))[1])
+            assert follow(clock, meter, 0.01)[3] == 0
+        assert follow(clock, meter, 0.2)[3] == 0
+
+
 def test_a_poll_does_not_wait():
     clock, _, meter = rig()
     meter.start(TONES, 1.0)

@@ -42,6 +42,7 @@ _PRODUCT = 22  # PRODUCTID_HS5
 _WINDOWS = 5  # of a block: the delay of a reading against the load of the USB port
 _STEPS = (240, 120, 80, 60, 48, 40, 30, 24, 20, 16, 15, 12, 10, 8, 6, 5, 4, 3, 2, 1)  # per sample: divide 240 MHz
 _TIMEOUT_S, _CHECK_S, _GAP_S = 1.0, 1.0, 0.25
+_DRIFT = 1e-3  # of the two clocks, at most
 _END = 0.999  # of the range: its highest code lies below it
 _LOSSES = 3  # one after the other, without a block between them
 _EXCITED = 0.05  # of a tone's amplitude: below it nothing drives the specimen
@@ -212,7 +213,7 @@ class Handyscope:
             self._scope.start()
         self._running, self._losses, self._settled = True, 0, False
         self._begin = self._heard = self._polled = self._checked = self._clock.now()
-        self._count, self._lag = 0, 0.0  # samples since the begin; time by which they are late
+        self._count, self._least, self._late = 0, 0.0, 0.0  # samples; least lag so far; lag beyond it [s]
 
     def read(self) -> Readings:
         """What has been measured since the last call.
@@ -340,25 +341,31 @@ class Handyscope:
     def _missing(self, *, heard: bool) -> int:
         """Windows lost before the blocks of this call, by the time by which the samples lag behind the clock.
 
-        Of a loss that the device does not report, as its vendor's simulated one, the lag alone tells.
+        Of a loss that the device does not report, as the vendor's simulated one, only the lag is a sign: if it exceeds
+        the least so far by a quarter of a second twice, since one call may have been late itself.
         """
         now = self._clock.now()
         if not heard:
             if now - self._heard > _TIMEOUT_S:
                 raise DeviceFault(f"no samples from Handyscope {self.address} for {now - self._heard:.1f} s")
             return 0
-        late = now - self._begin - self._count / RATE_HZ - self._lag
-        lost = 0
-        if self._settled and (self._losses or late > _GAP_S):
-            lost = max(1, round(late * RATE_HZ / self._window))
-        self._lag += late - lost * self._window / RATE_HZ
+        lag = now - self._begin - self._count / RATE_HZ
+        self._least = min(self._least + _DRIFT * (now - self._heard), lag) if self._settled else lag
+        late = lag - self._least
+        sure = late if self._losses else min(late, self._late)
+        lost = max(round(sure * RATE_HZ / self._window), 1 if self._losses else 0)
+        if not self._losses and sure <= _GAP_S:
+            lost = 0
+        self._late = late
         self._count += lost * self._window
         self._heard, self._losses = now, 0
         return lost
 
     def _demodulated(self, block: np.ndarray[Any, Any]) -> Readings:
         """Impedances of the windows of a block."""
-        voltage, output = (waveform.phasors(signal, RATE_HZ, self._tones, self._window) for signal in block)
+        windows = block.reshape(2, -1, self._window)  # one by one: BLAS would begin threads for more, and wait for them
+        phasors = [[waveform.phasors(each, RATE_HZ, self._tones, self._window)[0] for each in some] for some in windows]
+        voltage, output = np.array(phasors)
         with np.errstate(all="ignore"):
             impedance = voltage / output * self._transimpedance
         impedance[~(np.abs(voltage) > _EXCITED * self._amplitude) | ~np.isfinite(impedance)] = np.nan

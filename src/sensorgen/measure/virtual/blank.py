@@ -71,7 +71,7 @@ def _between(values: Real, at: tuple[float, ...], x: float) -> Real:
 
 
 def blank(design: Design, fine_mm: float = FINE_MM) -> Blank:
-    """The body of a design as printed, solved; kept on disk.
+    """The body of a design as printed, solved; kept in memory and on disk.
 
     Parameters
     ----------
@@ -87,6 +87,16 @@ def blank(design: Design, fine_mm: float = FINE_MM) -> Blank:
     MissingValue
         A material without modulus, permittivity or resistivity.
     """
+    key = design.id(), design.machine.tool_height_error_mm, fine_mm
+    if key not in _SOLVED:
+        _SOLVED[key] = _stored(design, fine_mm)
+    return _SOLVED[key]
+
+
+_SOLVED: dict[tuple[str, float, float], Blank] = {}
+
+
+def _stored(design: Design, fine_mm: float) -> Blank:
     question = {
         "what": "virtual blank", "design": design.id(), "fine_mm": fine_mm, "source": _source(),
         "film_mm": design.machine.tool_height_error_mm,

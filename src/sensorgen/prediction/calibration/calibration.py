@@ -65,7 +65,7 @@ class Calibration:
     notes : tuple of str
         What was left out, what is to be doubted.
     links : tuple of Link
-        How values of materials hang together with the parameters.
+        How parameters depend on values of materials.
     """
 
     specimen: str

@@ -1,7 +1,7 @@
 """Values of materials behind a calibration: what R, C and the rise of one specimen say of resistivity and the like.
 
-A parameter of the specimen differs from the prediction by the material's value, and by what is known less well than its
-readings: sizes as printed, and the models. Both are normal in the logarithm.
+A parameter of the specimen differs from the prediction by the material's value, and by the errors of sizes as printed and
+of the models. Both are normal in the logarithm.
 """
 
 import json
@@ -33,7 +33,7 @@ _TOLD = 0.8  # of the prior's standard deviation: a value that keeps more was no
 
 @dataclass(frozen=True)
 class Link:
-    """How a material's value and a parameter of the specimen hang together.
+    """How a parameter of the specimen depends on a material's value.
 
     Attributes
     ----------
