@@ -58,8 +58,8 @@ class ByModel:
         noise = np.median([press.noise for press in pressed], axis=0) if pressed else np.full(len(rest_ohm), NOISE)
         best = NextPress(self.model, within, np.maximum(noise, _LEAST), part.aim).best(known)
         interval = self._interval(known) if pressed else inf
-        numbers = (best.force_n, best.position_m / M_PER_MM, best.peak_n, best.hold_s)
-        return Choice(*(round(number, 3) for number in numbers), interval)
+        place = round(best.position_m / M_PER_MM, 3)
+        return Choice(round(best.force_n, 3), place, round(best.peak_n, 3), round(best.hold_s, 3), interval)
 
     def predicted(self, force_n: float, place_mm: float, rest_ohm: Complex) -> Complex:
         """Expected impedances under a press, by the design and what was read at rest before it (m,) [ohm]."""

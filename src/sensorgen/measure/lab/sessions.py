@@ -176,8 +176,8 @@ class Session:
             guardian = self._stack.enter_context(Guardian(Orders(devices, experiment.limits.dead_man_s, folder)))
         return run(
             experiment, clock=self._clock, log=self._log, rig=self._rig, simulated=asked.simulated, view=self._views,
-            guardian=guardian, next_press=self._model, predicted=self._model.predicted if self._model else None, resume=folder,
-            confirm=confirm,
+            guardian=guardian, next_press=self._model, resume=folder, confirm=confirm,
+            predicted=self._model.predicted if self._model else None,
         )  # fmt: skip
 
 
