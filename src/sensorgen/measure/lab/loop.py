@@ -84,8 +84,8 @@ class Loop:
         Mean at rest before the press [ohm].
     step, steps, message
         For the view.
-    paused : bool
-        Whether a pause was asked for.
+    paused, pausable : bool
+        Whether a pause was asked for, and whether now is the time for it.
     travels : bool
         Whether the stage was sent somewhere, and has not come to rest.
     homed : bool
@@ -117,6 +117,7 @@ class Loop:
     steps: int = 0
     message: str = ""
     paused: bool = False
+    pausable: bool = False
     travels: bool = False
     homed: bool = False
     late: int = 0
@@ -258,14 +259,13 @@ class Loop:
             self._operator_s = self.clock.now()
             if command == "abort":
                 raise Ended("abort", f"ended by {self.controls.signal or 'the operator'}")
-            if command == "pause" and not self.paused:
-                self.paused = True
-                raise Paused
-            if command == "resume":
-                self.paused = False
+            if command in ("pause", "resume"):
+                self.paused = command == "pause"
         operator = self.experiment.limits.operator_min
         if operator and self.clock.now() - self._operator_s > operator * 60:
             raise Ended("abort", f"no sign of the operator for {operator:g} min (limits.operator_min)")
+        if self.paused and self.pausable:
+            raise Paused
 
     def _rules(self) -> None:
         stop, now = self.experiment.stop, self.clock.now()

@@ -139,7 +139,6 @@ class Session:
         needed = page or any(part.kind == "next" for part in experiment.plan)
         self._model = ByModel(model(_design(experiment, log), experiment)) if needed and model else None
         self.mechanism: Mechanism | None = None
-        self._rig = self._devices(experiment)
         self.url, views = "", list[LiveView | LiveText]()
         if page:
             view = self._stack.enter_context(
@@ -151,6 +150,11 @@ class Session:
             views.append(LiveText(experiment.readout.tones_hz))
             self._stack.callback(views[-1].close)
         self._views = Views(views)
+        try:
+            self._rig = self._devices(experiment)
+        except BaseException:
+            self._stack.close()
+            raise
 
     def _devices(self, experiment: Experiment) -> Rig:
         if self._asked.simulated:
