@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import defaultdict
+from collections import defaultdict, deque
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "lab"))
@@ -105,6 +105,8 @@ def memory() -> list[str]:
 def hour(minutes: float) -> None:
     """Run for some minutes of simulated time, and print wall time, peak memory, impedances and rows."""
     lab = laboratory()
+    for simulator in (lab.simulators["actuator"], lab.simulators["stage"]):
+        simulator.heard = deque(maxlen=1000)
     plan = [{"random": {"presses": 1000, "seed": 1}}]
     begun = time.monotonic()
     with tempfile.TemporaryDirectory() as folder, Log(Path(folder) / "log.db", create=True) as log:

@@ -70,6 +70,15 @@ def test_a_pause_lifts_the_tip_and_the_press_is_done_again(tmp_path):
     assert lab.mechanism.violations == []
 
 
+@pytest.mark.parametrize("at_s", np.arange(0.5, 29, 1.5).tolist())
+def test_a_pause_at_any_time_does_no_harm(tmp_path, at_s):
+    lab = laboratory()
+    found = done(tmp_path, lab, view=Viewer([(at_s, "pause"), (at_s + 0.3, "pause"), (at_s + 12, "resume")]))
+    assert (found.end, found.done) == ("done", 2)
+    assert lab.mechanism.violations == []
+    assert lab.mechanism.peak_n < 4.2
+
+
 def test_abort_ends_with_the_tip_up_and_resume_does_the_rest(tmp_path):
     lab = laboratory()
     found = done(tmp_path, lab, view=Viewer([(19.0, "abort")]))

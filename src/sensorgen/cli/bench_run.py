@@ -12,8 +12,11 @@ from sensorgen.cli.log_words import made
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
+    from sensorgen.design.design import Design
     from sensorgen.measure.lab.devices import Identity
+    from sensorgen.measure.lab.experiment import Experiment
     from sensorgen.measure.lab.run import Planned
+    from sensorgen.prediction.calibration.specimen import SpecimenModel
 
 
 def _run(
@@ -39,12 +42,28 @@ def _run(
         log = stack.enter_context(log_words.opened(file, create=simulate))
         asked = sessions.again(log, again) if again else sessions.new(Path(experiment or ""), simulate=simulate)
         shown = (page if page is not None else not asked.simulated or real_time) and not render.form()
-        session = stack.enter_context(sessions.Session(asked, log, real_time=real_time, page=shown))
+        session = stack.enter_context(sessions.Session(asked, log, real_time=real_time, page=shown, model=_model))
         if session.url:
             render.say(f"live page: {session.url}", err=True)
         found = session.run(lambda plan, who: _confirmed(plan, who, yes=yes or asked.simulated))
     render.deliver(found)
     return 0 if found.end == "done" else FOUND_ERRORS
+
+
+def _model(design: "Design", experiment: "Experiment") -> "SpecimenModel":
+    """Model of a specimen by its design, for the choice of presses and the page's prediction."""
+    import numpy as np
+
+    from sensorgen.analysis.calibration import Bench, spread_of
+    from sensorgen.prediction import bodies
+    from sensorgen.prediction.calibration.specimen import SpecimenModel
+    from sensorgen.prediction.planning import sensor_model
+    from sensorgen.prediction.query import Query, Tip
+
+    tip_m = experiment.pressing.length_mm * 1e-3
+    predicted, _ = sensor_model(bodies.default_body(design), Query(tip=Tip(tip_m)))
+    tones = np.array(experiment.readout.tones_hz)
+    return SpecimenModel(predicted.sensor, tones, spread_of(predicted, Bench(tip_m)))
 
 
 def _confirmed(plan: "Planned", identities: "Mapping[str, Identity]", *, yes: bool) -> bool:

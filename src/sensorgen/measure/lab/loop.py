@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from math import inf, isfinite, nan
 from typing import Protocol
 
+import numpy as np
+
 from sensorgen.core.arrays import Complex
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.controls import Controls
@@ -52,8 +54,8 @@ class Paused(Exception):
     """Somebody asked for a pause; the step begins anew after it."""
 
 
-Predicted = Callable[[float, float], Complex]
-"""Expected impedances at a force and a place [N], [mm] -> (m,) [ohm]."""
+Predicted = Callable[[float, float, Complex], Complex]
+"""Expected impedances by force, place and what was read at rest [N], [mm], (m,) [ohm] -> (m,) [ohm]."""
 
 
 @dataclass
@@ -78,10 +80,12 @@ class Loop:
         Extension of the last landing; nan before the first [mm].
     wanted_mm : float
         Place that the stage was sent to [mm].
+    rest_ohm : (m,) array
+        Mean at rest before the press [ohm].
     step, steps, message
         For the view.
-    paused : bool
-        Whether a pause was asked for.
+    paused, pausable : bool
+        Whether a pause was asked for, and whether now is the time for it.
     travels : bool
         Whether the stage was sent somewhere, and has not come to rest.
     homed : bool
@@ -108,10 +112,12 @@ class Loop:
     up_s: float = -inf
     contact_mm: float = nan
     wanted_mm: float = nan
+    rest_ohm: Complex = field(default_factory=lambda: np.full(1, complex(nan, nan)))
     step: int = 0
     steps: int = 0
     message: str = ""
     paused: bool = False
+    pausable: bool = False
     travels: bool = False
     homed: bool = False
     late: int = 0
@@ -238,7 +244,9 @@ class Loop:
         if self.view is None:
             return
         force, set_n = (self.extension.force_n, self.set_n) if isfinite(self.set_n) else (0.0, 0.0)
-        predicted = self.predicted(force, self._known_place()) if self.predicted and isfinite(self.set_n) else None
+        predicted = None
+        if self.predicted and isfinite(self.set_n) and force > 0:
+            predicted = self.predicted(force, self._known_place(), self.rest_ohm)
         self.view.update(
             Sample(
                 self.clock.now() - self.begun_s, self.step, self.steps, self.message, force,
@@ -251,14 +259,13 @@ class Loop:
             self._operator_s = self.clock.now()
             if command == "abort":
                 raise Ended("abort", f"ended by {self.controls.signal or 'the operator'}")
-            if command == "pause" and not self.paused:
-                self.paused = True
-                raise Paused
-            if command == "resume":
-                self.paused = False
+            if command in ("pause", "resume"):
+                self.paused = command == "pause"
         operator = self.experiment.limits.operator_min
         if operator and self.clock.now() - self._operator_s > operator * 60:
             raise Ended("abort", f"no sign of the operator for {operator:g} min (limits.operator_min)")
+        if self.paused and self.pausable:
+            raise Paused
 
     def _rules(self) -> None:
         stop, now = self.experiment.stop, self.clock.now()

@@ -13,7 +13,7 @@ from sensorgen.measure.lab.experiment import Next
 from sensorgen.measure.lab.plans import Choice, Pressed
 from sensorgen.prediction.calibration.fitting import NOISE, Data, Posterior, by_rest, calibrated
 from sensorgen.prediction.calibration.next_press import NextPress, Range
-from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel
+from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, unknown
 
 _LEAST = 3e-4  # relative error of a mean at rest: from one place and time to the next it differs by more than noise
 _SHORTEST_S = 0.1  # of a hold: its logarithm counts
@@ -58,7 +58,13 @@ class ByModel:
         noise = np.median([press.noise for press in pressed], axis=0) if pressed else np.full(len(rest_ohm), NOISE)
         best = NextPress(self.model, within, np.maximum(noise, _LEAST), part.aim).best(known)
         interval = self._interval(known) if pressed else inf
-        return Choice(best.force_n, round(best.position_m / M_PER_MM, 3), best.peak_n, best.hold_s, interval)
+        place = round(best.position_m / M_PER_MM, 3)
+        return Choice(round(best.force_n, 3), place, round(best.peak_n, 3), round(best.hold_s, 3), interval)
+
+    def predicted(self, force_n: float, place_mm: float, rest_ohm: Complex) -> Complex:
+        """Expected impedances under a press, by the design and what was read at rest before it (m,) [ohm]."""
+        press = unknown(np.array([force_n]), np.array([place_mm * M_PER_MM]))
+        return np.asarray(rest_ohm * np.exp(self.model.ratio(np.zeros(len(self.model.names)), press)[0]))
 
     def _known(self, pressed: Sequence[Pressed], rest_ohm: Complex) -> Posterior:
         if not pressed:

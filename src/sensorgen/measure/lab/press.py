@@ -5,7 +5,7 @@ from math import isfinite, nan
 import numpy as np
 
 from sensorgen.measure.lab.devices import DeviceFault
-from sensorgen.measure.lab.loop import Loop, Paused
+from sensorgen.measure.lab.loop import Loop
 from sensorgen.measure.lab.plans import AVERAGED_S, Pressed, Step
 from sensorgen.measure.lab.safety import RAISED_MM, UP_MM, Ended
 
@@ -48,7 +48,9 @@ def travel(loop: Loop, place_mm: float) -> None:
     DeviceFault
         The tip is down, or the stage not raised; the stage does not arrive.
     """
-    if abs(loop.read_stage().position_mm - place_mm) < _THERE_MM and not loop.place.moving:
+    settle(loop, "at rest")
+    lowered = loop.place.height_mm < loop.rig.working_mm + RAISED_MM if isfinite(loop.rig.working_mm) else False
+    if lowered and abs(loop.place.position_mm - place_mm) < _THERE_MM:
         loop.wanted_mm = place_mm
         return
     low, high = loop.experiment.limits.travel_mm
@@ -137,6 +139,7 @@ def press(loop: Loop, step: Step) -> Pressed:
     loop.message = f"rest before press {step.number}"
     loop.wait(max(step.rest_s - (loop.clock.now() - loop.up_s), AVERAGED_S))
     before, noise = loop.watch.mean(), loop.watch.noise()
+    loop.rest_ohm = before
     _drift(loop)
     loop.message = f"press {step.number}, {step.kind}"
     land(loop)
@@ -161,9 +164,7 @@ def pause(loop: Loop) -> None:
     loop.recorder.journal.note("paused", step=loop.step)
     loop.message = "paused"
     lift(loop)
+    settle(loop, "at rest")
     while loop.paused:
-        try:
-            loop.period()
-        except Paused:  # asked for twice
-            continue
+        loop.period()
     loop.recorder.journal.note("resumed", step=loop.step)

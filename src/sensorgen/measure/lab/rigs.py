@@ -1,5 +1,6 @@
 """The devices of a rig: real ones at their addresses, or simulators that share one virtual specimen."""
 
+from collections import deque
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
@@ -12,6 +13,7 @@ from sensorgen.measure.lab.experiment import Device, Devices, Experiment
 from sensorgen.measure.lab.safety import Rig
 from sensorgen.measure.virtual import faults, mechanics
 
+_HEARD = 1000  # messages that a simulator remembers
 ROLES = ("actuator", "stage", "impedance")
 SIMULATED = Devices(
     actuator=Device(kind="smac-lcc10"), stage=Device(kind="reprapfirmware"), impedance=Device(kind="handyscope-hs5")
@@ -68,6 +70,8 @@ def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Rig
             _has_role(role, device)
             made = catalogue.simulated(device.kind, plant, settings, clock)
         found[role] = made.driver
+        if hasattr(made.simulator, "heard"):  # every message so far: of an hour, tens of megabytes
+            made.simulator.heard = deque(maxlen=_HEARD)
         if plant.planted and device.kind in _STRIKES:
             plant.planted.attach(_STRIKES[device.kind], made.simulator)
     return Rig(**found), plant

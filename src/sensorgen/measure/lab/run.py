@@ -315,6 +315,7 @@ class _Attempt:
     def _step(self, loop: Loop, step: Step) -> bool:
         """One press, again after a pause; False where no further one is worth it."""
         while True:
+            loop.pausable = True
             try:
                 chosen = self._chosen(loop, step)
                 if chosen is None:
@@ -324,8 +325,11 @@ class _Attempt:
                 press.travel(loop, chosen.place_mm)
                 pressed = press.press(loop, chosen)
             except Paused:
+                loop.pausable = False
                 press.pause(loop)
                 continue
+            finally:
+                loop.pausable = False
             self.done.add(step.number)
             loop.recorder.journal.note("done", step=step.number, **_kept(pressed))
             if all(np.isfinite(values).all() for values in (pressed.before_ohm, pressed.pressed_ohm, pressed.noise)):

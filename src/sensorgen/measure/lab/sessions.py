@@ -14,13 +14,14 @@ from sensorgen.measure.lab.clock import Clock, RealClock, SimulatedClock
 from sensorgen.measure.lab.experiment import Experiment
 from sensorgen.measure.lab.guardian import Guardian, Orders
 from sensorgen.measure.lab.live import LiveText, LiveView, Sample
-from sensorgen.measure.lab.plans import NextPress
+from sensorgen.measure.lab.next_best import ByModel
 from sensorgen.measure.lab.run import Confirm, RunResult, design_of, planned, run
 from sensorgen.measure.lab.safety import Rig
 
 if TYPE_CHECKING:
     from sensorgen.measure.log import Log
     from sensorgen.measure.virtual.mechanics import Rig as Mechanism
+    from sensorgen.prediction.calibration.specimen import SpecimenModel
 
 
 @dataclass(frozen=True)
@@ -109,8 +110,8 @@ class Session:
         Whether a simulated run takes its time.
     page, text : bool
         Whether to show the run as a page, and in the terminal.
-    next_press : callable, optional
-        Chooses the presses of parts ``next``, by the design of the specimen and the tip.
+    model : callable, optional
+        Makes the specimen's model by its design and the experiment: for parts ``next``, and for the page's prediction.
 
     Attributes
     ----------
@@ -127,7 +128,7 @@ class Session:
 
     def __init__(
         self, asked: Asked, log: "Log", *, real_time: bool = False, page: bool = False, text: bool = True,
-        next_press: "Callable[[Design, Experiment], NextPress] | None" = None,
+        model: "Callable[[Design, Experiment], SpecimenModel] | None" = None,
     ) -> None:  # fmt: skip
         self._asked, self._log, self._stack = asked, log, ExitStack()
         experiment = asked.experiment
@@ -135,10 +136,9 @@ class Session:
         self._clock: Clock = SimulatedClock() if asked.simulated and not real_time else RealClock()
         if isinstance(self._clock, SimulatedClock):
             self._clock = replace(self._clock, epoch_s=RealClock().epoch())
-        needs_model = any(part.kind == "next" for part in experiment.plan)
-        self._next = next_press(_design(experiment, log), experiment) if needs_model and next_press else None
+        needed = page or any(part.kind == "next" for part in experiment.plan)
+        self._model = ByModel(model(_design(experiment, log), experiment)) if needed and model else None
         self.mechanism: Mechanism | None = None
-        self._rig = self._devices(experiment)
         self.url, views = "", list[LiveView | LiveText]()
         if page:
             view = self._stack.enter_context(
@@ -150,6 +150,11 @@ class Session:
             views.append(LiveText(experiment.readout.tones_hz))
             self._stack.callback(views[-1].close)
         self._views = Views(views)
+        try:
+            self._rig = self._devices(experiment)
+        except BaseException:
+            self._stack.close()
+            raise
 
     def _devices(self, experiment: Experiment) -> Rig:
         if self._asked.simulated:
@@ -175,7 +180,8 @@ class Session:
             guardian = self._stack.enter_context(Guardian(Orders(devices, experiment.limits.dead_man_s, folder)))
         return run(
             experiment, clock=self._clock, log=self._log, rig=self._rig, simulated=asked.simulated, view=self._views,
-            guardian=guardian, next_press=self._next, resume=folder, confirm=confirm,
+            guardian=guardian, next_press=self._model, resume=folder, confirm=confirm,
+            predicted=self._model.predicted if self._model else None,
         )  # fmt: skip
 
 
