@@ -122,8 +122,10 @@ def _solved(design: Design, fine_mm: float) -> Blank:
     section = section_of(cell.scene)
     depth_m, length_m = section.depth_mm * M_PER_MM, design.params.length_mm * M_PER_MM
     per_length = depth_m * cell.count / length_m
-    coarse, fine = (_table(design, cell.scene, size) for size in (2 * fine_mm, fine_mm))
-    table = per_length * (fine + (fine - coarse) / (2**_ORDER - 1))
+    coarse = _table(design, cell.scene, 2 * fine_mm, _LN_MODULUS, _LN_PERMITTIVITY)
+    middle, fine = coarse[1, 1], _table(design, cell.scene, fine_mm, (0.0,), (0.0,))[0, 0]
+    exact = fine + (fine - middle) / (2**_ORDER - 1)
+    table = per_length * coarse * exact / middle  # what the values change is the same on both rasters
     grid, rho = _raster(design, cell.scene, fine_mm), resistivities(design)
     top, bottom = (
         rho[end].value / _conductor_m2(grid, number, depth_m, cell.count, length_m, along=section.across == "x")
@@ -136,19 +138,21 @@ def _raster(design: Design, scene: Scene, fine_mm: float) -> Raster:
     return raster(scene, {name: k + 1 for k, name in enumerate(_solids(design))}, fine_mm)
 
 
-def _table(design: Design, scene: Scene, fine_mm: float) -> Real:
-    """Capacitances per depth of a cell on one raster, in the order of ``Blank.table_f_per_m`` [F/m]."""
+def _table(
+    design: Design, scene: Scene, fine_mm: float, ln_moduli: Sequence[float], ln_permittivities: Sequence[float]
+) -> Real:
+    """Capacitances per depth of a cell on one raster, by ln of modulus, of permittivity, and pressure [F/m]."""
     used, grid = _solids(design), _raster(design, scene, fine_mm)
     number = list(used).index(film(design))
     found = []
-    for ln_modulus in _LN_MODULUS:
+    for ln_modulus in ln_moduli:
         solids = list(used.values())
         solids[number] = replace(solids[number], modulus_pa=solids[number].modulus_pa * exp(ln_modulus))
         loads = [p * exp(ln_modulus) for p in PRESSURES_PA]
         places = pressed(grid, [AIR, *solids], loads).place_m
         found.append([
             [capacitance(grid, _permittivities(solids, number, ln), place) for place in places]
-            for ln in _LN_PERMITTIVITY
+            for ln in ln_permittivities
         ])  # fmt: skip
     return np.array(found)
 
