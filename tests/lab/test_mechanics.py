@@ -224,7 +224,7 @@ def test_a_fault_waits_for_its_force_and_strikes_the_simulator_that_is_attached(
 
 @pytest.mark.parametrize(("fault", "seen"), [
     ("rig power loss", lambda r: r.force_n == pytest.approx(0.7, abs=0.02)),
-    ("rig jammed", lambda r: 0.0 < r.extension_mm < 10.0), ("rig stage moves", lambda r: r.axis("x")[0] > 5.0),
+    ("rig jammed", lambda r: 0.0 < r.extension_mm < 25.0), ("rig stage moves", lambda r: r.axis("x")[0] > 5.0),
     ("rig short", lambda r: r.specimen and abs(Rig.impedance(r, TONES_HZ)[0]) < 1e7),
 ])  # fmt: skip
 def test_each_fault_of_the_rig_does_what_it_says(fault, seen):

@@ -124,8 +124,9 @@ def _solved(design: Design, fine_mm: float) -> Blank:
     per_length = depth_m * cell.count / length_m
     coarse = _table(design, cell.scene, 2 * fine_mm, _LN_MODULUS, _LN_PERMITTIVITY)
     middle, fine = coarse[1, 1], _table(design, cell.scene, fine_mm, (0.0,), (0.0,))[0, 0]
-    exact = fine + (fine - middle) / (2**_ORDER - 1)
-    table = per_length * coarse * exact / middle  # what the values change is the same on both rasters
+    rise = _extrapolated(middle, fine) / _extrapolated(middle[0], fine[0]) / (middle / middle[0])
+    rest = _extrapolated(*(_at_rest(design, cell.scene, size) for size in (2 * fine_mm, fine_mm)))
+    table = per_length * rest[:, None] * coarse / coarse[:, :, :1] * rise  # other values change both rasters alike
     grid, rho = _raster(design, cell.scene, fine_mm), resistivities(design)
     top, bottom = (
         rho[end].value / _conductor_m2(grid, number, depth_m, cell.count, length_m, along=section.across == "x")
@@ -136,6 +137,19 @@ def _solved(design: Design, fine_mm: float) -> Blank:
 
 def _raster(design: Design, scene: Scene, fine_mm: float) -> Raster:
     return raster(scene, {name: k + 1 for k, name in enumerate(_solids(design))}, fine_mm)
+
+
+def _extrapolated(coarse: Real, fine: Real) -> Real:
+    """To a raster without size, by Richardson."""
+    return fine + (fine - coarse) / (2**_ORDER - 1)
+
+
+def _at_rest(design: Design, scene: Scene, fine_mm: float) -> Real:
+    """Capacitances per depth of a cell at rest, by ln of permittivity [F/m]."""
+    used, grid = _solids(design), _raster(design, scene, fine_mm)
+    number, at = list(used).index(film(design)), Grid(grid).at_m
+    solids = list(used.values())
+    return np.array([capacitance(grid, _permittivities(solids, number, ln), at) for ln in _LN_PERMITTIVITY])
 
 
 def _table(
