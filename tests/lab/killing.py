@@ -199,7 +199,7 @@ def many(folder: Path, rig: Served, seed: int, kills: int, ways: tuple[str, ...]
 def _moment(run: Started, rng: random.Random) -> bool:
     """Wait for a random moment of a run, two in three during a press; False where the run ends before."""
     kind = rng.choice(["identified", "step", "step"])
-    wait, before = rng.uniform(0.1, 8.0 if kind == "identified" else 6.0), len(run.events(kind))
+    wait, before = rng.uniform(0.1, 5.0), len(run.events(kind))
     while len(run.events(kind)) <= before:
         if run.process.poll() is not None:
             return False

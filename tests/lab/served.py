@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from laboratory import LIMIT_N, specimen
 
 from sensorgen.measure.lab.clock import RealClock
-from sensorgen.measure.virtual import mechanics, serving
+from sensorgen.measure.virtual import mechanics, reprap, serving
 from sensorgen.measure.virtual.reprap import RepRapFirmware
 from sensorgen.measure.virtual.scpi import LcrMeter
 from sensorgen.measure.virtual.smac import SmacController
@@ -21,6 +21,7 @@ DOWN_MM = 1.0
 
 
 def main() -> None:
+    reprap._HOMING_MM_S = 200.0  # so that a run begins to press sooner
     clock = RealClock()
     at = mechanics.Rig(specimen(), mechanics.Mechanics(force_limit_n=LIMIT_N), time_s=clock.now())
     actuator, stage, meter = SmacController(at), RepRapFirmware(at), LcrMeter(at, "hp-4284a")

@@ -32,6 +32,7 @@ REPORT = "guardian.jsonl"
 _ARM, _BEAT, _RELEASE, _ALIVE = b"A", b".", b"R", b"+"
 _TELL_S, _DEAF_S, _BEGIN_S = 0.2, 3.0, 30.0  # from one sign of the guardian to the next, until it is missed, to begin
 _TRIES_S, _AGAIN_S = 10.0, 0.1  # for which a call that fails is tried again, and how often
+_RAISED, _REFUSED = "raised", 2
 _UP_S, _RAISE_S = 1.5, 20.0  # that the piston, and the stage after a move that goes on, take at most
 _STALL = 2.0  # of the guardian itself, in its own periods: a stalled judge judges nobody
 
@@ -201,7 +202,7 @@ class Rescue:
 
     def __init__(self, devices: Mapping[str, Device]) -> None:
         self._devices, self._clock = devices, RealClock()
-        self._raised = threading.Event()
+        self._ended = threading.Event()  # of the stage's part
         self.found = dict.fromkeys(devices, "no answer")
 
     def run(self) -> None:
@@ -222,22 +223,32 @@ class Rescue:
             return
         self.found["actuator"] = "lifted, motor on"
         time.sleep(_UP_S)
-        if self._raised.wait(_TRIES_S + _RAISE_S) and self._tried("actuator", driver.off):
+        self._ended.wait(2 * _TRIES_S + _RAISE_S)
+        if self.found.get("stage") == _RAISED and self._tried("actuator", driver.off):
             self.found["actuator"] = "lifted, motor off"
 
     def _stage(self, device: Device) -> None:
-        driver = self._opened("stage", device)
-        if driver is None or not (self._tried("stage", driver.identify) and self._tried("stage", driver.lift)):
-            return
-        self.found["stage"] = "lifting"
-        until = time.monotonic() + _RAISE_S
-        while time.monotonic() < until:
+        try:
+            driver = self._opened("stage", device)
+            if driver is not None and self._tried("stage", driver.identify) and self._tried("stage", driver.lift):
+                self._raise(driver)
+        finally:
+            self._ended.set()
+
+    def _raise(self, driver: Any) -> None:
+        """Follow the stage up; one that refuses, as before it has its zero, is asked once more."""
+        self.found["stage"] = "not raised in time"
+        until, refused = time.monotonic() + _RAISE_S, 0
+        while time.monotonic() < until and refused < _REFUSED:
             time.sleep(_AGAIN_S)
-            with suppress(SensorgenError):
+            try:
                 if not driver.read().moving:
-                    self.found["stage"] = "raised"
-                    self._raised.set()
+                    self.found["stage"] = _RAISED
                     return
+            except SensorgenError as error:
+                self.found["stage"] = str(error)
+                refused += 1
+                self._tried("stage", driver.lift)
 
     def _opened(self, role: str, device: Device) -> Any:
         """A driver on a line that is opened anew; None where it cannot be in time, as while a dying run has it."""
