@@ -43,6 +43,21 @@ def test_the_offset_is_found_within_its_error(tmp_path, run, offset_s):
     np.testing.assert_allclose(found.set_position_mm[held], run.position_mm[held], atol=1e-3)
 
 
+def stamped(path):
+    """A rig's log whose time is by the computer that stamped the recording."""
+    path.write_text(path.read_text("utf-8").replace("time_s", "stamp_s", 1), "utf-8")
+    return rig(path)
+
+
+def test_stamps_of_one_computer_leave_little_to_find(tmp_path, run):
+    late = made.write_rig(tmp_path / "late.csv", made.rig_rows(MADE, 0.2))
+    found = joined(recording(run), stamped(late))
+    assert found.offset_s == pytest.approx(0.23, abs=3 * found.offset_error_s)
+    off = joined(recording(run), stamped(made.write_rig(tmp_path / "off.csv", made.rig_rows(MADE, 32.0))))
+    assert off.offset_s == 0  # a response that fits 32 s later is no reason to believe that
+    assert np.isnan(off.offset_error_s)
+
+
 def test_errors_of_the_offset_are_what_they_say(tmp_path):
     pulls = []
     for seed in range(8):

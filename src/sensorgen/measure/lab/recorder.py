@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 JOURNAL, EXPERIMENT = "journal.jsonl", "experiment.json"
 _SYNC_S = 0.5  # so that all that is older than a second is on the disk
-_RIG = "time_s,set_force_n,set_position_mm,force_n,error\n"
+_RIG = "stamp_s,set_force_n,set_position_mm,force_n,error\n"
 
 
 class Appended:

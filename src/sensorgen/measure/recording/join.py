@@ -11,6 +11,7 @@ from sensorgen.measure.recording.rig import RigLog
 from sensorgen.measure.recording.samples import Real, Recording
 
 _SILENT = 5.0  # median row distances beyond which the rig's log has a gap
+_STAMPED_S = 1.0  # by which stamps of one computer differ at most: blocks that wait, instruments that take their time
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,8 @@ def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = n
     rig : RigLog
         Log of the rig; rows with errors are ignored.
     within_s : float
-        Largest offset of the clocks; if not given, any offset with half of the shorter record in common [s].
+        Largest offset of the clocks; if not given, any offset with half of the shorter record in common, or a second
+        where one computer stamped both [s].
 
     Raises
     ------
@@ -82,6 +84,8 @@ def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = n
         Too few samples or rows; no response to the force, and no common clock to assume instead.
     """
     common_clock = all(np.isfinite(one.epoch_s) for one in recordings)
+    stamped = common_clock and rig.stamped
+    within_s = min(within_s, _STAMPED_S) if stamped else within_s
     times = [one.real_s() if common_clock else one.time_s for one in recordings]
     offsets: list[Offset] = []
     faults: list[BadInput] = []
@@ -93,7 +97,7 @@ def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = n
     if not offsets:
         raise faults[0]
     best = min(offsets, key=lambda offset: (offset.by_chance, offset.error_s))
-    if best.by_chance:
+    if best.by_chance or (stamped and abs(best.offset_s) > within_s):  # its refinement looks beyond
         if not common_clock:
             raise BadInput(
                 f"the force explains {best.explained:.1%} of the readings: too little to find the offset of the "

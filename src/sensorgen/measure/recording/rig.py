@@ -13,7 +13,8 @@ from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.recording.samples import Bools, Real
 from sensorgen.measure.recording.spool import MOST_BYTES
 
-_NEEDED = ("time_s", "set_force_n", "set_position_mm")
+_TIME, _STAMP = "time_s", "stamp_s"
+_NEEDED = ("set_force_n", "set_position_mm")
 _MOST_ROWS = 1 << 21  # 29 h at 20 rows/s
 _FORCE, _ERROR = "force_n", "error"
 _NO_ERROR = frozenset({"", "0", "0.0", "false", "no", "none", "ok"})
@@ -35,6 +36,8 @@ class RigLog:
         Rows that report an error, are not later than all rows before, or are incomplete.
     notes : tuple of str
         Remarks on the whole log.
+    stamped : bool
+        Whether the time is by the computer that stamped the recording, too.
     """
 
     time_s: Real
@@ -43,6 +46,7 @@ class RigLog:
     force_n: Real
     error: Bools
     notes: tuple[str, ...] = ()
+    stamped: bool = False
 
     def sound(self) -> tuple[Real, Real, Real, Real]:
         """Time [s], force (the set one if none was measured), set force [N] and position [mm] of sound rows."""
@@ -62,7 +66,8 @@ def rig(path: Path | str, columns: Mapping[str, str] | None = None) -> RigLog:
     ----------
     path : Path or str
         CSV file with the columns ``time_s``, ``set_force_n`` and ``set_position_mm``; ``force_n`` and ``error`` are
-        optional. Times are seconds, or dates as 2023-05-04T12:00:01.25+02:00.
+        optional. Times are seconds, or dates as 2023-05-04T12:00:01.25+02:00. ``stamp_s`` in place of ``time_s``:
+        seconds since 1970 by the computer that stamped the recording, too.
     columns : mapping of str to str, optional
         From the file's column names to sensorgen's.
 
@@ -82,12 +87,14 @@ def rig(path: Path | str, columns: Mapping[str, str] | None = None) -> RigLog:
 
 def _read(table: Table) -> RigLog:
     names = table.names
-    for needed in _NEEDED:
+    time_name = _STAMP if _STAMP in names else _TIME
+    for needed in (time_name, *_NEEDED):
         if names.count(needed) != 1:
-            message = f"columns {listed(names)}; expected {', '.join(_NEEDED)} once each, and {_FORCE} and {_ERROR} if "
+            expected = ", ".join((_TIME, *_NEEDED))
+            message = f"columns {listed(names)}; expected {expected} once each, and {_FORCE} and {_ERROR} if "
             raise table.error(1, f"{message}available: {needed} is not there once")
     force, error = ([names.index(name)] if name in names else [] for name in (_FORCE, _ERROR))
-    needed_columns = [names.index(name) for name in _NEEDED]
+    needed_columns = [names.index(name) for name in (time_name, *_NEEDED)]
     numbers, reported = [], []
     for block in table.blocks([*needed_columns, *force], error, dates=needed_columns[:1], truncated=True):
         numbers.append(block.numbers)
@@ -102,4 +109,5 @@ def _read(table: Table) -> RigLog:
         notes.append(f"{np.count_nonzero(late)} rows are not later than the rows before: taken as errors")
     time, set_force, position = values[:, :3].T
     measured = values[:, 3] if force else np.full(len(values), np.nan)
-    return RigLog(time, set_force, position, measured, np.concatenate(reported) | late | incomplete, tuple(notes))
+    error_rows = np.concatenate(reported) | late | incomplete
+    return RigLog(time, set_force, position, measured, error_rows, tuple(notes), time_name == _STAMP)
