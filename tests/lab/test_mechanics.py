@@ -131,8 +131,9 @@ def test_the_reading_is_that_of_the_specimen():
     assert found.impedance(TONES_HZ) == pytest.approx(line.impedance(lift, specimen.patch(0.05)), rel=1e-6)
 
 
-def test_creep_goes_with_the_logarithm_of_time_and_hysteresis_with_the_peak():
-    found = rig(Truth(creep=0.02, hysteresis=0.05), friction_n=0.0, lag_s=1e-3)
+@pytest.mark.parametrize(("creep", "hysteresis"), [(0.02, 0.0), (0.0, 0.05)])
+def test_creep_goes_with_the_logarithm_of_time_and_hysteresis_with_the_peak(creep, hysteresis):
+    found = rig(Truth(creep=creep, hysteresis=hysteresis), friction_n=0.0, lag_s=1e-3)
     line = found.specimen.line(TONES_HZ)
     rest = 1 / line.impedance(0.0, (0.0, 0.0))
 
@@ -146,12 +147,12 @@ def test_creep_goes_with_the_logarithm_of_time_and_hysteresis_with_the_peak():
     first = share()
     after(found, 9.0)
     later = share()
-    assert later / first == pytest.approx(1.02, abs=4e-3)
+    assert later / first == pytest.approx(1 + creep, abs=4e-3)
     found.drive(5.1)
     after(found, 1.0)
     found.drive(3.1)
     after(found, 10.0)
-    assert share() / later == pytest.approx(1 + 0.05 * (1 - 4.0 / 6.0), abs=6e-3)
+    assert share() / later == pytest.approx(1 + hysteresis * (1 - 4.0 / 6.0), abs=creep / 2 + 1e-3)
 
 
 def test_drift_is_as_wide_as_said_and_the_same_by_its_seed():
@@ -223,7 +224,7 @@ def test_a_fault_waits_for_its_force_and_strikes_the_simulator_that_is_attached(
 
 @pytest.mark.parametrize(("fault", "seen"), [
     ("rig power loss", lambda r: r.force_n == pytest.approx(0.7, abs=0.02)),
-    ("rig jammed", lambda r: r.extension_mm == 0.0), ("rig stage moves", lambda r: r.axis("x")[0] > 5.0),
+    ("rig jammed", lambda r: 0.0 < r.extension_mm < 25.0), ("rig stage moves", lambda r: r.axis("x")[0] > 5.0),
     ("rig short", lambda r: r.specimen and abs(Rig.impedance(r, TONES_HZ)[0]) < 1e7),
 ])  # fmt: skip
 def test_each_fault_of_the_rig_does_what_it_says(fault, seen):

@@ -104,7 +104,9 @@ def test_the_print_is_what_the_models_predict(tri):
 
 
 def test_cogs_along_the_strip_conduct_and_those_across_hardly():
-    along, across = (Specimen(make({**TRI, "along": axis})) for axis in ("y", "x"))
+    along, across = (
+        Specimen(make({"shape": "tri", "parameters": {"dielectric_mm": 0.2, "along": axis}})) for axis in ("y", "x")
+    )
     assert along.track_ohm_per_m[0] < 0.9 * across.track_ohm_per_m[0]
     assert across.track_ohm_per_m[1] == pytest.approx(0.2 / (10e-3 * 0.3e-3), rel=1e-6)
 
@@ -141,11 +143,13 @@ def test_a_short_shunts_the_strip_until_it_opens(tri):
 
 
 def test_a_profile_is_seen_from_the_contacts(tri):
-    """More resistance near the contacts than at the far end: more in all at high frequencies, the same at DC."""
-    bent = replace(tri, truth=Truth(profile=(0.3,), resistivity=3.0)).line(np.array([10.0, 1e5]))
-    even = replace(tri, truth=Truth(resistivity=3.0)).line(np.array([10.0, 1e5]))
+    """At low frequencies the current falls evenly to 0 at the far end: each place counts by its square."""
+    bent, even = (replace(tri, truth=Truth(profile=p)).line(np.array([100.0])) for p in ((0.3, -0.2), ()))
     ratio = bent.impedance(0.0, (0.0, 0.0)).real / even.impedance(0.0, (0.0, 0.0)).real
-    assert ratio[1] > 1.05 > ratio[0] * 0.9
+    x = (np.arange(1000) + 0.5) / 1000
+    weight = (1 - x) ** 2
+    bend = np.exp(0.3 * np.cos(np.pi * x) - 0.2 * np.cos(2 * np.pi * x))
+    assert ratio == pytest.approx(weight @ bend / weight.sum(), rel=1e-3)
 
 
 def test_modulus_and_permittivity_scale_as_they_should(tri):
@@ -162,7 +166,7 @@ def test_a_blank_interpolates_what_it_was_not_solved_for():
     other = {"x60": {"youngs_modulus_pa": 6e6 * 0.75, "relative_permittivity": 4.68 * 1.2}}
     solved = blank(make({**TRI, "material_values": other}), 0.05)
     between = blank(make(TRI), 0.05)
-    assert between.capacitance_f_per_m(np.log(1.2)) == pytest.approx(solved.capacitance_f_per_m(0.0), rel=1e-3)
+    assert between.capacitance_f_per_m(np.log(1.2)) == pytest.approx(solved.capacitance_f_per_m(0.0), rel=2e-3)
     at = [1e4, 1e5]
     rise = np.interp(at, *solved.rise(0.0, 0.0)), np.interp(at, *between.rise(np.log(1.2), np.log(0.75)))
     assert rise[1] == pytest.approx(rise[0], rel=0.01)

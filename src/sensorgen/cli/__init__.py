@@ -40,6 +40,7 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
         "report": "Compare predictions and measurements, as one page.",
         "fit": "Fit material values to what was measured.",
         "characterise": "Material values from a plate of test structures.",
+        "demo": "The whole loop on a virtual laboratory.",
     },
     "Reference": {
         "new": "Write a material, shape, printer, quality, design, target or experiment to change.",

@@ -141,9 +141,7 @@ class Session:
         self.mechanism: Mechanism | None = None
         self.url, views = "", list[LiveView | LiveText]()
         if page:
-            view = self._stack.enter_context(
-                LiveView(f"{experiment.specimen}: {plan.summary()}", experiment.readout.tones_hz)
-            )
+            view = self._stack.enter_context(LiveView(plan.summary(), experiment.readout.tones_hz))
             self.url = view.url
             views.append(view)
         if text:

@@ -122,8 +122,11 @@ def _solved(design: Design, fine_mm: float) -> Blank:
     section = section_of(cell.scene)
     depth_m, length_m = section.depth_mm * M_PER_MM, design.params.length_mm * M_PER_MM
     per_length = depth_m * cell.count / length_m
-    coarse, fine = (_table(design, cell.scene, size) for size in (2 * fine_mm, fine_mm))
-    table = per_length * (fine + (fine - coarse) / (2**_ORDER - 1))
+    coarse = _table(design, cell.scene, 2 * fine_mm, _LN_MODULUS, _LN_PERMITTIVITY)
+    middle, fine = coarse[1, 1], _table(design, cell.scene, fine_mm, (0.0,), (0.0,))[0, 0]
+    rise = _extrapolated(middle, fine) / _extrapolated(middle[0], fine[0]) / (middle / middle[0])
+    rest = _extrapolated(*(_at_rest(design, cell.scene, size) for size in (2 * fine_mm, fine_mm)))
+    table = per_length * rest[:, None] * coarse / coarse[:, :, :1] * rise  # other values change both rasters alike
     grid, rho = _raster(design, cell.scene, fine_mm), resistivities(design)
     top, bottom = (
         rho[end].value / _conductor_m2(grid, number, depth_m, cell.count, length_m, along=section.across == "x")
@@ -136,19 +139,34 @@ def _raster(design: Design, scene: Scene, fine_mm: float) -> Raster:
     return raster(scene, {name: k + 1 for k, name in enumerate(_solids(design))}, fine_mm)
 
 
-def _table(design: Design, scene: Scene, fine_mm: float) -> Real:
-    """Capacitances per depth of a cell on one raster, in the order of ``Blank.table_f_per_m`` [F/m]."""
+def _extrapolated(coarse: Real, fine: Real) -> Real:
+    """To a raster without size, by Richardson."""
+    return fine + (fine - coarse) / (2**_ORDER - 1)
+
+
+def _at_rest(design: Design, scene: Scene, fine_mm: float) -> Real:
+    """Capacitances per depth of a cell at rest, by ln of permittivity [F/m]."""
+    used, grid = _solids(design), _raster(design, scene, fine_mm)
+    number, at = list(used).index(film(design)), Grid(grid).at_m
+    solids = list(used.values())
+    return np.array([capacitance(grid, _permittivities(solids, number, ln), at) for ln in _LN_PERMITTIVITY])
+
+
+def _table(
+    design: Design, scene: Scene, fine_mm: float, ln_moduli: Sequence[float], ln_permittivities: Sequence[float]
+) -> Real:
+    """Capacitances per depth of a cell on one raster, by ln of modulus, of permittivity, and pressure [F/m]."""
     used, grid = _solids(design), _raster(design, scene, fine_mm)
     number = list(used).index(film(design))
     found = []
-    for ln_modulus in _LN_MODULUS:
+    for ln_modulus in ln_moduli:
         solids = list(used.values())
         solids[number] = replace(solids[number], modulus_pa=solids[number].modulus_pa * exp(ln_modulus))
         loads = [p * exp(ln_modulus) for p in PRESSURES_PA]
         places = pressed(grid, [AIR, *solids], loads).place_m
         found.append([
             [capacitance(grid, _permittivities(solids, number, ln), place) for place in places]
-            for ln in _LN_PERMITTIVITY
+            for ln in ln_permittivities
         ])  # fmt: skip
     return np.array(found)
 

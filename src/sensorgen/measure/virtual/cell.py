@@ -140,8 +140,6 @@ def pressed(raster: Raster, solids: Sequence[Solid], pressure_pa: Sequence[float
     OutOfRange
         A pressure at which no equilibrium was found.
     """
-    from scipy.sparse.linalg import splu
-
     grid = Grid(raster)
     body = _Body(grid, raster, solids)
     u, rate = np.zeros(2 * grid.count), np.zeros(2 * grid.count)
@@ -152,7 +150,7 @@ def pressed(raster: Raster, solids: Sequence[Solid], pressure_pa: Sequence[float
             step = min(step, after - at)
             ahead = u + step * rate  # where the last step leads, if that is nearer
             near = body.energy(ahead, at + step) < body.energy(u, at + step)
-            found = body.settled(ahead if near else u, at + step, splu)
+            found = body.settled(ahead if near else u, at + step)
             if found is None:
                 step /= 2
                 if step < _SMALLEST_STEP * (after - before):
@@ -235,9 +233,10 @@ class _Body:
         own = np.einsum("eab,eb->ea", self.hourglass, u[self.dofs])
         return force.reshape(n, 8) + own, stiff + self.hourglass
 
-    def settled(self, u: Real, pressure: float, splu: object) -> Real | None:
+    def settled(self, u: Real, pressure: float) -> Real | None:
         """Displacements in equilibrium, by Newton's method with a search along each step; None if there is none."""
         from scipy.sparse import coo_matrix
+        from scipy.sparse.linalg import splu
 
         energy, work = self.energy(u, pressure), 0.0
         size = 2 * self.grid.count
@@ -246,7 +245,10 @@ class _Body:
             left = pressure * self.load - np.bincount(self.dofs.ravel(), force.ravel(), size)
             whole = coo_matrix((stiff.ravel(), (self.rows, self.cols)), (size, size)).tocsc()
             step = np.zeros(size)
-            step[self.free] = splu(whole[self.free][:, self.free]).solve(left[self.free])  # type: ignore[operator]
+            inside = whole[self.free][:, self.free]
+            step[self.free] = splu(
+                inside, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}, diag_pivot_thresh=0.0
+            ).solve(left[self.free])
             fall = float(left @ step)
             if fall < 0:
                 return None
