@@ -170,7 +170,12 @@ def killed(rig: Served, run: Started, way: str = "kill") -> Killed:
     down = rig.state()["tip_mm"] < 1.0
     os.kill(run.process.pid, {"kill": signal.SIGKILL, "stop": signal.SIGSTOP}[way])
     up_s = seconds_to_tip_up(rig)
-    run.process.communicate(timeout=60)
+    try:
+        run.process.communicate(timeout=10)
+    except subprocess.TimeoutExpired:  # stopped before it began, or when it had ended and the guardian was released
+        assert rig.state()["tip_mm"] >= 1.0
+        os.kill(run.process.pid, signal.SIGKILL)
+        run.process.communicate()
     ended = not guardian or gone(guardian)
     state = rig.state()
     return Killed(way, down, up_s, ended and state["tip_mm"] >= 1.0 and abs(state["motor_n"]) < 1e-3, readable(run))

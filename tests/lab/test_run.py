@@ -201,7 +201,7 @@ def test_a_loop_that_stood_still_ends_the_run(tmp_path):
         def update(self, sample):
             super().update(sample)
             if sample.force_n > 3:
-                lab.clock.wait_until(lab.clock.now() + 2.0)
+                lab.clock.wait_until(lab.clock.now() + 3.0)
 
     lab = laboratory()
     found = done(tmp_path, lab, view=Slow([]))

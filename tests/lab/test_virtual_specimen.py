@@ -164,8 +164,8 @@ def test_modulus_and_permittivity_scale_as_they_should(tri):
 
 def test_a_blank_interpolates_what_it_was_not_solved_for():
     other = {"x60": {"youngs_modulus_pa": 6e6 * 0.75, "relative_permittivity": 4.68 * 1.2}}
-    solved = blank(make({**TRI, "material_values": other}), 0.05)
-    between = blank(make(TRI), 0.05)
+    solved = blank(make({**TRI, "material_values": other}))
+    between = blank(make(TRI))
     assert between.capacitance_f_per_m(np.log(1.2)) == pytest.approx(solved.capacitance_f_per_m(0.0), rel=2e-3)
     at = [1e4, 1e5]
     rise = np.interp(at, *solved.rise(0.0, 0.0)), np.interp(at, *between.rise(np.log(1.2), np.log(0.75)))

@@ -100,7 +100,7 @@ class Limits(Strict):
     travel_mm: Span = (0.0, 300.0)
     places_mm: Span | None = None
     hours: Annotated[float, Field(gt=0, le=20)] = 12.0
-    dead_man_s: Annotated[float, Field(ge=0.3, le=60)] = 1.0
+    dead_man_s: Annotated[float, Field(ge=0.3, le=60)] = 2.0
     operator_min: Positive | None = None
 
 

@@ -258,11 +258,11 @@ class _Attempt:
             except BaseException as error:  # whatever it is, the tip goes up first
                 end, reason, fault = "fault", f"{type(error).__name__}: {error}", error
             up, problems = safety.made_safe(self.rig, self.clock, loop.beat)
-            safety.close(self.rig)
-            if end == "done" and problems:
-                end, reason = "fault", f"{reason}, but at the end {problems[0]}"
             if up and guardian:
                 guardian.disarm()
+            problems += safety.close(self.rig)
+            if end == "done" and problems:
+                end, reason = "fault", f"{reason}, but at the end {problems[0]}"
         found = self._ended(loop, kept, end, reason, up, problems)
         if fault:
             raise fault

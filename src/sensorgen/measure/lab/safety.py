@@ -75,7 +75,7 @@ class _Attempts:
 
 
 def made_safe(rig: Rig, clock: Clock, beat: Callable[[], None] = lambda: None) -> tuple[bool, tuple[str, ...]]:
-    """Lift the actuator, raise the stage, and switch off actuator and impedance meter; devices never started are left.
+    """Lift the actuator, raise the stage, and switch the motor off; devices that were never started are left alone.
 
     Parameters
     ----------
@@ -100,8 +100,6 @@ def made_safe(rig: Rig, clock: Clock, beat: Callable[[], None] = lambda: None) -
         if safe.get("actuator") and not safe.get("stage"):
             _held(rig, clock, attempt)
     up = any(safe.values()) or not safe
-    if "impedance" in rig.started:
-        attempt("impedance meter off", rig.impedance.stop)
     return up, tuple(attempt.problems)
 
 
@@ -152,7 +150,11 @@ def _held(rig: Rig, clock: Clock, attempt: _Attempts) -> None:
         )
 
 
-def close(rig: Rig) -> None:
-    """Give the connections back."""
+def close(rig: Rig) -> tuple[str, ...]:
+    """Switch the impedance meter off, and give all connections back; what failed."""
+    attempt = _Attempts(lambda: None)
+    if "impedance" in rig.started:
+        attempt("impedance meter off", rig.impedance.stop)
     for device in (rig.actuator, rig.stage, rig.impedance):
         device.close()
+    return tuple(attempt.problems)

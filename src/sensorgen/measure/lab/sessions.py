@@ -10,6 +10,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design.design import Design
 from sensorgen.measure.lab import experiment as experiments
 from sensorgen.measure.lab import recorder, rigs
+from sensorgen.measure.lab.background import Background
 from sensorgen.measure.lab.clock import Clock, RealClock, SimulatedClock
 from sensorgen.measure.lab.experiment import Experiment
 from sensorgen.measure.lab.guardian import Guardian, Orders
@@ -160,7 +161,9 @@ class Session:
             return rig
         if experiment.devices is None:
             raise BadInput("devices is missing; expected actuator, stage and impedance")
-        return rigs.real(experiment.devices, self._clock)
+        rig = rigs.real(experiment.devices, self._clock)
+        rig.impedance = Background(rig.impedance)
+        return rig
 
     def __enter__(self) -> Self:
         return self

@@ -124,9 +124,12 @@ def _solved(design: Design, fine_mm: float) -> Blank:
     per_length = depth_m * cell.count / length_m
     coarse = _table(design, cell.scene, 2 * fine_mm, _LN_MODULUS, _LN_PERMITTIVITY)
     middle, fine = coarse[1, 1], _table(design, cell.scene, fine_mm, (0.0,), (0.0,))[0, 0]
-    rise = _extrapolated(middle, fine) / _extrapolated(middle[0], fine[0]) / (middle / middle[0])
+    exact = _extrapolated(middle, fine)
+    finer = (exact[1:] / exact[0] - 1) / (middle[1:] / middle[0] - 1)
     rest = _extrapolated(*(_at_rest(design, cell.scene, size) for size in (2 * fine_mm, fine_mm)))
-    table = per_length * rest[:, None] * coarse / coarse[:, :, :1] * rise  # other values change both rasters alike
+    rise = coarse / coarse[:, :, :1] - 1
+    rise[:, :, 1:] *= finer  # as of the design's values: others change both rasters alike
+    table = per_length * rest[:, None] * (1 + rise)
     grid, rho = _raster(design, cell.scene, fine_mm), resistivities(design)
     top, bottom = (
         rho[end].value / _conductor_m2(grid, number, depth_m, cell.count, length_m, along=section.across == "x")

@@ -176,6 +176,7 @@ class Rig:
             moved = self._axes["x"].moves or self.fault == "stage moves"
             if self.fault == "stage moves":
                 self._axes["x"].at_mm += _OWN_MM_S * dt
+                self._axes["x"].target_mm += _OWN_MM_S * dt
             for axis in self._axes.values():
                 if axis.moves:
                     axis.step(dt)

@@ -53,8 +53,12 @@ def serve(simulator: _Line, master_fd: int, clock: Clock, stop: threading.Event 
                 answer = simulator.exchange(data, clock.now())
         except OSError:
             continue
-        with suppress(BlockingIOError):
+        try:
             os.write(master_fd, answer)
+        except BlockingIOError:
+            continue
+        except OSError:  # the other end has died
+            return
 
 
 @contextmanager
