@@ -1,7 +1,7 @@
 """Values of materials behind a calibration: what R, C and the rise of one specimen say of resistivity and the like.
 
-A parameter of the specimen differs from the prediction by the material's value, and by the errors of sizes as printed and
-of the models. Both are normal in the logarithm.
+A parameter of the specimen differs from the prediction by the material's value, and by the errors of sizes as printed
+and of the models. Both are normal in the logarithm.
 """
 
 import json
