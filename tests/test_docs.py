@@ -42,7 +42,10 @@ def test_the_first_screen_of_the_readme_is_what_the_command_prints():
 @pytest.mark.parametrize("name", COMMANDS)
 def test_each_command_has_help_and_is_in_the_documents(name):
     assert cli.get_command(None, name).get_short_help_str()
-    assert any(f"sensorgen {name}" in page.read_text("utf-8") for page in [*PAGES, ROOT / "docs" / "reference.md"])
+    assert any(
+        f"sensorgen {name}" in page.read_text("utf-8")
+        for page in [*PAGES, ROOT / "docs" / "lab.md", ROOT / "docs" / "reference.md"]
+    )
 
 
 @pytest.fixture(scope="module")

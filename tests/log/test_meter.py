@@ -1,32 +1,41 @@
 """Multimeters through VISA, simulated: what they say is logged in their own words, or told why not."""
 
 import sys
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from sensorgen.core.errors import InstrumentFailed, MissingValue
-from sensorgen.measure.log import Log, meter
+from sensorgen.core.errors import NotInstalled
+from sensorgen.measure.lab import multimeter
+from sensorgen.measure.lab.devices import DeviceFault
+from sensorgen.measure.lab.port import VisaPort
+from sensorgen.measure.log import Log
 
 pytest.importorskip("pyvisa_sim")
 HP, KEITHLEY = "GPIB0::22::INSTR", "GPIB0::16::INSTR"
 FAILS = {
     "GPIB0::5::INSTR": r"is 'TEKTRONIX,TDS 2000,C34401A,1.0'; expected HP 34401A or Keithley 2000",
-    "GPIB0::9::INSTR": "no answer from a meter at 'GPIB0::9::INSTR': VI_ERROR_TMO .*Timeout",
+    "GPIB0::9::INSTR": "no answer from an instrument at 'GPIB0::9::INSTR': VI_ERROR_TMO .*Timeout",
     "GPIB0::17::INSTR": r"reports '-350,\"Queue overflow\"'",
     "GPIB0::18::INSTR": "answers 'about 650'; expected a resistance",
     "GPIB0::19::INSTR": "answers '.6.5000'; expected a resistance",
     "GPIB0::1::INSTR": "expected HP 34401A or Keithley 2000|no answer",
-    "nonsense": "no answer from a meter at 'nonsense'",
-    "": "no answer from a meter at ''",
+    "nonsense": "no answer from an instrument at 'nonsense'",
+    "": "no answer from an instrument at ''",
 }
 
 
 @pytest.fixture(autouse=True)
 def _simulated(monkeypatch):
     monkeypatch.setenv("PYVISA_LIBRARY", f"{Path(__file__).with_name('meters.yaml')}@sim")
-    monkeypatch.setattr(meter, "TIMEOUT_S", 0.2)
+    monkeypatch.setattr(multimeter, "TIMEOUT_S", 0.2)
+
+
+def opened(address):
+    """A meter, to be closed."""
+    return closing(multimeter.Multimeter(VisaPort(address)))
 
 
 @pytest.mark.parametrize(
@@ -40,7 +49,7 @@ def _simulated(monkeypatch):
     ],
 )
 def test_both_meters_with_two_and_four_leads(address, wires, said, name):
-    with meter.Meter(address) as found:
+    with opened(address) as found:
         assert (found.resistance(wires=wires), found.name) == (said, name)
 
 
@@ -95,14 +104,14 @@ def test_without_a_person_an_axis_is_needed_and_words_do_not_go_with_a_meter(run
 
 def test_without_pyvisa_it_is_named(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pyvisa", None)
-    with pytest.raises(MissingValue, match=r"pip install 'sensorgen\[bench\]'"):
-        meter.Meter(HP)
+    with pytest.raises(NotInstalled, match=r"pip install 'sensorgen\[lab\]'"):
+        VisaPort(HP)
 
 
 def test_a_meter_that_fails_is_let_go(monkeypatch):
-    with pytest.raises(InstrumentFailed), meter.Meter("GPIB0::18::INSTR") as found:
+    with pytest.raises(DeviceFault), opened("GPIB0::18::INSTR") as found:
         found.resistance(wires=2)
-    with meter.Meter(HP) as found:
+    with opened(HP) as found:
         assert found.resistance(wires=2)
 
 
@@ -110,12 +119,11 @@ def spoken(orders):
     """A VISA of one instrument, which writes down every order in turn."""
 
     class Port:
-        def write(self, order):
-            orders.append(order)
+        def write_raw(self, order):
+            orders.append(order.decode().strip())
 
-        def query(self, order):
-            orders.append(order)
-            return {"*IDN?": "HEWLETT-PACKARD,34401A,0,1", "SYST:ERR?": "+0"}.get(order, "+1.0E+03")
+        def read_raw(self):
+            return {"*IDN?": b"HEWLETT-PACKARD,34401A,0,1\n", "SYST:ERR?": b"+0\n"}.get(orders[-1], b"+1.0E+03\n")
 
         def close(self):
             orders.append("closed")
@@ -132,6 +140,6 @@ def spoken(orders):
 def test_orders_come_in_the_order_that_the_manuals_ask_for(monkeypatch, address, first):
     orders = []
     monkeypatch.setitem(sys.modules, "pyvisa", spoken(orders))
-    with meter.Meter(address) as found:
+    with opened(address) as found:
         found.resistance(wires=2)
     assert orders == [*first, "*IDN?", "*CLS", "MEAS:RES?", "SYST:ERR?", "closed", "closed"]

@@ -35,17 +35,18 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
     },
     "Measure": {
         "log": "Log of readings, recordings, prints and predictions.",
-        "bench": "Plan a run of loads, and evaluate its recording.",
+        "bench": "Plan and run loads, and evaluate the recording.",
         "calibrate": "Calibrate specimens by known presses.",
         "report": "Compare predictions and measurements, as one page.",
         "fit": "Fit material values to what was measured.",
         "characterise": "Material values from a plate of test structures.",
+        "demo": "The whole loop on a virtual laboratory.",
     },
     "Reference": {
-        "new": "Write a material, shape, printer, quality, design or target to change.",
+        "new": "Write a material, shape, printer, quality, design, target or experiment to change.",
         "pack": "Test packs of such files, and trust shape files.",
         "list": "List shapes, materials, printers, qualities, packs, models or sources.",
-        "schema": "Print the JSON schema of a design, a target or prediction.json.",
+        "schema": "Print the JSON schema of a design, target, experiment or prediction.",
         "completion": "Print the completion script for a shell.",
     },
     "For developers": {

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import bench_hysteresis, bench_live, bench_sets, bench_show, render
+from sensorgen.cli import bench_hysteresis, bench_live, bench_run, bench_sets, bench_show, render
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import Png, Values, one
 from sensorgen.core import units
@@ -48,7 +48,7 @@ PLAN: list[click.Parameter] = [
 
 @click.group("bench")
 def command() -> None:
-    """Plans for the rig that presses sensors, and its recordings."""
+    """Plans and runs of the rig that presses sensors, and its recordings."""
 
 
 def _work(
@@ -89,5 +89,5 @@ command.add_command(
         short_help="Write random presses, seeded, inside the sensor.",
     )
 )  # fmt: skip
-for _each in (bench_show, bench_hysteresis, bench_sets, bench_live):
+for _each in (bench_run, bench_show, bench_hysteresis, bench_sets, bench_live):
     command.add_command(_each.command)

@@ -105,12 +105,16 @@ def _asked_mega(**typed: str) -> bool:
 
 def _measured(visa: str, axis: str | None, wires: str) -> tuple[str, str, str]:
     """Words of a meter for Y and Z, and what it calls itself; leads are moved between the two."""
-    from sensorgen.measure.log.meter import Meter
+    from contextlib import closing
+
+    from sensorgen.measure.lab.multimeter import Multimeter
+    from sensorgen.measure.lab.port import VisaPort
 
     if axis is None and not (sys.stdin and sys.stdin.isatty()):
         raise BadInput("--visa without --axis needs somebody to move the leads; expected --axis y or --axis z")
     found = {"y": "", "z": ""}
-    with Meter(visa) as meter:
+    with closing(Multimeter(VisaPort(visa))) as meter:
+        meter.identify()
         for which in [axis] if axis else ["y", "z"]:
             if axis is None:
                 click.pause(f"Leads to {which.upper()}, then any key ...", err=True)

@@ -7,11 +7,11 @@ import click
 from sensorgen.cli import render
 from sensorgen.cli.words import OneOf
 
-KINDS = ("material", "shape", "printer", "quality", "instrument", "design", "target")
+KINDS = ("material", "shape", "printer", "quality", "instrument", "design", "target", "experiment")
 
 
 def _new(what: Any, name: str, pack: str) -> None:
-    """Write a commented file to change: a material, shape, printer, quality, instrument, design or target of your own.
+    """Write a commented file of your own to change, as a material, a shape, a design or an experiment.
 
     It goes to a folder of its kind in the working folder, as materials/NAME.yaml, where designs in this folder take it
     by its name; with --pack to one of your packs, for all designs. An existing file is never replaced.

@@ -17,6 +17,10 @@ def _schema(of: str) -> None:
         from sensorgen.workflows.optimise.target import Target
 
         found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Target.model_json_schema()}
+    elif of == "experiment":
+        from sensorgen.measure.lab.experiment import Experiment
+
+        found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Experiment.model_json_schema()}
     else:
         from sensorgen.prediction.results import adapter
 
@@ -27,7 +31,7 @@ def _schema(of: str) -> None:
 command = click.Command(
     "schema", callback=_schema, help=_schema.__doc__,
     params=[
-        click.Argument(["of"], type=click.Choice(["design", "target", "prediction"]), default="design"),
+        click.Argument(["of"], type=click.Choice(["design", "target", "experiment", "prediction"]), default="design"),
         render.options()[-1],
     ],
 )  # fmt: skip

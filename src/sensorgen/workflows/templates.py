@@ -10,10 +10,10 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design import packs
 from sensorgen.design.packs import Kind
 
-What = Literal["material", "shape", "printer", "quality", "instrument", "design", "target"]
+What = Literal["material", "shape", "printer", "quality", "instrument", "design", "target", "experiment"]
 KINDS: dict[What, Kind | None] = {
     "material": "materials", "shape": "shapes", "printer": "printers", "quality": "qualities",
-    "instrument": "instruments", "design": None, "target": None,
+    "instrument": "instruments", "design": None, "target": None, "experiment": None,
 }  # fmt: skip
 _NEXT: dict[What, str] = {
     "material": "replace its numbers; then sensorgen pack test {file}, and --material electrode={name} in any command",
@@ -23,6 +23,7 @@ _NEXT: dict[What, str] = {
     "instrument": "replace its numbers; then sensorgen pack test {file}",
     "design": "change it; then sensorgen check {file}",
     "target": "change it; then sensorgen optimise {file}",
+    "experiment": "change it; then sensorgen bench run {file} --simulate",
 }
 
 

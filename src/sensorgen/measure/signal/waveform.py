@@ -11,6 +11,7 @@ Tones that are all multiples of 100 Hz have whole periods in 10 ms.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import gcd
 from typing import Any
 
@@ -116,15 +117,21 @@ def phasors(signal: ArrayLike, rate_hz: float, tones_hz: ArrayLike, window: int 
 def _transformed(windows: NDArray[Any], bins: NDArray[np.int64]) -> Complex:
     """Coefficients of each window (n, m), normalised to amplitudes."""
     (count, size), tones = windows.shape, len(bins)
-    segment = next(n for n in range(min(_SEGMENT, size), size + 1) if size % n == 0)
-    within, between = (_turns(at, bins, size) for at in (np.arange(segment), np.arange(0, size, segment)))
-    mixer, step = np.hstack([within.real, within.imag]), _BATCH // size or 1
-    sums = np.empty((count, tones), np.complex128)
+    mixer, between = _factors(size, tuple(bins.tolist()))
+    sums, step = np.empty((count, tones), np.complex128), _BATCH // size or 1
     for i in range(0, count, step):
-        mixed = np.asarray(windows[i : i + step], float).reshape(-1, segment) @ mixer
+        mixed = np.asarray(windows[i : i + step], float).reshape(-1, len(mixer)) @ mixer
         segments = (mixed[:, :tones] + 1j * mixed[:, tones:]).reshape(-1, len(between), tones)
         sums[i : i + step] = (segments * between).sum(axis=1)
     return np.asarray(sums * (2 / size))
+
+
+@lru_cache(maxsize=8)
+def _factors(size: int, bins: tuple[int, ...]) -> tuple[NDArray[np.float64], Complex]:
+    """Matrix of a segment: real parts, imaginary parts; phase factors of the segments."""
+    segment = next(n for n in range(min(_SEGMENT, size), size + 1) if size % n == 0)
+    within, between = (_turns(at, np.array(bins), size) for at in (np.arange(segment), np.arange(0, size, segment)))
+    return np.hstack([within.real, within.imag]), between
 
 
 def _turns(at: NDArray[np.int64], bins: NDArray[np.int64], size: int) -> Complex:
@@ -163,19 +170,29 @@ def impedance(
     u, i = (phasors(signal, rate_hz, tones_hz, size) for signal in (voltage, current))
     if not i.all():
         raise BadInput("a tone carries no current at all; expected the waveform of the current")
-    clipped = _clipped(voltage, range_v, size, len(u)) | _clipped(current, range_a, size, len(u))
-    return Demodulated(np.asarray((np.arange(len(u)) + 0.5) * size / rate_hz, float), u / i, clipped)
+    beyond = clipped(voltage, range_v, size, len(u)) | clipped(current, range_a, size, len(u))
+    return Demodulated(np.asarray((np.arange(len(u)) + 0.5) * size / rate_hz, float), u / i, beyond)
 
 
-def _clipped(signal: NDArray[Any], limit: float, size: int, count: int) -> NDArray[np.bool_]:
-    """Windows with consecutive samples at the end of the range; a single sample may be a crest."""
-    clipped, step = np.zeros(count, bool), _BATCH // size or 1
+def clipped(signal: NDArray[Any], limit: float, size: int, count: int) -> NDArray[np.bool_]:
+    """Windows with consecutive samples at the end of the range; a single sample may be a crest.
+
+    Parameters
+    ----------
+    signal : (n,) array
+        Waveform.
+    limit : float
+        End of the range, either way, in the unit of the signal.
+    size, count : int
+        Length of a window [samples], and number of windows.
+    """
+    beyond, step = np.zeros(count, bool), _BATCH // size or 1
     for i in range(0, count if np.isfinite(limit) else 0, step):
         some = signal[i * size : (i + step) * size]
         if some.max() >= limit or some.min() <= -limit:
             at = (np.abs(some[: (count - i) * size]) >= limit).reshape(-1, size)
-            clipped[i : i + step] = (at[:, 1:] & at[:, :-1]).any(axis=1)
-    return clipped
+            beyond[i : i + step] = (at[:, 1:] & at[:, :-1]).any(axis=1)
+    return beyond
 
 
 def coincidences(tones_hz: ArrayLike) -> list[tuple[float, str]]:

@@ -13,7 +13,7 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
-from sensorgen.design.values import film, ln_spread, material_value, resistivities
+from sensorgen.design.values import ENDS, film, ln_spread, material_value, resistivities
 from sensorgen.measure.virtual.blank import Blank, blank
 
 PIECES = 60  # of the chain that the line is
@@ -168,11 +168,16 @@ class Specimen:
         return self.design.params.width_mm * M_PER_MM
 
     def values(self) -> dict[str, float]:
-        """True values of the materials, by quantity: of the bottom electrode and of the dielectric."""
+        """True values of the materials, by quantity: of the dielectric, and of the electrodes.
+
+        Where these differ by the design, the resistivity is the one at which both together resist as much.
+        """
         d, t = self.design, self.truth
         dielectric = d.material(film(d)), d.used()[film(d)]
+        of, tracks = resistivities(d), dict(zip(ENDS, self.blank.track_ohm_per_m, strict=True))
+        common = sum(tracks.values()) / sum(tracks[end] / of[end].value for end in ENDS)
         return {
-            "resistivity_ohm_m": resistivities(d)["bottom"].value * exp(t.resistivity),
+            "resistivity_ohm_m": common * exp(t.resistivity),
             "relative_permittivity": material_value(*dielectric, "relative_permittivity").value * exp(t.permittivity),
             "youngs_modulus_pa": material_value(*dielectric, "youngs_modulus_pa").value * exp(t.modulus),
         }

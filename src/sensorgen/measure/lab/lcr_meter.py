@@ -1,0 +1,204 @@
+"""Impedance analysers HP (Agilent) 4284A and Keysight (Agilent) E4980A through VISA.
+
+One frequency after the other: ``FREQ``, ``TRIG``, and when the time of the measurement is over ``FETC?``, which
+answers resistance, reactance and a status (0 good; -1, 1, 2 no value, which reads 9.9E37; 3, 4 signal not as set).
+``FREQ?`` says that the value is of this frequency, to which the nearest of the instrument's is set. Each frequency is a
+row of its own, since a sweep of seven takes a second, in which a force changes. The level is an rms value for the
+instrument. Sources: manual of the 4284A, chapters 7 to 9 (its times, without averaging); data sheet of the E4980A.
+
+``FETC?`` is short for FETC:IMP?. The times of the E4980A are rounded up; one that takes longer answers later. Own code,
+since the drivers of PyMeasure and QCoDeS block until a value is there, and each brings a framework.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from sensorgen.core.arrays import Real
+from sensorgen.core.errors import OutOfRange
+from sensorgen.core.records import Strict
+from sensorgen.measure.lab import scpi
+from sensorgen.measure.lab.clock import Clock
+from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings, WrongDevice
+from sensorgen.measure.lab.port import Port
+
+_ANSWER_S = 3.0
+_OVERLOAD = 9e37
+_GOOD, _SIGNAL = 0, (3, 4)  # measured, but the source was overloaded or its level not reached
+_NEAR = 0.03  # relative, of a frequency; the 4284A has steps of up to 1.6 %
+_NUMBERS = re.compile(r"\s*([-+][0-9.]+E[-+]?[0-9]+)\s*,\s*([-+][0-9.]+E[-+]?[0-9]+)\s*,\s*([-+]?[0-9])(?:\s*,.*)?")
+
+
+@dataclass(frozen=True)
+class Model:
+    """What distinguishes the models.
+
+    Attributes
+    ----------
+    name : str
+        In the answer to ``*IDN?``.
+    highest_hz : float
+        Frequency [Hz]; the lowest is 20.
+    times : dict of str to (float, float)
+        Time of a measurement by aperture: a constant [s] and periods of the frequency.
+    """
+
+    name: str
+    highest_hz: float
+    times: dict[str, tuple[float, float]]
+
+
+HP_4284A = Model("4284A", 1e6, {"SHOR": (0.04, 24), "MED": (0.19, 22), "LONG": (0.83, 22)})
+E4980A = Model("E4980A", 2e6, {"SHOR": (0.016, 9), "MED": (0.1, 9), "LONG": (0.23, 8)})
+LOWEST_HZ, LOWEST_V, HIGHEST_V = 20.0, 0.005, 2.0  # rms, without the option of 20 V
+
+
+class Settings(Strict):
+    """How it measures.
+
+    Attributes
+    ----------
+    aperture : str
+        ``SHOR``, ``MED`` or ``LONG``.
+    """
+
+    aperture: Literal["SHOR", "MED", "LONG"] = "MED"
+
+
+class LcrMeter:
+    """Driver of an analyser.
+
+    Parameters
+    ----------
+    port : Port
+        VISA, or a simulator.
+    clock : Clock
+        Of the run; the readings have its times.
+    model : Model
+        Which is expected.
+    settings : Settings
+        How it measures.
+    """
+
+    def __init__(self, port: Port, clock: Clock, model: Model, settings: Settings | None = None) -> None:
+        self.model, self.settings = model, settings or Settings()
+        self._port, self._clock = port, clock
+        self._tones_hz: Real = np.empty(0)
+        self._next = 0
+        self._begin_s = math.nan
+        self._known = False
+
+    def identify(self) -> Identity:
+        """Ask ``*IDN?``.
+
+        Raises
+        ------
+        WrongDevice
+            Another instrument answers.
+        """
+        said = scpi.identity(self._port, _ANSWER_S)
+        fields = [field.strip() for field in said.split(",")]
+        if len(fields) < 2 or fields[1].upper() not in (self.model.name, f"{self.model.name}L"):
+            raise WrongDevice(f"{self._port.address} is {said!r:.80}; expected {self.model.name}")
+        self._known = True
+        serial, firmware = (*fields[2:4], "", "")[:2]
+        return Identity(f"{fields[0]} {fields[1]}", serial, firmware)
+
+    def start(self, tones_hz: Real, voltage_v: float) -> None:
+        """Begin to measure at (m,) frequencies with an amplitude, which is the rms level times the root of 2 [Hz], [V].
+
+        Raises
+        ------
+        OutOfRange
+            A frequency or level that the instrument does not have; nothing is sent then.
+        DeviceFault
+            It reports an error.
+        """
+        tones = np.asarray(tones_hz, float).ravel()
+        if not (len(tones) and np.all((tones >= LOWEST_HZ) & (tones <= self.model.highest_hz))):
+            raise OutOfRange(
+                f"frequencies {', '.join(f'{f:g}' for f in tones)} Hz; expected {LOWEST_HZ:g} to"
+                f" {self.model.highest_hz:g} Hz for {self.model.name}"
+            )
+        level = voltage_v / math.sqrt(2)
+        if not LOWEST_V <= level <= HIGHEST_V:
+            low, high = LOWEST_V * math.sqrt(2), HIGHEST_V * math.sqrt(2)
+            raise OutOfRange(f"amplitude {voltage_v:g} V; expected {low:.3g} to {high:.3g} V for {self.model.name}")
+        if not self._known:
+            self.identify()
+        for command in ("*CLS", "ABOR", "FUNC:IMP RX", f"VOLT {level:.4f}", f"APER {self.settings.aperture},1"):
+            self._write(command)
+        self._write("TRIG:SOUR BUS")
+        self._write("INIT:CONT ON")
+        status = self._query("SYST:ERR?")
+        if not re.match(r"[-+]?0\b", status):
+            raise DeviceFault(f"{self.model.name} at {self._port.address} reports {status!r:.100}")
+        self._tones_hz, self._next = tones, 0
+        self._trigger()
+
+    def read(self) -> Readings:
+        """One row if a measurement has ended, with nan at the other frequencies.
+
+        Raises
+        ------
+        DeviceFault
+            No answer, or none with two numbers and a status, or a value of another frequency.
+        """
+        count = len(self._tones_hz)
+        k = self._next
+        if not count or self._clock.now() < self._begin_s + self._duration(k):
+            return Readings(np.empty(0), np.empty((0, count), complex), np.empty(0, bool))
+        said = self._query("FETC?")
+        found = _NUMBERS.fullmatch(said)
+        if not found:
+            raise DeviceFault(f"{self.model.name} at {self._port.address} answers {said!r:.60}; expected R,X,STATUS")
+        self._at(float(self._tones_hz[k]))
+        resistance, reactance, status = float(found[1]), float(found[2]), int(found[3])
+        row = np.full((1, count), complex(math.nan, math.nan))
+        if (status == _GOOD or status in _SIGNAL) and max(abs(resistance), abs(reactance)) < _OVERLOAD:
+            row[0, k] = complex(resistance, reactance)
+        time_s = self._begin_s + self._duration(k) / 2
+        self._next = (k + 1) % count
+        self._trigger()
+        return Readings(np.array([time_s]), row, np.array([status != _GOOD]))
+
+    def stop(self) -> None:
+        """End the measurement, with the level at its lowest: it has no switch."""
+        self._tones_hz = np.empty(0)
+        self._write("ABOR")
+        self._write("VOLT MIN")
+
+    def close(self) -> None:
+        """Give the connection back."""
+        self._port.close()
+
+    def _at(self, tone_hz: float) -> None:
+        """Refuse a value of another frequency."""
+        said = self._query("FREQ?")
+        try:
+            off = abs(float(said) / tone_hz - 1)
+        except ValueError:
+            off = math.inf
+        if not off <= _NEAR:
+            raise DeviceFault(
+                f"{self.model.name} at {self._port.address} measures at {said!r:.40} Hz, not {tone_hz:g} Hz"
+            )
+
+    def _trigger(self) -> None:
+        self._write(f"FREQ {self._tones_hz[self._next]:.10g}")
+        self._write("TRIG")
+        self._begin_s = self._clock.now()
+
+    def _duration(self, k: int) -> float:
+        """Time of a measurement [s]."""
+        constant, periods = self.model.times[self.settings.aperture]
+        return constant + periods / float(self._tones_hz[k])
+
+    def _write(self, command: str) -> None:
+        scpi.write(self._port, command)
+
+    def _query(self, command: str) -> str:
+        return scpi.query(self._port, command, _ANSWER_S)

@@ -1,0 +1,308 @@
+"""Connections to devices: serial lines, VISA, HTTP, and simulators in this process that answer the same bytes.
+
+A simulator is asked in turns: it is given the bytes that it receives and the time, and gives the bytes that it has sent
+by then. Only the waiting for an answer lets a simulated clock pass, so that no thread is needed.
+"""
+
+import http.client
+import urllib.parse
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, Protocol
+
+from sensorgen.core.errors import BadInput, NotInstalled
+from sensorgen.measure.lab.clock import Clock, RealClock
+from sensorgen.measure.lab.devices import DeviceFault
+
+_POLL_S = 0.005  # of the serial driver; half a period of the fastest control loop
+
+
+class Port(Protocol):
+    """A line to one device.
+
+    Attributes
+    ----------
+    address : str
+        For messages.
+    """
+
+    address: str
+
+    def write(self, data: bytes) -> None:
+        """Send; :class:`DeviceFault` if the line is cut."""
+
+    def read_until(self, end: bytes, timeout_s: float) -> bytes:
+        """Received bytes up to and including an end, fewer when the time is over [s]."""
+
+    def close(self) -> None:
+        """Give the line back; never raises."""
+
+
+class Web(Protocol):
+    """A device that answers HTTP requests.
+
+    Attributes
+    ----------
+    address : str
+        For messages.
+    """
+
+    address: str
+
+    def get(self, path: str, timeout_s: float) -> tuple[int, bytes]:
+        """Status and content of one GET request; :class:`DeviceFault` if nothing answers."""
+
+
+class Simulator(Protocol):
+    """What stands in for a device at the other end of a line.
+
+    Attributes
+    ----------
+    fault : str
+        Planted fault, "" for none.
+    heard : list of bytes
+        Every message that has come.
+    """
+
+    fault: str
+    heard: list[bytes]
+
+    def exchange(self, data: bytes, time_s: float) -> bytes:
+        """Bytes sent by a time, after having received some; OSError where the cable is out."""
+
+
+class WebSimulator(Protocol):
+    """What stands in for a device with HTTP."""
+
+    fault: str
+    heard: list[bytes]
+
+    def get(self, path: str, time_s: float) -> tuple[int, bytes]:
+        """Answer of one GET request; OSError where there is none."""
+
+
+@contextmanager
+def _faults(address: str) -> Iterator[None]:
+    """Translate errors of a connection to DeviceFault."""
+    try:
+        yield
+    except (OSError, ValueError, TypeError, http.client.HTTPException) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise DeviceFault(f"connection to {address} failed: {reason:.200}; check address, cable and power") from None
+
+
+class SerialPort:
+    """A serial line of this computer: 8 data bits, no parity, one stop bit, no flow control.
+
+    Parameters
+    ----------
+    address : str
+        ``/dev/ttyUSB0``, ``COM3``.
+    baud : int
+        Bits per second.
+    shared : bool
+        Open it also if another program has it: to stop what that program has begun.
+
+    Raises
+    ------
+    NotInstalled
+        pyserial is missing.
+    DeviceFault
+        There is no such line, or another program has it.
+    """
+
+    def __init__(self, address: str, baud: int, *, shared: bool = False) -> None:
+        try:
+            import serial
+        except ImportError:
+            raise NotInstalled("serial lines need pyserial: pip install 'sensorgen[lab]'") from None
+        self.address = address
+        self._received = bytearray()
+        with _faults(address):
+            self._line = serial.Serial(address, baud, timeout=_POLL_S, write_timeout=1.0, exclusive=not shared)
+
+    def write(self, data: bytes) -> None:
+        """Send; DeviceFault if the line is cut."""
+        with _faults(self.address):
+            self._line.write(data)
+
+    def read_until(self, end: bytes, timeout_s: float) -> bytes:
+        """Received bytes up to and including an end, fewer when the time is over [s]."""
+        clock = RealClock()
+        until = clock.now() + timeout_s
+        with _faults(self.address):
+            while end not in self._received:
+                waiting = self._line.in_waiting
+                if not waiting and clock.now() >= until:
+                    break
+                self._received += self._line.read(waiting or 1)
+        return _taken(self._received, end)
+
+    def close(self) -> None:
+        """Give the line back."""
+        with suppress(OSError):
+            self._line.close()
+
+
+class SimulatedPort:
+    """A line to a simulator in this process.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        The other end.
+    clock : Clock
+        Passes while an answer is waited for.
+    step_s : float
+        How often the simulator is asked while waiting [s].
+    """
+
+    def __init__(self, simulator: Simulator, clock: Clock, *, step_s: float = 1e-3) -> None:
+        self.address = f"simulated {type(simulator).__name__}"
+        self._simulator, self._clock, self._step_s = simulator, clock, step_s
+        self._received = bytearray()
+
+    def write(self, data: bytes) -> None:
+        """Send; DeviceFault if the line is cut."""
+        with _faults(self.address):
+            self._received += self._simulator.exchange(data, self._clock.now())
+
+    def read_until(self, end: bytes, timeout_s: float) -> bytes:
+        """Received bytes up to and including an end, fewer when the time is over [s]."""
+        until = self._clock.now() + timeout_s
+        with _faults(self.address):
+            self._received += self._simulator.exchange(b"", self._clock.now())
+            while end not in self._received and self._clock.now() < until:
+                self._clock.wait_until(min(until, self._clock.now() + self._step_s))
+                self._received += self._simulator.exchange(b"", self._clock.now())
+        return _taken(self._received, end)
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+
+def _taken(received: bytearray, end: bytes) -> bytes:
+    """Take the first message out of the bytes that came; all of them where none is complete."""
+    at = received.find(end)
+    length = len(received) if at < 0 else at + len(end)
+    message = bytes(received[:length])
+    del received[:length]
+    return message
+
+
+class VisaPort:
+    """An instrument at a VISA address, which ends its answers with a line feed.
+
+    Parameters
+    ----------
+    address : str
+        As ``GPIB0::22::INSTR``, ``ASRL/dev/ttyUSB0::INSTR``, ``TCPIP::10.0.0.5::INSTR``,
+        ``TCPIP::10.0.0.5::5025::SOCKET``.
+
+    Raises
+    ------
+    NotInstalled
+        PyVISA is missing.
+    DeviceFault
+        No instrument is there.
+    """
+
+    def __init__(self, address: str) -> None:
+        try:
+            import pyvisa
+        except ImportError:
+            raise NotInstalled("VISA needs PyVISA: pip install 'sensorgen[lab]'") from None
+        self.address, self._visa = address, pyvisa
+        self._resources: list[Any] = []
+        try:
+            with self._failures():
+                self._resource = self._connect()
+        except BaseException:
+            self.close()
+            raise
+
+    def write(self, data: bytes) -> None:
+        """Send."""
+        with self._failures():
+            self._resource.write_raw(data)
+
+    def read_until(self, end: bytes, timeout_s: float) -> bytes:
+        """One answer; DeviceFault if none comes in time [s]."""
+        with self._failures(), warnings.catch_warnings(action="ignore"):  # PyVISA's; drivers refuse a truncated answer
+            self._resource.timeout = timeout_s * 1e3
+            return bytes(self._resource.read_raw()).rstrip(b"\r\n") + end
+
+    def close(self) -> None:
+        """Give the instrument back."""
+        while self._resources:
+            with suppress(Exception):  # whatever a VISA makes of a device that is gone
+                self._resources.pop().close()
+
+    def _connect(self) -> Any:
+        self._resources.append(manager := self._visa.ResourceManager())
+        self._resources.append(resource := manager.open_resource(self.address))
+        if not isinstance(resource, self._visa.resources.MessageBasedResource):
+            raise ValueError("not the address of an instrument that takes commands, as GPIB0::22::INSTR")
+        resource.read_termination = resource.write_termination = "\n"
+        return resource
+
+    @contextmanager
+    def _failures(self) -> Iterator[None]:
+        """Translate errors of PyVISA to DeviceFault."""
+        try:
+            yield
+        except (self._visa.errors.Error, OSError, ValueError) as error:
+            reason = " ".join(str(error).split())
+            raise DeviceFault(
+                f"no answer from an instrument at {self.address!r}: {reason:.200}; check address, cable and power"
+            ) from None
+
+
+class HttpPort:
+    """A device in the local network.
+
+    Parameters
+    ----------
+    address : str
+        ``http://10.0.0.5``, with a port if it is not 80.
+
+    Raises
+    ------
+    BadInput
+        The address is none of HTTP.
+    """
+
+    def __init__(self, address: str) -> None:
+        parts = urllib.parse.urlsplit(address)
+        if parts.scheme != "http" or not parts.netloc:
+            raise BadInput(f"address {address!r:.80}; expected one of HTTP, as http://10.0.0.5")
+        self.address, self._host = address, parts.netloc
+
+    def get(self, path: str, timeout_s: float) -> tuple[int, bytes]:
+        """Status and content of one GET request; the firmware closes the connection after each."""
+        with _faults(self.address):
+            line = http.client.HTTPConnection(self._host, timeout=timeout_s)
+            try:
+                line.request("GET", path)
+                answer = line.getresponse()
+                return answer.status, answer.read(1_000_000)
+            finally:
+                line.close()
+
+
+class SimulatedWeb:
+    """HTTP to a simulator in this process."""
+
+    def __init__(self, simulator: WebSimulator, clock: Clock) -> None:
+        self.address = f"simulated {type(simulator).__name__}"
+        self._simulator, self._clock = simulator, clock
+
+    def get(self, path: str, timeout_s: float) -> tuple[int, bytes]:
+        """Status and content of one GET request; a simulator that does not answer takes the whole time [s]."""
+        with _faults(self.address):
+            try:
+                return self._simulator.get(path, self._clock.now())
+            except TimeoutError:
+                self._clock.wait_until(self._clock.now() + timeout_s)
+                raise

@@ -1,0 +1,102 @@
+"""The devices of a rig: real ones at their addresses, or simulators that share one virtual specimen."""
+
+from collections import deque
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any
+
+from sensorgen.core.errors import BadInput, within
+from sensorgen.design.design import Design
+from sensorgen.measure.lab import catalogue
+from sensorgen.measure.lab.clock import Clock
+from sensorgen.measure.lab.experiment import Device, Devices, Experiment
+from sensorgen.measure.lab.safety import Rig
+from sensorgen.measure.virtual import faults, mechanics
+
+_HEARD = 1000  # messages that a simulator remembers
+ROLES = ("actuator", "stage", "impedance")
+SIMULATED = Devices(
+    actuator=Device(kind="smac-lcc10"), stage=Device(kind="reprapfirmware"), impedance=Device(kind="handyscope-hs5")
+)
+"""The thesis's rig, where an experiment names no devices."""
+_STRIKES: Mapping[str, faults.Strikes] = {
+    "smac-lcc10": "actuator", "reprapfirmware": "stage", "handyscope-hs5": "analyser", "hp-4284a": "lcr-meter",
+    "keysight-e4980a": "lcr-meter",
+}  # fmt: skip
+
+
+def real(devices: Devices, clock: Clock) -> Rig:
+    """Drivers of real devices, which are sent nothing yet.
+
+    Raises
+    ------
+    BadInput, UnknownName
+        A kind that is not known or has another role, or a setting that it does not have; the message names the role.
+    DeviceFault
+        There is no such line.
+    """
+    found: dict[str, Any] = {}
+    try:
+        for role in ROLES:
+            device: Device = getattr(devices, role)
+            with within(f"devices.{role}"):
+                _has_role(role, device)
+                found[role] = catalogue.opened(device.kind, device.address, device.settings, clock)
+    except BaseException:
+        for driver in found.values():
+            driver.close()
+        raise
+    return Rig(**found)
+
+
+def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Rig, mechanics.Rig]:
+    """Drivers with simulators in this process, and the mechanism that they share, its faults planted.
+
+    Raises
+    ------
+    BadInput, UnknownName
+        As :func:`real`; a virtual specimen that cannot be; a kind without a simulator.
+    """
+    virtual = experiment.virtual or faults.VirtualSpecimen()
+    with within("virtual"):
+        plant = faults.rig_of(virtual, design, experiment.pressing.length_mm * 1e-3)
+    found: dict[str, Any] = {}
+    for role in ROLES:
+        device: Device = getattr(experiment.devices or SIMULATED, role)
+        settings = dict(device.settings)
+        if device.kind == SIMULATED.actuator.kind:
+            settings = {"weight_n": plant.mechanics.weight_n, "friction_n": plant.mechanics.friction_n} | settings
+        with within(f"devices.{role}"):
+            _has_role(role, device)
+            made = catalogue.simulated(device.kind, plant, settings, clock)
+        found[role] = made.driver
+        if hasattr(made.simulator, "heard"):  # every message so far: of an hour, tens of megabytes
+            made.simulator.heard = deque(maxlen=_HEARD)
+        if plant.planted and device.kind in _STRIKES:
+            plant.planted.attach(_STRIKES[device.kind], made.simulator)
+    return Rig(**found), plant
+
+
+def check(devices: Mapping[str, Device]) -> None:
+    """Refuse kinds of devices without opening any, by their roles; errors as :func:`real`."""
+    for role, device in devices.items():
+        with within(f"devices.{role}"):
+            _has_role(role, device)
+
+
+def opened(device: Device, clock: Clock) -> Any:
+    """Driver of one real device; errors as :func:`real`."""
+    return catalogue.opened(device.kind, device.address, device.settings, clock)
+
+
+def _has_role(role: str, device: Device) -> None:
+    has = catalogue.kind(device.kind).role
+    if has != role:
+        known = [name for name in catalogue.names() if _role(name) == role]
+        raise BadInput(f"kind {device.kind!r} is of the role {has}; expected one of {', '.join(known)}")
+
+
+def _role(name: str) -> str:
+    with suppress(BadInput):
+        return catalogue.kind(name).role
+    return ""

@@ -1,0 +1,424 @@
+"""Run an experiment: prepare the rig, press, record into the log, and leave the tip up whatever happens."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, field, replace
+from math import ceil, isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sensorgen.core.arrays import Real
+from sensorgen.core.document import Facts, Part
+from sensorgen.core.errors import BadInput, SensorgenError, within
+from sensorgen.core.version import __version__
+from sensorgen.design.design import Design, load, make
+from sensorgen.measure.lab import experiment as experiments
+from sensorgen.measure.lab import plans, preflight, press, recorder, safety
+from sensorgen.measure.lab.clock import Clock, SimulatedClock
+from sensorgen.measure.lab.controls import Controls
+from sensorgen.measure.lab.devices import Identity
+from sensorgen.measure.lab.experiment import Experiment, Next
+from sensorgen.measure.lab.loop import Alive, Loop, Paused, Predicted, View
+from sensorgen.measure.lab.plans import Choice, NextPress, Pressed, Step
+from sensorgen.measure.lab.recorder import Recorder, Run
+from sensorgen.measure.lab.safety import Ended, Rig
+from sensorgen.measure.lab.watch import Watch
+from sensorgen.measure.log import notes
+from sensorgen.measure.log.entries import BenchRun
+
+if TYPE_CHECKING:
+    from sensorgen.measure.log import Log
+
+Confirm = Callable[["Planned", dict[str, Identity]], bool]
+"""Whether the rig may move, by what is planned and what each device said that it is."""
+USUAL_MM = 100.0  # length of a specimen whose design is unknown
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What became of a run.
+
+    Attributes
+    ----------
+    specimen : str
+        Its name in the log.
+    folder : str
+        Of the run, beside the log; ``--resume`` takes it.
+    end : str
+        "done", "rule", "abort" or "fault".
+    reason : str
+        Why it ended.
+    done, steps : int
+        Presses that are done, of all attempts, and those of the plan.
+    simulated : bool
+        Whether no real device was there.
+    tip_up : bool
+        Whether actuator or stage said at the end that the tip is up.
+    rows : tuple of BenchRun
+        New recordings in the log.
+    problems : tuple of str
+        What failed beside, as while the rig was made safe.
+    identities : dict of str to Identity
+        What each device said that it is.
+    counts : dict of str to int
+        Impedances that were read, lost, clipped and invalid, and late periods.
+    """
+
+    specimen: str
+    folder: str
+    end: str
+    reason: str
+    done: int
+    steps: int
+    simulated: bool
+    tip_up: bool
+    rows: tuple[BenchRun, ...] = ()
+    problems: tuple[str, ...] = ()
+    identities: dict[str, Identity] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=dict)
+
+    def document(self) -> Iterator[Part]:
+        """Outcome, recordings and problems."""
+        yield f"{self.specimen}: {self.done} of {self.steps} presses{', simulated' if self.simulated else ''}"
+        facts = [("end", f"{self.end}: {self.reason}"), ("tip", "up" if self.tip_up else "NOT KNOWN TO BE UP")]
+        facts += [("device", f"{role}: {_named(who)}") for role, who in self.identities.items()]
+        facts += [("readings", ", ".join(f"{count} {name}" for name, count in self.counts.items()))]
+        facts += [("log", f"recording {row.number}") for row in self.rows] or [("log", "no new recording")]
+        facts += [("problem", problem) for problem in self.problems]
+        yield Facts((*facts, ("run", self.folder)))
+        if self.done < self.steps:
+            yield f"go on: sensorgen bench run --resume {Path(self.folder).name}"
+
+
+def _named(who: Identity) -> str:
+    return " ".join(filter(None, (who.model, who.serial, who.firmware)))
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A checked experiment with its presses.
+
+    Attributes
+    ----------
+    experiment : Experiment
+        What was asked.
+    length_mm : float
+        Of the specimen [mm].
+    steps : tuple of Step
+        All presses.
+    seconds : float
+        How long they take, about [s].
+    """
+
+    experiment: Experiment
+    length_mm: float
+    steps: tuple[Step, ...]
+    seconds: float
+
+    def summary(self) -> str:
+        """One line."""
+        kinds = Counter(step.kind for step in self.steps)
+        presses = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+        hours, minutes = divmod(ceil(self.seconds / 60), 60)
+        limits = self.experiment.limits
+        return (
+            f"{self.experiment.specimen}, {self.length_mm:g} mm: presses {presses}; about {hours} h {minutes} min; tip "
+            f"{self.experiment.pressing.length_mm:g} mm; limits {limits.force_n:g} N, {limits.deepest_mm:g} mm deep"
+        )
+
+
+def planned(experiment: Experiment, log: "Log | None" = None) -> Planned:
+    """Check an experiment against its specimen, and make its presses; nothing moves.
+
+    Raises
+    ------
+    SensorgenError
+        What :func:`sensorgen.measure.lab.experiment.check` refuses; a specimen whose name the log does not take.
+    """
+    with within("specimen"):
+        notes.specimen(experiment.specimen, log)
+    length = experiment.length_mm or _length_mm(design_of(experiment, log))
+    experiments.check(experiment, length, 0.0)  # its places, before presses are made of them
+    steps = plans.steps(experiment, length)
+    holds = [part.content.hold_s[1] for part in experiment.plan if isinstance(part.content, Next)]
+    seconds = plans.seconds(steps, max(holds, default=0.0))
+    experiments.check(experiment, length, seconds)
+    return Planned(experiment, length, tuple(steps), seconds)
+
+
+def design_of(experiment: Experiment, log: "Log | None") -> Design | None:
+    """Design of the specimen: the virtual one's own, else that in the log, else the one that its name stands for."""
+    from sensorgen.measure.log import batches
+
+    if experiment.virtual and experiment.virtual.design:
+        named = experiment.virtual.design
+        with within("virtual.design"):
+            return load(Path(named)) if Path(named).suffix else make({"shape": named})
+    design_id, _ = notes.design_fields(experiment.specimen, log)
+    found = batches.designs(log).get(design_id) if log else None
+    try:
+        return found or notes.design_of(experiment.specimen)
+    except BadInput:
+        return None
+
+
+def _length_mm(design: Design | None) -> float:
+    return float(design.params.length_mm) if design else USUAL_MM
+
+
+def run(
+    experiment: Experiment, *, clock: Clock, log: "Log", rig: Rig, simulated: bool, view: View | None = None,
+    controls: Controls | None = None, guardian: Alive | None = None, next_press: NextPress | None = None,
+    predicted: Predicted | None = None, resume: Path | None = None, confirm: Confirm = lambda *_: True,
+) -> RunResult:  # fmt: skip
+    """Run an experiment.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        What to do.
+    clock : Clock
+        Real, or simulated, with simulated devices alone.
+    log : Log
+        An open log, which gets the recording.
+    rig : Rig
+        The devices; they are closed at the end.
+    simulated : bool
+        Whether the devices are; the log says so.
+    view, controls, guardian, predicted
+        As of :class:`sensorgen.measure.lab.loop.Loop`.
+    next_press : callable, optional
+        Chooses the presses of ``next`` parts.
+    resume : Path, optional
+        Folder of a run of this experiment that ended early: the steps not done are done.
+    confirm : callable
+        Asked when all devices are identified, and before any moves, whether they may.
+
+    Raises
+    ------
+    SensorgenError
+        Wrong input, before anything is sent to a device but the question what it is. All that happens later is in the
+        result.
+    """
+    plan = planned(experiment, log)
+    if next_press is None and any(part.kind == "next" for part in experiment.plan):
+        raise BadInput("plan: a part 'next' needs a model of the specimen; expected other parts here")
+    recorder.recover(log, clock)
+    folder = resume or recorder.new_folder(log.path)
+    with ExitStack() as stack:
+        if not stack.enter_context(recorder.alone(folder)):
+            raise BadInput(f"{str(folder)!r} is a run that goes on in another process; expected one that has ended")
+        attempt = _Attempt(plan, clock, log, rig, folder, simulated, next_press, confirm)
+        controls = controls or Controls()
+        if view:
+            controls.add(view.commands)
+        return attempt.result(view, controls, guardian, predicted)
+
+
+class _Attempt:
+    """One attempt at a run: the first, or one that resumes it."""
+
+    def __init__(
+        self, plan: Planned, clock: Clock, log: "Log", rig: Rig, folder: Path, simulated: bool,
+        next_press: NextPress | None, confirm: Confirm,
+    ) -> None:  # fmt: skip
+        self.plan, self.clock, self.log, self.rig, self.folder = plan, clock, log, rig, folder
+        self.simulated, self.next_press, self.confirm = simulated, next_press, confirm
+        before = Run.read(folder) if (folder / recorder.JOURNAL).exists() else Run(folder, ())
+        self.number, self.done = before.attempts + 1, before.done
+        self.pressed = _pressed(before, plan.steps)
+        self.identities: dict[str, Identity] = {}
+
+    def result(
+        self, view: View | None, controls: Controls, guardian: Alive | None, predicted: Predicted | None
+    ) -> RunResult:
+        """Do it."""
+        experiment = self.plan.experiment
+        tones = np.array(experiment.readout.tones_hz)
+        stem = f"{'simulated' if self.simulated else 'run'}-{self.folder.name}-{self.number}"
+        recorder.trim(self.folder / recorder.JOURNAL)
+        kept = Recorder(self.folder, stem, tones, self.clock)
+        self._begin(kept, stem)
+        loop = Loop(
+            self.rig, self.clock, kept, experiment, controls, Watch(tones), view, guardian, predicted,
+            steps=len(self.plan.steps),
+        )  # fmt: skip
+        fault: BaseException | None = None
+        with ExitStack() as listening:  # signals are held back until the tip is up
+            try:
+                end, reason = self._worked(loop, listening)
+            except Ended as error:
+                end, reason = error.end, str(error)
+            except SensorgenError as error:
+                end, reason = "fault", str(error)
+            except BaseException as error:  # whatever it is, the tip goes up first
+                end, reason, fault = "fault", f"{type(error).__name__}: {error}", error
+            up, problems = safety.made_safe(self.rig, self.clock, loop.beat)
+            safety.close(self.rig)
+            if end == "done" and problems:
+                end, reason = "fault", f"{reason}, but at the end {problems[0]}"
+            if up and guardian:
+                guardian.disarm()
+        found = self._ended(loop, kept, end, reason, up, problems)
+        if fault:
+            raise fault
+        return found
+
+    def _begin(self, kept: Recorder, stem: str) -> None:
+        experiment = self.plan.experiment
+        words = ["simulated"] if self.simulated else []
+        words += [f"run {self.folder.name}, attempt {self.number}", *filter(None, [experiment.remark])]
+        kept.journal.note(
+            "begun", attempt=self.number, stem=stem, specimen=experiment.specimen, simulated=self.simulated,
+            remark="; ".join(words), version=__version__, numpy=np.__version__,
+            experiment=experiment.model_dump(mode="json", exclude_unset=True), length_mm=self.plan.length_mm,
+            steps=len(self.plan.steps),
+        )  # fmt: skip
+
+    def _worked(self, loop: Loop, listening: ExitStack) -> tuple[str, str]:
+        """All of the run, but for its end."""
+        self.identities = preflight.identified(self.rig)
+        loop.recorder.journal.note("identified", **{role: asdict(who) for role, who in self.identities.items()})
+        if not self.confirm(self.plan, self.identities):
+            raise Ended("abort", "not confirmed; nothing has moved")
+        listening.enter_context(loop.controls.listening())
+        if loop.guardian:
+            loop.guardian.arm()
+        loop.begin()
+        return self._presses(loop)
+
+    def _presses(self, loop: Loop) -> tuple[str, str]:
+        """Prepare the rig, then all presses that are not done."""
+        experiment = self.plan.experiment
+        low, high = self._places_mm
+        middle = experiment.approach.place_mm
+        preflight.prepared(loop, (low + high) / 2 if middle is None else middle)
+        for step in self.plan.steps:
+            loop.step = step.number
+            if step.number not in self.done and not self._step(loop, step):
+                return "done", "stop.interval: the widest interval is below it"
+            most = experiment.stop.presses
+            if most and loop.presses >= most and self.done < {each.number for each in self.plan.steps}:
+                raise Ended("rule", f"stop.presses: {most} presses are done")
+        loop.message = "last rest"
+        loop.wait(plans.AVERAGED_S)
+        return "done", "all presses are done"
+
+    @property
+    def _places_mm(self) -> tuple[float, float]:
+        return self.plan.experiment.places_mm(self.plan.length_mm)
+
+    def _step(self, loop: Loop, step: Step) -> bool:
+        """One press, again after a pause; False where no further one is worth it."""
+        while True:
+            loop.pausable = True
+            try:
+                chosen = self._chosen(loop, step)
+                if chosen is None:
+                    return False
+                loop.message = f"to {chosen.place_mm:g} mm"
+                loop.recorder.journal.note("step", step=step.number, place_mm=chosen.place_mm, force_n=chosen.force_n)
+                press.travel(loop, chosen.place_mm)
+                pressed = press.press(loop, chosen)
+            except Paused:
+                loop.pausable = False
+                press.pause(loop)
+                continue
+            finally:
+                loop.pausable = False
+            self.done.add(step.number)
+            loop.recorder.journal.note("done", step=step.number, **_kept(pressed))
+            if all(np.isfinite(values).all() for values in (pressed.before_ohm, pressed.pressed_ohm, pressed.noise)):
+                self.pressed.append(pressed)
+            return True
+
+    def _chosen(self, loop: Loop, step: Step) -> Step | None:
+        """The step with force and place; None where the rule of the interval says that it is enough."""
+        part = self.plan.experiment.plan[step.part].content
+        if step.course or not isinstance(part, Next) or self.next_press is None:
+            return step
+        loop.message = f"choosing press {step.number}"
+        part = part.model_copy(update={"position_mm": part.position_mm or self._places_mm})
+        choose, so_far, rest = self.next_press, tuple(self.pressed), loop.watch.mean()
+        choice = _beside(loop, lambda: choose(part, so_far, rest))
+        interval = self.plan.experiment.stop.interval
+        if interval and choice.interval <= interval:
+            return None
+        made = plans.chosen(step, choice, self.plan.experiment.approach)
+        experiments.check_press(
+            self.plan.experiment, max(made.force_n, made.peak_n), made.place_mm, self.plan.length_mm
+        )  # fmt: skip
+        return made
+
+    def _ended(
+        self, loop: Loop, kept: Recorder, end: str, reason: str, up: bool, problems: tuple[str, ...]
+    ) -> RunResult:
+        """Close the files, log them, and tell."""
+        watch = loop.watch
+        counts = {"read": watch.count, "lost": watch.lost, "clipped": watch.clipped, "invalid": watch.invalid,
+                  "late periods": loop.late}  # fmt: skip
+        failed = list(problems)
+        try:
+            kept.state(0.0, loop.wanted_mm if isfinite(loop.wanted_mm) else 0.0, float("nan"), _error_of(end, reason))
+            kept.journal.note("ended", attempt=self.number, end=end, reason=reason, tip_up=up, problems=problems,
+                              counts=counts)  # fmt: skip
+        except SensorgenError as error:
+            failed.append(str(error))
+        failed += kept.close()
+        rows: list[BenchRun] = []
+        try:
+            rows = recorder.log_attempts(self.log, self.folder, self.clock)
+        except SensorgenError as error:
+            failed.append(f"not logged yet: {error}")
+        failed += [each["problem"] for each in Run.read(self.folder).of("logged") if each["problem"]]
+        return RunResult(
+            self.plan.experiment.specimen, str(self.folder), end, reason, len(self.done), len(self.plan.steps),
+            self.simulated, up, tuple(rows), tuple(failed), self.identities, counts,
+        )  # fmt: skip
+
+
+def _error_of(end: str, reason: str) -> str:
+    return reason if end == "fault" else ""
+
+
+def _beside(loop: Loop, choose: Callable[[], Choice]) -> Choice:
+    """Choose while the loop goes on, tip up; with a simulated clock at once."""
+    if isinstance(loop.clock, SimulatedClock):
+        return choose()
+    with ThreadPoolExecutor(1) as pool:
+        future = pool.submit(choose)
+        while not future.done():
+            loop.period()
+        return future.result()
+
+
+def _kept(pressed: Pressed) -> dict[str, Any]:
+    """What the journal keeps of a press."""
+    step = pressed.step
+    return {
+        "place_mm": step.place_mm, "force_n": step.force_n, "peak_n": step.peak_n, "hold_s": step.hold_s,
+        "noise": _numbers(pressed.noise),
+        **{name: _numbers(getattr(pressed, name).view(float)) for name in ("before_ohm", "pressed_ohm")},
+    }  # fmt: skip
+
+
+def _numbers(values: Real) -> list[float] | None:
+    """For JSON, which has no nan."""
+    return values.tolist() if np.isfinite(values).all() else None
+
+
+def _pressed(before: Run, steps: Sequence[Step]) -> list[Pressed]:
+    """Presses of earlier attempts, for the choice of further ones."""
+    by_number = {step.number: step for step in steps}
+    found = []
+    for event in before.of("done"):
+        step = by_number.get(event["step"])
+        if step and all(event[name] for name in ("before_ohm", "pressed_ohm", "noise")):
+            values = {name: event[name] for name in ("place_mm", "force_n", "peak_n", "hold_s")}
+            at_rest, after = (np.array(event[name]).view(complex) for name in ("before_ohm", "pressed_ohm"))
+            found.append(Pressed(replace(step, **values), at_rest, after, np.array(event["noise"])))
+    return found

@@ -1,0 +1,117 @@
+"""Watch the impedances of a run: means at rest and under a press, drift, short and open circuits, silence."""
+
+from collections import deque
+from dataclasses import dataclass, field
+from math import nan
+
+import numpy as np
+
+from sensorgen.core.arrays import Complex, Real
+from sensorgen.measure.lab.devices import DeviceFault, Readings
+from sensorgen.measure.signal.presses import WINDOW_S
+
+SILENT_S = 5.0  # without a sound reading, a fault
+_OPEN_F = 0.3e-12  # less than any specimen with its leads
+_COURSE, _FEWEST_COURSE = 15, 5  # readings of which half have to say it
+_FEW = 3  # readings, from which their noise can be told
+_MOST = 1 << 14  # readings of a window, whatever the rate
+
+
+def circuit(tones_hz: Real, impedance_ohm: Complex) -> str:
+    """What a specimen is not, by its (m,) impedances: "short", "open", or "".
+
+    At the lowest frequency an intact specimen is a capacitor: its reactance exceeds its resistance. At the highest,
+    where the noise of a reading is least, an open circuit has a smaller capacitance than any specimen.
+    """
+    if not np.isfinite(impedance_ohm).all():
+        return ""
+    low, high = complex(impedance_ohm[np.argmin(tones_hz)]), int(np.argmax(tones_hz))
+    if 1 / (2 * np.pi * tones_hz[high] * abs(impedance_ohm[high])) < _OPEN_F:
+        return "open"
+    return "short" if low.real > -low.imag else ""
+
+
+@dataclass
+class Watch:
+    """Impedances of the last second, and what they say of specimen and instrument.
+
+    Attributes
+    ----------
+    tones_hz : (m,) array
+        Frequencies [Hz].
+    latest_ohm : (m,) array
+        The last sound reading; nan before [ohm].
+    count, lost, clipped, invalid : int
+        Readings so far, and of them lost, clipped and not finite.
+    sound_s : float
+        When a sound reading came last, by the run's clock [s].
+    """
+
+    tones_hz: Real
+    latest_ohm: Complex = field(init=False)
+    count: int = 0
+    lost: int = 0
+    clipped: int = 0
+    invalid: int = 0
+    sound_s: float = nan
+    _recent: deque[tuple[float, Complex]] = field(default_factory=lambda: deque(maxlen=_MOST))
+    _first_rest: Complex | None = None
+    _course: deque[Complex] = field(default_factory=lambda: deque(maxlen=_COURSE))
+
+    def __post_init__(self) -> None:
+        self.latest_ohm = np.full(len(self.tones_hz), complex(nan, nan))
+
+    def take(self, found: Readings, now_s: float) -> None:
+        """Take readings that came just now.
+
+        Raises
+        ------
+        DeviceFault
+            No sound reading for :data:`SILENT_S`.
+        """
+        sound = np.isfinite(found.impedance_ohm).all(axis=1) & (found.impedance_ohm != 0).all(axis=1)
+        self.count += len(sound)
+        self.lost += found.lost
+        self.clipped += int(np.count_nonzero(found.clipped))
+        self.invalid += int(np.count_nonzero(~sound))
+        self._course.extend(found.impedance_ohm[sound])
+        for row in found.impedance_ohm[sound & ~found.clipped]:
+            self.latest_ohm = row
+            self._recent.append((now_s, row))
+            self.sound_s = now_s
+        while self._recent and self._recent[0][0] < now_s - WINDOW_S:
+            self._recent.popleft()
+        if now_s - self.sound_s > SILENT_S:
+            what = "clipped" if found.clipped.any() else "no"
+            raise DeviceFault(f"impedance meter: {what} readings for {SILENT_S:g} s; check cables, range and specimen")
+
+    def circuit(self) -> str:
+        """What the specimen has not been for half of the last readings: "short", "open", or "".
+
+        Clipped readings count: a short drives more current than an input takes.
+        """
+        if len(self._course) < _FEWEST_COURSE:
+            return ""
+        admittance = 1 / np.array(self._course)
+        middle: Complex = np.median(admittance.real, axis=0) + 1j * np.median(admittance.imag, axis=0)
+        return circuit(self.tones_hz, np.asarray(1 / middle))
+
+    def mean(self) -> Complex:
+        """Mean over the last second; nan of nothing [ohm]."""
+        if not self._recent:
+            return np.full(len(self.tones_hz), complex(nan, nan))
+        return np.asarray(np.mean([row for _, row in self._recent], axis=0))
+
+    def noise(self) -> Real:
+        """Standard error of real and imaginary part of the mean, relative to abs(Z), of each frequency; nan of few."""
+        rows = np.array([row for _, row in self._recent])
+        if len(rows) < _FEW:
+            return np.full(len(self.tones_hz), nan)
+        return np.asarray(rows.std(axis=0) / np.abs(rows.mean(axis=0)) / np.sqrt(2 * len(rows)))
+
+    def drift(self) -> float:
+        """Change of abs(Z) at rest since the first call, at the frequency where it is largest [-]."""
+        now = np.abs(self.mean())
+        if self._first_rest is None and np.isfinite(now).all():
+            self._first_rest = now
+        return 0.0 if self._first_rest is None else float(np.max(np.abs(now / self._first_rest - 1)))

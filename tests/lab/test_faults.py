@@ -1,0 +1,60 @@
+"""Planted faults of every device at several moments: the mechanism's own record says whether the end was safe."""
+
+import pytest
+from laboratory import HARMLESS, KINDS, MOMENTS, Planted, laboratory, outcome, verdict
+
+from sensorgen.measure.log import Log
+from sensorgen.measure.log.bench import read_again
+
+_QUESTIONS = (b"M115", b"32 R 0x1000", b"32 R 0x11018", b"32 R 0x21018", b"32 R 0x31018", b"32 R 0x41018")
+
+
+@pytest.mark.parametrize("moment", MOMENTS, ids=lambda each: "-".join(f"{k}-{v}" for k, v in each.items()))
+@pytest.mark.parametrize("kind", [each for each in KINDS if each not in HARMLESS and each != "rig stage moves"])
+def test_every_fault_ends_with_the_tip_up_and_the_reason_told(tmp_path, kind, moment):
+    found, lab = outcome(tmp_path, (Planted(what=kind, **moment),))
+    assert verdict(found, lab, kind) == []
+    with Log(tmp_path / "log.db") as log:
+        for row in log.recordings():
+            parts, _ = read_again(log, row)
+            assert sum(len(one.time_s) for part in parts for one in part) > 0
+    if not found.rows:
+        assert found.counts["read"] < 50  # nothing to log
+
+
+@pytest.mark.parametrize("kind", ["actuator identity", "stage identity", "analyser wrong device", "actuator silent"])
+def test_nothing_is_sent_to_anybody_before_all_have_said_who_they_are(tmp_path, kind):
+    found, lab = outcome(tmp_path, (Planted(what=kind, at_s=0.0),))
+    assert found.end == "fault"
+    for role in ("actuator", "stage"):
+        assert all(line.strip() in _QUESTIONS for line in lab.simulators[role].heard)
+    assert not lab.rig.started
+    assert found.reason.startswith(("actuator", "stage", "impedance"))
+
+
+def test_a_run_without_faults_is_done_within_the_limits(tmp_path):
+    found, lab = outcome(tmp_path)
+    assert (found.end, found.done, found.steps) == ("done", 2, 2)
+    assert lab.mechanism.violations == []
+    assert 3.9 < lab.mechanism.peak_n < 4.2
+
+
+def test_the_limit_holds_where_the_actuator_presses_with_all_it_has(tmp_path):
+    found, lab = outcome(tmp_path, (Planted(what="actuator runaway", at_force_n=1.0),), plan=_at_the_limit())
+    assert found.end == "fault"
+    assert all(each.duration_s <= 0.01 + 1e-9 for each in lab.mechanism.violations)
+
+
+def _at_the_limit():
+    return [{"hold": {"position_mm": 50, "force_n": 6.6, "hold_s": 1.0}}]
+
+
+def test_the_verdict_sees_a_tip_that_is_left_down(tmp_path):
+    """The judge itself, on a planted fault."""
+    found, lab = outcome(tmp_path, (Planted(what="actuator cut", at_force_n=3.0),))
+    other = laboratory()
+    other.rig.started.add("stage")
+    other.mechanism.extension_mm = 50.5
+    other.mechanism.travel("z", 0.0, 100.0)
+    assert any("tip at" in each for each in verdict(found, other, "actuator cut"))
+    assert verdict(found, lab, "actuator cut") == []

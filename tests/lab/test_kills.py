@@ -1,0 +1,71 @@
+"""Runs of the command line that are killed, hung or robbed of their guardian, on a rig in another process."""
+
+import json
+import os
+import signal
+import sys
+import time
+
+import killing
+import pytest
+
+from sensorgen.measure.log import Log
+
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="pseudo-terminals and /proc of Linux"),
+]
+
+
+@pytest.fixture(scope="module")
+def rig():
+    pytest.importorskip("serial", reason="pyserial is missing: pip install 'sensorgen[lab]'")
+    pytest.importorskip("pyvisa", reason="PyVISA is missing: pip install 'sensorgen[lab]'")
+    with killing.Served() as served:
+        yield served
+
+
+def test_ten_killed_runs_leave_the_tip_up_and_go_on(tmp_path, rig):
+    found = list(killing.many(tmp_path, rig, seed=5, kills=10, ways=("kill", "kill", "kill", "kill", "stop")))
+    assert len(found) == 10
+    assert all(each.up_s < 10 for each in found)  # how fast, bench/lab_safety.py says
+    assert not [each for each in found if each.down and not each.raised]
+    assert [v for v in rig.state()["violations"] if v[0] == "sideways" or v[2] > 0.01] == []
+
+
+def _pressing(tmp_path, rig):
+    """A run whose tip is down."""
+    with Log(tmp_path / "log.db", create=True):
+        pass
+    run = killing.start(killing.experiment(tmp_path, rig.places, presses=4), tmp_path / "log.db")
+    until = time.monotonic() + 90
+    while rig.state()["force_n"] < 3.0:
+        assert run.process.poll() is None
+        assert time.monotonic() < until
+        time.sleep(0.02)
+    return run
+
+
+def test_a_run_ends_with_the_tip_up_when_its_guardian_dies(tmp_path, rig):
+    run = _pressing(tmp_path, rig)
+    os.kill(run.guardian(), signal.SIGKILL)
+    out, _ = run.process.communicate(timeout=90)
+    result = json.loads(out)
+    assert run.process.returncode == 1
+    assert result["end"] == "fault"
+    assert "guardian" in result["reason"]
+    assert result["tip_up"]
+    assert rig.state()["tip_mm"] >= 1.0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_signals_end_a_run_with_the_tip_up_and_the_log_closed(tmp_path, rig, number):
+    run = _pressing(tmp_path, rig)
+    os.kill(run.process.pid, number)
+    out, _ = run.process.communicate(timeout=90)
+    result = json.loads(out)
+    assert run.process.returncode == 1
+    assert (result["end"], result["tip_up"]) == ("abort", True)
+    assert signal.Signals(number).name in result["reason"]
+    assert rig.state()["tip_mm"] >= 1.0
+    with Log(run.log) as log:
+        assert len(log.recordings()) == 1
