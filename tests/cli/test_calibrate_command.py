@@ -259,3 +259,16 @@ def test_readings_that_no_specimen_has_are_named(bench):
     assert found.code == 0, found.err
     assert "2 readings of meters count, baked" in found.words
     assert "fit no specimen of this design" in found.words
+
+
+def test_values_of_materials_are_told_and_become_a_source(bench, tmp_path):
+    said = bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--source", "s1.yaml", "--dry-run")
+    assert (said.code, said.err) == (0, "")
+    assert "material values of this specimen, 95 %" in said.words
+    assert "x60: " not in said.words
+    text = (tmp_path / "s1.yaml").read_text("utf-8")
+    assert "resistivity_ohm_m: {value: " in text
+    found = json.loads(bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--dry-run", "--json").out)["materials"]
+    assert [one["quantity"] for one in found] == ["resistivity_ohm_m", "relative_permittivity", "youngs_modulus_pa"]
+    assert all(one["lower"] < one["value"] < one["upper"] for one in found)
+    assert bench("calibrate", "S1", "S2", "--source", "s1.yaml").code == 2

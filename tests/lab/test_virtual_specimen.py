@@ -213,3 +213,15 @@ def test_bodies_without_one_section_are_refused():
 
 def test_the_conductance_of_a_plate_is_its_shape():
     assert conductance(plate(), 1) == pytest.approx(0.3, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["blank", "cell", "section", "specimen", "mechanics", "faults"])
+def test_it_is_written_apart_from_what_analyses_it(name):
+    import ast
+
+    import sensorgen.measure.virtual as package
+
+    tree = ast.parse((Path(package.__file__).parent / f"{name}.py").read_text("utf-8"))
+    imported = {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    apart = ("models", "prediction", "solvers", "analysis", "measure.lab")
+    assert not [module for module in imported if module.startswith(tuple(f"sensorgen.{one}" for one in apart))]
