@@ -33,16 +33,20 @@ def test_ten_killed_runs_leave_the_tip_up_and_go_on(tmp_path, rig):
 
 
 def _pressing(tmp_path, rig):
-    """A run whose tip is down."""
-    with Log(tmp_path / "log.db", create=True):
-        pass
-    run = killing.start(killing.experiment(tmp_path, rig.places, presses=4), tmp_path / "log.db")
-    until = time.monotonic() + 90
-    while rig.state()["force_n"] < 3.0:
-        assert run.process.poll() is None
-        assert time.monotonic() < until
-        time.sleep(0.02)
-    return run
+    """A run whose tip is down; begun anew where a busy computer lets the served rig answer too late."""
+    for attempt in range(6):
+        log = tmp_path / f"{attempt}.db"
+        with Log(log, create=True):
+            pass
+        run = killing.start(killing.experiment(tmp_path, rig.places, presses=4), log)
+        until = time.monotonic() + 90
+        while run.process.poll() is None and time.monotonic() < until:
+            if rig.state()["force_n"] >= 3.0:
+                return run
+            time.sleep(0.02)
+        run.process.kill()
+        out, _ = run.process.communicate()
+    raise AssertionError(f"no run came to press: {out}")
 
 
 def test_a_run_ends_with_the_tip_up_when_its_guardian_dies(tmp_path, rig):
