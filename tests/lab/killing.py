@@ -204,7 +204,7 @@ def many(folder: Path, rig: Served, seed: int, kills: int, ways: tuple[str, ...]
 def _moment(rig: Served, run: Started, rng: random.Random) -> bool:
     """Wait for a random moment of a run, two in three with the tip down; False where the run ends before."""
     pressing, before = rng.random() < 2 / 3, len(run.events("identified"))
-    while not (rig.state()["tip_mm"] < 0.0 if pressing else len(run.events("identified")) > before):
+    while not (rig.state()["force_n"] > 1.0 if pressing else len(run.events("identified")) > before):
         if run.process.poll() is not None:
             return False
         time.sleep(0.02)
