@@ -191,7 +191,7 @@ def many(folder: Path, rig: Served, seed: int, kills: int, ways: tuple[str, ...]
             pass
         run = start(experiment(folder, rig.places, presses=4), log)
         for _ in range(100):
-            if count < kills and _moment(run, rng):
+            if count < kills and _moment(rig, run, rng):
                 yield killed(rig, run, ways[count % len(ways)])
                 count += 1
             elif run.process.wait(120) == 0:
@@ -201,16 +201,15 @@ def many(folder: Path, rig: Served, seed: int, kills: int, ways: tuple[str, ...]
         whole(run)
 
 
-def _moment(run: Started, rng: random.Random) -> bool:
-    """Wait for a random moment of a run, two in three during a press; False where the run ends before."""
-    kind = rng.choice(["identified", "step", "step"])
-    wait, before = rng.uniform(0.1, 5.0), len(run.events(kind))
-    while len(run.events(kind)) <= before:
+def _moment(rig: Served, run: Started, rng: random.Random) -> bool:
+    """Wait for a random moment of a run, two in three with the tip down; False where the run ends before."""
+    pressing, before = rng.random() < 2 / 3, len(run.events("identified"))
+    while not (rig.state()["force_n"] > 1.0 if pressing else len(run.events("identified")) > before):
         if run.process.poll() is not None:
             return False
         time.sleep(0.02)
     try:
-        run.process.wait(wait)
+        run.process.wait(rng.uniform(0.0, 1.5 if pressing else 6.0))
     except subprocess.TimeoutExpired:
         return True
     return False
