@@ -130,12 +130,23 @@ def _solved(design: Design, fine_mm: float) -> Blank:
     rise = coarse / coarse[:, :, :1] - 1
     rise[:, :, 1:] *= finer  # as of the design's values: others change both rasters alike
     table = per_length * rest[:, None] * (1 + rise)
-    grid, rho = _raster(design, cell.scene, fine_mm), resistivities(design)
+    by_film = _by_film(design, cell.scene)
+    return Blank(tuple(tuple(map(tuple, of)) for of in table.tolist()), tracks(design, fine_mm), by_film)
+
+
+def tracks(design: Design, fine_mm: float = FINE_MM) -> tuple[float, float]:
+    """Resistance per length of the top and the bottom electrode as printed [ohm/m]; errors as :func:`blank`."""
+    from sensorgen.asprinted import printed
+
+    cell = printed.body(design).cell
+    section, rho = section_of(cell.scene), resistivities(design)
+    grid, length_m = _raster(design, cell.scene, fine_mm), design.params.length_mm * M_PER_MM
     top, bottom = (
-        rho[end].value / _conductor_m2(grid, number, depth_m, cell.count, length_m, along=section.across == "x")
+        rho[end].value
+        / _conductor_m2(grid, number, section.depth_mm * M_PER_MM, cell.count, length_m, along=section.across == "x")
         for end, number in (("top", 2), ("bottom", 1))
     )
-    return Blank(tuple(tuple(map(tuple, of)) for of in table.tolist()), (top, bottom), _by_film(design, cell.scene))
+    return top, bottom
 
 
 def _raster(design: Design, scene: Scene, fine_mm: float) -> Raster:

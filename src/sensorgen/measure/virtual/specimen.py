@@ -14,7 +14,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.values import ENDS, film, ln_spread, material_value, resistivities
-from sensorgen.measure.virtual.blank import Blank, blank
+from sensorgen.measure.virtual.blank import Blank, blank, tracks
 
 PIECES = 60  # of the chain that the line is
 _THINNEST_M = 1e-12  # of a piece
@@ -174,8 +174,8 @@ class Specimen:
         """
         d, t = self.design, self.truth
         dielectric = d.material(film(d)), d.used()[film(d)]
-        of, tracks = resistivities(d), dict(zip(ENDS, self.blank.track_ohm_per_m, strict=True))
-        common = sum(tracks.values()) / sum(tracks[end] / of[end].value for end in ENDS)
+        of, of_end = resistivities(d), dict(zip(ENDS, tracks(d), strict=True))
+        common = sum(of_end.values()) / sum(of_end[end] / of[end].value for end in ENDS)
         return {
             "resistivity_ohm_m": common * exp(t.resistivity),
             "relative_permittivity": material_value(*dielectric, "relative_permittivity").value * exp(t.permittivity),
