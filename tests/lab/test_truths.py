@@ -77,7 +77,7 @@ def test_errors_of_the_model_are_in_the_interval(one):
     for link in links:
         wide = estimate(expected, posterior, replace(link, error=10 * link.error))
         usual = estimate(expected, posterior, link)
-        assert wide.upper / wide.lower > 1.3 * usual.upper / usual.lower
+        assert np.log(wide.upper / wide.lower) > 1.3 * np.log(usual.upper / usual.lower), link.parameter
 
 
 def test_a_source_of_the_values_can_be_named_by_a_design(one, tmp_path, monkeypatch):
