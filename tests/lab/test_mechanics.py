@@ -131,6 +131,15 @@ def test_the_reading_is_that_of_the_specimen():
     assert found.impedance(TONES_HZ) == pytest.approx(line.impedance(lift, specimen.patch(0.05)), rel=1e-6)
 
 
+def test_readings_have_the_noise_that_was_asked_for():
+    noisy = planted(noise=0.01)
+    still = noisy.specimen.line(TONES_HZ).impedance(0.0, (0.0, 0.0))
+    off = np.array([noisy.impedance(TONES_HZ) for _ in range(4000)]) / still - 1
+    assert np.hypot(off.real.std(axis=0), off.imag.std(axis=0)) == pytest.approx(0.01 * np.sqrt(2), rel=0.05)
+    assert abs(np.corrcoef(off[:, 0].real, off[:, 1].real)[0, 1]) < 0.06
+    assert abs(off.mean(axis=0)) == pytest.approx(abs(planted().impedance(TONES_HZ) / still - 1), abs=1e-3)
+
+
 @pytest.mark.parametrize(("creep", "hysteresis"), [(0.02, 0.0), (0.0, 0.05)])
 def test_creep_goes_with_the_logarithm_of_time_and_hysteresis_with_the_peak(creep, hysteresis):
     found = rig(Truth(creep=creep, hysteresis=hysteresis), friction_n=0.0, lag_s=1e-3)
@@ -268,7 +277,7 @@ def test_overrides_are_taken_and_the_rest_is_drawn():
     ({"faults": [{"what": "rig cable ot", "at_s": 1}]}, "did you mean 'rig cable out'"),
     ({"faults": [{"what": "rig short"}]}, "one of at_s and at_force_n"),
     ({"truth": {"crep": 0.1}}, "did you mean 'creep'"), ({"rig": {"friction": 0.1}}, "did you mean 'friction_n'"),
-    ({"sed": 1}, "did you mean 'seed'"),
+    ({"noise": -0.1}, "noise"), ({"sed": 1}, "did you mean 'seed'"),
 ])  # fmt: skip
 def test_wrong_settings_are_refused(bad, words):
     with pytest.raises(BadInput, match=words):

@@ -1,12 +1,16 @@
 """Bounds of a porous dielectric against closed forms, limits and a field solve of its lines."""
 
+import numpy as np
 import pytest
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.design.design import make
+from sensorgen.design.shapes import gaps
 from sensorgen.design.shapes import porous as shape
 from sensorgen.models import porous
-from sensorgen.scene.scene import Fill
+from sensorgen.prediction.compression_law import filled
+from sensorgen.scene.scene import Body, Fill, Scene, box
 
 SHARES = (0.05, 0.3, 0.5, 0.8, 1.0)
 
@@ -53,6 +57,69 @@ def test_capacitance_of_crossed_lines_lies_within_the_bounds():
     bounds = porous.permittivity(4.68, 0.5, "rectilinear")  # of half solid, but for the last line
     assert bounds.lower < found.lower / plate < found.upper / plate < bounds.upper
     assert found.width() < 0.02
+
+
+MODULI = {"x60": 6e6, "etpu": 22e6}
+
+
+def test_a_plate_with_slits_stands_on_its_pillars():
+    p = gaps.Params()
+    found = porous.filling(gaps.scene(p, Fill()), MODULI)
+    share = 1 - p.gap_width_mm / p.period_mm
+    assert found.share == pytest.approx(share)
+    assert found.modulus_pa.lower == pytest.approx(share * 6e6)
+    width = p.period_mm - p.gap_width_mm
+    stiffer = 4 / 3 * (1 + (width / (2 * p.dielectric_mm)) ** 2)
+    assert found.modulus_pa.upper == pytest.approx(stiffer * share * 6e6)
+
+
+def test_crossed_lines_stand_where_they_cross():
+    p = shape.Params(length_mm=40.5, width_mm=40.5)  # 45 lines of 0.5 mm and 44 spaces of 0.4 mm, nearly
+    found = porous.filling(shape.scene(p, Fill()), MODULI)
+    along = found.share  # of a level
+    assert found.modulus_pa.lower == pytest.approx(along**2 * 6e6, rel=1e-9)
+    assert found.modulus_pa.upper == pytest.approx(4 / 3 * (1 + (0.5 / 1.2) ** 2) * along * 6e6, rel=1e-9)
+
+
+def test_powers_of_the_rise_are_those_of_the_bounds():
+    """By differences of Wiener's bounds under a strain that leaves the volume of the solid."""
+    found, eps, strain = porous.Filling(0.6, 0.4, porous.Interval(1e6, 2e6)), 4.68, 1e-5
+
+    def rises(which):
+        own, pressed = (getattr(porous.permittivity(eps, s, "cubic"), which) for s in (0.4, 0.4 / (1 - strain)))
+        return np.log(pressed / own / (1 - strain)) / -np.log(1 - strain)
+
+    assert found.rise_powers(eps).lower == 1
+    assert found.rise_powers(eps).upper == pytest.approx(max(rises("lower"), rises("upper")), rel=1e-4)
+
+
+@pytest.mark.parametrize("name", ["tri", "rect", "pillar"])
+def test_electrodes_with_teeth_have_no_such_law(name):
+    assert porous.filling(make({"shape": name}).drawn, MODULI) is None
+
+
+def test_nothing_stands_where_levels_do_not_meet():
+    bodies = (
+        Body("bottom_electrode", "etpu", (box(0, 10, 0, 10, 0, 1),), "bottom"),
+        Body("left", "x60", (box(0, 4, 0, 10, 1, 2),)),
+        Body("right", "x60", (box(6, 10, 0, 10, 2, 3),)),
+        Body("top_electrode", "etpu", (box(0, 10, 0, 10, 3, 4),), "top"),
+    )
+    assert porous.filling(Scene(bodies, (10.0, 10.0, 4.0)), MODULI) is None
+
+
+@pytest.mark.parametrize(("parameters", "modulus_pa", "rise_at_100_kpa"), [
+    # press2d on the print: displacement 11.78 um of 600 um, C from 46.761 to 47.756 nF/m2
+    ({"shape": "gaps"}, 5.09e6, 0.02128),
+])  # fmt: skip
+def test_solved_cells_lie_within_the_law_of_infill(parameters, modulus_pa, rise_at_100_kpa):
+    design = make(parameters)
+    law = filled(design)
+    bounds = porous.filling(design.drawn, MODULI).modulus_pa
+    assert bounds.lower < modulus_pa < bounds.upper
+    strains = sorted(float(one.capacitive_strain(np.asarray(1e5))[0]) for one in law.others)
+    assert strains[0] < rise_at_100_kpa / (1 + rise_at_100_kpa) < strains[1]
+    assert strains[0] < float(law.compression.capacitive_strain(np.asarray(1e5))[0]) < strains[1]
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,16 @@
 """Effective permittivity and stiffness of a dielectric that is printed with sparse infill, as bounds."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
+from sensorgen.scene.overlay import parts
+from sensorgen.scene.scene import Scene
+from sensorgen.scene.sections import Column, Layer
 
 SOURCE = "Wiener (1912), Hashin & Shtrikman (1962, 1963), Gibson & Ashby (1997)"
 COST = 0
@@ -101,3 +110,101 @@ def _checked(share: float) -> float:
     if not 0 < share <= 1:
         raise OutOfRange(f"share of the solid is {share:g}; expected a number above 0 and at most 1")
     return share
+
+
+@dataclass(frozen=True)
+class Filling:
+    """What lies between two flat electrodes.
+
+    Attributes
+    ----------
+    gap_mm : float
+        Between the electrodes [mm].
+    share : float
+        Of the volume that is solid [-].
+    modulus_pa : Interval
+        Stress on the whole area over the relative change of the gap, at small strain [Pa].
+    """
+
+    gap_mm: float
+    share: float
+    modulus_pa: Interval
+
+    def rise_powers(self, permittivity: float) -> Interval:
+        r"""Powers n of :math:`C \propto (1 - e)^{-n}` under a strain e [-].
+
+        1 where the share of the solid stays; where its volume stays, the share rises, and with it the permittivity
+        along Wiener's bounds, of which the steeper is taken.
+        """
+        eps, share = permittivity, self.share
+        walls = share * (eps - 1) / (share * eps + 1 - share)
+        layers = share * (1 - 1 / eps) / (share / eps + 1 - share)
+        return Interval(1.0, 1 + max(walls, layers))
+
+
+def filling(scene: Scene, modulus_pa: Mapping[str, float]) -> Filling | None:
+    r"""Share and stiffness of what lies between flat electrodes; None where they are not flat, or nothing stands.
+
+    At least the columns that are solid from electrode to electrode carry, each free to bulge; at most each level stays
+    flat (Voigt in each level, Reuss over the levels), its solids held like plates bonded to both sides:
+
+    .. math:: \sum_k a_k \left(\sum_j \frac{h_j}{E_j}\right)^{-1} \le \frac{E}{d} \le
+              \frac{4}{3} \left(1 + \frac{w^2}{4 d^2}\right) \left(\sum_j \frac{h_j}{\sum_k a_{jk} E_{jk}}\right)^{-1}
+
+    with the columns' shares a of the area, the levels' heights h, the gap d and the width w of the widest solid (Gent
+    and Lindley, 1959, for the factor). The lower one is a bound for faces that slide or stick, the upper an estimate.
+
+    Parameters
+    ----------
+    scene : Scene
+        A cell.
+    modulus_pa : mapping of str to float
+        Young's modulus by material [Pa].
+    """
+    try:
+        found = [(part.depth_mm * (c.right_mm - c.left_mm), c) for part in parts(scene) for c in part.columns]
+    except ValueError:
+        return None
+    area = np.array([a for a, _ in found]) / sum(a for a, _ in found)
+    ends = {_gap(column) for _, column in found}
+    if len(ends) != 1 or (gap := ends.pop()) is None:
+        return None
+    between = [[one for one in column.layers if not one.body.terminal and _inside(one, gap)] for _, column in found]
+    levels = sorted({*gap, *(round(z, 9) for of in between for one in of for z in (one.bottom_mm[0], one.top_mm[0]))})
+    height = np.diff(levels)
+    moduli = np.array([[_modulus(of, (a + b) / 2, modulus_pa) for a, b in pairwise(levels)] for of in between])
+    with np.errstate(divide="ignore"):
+        standing = float(area @ (1 / (height / moduli).sum(axis=1)))
+        flat = float(1 / (height / (area @ moduli)).sum())
+    if not standing:
+        return None
+    d, widest = gap[1] - gap[0], _widest_mm(scene, gap)
+    stiffer = 4 / 3 * (1 + (widest / (2 * d)) ** 2)
+    share = float(area @ ((moduli > 0) @ height)) / d
+    return Filling(d, share, Interval(d * standing, d * flat * stiffer))
+
+
+def _gap(column: Column) -> tuple[float, float] | None:
+    """Heights between the electrodes of a column [mm]; None where one is missing or slanted."""
+    low = [one for one in column.layers if one.body.terminal == "bottom"]
+    high = [one for one in column.layers if one.body.terminal == "top"]
+    faces = {z for one in low + high for z in (one.bottom_mm, one.top_mm)}
+    if not (low and high) or any(a != b for a, b in faces):
+        return None
+    return round(max(one.top_mm[0] for one in low), 9), round(min(one.bottom_mm[0] for one in high), 9)
+
+
+def _inside(layer: Layer, gap: tuple[float, float]) -> bool:
+    return gap[0] - 1e-9 <= min(layer.bottom_mm) and max(layer.top_mm) <= gap[1] + 1e-9
+
+
+def _modulus(layers: list[Layer], z: float, modulus_pa: Mapping[str, float]) -> float:
+    """Of what is at a height, 0 of air [Pa]."""
+    return next((modulus_pa[one.body.material] for one in layers if one.bottom_mm[0] < z < one.top_mm[0]), 0.0)
+
+
+def _widest_mm(scene: Scene, gap: tuple[float, float]) -> float:
+    """The narrower side of the widest solid between the electrodes [mm]."""
+    pieces = [p for body in scene.bodies if not body.terminal for p in body.pieces]
+    inside = [p for p in pieces if gap[0] - 1e-9 <= p.span("z")[0] and p.span("z")[1] <= gap[1] + 1e-9]
+    return max(min(p.span(axis)[1] - p.span(axis)[0] for axis in "xy") for p in inside)

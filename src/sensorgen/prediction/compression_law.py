@@ -17,7 +17,7 @@ from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.values import MaterialValue, film, of_all_materials, permittivities
-from sensorgen.models import compression
+from sensorgen.models import compression, porous
 from sensorgen.models.compression import Compression, Curve, curve_of
 from sensorgen.prediction.capacitance import Answer, is_plate
 from sensorgen.prediction.mesh_ladder import (
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 LAWS = ("unconfined", "bonded", "solved")
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)), 1.2e5)  # 6 N on a tip of 5 x 10 mm are 120 kPa
 _LANDING = f"feet land at negligible force: the rise of C up to {STRESS_PA[1] / 1e3:g} kPa is mostly their fall"
+_STRAIN = np.linspace(0.0, 0.3, 7)  # of infill: lines of its law, which is straight up to there at most
 _SAME_RATIO = 1e-3  # difference of Poisson's ratios: 0.4999 and 0.5 are one cell, 0.45 deforms by 11 % more
 _ENOUGH = 0.5  # of the last of them: a curve that is known so far is extended [-]
 _ONSET = 0.25  # largest relative error of a curve's onset, on films of 0.02 to 0.2 mm from 0.5 kPa on
@@ -171,6 +172,34 @@ def expected(design: Design, mesh: MeshLevel) -> Curve:
     return replace(compression.prototype(_LIKE[mesh.model]).scaled_modulus(scale), within=mesh.rise_error)
 
 
+def filled(design: Design, piece: Piece | None = None) -> Law | None:
+    """Law of what lies between flat electrodes, as infill does, between bounds of its stiffness; None of other cells.
+
+    Parameters
+    ----------
+    design : Design
+        As drawn.
+    piece : Piece, optional
+        As printed; as drawn where not given.
+    """
+    moduli = of_all_materials(design, "youngs_modulus_pa")
+    found = porous.filling((piece or drawn(design)).scene, {n: t.value for n, t in moduli.items()})
+    if not found:
+        return None
+    eps = {t.material: t.value for t in permittivities(design)}
+    modulus_pa, power = found.modulus_pa, found.rise_powers(eps[film(design)])
+
+    def law(modulus: float, power: float) -> Curve:
+        ratio = (1 - _STRAIN) ** -power
+        own = compression.curve(
+            "between columns and levels", porous.SOURCE, (modulus * _STRAIN).tolist(), ratio.tolist()
+        )
+        return replace(own, displacement_m=float(_STRAIN[-1]) * found.gap_mm * M_PER_MM)
+
+    others = law(modulus_pa.lower, power.upper), law(modulus_pa.upper, power.lower)
+    return Law(law(modulus_pa.middle(), power.middle()), tuple(moduli.values()), others=others)
+
+
 def _stored(design: Design, youngs_modulus_pa: Mapping[str, float]) -> Curve | None:
     """The stored curve of this cell, for materials of the same Poisson's ratio; else None."""
     known = compression.solved(design.shape, vars(design.params), youngs_modulus_pa)
@@ -282,6 +311,8 @@ def at_a_few_pressures(
 ) -> Law | None:  # fmt: skip
     """The stored law of a printed cell; else a section or round cell solved at a few pressures on the coarsest mesh.
 
+    Of a cell in 3D the law of infill, where it applies.
+
     Its own error is not known: it tells by how much ways to print differ, which is far more.
 
     Parameters
@@ -294,14 +325,14 @@ def at_a_few_pressures(
     Returns
     -------
     Law or None
-        None where the cell is not solved: in 3D, and where the solver gives up.
+        None where there is none, and where the solver gives up.
     """
     from sensorgen.models.press2d import BoundaryConditions
 
     known = law_of(design, answer, name, printed=printed)
     model = model_of(printed, quick=True)
     if known.bounded or model == "press3d":
-        return known if known.bounded else None
+        return known if known.bounded else filled(design, printed)
     try:
         case = _case(design, printed, model, BoundaryConditions())
         found = pressed(case, [stress_pa * part for part in (0, 0.5, 1, 1.25)], COARSEST)

@@ -11,10 +11,12 @@ from math import inf
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.body import Body
+from sensorgen.design.design import Design
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.capacitance import Answer, default_width, weighed
-from sensorgen.prediction.compression_law import Law, Option, options
+from sensorgen.prediction.compression_law import Law, Option, filled, options
 from sensorgen.prediction.error_budget import ReferenceLoad
+from sensorgen.prediction.mesh_ladder import Piece
 from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, run_until_within
 from sensorgen.prediction.query import DEFAULT, FLAT, Load, Query, Tip
 from sensorgen.prediction.rest_state import rest_state
@@ -101,7 +103,7 @@ def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", t
 
     def laws(answer: Answer) -> list[Option]:
         found = options(body.design, answer, law, printed=printed)
-        return found if thorough else _inexpensive(found)
+        return found if thorough else _inexpensive(found, body.design, printed)
 
     width = min(wanted, 2 * share / by_capacitance, default_width(body.cells.first()))
     levels = (_cell(rough, width), _compression(laws(rough.rest.answer), sensor, load, share), line)
@@ -109,17 +111,19 @@ def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", t
     return PredictionPlan(body, load, tip, laws, rough, by_capacitance, Plan(wanted, at, levels))
 
 
-def _inexpensive(found: list[Option]) -> list[Option]:
-    """Without cells in 3D: in their place the curve of the nearest prototype, of unknown error."""
+def _inexpensive(found: list[Option], design: Design, printed: Piece | None) -> list[Option]:
+    """Without cells in 3D: in their place infill's law, else the nearest prototype's, of unknown error."""
     spatial = [option for option in found if option.name.startswith("press3d")]
     if not spatial:
         return found
-    said = (
-        f"compression of the nearest cell that was solved: solving this one takes some {spatial[0].seconds:.0f} s "
-        "(--compression solved)"
-    )
-    law = replace(spatial[0].expected, doubts=(said,), bounded=False)
-    return [Option("nearest prototype", 0.0, law, lambda: law)]
+    name, said = "nearest prototype", "compression of the nearest cell that was solved"
+    law = filled(design, printed)
+    if law:
+        name, said = law.compression.name, "compression of infill, between standing columns and flat levels"
+    known = law or replace(spatial[0].expected, bounded=False)
+    said += f": solving this cell takes some {spatial[0].seconds:.0f} s (--compression solved)"
+    known = replace(known, doubts=(said,))
+    return [Option(name, 0.0, known, lambda: known)]
 
 
 def execute(planned: PredictionPlan) -> tuple[SensorModel, Plan]:

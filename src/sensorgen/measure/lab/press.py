@@ -11,7 +11,7 @@ from sensorgen.measure.lab.safety import RAISED_MM, UP_MM, Ended
 
 _STUCK_S, _TRAVEL_S, _LAND_S = 0.5, 120.0, 60.0  # a piston that rises not at all; longest move and landing
 _ABOVE_MM, _EARLY_MM = 1.5, 3.0  # where the soft landing begins, and how far from the last one it may end
-_REST_S, _STILL_MM = 0.15, 0.02  # a landed tip comes down no further
+_REST_S, _STILL_MM = 0.15, 0.02  # the tip has landed once it moves less than this in that time
 _THERE_MM = 0.05  # of the place
 _LOOK_S = 0.05  # from one reading of the moving stage to the next
 

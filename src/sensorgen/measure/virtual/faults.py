@@ -122,8 +122,8 @@ class VirtualSpecimen(Strict):
         Values of :class:`sensorgen.measure.virtual.specimen.Truth` in place of drawn ones.
     rig : mapping
         Values of :class:`sensorgen.measure.virtual.mechanics.Mechanics` in place of its defaults.
-    noise : float or None
-        Relative noise of a reading; that of the simulated instrument if None [-].
+    noise : float
+        Relative standard deviation of both parts of a reading, beside the instrument's own noise [-].
     faults : sequence of Planted
         What goes wrong, and when.
     """
@@ -132,7 +132,7 @@ class VirtualSpecimen(Strict):
     seed: Annotated[int, Field(ge=0)] = 0
     truth: dict[str, float | Waves] = Field(default={})
     rig: dict[str, float] = Field(default={})
-    noise: Annotated[float, Field(gt=0)] | None = None
+    noise: Annotated[float, Field(ge=0, le=1)] = 0.0
     faults: tuple[Planted, ...] = Field(default=(), strict=False)
 
     @model_validator(mode="after")
@@ -164,7 +164,7 @@ def rig_of(settings: VirtualSpecimen, design: Design, tip_m: float) -> Rig:
     """
     changes: dict[str, Any] = dict(settings.truth)
     specimen = Specimen(design, replace(drawn(design, settings.seed), **changes), tip_m)
-    rig = Rig(specimen, Mechanics(**settings.rig), settings.seed)
+    rig = Rig(specimen, Mechanics(**settings.rig), settings.seed, settings.noise)
     rig.planted = Schedule(settings.faults)
     return rig
 

@@ -128,7 +128,9 @@ class Rig:
     mechanics : Mechanics
         Of piston, tip and stage.
     seed : int
-        Of the drift.
+        Of drift and noise.
+    noise : float
+        Relative standard deviation of both parts of an impedance, as of interference [-].
     force_n : float
         On the specimen now [N].
     peak_n : float
@@ -144,6 +146,7 @@ class Rig:
     specimen: Specimen
     mechanics: Mechanics = field(default_factory=Mechanics)
     seed: int = 0
+    noise: float = 0.0
     time_s: float = 0.0
     extension_mm: float = 0.0
     motor_n: float = 0.0
@@ -162,7 +165,7 @@ class Rig:
         self._press_peak_n = 0.0
         self._crept = np.zeros(len(_CREEP_S))
         self._open: dict[str, Violation] = {}
-        self._rng = np.random.default_rng([self.seed, 1])
+        self._rng, self._interference = (np.random.default_rng([self.seed, k]) for k in (1, 2))
         self._drift, self._drifted_s = self._rng.standard_normal(2), self.time_s
         self._lines: dict[bytes, Line] = {}
 
@@ -238,6 +241,9 @@ class Rig:
         found = self._lines[key].impedance(lift, ends if lift else (0.0, 0.0), c, r, shorted=shorted)
         if self.fault == "short" and self.force_n < _OPENS_N:
             found = np.asarray(found * _SHORT_OHM / (found + _SHORT_OHM))
+        if self.noise:
+            real, imaginary = self.noise * self._interference.standard_normal((2, len(frequency)))
+            found = found * (1 + real + 1j * imaginary)
         return found
 
     def resistance(self, *, wires: int) -> float:
