@@ -25,6 +25,7 @@ from sensorgen.scene.slabs import is_open
 # Relative width of a capacitance's bounds where none is asked for: a cross-section, 3D, electrodes that do not cover
 PLANE, SPATIAL, OPEN = 1e-3, 1e-2, 2.5e-2
 _EXACT = 1e-9  # relative width of a capacitance's bounds below which the scene is a plate
+_SOLID = 1e-6  # share of air in a plate, by rounding
 _LOSSLESS, _LOSSY = "capacitance", "lossy"  # functions of a model
 _CHEAP = 1  # up to this cost, a model is asked before it is weighed
 
@@ -316,7 +317,12 @@ def _of_plain(data: dict[str, Any]) -> Answer:
     )  # fmt: skip
 
 
-def is_plate(answer: Answer) -> bool:
-    """Whether a capacitance is that of a solid plate: its cell has no other bounds than itself, whatever cuts it."""
+def is_plate(answer: Answer, scene: Scene) -> bool:
+    """Whether a capacitance is that of a solid plate: its cell has no other bounds than itself, and no air in it."""
     widths = [c.width for c in answer.plan if c.model == answer.model and c.width is not None]
-    return min(widths, default=answer.capacitance_f.width()) < _EXACT
+    if min(widths, default=answer.capacitance_f.width()) >= _EXACT:
+        return False
+    from sensorgen.models import porous
+
+    found = porous.filling(scene, dict.fromkeys((body.material for body in scene.bodies), 1.0))
+    return found is None or found.share > 1 - _SOLID

@@ -56,7 +56,7 @@ def _plate(name: str, design: Design, piece: Piece, stress_pa: Sequence[float]) 
     """A law of solid plates, with rigid electrodes."""
     known = capacitance(piece.scene, {t.material: t.value for t in permittivities(design)}, model="columns", keep=False)
     between = {body.material for body in piece.scene.bodies if not body.terminal}
-    if not is_plate(known) or between != {film(design)}:
+    if not is_plate(known, piece.scene) or between != {film(design)}:
         raise BadInput(f"--model {name} applies to a solid plate of one material, {design.shape} is none: try springs")
     refuse_crushing(
         stress_pa[-1], {n: taken.value for n, taken in of_all_materials(design, "youngs_modulus_pa").items()}

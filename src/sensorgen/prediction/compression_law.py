@@ -17,7 +17,7 @@ from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.values import MaterialValue, film, of_all_materials, permittivities
-from sensorgen.models import compression, porous
+from sensorgen.models import compression
 from sensorgen.models.compression import Compression, Curve, curve_of
 from sensorgen.prediction.capacitance import Answer, is_plate
 from sensorgen.prediction.mesh_ladder import (
@@ -38,7 +38,8 @@ from sensorgen.scene.sections import sections
 if TYPE_CHECKING:
     from sensorgen.models.press2d import BoundaryConditions, Elastic
 
-LAWS = ("unconfined", "bonded", "solved")
+CLOSED_FORM = ("unconfined", "bonded", "infill")
+LAWS = (*CLOSED_FORM, "solved")
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)), 1.2e5)  # 6 N on a tip of 5 x 10 mm are 120 kPa
 _LANDING = f"feet land at negligible force: the rise of C up to {STRESS_PA[1] / 1e3:g} kPa is mostly their fall"
 _STRAIN = np.linspace(0.0, 0.3, 7)  # of infill: lines of its law, which is straight up to there at most
@@ -103,11 +104,17 @@ def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | N
     """
     if name not in ("", *LAWS):
         raise UnknownName("law of compression", name, LAWS)
-    moduli = of_all_materials(design, "youngs_modulus_pa")
-    if is_plate(answer):
-        return _plate(design, moduli, name, printed or drawn(design))
+    moduli, piece = of_all_materials(design, "youngs_modulus_pa"), printed or drawn(design)
+    if is_plate(answer, piece.scene):
+        return _plate(design, moduli, name, piece)
     if name == "bonded":
         raise OutOfRange(f"the law 'bonded' applies to a solid plate; {design.shape} has gaps: expected 'unconfined'")
+    if name == "infill":
+        if found := infill(design, printed):
+            return found
+        raise OutOfRange(
+            f"the law 'infill' applies to solids that stand between flat electrodes; {design.shape} has none"
+        )
     values = {n: t.value for n, t in moduli.items()}
     known = _stored_print(design, printed, values) if printed else _stored(design, values)
     if known and name != "unconfined":
@@ -146,12 +153,12 @@ class Option:
 
 def options(design: Design, answer: Answer, name: str = "", *, printed: Piece | None = None) -> list[Option]:
     """The available laws of a design, the least expensive first; parameters and errors as of :func:`law_of`."""
-    asked = name == "solved" and not is_plate(answer)
+    piece, moduli = printed or drawn(design), of_all_materials(design, "youngs_modulus_pa")
+    asked = name == "solved" and not is_plate(answer, piece.scene)
     at_once = law_of(design, answer, "" if asked else name, printed=printed)
     known = Option(at_once.compression.name, 0.0, at_once, lambda: at_once)
     if at_once.bounded or name == "unconfined":
         return [known]
-    piece, moduli = printed or drawn(design), of_all_materials(design, "youngs_modulus_pa")
     model = model_of(piece, quick=not asked)
     meshes = [
         Option(
@@ -172,7 +179,7 @@ def expected(design: Design, mesh: MeshLevel) -> Curve:
     return replace(compression.prototype(_LIKE[mesh.model]).scaled_modulus(scale), within=mesh.rise_error)
 
 
-def filled(design: Design, piece: Piece | None = None) -> Law | None:
+def infill(design: Design, piece: Piece | None = None) -> Law | None:
     """Law of what lies between flat electrodes, as infill does, between bounds of its stiffness; None of other cells.
 
     Parameters
@@ -182,6 +189,8 @@ def filled(design: Design, piece: Piece | None = None) -> Law | None:
     piece : Piece, optional
         As printed; as drawn where not given.
     """
+    from sensorgen.models import porous
+
     moduli = of_all_materials(design, "youngs_modulus_pa")
     found = porous.filling((piece or drawn(design)).scene, {n: t.value for n, t in moduli.items()})
     if not found:
@@ -191,9 +200,7 @@ def filled(design: Design, piece: Piece | None = None) -> Law | None:
 
     def law(modulus: float, power: float) -> Curve:
         ratio = (1 - _STRAIN) ** -power
-        own = compression.curve(
-            "between columns and levels", porous.SOURCE, (modulus * _STRAIN).tolist(), ratio.tolist()
-        )
+        own = compression.curve("infill", porous.SOURCE, (modulus * _STRAIN).tolist(), ratio.tolist())
         return replace(own, displacement_m=float(_STRAIN[-1]) * found.gap_mm * M_PER_MM)
 
     others = law(modulus_pa.lower, power.upper), law(modulus_pa.upper, power.lower)
@@ -235,7 +242,7 @@ def content(piece: Piece) -> str:
 
 def _plate(design: Design, moduli: Mapping[str, MaterialValue], name: str, piece: Piece) -> Law:
     """A plate, free or bonded; the other law brackets it."""
-    if name == "solved":
+    if name in ("infill", "solved"):
         raise OutOfRange(f"{design.shape} is a solid plate: expected the law 'unconfined' or 'bonded'")
     soft = moduli[film(design)]
     free = compression.unconfined(soft.value)
@@ -329,10 +336,12 @@ def at_a_few_pressures(
     """
     from sensorgen.models.press2d import BoundaryConditions
 
+    if name == "infill":
+        return infill(design, printed)
     known = law_of(design, answer, name, printed=printed)
     model = model_of(printed, quick=True)
     if known.bounded or model == "press3d":
-        return known if known.bounded else filled(design, printed)
+        return known if known.bounded else infill(design, printed)
     try:
         case = _case(design, printed, model, BoundaryConditions())
         found = pressed(case, [stress_pa * part for part in (0, 0.5, 1, 1.25)], COARSEST)

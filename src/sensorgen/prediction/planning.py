@@ -14,7 +14,7 @@ from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.capacitance import Answer, default_width, weighed
-from sensorgen.prediction.compression_law import Law, Option, filled, options
+from sensorgen.prediction.compression_law import Law, Option, infill, options
 from sensorgen.prediction.error_budget import ReferenceLoad
 from sensorgen.prediction.mesh_ladder import Piece
 from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, run_until_within
@@ -117,7 +117,7 @@ def _inexpensive(found: list[Option], design: Design, printed: Piece | None) -> 
     if not spatial:
         return found
     name, said = "nearest prototype", "compression of the nearest cell that was solved"
-    law = filled(design, printed)
+    law = infill(design, printed)
     if law:
         name, said = law.compression.name, "compression of infill, between standing columns and flat levels"
     known = law or replace(spatial[0].expected, bounded=False)

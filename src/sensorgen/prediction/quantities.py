@@ -17,7 +17,7 @@ from sensorgen.models import line
 from sensorgen.models.compression import Compression
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.capacitance import Unpredictable
-from sensorgen.prediction.compression_law import at_a_few_pressures
+from sensorgen.prediction.compression_law import CLOSED_FORM, at_a_few_pressures
 from sensorgen.prediction.electrodes import electrode_resistance
 from sensorgen.prediction.error_budget import ReferenceLoad, error_budget, material_ends
 from sensorgen.prediction.identifiability.fisher import Setup
@@ -196,7 +196,7 @@ def _printed_otherwise(model: SensorModel, load: Load, query: Query) -> Iterator
     pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
     for _, other, rest in ends.values():
         if other is not body:
-            law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa, _plate_law(model))
+            law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa, _closed_form(model))
             yield build_sensor(other, law, query.tip, rest=rest).sensor if law else None
 
 
@@ -211,14 +211,14 @@ def _other_films(model: SensorModel, load: Load, query: Query) -> Iterator[Senso
             continue
         cells = replace(body.cells, scenes={"film": scene}, film=None)
         other = replace(body, make=lambda cells=cells: cells)  # type: ignore[misc]
-        law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa, _plate_law(model))
+        law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa, _closed_form(model))
         at_rest = replace(rest, capacitance=replace(rest.capacitance, value=farad))
         yield build_sensor(other, law, query.tip, rest=at_rest).sensor if law else None
 
 
-def _plate_law(model: SensorModel) -> str:
-    """The law of a plate that was taken, or ""."""
-    return model.law.compression.name if model.law.compression.name in ("unconfined", "bonded") else ""
+def _closed_form(model: SensorModel) -> str:
+    """The law in closed form that was taken, or ""."""
+    return name if (name := model.law.compression.name) in CLOSED_FORM else ""
 
 
 def _end(found: list[tuple[float, Body, RestState]], *, least: bool) -> tuple[float, Body, RestState]:

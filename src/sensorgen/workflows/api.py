@@ -98,7 +98,7 @@ def predict(
     accuracy : float, optional
         Of abs(Z), relative [-]; the default of all commands if not given.
     law : str
-        Law of compression: "unconfined", "bonded" or "solved"; the best within seconds if not given.
+        Law of compression: "unconfined", "bonded", "infill" or "solved"; the best within seconds if not given.
     tip : Tip
         What presses.
     noise : float

@@ -16,7 +16,7 @@ from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import mesh_ladder, planning
 from sensorgen.prediction.capacitance import is_plate
-from sensorgen.prediction.compression_law import elastic, law_of
+from sensorgen.prediction.compression_law import CLOSED_FORM, elastic, law_of
 from sensorgen.prediction.cost_model import expected
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.rest_state import rest_state
@@ -156,20 +156,21 @@ def _capacitance(body: Body) -> Question:
 
 def _compression(body: Body, stress_pa: float) -> Question:
     rest, pressed = rest_state(body, inf), piece(body)
+    plate = is_plate(rest.answer, pressed.scene)
     series, silent = [], [("springs", "it has a displacement and no capacitance")]
-    for law in ("unconfined", "bonded", ""):
+    for law in (*CLOSED_FORM, ""):
         try:
             found = law_of(body.design, rest.answer, law, printed=None if body.is_drawn else pressed)
         except SensorgenError as error:
             silent.append((f"compression: {law}", str(error)))
             continue
-        if law or not (is_plate(rest.answer) or not found.bounded):
+        if law or not (plate or not found.bounded):
             name = f"compression: {law or 'stored curve'}"
             series.append(Series(name, OWN, (("", partial(works.rise_by_law, body, law, stress_pa), 0.0),)))
     references: tuple[Reference, ...] = ()
     for name in mesh_ladder.MODELS:
         why = mesh_ladder.why_not_applicable(pressed, name)
-        if why or is_plate(rest.answer):
+        if why or plate:
             silent.append((name, why or "a solid plate lies between its two laws, free and bonded"))
             continue
         eps = {v.material: v.value for v in permittivities(body.design)}
@@ -181,7 +182,7 @@ def _compression(body: Body, stress_pa: float) -> Question:
         )  # fmt: skip
         series.append(Series(name, OWN, levels))
         references = _published(body, case, stress_pa)
-    if is_plate(rest.answer):
+    if plate:
         ends = [works.rise_by_law(body, law, stress_pa).value[0].real for law in ("unconfined", "bonded")]
         middle = (ends[0] + ends[1]) / 2
         references = (Reference("between a free and a bonded plate", "laws", (middle,), abs(ends[0] / middle - 1)),)
