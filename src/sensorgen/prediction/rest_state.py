@@ -49,7 +49,7 @@ class RestState:
     doubts: tuple[str, ...] = ()
 
 
-def rest_state(body: Body, width: float | None = None) -> RestState:
+def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -> RestState:
     """Capacitance and resistivities of a body at rest.
 
     Parameters
@@ -58,7 +58,9 @@ def rest_state(body: Body, width: float | None = None) -> RestState:
         Drawn or printed.
     width : float, optional
         Relative width that the bounds of the capacitance may have [-]; as of :func:`default_width` if not given, which
-        a larger one does not coarsen. Infinite: closed-form bounds of the most likely cell alone.
+        a larger one does not coarsen. Infinite: closed-form bounds, without ranges.
+    ranges : bool
+        Solve for what other ways to print it and other values of the materials lead to as well.
 
     Raises
     ------
@@ -71,8 +73,8 @@ def rest_state(body: Body, width: float | None = None) -> RestState:
     eps = {v.material: v.value for v in values}
     cells = body.cells
     scene, *others = dict.fromkeys(cells.scenes.values())
-    rough = width == inf
-    wanted = inf if rough else min(width or inf, default_width(scene))
+    ranges = ranges and width != inf
+    wanted = inf if width == inf else min(width or inf, default_width(scene))
     said = cells.remarks.get(next(iter(cells.scenes)), ())
     try:
         answer = capacitance(scene, eps, wanted).times(*cells.counted)
@@ -81,7 +83,7 @@ def rest_state(body: Body, width: float | None = None) -> RestState:
     c = answer.capacitance_f
     found, doubts, unbounded = [c.middle()], list(said), False
     coarse = 2 * wanted if is_open(scene) else wanted  # whole sensors take long
-    for other in () if rough else others:
+    for other in others if ranges else ():
         try:
             found.append(capacitance(other, eps, coarse).capacitance_f.middle() * cells.count)
         except Unpredictable as error:
@@ -89,13 +91,13 @@ def rest_state(body: Body, width: float | None = None) -> RestState:
             rule = _rule(cells, other)
             doubts.append(f"printed by the rule {rule!r} it has no capacitance: {error}")
     by_width = Interval(min(found), max(found))
-    thick, thin = (1.0, 1.0) if rough else _film_ratios(cells, eps)
+    thick, thin = _film_ratios(cells, eps) if ranges else (1.0, 1.0)
     by_film = Interval(c.middle() * thick, c.middle() * (thin or 1.0))
     by_print = Interval(by_width.lower * thick, by_width.upper * (thin or 1.0))
     bounds = Bounds.of(
         c.middle(), "F", model=c, print=by_print, certified=True,
         open="upper" if unbounded or thin is None else "",
-        material=Interval(c.middle(), c.middle()) if rough else _permittivity_range(body.design, scene, c.middle()),
+        material=_permittivity_range(body.design, scene, c.middle()) if ranges else Interval(c.middle(), c.middle()),
     )  # fmt: skip
     ends = (rho["top"].value, rho["bottom"].value)
     resistance, unknown = _resistance(body, scene)

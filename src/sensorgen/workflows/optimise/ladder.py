@@ -15,6 +15,7 @@ from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
+from sensorgen.design.walls import rules as wall_rules
 from sensorgen.prediction import bodies
 from sensorgen.prediction.compression_law import at_a_few_pressures
 from sensorgen.prediction.identifiability.fisher import bounds, slopes
@@ -66,7 +67,7 @@ def known(design: Design, query: Query, solve: bool) -> dict[str, Known]:
 
     Empty where no model applies, as of a short.
     """
-    body = bodies.estimated(design)
+    body = bodies.estimated(design, wall_rules(design.profile.walls)[0])  # the most likely way to print it alone
     question = {"what": "known", "body": body.identity, "query": asdict(query), "solve": solve}
 
     def work() -> dict[str, list[float]]:
@@ -81,8 +82,8 @@ def known(design: Design, query: Query, solve: bool) -> dict[str, Known]:
 
 def _known(body: Body, query: Query, solve: bool) -> dict[str, Known]:
     rule, gap_mm = next(iter(body.cells.gap_mm.items()))
-    body = body.printed_otherwise(rule)  # the most likely cell alone
-    rest = rest_state(body)
+    body = body.printed_otherwise(rule)
+    rest = rest_state(body, ranges=False)
     numbers = Numbers(
         Bounds.of(gap_mm * M_PER_MM, "m", certified=True) if 0 < gap_mm < np.inf else None,
         rest.capacitance, rest.resistance["top"], rest.resistance["bottom"],
