@@ -148,11 +148,12 @@ def filling(scene: Scene, modulus_pa: Mapping[str, float]) -> Filling | None:
     At least the columns that are solid from electrode to electrode carry, each free to bulge; at most each level stays
     flat (Voigt in each level, Reuss over the levels), its solids held like plates bonded to both sides:
 
-    .. math:: \sum_k a_k \left(\sum_j \frac{h_j}{E_j}\right)^{-1} \le \frac{E}{d} \le
-              \frac{4}{3} \left(1 + \frac{w^2}{4 d^2}\right) \left(\sum_j \frac{h_j}{\sum_k a_{jk} E_{jk}}\right)^{-1}
+    .. math:: \sum_k a_k \left(\sum_j \frac{h_j}{E_{jk}}\right)^{-1} \le \frac{E}{d} \le
+              \left(\sum_j \frac{h_j}{s_j \sum_k a_k E_{jk}}\right)^{-1},
+              \quad s_j = \frac{4}{3} \left(1 + \frac{w_j^2}{4 d^2}\right)
 
-    with the columns' shares a of the area, the levels' heights h, the gap d and the width w of the widest solid (Gent
-    and Lindley, 1959, for the factor). The lower one is a bound for faces that slide or stick, the upper an estimate.
+    with the columns' shares a of the area, the levels' heights h, the gap d and the width w of a level's widest solid
+    (Gent and Lindley, 1959, for s). The lower one is a bound for faces that slide or stick, the upper an estimate.
 
     Parameters
     ----------
@@ -175,13 +176,14 @@ def filling(scene: Scene, modulus_pa: Mapping[str, float]) -> Filling | None:
     moduli = np.array([[_modulus(of, (a + b) / 2, modulus_pa) for a, b in pairwise(levels)] for of in between])
     with np.errstate(divide="ignore"):
         standing = float(area @ (1 / (height / moduli).sum(axis=1)))
-        flat = float(1 / (height / (area @ moduli)).sum())
     if not standing:
         return None
-    d, widest = gap[1] - gap[0], _widest_mm(scene, gap)
+    d = gap[1] - gap[0]
+    widest = np.array([_widest_mm(scene, (a + b) / 2) for a, b in pairwise(levels)])
     stiffer = 4 / 3 * (1 + (widest / (2 * d)) ** 2)
+    flat = float(1 / (height / (stiffer * (area @ moduli))).sum())
     share = float(area @ ((moduli > 0) @ height)) / d
-    return Filling(d, share, Interval(d * standing, d * flat * stiffer))
+    return Filling(d, share, Interval(d * standing, d * flat))
 
 
 def _gap(column: Column) -> tuple[float, float] | None:
@@ -203,8 +205,7 @@ def _modulus(layers: list[Layer], z: float, modulus_pa: Mapping[str, float]) -> 
     return next((modulus_pa[one.body.material] for one in layers if one.bottom_mm[0] < z < one.top_mm[0]), 0.0)
 
 
-def _widest_mm(scene: Scene, gap: tuple[float, float]) -> float:
-    """The narrower side of the widest solid between the electrodes [mm]."""
-    pieces = [p for body in scene.bodies if not body.terminal for p in body.pieces]
-    inside = [p for p in pieces if gap[0] - 1e-9 <= p.span("z")[0] and p.span("z")[1] <= gap[1] + 1e-9]
-    return max(min(p.span(axis)[1] - p.span(axis)[0] for axis in "xy") for p in inside)
+def _widest_mm(scene: Scene, z: float) -> float:
+    """The narrower side of the widest solid at a height [mm]."""
+    spans = [[p.span(axis) for axis in "xyz"] for body in scene.bodies if not body.terminal for p in body.pieces]
+    return max(min(x[1] - x[0], y[1] - y[0]) for x, y, (low, high) in spans if low < z < high)
