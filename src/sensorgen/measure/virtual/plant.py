@@ -47,3 +47,11 @@ class Plant(Protocol):
 
     def resistance(self, *, wires: int) -> float:
         """What an ideal multimeter would read across the bottom electrode [ohm]."""
+
+
+def lines(received: bytearray, data: bytes, end: bytes) -> list[bytes]:
+    """Lines that are complete with some more bytes; what is left stays in ``received``."""
+    received += data
+    *found, rest = bytes(received).split(end)
+    received[:] = rest
+    return found

@@ -8,7 +8,7 @@ import re
 import urllib.parse
 from collections import deque
 
-from sensorgen.measure.virtual.plant import Plant
+from sensorgen.measure.virtual.plant import Plant, lines
 
 FAULTS = ("silent", "hung", "garbage", "identity", "truncated", "cut", "error", "stuck")
 _SESSION_S, _QUEUE, _BUFFER = 8.0, 40, 1024
@@ -56,10 +56,7 @@ class RepRapFirmware:
         if self.fault == "cut":
             raise OSError("cable out")
         self._plant.advance(time_s)
-        self._received += data
-        *lines, rest = bytes(self._received).split(b"\n")
-        self._received[:] = rest
-        for line in lines:
+        for line in lines(self._received, data, b"\n"):
             self._accept(line, "usb")
         self._step()
         sent, self._out = bytes(self._out), bytearray()

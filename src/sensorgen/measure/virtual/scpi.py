@@ -5,7 +5,7 @@ Written from their manuals, but without the drivers.
 
 import numpy as np
 
-from sensorgen.measure.virtual.plant import Plant
+from sensorgen.measure.virtual.plant import Plant, lines
 
 FAULTS = ("silent", "hung", "garbage", "identity", "truncated", "cut", "error", "stuck", "overload")
 IDENTITIES = {
@@ -43,10 +43,7 @@ class _Instrument:
         if self.fault == "cut":
             raise OSError("cable out")
         self._plant.advance(time_s)
-        self._received += data
-        *lines, rest = bytes(self._received).split(b"\n")
-        self._received[:] = rest
-        for line in lines:
+        for line in lines(self._received, data, b"\n"):
             self.heard.append(line)
             if self.fault != "hung":
                 self._take(line.decode("ascii", "replace").strip(), time_s)

@@ -3,7 +3,7 @@
 Written from the public notes that the driver names, but without the driver.
 """
 
-from sensorgen.measure.virtual.plant import Plant
+from sensorgen.measure.virtual.plant import Plant, lines
 
 FAULTS = ("silent", "hung", "garbage", "identity", "truncated", "echo", "cut", "error", "stuck", "runaway")
 _SIGNED = {
@@ -67,11 +67,8 @@ class SmacController:
             raise OSError("cable out")
         self._now_s = time_s
         self._plant.advance(time_s)
-        self._received += data
-        *lines, rest = bytes(self._received).split(b"\r")
-        self._received[:] = rest
         self._step()
-        for line in lines:
+        for line in lines(self._received, data, b"\r"):
             self.heard.append(line)
             if self.fault != "hung":
                 self._obey(line)
