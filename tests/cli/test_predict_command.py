@@ -181,7 +181,7 @@ def test_the_verdict_on_a_cell_that_nobody_solved_says_so(run):
         "not known, as the cell was not solved, and is taken to deform as a solid plate;"
     )
     assert (found["senses_force"], found["locates"]) == (None, None)
-    assert not any("cell of triangles" in change["change"] for change in found["changes"])
+    assert not any("triangles 2 mm apart" in change["change"] for change in found["changes"])
     solved = json.loads(run("predict", "tri", "--drawn", "--json").out)["identifiability"]
     assert (solved["senses_force"], solved["assumed"]) == ("yes", None)
 

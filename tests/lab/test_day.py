@@ -38,7 +38,8 @@ def test_every_command_of_the_page_works_in_its_order(tmp_path, monkeypatch):
             (tmp_path / "first.yaml").write_text(experiment, "utf-8")
     assert "31 of 31 presses, simulated" in said["bench"]
     assert "youngs_modulus_pa" in said["calibrate"]
-    off = re.search(r"Impedance at rest: measured ([0-9.]+) % of", said["report"])
+    assert "simulated, not measured: recording 1" in said["calibrate"]
+    off = re.search(r"Impedance at rest: simulated ([0-9.]+) % of", said["report"])
     assert float(off[1]) < 30  # its materials are from their ranges
     assert (tmp_path / "s1.html").exists()
 

@@ -262,6 +262,25 @@ def test_a_fault_planted_in_the_file_is_reported(tmp_path, shared_cache):
     assert "recording 1" in found.stdout
 
 
+def test_a_fault_of_a_device_that_is_not_in_use_is_refused(tmp_path):
+    virtual = {"design": "reference", "faults": [{"what": "lcr-meter hung", "at_s": 2.0}]}
+    found = _cli(_file(tmp_path, virtual=virtual), "--simulate", "--log", tmp_path / "log.db")
+    assert isinstance(found.exception, BadInput)
+    assert "'lcr-meter hung' strikes a device that is not in use; expected one of actuator" in str(found.exception)
+    assert not list(tmp_path.glob("*/*"))
+
+
+def test_a_specimen_that_cannot_be_simulated_is_refused_before_the_run(tmp_path):
+    virtual = {"design": "rect", "truth": {"modulus": 0.1}}
+    design = {"shape": "rect", "parameters": {"angle_deg": 60, "length_mm": 20}}
+    (tmp_path / "slanted.yaml").write_text(yaml.safe_dump(design))
+    file = _file(tmp_path, virtual=virtual | {"design": str(tmp_path / "slanted.yaml")})
+    found = _cli(file, "--simulate", "--log", tmp_path / "log.db")
+    assert isinstance(found.exception, SensorgenError)
+    assert "virtual" in str(found.exception)
+    assert not list(tmp_path.glob("*/*"))
+
+
 def test_faults_are_seen_by_the_fakes_too(tmp_path):
     """One of each device on the mechanism of the tests: both judges agree."""
     for role in ("actuator", "stage", "impedance"):

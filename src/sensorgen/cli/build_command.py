@@ -52,7 +52,9 @@ def _work(
             )  # fmt: skip
     except Unprintable as error:
         _refuse(design, error, budget, apply_change)
-        raise
+        if apply_change is None:
+            raise
+        return FOUND_ERRORS  # of the design as it was: the file has another one now
     render.deliver(DetailedBuild(**vars(built)) if details else built)
     settings.applied(design, built.advice, apply_change)
     return 1 if lost(built.findings) and not force else 0

@@ -172,7 +172,8 @@ def applied(design: "Design", advice: "Advice | None", number: int | None) -> No
     apply(Path(word), design, change)
     from sensorgen.cli import render
 
-    render.say(f"{word}: {', '.join(one.words() for one in change.changes)}", err=True)
+    changes = ", ".join(one.words() for one in change.changes)
+    render.say(f"{word} is changed: {changes}; all above is of the design before: run the command again", err=True)
 
 
 def _options(changes: "tuple[Change, ...]") -> list[str]:

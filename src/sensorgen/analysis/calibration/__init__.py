@@ -201,6 +201,8 @@ def known(
         notes = ["no recording: R, C and leak by meters alone"]
     left_out += unfit
     notes += unfit
+    if simulated := [str(row.number) for row in rows if row.simulated]:
+        notes.insert(0, f"simulated, not measured: recording{'s' * (len(simulated) > 1)} {', '.join(simulated)}")
     model = SpecimenModel(predicted.sensor, tones, spread_of(predicted, bench))
     _check_presses(name, model, data)
     if meter:

@@ -64,10 +64,11 @@ class Run:
 
     @property
     def name(self) -> str:
-        """Specimen, and the recording's number in the log."""
+        """Specimen, the recording's number in the log, and whether it is simulated."""
         part = f", part {self.source.part}" if self.source.part else ""
         lockin = f", lock-in {self.source.lockin}" if self.source.lockin > 1 else ""
-        return f"{self.entry.specimen}, recording {self.entry.number}{part}{lockin}"
+        simulated = ", simulated" if self.entry.simulated else ""
+        return f"{self.entry.specimen}, recording {self.entry.number}{part}{lockin}{simulated}"
 
 
 def runs(

@@ -110,10 +110,13 @@ def headline(table: Table | None) -> Iterator[str]:
     rows = [row for row in table.rows if row.r_residual is not None] if table else []
     if rows:
         off = float(np.median([hypot(row.r_residual, row.x_residual) for row in rows]))
-        names = len({row.recording for row in rows})
+        names = {row.recording for row in rows}
+        simulated = sum(name.endswith(", simulated") for name in names)
+        kind = "simulated" if simulated == len(names) else "measured"
+        beside = f", {simulated} of them simulated" if 0 < simulated < len(names) else ""
         yield (
-            f"Impedance at rest: measured {100 * off:.3g} % of |Z| off the prediction (median of {len(rows)} "
-            f"frequencies in {names} recording{'s' * (names > 1)})."
+            f"Impedance at rest: {kind} {100 * off:.3g} % of |Z| off the prediction (median of {len(rows)} "
+            f"frequencies in {len(names)} recording{'s' * (len(names) > 1)}{beside})."
         )
 
 

@@ -55,14 +55,18 @@ def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Rig
     Raises
     ------
     BadInput, UnknownName
-        As :func:`real`; a virtual specimen that cannot be; a kind without a simulator.
+        As :func:`real`; a virtual specimen that cannot be; a fault of a device that is not in use; a kind without a
+        simulator.
     """
     virtual = experiment.virtual or faults.VirtualSpecimen()
+    devices = experiment.devices or SIMULATED
     with within("virtual"):
+        _strike(virtual, devices)
         plant = faults.rig_of(virtual, design, experiment.pressing.length_mm * 1e-3)
+        plant.specimen.blank  # noqa: B018 - solved now: one that cannot be is refused before the run begins
     found: dict[str, Any] = {}
     for role in ROLES:
-        device: Device = getattr(experiment.devices or SIMULATED, role)
+        device: Device = getattr(devices, role)
         settings = dict(device.settings)
         if device.kind == SIMULATED.actuator.kind:
             settings = {"weight_n": plant.mechanics.weight_n, "friction_n": plant.mechanics.friction_n} | settings
@@ -75,6 +79,15 @@ def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Rig
         if plant.planted and device.kind in _STRIKES:
             plant.planted.attach(_STRIKES[device.kind], made.simulator)
     return Rig(**found), plant
+
+
+def _strike(virtual: faults.VirtualSpecimen, devices: Devices) -> None:
+    """Refuse planted faults of devices that are not in use."""
+    struck = {"rig", *(_STRIKES.get(getattr(devices, role).kind, "") for role in ROLES)}
+    for one in virtual.faults:
+        if faults.FAULTS[one.what].strikes not in struck:
+            known = ", ".join(name for name, fault in faults.FAULTS.items() if fault.strikes in struck)
+            raise BadInput(f"faults: {one.what!r} strikes a device that is not in use; expected one of {known}")
 
 
 def check(devices: Mapping[str, Device]) -> None:

@@ -185,6 +185,11 @@ class BenchRun(_OfSpecimen):
     rig_file: str = ""
     facts: str = "{}"
 
+    @property
+    def simulated(self) -> bool:
+        """Whether ``bench run --simulate`` made it, or its remark begins with that word."""
+        return self.remark.partition(";")[0].strip() == "simulated"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction(Entry):

@@ -195,7 +195,7 @@ def quieter(setup: Setup) -> Setup:
 
 
 CHANGES = (
-    Change("film", "a cell of triangles over a film of 0.1 mm (tri), in place of the film",
+    Change("film", "triangles 2 mm apart over a film of 0.1 mm (tri), in place of this cell",
            "the apexes may short through a film of one or two layers; printing it needs support", cell),
     Change("film", "a film six times softer (X60: 1 MPa by Table 4.1 in place of 6 MPa)",
            "softer filaments are hard to feed, and creep more", soft_film),
