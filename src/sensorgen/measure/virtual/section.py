@@ -17,27 +17,16 @@ FINE_MM = 0.025
 _MOST_COLUMNS = 120  # of elements; the width of a cell with a larger one is cut evenly
 _GRADED = 0.7  # share of the cosine in the grading of elements
 _NONE_MM = 1e-9
-_TERMINALS = {"bottom": 1, "top": 2, FLOATING: 3}
+TERMINALS = {"bottom": 1, "top": 2, FLOATING: 3}
 
 
-def section_of(scene: Scene) -> Section:
-    """The one cross-section of a scene.
-
-    Raises
-    ------
-    OutOfRange
-        The scene has none, or several.
-    """
+def section_of(scene: Scene) -> Section | None:
+    """The one cross-section of a scene; None where it has none, or several."""
     try:
         found = sections(scene)
     except ValueError:
-        found = []
-    if len(found) != 1:
-        raise OutOfRange(
-            f"a virtual specimen of a body with {len(found)} cross-sections; expected a shape with one along the whole "
-            "sensor or across it, as tri or reference"
-        )
-    return found[0]
+        return None
+    return found[0] if len(found) == 1 else None
 
 
 def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM) -> Raster:
@@ -55,9 +44,11 @@ def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM)
     Raises
     ------
     OutOfRange
-        As :func:`section_of`; the section's interfaces are not the same lines from one side to the other.
+        The scene has several cross-sections, or one whose interfaces are not the same lines from side to side.
     """
     section = section_of(scene)
+    if section is None:
+        raise OutOfRange("a raster of a body with several cross-sections; expected one along the sensor or across it")
     across = "xy".index(section.across)
     found = columns(section)
     levels = _levels(found)
@@ -128,5 +119,5 @@ def _kinds(
         bodies.append(column.layers[k].body if k >= 0 and middle < spans[k][1] else None)
     return (
         [materials[b.material] if b else 0 for b in bodies],
-        [_TERMINALS.get(b.terminal, 0) if b else 0 for b in bodies],
+        [TERMINALS.get(b.terminal, 0) if b else 0 for b in bodies],
     )
