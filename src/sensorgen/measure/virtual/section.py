@@ -51,15 +51,9 @@ def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM)
         raise OutOfRange("a raster of a body with several cross-sections; expected one along the sensor or across it")
     across = "xy".index(section.across)
     found = columns(section)
-    levels = _levels(found)
     sides = [found[0].left_mm, *(c.right_mm for c in found)]
     widest = max(fine_mm, (sides[-1] - sides[0]) / _MOST_COLUMNS)
-    lines = [_lines(c, levels) for c in found]
-    if len({len(of) for of in lines}) > 1 or not _joined(lines):
-        raise OutOfRange(
-            "a virtual specimen of a section whose sloping interfaces end inside it; print it: what is printed in "
-            "layers has level ones"
-        )
+    lines = _interfaces(found)
     rows = [max(round(np.max([of[k + 1] - of[k] for of in lines]) / fine_mm), 1) for k in range(len(lines[0]) - 1)]
     pieces = [1] if len(found) == 1 else [max(int(np.ceil((b - a) / widest - 1e-6)), 1) for a, b in pairwise(sides)]
     shares = np.concatenate([[0.0], *(k + graded(n) for k, n in enumerate(rows))])
@@ -84,6 +78,18 @@ def graded(count: int) -> Real:
     """Ends of parts of 1 that are smaller towards both its ends, where corners are."""
     even = np.arange(1, count + 1) / count
     return np.asarray(_GRADED * (1 - np.cos(np.pi * even)) / 2 + (1 - _GRADED) * even)
+
+
+def _interfaces(found: Sequence[Column]) -> list[Real]:
+    """Heights of the interfaces of all columns at their sides, the same ones from side to side [mm]."""
+    levels = _levels(found)
+    lines = [_lines(c, levels) for c in found]
+    if len({len(of) for of in lines}) > 1 or not _joined(lines):
+        raise OutOfRange(
+            "a virtual specimen of a section whose sloping interfaces end inside it; print it: what is printed in "
+            "layers has level ones"
+        )
+    return lines
 
 
 def _levels(found: Sequence[Column]) -> list[float]:
