@@ -126,6 +126,19 @@ def test_at_rest_rect_lies_between_certified_bounds():
     assert bounds.lower * 0.999 < found < bounds.upper * 1.001
 
 
+@pytest.mark.parametrize("shape", ["pillar", "pyramid"])
+def test_arrays_at_rest_lie_between_certified_bounds(shape):
+    from sensorgen.models import fem3d
+
+    cell = printed.body(make({"shape": shape})).cell.scene
+    bounds = next(fem3d.steps(cell, {"x60": 4.68, "air": 1.00059})).interval
+    grids = [bricks(cell, NUMBERS, 0.07, 5500, n) for n in (1, 2)]
+    plan_m2 = (grids[0].x_m[-1] - grids[0].x_m[0]) * (grids[0].y_m[-1] - grids[0].y_m[0])
+    times = cell.size_mm[0] * cell.size_mm[1] * 1e-6 / plan_m2
+    found = times * extrapolated(*(capacitance(of, EPS, of.grid.at_m) for of in grids))
+    assert bounds.lower * 0.999 < found < bounds.upper * 1.001
+
+
 def test_rect_sinks_and_rises_as_in_another_program():
     """NGSolve at small strain; press3d's curve up to 100 kPa: displacement to 3 %, rise to 6 %."""
     known = json.loads((REFERENCE / "rect_rise.json").read_text())["cells"][1]
