@@ -6,6 +6,7 @@ from functools import cache
 from hashlib import sha256
 from math import exp, log
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,15 +16,21 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.values import film, of_all_materials, resistivities
-from sensorgen.measure.virtual.cell import AIR, Grid, Raster, Solid, capacitance, conductance, pressed
+from sensorgen.measure.virtual.bricks import bricks
+from sensorgen.measure.virtual.cell import AIR, Bricks, Raster, Solid, capacitance, conductance, pressed
 from sensorgen.measure.virtual.section import FINE_MM, raster, section_of
 from sensorgen.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from sensorgen.asprinted.printed import Cell
 
 PRESSURES_PA = tuple(1e3 * p for p in (0, 2.5, 5, 10, 20, 35, 60, 100, 150, 200, 300, 400))
 _LN_PERMITTIVITY = (-0.4, 0.0, 0.4)
 _LN_MODULUS = (-0.7, 0.0, 0.7)  # of the dielectric alone
 _ORDER = 4 / 3  # of convergence: energy of a field at a corner of 270 degrees
 _POISSON = 0.4999  # of rubber, where no source gives it
+_FEWEST = 6  # pressures that a cell has to bear: up to 35 kPa
+_PRESSED, _AT_REST = (0.175, 500), (0.07, 5500)  # longest edge [mm] and number of the coarser bricks
 
 
 @dataclass(frozen=True)
@@ -33,7 +40,8 @@ class Blank:
     Attributes
     ----------
     table_f_per_m : (3, 3, k) nested tuples
-        By ln of the dielectric's modulus, of its permittivity, and pressure over the modulus' factor [F/m].
+        By ln of the dielectric's modulus, of its permittivity, and pressure over the modulus' factor, up to the highest
+        at which all were solved [F/m].
     track_ohm_per_m : (float, float)
         Of the top and the bottom electrode [ohm/m].
     by_film_per_mm : float
@@ -57,7 +65,7 @@ class Blank:
         # a modulus that all materials share scales the pressure exactly; the table holds what their ratio does beside
         ln = np.log(np.maximum(self._table[:, :, 1:] / self._table[:, :, :1] - 1, 1e-12))
         found = np.exp(_between(_between(ln, _LN_MODULUS, ln_modulus), _LN_PERMITTIVITY, ln_permittivity))
-        pressure = np.array(PRESSURES_PA)
+        pressure = np.array(PRESSURES_PA[: self._table.shape[-1]])
         return pressure * exp(ln_modulus), np.concatenate([[0.0], found])
 
 
@@ -70,38 +78,31 @@ def _between(values: Real, at: tuple[float, ...], x: float) -> Real:
     return np.asarray(found)
 
 
-def blank(design: Design, fine_mm: float = FINE_MM) -> Blank:
+def blank(design: Design) -> Blank:
     """The body of a design as printed, solved; kept in memory and on disk.
-
-    Parameters
-    ----------
-    design : Design
-        What is printed.
-    fine_mm : float
-        Edge of the finer raster's elements; the coarser one's are twice as long [mm].
 
     Raises
     ------
     OutOfRange
-        Its cell has no single cross-section.
+        Its cell is neither one cross-section nor a few prisms between mirrors, or bears too little pressure.
     MissingValue
         A material without modulus, permittivity or resistivity.
     """
-    key = design.id(), design.machine.tool_height_error_mm, fine_mm
+    key = design.id(), design.machine.tool_height_error_mm
     if key not in _SOLVED:
-        _SOLVED[key] = _stored(design, fine_mm)
+        _SOLVED[key] = _stored(design)
     return _SOLVED[key]
 
 
-_SOLVED: dict[tuple[str, float, float], Blank] = {}
+_SOLVED: dict[tuple[str, float], Blank] = {}
 
 
-def _stored(design: Design, fine_mm: float) -> Blank:
+def _stored(design: Design) -> Blank:
     question = {
-        "what": "virtual blank", "design": design.id(), "fine_mm": fine_mm, "source": _source(),
+        "what": "virtual blank", "design": design.id(), "source": _source(),
         "film_mm": design.machine.tool_height_error_mm,
     }  # fmt: skip
-    found = answers.answer(question, lambda: asdict(_solved(design, fine_mm)))
+    found = answers.answer(question, lambda: asdict(_solved(design)))
     table = tuple(tuple(tuple(row) for row in of) for of in found["table_f_per_m"])
     top, bottom = found["track_ohm_per_m"]
     return Blank(table, (top, bottom), found["by_film_per_mm"])
@@ -111,78 +112,92 @@ def _stored(design: Design, fine_mm: float) -> Blank:
 def _source() -> str:
     """Of the code that decides: a new version solves anew."""
     here = Path(__file__)
-    files = (here, here.with_name("cell.py"), here.with_name("section.py"))
+    files = (here, *(here.with_name(f"{name}.py") for name in ("bricks", "cell", "section")))
     return sha256(b"".join(f.read_bytes() for f in files)).hexdigest()
 
 
-def _solved(design: Design, fine_mm: float) -> Blank:
+def _solved(design: Design) -> Blank:
     from sensorgen.asprinted import printed
 
     cell = printed.body(design).cell
-    section = section_of(cell.scene)
-    depth_m, length_m = section.depth_mm * M_PER_MM, design.params.length_mm * M_PER_MM
-    per_length = depth_m * cell.count / length_m
-    coarse = _table(design, cell.scene, 2 * fine_mm, _LN_MODULUS, _LN_PERMITTIVITY)
-    middle, fine = coarse[1, 1], _table(design, cell.scene, fine_mm, (0.0,), (0.0,))[0, 0]
+    grids = _grids(design, cell.scene, _PRESSED)
+    coarse = _table(design, grids[0], _LN_MODULUS, _LN_PERMITTIVITY)
+    fine = _table(design, grids[1], (0.0,), (0.0,), coarse.shape[-1])[0, 0]
+    coarse = coarse[..., : len(fine)]
+    middle = coarse[1, 1]
     exact = _extrapolated(middle, fine)
     finer = (exact[1:] / exact[0] - 1) / (middle[1:] / middle[0] - 1)
-    rest = _extrapolated(*(_at_rest(design, cell.scene, size) for size in (2 * fine_mm, fine_mm)))
     rise = coarse / coarse[:, :, :1] - 1
-    rise[:, :, 1:] *= finer  # as of the design's values: others change both rasters alike
-    table = per_length * rest[:, None] * (1 + rise)
+    rise[:, :, 1:] *= finer  # as of the design's values: others change both grids alike
+    per_length = _per_length(design, cell, grids[0])
+    table = per_length * _at_rest(design, cell.scene, _LN_PERMITTIVITY)[:, None] * (1 + rise)
     by_film = _by_film(design, cell.scene)
-    return Blank(tuple(tuple(map(tuple, of)) for of in table.tolist()), tracks(design, fine_mm), by_film)
+    return Blank(tuple(tuple(map(tuple, of)) for of in table.tolist()), tracks(design), by_film)
 
 
-def tracks(design: Design, fine_mm: float = FINE_MM) -> tuple[float, float]:
+def tracks(design: Design) -> tuple[float, float]:
     """Resistance per length of the top and the bottom electrode as printed [ohm/m]; errors as :func:`blank`."""
     from sensorgen.asprinted import printed
 
-    cell = printed.body(design).cell
-    section, rho = section_of(cell.scene), resistivities(design)
-    grid, length_m = _raster(design, cell.scene, fine_mm), design.params.length_mm * M_PER_MM
+    cell, rho = printed.body(design).cell, resistivities(design)
+    section, grids = section_of(cell.scene), _grids(design, cell.scene, _AT_REST)
+    along, per_length = section is None or section.across == "x", _per_length(design, cell, grids[0])
     top, bottom = (
-        rho[end].value
-        / _conductor_m2(grid, number, section.depth_mm * M_PER_MM, cell.count, length_m, along=section.across == "x")
+        rho[end].value / (float(_extrapolated(*(_as_track(grid, number, along=along) for grid in grids))) * per_length)
         for end, number in (("top", 2), ("bottom", 1))
     )
     return top, bottom
 
 
-def _raster(design: Design, scene: Scene, fine_mm: float) -> Raster:
-    return raster(scene, {name: k + 1 for k, name in enumerate(_solids(design))}, fine_mm)
+def _grids(design: Design, scene: Scene, of: tuple[float, int]) -> tuple[Raster | Bricks, Raster | Bricks]:
+    """A coarse grid of a cell and one of half its elements' size, bricks of a size and number."""
+    numbers = {name: k + 1 for k, name in enumerate(_solids(design))}
+    if section_of(scene):
+        return raster(scene, numbers, 2 * FINE_MM), raster(scene, numbers, FINE_MM)
+    return bricks(scene, numbers, *of), bricks(scene, numbers, *of, parts=2)
 
 
-def _extrapolated(coarse: Real, fine: Real) -> Real:
-    """To a raster without size, by Richardson."""
-    return fine + (fine - coarse) / (2**_ORDER - 1)
+def _per_length(design: Design, cell: "Cell", grid: Raster | Bricks) -> float:
+    """Depth of all sections of a sensor over its length [-], or number of cells as of bricks per length [1/m]."""
+    x_mm, y_mm, _ = cell.scene.size_mm
+    plan_m2, of_grid = x_mm * y_mm * M_PER_MM**2, float(grid.grid.top_m.sum())
+    return plan_m2 / of_grid * cell.count / (design.params.length_mm * M_PER_MM)
 
 
-def _at_rest(design: Design, scene: Scene, fine_mm: float) -> Real:
-    """Capacitances per depth of a cell at rest, by ln of permittivity [F/m]."""
-    used, grid = _solids(design), _raster(design, scene, fine_mm)
-    number, at = list(used).index(film(design)), Grid(grid).at_m
-    solids = list(used.values())
-    return np.array([capacitance(grid, _permittivities(solids, number, ln), at) for ln in _LN_PERMITTIVITY])
+def _extrapolated(coarse: Real | float, fine: Real | float) -> Real:
+    """To a grid without size, by Richardson."""
+    return np.asarray(fine + (np.asarray(fine) - coarse) / (2**_ORDER - 1))
+
+
+def _at_rest(design: Design, scene: Scene, ln_permittivities: Sequence[float]) -> Real:
+    """Capacitances of a grid's cell at rest, by ln of permittivity [F/m] or [F]."""
+    used = _solids(design)
+    number, solids = list(used).index(film(design)), list(used.values())
+    return _extrapolated(*(
+        np.array([capacitance(of, _permittivities(solids, number, ln), of.grid.at_m) for ln in ln_permittivities])
+        for of in _grids(design, scene, _AT_REST)
+    ))  # fmt: skip
 
 
 def _table(
-    design: Design, scene: Scene, fine_mm: float, ln_moduli: Sequence[float], ln_permittivities: Sequence[float]
-) -> Real:
-    """Capacitances per depth of a cell on one raster, by ln of modulus, of permittivity, and pressure [F/m]."""
-    used, grid = _solids(design), _raster(design, scene, fine_mm)
+    design: Design, grid: Raster | Bricks, ln_moduli: Sequence[float], ln_permittivities: Sequence[float],
+    count: int = len(PRESSURES_PA),
+) -> Real:  # fmt: skip
+    """Capacitances of a grid's cell, by ln of modulus, of permittivity, and pressure, of those all reach."""
+    used = _solids(design)
     number = list(used).index(film(design))
     found = []
     for ln_modulus in ln_moduli:
         solids = list(used.values())
         solids[number] = replace(solids[number], modulus_pa=solids[number].modulus_pa * exp(ln_modulus))
-        loads = [p * exp(ln_modulus) for p in PRESSURES_PA]
-        places = pressed(grid, [AIR, *solids], loads).place_m
+        loads = [p * exp(ln_modulus) for p in PRESSURES_PA[:count]]
+        places = pressed(grid, [AIR, *solids], loads, _FEWEST).place_m
         found.append([
             [capacitance(grid, _permittivities(solids, number, ln), place) for place in places]
             for ln in ln_permittivities
         ])  # fmt: skip
-    return np.array(found)
+    reached = min(len(of[0]) for of in found)
+    return np.array([[row[:reached] for row in of] for of in found])
 
 
 def _permittivities(solids: Sequence[Solid], number: int, ln: float) -> list[float]:
@@ -196,21 +211,17 @@ def _by_film(design: Design, scene: Scene) -> float:
     scenes = [thicker(scene, more) for more in (by, -by)]
     if not by or None in scenes:
         return 0.0
-    solids = list(_solids(design).values())
-    grids = [_raster(design, one, 2 * FINE_MM) for one in scenes if one]
-    ends = [capacitance(grid, _permittivities(solids, 0, 0.0), Grid(grid).at_m) for grid in grids]
+    ends = [float(_at_rest(design, one, (0.0,))[0]) for one in scenes if one]
     return log(ends[0] / ends[1]) / (2 * by)
 
 
-def _conductor_m2(grid: Raster, electrode: int, depth_m: float, count: float, length_m: float, *, along: bool) -> float:
-    """Cross-section of a plain track of the same resistance [m2]."""
+def _as_track(grid: Raster | Bricks, electrode: int, *, along: bool) -> float:
+    """Volume of a plain track that resists as an electrode of the grid's cell: per depth [m2], or of bricks [m3]."""
     period = float(grid.x_m[-1] - grid.x_m[0])
-    if along:
-        across = count * period / length_m  # cells side by side
-        return conductance(grid, electrode) * period * depth_m * across
+    if along or isinstance(grid, Bricks):
+        return conductance(grid, electrode) * period**2
     z = (grid.z_m[:, 1:] + grid.z_m[:, :-1]) / 2
-    area = (np.diff(z, axis=0) * np.diff(grid.x_m))[grid.electrode == electrode].sum()
-    return float(area * count * depth_m / length_m)
+    return float((np.diff(z, axis=0) * np.diff(grid.x_m))[grid.electrode == electrode].sum())
 
 
 def _solids(design: Design) -> Mapping[str, Solid]:

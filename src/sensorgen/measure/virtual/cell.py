@@ -1,13 +1,15 @@
 """A pressed unit cell on a raster: finite strain with air as a very soft third medium, then the electric field.
 
-One element is one cell of a grid whose lines pass through all corners of the section. Contact is what air does when it
-is flattened: its pressure rises without limit (third medium contact, Wriggers, Schroeder and Schwarz, 2013). Written
-apart from ``solvers`` and ``models``, so that what is made here and analysed there shares no error.
+Of a section in plane strain, or of a cell in three dimensions. One element is one cell of a grid whose lines pass
+through all corners. Contact is what air does when it is flattened: its pressure rises without limit (third medium
+contact, Wriggers, Schroeder and Schwarz, 2013). Written apart from ``solvers`` and ``models``, so that what is made
+here and analysed there shares no error.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import cached_property
+from itertools import combinations, pairwise, product
 from typing import Any
 
 import numpy as np
@@ -23,9 +25,54 @@ _HOURGLASS = 1e-3  # stiffness of air's hourglass mode, over its shear modulus: 
 _BULK = 1000.0  # Lame's first constant over the shear modulus at most: with the mean of an element no locking below it
 _ROUNDS = 40
 _SETTLED = 1e-7  # of the energy's fall, relative to the load's work
-_SMALLEST_STEP = 1e-3  # of a load step, before it is given up
+_SMALLEST_STEP = 1e-2  # of a load step, before it is given up
 _GAUSS = 0.5 / np.sqrt(3)
 _FLAT = 1e-9  # of the height: rows that are flatter have none
+_MOST_DIRECT = 15_000  # unknowns of a field that is solved by factors
+_RESIDUAL = 1e-8  # relative, of larger ones
+
+
+@dataclass(frozen=True)
+class Solid:
+    """Young's modulus [Pa], Poisson's ratio [-] and relative permittivity [-] of a material."""
+
+    modulus_pa: float
+    poisson: float
+    permittivity: float
+
+
+AIR = Solid(0.0, 0.0, 1.00059)
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Elements of a section (d = 2) or of a whole cell (d = 3); those of no area are left out.
+
+    Attributes
+    ----------
+    nodes : (e, 2^d) array
+        Numbers of the elements' corners, in the order of :func:`_corners`.
+    at_m : (e, 2^d, d) array
+        Where the corners are, the height last [m].
+    material, electrode : (e,) array
+        As of the raster.
+    fixed : (n, d) array
+        Which displacements of the nodes are zero: all at the base, at the sides those across them.
+    top_m : (n,) array
+        Length or area of the top that belongs to each node [m] or [m2].
+    """
+
+    nodes: Whole
+    at_m: Real
+    material: Whole
+    electrode: Whole
+    fixed: Mask
+    top_m: Real
+
+    @cached_property
+    def shapes(self) -> tuple[Real, Real]:
+        """As :func:`gradients` at rest."""
+        return gradients(self.at_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,56 +99,96 @@ class Raster:
     electrode: Whole
     repeats: bool
 
-
-@dataclass(frozen=True)
-class Solid:
-    """Young's modulus [Pa], Poisson's ratio [-] and relative permittivity [-] of a material."""
-
-    modulus_pa: float
-    poisson: float
-    permittivity: float
-
-
-AIR = Solid(0.0, 0.0, 1.00059)
-
-
-class Grid:
-    """Nodes, elements and shape functions of a raster; constant for all loads. Elements of no area are left out."""
-
-    def __init__(self, raster: Raster) -> None:
-        z = raster.z_m
+    @cached_property
+    def grid(self) -> Grid:
+        """Its elements."""
+        z = self.z_m
         rise = np.diff(z, axis=0) > _FLAT * np.ptp(z)
         number = np.concatenate([np.zeros((1, z.shape[1]), int), rise.cumsum(0)])  # along each side
-        sides = number[:, :-1] if raster.repeats else number
+        sides = number[:, :-1] if self.repeats else number
         number = number + np.concatenate([[0], np.cumsum(sides[-1] + 1)])[: z.shape[1]]
-        if raster.repeats:
+        if self.repeats:
             number[:, -1] = number[:, 0]
-        self.count = int(number.max()) + 1
-        self.edges: Whole = np.empty(0, int) if raster.repeats else np.unique(number[:, [0, -1]])
-        self.base: Whole = np.unique(number[0])
-        x = np.broadcast_to(raster.x_m, z.shape)
+        fixed, top = np.zeros((int(number.max()) + 1, 2), bool), np.zeros(int(number.max()) + 1)
+        fixed[number[0]] = True
+        if not self.repeats:
+            fixed[number[:, [0, -1]], 0] = True
+        np.add.at(top, number[-1], _shares(self.x_m))
+        at = np.stack([np.broadcast_to(self.x_m, z.shape), z], -1)
+        kept = (rise[:, 1:] | rise[:, :-1]).T.ravel()
+        of = self.material.T.ravel()[kept], self.electrode.T.ravel()[kept]
+        return Grid(_at_corners(number.T, 2)[kept], _at_corners(at.swapaxes(0, 1), 2)[kept], *of, fixed, top)
 
-        def corners(of: NDArray[Any]) -> NDArray[Any]:
-            return np.stack([of[:-1, :-1], of[:-1, 1:], of[1:, 1:], of[1:, :-1]], -1).reshape(-1, 4)
 
-        kept = (rise[:, 1:] | rise[:, :-1]).ravel()
-        self.nodes: Whole = corners(number)[kept]
-        self.at_m: Real = np.stack([corners(x), corners(z)], -1)[kept]
-        self.material, self.electrode = raster.material.ravel()[kept], raster.electrode.ravel()[kept]
-        self.top: Whole = np.stack([number[-1, :-1], number[-1, 1:]], -1)
-        self.gradients, self.weight = gradients(self.at_m)
+@dataclass(frozen=True, eq=False)
+class Bricks:
+    """A cell as bricks between mirrors, of planes square to x, y and z.
+
+    Attributes
+    ----------
+    x_m, y_m, z_m : (nx + 1,), (ny + 1,), (nz + 1,) array
+        Places of the planes [m].
+    material, electrode : (nx, ny, nz) array
+        As of :class:`Raster`.
+    """
+
+    x_m: Real
+    y_m: Real
+    z_m: Real
+    material: Whole
+    electrode: Whole
+
+    @cached_property
+    def grid(self) -> Grid:
+        """Its elements."""
+        at = np.stack(np.meshgrid(self.x_m, self.y_m, self.z_m, indexing="ij"), -1)
+        number = np.arange(at[..., 0].size).reshape(at.shape[:3])
+        fixed, top = np.zeros((number.size, 3), bool), np.zeros(number.size)
+        fixed[number[..., 0]] = True
+        fixed[number[[0, -1]], 0] = fixed[number[:, [0, -1]], 1] = True
+        top[number[..., -1]] = np.outer(_shares(self.x_m), _shares(self.y_m))
+        of = self.material.ravel(), self.electrode.ravel()
+        return Grid(_at_corners(number, 3), _at_corners(at, 3), *of, fixed, top)
+
+
+def _shares(at_m: Real) -> Real:
+    """Length that belongs to each of some places in a row [m]."""
+    return np.convolve(np.diff(at_m), [0.5, 0.5])
+
+
+def _corners(dimensions: int) -> Whole:
+    """Corners of the unit square or cube (2^d, d)."""
+    return np.array(list(product((0, 1), repeat=dimensions)))
+
+
+def _at_corners(of: NDArray[Any], dimensions: int) -> NDArray[Any]:
+    """Values at the corners of all elements (e, 2^d, ...), of values at the nodes of a grid."""
+    ends = product((slice(None, -1), slice(1, None)), repeat=dimensions)
+    return np.stack([of[end] for end in ends], dimensions).reshape(-1, 2**dimensions, *of.shape[dimensions:])
 
 
 def gradients(at_m: Real) -> tuple[Real, Real]:
-    """Derivatives of four shape functions at four points of Gauss (e, 4, 4, 2) [1/m], and the points' areas (e, 4)."""
-    points = 0.5 + _GAUSS * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    u, v = points.T
+    """Derivatives of the shape functions at the points of Gauss, and the points' areas or volumes.
+
+    Parameters
+    ----------
+    at_m : (e, 2^d, d) array
+        Corners of elements [m].
+
+    Returns
+    -------
+    (e, g, 2^d, d) array, (e, g) array
+        Of g = 2^d points [1/m], [m^d].
+    """
+    dimensions = at_m.shape[-1]
+    corner = _corners(dimensions)
+    point = (0.5 + _GAUSS * (2 * corner - 1))[:, None]
+    value = np.where(corner, point, 1 - point)
     by = np.stack([
-        np.stack([-(1 - v), 1 - v, v, -v], -1), np.stack([-(1 - u), -u, u, 1 - u], -1),
+        (2 * corner[:, k] - 1) * np.delete(value, k, -1).prod(-1) for k in range(dimensions)
     ], -1)  # fmt: skip
     turn = np.einsum("eni,gnk->egik", at_m, by)
-    area = turn[..., 0, 0] * turn[..., 1, 1] - turn[..., 0, 1] * turn[..., 1, 0]
-    return np.einsum("gnk,egki->egni", by, np.linalg.inv(turn)), area / 4
+    return by @ np.linalg.inv(turn), np.linalg.det(turn) / len(corner)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,84 +210,86 @@ class Pressed:
     place_m: Real
 
 
-def pressed(raster: Raster, solids: Sequence[Solid], pressure_pa: Sequence[float]) -> Pressed:
+def pressed(
+    raster: Raster | Bricks, solids: Sequence[Solid], pressure_pa: Sequence[float], least: int | None = None
+) -> Pressed:
     """Press the top of a cell that stands on a fixed base; its width stays.
 
     Parameters
     ----------
-    raster : Raster
-        The section.
+    raster : Raster or Bricks
+        The section, or the cell.
     solids : sequence of Solid
         Materials by number; the first, of air, counts by its permittivity alone.
     pressure_pa : sequence of float
         Rising, from 0 on [Pa].
+    least : int, optional
+        Number of pressures that have to be reached; the others are left out where no equilibrium is found. All if None.
 
     Raises
     ------
     OutOfRange
-        A pressure at which no equilibrium was found.
+        No equilibrium was found at one of the pressures that have to be reached.
     """
-    grid = Grid(raster)
-    body = _Body(grid, raster, solids)
-    u, rate = np.zeros(2 * grid.count), np.zeros(2 * grid.count)
+    grid = raster.grid
+    body = _Body(grid, solids)
+    u, rate = np.zeros(grid.fixed.size), np.zeros(grid.fixed.size)
     sinks, places = [0.0], [grid.at_m]
     for before, after in pairwise(pressure_pa):
         at, step = before, after - before
-        while at < after - 1e-9 * after:
+        while at < after - 1e-9 * after and step >= _SMALLEST_STEP * (after - before):
             step = min(step, after - at)
             ahead = u + step * rate  # where the last step leads, if that is nearer
             near = body.energy(ahead, at + step) < body.energy(u, at + step)
             found = body.settled(ahead if near else u, at + step)
             if found is None:
                 step /= 2
-                if step < _SMALLEST_STEP * (after - before):
-                    raise OutOfRange(f"the cell has no equilibrium that the raster can find above {at / 1e3:.3g} kPa")
                 continue
             u, rate, at = found, (found - u) / step, at + step
             step *= 1.5
-        sinks.append(float(body.load @ u) / float(np.diff(raster.x_m).sum()))
-        places.append(grid.at_m + u.reshape(-1, 2)[grid.nodes])
-    return Pressed(np.array(pressure_pa, float), np.array(sinks), np.array(places))
+        if at < after - 1e-9 * after:
+            if len(sinks) < (least or len(pressure_pa)):
+                raise OutOfRange(f"the cell has no equilibrium that the raster can find above {at / 1e3:.3g} kPa")
+            break
+        sinks.append(float(body.load @ u) / float(grid.top_m.sum()))
+        places.append(grid.at_m + u.reshape(grid.fixed.shape)[grid.nodes])
+    return Pressed(np.array(pressure_pa[: len(sinks)], float), np.array(sinks), np.array(places))
 
 
 class _Body:
-    """Energy of a cell by its displacements, per depth, and its derivatives."""
+    """Energy of a cell by its displacements, of a section per depth, and its derivatives."""
 
-    def __init__(self, grid: Grid, raster: Raster, solids: Sequence[Solid]) -> None:
+    def __init__(self, grid: Grid, solids: Sequence[Solid]) -> None:
         self.grid = grid
-        number = grid.material
-        self.air: Mask = number == 0
+        self.air: Mask = grid.material == 0
         shear = np.array([0.0] + [s.modulus_pa / 2 / (1 + s.poisson) for s in solids[1:]])
         ratio = np.array([0.0] + [min(2 * s.poisson / (1 - 2 * s.poisson), _BULK) for s in solids[1:]])
         shear[0] = _SOFT * shear[1:].min()
-        self.shear = shear[number]
-        self.bulk = (shear * ratio)[number]
-        nodes = 2 * grid.nodes
-        self.dofs: Whole = np.stack([nodes, nodes + 1], -1).reshape(-1, 8)
-        self.rows = np.repeat(self.dofs, 8, axis=1).ravel()
-        self.cols = np.tile(self.dofs, (1, 8)).ravel()
-        fixed = np.zeros(2 * grid.count, bool)
-        fixed[2 * grid.base] = fixed[2 * grid.base + 1] = fixed[2 * grid.edges] = True
-        self.free = np.flatnonzero(~fixed)
-        self.load = np.zeros(2 * grid.count)  # work per displacement of a pressure of 1, downwards negative
-        np.add.at(self.load, 2 * grid.top + 1, -np.diff(raster.x_m)[:, None] / 2 * np.ones(2))
-        twist = np.array([1.0, -1.0, 1.0, -1.0])
-        size = np.ptp(grid.at_m, axis=1)
-        own = np.where(self.air, _HOURGLASS * self.shear, 0.0) * (size.prod(1) * (size**-2).sum(1))
-        self.hourglass = own[:, None, None] * np.kron(np.outer(twist, twist), np.eye(2))
+        self.shear = shear[grid.material]
+        self.bulk = (shear * ratio)[grid.material]
+        elements, corners, d = grid.at_m.shape
+        self.dofs: Whole = (d * grid.nodes[..., None] + np.arange(d)).reshape(elements, -1)
+        self.rows = np.repeat(self.dofs, corners * d, axis=1).ravel()
+        self.cols = np.tile(self.dofs, (1, corners * d)).ravel()
+        self.free = np.flatnonzero(~grid.fixed)
+        load = np.zeros(grid.fixed.shape)  # work per displacement of a pressure of 1, downwards negative
+        load[:, -1] = -grid.top_m
+        self.load: Real = load.ravel()
+        self.hourglass = np.where(self.air, _HOURGLASS * self.shear, 0.0)[:, None, None] * _twists(grid.at_m)
 
     def strain(self, u: Real) -> tuple[Real, Real]:
-        """Deformation gradients (e, 4, 2, 2) and their determinants (e, 4)."""
-        f = np.eye(2) + np.einsum("eni,egnk->egik", u.reshape(-1, 2)[self.grid.nodes], self.grid.gradients)
-        return f, f[..., 0, 0] * f[..., 1, 1] - f[..., 0, 1] * f[..., 1, 0]
+        """Deformation gradients (e, 2^d, d, d) and their determinants (e, 2^d)."""
+        moved = u.reshape(self.grid.fixed.shape)[self.grid.nodes]
+        f = np.eye(moved.shape[-1]) + moved.swapaxes(1, 2)[:, None] @ self.grid.shapes[0]
+        return f, np.linalg.det(f)
 
     def energy(self, u: Real, pressure: float) -> float:
         """Of strain less the load's work; infinite where an element is turned inside out."""
         f, j = self.strain(u)
         if (j <= 0).any():
             return np.inf
-        w, ln = self.grid.weight, np.log(j)
-        density = self.shear[:, None] * ((f * f).sum((2, 3)) / 2 - 1 - ln)
+        w, ln = self.grid.shapes[1], np.log(j)
+        density = self.shear[:, None] * (((f * f).sum((2, 3)) - f.shape[-1]) / 2 - ln)
         density = density + np.where(self.air, _AIR_BULK / 2 * self.shear, 0.0)[:, None] * ln**2
         mean = (w * j).sum(1) / w.sum(1) - 1
         own = u[self.dofs]
@@ -209,29 +298,24 @@ class _Body:
         return float(total - pressure * (self.load @ u))
 
     def slopes(self, u: Real) -> tuple[Real, Real]:
-        """Forces (e, 8) and stiffness (e, 8, 8) of the elements."""
+        """Forces (e, m) and stiffness (e, m, m) of the elements, of m displacements each."""
         f, j = self.strain(u)
-        w, g = self.grid.weight, self.grid.gradients
+        g, w = self.grid.shapes
+        elements, points, corners, d = g.shape
         mean = (w * j).sum(1) / w.sum(1) - 1
-        by_ln = -self.shear[:, None] + (self.bulk * mean)[:, None] * j
-        twice = (self.bulk * mean)[:, None] * j
         air = self.air[:, None]
-        by_ln = np.where(air, self.shear[:, None] * (_AIR_BULK * np.log(j) - 1), by_ln)
-        twice = np.where(air, _AIR_BULK * self.shear[:, None], twice)
-        inverse = np.stack([
-            np.stack([f[..., 1, 1], -f[..., 1, 0]], -1), np.stack([-f[..., 0, 1], f[..., 0, 0]], -1),
-        ], -2) / j[..., None, None]  # transposed  # fmt: skip
-        b = np.einsum("egik,egnk->egni", inverse, g)
-        n = len(j)
-        force = np.einsum("eg,egik,egnk->eni", w * self.shear[:, None], f, g) + np.einsum("eg,egni->eni", w * by_ln, b)
-        same = np.einsum("eg,egnk,egmk->enm", w * self.shear[:, None], g, g)
-        k = np.einsum("enm,ij->enimj", same, np.eye(2))
-        k = k + np.einsum("eg,egni,egmj->enimj", w * twice, b, b) - np.einsum("eg,egnj,egmi->enimj", w * by_ln, b, b)
-        stiff = k.reshape(n, 8, 8)
-        volume = np.einsum("eg,egni->eni", w * j, b).reshape(n, 8)
-        stiff = stiff + (self.bulk / w.sum(1))[:, None, None] * volume[:, :, None] * volume[:, None, :]
+        twice = np.where(air, _AIR_BULK * self.shear[:, None], (self.bulk * mean)[:, None] * j)  # by ln J, twice
+        by_ln = np.where(air, self.shear[:, None] * (_AIR_BULK * np.log(j) - 1), twice - self.shear[:, None])
+        b = g @ np.linalg.inv(f)  # derivatives of ln J
+        stretch, flat = w * self.shear[:, None], b.reshape(elements, points, -1)
+        force = np.einsum("eg,egnk,egik->eni", stretch, g, f) + np.einsum("eg,egni->eni", w * by_ln, b)
+        turned = _products(w * by_ln, flat).reshape(elements, corners, d, corners, d).swapaxes(2, 4)
+        k = _each_way(_gradient_products(stretch, g), d) + _products(w * twice, flat)
+        k = k - turned.reshape(k.shape)
+        volume = np.einsum("eg,egm->em", w * j, flat)
+        k = k + (self.bulk / w.sum(1))[:, None, None] * volume[:, :, None] * volume[:, None, :]
         own = np.einsum("eab,eb->ea", self.hourglass, u[self.dofs])
-        return force.reshape(n, 8) + own, stiff + self.hourglass
+        return force.reshape(elements, -1) + own, k + self.hourglass
 
     def settled(self, u: Real, pressure: float) -> Real | None:
         """Displacements in equilibrium, by Newton's method with a search along each step; None if there is none."""
@@ -239,7 +323,7 @@ class _Body:
         from scipy.sparse.linalg import splu
 
         energy, work = self.energy(u, pressure), 0.0
-        size = 2 * self.grid.count
+        size = self.grid.fixed.size
         for _ in range(_ROUNDS):
             force, stiff = self.slopes(u)
             left = pressure * self.load - np.bincount(self.dofs.ravel(), force.ravel(), size)
@@ -265,59 +349,90 @@ class _Body:
         return None
 
 
-def capacitance(raster: Raster, permittivity: Sequence[float], place_m: Real) -> float:
-    """Between the electrodes, per depth [F/m].
+def _products(weight: Real, of: Real) -> Real:
+    """Sums over points of weight (e, g) times the products of a vector's (e, g, m) components (e, m, m)."""
+    return np.asarray((weight[..., None] * of).swapaxes(1, 2) @ of)
+
+
+def _gradient_products(weight: Real, by: Real) -> Real:
+    """Sums over points of weight (e, g) times the scalar products of gradients (e, g, n, d), of all pairs (e, n, n)."""
+    return np.asarray(sum(_products(weight, by[..., k]) for k in range(by.shape[-1])))
+
+
+def _each_way(of: Real, dimensions: int) -> Real:
+    """Matrices of one quantity (e, n, n) for each component of a vector alike (e, n d, n d)."""
+    size = of.shape[-1] * dimensions
+    return np.asarray(np.einsum("enm,ij->enimj", of, np.eye(dimensions)).reshape(-1, size, size))
+
+
+def _twists(at_m: Real) -> Real:
+    """Stiffness of the hourglass modes of elements of a unit modulus (e, m, m)."""
+    dimensions = at_m.shape[-1]
+    sign, size = 2 * _corners(dimensions) - 1, np.ptp(at_m, axis=1)
+    found = 0.0
+    for count in range(2, dimensions + 1):
+        for axes in combinations(range(dimensions), count):
+            twist = sign[:, axes].prod(1)
+            own = size.prod(1) * (size[:, axes] ** -2).sum(1) * 4.0 ** (count - dimensions)
+            found = found + own[:, None, None] * np.outer(twist, twist)
+    return _each_way(np.asarray(found), dimensions)
+
+
+def capacitance(raster: Raster | Bricks, permittivity: Sequence[float], place_m: Real) -> float:
+    """Between the electrodes, of a section per depth [F/m], of bricks [F].
 
     Parameters
     ----------
-    raster : Raster
-        The section.
+    raster : Raster or Bricks
+        The section, or the cell.
     permittivity : sequence of float
         Relative, by material; the first of air.
-    place_m : (e, 4, 2) array
+    place_m : (e, 2^d, d) array
         Corners of its elements, displaced [m].
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.linalg import splu
-
-    grid = Grid(raster)
+    grid = raster.grid
     inside = grid.electrode == 0
-    corners = grid.nodes[inside]
-    by, area = gradients(place_m[inside])
+    by, size = gradients(place_m[inside])
     eps = np.array(permittivity)[grid.material[inside]] * EPSILON_0
-    k = np.einsum("eg,egni,egmi->enm", eps[:, None] * np.abs(area), by, by)
-    same = _potentials(grid)
-    used, numbers = np.unique(same[corners], return_inverse=True)
-    numbers = numbers.reshape(corners.shape)
-    whole = coo_matrix((k.ravel(), (np.repeat(numbers, 4, 1).ravel(), np.tile(numbers, (1, 4)).ravel())),
-                       (len(used), len(used))).tocsc()  # fmt: skip
-    v = (used == -2).astype(float)
-    free = np.flatnonzero(used >= 0)
-    fixed = np.flatnonzero(used < 0)
-    v[free] = splu(whole[free][:, free]).solve(-(whole[free][:, fixed] @ v[fixed]))
-    return float(v @ (whole @ v))
+    return _flux(_potentials(grid)[grid.nodes[inside]], eps[:, None] * np.abs(size), by)
 
 
-def conductance(raster: Raster, electrode: int) -> float:
-    """Of an electrode from one side of the section to the other, per depth and conductivity [-]."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.linalg import splu
-
-    grid = Grid(raster)
+def conductance(raster: Raster | Bricks, electrode: int) -> float:
+    """Of an electrode from the lowest x to the highest, per conductivity: of a section per depth [-], of bricks [m]."""
+    grid = raster.grid
     inside = grid.electrode == electrode
-    by, area = gradients(grid.at_m[inside])
-    k = np.einsum("eg,egni,egmi->enm", area, by, by)
-    used, numbers = np.unique(grid.nodes[inside], return_inverse=True)
-    numbers = numbers.reshape(-1, 4)
-    pairs = np.repeat(numbers, 4, 1).ravel(), np.tile(numbers, (1, 4)).ravel()
+    by, size = gradients(grid.at_m[inside])
+    x = grid.at_m[inside][..., 0]
+    left, right = (np.isclose(x, side, rtol=0, atol=1e-9) for side in (raster.x_m[0], raster.x_m[-1]))
+    return _flux(np.where(left, -1, np.where(right, -2, grid.nodes[inside])), size, by)
+
+
+def _flux(unknown: Whole, weight: Real, by: Real) -> float:
+    """Between potentials 0 and 1, of elements with their corners' unknowns (e, n), -1 and -2 at those potentials."""
+    from scipy.sparse import coo_matrix
+
+    used, number = np.unique(unknown, return_inverse=True)
+    k, (elements, corners) = _gradient_products(weight, by), unknown.shape
+    number = number.reshape(elements, corners)
+    pairs = np.repeat(number, corners, 1).ravel(), np.tile(number, (1, corners)).ravel()
     whole = coo_matrix((k.ravel(), pairs), (len(used), len(used))).tocsc()
-    at = np.empty(len(used))
-    at[numbers] = grid.at_m[inside][..., 0]
-    left, right = (np.isclose(at, side, rtol=0, atol=1e-9) for side in (raster.x_m[0], raster.x_m[-1]))
-    v = right.astype(float)
-    free, fixed = np.flatnonzero(~(left | right)), np.flatnonzero(left | right)
-    v[free] = splu(whole[free][:, free]).solve(-(whole[free][:, fixed] @ v[fixed]))
+    v = (used == -2).astype(float)
+    free, fixed = np.flatnonzero(used >= 0), np.flatnonzero(used < 0)
+    v[free] = _solved(whole[free][:, free], -(whole[free][:, fixed] @ v[fixed]))
     return float(v @ (whole @ v))
+
+
+def _solved(matrix: Any, right: Real) -> Real:
+    """Solution of a symmetric positive definite system; a large one by conjugate gradients."""
+    from scipy.sparse import diags
+    from scipy.sparse.linalg import cg, splu
+
+    if len(right) < _MOST_DIRECT:
+        return np.asarray(splu(matrix).solve(right))
+    found, failed = cg(matrix, right, rtol=_RESIDUAL, M=diags(1 / matrix.diagonal()))
+    if failed:
+        raise OutOfRange(f"the field of a cell with {len(right)} unknowns did not converge")
+    return np.asarray(found)
 
 
 def _potentials(grid: Grid) -> Whole:
@@ -325,10 +440,11 @@ def _potentials(grid: Grid) -> Whole:
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    found = np.arange(grid.count)
+    count = len(grid.top_m)
+    found = np.arange(count)
     loose = grid.nodes[grid.electrode > 2]
-    pairs = loose[:, [0, 1, 2]].ravel(), loose[:, [1, 2, 3]].ravel()
-    _, piece = connected_components(coo_matrix((np.ones(len(pairs[0])), pairs), (grid.count, grid.count)), False)
+    pairs = loose[:, :-1].ravel(), loose[:, 1:].ravel()
+    _, piece = connected_components(coo_matrix((np.ones(len(pairs[0])), pairs), (count, count)), False)
     found[loose] = np.unique(piece, return_index=True)[1][piece][loose]
     for terminal in (2, 1):
         found[grid.nodes[grid.electrode == terminal]] = -terminal

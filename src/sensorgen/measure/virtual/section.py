@@ -17,27 +17,16 @@ FINE_MM = 0.025
 _MOST_COLUMNS = 120  # of elements; the width of a cell with a larger one is cut evenly
 _GRADED = 0.7  # share of the cosine in the grading of elements
 _NONE_MM = 1e-9
-_TERMINALS = {"bottom": 1, "top": 2, FLOATING: 3}
+TERMINALS = {"bottom": 1, "top": 2, FLOATING: 3}
 
 
-def section_of(scene: Scene) -> Section:
-    """The one cross-section of a scene.
-
-    Raises
-    ------
-    OutOfRange
-        The scene has none, or several.
-    """
+def section_of(scene: Scene) -> Section | None:
+    """The one cross-section of a scene; None where it has none, or several."""
     try:
         found = sections(scene)
     except ValueError:
-        found = []
-    if len(found) != 1:
-        raise OutOfRange(
-            f"a virtual specimen of a body with {len(found)} cross-sections; expected a shape with one along the whole "
-            "sensor or across it, as tri or reference"
-        )
-    return found[0]
+        return None
+    return found[0] if len(found) == 1 else None
 
 
 def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM) -> Raster:
@@ -55,20 +44,16 @@ def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM)
     Raises
     ------
     OutOfRange
-        As :func:`section_of`; the section's interfaces are not the same lines from one side to the other.
+        The scene has several cross-sections, or one whose interfaces are not the same lines from side to side.
     """
     section = section_of(scene)
+    if section is None:
+        raise OutOfRange("a raster of a body with several cross-sections; expected one along the sensor or across it")
     across = "xy".index(section.across)
     found = columns(section)
-    levels = _levels(found)
     sides = [found[0].left_mm, *(c.right_mm for c in found)]
     widest = max(fine_mm, (sides[-1] - sides[0]) / _MOST_COLUMNS)
-    lines = [_lines(c, levels) for c in found]
-    if len({len(of) for of in lines}) > 1 or not _joined(lines):
-        raise OutOfRange(
-            "a virtual specimen of a section whose sloping interfaces end inside it; print it: what is printed in "
-            "layers has level ones"
-        )
+    lines = _interfaces(found)
     rows = [max(round(np.max([of[k + 1] - of[k] for of in lines]) / fine_mm), 1) for k in range(len(lines[0]) - 1)]
     pieces = [1] if len(found) == 1 else [max(int(np.ceil((b - a) / widest - 1e-6)), 1) for a, b in pairwise(sides)]
     shares = np.concatenate([[0.0], *(k + graded(n) for k, n in enumerate(rows))])
@@ -93,6 +78,18 @@ def graded(count: int) -> Real:
     """Ends of parts of 1 that are smaller towards both its ends, where corners are."""
     even = np.arange(1, count + 1) / count
     return np.asarray(_GRADED * (1 - np.cos(np.pi * even)) / 2 + (1 - _GRADED) * even)
+
+
+def _interfaces(found: Sequence[Column]) -> list[Real]:
+    """Heights of the interfaces of all columns at their sides, the same ones from side to side [mm]."""
+    levels = _levels(found)
+    lines = [_lines(c, levels) for c in found]
+    if len({len(of) for of in lines}) > 1 or not _joined(lines):
+        raise OutOfRange(
+            "a virtual specimen of a section whose sloping interfaces end inside it; print it: what is printed in "
+            "layers has level ones"
+        )
+    return lines
 
 
 def _levels(found: Sequence[Column]) -> list[float]:
@@ -128,5 +125,5 @@ def _kinds(
         bodies.append(column.layers[k].body if k >= 0 and middle < spans[k][1] else None)
     return (
         [materials[b.material] if b else 0 for b in bodies],
-        [_TERMINALS.get(b.terminal, 0) if b else 0 for b in bodies],
+        [TERMINALS.get(b.terminal, 0) if b else 0 for b in bodies],
     )

@@ -1,0 +1,197 @@
+"""The virtual specimen of shapes with several cross-sections: bricks against closed forms, sections, other programs."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from cell_scenes import rect_cell
+from click.testing import CliRunner
+
+from sensorgen.asprinted import printed
+from sensorgen.cli import cli
+from sensorgen.core.errors import OutOfRange
+from sensorgen.design.design import make
+from sensorgen.measure.virtual.blank import blank
+from sensorgen.measure.virtual.bricks import bricks
+from sensorgen.measure.virtual.cell import AIR, EPSILON_0, Bricks, Raster, Solid, capacitance, conductance, pressed
+from sensorgen.measure.virtual.specimen import Specimen
+from sensorgen.scene.scene import Body, Scene, box
+
+REFERENCE = Path(__file__).parents[1] / "reference"
+X60, ETPU = Solid(6e6, 0.4999, 4.68), Solid(22e6, 0.4999, 5.73)
+SOLIDS, EPS = [AIR, X60, ETPU], [AIR.permittivity, 4.68, 1.0]
+NUMBERS = {"x60": 1, "etpu": 2}
+ORDER = 4 / 3
+TRI = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
+RECT = {"shape": "rect", "parameters": {"dielectric_mm": 0.2}}
+
+
+@pytest.fixture(autouse=True)
+def _stored(shared_cache):
+    """Blanks are solved once for all tests."""
+
+
+def extrapolated(coarse, fine):
+    return fine + (fine - coarse) / (2**ORDER - 1)
+
+
+def bar(material, electrode):
+    """Bricks of 0.5 x 0.4 x 1.2 mm, of layers upwards."""
+    x, y, z = np.linspace(0, 0.5e-3, 3), np.linspace(0, 0.4e-3, 4), np.array([0, 0.3, 0.5, 0.9, 1.2]) * 1e-3
+    return Bricks(x, y, z, *(np.broadcast_to(of, (2, 3, 4)).copy() for of in (material, electrode)))
+
+
+def quarter():
+    """Of a cell of rect as drawn: from the middle of a conductor's strip to that of a dielectric's, both ways."""
+    whole = rect_cell(0.2)
+    bodies = []
+    for body in whole.bodies:
+        ends = [[(max(a, 0.35) - 0.35, min(b, 1.35) - 0.35) for a, b in map(p.span, "xy")] for p in body.pieces]
+        inside = zip(ends, body.pieces, strict=True)
+        cut = (box(*x, *y, *p.span("z")) for (x, y), p in inside if x[0] < x[1] and y[0] < y[1])
+        bodies.append(replace(body, pieces=tuple(cut)))
+    return replace(whole, bodies=tuple(bodies), size_mm=(1.0, 1.0, whole.size_mm[2]))
+
+
+def test_layers_between_plates_are_capacitors_in_series():
+    layered = bar([2, 1, 0, 2], [1, 0, 0, 2])
+    found = capacitance(layered, EPS, layered.grid.at_m)
+    assert found == pytest.approx(EPSILON_0 * 0.2e-6 / (0.2e-3 / 4.68 + 0.4e-3 / 1.00059), rel=1e-9)
+
+
+def test_blocks_between_plates_are_capacitors_side_by_side():
+    beside = bar([2, 1, 1, 2], [1, 0, 0, 2])
+    beside.material[1, :, 1:3] = 0
+    found = capacitance(beside, EPS, beside.grid.at_m)
+    assert found == pytest.approx(EPSILON_0 * 0.1e-6 / 0.6e-3 * (4.68 + 1.00059), rel=1e-9)
+
+
+def test_a_large_field_is_solved_by_iterations_to_the_same():
+    x, z = np.linspace(0, 1e-3, 31), np.linspace(0, 1.2e-3, 31)
+    electrode = np.zeros((30, 30, 30), int)
+    electrode[..., 0], electrode[..., -1] = 1, 2
+    large = Bricks(x, x, z, np.where(electrode, 2, 1), electrode)
+    found = capacitance(large, EPS, large.grid.at_m)
+    assert found == pytest.approx(EPSILON_0 * 4.68 * 1e-6 / (28 * 0.04e-3), rel=1e-6)
+
+
+def test_the_conductance_of_a_bar_is_its_cross_section_over_its_length():
+    assert conductance(bar([2, 1, 0, 2], [1, 0, 0, 2]), 2) == pytest.approx(0.4e-3 * 0.3e-3 / 0.5e-3, rel=1e-9)
+
+
+def test_bricks_of_one_section_are_that_section():
+    """A strip beside air on a film: displacement and capacitance per depth to rounding."""
+    x, y, z = (np.array(of) * 1e-3 for of in ([0, 0.2, 0.4, 0.7, 1.0], [0, 0.7], [0, 0.2, 0.4, 0.7, 1.0]))
+    material, electrode = np.full((4, 4), 2), np.zeros((4, 4), int)
+    material[:, 1], material[2:, 2] = 1, 0
+    electrode[:, 0], electrode[material == 2] = 1, 2
+    electrode[:, 0] = 1
+    flat = Raster(x, np.tile(z[:, None], len(x)), material.T, electrode.T, False)
+    deep = Bricks(x, y, z, material[:, None], electrode[:, None])
+    loads = [0.0, 1e4, 2e5]
+    two, three = pressed(flat, SOLIDS, loads), pressed(deep, SOLIDS, loads)
+    assert three.sink_m == pytest.approx(two.sink_m, rel=1e-6)
+    for section, cell in zip(two.place_m, three.place_m, strict=True):
+        assert capacitance(deep, EPS, cell) / 0.7e-3 == pytest.approx(capacitance(flat, EPS, section), rel=1e-9)
+
+
+def test_the_part_that_mirrors_repeat_is_solved():
+    """A quarter of a printed cell; of a whole sensor in which the cells do not go up evenly, the same."""
+    cell = printed.body(make(RECT)).cell.scene
+    part = bricks(cell, NUMBERS, 0.175, 500)
+    assert (part.x_m[-1] - part.x_m[0], part.y_m[-1] - part.y_m[0]) == pytest.approx((1e-3, 1e-3))
+    blocks = [box(x, x + 1.4, y, y + 0.9, 0.5, 0.8) for x in np.arange(0.3, 40, 2) for y in np.arange(0.2, 20, 1)]
+    whole = Scene((Body("blocks", "x60", tuple(blocks)),), (40.0, 20.3, 1.4))
+    many = bricks(whole, NUMBERS, 0.175, 500)
+    assert (many.x_m[-1] - many.x_m[0], many.y_m[-1] - many.y_m[0]) == pytest.approx((1e-3, 0.5e-3))
+
+
+def test_finer_bricks_converge_in_the_order_that_extrapolates_them():
+    cell = quarter()
+    c = [capacitance(of, EPS, of.grid.at_m) for of in (bricks(cell, NUMBERS, 0.175, 500, n) for n in (1, 2, 4))]
+    assert 2**ORDER * 0.85 < (c[0] - c[1]) / (c[1] - c[2]) < 2**ORDER * 1.4
+
+
+def test_at_rest_rect_lies_between_certified_bounds():
+    from sensorgen.models import fem3d
+
+    design = make(RECT)
+    cell = printed.body(design).cell
+    bounds = next(fem3d.steps(cell.scene, {"x60": 4.68, "air": 1.00059})).interval
+    per_length = cell.count / 0.1
+    found = blank(design).capacitance_f_per_m(0.0) / per_length
+    assert bounds.lower * 0.999 < found < bounds.upper * 1.001
+
+
+@pytest.mark.parametrize("shape", ["pillar", "pyramid"])
+def test_arrays_at_rest_lie_between_certified_bounds(shape):
+    from sensorgen.models import fem3d
+
+    cell = printed.body(make({"shape": shape})).cell.scene
+    bounds = next(fem3d.steps(cell, {"x60": 4.68, "air": 1.00059})).interval
+    grids = [bricks(cell, NUMBERS, 0.07, 5500, n) for n in (1, 2)]
+    plan_m2 = (grids[0].x_m[-1] - grids[0].x_m[0]) * (grids[0].y_m[-1] - grids[0].y_m[0])
+    times = cell.size_mm[0] * cell.size_mm[1] * 1e-6 / plan_m2
+    found = times * extrapolated(*(capacitance(of, EPS, of.grid.at_m) for of in grids))
+    assert bounds.lower * 0.999 < found < bounds.upper * 1.001
+
+
+def test_rect_sinks_and_rises_as_in_another_program():
+    """NGSolve at small strain; press3d's curve up to 100 kPa: displacement to 3 %, rise to 6 %."""
+    known = json.loads((REFERENCE / "rect_rise.json").read_text())["cells"][1]
+    assert known["dielectric_mm"] == 0.2
+    exact = known["meshes"][-1]
+    loads = [0.0, 1e4, 1e5]
+    c, sink = [], []
+    for n in (1, 2):
+        grid = bricks(quarter(), NUMBERS, 0.175, 500, n)
+        found = pressed(grid, SOLIDS, loads)
+        c.append(np.array([capacitance(grid, EPS, place) for place in found.place_m]))
+        sink.append(found.sink_m)
+    limit = extrapolated(*c)
+    assert extrapolated(*sink)[1] == pytest.approx(exact["displacement_um"] * 1e-6, rel=0.03)
+    assert limit[1:] / limit[0] - 1 == pytest.approx([exact["rise"], 0.0107451], rel=0.06)
+
+
+def test_patterns_without_mirrors_are_refused():
+    with pytest.raises(OutOfRange, match="pattern without mirrors; expected strips along or across the sensor"):
+        _ = Specimen(make({"shape": "rect", "parameters": {"angle_deg": 60}})).capacitance_f_per_m
+
+
+def test_cells_of_too_many_faces_are_refused():
+    whole = make({"shape": "rect", "parameters": {"length_mm": 33.3, "width_mm": 10.7}}).in_use
+    with pytest.raises(OutOfRange, match="faces along x, y and z; expected a pattern that repeats"):
+        bricks(whole, NUMBERS, 0.175, 500)
+
+
+def test_a_very_soft_dielectric_is_pressed_as_far_as_it_bears():
+    soft = make({**TRI, "material_values": {"x60": {"youngs_modulus_pa": 2e6}}})
+    specimen = Specimen(soft)
+    pressure, rise = specimen.blank.rise(0.0, 0.0)
+    assert 3.5e4 <= pressure[-1] < 4e5
+    assert (np.diff(rise) > 0).all()
+    ends = [specimen.rise(force, 5e-3) for force in np.array([0.9, 1.0, 2.0]) * pressure[-1] * 10e-3 * 5e-3]
+    assert ends[0] < ends[1] < ends[2]
+
+
+def test_a_cell_that_bears_nothing_is_refused():
+    layered = bar([2, 1, 0, 2], [1, 0, 0, 2])
+    assert len(pressed(layered, SOLIDS, [0.0, 1e3, 1e12], least=2).sink_m) == 2
+    with pytest.raises(OutOfRange, match="no equilibrium that the raster can find above"):
+        pressed(layered, SOLIDS, [0.0, 1e3, 1e12])
+
+
+def test_a_bench_presses_crossed_strips(tmp_path, monkeypatch):
+    monkeypatch.setenv("SENSORGEN_LOG", str(tmp_path / "log.db"))
+    monkeypatch.chdir(tmp_path)
+    Path("mine.yaml").write_text(yaml.safe_dump(RECT), "utf-8")
+    plan = [{"hold": {"position_mm": 40, "force_n": 4.0, "hold_s": 1.0, "rest_s": 2.0}}]
+    asked = {"specimen": "S1", "virtual": {"seed": 3}, "plan": plan}
+    Path("first.yaml").write_text(yaml.safe_dump(asked), "utf-8")
+    for words in (["log", "specimen", "S1", "--design", "mine.yaml"], ["bench", "run", "first.yaml", "--simulate"]):
+        done = CliRunner().invoke(cli, words)
+        assert done.exit_code == 0, done.output
+    assert "1 of 1 presses, simulated" in done.output
