@@ -12,7 +12,7 @@ from laboratory import PLAN, asked, laboratory, outcome
 
 from sensorgen.cli import cli
 from sensorgen.core import document
-from sensorgen.core.errors import SensorgenError
+from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.measure.lab import recorder, run
 from sensorgen.measure.lab.clock import SimulatedClock
 from sensorgen.measure.lab.plans import Choice
@@ -271,10 +271,9 @@ def test_a_fault_of_a_device_that_is_not_in_use_is_refused(tmp_path):
 
 
 def test_a_specimen_that_cannot_be_simulated_is_refused_before_the_run(tmp_path):
-    virtual = {"design": "rect", "truth": {"modulus": 0.1}}
-    design = {"shape": "rect", "parameters": {"angle_deg": 60, "length_mm": 20}}
+    design = {"shape": "rect", "parameters": {"angle_deg": 60, "length_mm": 40}}
     (tmp_path / "slanted.yaml").write_text(yaml.safe_dump(design))
-    file = _file(tmp_path, virtual=virtual | {"design": str(tmp_path / "slanted.yaml")})
+    file = _file(tmp_path, plan=PLAN[:1], virtual={"design": str(tmp_path / "slanted.yaml")})
     found = _cli(file, "--simulate", "--log", tmp_path / "log.db")
     assert isinstance(found.exception, SensorgenError)
     assert "virtual" in str(found.exception)
