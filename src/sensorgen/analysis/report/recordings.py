@@ -19,6 +19,7 @@ from sensorgen.core.units import si
 
 _SAME = 1e-6  # relative: frequencies nearer than this are the same
 _F_PER_PF = 1e-12
+_SURE = 3.0  # standard errors by which a reading is beyond a range
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ def headline(table: Table | None) -> Iterator[str]:
 
 
 def findings(recorded: Sequence[Run], table: Table | None) -> Iterator[str]:
-    """Impedance, noise and capacitance of recordings at rest; verdicts by frequency; negative resistances."""
+    """Impedance, noise and capacitance of recordings at rest; verdicts; what cannot be, or was not expected."""
     rows: Sequence[ImpedanceRow] = table.rows if table else ()
     for run in recorded:
         mine = [row for row in rows if row.recording == run.name]
@@ -130,6 +131,9 @@ def findings(recorded: Sequence[Run], table: Table | None) -> Iterator[str]:
         if negative:
             at = ", ".join(negative)
             yield f"Flagged: {run.name} has a negative resistance at {at}: check the bridge's calibration."
+        off = {part: ", ".join(_outside(mine, part)) for part in "RX"}
+        if said := " and ".join(f"{part} at {where}" for part, where in off.items() if where):
+            yield f"Flagged: {run.name} is outside the predicted range by its {said}."
         if run.pairs is not None or not mine:
             continue
         low = min(mine, key=lambda row: row.frequency_hz)
@@ -139,6 +143,16 @@ def findings(recorded: Sequence[Run], table: Table | None) -> Iterator[str]:
             f"{at_text(low.frequency_hz)}{c}; noise of a sample {low.noise_percent:.2g} % of |Z|; "
             f"{capacitor_from(verdicts)}."
         )
+
+
+def _outside(rows: Sequence[ImpedanceRow], part: str) -> Iterator[str]:
+    """Frequencies at which R or X is beyond its predicted range by more than its own error."""
+    of = part.lower()
+    for row in rows:
+        low, high = getattr(row, f"{of}_from_ohm"), getattr(row, f"{of}_to_ohm")
+        value, error = getattr(row, f"{of}_ohm"), _SURE * getattr(row, f"{of}_error_ohm")
+        if low is not None and not low - error <= value <= high + error:
+            yield at_text(row.frequency_hz)
 
 
 def residuals(table: Table) -> Iterator[Figure]:
