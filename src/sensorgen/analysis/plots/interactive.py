@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sensorgen.analysis.plots.figure import Axis, Body, Curve, Figure, Map, Panel, Values
 
 _ROW_PX, _LEAST_PX, _PANEL_PX, _SOLID_PX, _FRAME_PX = 19, 260, 320, 560, 110
+_BELOW_PX = 58  # from the last axis to a legend: below its title
 _MOST_MARKS = 4000  # of a map without a grid; WebGL would take more, but compiles scripts, which the page forbids
 _GAPS = (0.08, 0.34)  # between panels, of a panel's height: over one axis, or each over its own
 _DIVERGING = [[0, "#7f3b08"], [0.25, "#f1a340"], [0.5, "#f7f7f7"], [0.75, "#998ec3"], [1, "#2d004b"]]
@@ -80,7 +81,7 @@ def _layout(panels: Sequence[Panel], figure: Figure) -> Data:
             {"text": escape(panel.title), "xref": "paper", "yref": "paper", "x": 0, "y": _domain(panels, k)[1],
              "yanchor": "bottom", "showarrow": False} for k, panel in enumerate(panels) if panel.title
         ]  # fmt: skip
-        layout["legend"] |= {"y": -0.06, "yanchor": "top"}
+        layout["legend"] |= {"y": -_BELOW_PX / (height_px(figure) - _FRAME_PX), "yanchor": "top"}
     return layout
 
 
