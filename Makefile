@@ -16,7 +16,7 @@ demo: $(READY) ## set up (with the solver NGSolve), and build the triangular sen
 test: $(READY_DEV) ## set up, with slicers, ngspice and Chromium where apt may, and run all tests
 	scripts/system-packages --programs
 	scripts/debian13-slicers
-	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
+	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 	$(BIN)/python -m pytest -m kernel tests/geometry $(ARGS)
 
 lint: $(READY_DEV) ## style, types, and which module may import which

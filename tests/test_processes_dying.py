@@ -1,6 +1,7 @@
 """Works in chunks: a process that dies costs its chunk, a work that kills is named, a cluster does the same."""
 
 import os
+import time
 from pathlib import Path
 
 import pytest
@@ -113,3 +114,26 @@ def test_a_cluster_that_goes_away_is_one_line(monkeypatch, capfd):
     with pytest.raises(SensorgenError, match="no longer answers; results so far are kept"):
         list(results)
     assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("leaves", [True, False])
+def test_what_dask_makes_of_cancelled_futures_is_one_line(monkeypatch, leaves):
+    """Dask may unpack the state of a future that it has cancelled wrongly: a ValueError, if the cluster went away."""
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(parallel, "_CONNECT_S", 1.0)
+    cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None)
+
+    def work():
+        with open_lanes(1, cluster.scheduler_address) as lanes:
+            if leaves:
+                cluster.close()
+                until = time.monotonic() + 20
+                while lanes[0].client.status == "running" and time.monotonic() < until:
+                    time.sleep(0.01)
+            raise ValueError("not enough values to unpack")
+
+    expected, words = (SensorgenError, "no longer answers") if leaves else (ValueError, "unpack")
+    with pytest.raises(expected, match=words):
+        work()
+    cluster.close()

@@ -311,7 +311,9 @@ def definition(name: str, program: str = "") -> dict[str, dict[str, object]]:
                 flat[key] = node
             walk(node.get("children", {}))
 
-    walk(json.loads((curaengine.resources(program) / "definitions" / f"{name}.def.json").read_text())["settings"])
+    walk(
+        json.loads((curaengine.resources(program) / "definitions" / f"{name}.def.json").read_text("utf-8"))["settings"]
+    )
     return flat
 
 

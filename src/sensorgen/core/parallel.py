@@ -364,5 +364,9 @@ def _on_cluster(address: str) -> Iterator[Sequence[Lane]]:
         yield [_Cluster(client, address)] * (2 * threads)
     except (CancelledError, OSError):
         raise gone(address) from None
+    except ValueError:  # Dask's own, of a future that it has cancelled
+        if client.status == "running":
+            raise
+        raise gone(address) from None
     finally:
         client.close(timeout=_CONNECT_S)
