@@ -1,6 +1,6 @@
 """The best printed sensor of triangles, and how fast a space is searched.
 
-``python bench/optimise.py engine`` (5 minutes on two quiet cores) compares one process, two, and Dask with two workers
+``python bench/optimise.py engine`` (7 minutes on two quiet cores) compares one process, two, and Dask with two workers
 on equal works, and writes the section Engine of bench/results/optimise.md; ``front`` searches the space of
 bench/best-tri.yaml, ``full`` that of bench/tri-1500.yaml with two processes (half an hour).
 

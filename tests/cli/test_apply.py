@@ -28,6 +28,19 @@ def test_apply_writes_into_the_file(run, tmp_path, shared_cache):
     assert json.loads(after.out)["verdict"] == "PRINT"
 
 
+def test_build_that_is_refused_says_what_became_of_the_file(run, tmp_path, shared_cache):
+    path = tmp_path / "plate.yaml"
+    path.write_text(OFF_GRID, "utf-8")
+    words = ["build", str(path), "--strict", "--no-cad", "--budget", "600", "--out", str(tmp_path / "out")]
+    assert "nothing was written" in run(*words).err
+    said = run(*words, "--apply")
+    assert said.code == 1
+    assert "nothing was written" not in said.err
+    assert f"{path} is changed: dielectric_mm 0.57 -> 0.6; all above is of the design before" in said.err
+    assert path.read_text("utf-8") == OFF_GRID.replace("0.57", "0.6")
+    assert run(*words).code == 0
+
+
 def test_apply_refuses_what_is_no_file_or_no_change(run, tmp_path, shared_cache):
     path = tmp_path / "plate.yaml"
     path.write_text(OFF_GRID, "utf-8")

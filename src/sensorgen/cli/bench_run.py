@@ -42,7 +42,7 @@ def _run(
         log = stack.enter_context(log_words.opened(file, create=simulate))
         asked = sessions.again(log, again) if again else sessions.new(Path(experiment or ""), simulate=simulate)
         if asked.simulated:
-            render.say("solves the virtual specimen; once for each design", err=True)
+            render.say("solving the virtual specimen, once for each design", err=True)
         shown = (page if page is not None else not asked.simulated or real_time) and not render.form()
         session = stack.enter_context(sessions.Session(asked, log, real_time=real_time, page=shown, model=_model))
         if session.url:

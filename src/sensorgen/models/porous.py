@@ -12,7 +12,7 @@ from sensorgen.scene.overlay import parts
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import Column, Layer
 
-SOURCE = "Wiener (1912), Hashin & Shtrikman (1962, 1963), Gibson & Ashby (1997)"
+SOURCE = "Wiener (1912), Gent & Lindley (1959), Hashin & Shtrikman (1962, 1963), Gibson & Ashby (1997)"
 COST = 0
 
 _EXTRUDED = ("grid", "honeycomb", "triangles", "concentric")  # the same lines in every layer: upright walls

@@ -110,7 +110,7 @@ def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | N
     if name == "bonded":
         raise OutOfRange(f"the law 'bonded' applies to a solid plate; {design.shape} has gaps: expected 'unconfined'")
     if name == "infill":
-        if found := infill(design, printed):
+        if found := infill(design, piece):
             return found
         raise OutOfRange(
             f"the law 'infill' applies to solids that stand between flat electrodes; {design.shape} has none"
@@ -179,20 +179,20 @@ def expected(design: Design, mesh: MeshLevel) -> Curve:
     return replace(compression.prototype(_LIKE[mesh.model]).scaled_modulus(scale), within=mesh.rise_error)
 
 
-def infill(design: Design, piece: Piece | None = None) -> Law | None:
+def infill(design: Design, piece: Piece) -> Law | None:
     """Law of what lies between flat electrodes, as infill does, between bounds of its stiffness; None of other cells.
 
     Parameters
     ----------
     design : Design
-        As drawn.
-    piece : Piece, optional
-        As printed; as drawn where not given.
+        Whose materials it has.
+    piece : Piece
+        Drawn or printed.
     """
     from sensorgen.models import porous
 
     moduli = of_all_materials(design, "youngs_modulus_pa")
-    found = porous.filling((piece or drawn(design)).scene, {n: t.value for n, t in moduli.items()})
+    found = porous.filling(piece.scene, {n: t.value for n, t in moduli.items()})
     if not found:
         return None
     eps = {t.material: t.value for t in permittivities(design)}

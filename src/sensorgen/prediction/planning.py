@@ -11,12 +11,10 @@ from math import inf
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.body import Body
-from sensorgen.design.design import Design
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.capacitance import Answer, default_width, weighed
 from sensorgen.prediction.compression_law import Law, Option, infill, options
 from sensorgen.prediction.error_budget import ReferenceLoad
-from sensorgen.prediction.mesh_ladder import Piece
 from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, run_until_within
 from sensorgen.prediction.query import DEFAULT, FLAT, Load, Query, Tip
 from sensorgen.prediction.rest_state import rest_state
@@ -103,7 +101,7 @@ def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", t
 
     def laws(answer: Answer) -> list[Option]:
         found = options(body.design, answer, law, printed=printed)
-        return found if thorough else _inexpensive(found, body.design, printed)
+        return found if thorough else _inexpensive(found, body)
 
     width = min(wanted, 2 * share / by_capacitance, default_width(body.cells.first()))
     levels = (_cell(rough, width), _compression(laws(rough.rest.answer), sensor, load, share), line)
@@ -111,13 +109,13 @@ def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", t
     return PredictionPlan(body, load, tip, laws, rough, by_capacitance, Plan(wanted, at, levels))
 
 
-def _inexpensive(found: list[Option], design: Design, printed: Piece | None) -> list[Option]:
+def _inexpensive(found: list[Option], body: Body) -> list[Option]:
     """Without cells in 3D: in their place infill's law, else the nearest prototype's, of unknown error."""
     spatial = [option for option in found if option.name.startswith("press3d")]
     if not spatial:
         return found
     name, said = "nearest prototype", "compression of the nearest cell that was solved"
-    law = infill(design, printed)
+    law = infill(body.design, piece(body))
     if law:
         name, said = law.compression.name, "compression of infill, between standing columns and flat levels"
     known = law or replace(spatial[0].expected, bounded=False)
