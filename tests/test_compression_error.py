@@ -49,7 +49,7 @@ def test_intervals_hold_what_another_program_found(level):
     found = estimated(level)
     assert found.found.faults == ()
     assert all(holds(found))
-    assert found.relative()[1] < {-1: 0.08, 0: 0.04, 2: 0.0101}[level]
+    assert found.relative()[1] < {-1: 0.084, 0: 0.04, 2: 0.0101}[level]
     if level >= 0:  # 1 % of the displacement and 1.5 % of the rise
         down = found.found.displacement_m[1:] * 1e6
         assert down == pytest.approx([np.mean(u) for u in KNOWN["uy_um"]], rel=0.01)

@@ -158,7 +158,7 @@ def test_a_sloping_joint_hands_an_even_pressure_on(drop):
     found, run = solved(cell, stresses)
     assert found.faults == ()
     assert found.fall_m == pytest.approx(1e-6, rel=1e-6)  # straight down, on a slope too
-    filled, _ = press2d._field(cell, run, run.states[-1].u_m, EPS)
+    filled, _ = press2d._field(cell, run, run.states[-1].u_m, EPS, 0.2)
     assert filled.middle() == pytest.approx(EPS["x60"] * EPS0 / (0.6e-3 - found.displacement_m[-1]), rel=1e-4, abs=0)
     off = np.abs(-run.states[-1].inner.pressure[:, 0] / 1e5 - 1)
     mesh = run.problem.elements.mesh

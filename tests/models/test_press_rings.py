@@ -104,3 +104,11 @@ def test_a_wedge_is_filled_though_its_corners_lie_on_a_line():
     assert area.min() > 1e-3
     assert area.sum() == pytest.approx((x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2, rel=1e-12)
     assert len(found) == len(places) - 2
+
+
+def test_a_wedge_ends_before_the_way_across_would_cut_its_side():
+    """Air between a slope and a step below it; the way across from the slope to the step's foot runs below its head."""
+    tip, slope, head, foot = (85.3, 13.4), (42.3, 18.4), (32.6, 15.2), (32.55, 0.0)
+    outline = [tip, slope, (0.5, 25.3), (0.0, -15.0), (32.5, -15.0), foot, head]
+    edges = dict.fromkeys(zip(outline, [*outline[1:], tip], strict=True), (1, 2))
+    assert wedge.Wedge((tip, slope), (tip, head)) in wedge.wedges(edges, 1)

@@ -28,8 +28,7 @@ __all__ = ["BoundaryConditions", "Elastic", "Fineness", "Pressed", "cell", "comp
 
 _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 6 MPa [-]
 _STICKING_STEP = _STEP / 16  # the same where faces stick: how far they had slid when they touched counts [-]
-_FIELD_GROWTH = 0.2  # of the triangles of the capacitance's mesh, per distance, at most [-]
-_FIELD_SHARE = 0.4  # the same over the growth of the solids' mesh [-]
+_FIELD_SHARE = 0.4  # growth of the triangles of the capacitance's mesh, over that of the solids' mesh [-]
 _UM = 1e-3  # in mm
 _MISFIT = 1e-3  # of a solid's area: gaps that were closed in the wrong place change more [-]
 _APEX = (1.0, 3.0, 9.0, 20.0)  # times the size of the triangles at an apex, the next where pressure folds the finer [-]
@@ -123,14 +122,13 @@ def _with_fields(
     found: Pressed, cell: Cell, run: Run[Mesh], permittivity: Mapping[str, float], fineness: Fineness
 ) -> Pressed:
     """The same with the capacitance of the deformed outlines."""
-    growth = min(_FIELD_GROWTH, _FIELD_SHARE * fineness.growth)
-    states = run.states[: len(found.stress_pa)]
+    states, growth = run.states[: len(found.stress_pa)], _FIELD_SHARE * fineness.growth
     fields = [_field(cell, run, state.u_m, permittivity, growth) for state in states]
     return with_capacitances(found, [c for c, _ in fields], tuple(outline for _, outline in fields))
 
 
 def _field(
-    cell: Cell, run: Run[Mesh], u_m: Real, permittivity: Mapping[str, float], growth: float = _FIELD_GROWTH
+    cell: Cell, run: Run[Mesh], u_m: Real, permittivity: Mapping[str, float], growth: float
 ) -> tuple[Interval | None, Cell]:
     """Capacitance and outlines of a deformed cell; None where no sound mesh of them was found."""
     from sensorgen.solvers.contact import deformed, plane_field

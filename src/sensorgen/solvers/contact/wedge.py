@@ -50,10 +50,11 @@ def wedges(edges: Mapping[Edge, tuple[int, int]], air: int) -> list[Wedge]:
                     thick = min(_off(first[-1], second[-1], on_second), _off(second[-1], first[-1], on_first))
                     if thick > _THICK * min(_far(first[-1], on_first), _far(second[-1], on_second)):
                         break
-                    if _far(on_first, second[-1]) < _far(first[-1], on_second):
-                        first.append(on_first)
-                    else:
-                        second.append(on_second)
+                    shorter = _far(on_first, second[-1]) < _far(first[-1], on_second)
+                    side, ahead_on = (first, on_first) if shorter else (second, on_second)
+                    if _area(first[-1], ahead_on, second[-1]) <= 0:  # the way across would cut a side
+                        break
+                    side.append(ahead_on)
                 found.append(Wedge(tuple(first), tuple(second)))
                 used |= {*found[-1].first[1:], *found[-1].second[1:]}
     return found
