@@ -112,3 +112,13 @@ def test_a_wedge_ends_before_the_way_across_would_cut_its_side():
     outline = [tip, slope, (0.5, 25.3), (0.0, -15.0), (32.5, -15.0), foot, head]
     edges = dict.fromkeys(zip(outline, [*outline[1:], tip], strict=True), (1, 2))
     assert wedge.Wedge((tip, slope), (tip, head)) in wedge.wedges(edges, 1)
+
+
+def test_a_wedge_ends_before_another_body_stands_in_it():
+    """The mesher would not end where the way across runs through the corner of a body."""
+    tip, out, beyond, into = (0.0, 0.0), (0.66, 0.88), (1.17, -1.98), (1.38, 3.11)
+    outline = [tip, out, beyond, (9.0, -9.0), (9.0, 9.0), into]
+    body = [(1.32, 2.87), (3.6, 4.46), (1.5, 2.05)]
+    rings_ = [(outline, (1, 2)), (body, (3, 1))]
+    edges = {(p, q): sides for ring, sides in rings_ for p, q in zip(ring, [*ring[1:], ring[0]], strict=True)}
+    assert wedge.Wedge((tip, out), (tip, into)) in wedge.wedges(edges, 1)

@@ -113,7 +113,7 @@ def _meshed(cell: Cell, coarse_mm: float, growth: float) -> Mesh:
             cut[wedge.first[-1], wedge.second[-1]] = (-number, cell.air)
     if any(not cell.left_mm - room <= x <= cell.right_mm + room for edge in edges for x, _ in edge):
         raise Unmeshed("the deformed outlines run through the mirrors")
-    _refuse_crossings(np.array(list(edges)).reshape(-1, 2, 2))
+    _refuse_crossings(np.array(list(cut)).reshape(-1, 2, 2))
     net = triangulated(cut, coarse_mm, growth, quick=True)
     new = [triangle for number, wedge in enumerate(thin, 1) for triangle in _filling(net, number, wedge)]
     corners = np.concatenate([net.corners, np.array(new, int).reshape(-1, 3)])

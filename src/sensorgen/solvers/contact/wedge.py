@@ -11,6 +11,7 @@ from math import atan2, hypot, pi
 
 import numpy as np
 
+from sensorgen.core.arrays import Real
 from sensorgen.scene.scene import Point
 from sensorgen.solvers.contact.cell import Edge
 from sensorgen.solvers.electrostatics.triangles import flipped
@@ -37,9 +38,10 @@ def wedges(edges: Mapping[Edge, tuple[int, int]], air: int) -> list[Wedge]:
             back[b].append(a)
     found: list[Wedge] = []
     used: set[Point] = set()
+    points = np.array([*{p for edge in edges for p in edge}]).reshape(-1, 2)
     for tip in list(ahead):
         for out, into in product(ahead[tip], back[tip]):
-            if _is_tip(tip, out, into, ahead) and not {out, into} & used:
+            if _is_tip(tip, out, into, ahead) and not {out, into} & used and _is_free(tip, out, into, points):
                 # Walk along both sides, where the way across is shorter, until the air is thick or both sides meet.
                 first, second = [tip, out], [tip, into]
                 while first[-1] != second[-1] and ahead[first[-1]] and back[second[-1]]:
@@ -52,7 +54,7 @@ def wedges(edges: Mapping[Edge, tuple[int, int]], air: int) -> list[Wedge]:
                         break
                     shorter = _far(on_first, second[-1]) < _far(first[-1], on_second)
                     side, ahead_on = (first, on_first) if shorter else (second, on_second)
-                    if _area(first[-1], ahead_on, second[-1]) <= 0:  # the way across would cut a side
+                    if not _is_free(first[-1], ahead_on, second[-1], points):  # the way across would cut a side
                         break
                     side.append(ahead_on)
                 found.append(Wedge(tuple(first), tuple(second)))
@@ -64,6 +66,15 @@ def _is_tip(tip: Point, out: Point, into: Point, ahead: Mapping[Point, list[Poin
     """Whether air lies, sharp and undivided, between the edges to ``out`` and from ``into``."""
     angle = _turn(tip, out, into)
     return 0 < angle < _SHARP and not any(0 < _turn(tip, out, other) < angle for other in ahead[tip] if other != out)
+
+
+def _is_free(a: Point, b: Point, c: Point, points: Real) -> bool:
+    """Whether a, b and c turn left, and no other of the points (n, 2) lies in their triangle or on its sides."""
+    x, y = points.T
+    inside = np.ones(len(points), bool)
+    for p, q in ((a, b), (b, c), (c, a)):
+        inside &= (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]) >= 0
+    return _area(a, b, c) > 0 and {a, b, c}.issuperset(map(tuple, points[inside].tolist()))
 
 
 def _turn(tip: Point, a: Point, b: Point) -> float:
