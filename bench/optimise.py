@@ -27,7 +27,6 @@ HERE = Path(__file__).parent
 RESULTS = HERE / "results" / "optimise.md"
 WORKS, ROUNDS, EVALUATED = 16, 3, 2
 ENGINES = (("one process", "–"), ("two processes", 1.8), ("Dask, two workers", 1.6), ("`--jobs 1`", "–"))
-PRESSED, FRONT = 1300, 40  # of 1500 designs: those that pass the design rules, and those that are evaluated
 
 
 def cpu_s():
@@ -107,16 +106,12 @@ def engine():
     for k, (name, goal) in enumerate(ENGINES):
         wall_s, cpu_s_ = (median(r[k][n] for r in taken) for n in (0, 1))
         yield f"| {name} | {wall_s:.1f} s | {cpu_s_:.2f} s | {gains[k]:.2f} | {waited[k]:.2f} | {goal} |\n"
-    total_s = 1500 * cost_s["design rules"] + PRESSED * cost_s["coarse mesh"] + FRONT * cost_s["evaluation"]
     costs = ", ".join(f"{name} {s:.2g} s" for name, s in cost_s.items())
     words = (
         "The gain of waiting works does not depend on the load: it is what sending works and collecting results leave. "
         f"A process begins with {begin_s:.1f} s of CPU, once for a search, and has one thread of BLAS; `--jobs 1` "
         "works in the program's own process, whose BLAS has a thread for each core.\n"
-        f"One design of triX costs, of CPU: {costs}. So 1500 designs, of which {PRESSED} pass the rules and {FRONT} "
-        f"are evaluated, take {total_s:.0f} s of CPU, {total_s / waited[1] / 60:.0f} minutes with two processes: "
-        "extrapolated; "
-        "`python bench/optimise.py full` measures it.\n"
+        f"One design of triX costs, of CPU: {costs}.\n"
         f"`python bench/optimise.py engine` writes this section, in {(time.perf_counter() - begun) / 60:.1f} minutes."
     )
     yield "".join(f"\n{textwrap.fill(each, 130, break_on_hyphens=False)}\n" for each in words.splitlines())
