@@ -258,6 +258,30 @@ def test_an_interruption_between_two_renames_waits_for_the_last(start, built, co
     assert contents(built) == {f"x/{name}": content for name, content in both[1].items()}
 
 
+WITHIN_A_LIBRARY = """
+import os, signal
+from sensorgen.core import files
+def write(*_):
+    try:
+        os.kill(os.getpid(), signal.{name})
+        for _ in range(1000):
+            pass
+    except BaseException:
+        raise {error}("of the library's own") from None
+files.write = write
+exec("")"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize("error", ["RuntimeError", "OSError", "ImportError"])
+@pytest.mark.parametrize(("name", "said"), [("SIGINT", "interrupted"), ("SIGTERM", "stopped")])
+def test_an_interruption_of_which_a_library_makes_an_error(real, built, contents, both, name, said, error):
+    before = WITHIN_A_LIBRARY.format(name=name, error=error)
+    left = real(*BUILD, *NEW, before=f"exec({before!r})")
+    assert (left.code, left.line) == (SIGNALS[name], f"sensorgen: {said}; no file is half-written")
+    assert contents(built) == {f"x/{name}": content for name, content in both[0].items()}
+
+
 def test_builds_of_one_name_at_once(start, tmp_path, contents, both):
     """Whoever comes last wins, with all of its files."""
     for _ in range(2):

@@ -5,8 +5,10 @@ import os
 import re
 import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
@@ -145,7 +147,6 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy loads: on small matrices threads only wait
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # to look for them takes 17 ms
     try:
-        signal.signal(signal.SIGTERM, _terminate)
         code = _run()
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -163,7 +164,8 @@ def main() -> None:
 
 def _run() -> int:
     try:
-        code = cli.main(prog_name="sensorgen", standalone_mode=False)
+        with _stoppable():
+            code = cli.main(prog_name="sensorgen", standalone_mode=False)
     except Unprintable as error:
         return _complain(error, FOUND_ERRORS)
     except SensorgenError as error:
@@ -177,8 +179,28 @@ def _run() -> int:
     return code if isinstance(code, int) else 0
 
 
-def _terminate(_: int, __: FrameType | None) -> None:
-    raise _Terminated
+@contextmanager
+def _stoppable() -> Iterator[None]:
+    """Raise on Ctrl-C and SIGTERM, also where a library makes an error of its own of what was raised within it."""
+    asked: list[type[BaseException]] = []
+
+    def stop(number: int, _: FrameType | None) -> NoReturn:
+        asked.append(_Terminated if number == signal.SIGTERM else KeyboardInterrupt)
+        raise asked[-1]
+
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        for number, handler in before.items():
+            if handler is not signal.SIG_IGN:  # as below nohup, or in the background of a shell
+                signal.signal(number, stop)
+        yield
+    except Exception:
+        if asked:
+            raise asked[0] from None
+        raise
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _silence() -> int:
