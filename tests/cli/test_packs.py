@@ -70,6 +70,13 @@ def test_from_an_empty_folder_to_files_for_a_print(run, unpressed):
     assert "eel" in Path("out/my/design.json").read_text(encoding="utf-8")
 
 
+def test_a_new_design_is_the_shape_by_its_name(run):
+    """The template's values are the defaults: one plate, one answer, from the file and by name."""
+    run("new", "design", "my")
+    ours, by_name = design.load(Path("my.yaml")), design.make({"shape": "reference", "name": "my"})
+    assert ours.id() == by_name.id()
+
+
 def test_by_options_alone(run):
     for words in (("material", "eel"), ("shape", "zig")):
         run("new", *words)

@@ -212,7 +212,7 @@ def test_interrupted_while_writing(start, real, built, contents, both, name):
         process.send_signal(getattr(signal, name))
         _, err = process.communicate()
         done = process.returncode in (0, -getattr(signal, name))  # by then, or as good as
-        assert done or process.returncode == SIGNALS[name]
+        assert done or process.returncode == SIGNALS[name], err
         assert_whole(contents(built / "x"), both)
         left = [p.name for p in built.iterdir() if p.name != "x"]
         if name != "SIGKILL":
