@@ -2,6 +2,7 @@
 
 import os
 import time
+from itertools import repeat
 from pathlib import Path
 
 import pytest
@@ -33,6 +34,28 @@ def test_a_death_costs_one_chunk(tmp_path):
     assert found == {k: k**2 for k in range(6) if k != 3} | {3: "3: a process ended"}
     with pytest.raises(SensorgenError, match="a process ended before its answer"):
         dict(in_parallel(fatal, works, 2))
+
+
+def endless(number):
+    """The square; number 3 goes round in compiled code, which looks at no signal."""
+    return max(repeat(0)) if number == 3 else number**2
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no limits of processor time on Windows")
+def test_a_work_that_does_not_end_is_lost_as_one_that_kills(monkeypatch):
+    monkeypatch.setattr(parallel, "_LIMIT_S", 0.2)
+    found = dict(in_parallel(endless, [(k,) for k in range(6)], 2, lost=lambda k, reason: f"{k}: {reason:.15}"))
+    assert found == {k: k**2 for k in range(6) if k != 3} | {3: "3: a process ended"}
+
+
+def patient(number):
+    time.sleep(0.3)
+    return number**2
+
+
+def test_waiting_takes_nothing_of_the_limit(monkeypatch):
+    monkeypatch.setattr(parallel, "_LIMIT_S", 0.1)
+    assert dict(in_parallel(patient, [(k,) for k in range(4)], 2)) == {k: k**2 for k in range(4)}
 
 
 def where(number):

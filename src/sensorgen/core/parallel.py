@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -24,7 +25,11 @@ _ENVIRONMENT = {
     "VECLIB_MAXIMUM_THREADS": "1",
 }  # fmt: skip
 _POLL_S, _CONNECT_S, _ALONE_S = 1.0, 10.0, 60.0
-_DIED = "a process ended before its answer, as when the memory is full: ask for less accuracy, or --jobs 1"
+_LIMIT_S = 1800.0  # of processor time for one work; the longest that we know takes a tenth
+_DIED = (
+    "a process ended before its answer, as when the memory is full, or after half an hour with one: "
+    "ask for less accuracy, or --jobs 1"
+)
 Result = TypeVar("Result")
 Work = Callable[..., Result]
 Lost = Callable[[int, str], Result]
@@ -37,7 +42,8 @@ def in_parallel(
     """Number and result of each, as they come; in this process where one is enough.
 
     Works are sent in chunks that take about ``CHUNK_S``. A chunk whose process dies is sent again; one that kills twice
-    is divided into its works, and one that kills alone is lost.
+    is divided into its works, and one that kills alone is lost. A process of this computer also ends when a work takes
+    half an hour of its time: a mesher that goes round in circles would keep it for ever.
 
     Parameters
     ----------
@@ -172,6 +178,17 @@ def _chunk(work: Work[Result], inputs: Sequence[tuple[Any, ...]]) -> tuple[float
     return perf_counter() - begun, results
 
 
+def _within(limit_s: float, work: Work[Result], *given: Any) -> Result:
+    """The result of a work; the end of the process where it takes longer, since compiled code heeds nothing less."""
+    if not hasattr(signal, "setitimer"):  # Windows
+        return work(*given)
+    signal.setitimer(signal.ITIMER_PROF, limit_s)
+    try:
+        return work(*given)
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+
+
 def said(work: Work[Result], *given: Any, refused: tuple[type[SensorgenError], ...]) -> Result | str:
     """What a work finds, or why it finds nothing.
 
@@ -240,11 +257,12 @@ class _Process:
 
     def submit(self, work: Work[Result], inputs: Sequence[tuple[Any, ...]]) -> "Future[tuple[float, list[Result]]]":
         """Begin a chunk, in another process if this one has died at rest."""
+        limited = partial(_within, _LIMIT_S, work)
         try:
-            return self.executor.submit(_chunk, work, inputs)
+            return self.executor.submit(_chunk, limited, inputs)
         except self.deadly:
             self.renew()
-            return self.executor.submit(_chunk, work, inputs)
+            return self.executor.submit(_chunk, limited, inputs)
 
     def renew(self) -> None:
         """Another process in place of the dead one."""
