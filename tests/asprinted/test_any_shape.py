@@ -56,6 +56,15 @@ def test_a_pattern_of_posts_repeats_both_ways():
     assert found.x_mm[0] % PERIOD == pytest.approx(0.0)  # from the middle between two posts: no post is cut
 
 
+def test_a_pattern_about_the_middle_that_both_ends_cut_is_solved_as_one_period():
+    """Half the sensor occurs a whole number of times, too; but it has many periods."""
+    middles = SIZE / 2 + 1.1 * np.arange(-5, 6)
+    spans = [(rounded(max(x - 0.3, 0.0)), rounded(min(x + 0.3, SIZE))) for x in middles]
+    strips = sensor([((a, 0.0), (b, 0.0), (b, SIZE), (a, SIZE)) for a, b in spans])
+    found = window.window(drawn(strips, FINE.boundaries_mm(1.2)), strips)
+    assert found.sides_mm()[0] == pytest.approx(1.1)
+
+
 def test_a_pattern_without_mirrors_is_solved_as_a_whole():
     steps = np.arange(0.5, SIZE - 4, PERIOD)
     slanted = sensor([((x, 0.0), (x + 1, 0.0), (x + 4, 3.0), (x + 3, 3.0)) for x in steps])

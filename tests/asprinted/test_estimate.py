@@ -180,6 +180,15 @@ def test_an_unknown_way_of_walls():
         estimate(tri().printed, tri().machine, tri().layers, "arachn")
 
 
+@pytest.mark.parametrize("end_mm", [0.001, 0.15, 0.3, 0.42, 0.9, 1.0, 1.2, 1.95, 1.98, 2.1, 2.25, 2.399])
+def test_a_window_is_one_period_wherever_the_sensor_ends(end_mm):
+    """Also where its end is an edge of a layer, but for rounding."""
+    size = {"length_mm": 33 * 2.4 + end_mm, "period_mm": 2.4, "lower_height_mm": 0.2, "dielectric_mm": 0.2}
+    d = design.make({"shape": "tri", "parameters": size})
+    plan = window.window(drawn(d.printed, d.layers.boundaries_mm(d.printed.size_mm[2])), d.printed)
+    assert plan.sides_mm()[0] == pytest.approx(2.4)
+
+
 def test_a_window_is_the_whole_where_nothing_repeats():
     d = design.make({"shape": "tri", "parameters": {"length_mm": 2.0}})
     plan = window.window(drawn(d.printed, d.layers.boundaries_mm(d.printed.size_mm[2])), d.printed)

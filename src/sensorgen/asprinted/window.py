@@ -18,7 +18,7 @@ from sensorgen.scene.layers import LayerRegions, Region, cleaned, parts
 from sensorgen.scene.repetition import repeat
 from sensorgen.scene.scene import SLIVER_MM, Point, Scene, rounded
 from sensorgen.scene.sections import square_to
-from sensorgen.scene.unit_cell import Band, Slice, mirrored
+from sensorgen.scene.unit_cell import Band, Slice, affordable
 
 ROUNDED_MM = 2e-3  # edges nearer than this are one: G-code has three decimals
 
@@ -107,9 +107,10 @@ def _period(
         # The pattern of strips as slices of one level band each, named by all that stands there
         regions = list({region for layer in patterned for region in layer.regions.values()})
         places = np.unique(np.append(shapely.get_coordinates(regions)[:, axis], [0.0, end]))
-        # A face sampled just below leaves slivers: their middle is where the drawing's mirrors see the edge.
+        # A face sampled just below leaves slivers: their middle is where the drawing's mirrors see the edge. An edge so
+        # near to the sensor's end is where the other periods have it, and the end is there too.
         groups = np.split(places, np.flatnonzero(np.diff(places) > SLIVER_MM) + 1)
-        places = np.array([0.0, *(group.mean() for group in groups[1:-1]), end])
+        places = np.array([groups[0][-1], *(group.mean() for group in groups[1:-1]), groups[-1][0]])
         middles = (places[:-1] + places[1:]) / 2
         x, y = (middles, wide / 2) if axis == 0 else (wide / 2, middles)
         looks = np.array([shapely.contains_xy(region, x, y) for region in regions], dtype=bool)
@@ -117,7 +118,7 @@ def _period(
             (Band(look.tobytes().hex(), "", (0.0, 0.0), (1.0, 1.0)),) for look in looks.T.reshape(len(middles), -1)
         ]
         strips = [Slice(a, b, band) for (a, b), band in zip(pairwise(places.tolist()), bands, strict=True)]
-        piece = mirrored(tuple(strips)).slices
+        piece = affordable(tuple(strips)).slices
         low, width, shifts = piece[0].left_mm, piece[-1].right_mm - piece[0].left_mm, False
     else:
         found = repeat([region for layer in patterned for region in layer.regions.values()], size_mm, axis)

@@ -9,9 +9,7 @@ import numpy as np
 from sensorgen.core.arrays import Real, Whole
 from sensorgen.scene.scene import Body, Scene
 from sensorgen.scene.sections import ROUNDING_MM
-from sensorgen.scene.unit_cell import Band, Slice, mirrored
-
-LARGER = 2  # slices of a cell that the sensor's end does not cut, over those of one that it cuts
+from sensorgen.scene.unit_cell import Band, Slice, affordable
 
 
 @dataclass(frozen=True)
@@ -49,8 +47,7 @@ def raster(
     outer_mm : three sequences of float
         Planes on x, y and z beside those of the boxes [mm].
     evenly : bool
-        Whether a piece that occurs a whole number of times is preferred to one that the end cuts, where it has at most
-        ``LARGER`` times as many slices along an axis: half a sensor may be a hundred periods.
+        Whether a piece that occurs a whole number of times is preferred, where it is affordable.
 
     Raises
     ------
@@ -79,10 +76,7 @@ def raster(
         names = [looks.setdefault(layer.tobytes(), str(len(looks))) for layer in np.moveaxis(fill, k, 0)]
         bands = [(Band(name, "", (0.0, 0.0), (1.0, 1.0)),) for name in names]
         walk = [Slice(a, b, band) for (a, b), band in zip(pairwise(planes[k].tolist()), bands, strict=True)]
-        cell = mirrored(tuple(walk), evenly=False)
-        even = mirrored(tuple(walk)) if evenly else cell
-        if len(even.slices) <= LARGER * len(cell.slices):
-            cell = even
+        cell = affordable(tuple(walk), evenly)
         middles = [(s.left_mm + s.right_mm) / 2 for s in cell.slices]
         fill = fill.take(np.searchsorted(planes[k], middles) - 1, k)
         planes[k] = np.array([cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)])

@@ -16,6 +16,7 @@ import numpy as np
 from sensorgen.scene.scene import Point
 from sensorgen.scene.sections import ROUNDING_MM, Column, Section, columns
 
+LARGER = 2  # slices of a cell that the sensor's end does not cut, over those of one that it cuts
 _MOST_PLACES = 400  # for the first two mirrors; a pattern of more corners than these is solved as a whole
 
 
@@ -134,6 +135,16 @@ def mirrored(slices: tuple[Slice, ...], evenly: bool = True) -> Cell:
             if _repeats(whole, low, high):
                 return _cell(whole, low, high)
     return Cell(tuple(whole), (1.0,) * len(whole))
+
+
+def affordable(slices: tuple[Slice, ...], evenly: bool = True) -> Cell:
+    """The piece that occurs a whole number of times, or the smallest where that has far fewer slices.
+
+    Half a sensor may be a hundred periods: ``LARGER`` times as many slices are too many.
+    """
+    smallest = mirrored(slices, evenly=False)
+    even = mirrored(slices) if evenly else smallest
+    return even if len(even.slices) <= LARGER * len(smallest.slices) else smallest
 
 
 def _slice(column: Column, height_mm: float) -> Slice:
