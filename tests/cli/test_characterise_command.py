@@ -272,6 +272,29 @@ def test_from_plate_to_prediction(planned, study, truth, tmp_path, run):
         assert row.low - 0.3 * (row.high - row.low) <= value <= row.high + 0.3 * (row.high - row.low), row.title
 
 
+def test_a_form_with_readings_is_never_replaced(run, tmp_path):
+    words = ("characterise", "diabase-h5", "etpu", "x60", "--count", "2", "--name", "p")
+    form = tmp_path / "out" / "p" / "form.yaml"
+    for _ in range(2):  # an empty one is
+        assert run(*words).code == 0
+    blank = form.read_text("utf-8")
+    for text in (blank.replace(": ~", ": 3.1", 1), blank + "  : [\n"):
+        form.write_text(text, "utf-8")
+        said = run(*words)
+        assert said.code == 2
+        assert "form.yaml' has readings, or is damaged: move it away, or choose another plate's --name" in said.line
+        assert form.read_text("utf-8") == text
+
+
+def test_values_that_may_be_below_zero_are_taken_by_designs(run, study, tmp_path):
+    """A gap that is not there is fitted below 0 as often as above."""
+    (tmp_path / "materials").mkdir()
+    lines = "".join(f"    {t.quantity}: {{value: -1e-6, low: -3e-6, high: 1e-6}}\n" for t in study.targets if t.linear)
+    (tmp_path / "materials" / "lab-1.yaml").write_text(f"about: a fit\nmaterials:\n  x60:\n{lines}", "utf-8")
+    said = run("check", "reference", "--length", "10", "--material", "dielectric=x60@lab-1")
+    assert (said.code, said.err) == (0, "")
+
+
 def test_an_existing_source_is_replaced_on_request_alone(planned, study, truth, tmp_path, run):
     (tmp_path / "form.yaml").write_text(filled(planned, study, truth), "utf-8")
     assert run("characterise", "read", "form.yaml", "--name", "lab-1").code == 0

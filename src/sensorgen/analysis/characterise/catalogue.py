@@ -13,7 +13,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
-from sensorgen.design.materials import Material
+from sensorgen.design.materials import INTERFACE_GAP, Material
 from sensorgen.models import coupons as closed
 
 LEVEL_SIGMA = 1.959964  # half of a 95 % interval in standard deviations
@@ -253,7 +253,7 @@ def targets(conductor: str, dielectric: str, line_mm: float) -> tuple[Target, ..
         Target("resistivity through the layers", conductor, "resistivity_through_ohm_m", 0.05, of("through_ohm_m")),
         Target("contact to terminals", conductor, "terminal_contact_ohm_m2", 0.1, of("terminal_ohm_m2")),
         Target("permittivity", dielectric, "relative_permittivity", 0.03, of("permittivity")),
-        Target("interface gap", dielectric, "interface_gap_m", None, of("gap_m"), linear=True),
+        Target("interface gap", dielectric, INTERFACE_GAP, None, of("gap_m"), linear=True),
         Target("Young's modulus", conductor, "youngs_modulus_pa", 0.1, of("conductor_pa")),
         Target("Young's modulus", dielectric, "youngs_modulus_pa", 0.1, of("dielectric_pa")),
     )  # fmt: skip

@@ -22,12 +22,14 @@ from sensorgen.design.packs import Kind
 
 FILM_LEAK = "leak_s_per_m2"  # leak of a film per area; a matter of how it was printed: no source that ships gives one
 PIEZORESISTANCE = "piezoresistance_per_pa"  # relative rise of an electrode's resistivity with pressure: none either
+INTERFACE_GAP = "interface_gap_m"  # air between electrode and dielectric; a fit of none is below 0 as often as above
 SET = "set by the user"  # source of a value that stands in a design itself
 _RANGES = {  # finite ends belong to it; anything else is above 0
     "poisson_ratio": (-1.0, 0.5),
     "relative_permittivity": (1e-9, 1e9),  # far beyond any material; ratios of such values are still numbers
     "loss_tangent": (0.0, 1e6),
     PIEZORESISTANCE: (-inf, inf),
+    INTERFACE_GAP: (-inf, inf),
 }
 _PLAUSIBLE = {  # of any solid, foam or gel, and of any print; what is beyond has another unit
     "resistivity_ohm_m": (1e-8, inf),

@@ -37,6 +37,7 @@ from sensorgen.workflows.characterise import plate as plates
 from sensorgen.workflows.characterise.intervals import svg
 
 STEPS = ("catalogue", "selection", "3MF", "profiles", "picture", "done")
+FORM = "form.yaml"
 MOST, HOURS = 12, 4.0  # coupons with the piece for lines and shorts, and print time
 _SLOWER, _CHANGE_S = 1.15, 20.0  # of a print against its flow; two tool changes of a layer [s]
 _DETERMINED = 0.5  # of an interval before, below which one after counts as measured
@@ -241,8 +242,8 @@ class Planned:
                 yield f"goal missed: {row.quantity} of {row.material}: {row.half_width:.2g} %, goal {row.goal:g} %"
         yield from (f"rests on {coupon} alone: {quantities}" for coupon, quantities in self.exposed)
         yield f"{self.folder}: {len(self.files)} files; print {self.name}.prusa.3mf (.cura, .orca) as plate.svg shows,"
-        yield "measure, fill in form.yaml, then:"
-        yield f"sensorgen characterise read {self.folder / 'form.yaml'}"
+        yield f"measure, fill in {FORM}, then:"
+        yield f"sensorgen characterise read {self.folder / FORM}"
 
 
 def plan(
@@ -270,20 +271,23 @@ def plan(
     ------
     OutOfRange
         Nothing fits on the plate within the print time.
+    BadInput
+        The plate's form has readings.
     Unwritable
         The place cannot be written to; nothing was written.
     """
     if not 2 <= count <= MOST or not 0 < hours < np.inf:
         raise OutOfRange(f"{count} coupons in {hours:g} h; expected 2 to {MOST} coupons, and a time above 0")
     study.check_printer()
+    label = name or f"{study.design.machine.name}-{study.conductor}-{study.dielectric}"
+    folder, names = out / label, (study.conductor, study.dielectric)
+    forms.refuse_filled(folder / FORM)
     step("catalogue")
     found = selection.candidates(study.coupons, study.unknowns, study.targets, Meters())
     step("selection")
     chosen = selection.select(found, count - 1, lambda chosen: study.fits(chosen, hours))
     coupons = named([study.coupons[k] for k in chosen])
-    label = name or f"{study.design.machine.name}-{study.conductor}-{study.dielectric}"
     result = rows(prior(study.unknowns), found.expected(chosen, study.unknowns), study.targets)
-    folder, names = out / label, (study.conductor, study.dielectric)
     plate = plates.arranged(coupons, study.design)
     usual = study.expected()
     expected = {c.name: usual[study.coupons[k].name] for c, k in zip(coupons, chosen, strict=True)}
@@ -295,7 +299,7 @@ def plan(
         step("picture")
         texts = {
             "plate.svg": plates.picture(label, coupons, study.design, plate, names),
-            "form.yaml": forms.blank(study.head(label), coupons, expected),
+            FORM: forms.blank(study.head(label), coupons, expected),
             "intervals.svg": svg(f"{label}: expected", result),
         }
         store.write(stage, {file: text.encode() for file, text in (study.files() | texts).items()})

@@ -165,6 +165,24 @@ def read(path: Path) -> Form:
         raise error.within(str(path)) from None
 
 
+def refuse_filled(path: Path) -> None:
+    """Refuse to replace a form that somebody has filled in.
+
+    Raises
+    ------
+    BadInput
+        It has readings, or cannot be read, so that nobody can tell.
+    """
+    if not path.exists():
+        return
+    try:
+        full = any(value is not None for fields in read(path).coupons.values() for value in fields.values())
+    except SensorgenError:
+        full = True
+    if full:
+        raise BadInput(f"{str(path)!r} has readings, or is damaged: move it away, or choose another plate's --name")
+
+
 def _meters(given: object) -> Meters:
     if not isinstance(given, Mapping):
         raise BadInput(f"meters is {shown(given)}; expected a mapping of names to numbers")
