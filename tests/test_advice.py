@@ -88,6 +88,27 @@ def test_a_budget_that_is_used_up_is_stated(plate):
     assert "ended by the budget" in list(advice.document())[-1]
 
 
+def test_many_heights_go_to_the_grid_at_once(shared_cache, monkeypatch):
+    """Before single steps, of which there may be more than are tried: one alone leaves the findings of the other."""
+    size = {"length_mm": 20.0, "electrode_mm": 0.45, "dielectric_mm": 0.25, "height_mm": 0.35}
+    together = {"electrode_mm": 0.4, "dielectric_mm": 0.2, "height_mm": 0.3}
+    design = make({"shape": "cog", "parameters": size})
+    left = len(warnings(make({"shape": "cog", "parameters": size | together})))
+    for one in together:
+        assert len(warnings(make({"shape": "cog", "parameters": size | {one: together[one]}}))) > left
+    monkeypatch.setattr("sensorgen.workflows.advice.MOST_CHECKED", 9)
+    advice = advise(design, trial(design), 1e9)
+    found = [{c.key.removeprefix("parameters."): c.after for c in one.changes} for one in advice.tried]
+    assert together in found
+
+
+def test_the_most_that_are_tried_are_stated(plate, monkeypatch):
+    design, made, _ = plate
+    monkeypatch.setattr("sensorgen.workflows.advice.MOST_CHECKED", 1)
+    last = list(advise(design, made, 1e9).document())[-1]
+    assert last.startswith("(1 designs checked, 1 predicted; that many are tried at most; not tried:")
+
+
 def test_a_change_that_senses_nothing_is_not_advice(plate, monkeypatch):
     """Planted: the design senses, its changes do not."""
     design, made, _ = plate

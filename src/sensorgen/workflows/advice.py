@@ -68,6 +68,12 @@ class _Search:
         heap: list[tuple[float, int, dict[Key, Value], tuple[int, int]]] = []
         heappush(heap, (0.0, 0, {}, (len(self.now.findings),) * 2))
         seen: set[frozenset[tuple[Key, Value]]] = {frozenset()}
+        if "grid" in moves.kinds(self.now.findings):  # first: of many heights, single steps leave findings to the last
+            for together in moves.onto_grid(self.design):
+                mark = frozenset(together.items())
+                if mark not in seen and moves.distance(self.design, together) <= FARTHEST:
+                    seen.add(mark)
+                    heappush(heap, (0.0, len(seen), together, (len(self.now.findings),) * 2))
         while heap and not self._over():
             self.reached, _, changes, least = heappop(heap)
             findings = self._reviewed(changes) if changes else self.now.findings

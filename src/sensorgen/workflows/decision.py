@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
     from sensorgen.prediction.results import Prediction
 
-_VERSION = 4  # of the search for changes: stored advice of another one is not read
+_VERSION = 5  # of the search for changes: stored advice of another one is not read
 _OF_PRINT = ("1-short", UNPREDICTED)  # rules whose findings are of the prediction
 STEPS = ("prediction", "changes", "done")
 Step = Callable[[str], None]
@@ -131,7 +131,9 @@ class Advice:
             yield "no change was tried: the design's own prediction took the budget; a second run reads it from disk"
         else:
             yield "no change was found that removes findings and keeps what the sensor senses"
-        limit = "" if self.complete else f"; ended by the budget of {self.budget_s:g} s (--budget)"
+        spent = self.seconds >= round(self.budget_s, 2)  # which is how it is rounded
+        ended = f"; ended by the budget of {self.budget_s:g} s (--budget)" if spent else "; that many are tried at most"
+        limit = "" if self.complete else ended
         yield f"({effort}{limit}; not tried: {self.not_tried})"
 
 

@@ -87,6 +87,13 @@ def steps(design: Design, wanted: Iterable[str]) -> Iterator[tuple[Key, Value]]:
         yield from _PARAMETERS[kind](design, kind) if kind in _PARAMETERS else _choices(design, kind)
 
 
+def onto_grid(design: Design) -> list[dict[Key, Value]]:
+    """All heights that are no whole number of layers moved to one at once: down, up, and each to the nearer."""
+    pairs = [_beside(name, value, design.layers.layer_mm) for name, value in _off_grid(design)]
+    nearer = [min(pair, key=lambda move: distance(design, dict([move]))) for pair in pairs]
+    return [dict(moves) for moves in (*zip(*pairs, strict=True), nearer) if len(moves) > 1]
+
+
 def _choices(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
     """Another choice of printing the same sensor."""
     nozzle = design.machine.nozzle_mm
@@ -106,11 +113,20 @@ def _choices(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
 def _heights(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
     """The nearest whole numbers of layers below and above: of the film, of other heights, or of those off the grid."""
     layer, plain = design.layers.layer_mm, asdict(Envelope())
+    if kind == "grid":
+        for name, value in _off_grid(design):
+            yield from _beside(name, value, layer)
+        return
     for name, value, vertical in _lengths(design):
         is_film = name.endswith("dielectric_mm")
-        off = abs(value / layer - round(value / layer)) > _EPS
-        if vertical and (off if kind == "grid" else is_film if kind == "film" else not is_film and name not in plain):
+        if vertical and (is_film if kind == "film" else not is_film and name not in plain):
             yield from _beside(name, value, layer)
+
+
+def _off_grid(design: Design) -> list[tuple[str, float]]:
+    """Heights that are no whole number of layers [mm]."""
+    layer = design.layers.layer_mm
+    return [(n, v) for n, v, vertical in _lengths(design) if vertical and abs(v / layer - round(v / layer)) > _EPS]
 
 
 def _widths(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
