@@ -40,7 +40,9 @@ def test_it_says_what_the_plate_cannot_do():
     assert "verdict at 0.1 % noise this design cannot sense force and cannot locate a press" in said
     assert "position to 225 mm" in said
     assert "(213 N, 21 m)" in said
-    assert "1. triangles 2 mm apart over a film of 0.1 mm (tri), in place of this cell: 0.15 N, 8.3 mm" in said
+    assert (
+        "1. triangles 2 mm apart over a film of 0.1 mm (tri), as drawn, in place of this cell: 0.15 N, 8.3 mm" in said
+    )
     assert "all together:" in said
     assert "99.7 kHz (6 N, 258 mm); 49.9 + 99.7 kHz" in said
     assert "of all up to 1 MHz:" in said

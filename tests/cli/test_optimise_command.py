@@ -156,6 +156,10 @@ def test_discards_on_a_coarse_mesh_hold_or_are_taken_back(monkeypatch):
         ({"refuse_warnings": ["2-flim"]}, BadInput, "unknown rule '2-flim'; did you mean '2-film'"),
         ({"parameters": {"dielectric_mm": 5}}, BadInput, "is 5; expected a mapping with from, to, step, or"),
         ({"parameters": {"dielectric_mm": {"from": 1, "too": 2}}}, BadInput, "Known: from, step, to"),
+        ({"parameters": {"dielectric_mm": []}}, BadInput, "dielectric_mm is an empty list; expected at least one"),
+        ({"parameters": {"dielectric_mm": [0.2, -1]}}, BadInput, "no design can have -1.0: dielectric_mm is -1;"),
+        ({"parameters": {"dielectric_mm": ["0.2 in"]}}, BadInput, "no design can have '0.2 in': "),
+        ({"parameters": {"materials.film": ["x60", "unob"]}}, BadInput, "no design can have 'unob': unknown material"),
         ({"parameters": {"dielectric_mm": [None]}}, BadInput, "dielectric_mm.0 is None; expected a number, or text"),
         ({"objectives": {"capacitance_pf": "min"}}, BadInput, "or 'maximise', or a mapping with near"),
         ({"objectives": {"capacitance_pf": {"near": "x"}}}, BadInput, "capacitance_pf.near is 'x'; expected a number"),
@@ -197,11 +201,11 @@ def test_a_length_in_the_plane_is_varied_in_half_lines():
 
 
 def test_a_design_that_cannot_be_made_has_its_reason():
-    search_ = found(parameters={"dielectric_mm": [0.2, -1, -2]})
+    search_ = found(parameters={"dielectric_mm": {"from": -0.2, "to": 0.2}})
     (why,) = [r for r in search_.reasons() if r[0].startswith("cannot be made")]
     assert why[1:] == (True, 2)
     assert "dielectric_mm" in why[0]
-    assert "-1" in why[0]
+    assert "-0.2" in why[0]
 
 
 def test_an_accepted_doubt_that_nothing_has_is_named():

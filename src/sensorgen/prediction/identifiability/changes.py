@@ -36,7 +36,7 @@ class Change:
     kind : str
         Part of the sensor or readout; of each kind only the most helpful change is advised.
     name : str
-        As text; ``{lowest}`` and ``{highest}`` stand for the frequencies.
+        As text; ``{count}``, ``{lowest}`` and ``{highest}`` stand for the frequencies.
     risk : str
         Its disadvantage.
     apply : callable
@@ -66,7 +66,7 @@ class Tried:
         return ChangeResult(
             **vars(standard_errors(self.bounds)),
             kind=self.change.kind,
-            change=self.change.name.format(lowest=low, highest=high),
+            change=self.change.name.format(lowest=low, highest=high, count=len(self.setup.frequency_hz)),
             risk=self.change.risk,
             shortfall=self.shortfall,
         )
@@ -195,8 +195,8 @@ def quieter(setup: Setup) -> Setup:
 
 
 CHANGES = (
-    Change("film", "triangles 2 mm apart over a film of 0.1 mm (tri), in place of this cell",
-           "the apexes may short through a film of one or two layers; printing it needs support", cell),
+    Change("film", "triangles 2 mm apart over a film of 0.1 mm (tri), as drawn, in place of this cell",
+           "a print may lose the apexes, or short through a film of one or two layers: see sensorgen check tri", cell),
     Change("film", "a film six times softer (X60: 1 MPa by Table 4.1 in place of 6 MPa)",
            "softer filaments are hard to feed, and creep more", soft_film),
     Change("film", "a film half as thick", "it shorts sooner, and if bonded is four times stiffer", thin_film),
@@ -211,7 +211,7 @@ CHANGES = (
     Change("tip", "a tip half as long", "twice the pressure on the film", tip(0.5)),
     Change("frequencies", "ten times higher frequencies, {lowest} to {highest}",
            "stray capacitance and leads count more", higher_frequencies),
-    Change("frequencies", "frequencies about the corner, {lowest} to {highest}",
+    Change("frequencies", "{count} frequencies about the corner, log-spaced from {lowest} to {highest}",
            "stray capacitance and leads count more", frequencies_at_corner),
     Change("noise", "a tenth of the noise", "a hundred readings averaged in place of one, or a better bridge", quieter),
 )  # fmt: skip

@@ -91,7 +91,7 @@ def candidates(target: Target, folder: Path = Path()) -> list[Candidate]:
     UnknownName
         A parameter that neither the shape nor a design file has.
     BadInput
-        No design at all, or more than ``MOST``.
+        No design at all, none with one of the values that are listed, or more than ``MOST``.
     """
     whole = space(target, folder)
     if whole.size > MOST:
@@ -100,7 +100,13 @@ def candidates(target: Target, folder: Path = Path()) -> list[Candidate]:
             f"{whole.size:.3g} designs; expected at most {MOST}: give a larger step, narrower ranges or fewer choices "
             f"({longest[1]} alone has {longest[0]} values), or --sample 400, which proves nothing"
         )
-    return [whole.candidate(chosen | values) for chosen, inside in whole.parts for values in _combinations(inside)]
+    found = [whole.candidate(chosen | values) for chosen, inside in whole.parts for values in _combinations(inside)]
+    for key, given in target.parameters.items():
+        for value in [] if isinstance(given, Range) else given:
+            own = [candidate for candidate in found if candidate.values[key] == value]
+            if own and not any(candidate.design for candidate in own):
+                raise BadInput(f"parameters.{key}: no design can have {value!r}: {own[0].reason}")
+    return found
 
 
 def space(target: Target, folder: Path = Path()) -> Space:

@@ -173,6 +173,8 @@ class Target(Strict):
         for name in self.refuse_warnings:
             if name not in RULES:
                 raise ValueError(f"refuse_warnings: {UnknownName('rule', name, RULES)}")
+        if empty := [key for key, values in self.parameters.items() if values == []]:
+            raise ValueError(f"parameters.{empty[0]} is an empty list; expected at least one value")
         for key, goal in self.objectives.items():
             limit = self.limits.get(key, Limit())
             if isinstance(goal, Near) and limit.beyond(goal.near):
