@@ -197,7 +197,9 @@ def test_stl_files_are_repaired_and_walk_on(run, plates):
     ("words", "line"),
     [
         (["--unit", "m"], "it is 20000 x 10000 x 1000 mm; expected 1 to 1000 mm"),
+        (["--unit", "m"], "its numbers may be in mm (20 x 10 x 1 mm) or cm (200 x 100 x 10 mm) or inch (508 x 254 x"),
         (["--unit", "micron"], "it is 0.02 x 0.01 x 0.001 mm; expected 1 to 1000 mm"),
+        (["--unit", "micron"], "its numbers may be in mm (20 x 10 x 1 mm) or cm (200 x 100 x 10 mm) or inch (508 x"),
         ([], "an STL has no unit; expected --unit mm"),
         (["--unit", "mm", "--map", "low=etpu@2"], "no material for film, up: give --map film=x60 --map up=MATERIAL"),
         (["--unit", "mm", *PLATES, "--map", "film=x61"], "unknown material 'x61'; did you mean 'x60'?"),

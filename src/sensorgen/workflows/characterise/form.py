@@ -171,7 +171,7 @@ def refuse_filled(path: Path) -> None:
     Raises
     ------
     BadInput
-        It has readings, or cannot be read, so that nobody can tell.
+        It has readings, or cannot be read, so that it may have some.
     """
     if not path.exists():
         return

@@ -120,7 +120,7 @@ def read(paths: Sequence[Path], unit: str = "", chord_mm: float = CHORD_MM) -> A
         found, own = _repaired(name, raw)
         bodies.append(found)
         findings += own
-    findings += _sizes(bodies)
+    findings += _sizes(bodies, unit)
     if not any(f.severity == "error" for f in findings):
         bodies, own = _apart(bodies)
         findings += own
@@ -190,21 +190,29 @@ def _repaired(name: str, raw: FileBody) -> tuple[ReadBody, list[Finding]]:
     return body, findings
 
 
-def _sizes(bodies: Sequence[ReadBody]) -> list[Finding]:
-    """A finding where the sensor is larger or smaller than one can be: its unit is wrong."""
+def _sizes(bodies: Sequence[ReadBody], unit: str) -> list[Finding]:
+    """A finding where the sensor is larger or smaller than one can be: its unit, given or the file's own, is wrong."""
     box = np.array([body.box_mm for body in bodies])
     low, high = box[:, 0].min(0), box[:, 1].max(0)
     size = high - low
-    if (size >= _LEAST_MM).all() and (size <= _MOST_MM).all():
+
+    def fits(edges: Real) -> bool:
+        return bool((edges >= _LEAST_MM).all() and (edges <= _MOST_MM).all())
+
+    def shown(edges: Real) -> str:
+        return " x ".join(f"{edge:.6g}" for edge in edges)
+
+    if fits(size):
         return []
-    shown = " x ".join(f"{edge:.6g}" for edge in size)
-    fits = [
-        unit for unit, scale in mesh_files.UNITS_MM.items() for factor in (scale, 1 / scale)
-        if scale != 1 and (size * factor >= _LEAST_MM).all() and (size * factor <= _MOST_MM / 2).all()
-    ]  # fmt: skip
-    hint = f"its numbers may be in {' or '.join(dict.fromkeys(fits))}" if fits else "look at its unit"
+    scales = mesh_files.UNITS_MM
+    sizes = [(name, size * scale / scales[unit or "mm"]) for name, scale in scales.items()]
+    sizes += [("mm", size / scale) for scale in scales.values()] if not unit else []
+    likely = {name: shown(edges) for name, edges in reversed(sizes) if fits(edges)}
+    words = " or ".join(f"{name} ({likely[name]} mm)" for name in scales if name in likely)
+    hint = f"its numbers may be in {words}" if words else "no unit makes a sensor of it: look at its dimensions"
     return [
-        Finding("11-size", "error", "sensor", f"it is {shown} mm; expected 1 to 1000 mm in x and y, from 0.05 in z",
+        Finding("11-size", "error", "sensor",
+                f"it is {shown(size)} mm; expected 1 to 1000 mm in x and y, from 0.05 in z",
                 f"{hint}: export it in mm, or give --unit for STL and 3MF", place_mm=tuple(low.round(6).tolist()))
     ]  # fmt: skip
 
