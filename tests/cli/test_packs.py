@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen.core import yamlfile
+from sensorgen.core import paths, yamlfile
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.design import design, materials, packs, shape_files
 from sensorgen.measure import accuracy
@@ -440,6 +440,21 @@ def test_planted_faults_are_found(run, here, what, old, new, expected):
     assert said.code == 1
     findings = json.loads(said.out)["findings"]
     assert any(re.search(expected, f"{f['rule']}: {f['message']}") for f in findings), findings
+
+
+def test_a_fault_of_a_shape_is_one_finding_with_how_many_sensors_have_it(run, here):
+    put(here, "shape", "zig", ("box(*whole, low, film)", "box(*whole, low, film + 0.02)"))
+    found = json.loads(run("pack", "test", ".", "--json").out)["findings"]
+    assert [f["rule"] for f in found] == ["scene", "scene", "volume", "support"]
+    assert found[0]["message"] == "film / blocks: overlap by 0.6 mm3 (in 13 of 13 sensors tried)"
+
+
+def test_a_source_that_a_command_wrote_is_tested_where_it_is(run):
+    file = paths.data(packs.SOURCES, "materials") / "bars-1.yaml"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    text = "about: bars\nmaterials: {etpu: {youngs_modulus_pa: {value: 2.0e7, low: 1.0e6, high: 1.0e8}}}\n"
+    file.write_text(text, "utf-8")
+    assert run("pack", "test", str(file)).out == f"{file}: 1 file, no findings\n"
 
 
 @pytest.mark.parametrize(

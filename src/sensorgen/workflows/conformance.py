@@ -26,6 +26,7 @@ from sensorgen.scene.scene import Envelope, Fill, Scene
 _SMALL = {"length_mm": 12.0, "width_mm": 5.0}  # of a test's sensor, where the shape's ranges hold it
 _IMPORTS = ("sensorgen.scene", "sensorgen.core.errors")
 _NEEDED = {True: ("resistivity_ohm_m",), False: ("relative_permittivity", "youngs_modulus_pa", "poisson_ratio")}
+_NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 Step = Callable[[str], None]
 
 
@@ -80,6 +81,9 @@ def chosen(word: str) -> list[File]:
 
 def _one(word: str) -> File:
     path = Path(word)
+    own = [file for pack in packs.own() for file in _files(pack) if file.path.resolve() == path.resolve()]
+    if own:  # of a pack whose folder is elsewhere
+        return own[0]
     kind = next((kind for kind in packs.SINGULAR if path.absolute().parent.name == kind), None)
     if kind is None or path.suffix != packs.suffix(kind) or not packs.is_name(kind, path.stem):
         folders = ", ".join(packs.SINGULAR)
@@ -131,7 +135,8 @@ def conformance(word: str, step: Step = lambda _: None) -> PackReport:
                     _finding("name", where, f"a {packs.SINGULAR[file.kind]} of that name ships", "rename it")
                 )
                 continue
-            findings += [_finding(rule, where, *words) for rule, *words in _TESTS[file.kind](file)]
+            faults = _shape(file, step) if file.kind == "shapes" else _TESTS[file.kind](file)
+            findings += [_finding(rule, where, *words) for rule, *words in faults]
         except SensorgenError as error:
             kind = _kind_of(file.path)
             advice = f"it holds a {packs.SINGULAR[kind]}: move it to {kind}" if kind and kind != file.kind else ""
@@ -231,7 +236,8 @@ def _material(file: File) -> Faults:
         yield "values", "no values", "add at least one quantity"
 
 
-def _shape(file: File) -> Faults:
+def _shape(file: File, step: Step) -> Faults:
+    """Faults of its scenes at the ends of its parameters, each once with how many sensors have it."""
     text = file.text()
     for name in _imported(text, file):
         if not name.startswith(_IMPORTS) and name.partition(".")[0] not in sys.stdlib_module_names:
@@ -247,17 +253,27 @@ def _shape(file: File) -> Faults:
         name: value for f in fields(form.Params) if (name := f.name) in _SMALL
         for value in (min(max(_SMALL[name], f.metadata["range"][0]), f.metadata["range"][1]),)
     }  # fmt: skip
-    for about, changed in _cases(form.Params, usual):
-        try:
-            params: Any = form.Params
-            made = params(**changed)
-            if not 0 < made.cells() < designs.MAX_CELLS:
-                continue
+    cases = list(_cases(form.Params, usual))
+    found = dict[tuple[str, str], tuple[str, str, set[str]]]()
+    for about, changed in cases:
+        step(f"{file.name}: {about or 'defaults'}")
+        for rule, message, advice in _tried(form, changed, about):
+            alike = rule, _NUMBER.sub("", message)
+            found.setdefault(alike, (about + message, advice, set()))[2].add(about)
+    for (rule, _), (message, advice, where) in found.items():
+        yield rule, message + (f" (in {len(where)} of {len(cases)} sensors tried)" if len(where) > 1 else ""), advice
+
+
+def _tried(form: Any, changed: dict[str, Any], about: str) -> Faults:
+    """Faults of the scenes of one set of parameters: of two materials, of three, and with a support."""
+    try:
+        made = form.Params(**changed)
+        if 0 < made.cells() < designs.MAX_CELLS:
             for fill in (Fill(), Fill(support="bvoh"), Fill(film="pla")):
-                yield from _scene_faults(about, form.scene(made, fill), fill)
-        except OutOfRange:
-            if not about:
-                raise
+                yield from _scene_faults(form.scene(made, fill), fill)
+    except OutOfRange:
+        if not about:
+            raise
 
 
 def _imported(text: str, file: File) -> Iterator[str]:
@@ -281,21 +297,21 @@ def _cases(params: type[Envelope], usual: dict[str, Any]) -> Iterator[tuple[str,
                 yield f"{f.name} {value}: ", usual | {f.name: value}
 
 
-def _scene_faults(about: str, scene: Scene, fill: Fill) -> Faults:
+def _scene_faults(scene: Scene, fill: Fill) -> Faults:
     advice = "correct scene()"
     terminals = sorted(body.terminal for body in scene.bodies if body.terminal)
     if terminals not in (["bottom", "top"], ["bottom", "middle", "top"]):
-        yield "terminals", f"{about}terminals are {terminals}", "give one body 'top', and one 'bottom'"
+        yield "terminals", f"terminals are {terminals}", "give one body 'top', and one 'bottom'"
     made = {body.name: meshes.mesh(body) for body in scene.bodies}
     for body, fault in validity.faults(scene, made):
-        yield "scene", f"{about}{body}: {fault}", advice
+        yield "scene", f"{body}: {fault}", advice
     volume, box = sum(body.volume_mm3() for body in scene.bodies), math.prod(scene.size_mm)
     is_round = any(piece.is_round() for body in scene.bodies for piece in body.pieces)
     within = 1e-3 if is_round else 1e-9  # beside a circle, a support has chords
     if volume > box * (1 + within):
-        yield "volume", f"{about}bodies have {volume:.6g} mm3, their box {box:.6g} mm3", advice
+        yield "volume", f"bodies have {volume:.6g} mm3, their box {box:.6g} mm3", advice
     if fill.support and abs(volume - box) > within * box:
-        missing = f"{about}with a support, {box - volume:.3g} mm3 of {box:.6g} mm3 are left empty"
+        missing = f"with a support, {box - volume:.3g} mm3 of {box:.6g} mm3 are left empty"
         yield "support", missing, "fill all air with a body 'support' where fill.support is given"
 
 
@@ -352,6 +368,6 @@ def _source(file: File) -> Faults:
 
 
 _TESTS: dict[Kind, Callable[[File], Faults]] = {
-    "materials": _material, "sources": _source, "shapes": _shape, "printers": _printer, "qualities": _quality,
+    "materials": _material, "sources": _source, "printers": _printer, "qualities": _quality,
     "instruments": _instrument,
 }  # fmt: skip
