@@ -173,7 +173,7 @@ def test_capacitance_is_the_share_of_the_cells(tmp_path):
     ("given", "message"),
     [
         ({"parameters": {"length_mm": 100.0}}, "parameters.length_mm is 100.0, but the border is 56 mm"),
-        ({"border": "nothing.svg"}, "0 bytes; expected an outline"),
+        ({"border": "nothing.svg"}, "cannot read '.*nothing.svg': No such file"),
         ({"border": "POLYGON ((0 0, 9 9, 9 0, 0 9, 0 0))"}, "expected an SVG or DXF file, or one POLYGON"),
         ({"border": "POLYGON ((5 5, 9 5, 9 9, 5 5))"}, "it begins at 5, 5 mm"),
         ({"border": "POLYGON ((0 0"}, "border: "),

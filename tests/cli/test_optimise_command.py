@@ -1,6 +1,7 @@
 """``sensorgen optimise``: the front against a plain loop, a planted optimum, doubts, limits, bad targets."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from statistics import mean
@@ -9,6 +10,7 @@ import pytest
 
 from sensorgen.core import cache
 from sensorgen.core.bounds import Bounds, Interval
+from sensorgen.core.document import text
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 from sensorgen.core.findings import Finding
 from sensorgen.core.records import checked
@@ -267,13 +269,15 @@ def test_ties_and_what_cannot_be_sensed_are_shown(plate):
         (">", 1.0, 0.5, "cannot locate", *answer.table().cells[0][5:]),
         ("=", 2.0, 0.51, "cannot locate", *answer.table().cells[1][5:]),
     ]
-    (first,) = [
-        Recommended("best force", answer.front[0], ties=(2,), robust={"position_resolution_mm": Spread(20, 20, 50, 60)})
-    ]
-    words = " ".join(word for _, word in result._facts(first))
-    assert "position_resolution_mm cannot locate" in words
-    assert "median 20, worst cannot locate; with material ranges cannot locate" in words
-    assert "tied with 2 within what the models leave open; chosen by fewest warnings" in words
+    robust = {"position_resolution_mm": Spread(20, 20, 50, 60)}
+    sliced = {"force_resolution_n": Bounds.of(0.55, "N"), "position_resolution_mm": Bounds.of(50, "mm")}
+    one = Recommended("best force", answer.front[0], ties=(2,), robust=robust, sliced=sliced, slicer="Prusa 2")
+    shown = list(text(replace(answer, recommended=(one,)).document()))
+    place = next(line for line in shown if line.startswith("position_resolution_mm"))
+    assert re.split("  +", place)[1:] == ["cannot locate", "20", *["cannot locate"] * 3]
+    force = next(line for line in shown if line.startswith("force_resolution_n"))
+    assert force.split()[1:] == ["0.5", "–", "–", "–", "0.55", "(+10.0%)"]
+    assert "tied with 2 within what the models leave open; chosen by fewest warnings" in " ".join(shown)
 
 
 def test_a_huge_space_is_refused_with_its_size():

@@ -279,12 +279,17 @@ def _html(part: Part) -> str:
     if isinstance(part, str):
         return f"<p>{escape(part)}</p>"
     if isinstance(part, Facts):
-        return f"<table>{''.join(_html_row(row, 'td') for row in part.rows)}</table>"
+        return _scrolled("".join(_html_row(row, "td") for row in part.rows))
     table = part.filled()
     rows = [[c.words(v) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
     head = _html_row([c.head for c in table.columns], "th")
     caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
-    return f"<table>{caption}{head}{''.join(_html_row(row, 'td') for row in rows)}</table>"
+    return _scrolled(f"{caption}{head}{''.join(_html_row(row, 'td') for row in rows)}")
+
+
+def _scrolled(rows: str) -> str:
+    """A table that moves within the page where it is wider."""
+    return f'<div class="scroll" tabindex="0"><table>{rows}</table></div>'
 
 
 def _html_row(cells: Iterable[str], tag: str) -> str:

@@ -99,7 +99,7 @@ def problem(error: ValidationError, data: object, kind: type[Strict] | None = No
     place = _place(first, data)
     key = ".".join(map(str, place)) or (f"a {kind.__name__.lower()}" if kind else "all of it")
     if first["type"] in ("value_error", "assertion_error"):
-        return f"{key}: {first['ctx']['error']}"
+        return f"{key}: {first['ctx']['error']}" if place else str(first["ctx"]["error"])
     if first["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
         return f"{key} is missing"
     if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):

@@ -408,8 +408,9 @@ def _checked(field: dataclasses.Field[Any], value: float | str) -> float | str:
     low, high = field.metadata["range"]
     if isinstance(value, str) or not math.isfinite(value) or not low <= value <= high:
         shown = repr(value) if isinstance(value, str) else f"{value:g}"
-        limits = f"{low:g} to {high:g} {unit_of(field.name)}"
-        raise OutOfRange(f"{field.name} is {shown}; expected a number from {limits}")
+        unit = unit_of(field.name)
+        own = f": write it in {unit}, without a unit" if isinstance(value, str) and value[:1].isdigit() else ""
+        raise OutOfRange(f"{field.name} is {shown}; expected a number from {low:g} to {high:g} {unit}{own}")
     return float(value)
 
 

@@ -84,7 +84,7 @@ class Pack:
         try:
             return checked(Manifest, yamlfile.parse(_text(path, self.folder), str(path)))
         except BadInput as error:
-            raise error if str(path) in str(error) else error.within(str(path)) from None
+            raise error.within(str(path)) from None
 
     @property
     def version(self) -> str:

@@ -239,7 +239,7 @@ def _parsed(kind: type[_Profile], file: str, text: str) -> _Profile:
     try:
         return checked(kind, {**yamlfile.parse(text, file), "name": _safe(Path(file).stem)})
     except BadInput as error:
-        raise error if str(error).startswith(file) else error.within(file) from None
+        raise error.within(file) from None
 
 
 def _safe(stem: str) -> str:

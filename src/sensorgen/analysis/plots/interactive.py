@@ -101,7 +101,8 @@ def _domain(panels: Sequence[Panel], k: int) -> list[float]:
 def _axis(axis: Axis) -> Data:
     found: Data = {"title": {"text": escape(axis.title)}, "automargin": True, "zeroline": False}
     if axis.log:
-        found |= {"type": "log", "exponentformat": "power" if "[-]" in axis.title else "SI"}
+        found |= {"type": "log"}  # without a format, 20 is written as 2
+        found |= {"exponentformat": "power"} if "[-]" in axis.title else {"tickformat": "~g"}
     if isfinite(axis.low) and isfinite(axis.high):
         found["range"] = [log10(end) if axis.log else end for end in (axis.low, axis.high)]
     elif isfinite(axis.low):

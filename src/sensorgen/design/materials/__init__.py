@@ -266,7 +266,7 @@ def _own(source: str, text: str | None) -> Own:
     try:
         return checked(Own, yamlfile.parse(own.text(source) if text is None else text, file))
     except BadInput as error:
-        raise error if file in str(error) else error.within(file) from None
+        raise error.within(file) from None
 
 
 def _check_values(name: str, values: Mapping[str, float], texts: Texts) -> None:
@@ -306,7 +306,7 @@ def parse(name: str, text: str) -> Material:
     try:
         made = checked(Material, {**yamlfile.parse(text, file), "name": name})
     except BadInput as error:
-        raise error if str(error).startswith(file) else error.within(file) from None
+        raise error.within(file) from None
     for group, values in (("properties", made.properties), ("print", made.print)):
         for quantity, several in values.items():
             for k, each in enumerate(several):

@@ -38,12 +38,12 @@ def read(path: Path) -> shapely.Polygon:
         smaller than a sensor can be.
     """
     with reading(path):
-        size = path.stat().st_size if path.is_file() else 0
+        size = path.stat().st_size
+    kinds = {".svg": _of_svg, ".dxf": _of_dxf}
+    if not path.is_file() or path.suffix.lower() not in kinds:
+        raise BadInput(f"{path}: expected an outline in a file .svg or .dxf")
     if not 0 < size <= MOST_BYTES:
         raise BadInput(f"{path}: {size} bytes; expected an outline of 1 to {MOST_BYTES} bytes")
-    kinds = {".svg": _of_svg, ".dxf": _of_dxf}
-    if path.suffix.lower() not in kinds:
-        raise BadInput(f"{path}: expected an outline in .svg or .dxf")
     lines = [line for line in islice(kinds[path.suffix.lower()](path), _MOST_CURVES) if len(line) > 1]
     try:
         region = _region(lines)

@@ -10,7 +10,6 @@ from markupsafe import Markup
 from sensorgen.analysis.plots import pages, static
 from sensorgen.analysis.plots.figure import GREY, Axis, Curve, Figure, Panel, look
 from sensorgen.core import document
-from sensorgen.core.document import Table
 from sensorgen.verification.design_chart.results import DesignChart, Point
 
 ALT = (
@@ -47,10 +46,8 @@ def html(found: DesignChart) -> str:
 
 
 def _table(found: DesignChart, key: str) -> Markup:
-    """The table of one quantity, which scrolls on a narrow screen, and the words below it."""
-    parts = [(isinstance(part, Table), document.html([part])) for part in found.parts(key)]
-    tables = (f'<div class="scroll" tabindex="0">{text}</div>' if table else text for table, text in parts)
-    return Markup("".join(tables))  # noqa: S704 - escaped by the document
+    """The table of one quantity, and the words below it."""
+    return Markup(document.html(found.parts(key)))  # noqa: S704 - escaped by the document
 
 
 def _title(found: DesignChart) -> str:

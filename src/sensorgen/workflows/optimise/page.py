@@ -3,7 +3,7 @@
 from sensorgen.analysis.plots import pages
 from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, Axis, Curve, Figure, Panel
 from sensorgen.core.bounds import Bounds
-from sensorgen.core.document import Facts, Table, html
+from sensorgen.core.document import html
 from sensorgen.workflows.optimise.result import Chosen, Optimised
 
 
@@ -22,10 +22,9 @@ def page(found: Optimised) -> str:
     panel = Panel(curves, Axis(across, log=True), Axis(up, log=True))
     alt = f"Evaluated designs by {across} and {up}, with what the models leave open of {across}."
     figures = [Figure("front", f"{across} and {up} as printed", alt, {"": (panel,)})] if curves else []
-    parts = [part for part in found.document() if isinstance(part, (Table, Facts)) or part]
     return pages.render(
         "sensorgen.workflows.optimise", "optimised.html", figures, title=f"Best designs: {found.name}", words=(),
-        content=html(parts),
+        content=html(found.document()),
     )  # fmt: skip
 
 

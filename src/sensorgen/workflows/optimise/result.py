@@ -1,13 +1,13 @@
 """The answer to a target: how many designs there are and why they are out, the front, and the designs to print."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from typing import ClassVar
 
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.display import Displayed
-from sensorgen.core.document import Cell, Column, Facts, Part, Table, comma_separated, shown
+from sensorgen.core.document import Cell, Column, Part, Table, comma_separated, shown
 from sensorgen.core.findings import Verdict
 from sensorgen.workflows.optimise.search import Row, Searched
 from sensorgen.workflows.optimise.target import NUMBERS, Target
@@ -191,9 +191,7 @@ class Optimised(Displayed):
             yield from self._missed()
             return
         yield self.table()
-        yield ""
-        for one in self.recommended:
-            yield Facts(tuple(_facts(one)))
+        yield from _designs(self.recommended)
 
     def table(self) -> Table:
         """The front: parameters that differ, objectives with what the models leave open, verdict."""
@@ -270,24 +268,41 @@ class Optimised(Displayed):
         yield comma_separated(Table("designs", "", columns, tuple(tuple(cells(c)) for c in self.designs)))
 
 
-def _facts(one: Recommended) -> Iterator[tuple[str, str]]:
+def _designs(some: Sequence[Recommended]) -> Iterator[Part]:
+    """What is known of each design to print."""
+    for one in some:
+        yield ""
+        files = ", ".join(filter(None, (one.verdict, one.folder)))
+        yield f"design {one.design.number}, {one.role}" + (f": {files}" if files else "")
+        if one.ties:
+            others = ", ".join(map(str, one.ties[:_LISTED])) + ", ..." * (len(one.ties) > _LISTED)
+            yield f"tied with {others} within what the models leave open; chosen by {RULE}"
+        yield _numbers(one)
+        if one.slicer and not one.sliced:
+            yield one.slicer
+    if any(one.robust for one in some):
+        yield ""
+        yield "median and worst: over walls of slicers and tolerance; with materials: worst over their ranges"
+
+
+def _numbers(one: Recommended) -> Table:
+    """Its numbers, as estimated, in the worst case, and by a real slicer."""
+
     def words(key: str, value: float | None = None) -> str:
         return shown(one.design.cell(key, value), 3)
 
-    yield one.role, f"{one.design.name}: " + ", ".join(f"{key} {words(key)}" for key in one.design.numbers)
-    if one.ties:
-        others = ", ".join(map(str, one.ties[:_LISTED])) + ", ..." * (len(one.ties) > _LISTED)
-        yield "", f"design {one.design.number}, tied with {others} within what the models leave open; chosen by {RULE}"
-    for key, s in (one.robust or {}).items():
-        median, worst, wide = (words(key, each) for each in (s.median, s.worst, s.with_materials))
-        yield "", f"{key} over walls and tolerance: median {median}, worst {worst}; with material ranges {wide}"
-    if one.folder:
-        yield "", f"{one.verdict}, {one.folder}"
-    for key, b in (one.sliced or {}).items():
-        change = b.value / one.design.numbers[key].value - 1 if one.design.numbers[key].value else 0.0
-        yield "", f"{key} by {one.slicer}: {words(key, b.value)} ({change:+.1%} to the estimate)"
-    if one.slicer and not one.sliced:
-        yield "", one.slicer
+    def cells(key: str) -> Iterator[Cell]:
+        yield from (key, words(key))
+        spread, own, sliced = (one.robust or {}).get(key), one.design.numbers[key].value, (one.sliced or {}).get(key)
+        ends = (spread.median, spread.worst, spread.with_materials) if spread else ()
+        yield from (words(key, end) for end in ends) if ends else (None, None, None)
+        is_number = sliced and own and not isinstance(one.design.cell(key, sliced.value), str)
+        change = f" ({sliced.value / own - 1:+.1%})" if sliced and is_number else ""
+        yield words(key, sliced.value) + change if sliced else None
+
+    heads = ("", "estimate", "median", "worst", "with materials", one.slicer if one.sliced else "")
+    columns = tuple(Column(head, right=bool(head), key=head or "number") for head in heads)
+    return Table(f"design-{one.design.number}", "", columns, tuple(tuple(cells(key)) for key in one.design.numbers))
 
 
 def result(name: str, found: Searched, recommended: tuple[Recommended, ...] = ()) -> Optimised:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from sensorgen.core import document
 from sensorgen.core import files as store
+from sensorgen.core.errors import within
 from sensorgen.workflows.optimise.page import page
 from sensorgen.workflows.optimise.recommend import recommended
 from sensorgen.workflows.optimise.result import Optimised, Recommended, result
@@ -39,7 +40,8 @@ def optimise(
     """
     target, name = load(path), path.stem
     chosen: tuple[Recommended, ...] = ()
-    designs = space(target, path.parent) if count else candidates(target, path.parent)
+    with within(str(path)):
+        designs = space(target, path.parent) if count else candidates(target, path.parent)
     with workers.opened() as opened:
         if isinstance(designs, Space):
             found = sample(target, designs, count, opened, keep=keep, progress=progress)
