@@ -180,7 +180,7 @@ def test_a_file_whose_name_is_no_name_for_results(run, tmp_path, stem):
     path = tmp_path / f"{stem}.yaml"
     path.write_text("shape: reference")
     said = run("check", path)
-    assert "set it with --name, or 'name:' in the file" in said.line
+    assert "set it with --name, or 'name:' in a design file" in said.line
     assert run("check", path, "--name", "fine-name").code == 0
     path.write_text("shape: reference\nname: fine-name")
     assert run("check", path).code == 0

@@ -283,7 +283,9 @@ def test_a_conductor_between_both_electrodes_is_a_short(run, tmp_path):
     """It was called a middle electrode."""
     files = stacked(tmp_path, low=(0.0, 0.4), block=(0.4, 0.6), up=(0.6, 1.0))
     said = run("import", *files, "--map", "*=etpu@2", "--name", "short")
-    assert said.code == 0
+    assert said.code == 1
+    assert "next correct what is found below, then import again with --force" in said.words
+    assert "(columns, fem2d, fem3d, prisms: the electrodes touch" in said.words
     assert "1-short low / block / up conductors that touch are both electrodes" in said.words
     assert "middle" not in said.words
     assert {b.name: b.terminal for b in load(Path("short.yaml")).drawn.bodies} == {

@@ -4,14 +4,15 @@ from pathlib import Path
 
 import click
 
-from sensorgen.cli import render
+from sensorgen.cli import FOUND_ERRORS, render
 from sensorgen.cli.words import Length
 from sensorgen.core.errors import BadInput
 
 
 @click.command(
     "import",
-    help="Import bodies drawn in another CAD program as a design: STEP, 3MF, or STL with --unit. All commands take it.",
+    help="Import bodies drawn in another CAD program as a design: STEP, 3MF, or STL with --unit. All commands take it. "
+    "Exit code 1 where electrodes touch.",
 )
 @click.argument("files", nargs=-1, required=True, metavar="FILE...")
 @click.option("--map", "maps", multiple=True, metavar="BODY=MATERIAL[@SOURCE][@TOOL]",
@@ -59,7 +60,7 @@ def command(
     more = {key: value for key, value in (("printer", printer), ("quality", quality)) if value}
     made = writing.write(assembly, chosen, name=name, folder=Path(out), more=more, replace_existing=force)
     render.deliver(made)
-    return 0
+    return FOUND_ERRORS if made.errors else 0
 
 
 command.params += render.options("json", "csv", "markdown")

@@ -124,7 +124,8 @@ class Design(Strict):
         if not _NAME.fullmatch(name) or _DEVICES.fullmatch(name):
             raise ValueError(
                 f"{shown(name)} cannot be a file name everywhere; expected at most 100 letters a to z, digits, "
-                "'.', '-' and '_', with a letter or digit first and last: set it with --name, or 'name:' in the file"
+                "'.', '-' and '_', with a letter or digit first and last: set it with --name, or 'name:' in a design "
+                "file"
             )
         return name
 

@@ -56,19 +56,32 @@ class Imported:
     findings: tuple[Finding, ...] = ()
     models: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def errors(self) -> list[Finding]:
+        """Findings with which it cannot be a sensor."""
+        return [finding for finding in self.findings if finding.severity == "error"]
+
     def document(self) -> Iterator[Part]:
         """What was written, and what applies to it."""
         size = " x ".join(f"{edge:g}" for edge in self.size_mm)
         moved = ", ".join(f"{way:g}" for way in self.moved_mm)
         able = [name for name, reason in self.models.items() if not reason]
-        reasons = "; ".join(f"{name}: {reason}" for name, reason in self.models.items() if reason)
-        as_drawn = ", ".join(able) or f"no model applies, only as printed ({reasons})"
+        reasons: dict[str, list[str]] = {}
+        for name, reason in self.models.items():
+            reasons.setdefault(reason, []).append(name)
+        why = "; ".join(f"{', '.join(names)}: {reason}" for reason, names in reasons.items())
+        as_drawn = ", ".join(able) or f"no model applies, only as printed ({why})"
         rows = [
             ("size", f"{size} mm" + (f"; moved by {moved} mm, its corner to 0, 0, 0" if any(self.moved_mm) else "")),
             *self.bodies.items(),
             ("capacitance as drawn", as_drawn),
             ("written", f"{self.design} and {self.geometry}"),
-            ("next", f"sensorgen check {self.design}"),
+            (
+                "next",
+                "correct what is found below, then import again with --force"
+                if self.errors
+                else f"sensorgen check {self.design}",
+            ),
         ]
         yield Facts(tuple(rows))
         if self.findings:
