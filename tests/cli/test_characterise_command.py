@@ -230,6 +230,18 @@ def filled(planned, study, truth, seed=4):
     return virtual_lab.filled(blank, coupons, truth, METERS, np.random.default_rng(seed))
 
 
+@pytest.mark.parametrize(
+    ("walls_mm", "words"),
+    [((0.45, 0.9), "as wide as"), ((0.44, 0.89), "0.010 mm narrower than"), ((0.46, 0.91), "0.010 mm wider than")],
+)
+def test_walls_beside_their_lines(planned, study, truth, tmp_path, run, walls_mm, words):
+    form, text = tmp_path / "form.yaml", filled(planned, study, truth)
+    for k, wall in enumerate(walls_mm, 1):
+        text = text.replace(f"wall_{k}_mm: ~", f"wall_{k}_mm: {wall}")
+    form.write_text(text, "utf-8")
+    assert f"line width 0.450 mm (set 0.44); a wall is {words} its lines" in run("characterise", "read", form).words
+
+
 def test_from_plate_to_prediction(planned, study, truth, tmp_path, run):
     """The budget of a prediction shrinks to what the coupons leave open, and the truth lies within."""
     form = tmp_path / "form.yaml"
@@ -248,7 +260,7 @@ def test_from_plate_to_prediction(planned, study, truth, tmp_path, run):
     assert (tmp_path / "after.svg").read_text("utf-8").startswith("<svg")
     assert "smallest film without a short: 2 layers" in said.words
     assert "x -0.20 mm" in said.words
-    assert "line width 0.450 mm" in said.words
+    assert "line width 0.450 mm (set 0.44); a wall is 0.010 mm wider than its lines" in said.words
     own = [word for part in ("electrode=etpu", "dielectric=x60") for word in ("--material", f"{part}@lab-spool7")]
     budgets = []
     for more in ([], own):

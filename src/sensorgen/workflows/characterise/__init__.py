@@ -367,7 +367,7 @@ class Characterised:
 
     def document(self) -> Iterator[Part]:
         """Values, coupons that are left out, findings, and how a design takes the values."""
-        yield f"{self.source}: {self.readings} readings of {self.coupons} coupons"
+        yield f"{self.source}: {self.readings} readings of {self.coupons} coupons, besides sizes and lines"
         yield Table.of("values", "95 % intervals, before and after", self.rows)
         yield from (
             f"{name} is left out: dead with probability {share:.0%}, against the others or the sources' values"
@@ -463,7 +463,8 @@ def _findings(piece: forms.Lines, line_mm: float) -> Iterator[str]:
     if len(walls) > 1:
         lines, widths = np.array(walls, float).T
         slope, over = np.polyfit(lines, widths, 1)
-        yield f"line width {slope:.3f} mm (set {line_mm:g}); a wall is {over:+.3f} mm wider than its lines"
+        differs = f"{abs(over):.3f} mm {'wider' if over > 0 else 'narrower'} than" if round(over, 3) else "as wide as"
+        yield f"line width {slope:.3f} mm (set {line_mm:g}); a wall is {differs} its lines"
     missing = [k for k, w in enumerate(piece.walls_mm, 1) if w == 0]
     if missing:
         yield f"walls of {max(missing)} lines or fewer are not printed"
