@@ -65,6 +65,12 @@ def test_without_electrical_numbers_no_design_is_plainly_printed():
     assert "not predicted: checks alone" in alone
 
 
+def test_the_first_screen_says_what_is_doubtful():
+    design = make({"shape": "reference", "parameters": {"length_mm": 30.0}})
+    said = " ".join(" ".join(text(decision(design, review(design), 0.0).document())).split())
+    assert "doubtful: plate free to expand sideways: bonded to its electrodes it would be stiffer" in said
+
+
 def test_waived_findings_do_not_count():
     open_, waived = (
         make({"shape": "reference", "parameters": {"dielectric_mm": 0.1}, "waivers": waivers})

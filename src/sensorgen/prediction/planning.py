@@ -119,7 +119,7 @@ def _inexpensive(found: list[Option], body: Body) -> list[Option]:
     if law:
         name, said = law.compression.name, "compression of infill, between standing columns and flat levels"
     known = law or replace(spatial[0].expected, bounded=False)
-    said += f": solving this cell takes some {spatial[0].seconds:.0f} s (--compression solved)"
+    said += f": solving this cell takes some {spatial[0].seconds:.0f} s (predict --compression solved)"
     known = replace(known, doubts=(said,))
     return [Option(name, 0.0, known, lambda: known)]
 

@@ -301,7 +301,7 @@ def _grade(error: Bounds | None, good: float, useless: float) -> int:
 
 
 def table(tried: Trial) -> Iterator[Part]:
-    """Electrode gap, capacitance, resistance of the electrodes, resolution, and the time of the print where known."""
+    """Electrode gap, capacitance, resistance of the electrodes, resolution, the time of the print where known, and doubts."""
     both, length_m = (tried.drawn, tried.printed), 2 * tried.position_m
     rows = [
         ("electrode gap", *(_words(n.gap) for n in both)),
@@ -317,6 +317,7 @@ def table(tried: Trial) -> Iterator[Part]:
     yield f"(resolution at {tried.force_n:g} N and {tried.position_m * 1e3:g} mm; {tried.body})"
     if tried.reason and tried.status != "not predicted":
         yield tried.reason
+    yield from (f"doubtful: {doubt}" for doubt in tried.doubts)
 
 
 def words_of(tried: Trial) -> str:
