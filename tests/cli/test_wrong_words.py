@@ -171,3 +171,13 @@ def test_no_traceback_in_a_process_of_its_own(real, command):
         said = real(command, *words)
         assert said.code == 2
         assert said.line
+
+
+@pytest.mark.parametrize(
+    "words", [["check", "reference", "--budget", "nan"], ["log", "add", "S1", "--humidity", "nan"]]
+)
+def test_nan_is_within_no_range(run, words):
+    """A budget of nan seconds was taken as none."""
+    said = run(*words)
+    assert (said.code, said.out) == (2, "")
+    assert "nan is not a number" in said.line

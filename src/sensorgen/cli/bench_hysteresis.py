@@ -7,7 +7,7 @@ import click
 
 from sensorgen.cli import bench_opened, render
 from sensorgen.cli.log_words import made
-from sensorgen.cli.words import Png
+from sensorgen.cli.words import NumberRange, Png
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ command = made(
     click.Option(["--rig", "rig_file"], metavar="FILE", help="The rig's log that belongs to RECORDING_FILE."),
     *bench_opened.options(),
     click.Option(
-        ["--threshold", "threshold_n"], type=click.FloatRange(0, min_open=True), default=0.2, show_default=True,
+        ["--threshold", "threshold_n"], type=NumberRange(0, min_open=True), default=0.2, show_default=True,
         metavar="N", help="Force from which on the tip presses.",
     ),
     click.Option(["--plot"], type=Png(), metavar="FILE.png", help="Draw the ways up and down over the force."),

@@ -12,7 +12,7 @@ from sensorgen.cli import render
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.log_words import columns_of, existing, made, opened, recorded_columns, where
 from sensorgen.cli.settings import pairs
-from sensorgen.cli.words import OneOf
+from sensorgen.cli.words import NumberRange, OneOf
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
@@ -234,8 +234,8 @@ add = made(
     click.Option(["--baked/--unbaked"], default=None, help="Whether the specimen was baked before."),
     click.Option(["--measured-at"], metavar="WHEN", default="", help="When it was measured, in your own words."),
     click.Option(["--instrument"], metavar="NAME", default="", help="The meter, as 'HP 4284A': its accuracy is used."),
-    click.Option(["--temperature"], metavar="C", type=click.FloatRange(-50, 200), help="Of the air [C]."),
-    click.Option(["--humidity"], metavar="PERCENT", type=click.FloatRange(0, 100), help="Of the air, relative."),
+    click.Option(["--temperature"], metavar="C", type=NumberRange(-50, 200), help="Of the air [C]."),
+    click.Option(["--humidity"], metavar="PERCENT", type=NumberRange(0, 100), help="Of the air, relative."),
     click.Option(["--photo"], metavar="FILE", help="A photo of the specimen, kept with the log."),
     click.Option(["--defect", "defects"], type=OneOf(DEFECTS), multiple=True, help="A defect that can be seen."),
     click.Option(["--visa"], metavar="ADDRESS", help="Read the meter there, as GPIB0::22::INSTR: first Y, then Z."),

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sensorgen.cli.words import NumberRange
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
 
@@ -139,7 +140,7 @@ def advice_options() -> list[click.Parameter]:
     """``--budget`` and ``--apply``: changes of a design that are tried, and written into its file."""
     return [
         click.Option(
-            ["--budget"], type=click.FloatRange(0, 3600), default=30.0, show_default=True, metavar="SECONDS",
+            ["--budget"], type=NumberRange(0, 3600), default=30.0, show_default=True, metavar="SECONDS",
             envvar="SENSORGEN_BUDGET",
             help="Processor time for prediction and for changes to try; 0 tries none.",
         ),
@@ -162,7 +163,9 @@ def applied(design: "Design", advice: "Advice | None", number: int | None) -> No
         return
     tried = advice.tried if advice else ()
     if number > len(tried):
-        raise BadInput(f"--apply {number}: {len(tried)} changes that were tried are good; expected one of them")
+        raise BadInput(
+            f"--apply {number}: expected the number of a change that helps, of which there are {len(tried)}"
+        )
     change = tried[number - 1]
     word = click.get_current_context().info_name or ""
     if not (word.endswith((".yaml", ".yml")) or "/" in word):

@@ -1,6 +1,7 @@
 """Kinds of words on the command line: lengths with their units, and names from a list."""
 
 from collections.abc import Callable, Iterable, Sequence
+from math import isnan
 from typing import Any
 
 import click
@@ -22,6 +23,15 @@ class Length(click.ParamType):  # type: ignore[type-arg]
             return units.length_mm(value)
         except BadInput as error:
             raise error.within(_said(param)) from None
+
+
+class NumberRange(click.FloatRange):
+    """A number within limits; ``nan``, which is below no limit, is none."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Read a number as typed."""
+        number = float(super().convert(value, param, ctx))
+        return self.fail("nan is not a number", param, ctx) if isnan(number) else number
 
 
 class Values(click.ParamType):  # type: ignore[type-arg]

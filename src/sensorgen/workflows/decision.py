@@ -301,7 +301,7 @@ def _grade(error: Bounds | None, good: float, useless: float) -> int:
 
 
 def table(tried: Trial) -> Iterator[Part]:
-    """Electrode gap, capacitance, resistance of the electrodes, resolution, the time of the print where known, and doubts."""
+    """Electrode gap, capacitance, resistance of the electrodes, resolution, time of the print where known; doubts."""
     both, length_m = (tried.drawn, tried.printed), 2 * tried.position_m
     rows = [
         ("electrode gap", *(_words(n.gap) for n in both)),
