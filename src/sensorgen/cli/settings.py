@@ -163,9 +163,8 @@ def applied(design: "Design", advice: "Advice | None", number: int | None) -> No
         return
     tried = advice.tried if advice else ()
     if number > len(tried):
-        raise BadInput(
-            f"--apply {number}: expected the number of a change that helps, of which there are {len(tried)}"
-        )
+        above = f"expected the number of a change above, at most {len(tried)}"
+        raise BadInput(f"--apply {number}: {above if tried else 'no change that was tried helps'}")
     change = tried[number - 1]
     word = click.get_current_context().info_name or ""
     if not (word.endswith((".yaml", ".yml")) or "/" in word):
