@@ -52,6 +52,8 @@ class Cells:
         Of a print; None of a drawing, and where no film lies between the electrodes.
     count_error : float
         Of ``count``, relative, where a border cuts cells [-].
+    beside : tuple of (Scene, float)
+        Of a drawing, cells with the rim that whole cells leave at the sensor's ends, and how many of each [-].
     """
 
     scenes: Mapping[str, Scene]
@@ -62,16 +64,12 @@ class Cells:
     remarks: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     film: Film | None = None
     count_error: float = 0.0
+    beside: tuple[tuple[Scene, float], ...] = ()
 
     @cached_property
     def gap_mm(self) -> Mapping[str, float]:
         """Smallest distance of two electrodes, by the same rules; infinite where there are no two [mm]."""
         return self.gaps()
-
-    @property
-    def counted(self) -> tuple[float, float]:
-        """How many cells the sensor has, and the relative error of that [-]."""
-        return self.count, self.count_error
 
     def first(self) -> Scene:
         """The cell by the most likely rule."""

@@ -32,33 +32,41 @@ def drawn(design: Design) -> Body:
 def _drawn_cells(design: Design) -> Cells:
     if design.border:
         return _inside(design, _drawn_cells(design.unbordered))
-    period, (scene, count) = getattr(design.params, "period_mm", None), _one_cell(design)
+    period, ((scene, count), *beside) = getattr(design.params, "period_mm", None), _parts(design)
+    scene = _connected(design, scene)
+    if any(isinstance(p, Prism) and p.axis == "z" and not p.is_box() for b in scene.bodies for p in b.pieces):
+        scene, periods = _one_period(scene)
+        count *= periods
+    rims = tuple((_connected(design, part), number) for part, number in beside)
+    return Cells({DRAWN: scene}, count, period, partial(_drawn_gap, design), beside=rims)
+
+
+def _connected(design: Design, scene: "Scene") -> "Scene":
+    """The scene, each electrode one body of one conductor."""
     conducting = [b.terminal for b in scene.bodies if b.terminal or design.conducts(b.material) for _ in b.pieces]
     if "" in conducting or len(set(conducting)) < len(conducting):  # else each electrode is one piece
         from sensorgen.scene.connections import connected_scene
 
-        scene = connected_scene(scene, design.conducts)
-    if any(isinstance(p, Prism) and p.axis == "z" and not p.is_box() for b in scene.bodies for p in b.pieces):
-        scene, periods = _one_period(scene)
-        count *= periods
-    return Cells({DRAWN: scene}, count, period, partial(_drawn_gap, design))
+        return connected_scene(scene, design.conducts)
+    return scene
 
 
-def _one_cell(design: Design) -> "tuple[Scene, float]":
-    """What stands for the sensor as drawn, and how many of it there are: one cell of an array that is no prisms.
+def _parts(design: Design) -> "list[tuple[Scene, float]]":
+    """What stands for the sensor as drawn, and how many of each: of an array that is no prisms one cell, and its rims.
 
     Other patterns are whole: models of prisms find the cell, and what the sensor's ends cut off.
     """
-    scene, params = design.in_use, design.params
-    if all(isinstance(p, Prism) for b in scene.bodies for p in b.pieces):
-        return scene, 1.0
     from sensorgen.scene.array import ArrayParams
 
-    if not isinstance(params, ArrayParams):
-        return scene, 1.0
-    one = replace(params, length_mm=params.period_mm, width_mm=params.period_mm)
-    cell = make(design.model_dump(exclude_defaults=True, mode="json") | {"parameters": asdict(one)})
-    return cell.in_use, params.cells()
+    scene, params = design.in_use, design.params
+    if not isinstance(params, ArrayParams) or all(isinstance(p, Prism) for b in scene.bodies for p in b.pieces):
+        return [(scene, 1.0)]
+    given = design.model_dump(exclude_defaults=True, mode="json")
+    found = []
+    for length, width, count in params.parts():
+        one = replace(params, length_mm=length, width_mm=width)
+        found.append((make(given | {"parameters": asdict(one)}).in_use, count))
+    return found
 
 
 def _one_period(scene: "Scene") -> "tuple[Scene, float]":
@@ -101,7 +109,8 @@ def _inside(design: Design, whole: Cells) -> Cells:
         f"to {100 * left.error:.2g} %; resistances and loads are those of the rectangle"
     )
     remarks = {name: (*whole.remarks.get(name, ()), remark) for name in whole.scenes}
-    return replace(whole, count=whole.count * left.area, count_error=left.error, remarks=remarks)
+    beside = tuple((part, number * left.area) for part, number in whole.beside)
+    return replace(whole, count=whole.count * left.area, beside=beside, count_error=left.error, remarks=remarks)
 
 
 def _drawn_gap(design: Design) -> dict[str, float]:

@@ -15,6 +15,7 @@ from typing import Any
 from sensorgen.core import cache as cached
 from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
+from sensorgen.design.body import Cells
 from sensorgen.models import capacitance_models
 from sensorgen.prediction.cost_model import expected, measured
 from sensorgen.prediction.plan import Candidate
@@ -100,9 +101,32 @@ class Answer:
         loss = self.loss_f and whole(self.loss_f)
         return replace(self, capacitance_f=whole(self.capacitance_f), loss_f=loss)
 
+    def plus(self, other: "Answer") -> "Answer":
+        """The capacitance of both side by side."""
+
+        def both(one: Interval, two: Interval) -> Interval:
+            return Interval(one.lower + two.lower, one.upper + two.upper)
+
+        loss = both(self.loss_f, other.loss_f) if self.loss_f and other.loss_f else None
+        return replace(self, capacitance_f=both(self.capacitance_f, other.capacitance_f), loss_f=loss)
+
     def seconds(self) -> float:
         """Time that all models took together, imports left out [s]."""
         return sum(c.seconds or 0.0 for c in self.plan)
+
+
+def of_sensor(
+    cells: Cells, permittivity: Mapping[str, complex], width: float = inf, model: str = "", keep: bool = True
+) -> Answer:
+    """Capacitance of a whole sensor by its most likely cells; parameters and errors as of :func:`capacitance`."""
+    found = capacitance(cells.first(), permittivity, width, model, keep).times(cells.count, cells.count_error)
+    for scene, count in cells.beside:
+        try:
+            rims = capacitance(scene, permittivity, width, model, keep)
+        except Unpredictable as error:
+            raise Unpredictable(f"rims that its cells leave; a sensor of whole cells has none: {error}") from None
+        found = found.plus(rims.times(count, cells.count_error))
+    return found
 
 
 def capacitance(

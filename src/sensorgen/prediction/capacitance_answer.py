@@ -11,7 +11,7 @@ from sensorgen.core.units import M_PER_MM, si
 from sensorgen.design.body import Body
 from sensorgen.design.values import MaterialValue
 from sensorgen.prediction import losses
-from sensorgen.prediction.capacitance import Unpredictable, capacitance, default_width
+from sensorgen.prediction.capacitance import Unpredictable, default_width, of_sensor
 from sensorgen.prediction.plan import Candidate, candidates_table
 from sensorgen.prediction.sweep import Sweep
 from sensorgen.prediction.sweep import sweep as swept
@@ -168,7 +168,7 @@ def answer(body: Body, asked: Asked) -> CellCapacitance:
     design, scene = body.design, body.cells.first()
     permittivity, values = losses.permittivity(design, asked.frequency_hz)
     width = default_width(scene) if asked.width is None else asked.width
-    found = capacitance(scene, permittivity, width, asked.model, asked.keep).times(body.cells.count)
+    found = of_sensor(body.cells, permittivity, width, asked.model, asked.keep)
     area_m2 = design.area_mm2 * M_PER_MM**2
     real, loss, per_area = found.capacitance_f, found.loss_f, found.capacitance_f.times(1 / area_m2)
     tan_delta = None

@@ -9,7 +9,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.design.body import Body, Cells
 from sensorgen.design.design import Design
 from sensorgen.design.values import ENDS, MaterialValue, permittivities, resistivities
-from sensorgen.prediction.capacitance import PLANE, Answer, Unpredictable, capacitance, default_width
+from sensorgen.prediction.capacitance import PLANE, Answer, Unpredictable, capacitance, default_width, of_sensor
 from sensorgen.prediction.electrodes import electrode_resistance
 from sensorgen.prediction.spread import spread
 from sensorgen.scene.scene import Scene
@@ -77,7 +77,7 @@ def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -
     wanted = inf if width == inf else min(width or inf, default_width(scene))
     said = cells.remarks.get(next(iter(cells.scenes)), ())
     try:
-        answer = capacitance(scene, eps, wanted).times(*cells.counted)
+        answer = of_sensor(cells, eps, wanted)
     except Unpredictable as error:
         raise Unpredictable("; ".join((*said, str(error)))) from None
     c = answer.capacitance_f

@@ -7,6 +7,8 @@ from math import floor
 from sensorgen.core.errors import OutOfRange
 from sensorgen.scene.scene import Body, Envelope, Fill, Piece, Prism, Scene, box, rounded
 
+_NO_RIM_MM = 1e-6
+
 
 @dataclass(frozen=True)
 class ArrayParams(Envelope):
@@ -26,6 +28,29 @@ class ArrayParams(Envelope):
     def cells(self) -> float:
         """How many cells of the pattern the sensor holds [-]."""
         return self.length_mm * self.width_mm / self.period_mm**2
+
+    def fitting(self) -> tuple[int, int]:
+        """How many whole cells it has along its length and width."""
+        along, across = (floor(size / self.period_mm + 1e-9) for size in (self.length_mm, self.width_mm))
+        return along, across
+
+    def parts(self) -> list[tuple[float, float, float]]:
+        """Length and width of sensors that make it up [mm], and how many of each: one cell, then those with rims.
+
+        A sensor is mirrored in the walls of its inner cells, so that it may be cut there; what its whole cells leave at
+        either end belongs to the last of them. The two ends of a row are one sensor of two cells.
+        """
+
+        def along(size: float, cells: int) -> list[tuple[float, int]]:
+            left = size - cells * self.period_mm
+            if left < _NO_RIM_MM:
+                return [(self.period_mm, cells)]
+            ends = min(cells, 2)
+            return [(self.period_mm, cells - ends), (rounded(ends * self.period_mm + left), 1)]
+
+        rows, columns = (along(*each) for each in zip((self.length_mm, self.width_mm), self.fitting(), strict=True))
+        cell, *rims = [(x, y, float(m * n)) for x, m in rows for y, n in columns]
+        return [cell, *(rim for rim in rims if rim[2])]
 
     def refuse_wider(self, width_mm: float) -> None:
         """Refuse structures that would run into each other, and a sensor without room for one cell."""
@@ -59,7 +84,7 @@ def array_scene(
     """
     low, film = p.electrode_mm, p.electrode_mm + p.dielectric_mm
     roof, top = film + p.height_mm, film + p.height_mm + p.electrode_mm
-    counts = [floor(size / p.period_mm + 1e-9) for size in (p.length_mm, p.width_mm)]
+    counts = p.fitting()
     starts = [(size - n * p.period_mm) / 2 for size, n in zip((p.length_mm, p.width_mm), counts, strict=True)]
     places = [
         (rounded(starts[0] + (i + 0.5) * p.period_mm), rounded(starts[1] + (j + 0.5) * p.period_mm))

@@ -117,7 +117,7 @@ def questions(body: Body, query: Query) -> list[Question]:
 
 
 def _capacitance(body: Body) -> Question:
-    scene, count = body.cells.first(), body.cells.count
+    scene, count = body.cells.first(), body.cells.count or 1.0  # 0 where every cell has a rim
     eps = {v.material: v.value for v in permittivities(body.design)}
     series, silent = [], []
     for name, module in capacitance_models().items():
