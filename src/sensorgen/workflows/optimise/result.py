@@ -269,7 +269,7 @@ class Optimised(Displayed):
 
 
 def _designs(some: Sequence[Recommended]) -> Iterator[Part]:
-    """What is known of each design to print."""
+    """Each design to print: role, verdict, folder, ties and numbers."""
     for one in some:
         yield ""
         files = ", ".join(filter(None, (one.verdict, one.folder)))
