@@ -174,7 +174,7 @@ def test_a_sensor_of_cells_and_rims_has_the_capacitance_of_its_whole_drawing(sha
     assert all_of_it.lower <= parts.upper
     assert parts.width() < 5e-3
     has_rims = design.params.fitting() != (length_mm / 1.25, width_mm / 1.25)
-    assert bool(cells.beside) == has_rims
+    assert (bool(cells.beside), bool(cells.remarks["drawn"])) == (has_rims, has_rims)
     areas = [
         count * scene.size_mm[0] * scene.size_mm[1] for scene, count in (*cells.beside, (cells.first(), cells.count))
     ]

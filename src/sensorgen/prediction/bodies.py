@@ -38,7 +38,9 @@ def _drawn_cells(design: Design) -> Cells:
         scene, periods = _one_period(scene)
         count *= periods
     rims = tuple((_connected(design, part), number) for part, number in beside)
-    return Cells({DRAWN: scene}, count, period, partial(_drawn_gap, design), beside=rims)
+    said = "its cells leave rims without structures: compression is that of the cells, as if there were no rims"
+    remarks: dict[str, tuple[str, ...]] = {DRAWN: (said,) if rims else ()}
+    return Cells({DRAWN: scene}, count, period, partial(_drawn_gap, design), remarks=remarks, beside=rims)
 
 
 def _connected(design: Design, scene: "Scene") -> "Scene":

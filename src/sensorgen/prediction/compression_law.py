@@ -124,7 +124,7 @@ def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | N
     soft = moduli[film(design)]
     doubt = (
         f"{design.shape} approximated by a free solid plate of {soft.material} (B.49): its cell was not solved; "
-        "ask for the law 'solved', which takes from seconds to a minute"
+        "predict --compression solved does that, in seconds to a minute"
     )
     return Law(compression.unconfined(soft.value), (soft,), (doubt,), bounded=False)
 

@@ -191,8 +191,9 @@ def _compression(laws: list[Option], sensor: Sensor, load: Load, allowed: float)
 
 
 def _with_failures(law: Law, level: Level) -> Law:
-    """A law of unknown error says why no better one was found."""
-    failed = () if law.bounded else tuple(f"{c.model}: {c.passed_over}" for c in level.candidates if c.passed_over)
+    """A law of unknown error says why no better one was found, of several meshes of one model once."""
+    over = [(c.model.partition(",")[0], c.passed_over) for c in level.candidates if c.passed_over]
+    failed = () if law.bounded else tuple(f"{model}: {why}" for model, why in dict.fromkeys(over))
     return replace(law, doubts=(*law.doubts, *failed))
 
 
