@@ -113,6 +113,13 @@ def test_a_target_that_nothing_meets_names_the_nearest_and_what_binds():
     words = " ".join(str(part) for part in answer.document())
     assert "none of 12 designs meets the target" in words
     assert "nearest: dielectric_mm 0.1" in words
+    assert not answer.remarks  # no design was evaluated: nothing is known of its doubts
+
+
+def test_of_the_nearest_design_the_numbers_are_told():
+    search_ = found(parameters={"dielectric_mm": [0.2]}, limits={"force_resolution_n": {"most": 1e-6}})
+    words = " ".join(str(part) for part in result.result("plates", search_).document())
+    assert re.search(r"violates limit force_resolution_n \(.*capacitance_pf \d", words)
 
 
 def test_a_search_that_is_stopped_goes_on_where_it_was(monkeypatch):

@@ -238,7 +238,9 @@ class Optimised(Displayed):
             values = ", ".join(
                 f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in self.nearest.values.items()
             )
-            yield f"nearest: {values}; violates {', '.join(self.nearest.violated)}"
+            numbers = ", ".join(f"{k} {shown(self.nearest.cell(k), 3)}" for k in self.nearest.numbers)
+            has = f" ({numbers})" if numbers else ""
+            yield f"nearest: {values}; violates {', '.join(self.nearest.violated)}{has}"
         if self.binding:
             yield Table(
                 "binding", "", (Column("constraint"), Column("violated by"), Column("by it alone")),
@@ -332,7 +334,7 @@ def result(name: str, found: Searched, recommended: tuple[Recommended, ...] = ()
 def _remarks(found: Searched) -> Iterator[str]:
     """Accepted doubts that no evaluated design has."""
     doubts = list(dict.fromkeys(doubt for row in found.evaluated if row.trial for doubt in row.trial.doubts))
-    for part in found.target.accept_doubts:
+    for part in found.target.accept_doubts if found.evaluated else ():
         if not any(part in doubt for doubt in doubts):
             known = "; ".join(f"{doubt:.60}" for doubt in doubts[:3]) or "none"
             yield (
