@@ -10,6 +10,7 @@ import shapely
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
 from sensorgen.prediction import bodies
+from sensorgen.prediction.capacitance_answer import Asked, answer
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.scene.border import share
 from sensorgen.scene.geometry import meshes, outline_files, validity
@@ -155,6 +156,10 @@ def test_capacitance_is_the_share_of_the_cells(tmp_path):
     exact = 8.8541878128e-12 * eps * math.pi * 28 * 18 * 1e-6 / 0.6e-3
     assert plate.value == pytest.approx(exact, rel=2e-3, abs=0.0)
     assert plate.model.lower < exact < plate.model.upper
+    cell = answer(bodies.drawn(bordered("reference", path)), Asked())
+    assert cell.lower_f_per_m2 * cell.area_m2 < exact < cell.upper_f_per_m2 * cell.area_m2
+    assert (cell.reached, cell.relative_width > cell.accuracy) == (True, True)
+    assert "is inside the border" in cell.doubts[0]
     tri = make({"shape": "tri", "parameters": {"length_mm": 56.0, "width_mm": 36.0}})
     region = outline_files.read(path)
     left = share(tri.drawn, region, (2.0, 36.0))
@@ -167,6 +172,16 @@ def test_capacitance_is_the_share_of_the_cells(tmp_path):
         of_all = (peak * wide).sum() / (peak * 36).sum()
         assert abs(of_all / left.area - 1) <= left.error
     assert left.error < 0.15
+
+
+def test_a_border_counts_the_cells_of_an_array_with_rims(tmp_path):
+    """Its period, not the whole sensor: else a border left all of the capacitance open."""
+    design = bordered("cone", svg(tmp_path, ELLIPSE, width="12mm", height="8mm", box=(600, 400)))
+    cells = bodies.drawn(design).cells
+    tiles = (*cells.beside, (cells.first(), cells.count))
+    areas = [count * scene.size_mm[0] * scene.size_mm[1] for scene, count in tiles]
+    assert sum(areas) == pytest.approx(design.area_mm2, rel=1e-3)
+    assert 0.1 < cells.count_error < 0.6
 
 
 @pytest.mark.parametrize(

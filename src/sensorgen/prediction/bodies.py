@@ -105,7 +105,8 @@ def _inside(design: Design, whole: Cells) -> Cells:
 
     scene = design.unbordered.drawn
     plan = window(layers(scene, design.layers.boundaries_mm(scene.size_mm[2])), scene)
-    left = share(scene, borders.region(design.border or ""), plan.sides_mm())
+    sides = whole.first().size_mm[:2] if whole.beside else plan.sides_mm()
+    left = share(scene, borders.region(design.border or ""), sides)
     remark = (
         f"{100 * left.area:.3g} % of the rectangle is inside the border: its capacitance is that share of the cells', "
         f"to {100 * left.error:.2g} %; resistances and loads are those of the rectangle"

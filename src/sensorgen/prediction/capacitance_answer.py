@@ -64,7 +64,7 @@ class CellCapacitance:
     seconds : float or None
         Time that all models took together, imports left out [s].
     reached : bool
-        Whether the bounds are as narrow as asked.
+        Whether the bounds are as narrow as asked, beside what a border leaves open.
     reason : str
         Why there is no answer, or "".
     accuracy : float or None
@@ -83,6 +83,8 @@ class CellCapacitance:
         All models, with what they reached.
     values : tuple of MaterialValue
         Material values used.
+    doubts : tuple of str
+        Of how its cells stand for the sensor, as a border that cuts them.
     """
 
     design: str
@@ -104,6 +106,7 @@ class CellCapacitance:
     refused: tuple[str, ...] = ()
     plan: tuple[Candidate, ...] = ()
     values: tuple[MaterialValue, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     def table(self) -> Table:
         """One row."""
@@ -124,6 +127,7 @@ class CellCapacitance:
         if self.loss_lower_f_per_m2 is not None:
             yield "loss", "minus the imaginary part of the capacitance per area [F/m2]"
         yield from (("with", remark) for remark in self.remarks())
+        yield from (("doubtful", doubt) for doubt in self.doubts)
 
     def remarks(self) -> Sequence[str]:
         """Material values and their sources."""
@@ -165,10 +169,11 @@ def answer(body: Body, asked: Asked) -> CellCapacitance:
     MissingValue
         A dielectric without a permittivity.
     """
-    design, scene = body.design, body.cells.first()
+    design, cells = body.design, body.cells
+    scene = cells.first()
     permittivity, values = losses.permittivity(design, asked.frequency_hz)
     width = default_width(scene) if asked.width is None else asked.width
-    found = of_sensor(body.cells, permittivity, width, asked.model, asked.keep)
+    found = of_sensor(cells, permittivity, width, asked.model, asked.keep)
     area_m2 = design.area_mm2 * M_PER_MM**2
     real, loss, per_area = found.capacitance_f, found.loss_f, found.capacitance_f.times(1 / area_m2)
     tan_delta = None
@@ -180,9 +185,11 @@ def answer(body: Body, asked: Asked) -> CellCapacitance:
         lower_f_per_m2=per_area.lower, upper_f_per_m2=per_area.upper,
         loss_lower_f_per_m2=loss.lower / area_m2 if loss else None,
         loss_upper_f_per_m2=loss.upper / area_m2 if loss else None,
-        relative_width=found.width(), seconds=found.seconds(), reached=found.reached(),
+        relative_width=found.width(), seconds=found.seconds(),
+        reached=found.width() <= found.wanted + 2 * cells.count_error * (1 + found.wanted),
         accuracy=found.wanted if found.wanted < inf else None, known=found.known, area_m2=area_m2, tan_delta=tan_delta,
         frequency_hz=asked.frequency_hz if loss else None, refused=found.refused, plan=found.plan, values=tuple(values),
+        doubts=cells.remarks.get(next(iter(cells.scenes)), ()),
     )  # fmt: skip
 
 
