@@ -107,3 +107,18 @@ def test_damaged_facts_of_a_recording():
             facts.from_json(text)
         assert message in str(caught.value)
         assert not OF_PYDANTIC.search(str(caught.value))
+
+
+@pytest.mark.parametrize(
+    ("message", "where", "expected"),
+    [
+        ("bad.yaml: holds nothing", "bad.yaml", "bad.yaml: holds nothing"),
+        ("zig.py, line 3: no colon", "zig.py", "zig.py, line 3: no colon"),
+        ("cannot read 'a.yaml': No such file", "a.yaml", "cannot read 'a.yaml': No such file"),
+        ("tool 3 is there twice", "t", "t: tool 3 is there twice"),
+        ("designs.12: no shape", "designs.1", "designs.1: designs.12: no shape"),
+    ],
+)
+def test_a_message_names_its_file_once(message, where, expected):
+    """A file named t was left out where the message began with a t."""
+    assert str(BadInput(message).within(where)) == expected

@@ -11,9 +11,10 @@ class SensorgenError(Exception):
     """Anything a user can put right; the command line shows it as one line and exits with 2."""
 
     def within(self, where: str) -> Self:
-        """The same error, its message led by the file or key that it is about, unless it is already."""
-        if where and not str(self).startswith(where):
-            self.args = (f"{where}: {self}",)
+        """The same error, its message led by the file or key that it is about, unless it names that already."""
+        said = str(self)
+        if where and not (said.startswith((f"{where}:", f"{where},")) or f" {where!r}: " in said):
+            self.args = (f"{where}: {said}",)
         return self
 
 

@@ -37,8 +37,9 @@ class ArrayParams(Envelope):
     def parts(self) -> list[tuple[float, float, float]]:
         """Length and width of sensors that make it up [mm], and how many of each: one cell, then those with rims.
 
-        A sensor is mirrored in the walls of its inner cells, so that it may be cut there; what its whole cells leave at
-        either end belongs to the last of them. The two ends of a row are one sensor of two cells.
+        Inner cells are mirrored in their walls, so that they may be cut there; what whole cells leave at either end
+        belongs to the last of them, and the two ends of a row are one sensor of two cells. The wall between an end and
+        an inner cell is no mirror: insulating it lowers the capacitance, of cones on 12 x 6 mm by at most 0.15 %.
         """
 
         def along(size: float, cells: int) -> list[tuple[float, int]]:
