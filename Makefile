@@ -5,7 +5,7 @@ BIN = $(VENV)/bin
 READY = $(VENV)/.ready
 READY_DEV = $(VENV)/.ready-dev
 
-.PHONY: help demo test lint docs site words size bench clean attack lowest pythons wheel hashes sbom
+.PHONY: help demo test nightly lint docs site words size bench clean attack lowest pythons wheel hashes sbom
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 8
@@ -17,7 +17,14 @@ test: $(READY_DEV) ## set up, with slicers, ngspice and Chromium where apt may, 
 	scripts/system-packages --programs
 	scripts/debian13-slicers
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
-	$(BIN)/python -m pytest -m kernel tests/geometry $(ARGS)
+	$(BIN)/python -m pytest -m "kernel and not nightly" tests/geometry $(ARGS)
+
+nightly: $(READY_DEV) ## the tests that guard more of the same, kills and attacks among them, then the coverage of intervals; hours
+	scripts/system-packages --programs
+	scripts/debian13-slicers
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "nightly and not kernel" $(ARGS)
+	$(BIN)/python bench/coverage.py
+	$(MAKE) attack
 
 lint: $(READY_DEV) ## style, types, which module may import which, and the lines of budget.tsv
 	$(BIN)/ruff format --check src tests bench docs scripts
