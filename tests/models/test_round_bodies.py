@@ -167,7 +167,7 @@ def test_a_cone_in_a_tin_is_that_of_its_plane(tip):
         ("bump", 5.0, 1.7),
         ("cone", 3.0, 2.0),
         ("cone", 5.0, 2.5),
-    ],  # fmt: skip
+    ],
 )
 def test_a_sensor_of_cells_and_rims_has_the_capacitance_of_its_whole_drawing(shape, length_mm, width_mm):
     """The rims counted as cells: +19 % of the cones on 12 x 6 mm, of which 36 fit, and not 46."""
