@@ -5,7 +5,7 @@ BIN = $(VENV)/bin
 READY = $(VENV)/.ready
 READY_DEV = $(VENV)/.ready-dev
 
-.PHONY: help demo test lint docs site words size bench clean attack mutants lowest pythons wheel hashes sbom
+.PHONY: help demo test nightly lint docs site words size bench clean attack mutants lowest pythons wheel hashes sbom
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 8
@@ -17,13 +17,21 @@ test: $(READY_DEV) ## set up, with slicers, ngspice and Chromium where apt may, 
 	scripts/system-packages --programs
 	scripts/debian13-slicers
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
-	$(BIN)/python -m pytest -m kernel tests/geometry $(ARGS)
+	$(BIN)/python -m pytest -m "kernel and not nightly" tests/geometry $(ARGS)
 
-lint: $(READY_DEV) ## style, types, and which module may import which
+nightly: $(READY_DEV) ## the tests that guard more of the same, kills and attacks among them, then the coverage of intervals; hours
+	scripts/system-packages --programs
+	scripts/debian13-slicers
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "nightly and not kernel" $(ARGS)
+	$(BIN)/python bench/coverage.py
+	$(MAKE) attack
+
+lint: $(READY_DEV) ## style, types, which module may import which, and the lines of budget.tsv
 	$(BIN)/ruff format --check src tests bench docs scripts
 	$(BIN)/ruff check src tests bench docs scripts
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/python scripts/size.py --check
 
 docs: $(READY_DEV) ## write docs/reference.md from the --help texts, and the pictures of README and docs
 	$(BIN)/python docs/generate.py
@@ -36,8 +44,8 @@ site: $(READY_DEV) ## build the documentation as a site that works offline, out/
 words: $(READY_DEV) ## list words that docs/words.yaml has retired, with file, line and the better word
 	$(BIN)/python scripts/words.py $(ARGS)
 
-size: ## print code lines, functions and the longest function of each package
-	@$(PYTHON) scripts/size.py
+size: $(READY_DEV) ## print the size of the code beside its lines in budget.tsv; ARGS=--lower lowers them
+	@$(BIN)/python scripts/size.py $(ARGS)
 
 bench: $(READY_DEV) ## measure speed, memory and accuracy; write bench/results
 	set -e; for program in bench/*.py; do $(BIN)/python $$program; done

@@ -14,9 +14,9 @@ with suppress(ValueError):  # not in the main thread
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job would hand down a deaf ear
 
 
-def _own_folders(monkeypatch, tmp_path_factory):
+def _own_folders(monkeypatch, tmp_path_factory, cache):
     """Whatever the user, or another test, has kept is out of sight."""
-    monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path_factory.mktemp("cache")))
+    monkeypatch.setenv("SENSORGEN_CACHE", str(cache))
     monkeypatch.setenv("SENSORGEN_LOG", str(tmp_path_factory.mktemp("log") / "log.db"))
     monkeypatch.setenv("BROWSER", "true")  # opens nothing
     monkeypatch.setenv("SENSORGEN_BUDGET", "0")  # changes of designs are tried by the tests of that alone
@@ -24,30 +24,32 @@ def _own_folders(monkeypatch, tmp_path_factory):
     monkeypatch.setenv("SENSORGEN_PACKS", str(tmp_path_factory.mktemp("packs")))
 
 
-@pytest.fixture(autouse=True, scope="session")
-def _session(tmp_path_factory):
-    """For fixtures of modules, which are made before those of a test."""
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        _own_folders(monkeypatch, tmp_path_factory)
-        yield
-
-
-@pytest.fixture(autouse=True)
-def _cache(monkeypatch, tmp_path_factory):
-    _own_folders(monkeypatch, tmp_path_factory)
-
-
 @pytest.fixture(scope="session")
-def _session_cache(tmp_path_factory):
-    """Of all test processes: below each has a folder of its own."""
+def session_cache(tmp_path_factory):
+    """Predictions of all test processes of this run, keyed as a user's are: by design, models and source code."""
     base = tmp_path_factory.getbasetemp()
     return (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "session-cache"
 
 
+@pytest.fixture(autouse=True, scope="session")
+def _session(tmp_path_factory, session_cache):
+    """For fixtures of modules, which are made before those of a test."""
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        _own_folders(monkeypatch, tmp_path_factory, session_cache)
+        yield
+
+
+@pytest.fixture(autouse=True)
+def _cache(request, monkeypatch, tmp_path_factory, session_cache):
+    """A test that patches, or is marked `own_cache`, neither reads nor keeps predictions of others."""
+    patches = "monkeypatch" in request.node._fixtureinfo.argnames and "shared_cache" not in request.fixturenames
+    own = patches or request.node.get_closest_marker("own_cache")
+    _own_folders(monkeypatch, tmp_path_factory, tmp_path_factory.mktemp("cache") if own else session_cache)
+
+
 @pytest.fixture
-def shared_cache(monkeypatch, _session_cache):
-    """Stored predictions are read again by later tests: for tests of what is made of them, not of how they are made."""
-    monkeypatch.setenv("SENSORGEN_CACHE", str(_session_cache))
+def shared_cache():
+    """For a test that patches nothing that decides a prediction: it shares predictions, as tests without patches do."""
 
 
 @pytest.fixture

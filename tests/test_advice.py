@@ -31,15 +31,13 @@ def warnings(design):
 
 
 @pytest.fixture(scope="module")
-def plate(tmp_path_factory, _session_cache):
+def plate(tmp_path_factory):
     """A plate whose film ends between two layers, its trial, and the advice."""
     path = tmp_path_factory.mktemp("advice") / "plate.yaml"
     path.write_text(OFF_GRID, "utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("SENSORGEN_CACHE", str(_session_cache))
-        design = load(path)
-        made = trial(design)
-        return design, made, advise(design, made, 1e9)
+    design = load(path)
+    made = trial(design)
+    return design, made, advise(design, made, 1e9)
 
 
 def test_the_nearest_change_is_the_nearest_whole_layer(plate):
@@ -66,7 +64,7 @@ def test_numbers_of_a_change_are_those_of_its_own_trial(plate):
     assert first.words().startswith("dielectric_mm 0.57 -> 0.6: 0 errors, 0 warnings; C ")
 
 
-def test_no_change_of_a_design_without_findings(shared_cache):
+def test_no_change_of_a_design_without_findings():
     design = make({"shape": "reference", "parameters": {"length_mm": 30.0}})
     held = review(design)
     decided = decision(design, held, 5.0)

@@ -66,7 +66,7 @@ def test_an_error_of_the_model_no_longer_misleads(model, error):
     assert found.position >= 0.85 * found.presses
 
 
-@pytest.mark.parametrize("scale", [1.0, 2.0])
+@pytest.mark.parametrize("scale", [1.0, pytest.param(2.0, marks=pytest.mark.nightly)])
 def test_intervals_hold_on_specimens_with_all_errors_at_once(model, scale):
     """Some of the specimens of bench/coverage.py, which has 200 of each kind."""
     shares = []
@@ -90,13 +90,13 @@ def test_never_calibrated_is_said_and_holds(model, one):
     assert calibrated_.force_width_n < said.force_width_n / 2
 
 
-def test_what_is_told_is_found(model, one):
+def test_what_is_told_is_found(model, one, stored):
     truth, known, _, found = one
-    values = {v.name: v for v in _record(model, one).values()}
+    values = {v.name: v for v in stored.values()}
     assert values["resistance"].lower < truth.track_ohm_per_m * 0.1 < values["resistance"].upper
     c_pf = 64.256829 * np.exp(truth.capacitance)
     assert values["capacitance"].lower < c_pf < values["capacitance"].upper
-    assert "lead" in _record(model, one).unidentified
+    assert "lead" in stored.unidentified
     told = gain(model, known, found.at)
     assert np.abs(told.real - np.real(truth.gain)).max() < 8e-3
 
@@ -105,6 +105,12 @@ def _record(model, one):
     _, known, _, found = one
     held = held_out(model, known, LIMIT_N)
     return records.Calibration("S1", "mine", "0" * 16, model, found, 6.0, held[0], ("a",), (1e-3 + 0j,) * 7, ("n",))
+
+
+@pytest.fixture(scope="module")
+def stored(model, one):
+    """A calibration as the log keeps it."""
+    return _record(model, one)
 
 
 def test_its_own_check_on_presses_held_back(model, one):
@@ -116,11 +122,10 @@ def test_its_own_check_on_presses_held_back(model, one):
     assert held_out(model, known.rows(np.arange(9)), LIMIT_N) is None
 
 
-def test_a_calibration_comes_back_from_the_log_as_it_was(model, one):
-    record = _record(model, one)
-    again = records.from_json(record.to_json())
-    assert again.to_json() == record.to_json()
-    inverters = [Inverter(r.model, r.posterior, force_limit_n=LIMIT_N) for r in (record, again)]
+def test_a_calibration_comes_back_from_the_log_as_it_was(stored, one):
+    again = records.from_json(stored.to_json())
+    assert again.to_json() == stored.to_json()
+    inverters = [Inverter(r.model, r.posterior, force_limit_n=LIMIT_N) for r in (stored, again)]
     found = [inverter.batch(one[2].ratio[:20]).force_n for inverter in inverters]
     assert (found[0] == found[1]).all()
 
@@ -133,9 +138,9 @@ def test_a_calibration_comes_back_from_the_log_as_it_was(model, one):
         lambda t: t.replace('"at"', '"it"'),
     ],
 )  # fmt: skip
-def test_what_is_no_calibration_is_refused(model, one, change):
+def test_what_is_no_calibration_is_refused(stored, change):
     with pytest.raises(BadInput):
-        records.from_json(change(_record(model, one).to_json()))
+        records.from_json(change(stored.to_json()))
 
 
 def test_specimens_of_one_bench_share_what_is_its_own(model):

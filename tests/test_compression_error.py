@@ -116,7 +116,7 @@ def test_work_and_energy_agree_at_few_loads_and_a_wrong_energy_is_seen(monkeypat
     assert "work and energy differ by" in mesh_ladder.pressed(of, [0.0, 1e4, 1e5], keep=False).faults[0]
 
 
-@pytest.mark.parametrize("parameters", [OTHER, {"dielectric_mm": 0.2}])
+@pytest.mark.parametrize("parameters", [OTHER, pytest.param({"dielectric_mm": 0.2}, marks=pytest.mark.nightly)])
 def test_every_load_to_1100_kpa_converges(parameters):
     loads = np.array([0.0, 1e5, 3e5, 5e5, 1.1e6])
     found = mesh_ladder.pressed(case(parameters=parameters), loads.tolist(), keep=False)

@@ -5,24 +5,28 @@ import re
 import statistics
 
 import bench_files
+import numpy as np
 import pytest
 import yaml
 from drawn_sensor import sensor_of
 from scipy import stats
 
 from sensorgen.analysis.comparison.allowed import Allowed
+from sensorgen.analysis.comparison.moved import Movable
 from sensorgen.analysis.fit import Fit, Fitted, Untold, fit, text
 from sensorgen.analysis.fit.fitting import held_back
 from sensorgen.analysis.fit.resistance import leak, resistivity
-from sensorgen.analysis.fit.tones import _together
+from sensorgen.analysis.fit.tones import OfSpecimen, _together, values
 from sensorgen.cli import cli
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
 from sensorgen.design import materials
 from sensorgen.design.design import make
 from sensorgen.design.materials import own
 from sensorgen.design.specimen_name import design_of, parse
-from sensorgen.measure.log import Log, bench, notes
+from sensorgen.measure.log import Log, bench, binding, notes
 from sensorgen.measure.signal.leakage import across_ohm, along_ohm
+from sensorgen.models import columns
+from sensorgen.prediction import capacitance as prediction_of_c
 from sensorgen.prediction.bodies import default_body, drawn
 from sensorgen.prediction.electrodes import electrode_resistance
 from sensorgen.prediction.evaluate import evaluate
@@ -273,6 +277,58 @@ def test_specimens_of_one_plate_are_one_print():
     one_plate = _together(pairs, ["plate"] * 3)
     assert one_plate == (pytest.approx(1.1), pytest.approx(_together([(1.1, 1e-9)], ["a"])[1]))
     assert _together(pairs, ["a", "b", "c"])[1] < one_plate[1]
+
+
+PILLARS = "shape: pillar\nname: pillars\nparameters: {length_mm: 20, width_mm: 5}\n"
+EPS_TRUE = 5.2
+
+
+def pillars_f(permittivity, end):
+    """Closed form of electrode pillars, 0.8 mm wide every 1.25 mm and 0.4 mm high, on 0.2 mm of film, 20 x 5 mm [F].
+
+    The lower end of the field-free bounds is the limit of wide pillars, columns in parallel; the upper end that of fine
+    ones, which shield the air between them: a plate on the film.
+    """
+    share, film, air = 0.8**2 / 1.25**2, 0.2e-3 / permittivity, 0.4e-3 / 1.00059
+    covered = {"lower": share / film + (1 - share) / (film + air), "upper": 1 / film}
+    return 8.8541878128e-12 * 20e-3 * 5e-3 * covered[end]
+
+
+@pytest.fixture
+def bounded(monkeypatch, unpressed):
+    """No model of the cell but the closed-form bounds."""
+    monkeypatch.setattr(prediction_of_c, "capacitance_models", lambda: {"columns": columns})
+
+
+@pytest.mark.parametrize("end", ["lower", "upper"])
+def test_the_interval_of_a_permittivity_covers_prints_at_the_end_of_the_models_bounds(end, bounded):
+    """40 fits of five prints each, whose capacitances scatter by 10 % about an end of the bounds, read to 2 %."""
+    of, rng = Movable(drawn(make(yaml.safe_load(PILLARS)))), np.random.default_rng(7)
+    predicted, hits = of.model.sensor.capacitance_f(), 0
+    for _ in range(40):
+        read = pillars_f(EPS_TRUE, end) * np.exp(rng.normal(0, math.hypot(0.1, 0.02), 5))
+        prints = [
+            OfSpecimen(str(k), str(k), of, (0.0, math.inf), (math.log(c / predicted), 0.02), None, None)
+            for k, c in enumerate(read)
+        ]
+        (found,) = (one for one in values(prints) if isinstance(one, Fitted))
+        hits += found.low <= EPS_TRUE <= found.high
+    assert hits >= stats.binom.ppf(1e-3, 40, 0.95)
+
+
+@pytest.mark.parametrize("end", ["lower", "upper"])
+def test_a_cell_at_the_end_of_the_models_bounds_is_fitted_from_the_log(end, bounded, tmp_path):
+    (tmp_path / "pillars.yaml").write_text(PILLARS)
+    names, rng = [f"P{k}" for k in range(3)], np.random.default_rng(3)
+    with Log(tmp_path / "log.db", create=True) as log:
+        binding.bind(log, names, str(tmp_path / "pillars.yaml"))
+        for name in names:
+            pf = 1e12 * pillars_f(EPS_TRUE, end) * math.exp(rng.normal(0, 0.02))
+            log.add([notes.with_ac(notes.reading(name, log=log), {"Cp": [f"{pf:.6g}pF@1kHz"]})])
+        eps = value(fit(log, None, specimens=names, body_of=drawn), "relative_permittivity")
+    assert eps.low <= EPS_TRUE <= eps.high
+    c = math.log(pillars_f(EPS_TRUE, "upper") / pillars_f(EPS_TRUE, "lower"))
+    assert c < math.log(eps.high / eps.low) < 2 * c
 
 
 def test_nothing_to_fit_to(tmp_path):

@@ -38,7 +38,6 @@ from sensorgen.prediction.losses import Lost
 from sensorgen.prediction.query import NOISE, TONES_HZ, Query
 from sensorgen.prediction.results import from_json, to_json
 
-pytestmark = pytest.mark.usefixtures("shared_cache")
 EPS = {"x60": 4.68, "air": 1.00059}
 TABLE_3_2 = {"top_electrode": "etpu@thesis-3.2", "bottom_electrode": "etpu@thesis-3.2"}  # 1.2 S/m
 PLATE_F = 69.06266493984e-12  # eps0 4.68 100 x 10 / 0.6 mm

@@ -128,6 +128,45 @@ def test_rings_of_lines_make_a_round_post(convention, more):
     assert shapely.get_num_interior_rings(shapely.get_parts(found)).sum() == 0
 
 
+def straight(start, end, width=0.4):
+    """Lines of the pattern in the seventh layer, their volume that of a rectangle of 0.1 mm height."""
+    start, end = np.array(start, float), np.array(end, float)
+    ones = np.ones(len(start))
+    volume = np.hypot(*(end - start).T) * width * 0.1
+    layer, body, tool = (np.full(len(start), k) for k in (6, 2, 1))
+    return Beads(start, end, ones * width, ones * 0.1, volume, layer, body, tool, np.arange(len(start)))
+
+
+@pytest.mark.parametrize("convention", ["vol", "deposit"])
+@pytest.mark.parametrize("across", [False, True], ids=["along", "across"])
+def test_lines_that_end_half_a_width_inside_a_strip_fill_it(across, convention):
+    """As a slicer lays them: the print has the strip's volume, 1.2 x 12 x 0.1 mm, and its place."""
+    low, high = (5.0, 0.0), (6.2, SIZE)
+    strip = sensor([((low[0], low[1]), (high[0], low[1]), high, (low[0], high[1]))])
+    if across:
+        rows = np.arange(0.2, SIZE, 0.4)
+        lines = straight([(5.2, y) for y in rows], [(6.0, y) for y in rows])
+    else:
+        lines = straight([(x, 0.2) for x in (5.2, 5.6, 6.0)], [(x, SIZE - 0.2) for x in (5.2, 5.6, 6.0)])
+    made = type("Sliced", (), {"printed": strip, "layers": FINE})
+    found = layers(made, lines, convention)[6]
+    assert found.region("pattern").area * found.height_mm == pytest.approx(1.2 * SIZE * 0.1, rel=1e-9)
+    assert found.region("pattern").bounds == pytest.approx((*low, *high))
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.6, pi / 2])
+@pytest.mark.parametrize(("convention", "width"), [("vol", 0.4), ("stadium", 0.4 + estimate.ROUND * 0.1)])
+def test_ends_of_a_line_by_closed_form(turn, convention, width):
+    """A rectangle of width w, longer than the line by w; of any shape a half circle, of 16 corners, at both ends."""
+    length, start = 2.0, np.array([5.0, 5.0])
+    line = straight([start], [start + length * np.array([cos(turn), sin(turn)])])
+    (corners,) = line.corners_mm(convention)
+    assert shapely.Polygon(corners).area == pytest.approx((length + 0.4) * width, rel=1e-12)
+    assert corners.mean(0) == pytest.approx(start + length / 2 * np.array([cos(turn), sin(turn)]))
+    region = layers(Sliced, line, convention)[6].region("pattern")
+    assert region.area == pytest.approx(length * width + 8 * sin(pi / 8) * (width / 2) ** 2, rel=1e-6)
+
+
 @pytest.mark.parametrize(("pattern", "slicer"), [("posts", "cura"), ("slanted", "prusa")])
 def test_a_shape_of_ones_own_is_sliced_and_read(pattern, slicer, tmp_path):
     """The capacitance by the lines of a real slicer is that of the drawing but for a rounding, and has both bounds."""

@@ -1,5 +1,6 @@
 """Through-holes of films: planted ones, percolation, closed forms, and the probability of a short."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -44,6 +45,17 @@ def test_slits_of_parallel_lines_by_hand():
 
 def test_lines_that_touch_leave_nothing_open():
     assert through(opened(film(lines(0.5, 0.5)), [1.0])) == []
+
+
+def test_round_ends_of_lines_leave_their_corners_open():
+    """Lines 0.5 mm wide as stadiums that end half a width inside the plan: of each end, w^2/2 less half a circle."""
+    lying = lines(0.5, 0.5 - (1 - np.pi / 4) * 0.1)
+    less = np.array([2.25, 0])
+    ending = replace(lying, start_mm=lying.start_mm + less, end_mm=lying.end_mm - less)
+    half_circle = 4 * np.sin(np.pi / 8) * 0.25**2  # of 16 corners
+    (found,) = opened(film(ending), [1.0])
+    assert found.area == pytest.approx(2 * 20 * (0.5**2 / 2 - half_circle), rel=1e-6)
+    assert all(x < 0.25 or x > 9.75 for hole in through([found]) for x, _ in [hole.centroid.coords[0]])
 
 
 def test_a_planted_gap_is_found_at_its_place():

@@ -73,6 +73,7 @@ def test_a_known_answer_loads_no_numbers(run, real):
     assert ", stored\n" in run("cell", "tri", "--drawn").out
 
 
+@pytest.mark.own_cache
 def test_no_cache_solves_anew_and_keeps_nothing(run):
     assert not answer(run("cell", "tri", "--json", "--no-cache"))["known"]
     assert not answer(run("cell", "tri", "--json"))["known"]

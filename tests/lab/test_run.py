@@ -13,7 +13,7 @@ from laboratory import PLAN, asked, laboratory, outcome
 from sensorgen.cli import cli
 from sensorgen.core import document
 from sensorgen.core.errors import BadInput, SensorgenError
-from sensorgen.measure.lab import recorder, run
+from sensorgen.measure.lab import recorder, run, safety
 from sensorgen.measure.lab.clock import SimulatedClock
 from sensorgen.measure.lab.plans import Choice
 from sensorgen.measure.log import Log
@@ -194,6 +194,18 @@ def test_devices_of_any_kind_can_be_run(tmp_path):
         found = run.run(asked(), clock=clock, log=log, rig=rig, simulated=True)
     assert (found.end, found.done, plant.sideways, plant.above_s) == ("done", 2, 0, 0.0)
     assert 3.9 < plant.worst_n < 4.1
+
+
+@pytest.mark.parametrize(("position_mm", "up"), [(0.99, True), (1.01, False), (5.0, False)])
+def test_a_piston_that_sticks_below_its_upper_end_is_not_up(position_mm, up):
+    """It answers and obeys nothing; the stage, which could raise it, was never started."""
+    clock = SimulatedClock()
+    rig, plant = fake_rig(clock)
+    rig.started.add("actuator")
+    rig.actuator.deaf, plant.extension_mm = True, position_mm
+    assert safety.made_safe(rig, clock) == (up, ())
+    assert "actuator lift" in plant.sent
+    assert (plant.on, plant.extension_mm) == (False, position_mm)
 
 
 def test_a_loop_that_stood_still_ends_the_run(tmp_path):

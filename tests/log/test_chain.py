@@ -7,6 +7,8 @@ from datetime import UTC, datetime, timedelta
 from hashlib import sha256
 
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Log, anchors, chain, logbook, verify
@@ -165,6 +167,39 @@ def test_order_of_a_prediction_and_readings(log):
     assert log.before(early, rows) is True
     assert log.before(late, rows) is False
     assert log.before(late, []) is True
+
+
+@st.composite
+def histories(draw):
+    """Parents of each record of a log, in order, after three machines have logged and taken over each other's logs.
+
+    A new record follows the machine's last one. What a machine takes over it appends in the other's order, and logs a
+    merge of all records without a successor where there are several.
+    """
+    logs, machine = [{}, {}, {}], st.integers(0, 2)
+    for name, (own, other) in enumerate(draw(st.lists(st.tuples(machine, machine), min_size=10, max_size=30))):
+        log = logs[own]
+        if own == other:
+            log[name] = tuple(log)[-1:]
+            continue
+        log |= {key: parents for key, parents in logs[other].items() if key not in log}
+        ends = tuple(log.keys() - set().union(*log.values()))
+        if len(ends) > 1:
+            log[name] = tuple(sorted(ends, key=list(log).index))
+    return logs[0]
+
+
+@settings(deadline=None)
+@given(histories())
+@example({0: (), 1: (0,), 2: (1,), 3: (0,), 4: (1, 3), 5: (2, 4)})  # 3 knows less of the first line than 1, 4's parents
+def test_ancestry_is_that_of_a_walk_through_all_parents(parents):
+    ancestry = chain.Ancestry((str(key), tuple(map(str, before))) for key, before in parents.items())
+    for second in parents:
+        reached, left = set(), [*parents[second]]
+        while left:
+            reached.add(key := left.pop())
+            left += parents[key]
+        assert {first for first in parents if ancestry.before(str(first), str(second))} == reached
 
 
 def test_the_claim_of_an_export_proves_nothing(log, tmp_path):

@@ -133,6 +133,22 @@ def test_every_pair_gives_the_impedance_back(pair, r, size, sign, frequency_hz):
     assert found == pytest.approx(complex(r, x), rel=1e-9, abs=1e-9 * abs(complex(r, x)))
 
 
+@pytest.mark.parametrize(
+    ("text", "farad"),
+    [
+        ("12.3 / 12.4pF@1kHz", (12.3e-12, 12.4e-12)),
+        ("1.2nF / 7 / 9pF@1kHz", (1.2e-9, 7e-12, 9e-12)),
+        ("7 ± 1 / 9pF / 1.2nF@1kHz", (7e-9, 9e-12, 1.2e-9)),
+        ("7pF / 9@1kHz", (7e-12, 9.0)),
+    ],
+)
+def test_repeats_without_a_unit_have_that_of_the_last(text, farad):
+    found = immittance.parse("Cp", text)
+    assert [one.value for one in found] == pytest.approx(farad, rel=1e-12, abs=0)
+    assert [one.uncertainty for one in found][1:] == [0.0] * (len(farad) - 1)
+    assert found[0].uncertainty == pytest.approx(1e-9 if "±" in text else 0.0, abs=1e-21)
+
+
 def test_an_export_becomes_one_reading_with_its_file(run, path, tmp_path):
     (tmp_path / "lcr.csv").write_text(WAYS["Hioki"])
     said = run("import", "lcr.csv", "--specimen", "23 triX .2mm", "--unbaked")

@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cell_scenes import stairs
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from sensorgen.core.units import EPS0_F_PER_M
@@ -284,6 +286,34 @@ def test_the_straight_potential_is_that_of_scikit_fem():
     exact = float(x @ matrix @ x)
     assert straight(sections(scene)[0], scene.size_mm[2], EPS) == close(exact, 1e-9)
     assert capacitance(scene, EPS).upper == close(exact * EPS0_F_PER_M * MM, 1e-9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.integers(1, 12), st.floats(0.05, 0.65), st.floats(0.1, 0.9), st.floats(0.1, 0.9), st.floats(1.5, 50),
+    st.booleans(),
+)  # fmt: skip
+def test_smooth_rows_hold_at_most_what_a_potential_of_the_height_alone_gives(count, height, top, lean, eps, hanging):
+    """Trapezia side by side, from flat to steep: two plates in series, one of the mean permittivity of its slab.
+
+    Their columns' own potentials meet, and hold much more where the flanks are steep.
+    """
+    pitch, steps = 4 / count, np.array([0, 1, lean * (1 - top) + top, lean * (1 - top)])
+    heights = np.array([0, 0, height, height])
+    z = (1.0 - heights if hanging else 0.3 + heights).round(9).tolist()
+    ridges = [Prism("y", tuple(zip(((k + steps) * pitch).round(9).tolist(), z, strict=True)), 0.0, 2.0)
+              for k in range(count)]  # fmt: skip
+    found = capacitance(plates(Body("ridges", "x60", tuple(ridges))), {"x60": eps, "air": 1.0})
+    mean = 1 + (eps - 1) * (1 + top) / 2
+    assert found.upper <= EPS0_F_PER_M * 4 * 2 * MM / (height / mean + 0.7 - height) * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("period", [0.1, 0.25, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("film", [0.1, 1.0])
+def test_triangles_of_any_pitch_hold_at_most_a_plate_on_their_film(period, film):
+    """The upper electrode's cogs reach down to the film: no height above it is free of them."""
+    plate = EPS0_F_PER_M * EPS["x60"] * 2 / film
+    assert tri_bounds(film, period_mm=period)[1] <= plate * (1 + 1e-12)
 
 
 @pytest.mark.parametrize("bound", [0, 1])

@@ -159,7 +159,7 @@ def slope_m_per_pa(scene, solids, fine_mm):
 
 
 @pytest.mark.skipif(importlib.util.find_spec("ngsolve") is None, reason="NGSolve is not installed")
-@pytest.mark.parametrize("shape", ["pyramid", "cone"])
+@pytest.mark.parametrize("shape", [pytest.param("pyramid", marks=pytest.mark.nightly), "cone"])
 def test_blunt_tips_deform_as_finite_elements_in_3d_within_the_stated_error(shape):
     scene = make({"shape": shape}).in_use
     coarse, fine = (slope_m_per_pa(scene, SOLIDS, size) for size in (0.08, 0.04))

@@ -146,12 +146,15 @@ ROWS = [
 SETTINGS = ((0.135, 1), (0.135, 10), (0.83, 1), (5.0, 1))  # resistivity, and times the thesis's tones
 
 
+FAST = ("one-edge", "corner")
+
+
 def metres(cell):
     number, unit = cell.split()
     return float(number) * {"mm": 1e-3, "m": 1.0, "km": 1e3}[unit]
 
 
-@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize("name", [pytest.param(k, marks=[pytest.mark.nightly] * (k not in FAST)) for k in SETS])
 def test_the_table_of_contacts(name):
     """docs/sheet.md, each row: medians over 7 x 7 places, of x and of y."""
     (row,) = (row for row in ROWS if row[0].partition(":")[0] == name)

@@ -176,7 +176,7 @@ def _together(
 def _permittivity(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
     if not fits:
         return Untold(PERMITTIVITY, "no reading of a specimen depends on it")
-    found = []
+    found, open_ = [], 0.0
     for fit in fits:
         factor, curve = fit.of.by_permittivity
         if not curve[0] <= fit.capacitance[0] <= curve[-1]:
@@ -188,10 +188,10 @@ def _permittivity(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
         slope = float(np.interp(fit.capacitance[0], curve, np.gradient(curve, factor)))
         at = float(np.interp(fit.capacitance[0], curve, factor))
         c = fit.of.model.rest.capacitance  # what model and print leave open
-        open_ = log(c.model.upper / c.model.lower * c.print.upper / c.print.lower) / 2 / _SURE
-        found.append((log(fit.of.permittivity) + at, sqrt(fit.capacitance[1] ** 2 + open_**2) / slope))
+        open_ = max(open_, log(c.model.upper / c.model.lower * c.print.upper / c.print.lower) / 2 / _SURE / slope)
+        found.append((log(fit.of.permittivity) + at, fit.capacitance[1] / slope))
     at, between = _together(found, _prints(fits))
-    error = max(between, max(e for _, e in found))  # bounds of a model do not average out
+    error = between + open_  # bounds of a model do not average out, and prints scatter about their ends too
     note = f"Im Z of {_specimens(len(fits))}; the interval holds the bounds of the cell's model"
     return _value(film, PERMITTIVITY, (at, error), note, len(fits))
 
