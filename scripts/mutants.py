@@ -27,7 +27,7 @@ LIST, PAGE = ROOT / "tests" / "mutants.yaml", ROOT / "bench" / "results" / "muta
 GOAL = 57  # of 60
 LIMIT_S = 300
 LEFT_OUT = (".venv", ".git", "out", "dist", "__pycache__", ".*_cache", ".hypothesis")
-FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
+FAILED = re.compile(r"^(?:FAILED|ERROR) ([^\s\[]+)", re.MULTILINE)
 PYTEST = (sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-m", "not nightly")
 
 

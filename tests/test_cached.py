@@ -12,6 +12,7 @@ from sensorgen.core import cache as cached
 from sensorgen.prediction.capacitance import capacitance
 from sensorgen.scene.scene import Body, Scene, box
 
+pytestmark = pytest.mark.own_cache
 QUESTION = {"what": "sum", "terms": [1, 2.5], "eps": {"x60": 4.68}}
 
 
@@ -147,8 +148,6 @@ def test_the_version_covers_the_models_and_what_they_stand_on(monkeypatch, tmp_p
 WRITER = """
 import sys
 from sensorgen.core import cache as cached
-from sensorgen.prediction.capacitance import capacitance
-from sensorgen.scene.scene import Body, Scene, box
 for k in range(200):
     question = {"k": k % 7}
     assert cached.answer(question, lambda: [k % 7] * 1000) == [k % 7] * 1000
