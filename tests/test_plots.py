@@ -14,7 +14,7 @@ from drawn_sensor import sensor_of
 
 from sensorgen.analysis import plots
 from sensorgen.analysis.plots import libraries, pages, static
-from sensorgen.analysis.plots.figure import frequency, scale
+from sensorgen.analysis.plots.figure import Map, frequency, scale
 from sensorgen.analysis.plots.response import (
     LARGEST,
     MOST_FREQUENCIES,
@@ -307,3 +307,19 @@ def test_the_page_in_a_browser(chromium, answer, tmp_path):
     assert report["chosen"] == [1] * 8
     assert np.array(report["z"]) * 1e3 == pytest.approx(answer.values("resistance")[0], rel=1e-6)
     assert np.array(report["second"]) * 1e3 == pytest.approx(answer.values("reactance")[1], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("values", "ends", "span"),
+    [
+        ((-1.0, 3.0), (), (-3.0, 3.0)),
+        ((-5.0, 2.0, np.nan), (), (-5.0, 5.0)),
+        ((1.0, 3.0), (), (1.0, 3.0)),
+        ((-3.0, -1.0), (), (-3.0, -1.0)),
+        ((-1.0, 3.0), (-2.0, 1.0), (-2.0, 2.0)),
+        ((np.nan,), (), (0.0, 1.0)),
+    ],
+)
+def test_a_colour_scale_of_both_signs_is_even_about_0_and_holds_all_values(values, ends, span):
+    found = Map(np.arange(len(values)), np.arange(1), np.array([values]), "", *ends)
+    assert (found.span, found.signed) == (span, span[0] < 0 < span[1])

@@ -17,6 +17,7 @@ from sensorgen.core.records import checked
 from sensorgen.design.design import make
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.query import Query
 from sensorgen.workflows.optimise import ladder, recommend, result
 from sensorgen.workflows.optimise.result import Recommended, Spread
 from sensorgen.workflows.optimise.sample import sample
@@ -93,6 +94,13 @@ def test_feet_in_free_fall_lose():
     assert any("hang free" in doubt for doubt in trial.doubts)
     assert trial.printed.position_resolution.value < 0.02  # better than as drawn
     assert any(name.startswith("doubt: feet hang free") for name in wanted.violated(trial))
+
+
+def test_sensitivity_on_the_coarse_mesh_is_that_of_a_free_plate():
+    """C(p)/C(0) = 1/(1 - p/E), with E = 6 MPa: the relative change from 300 to 1200 kPa, per kPa."""
+    low, high = 300 / 6000, 1200 / 6000
+    of = ladder.known(make({"shape": "reference"}), Query(range_kpa=(300.0, 1200.0)), True)["sensitivity_per_kpa"]
+    assert of.lower == of.upper == pytest.approx(((1 - low) / (1 - high) - 1) / 900, rel=1e-9)
 
 
 def test_limits_are_proven_before_anything_is_evaluated():

@@ -13,7 +13,7 @@ from sensorgen.analysis.plots.figure import Axis, Curve, Figure, Panel, thinned
 from sensorgen.analysis.plots.interactive import data, packed
 from sensorgen.analysis.plots.static import files
 from sensorgen.analysis.report.recordings import compared
-from sensorgen.analysis.report.variants import errors
+from sensorgen.analysis.report.variants import errors, identifiability
 from sensorgen.cli import cli
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Log
@@ -173,3 +173,20 @@ def test_a_table_with_columns_of_its_own_is_not_left_out(tmp_path):
     assert left_out == []
     assert found.rest_ohm[0].real == pytest.approx(1001, abs=0.1)
     assert any("no log of the rig" in note for note in found.notes)
+
+
+def test_errors_of_position_stand_in_millimetres_and_unknown_ones_are_empty():
+    known = SimpleNamespace(sigma_force_n=0.25, sigma_position_m=4e-3, correlation=-0.5, verdict="senses force")
+    lost = SimpleNamespace(sigma_force_n=0.25, sigma_position_m=None, correlation=None, verdict="no position")
+    cards = {"a": known, "b": lost, "c": None}
+    predictions = {
+        name: SimpleNamespace(prediction=SimpleNamespace(identifiability=card), reason="a short")
+        for name, card in cards.items()
+    }
+    (table,) = identifiability(SimpleNamespace(predictions=predictions))
+    assert table.columns[2].unit == "mm"
+    assert list(table.cells) == [
+        ("a", 0.25, 4.0, -0.5, "senses force"),
+        ("b", 0.25, None, None, "no position"),
+        ("c", None, None, None, "a short"),
+    ]
