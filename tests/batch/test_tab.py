@@ -7,7 +7,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design import design
 from sensorgen.design.specimen_name import Specimen, parse
 from sensorgen.scene.geometry import meshes
-from sensorgen.workflows.batch import tab
+from sensorgen.workflows.batch import arranged, tab
 
 SENSOR = design.make({"shape": "tri"})
 NAME = "26 triX .2mm 12 x fine"
@@ -82,6 +82,20 @@ def test_the_mesh_is_closed_and_of_the_volume_of_its_boxes():
     assert mesh.volume_mm3() == pytest.approx(body.volume_mm3(), rel=1e-9)
     edges = np.sort(mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     assert set(np.unique(edges, axis=0, return_counts=True)[1]) == {2}
+
+
+@pytest.mark.parametrize("wanted", ["true", "false"])
+def test_a_piece_has_room_for_its_tab_on_the_plate(plan, wanted):
+    """As long and wide as all of its boxes together."""
+    path = plan()
+    path.write_text(f"{path.read_text('utf-8')}labels: {{tab: {wanted}}}\n", "utf-8")
+    found = arranged(path)
+    for number, rect in found.plate.items():
+        piece = found.pieces[number]
+        more = tab.bodies(piece.design, piece.name) if wanted == "true" else ()
+        boxes = [p for body in (*piece.design.printed.bodies, *more) for p in body.pieces]
+        length, width = (max(p.span(axis)[1] for p in boxes) - min(p.span(axis)[0] for p in boxes) for axis in "xy")
+        assert (rect.x1 - rect.x0, rect.y1 - rect.y0) == pytest.approx((length, width))
 
 
 def test_every_name_of_the_grammar_can_be_written():
