@@ -6,7 +6,7 @@ READY = $(VENV)/.ready
 READY_DEV = $(VENV)/.ready-dev
 unexport PYTHONDONTWRITEBYTECODE  # without bytecode, each of the thousand processes of the tests compiles what it imports
 
-.PHONY: help demo test nightly lint docs site words size bench clean attack lowest pythons wheel hashes sbom
+.PHONY: help demo test nightly lint docs site words size bench clean attack mutants lowest pythons wheel hashes sbom
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 8
@@ -54,6 +54,9 @@ bench: $(READY_DEV) ## measure speed, memory and accuracy; write bench/results
 attack: $(READY_DEV) ## feed 10 000 damaged files of each kind to every reader, in 2 GB; takes hours
 	$(BIN)/python tests/attacks/fuzz.py $(ARGS)
 	SENSORGEN_ATTACK=1 $(BIN)/python -m pytest -q tests/attacks/test_log.py
+
+mutants: $(READY_DEV) ## plant 60 faults one at a time, run the tests that guard against each; write bench/results/mutants.md
+	$(BIN)/python scripts/mutants.py $(ARGS)
 
 lowest: ## install the lowest versions that pyproject.toml allows in a fresh environment, and run every command there
 	scripts/clean-environment "$(PYTHON)" lowest-direct $(ARGS)

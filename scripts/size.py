@@ -231,7 +231,9 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", action="store_true", help="exit code 1 where a line is not kept")
     parser.add_argument("--lower", action="store_true", help="write today's figures into the lines above them")
-    parser.add_argument("--seconds", type=float, nargs="+", help="processor seconds of a test run, in parts: they alone")
+    parser.add_argument(
+        "--seconds", type=float, nargs="+", help="processor seconds of a test run, in parts: they alone"
+    )
     chosen = parser.parse_args(arguments)
     sys.path.insert(0, str(ROOT / "src"))
     rows = budget(BUDGET.read_text("utf-8"))

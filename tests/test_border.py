@@ -174,6 +174,15 @@ def test_capacitance_is_the_share_of_the_cells(tmp_path):
     assert left.error < 0.15
 
 
+def test_the_error_of_a_share_is_that_of_its_farther_end():
+    """13/16 of a plan of 16 cells: 12 of them are whole, and 4 are cut; all or nothing of these is the worst."""
+    pattern = make({"shape": "cone", "parameters": {"length_mm": 4.0, "width_mm": 4.0, "period_mm": 1.0}}).drawn
+    left = share(pattern, shapely.box(0, 0, 3.25, 4), (1.0, 1.0))
+    assert (left.area, left.error) == pytest.approx((13 / 16, 16 / 13 - 1))
+    left = share(pattern, shapely.box(0, 0, 3.75, 4), (1.0, 1.0))
+    assert (left.area, left.error) == pytest.approx((15 / 16, 1 - 12 / 15))
+
+
 def test_a_border_counts_the_cells_of_an_array_with_rims(tmp_path):
     """Its period, not the whole sensor: else a border left all of the capacitance open."""
     design = bordered("cone", svg(tmp_path, ELLIPSE, width="12mm", height="8mm", box=(600, 400)))

@@ -4,11 +4,15 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
 from sensorgen.core import cache as cached
+from sensorgen.prediction.capacitance import capacitance
+from sensorgen.scene.scene import Body, Scene, box
 
+pytestmark = pytest.mark.own_cache
 QUESTION = {"what": "sum", "terms": [1, 2.5], "eps": {"x60": 4.68}}
 
 
@@ -34,6 +38,20 @@ def test_the_order_of_keys_does_not_matter_and_every_value_does():
     assert cached.answer(dict(reversed(QUESTION.items())), never) == 1
     for change in ({"what": "product"}, {"terms": [2.5, 1]}, {"eps": {"x60": 4.680000000000001}}, {"more": None}):
         assert cached.known(QUESTION | change) is None
+
+
+def test_a_capacitance_is_known_of_the_same_sensor_alone():
+    plates = (Body("low", "etpu", (box(0, 1, 0, 1, 0, 1),), "bottom"), Body("film", "x60", (box(0, 1, 0, 1, 1, 2),)),
+              Body("high", "etpu", (box(0, 1, 0, 1, 2, 3),), "top"))  # fmt: skip
+    eps = {"air": 1.0, "x60": 4.68}
+    for of, permittivity, known in (
+        (Scene(plates, (1.0, 1.0, 3.0)), eps, False),
+        (Scene(plates, (1.0, 1.0, 3.0)), eps, True),
+        (Scene(plates, (1.0, 1.0, 4.0)), eps, False),
+        (Scene(plates, (1.0, 1.0, 3.0)), eps | {"x60": 4.69}, False),
+        (Scene((replace(plates[0], material="pla"), *plates[1:]), (1.0, 1.0, 3.0)), eps, False),
+    ):
+        assert capacitance(of, permittivity, 1e-3).known is known
 
 
 def test_an_answer_of_nothing_is_asked_again():

@@ -9,7 +9,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.calibration import calibration as records
 from sensorgen.prediction.calibration.coverage import coverage_of, held_out, inside
-from sensorgen.prediction.calibration.fitting import calibrated, gain, prior, shared, widened
+from sensorgen.prediction.calibration.fitting import by_rest, calibrated, gain, prior, shared, widened
 from sensorgen.prediction.calibration.inversion import Inverter, Verdict
 from sensorgen.prediction.calibration.rest import Rest, checked
 from sensorgen.prediction.calibration.specimen import Spread, unknown
@@ -40,6 +40,16 @@ def test_without_errors_the_model_is_the_line_sensor(model):
     rest = sensor.impedance(TONES_HZ, 0.0, 0.05)
     assert clean.rest(at) == pytest.approx(np.log(rest), rel=1e-9)
     assert clean.ratio(at, unknown(force, place)) == pytest.approx(np.log(np.array(z) / rest), abs=1e-9)
+
+
+def test_tones_do_not_average_out_the_gain_that_they_share(model):
+    """Half of its variance is common to all: an error of ln Z, and so of ln C, however many tones are read."""
+    spread = Spread(leak=1e-12, dispersion=1e-12, lead_ohm=1e-9, stray_f=1e-24)
+    many = replace(model, spread=spread, frequency_hz=np.geomspace(1e3, 1e4, 300))
+    found = by_rest(many, many.rest(np.zeros(len(many.names))) + 1e-3, 1e-6, 1e-6)
+    at = many.names.index("capacitance")
+    error, common = spread.capacitance * np.sqrt(found.covariance[at, at]), spread.gain / np.sqrt(2)
+    assert error == pytest.approx(1 / np.hypot(1 / common, 1 / spread.capacitance), rel=0.02)
 
 
 @pytest.mark.parametrize("error", ["C +1 %", "stray 1 pF", "gain 0.3 %, 20 ohm, 0.3 pF, E -5 %"])

@@ -250,3 +250,9 @@ def test_an_outline_that_encloses_nothing_is_refused_wherever_a_scene_is_made(co
     monkeypatch.setattr(design.shape("cogs"), "scene", lambda p, fill: Prism("y", corners, 0.0, 1.0))
     with pytest.raises(BadInput, match=rf"^there: an outline {said}.* expected at least three corners"):
         make({"shape": "cogs"}, "there")
+
+
+def test_a_dielectric_fills_film_and_isolation_unless_they_are_given():
+    materials = {"dielectric": "pla", "film": "x60"}
+    made = make({"shape": "tri", "parameters": {"isolation_mm": 0.2}, "materials": materials}).materials
+    assert (made.dielectric, made.film, made.isolation) == ("pla", "x60", "pla")

@@ -16,8 +16,9 @@ from sensorgen.core import plugins as registry
 from sensorgen.core.findings import Finding
 from sensorgen.design import shapes
 from sensorgen.scene.drawing import markers, panels, svg
-from sensorgen.scene.drawing.paper import fitted, spread, width, wrapped
-from sensorgen.scene.drawing.view import nearest, period, views
+from sensorgen.scene.drawing.dimensions import beside
+from sensorgen.scene.drawing.paper import Frame, fitted, spread, width, wrapped
+from sensorgen.scene.drawing.view import Measure, nearest, period, views
 from sensorgen.scene.scene import Body, Fill, Point, Prism, Scene, area_mm2, box
 from sensorgen.scene.sections import Column, columns
 
@@ -439,3 +440,12 @@ def test_scales_are_customary() -> None:
         "1:2",
         "2000:1",
     ]
+
+
+@pytest.mark.parametrize(("high_mm", "leaders"), [((1.0, 2.0), 0), ((0.05, 0.1), 2)])
+def test_a_value_that_fits_beside_its_dimension_has_no_leader(high_mm: Point, leaders: int) -> None:
+    """By the only slanted lines there are: ends of dimensions run across, dimensions upright."""
+    lane = [Measure(0.0, high_mm[0]), Measure(high_mm[0], high_mm[1])]
+    svg = f"<g>{''.join(beside(Frame(50.0, 100.0, 90.0, 20.0, 10.0, 10.0), [lane]))}</g>"
+    lines = [{k: float(each.get(k, "")) for k in ("x1", "y1", "x2", "y2")} for each in ET.fromstring(svg).iter("line")]
+    assert sum(each["x1"] - each["x2"] == pytest.approx(2.2) for each in lines) == leaders

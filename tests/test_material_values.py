@@ -130,3 +130,9 @@ def test_the_bounds_hold_over_the_whole_range_of_permittivities(shape, value):
 def test_a_permittivity_beyond_sense_is_refused(value):
     with pytest.raises(OutOfRange, match=r"relative_permittivity of x60 is .*; expected 1e-09 to 1e.09"):
         design({"x60": {"relative_permittivity": value}}, "tri")
+
+
+def test_a_later_value_goes_before_the_designs_own():
+    own = drawn(design({"x60": {"relative_permittivity": 3.0, "youngs_modulus_pa": 2e6}}))
+    later = own.with_values({"x60": {"relative_permittivity": 2.0}}).design
+    assert later.material_values == {"x60": {"relative_permittivity": 2.0, "youngs_modulus_pa": 2e6}}

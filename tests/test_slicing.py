@@ -257,3 +257,11 @@ def test_the_usual_name_is_that_of_the_last_file_which_passed(copies, tmp_path):
     good, refused = ["gcode", "gcode.json", "layers.html"], ["layers.html", "refused.gcode", "refused.json"]
     cut = filled(OTHER, layers=[1, 2, 3, 4, 8, 9, 10, 11, 12, 13])
     assert [names(text) for text in (filled(OTHER), cut, cut, filled(OTHER))] == [good, refused, refused, good]
+
+
+def test_a_program_that_is_missing_or_cannot_be_run_is_told_from_one_that_ended_well(tmp_path):
+    locked = tmp_path / "prusa-slicer"
+    locked.write_text("#!/bin/sh\n")
+    for program in (tmp_path / "none", locked):
+        with pytest.raises(SlicerFailed, match="cannot run"):
+            run.run([str(program)], tmp_path / "raw.gcode")

@@ -77,6 +77,13 @@ def test_a_way_within_a_layer_connects_holes_that_do_not_lie_above_each_other():
     assert through(opened(film(low, lines(0.5, 0.5), high), [1.0] * 3)) == []
 
 
+def test_the_narrowest_place_of_a_path_is_the_hole():
+    """A millimetre square open through two layers, and a tenth of it through the third."""
+    square, tenth = shapely.box(0, 0, 1, 1), shapely.box(0.9, 0, 2, 1)
+    for layers in ([square, square, tenth], [tenth, square, square], [square, square, tenth, tenth]):
+        assert [hole.area for hole in through(layers)] == pytest.approx([0.1])
+
+
 def test_a_shift_of_both_layers_alike_opens_nothing():
     two = film(lines(0.5, 0.47), lines(0.5, 0.47, along_x=False))
     areas = [

@@ -3,9 +3,10 @@
 import pytest
 import shapely
 
-from sensorgen.checks.volumes import findings, rows
+from sensorgen.checks.volumes import Row, findings, rows
 from sensorgen.design.design import make
 from sensorgen.scene.layers import drawn
+from sensorgen.scene.scene import Body, Scene, box
 
 DESIGN = make({"shape": "tri", "parameters": {"length_mm": 12.0, "width_mm": 8.0}})
 BODY, LAYER = "top_electrode_with_cogs", 8  # cogs of six periods, from 0.8 to 0.9 mm
@@ -53,3 +54,12 @@ def test_they_are_told_in_the_finding():
     lost, fused = (findings([row_of(runs)], SCENE)[0].message for runs in (RUNS[2:], ((0.0, 12.0),)))
     assert "2 of 6 strips vanish" in lost
     assert "5 fuse" in fused
+
+
+@pytest.mark.parametrize(("material", "severity"), [("bvoh", "warning"), ("x60", "error")])
+def test_lost_support_is_no_error(material, severity):
+    """It is washed out in the end: what it would have held up is another rule's."""
+    name = "support" if material == "bvoh" else "film"
+    scene = Scene((Body(name, material, (box(0, 1, 0, 1, 0, 0.1),)),), (1.0, 1.0, 0.1))
+    row = Row(name, 1, 0.0, 0.1, 0.1, 0.0, 1, 1, 0, (0.0, 0.0))
+    assert [f.severity for f in findings([row], scene)] == [severity]

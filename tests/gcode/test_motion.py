@@ -33,6 +33,11 @@ def test_starts_are_where_the_last_move_ended():
     assert follow([R, "G1 X1 Y1 Z1", "G92", "G1 X3"]).length_mm[1] == 3
 
 
+def test_homing_without_an_axis_is_homing_of_all():
+    assert follow([R, "G1 X1 Y2 Z3", "G28", "G1 X4"]).start_mm[-1].tolist() == [0, 0, 0]
+    assert follow([R, "G1 X1 Y2 Z3", "G28 Z", "G1 X4"]).start_mm[-1].tolist() == [1, 2, 0]
+
+
 def test_inches():
     assert ends(R, "G20", "G1 X1 F10", "G21", "G1 X1") == [[25.4, 0, 0], [1, 0, 0]]
     assert follow([R, "G20", "G1 X1 E1 F10"]).feed_mm_min.tolist() == [254.0]

@@ -13,6 +13,7 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.shapes import rect
 from sensorgen.models import fem2d, fem3d, prisms
 from sensorgen.scene.layers import outlines
+from sensorgen.scene.repetition import Repeat
 from sensorgen.scene.scene import FLOATING, Body, Fill, Prism, Scene, box, rounded
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.bounds import Unsolved
@@ -262,3 +263,14 @@ def test_a_cell_of_one_post_is_solved_as_its_quarter():
     a, b = (prisms.capacitance(one_post(turn), {"air": 1.0}, 1e-2) for turn in (22.5, 10.0))
     assert max(a.lower, b.lower) < min(a.upper, b.upper)
     assert a.middle() == pytest.approx(b.middle(), rel=5e-3)
+
+
+@pytest.mark.parametrize(("low", "size", "whole"), [(0.3, 1.0, 2.8), (0.75, 1.0, 5.2), (0.0, 2.0, 9.0)])
+@pytest.mark.parametrize("shifts", [False, True])
+def test_parts_of_a_cell_occur_as_often_as_they_are_unfolded(low, size, whole, shifts):
+    """Places of the whole, each folded into the cell by mirrors or shifts, counted one by one."""
+    of = Repeat.of(low, low + size, shifts, whole)
+    x = (np.arange(200_000) + 0.5) / 200_000 * whole - low
+    folded = x % size if shifts else size - np.abs(x % (2 * size) - size)
+    counted = np.histogram(folded + low, of.places_mm)[0] * whole / 200_000
+    assert counted == pytest.approx(of.shares * np.diff(of.places_mm), abs=1e-3)

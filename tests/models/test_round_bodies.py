@@ -11,6 +11,7 @@ from sensorgen.design.design import make
 from sensorgen.models import fem2d, fem3d
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.capacitance import capacitance, of_sensor
+from sensorgen.scene.array import ArrayParams
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Body, Prism, Scene, box
 from sensorgen.solvers.electrostatics.bounds import whole
@@ -185,3 +186,14 @@ def test_a_sensor_of_cells_and_rims_has_the_capacitance_of_its_whole_drawing(sha
         count * scene.size_mm[0] * scene.size_mm[1] for scene, count in (*cells.beside, (cells.first(), cells.count))
     ]
     assert sum(areas) == pytest.approx(length_mm * width_mm)
+
+
+@pytest.mark.parametrize(("cells", "rim_mm"), [(1, 0.4), (2, 0.4), (5, 0.4), (5, 0.0)])
+def test_the_two_ends_of_a_row_keep_their_rims(cells, rim_mm):
+    """Cells with a rim beside them are those at either end, by counting; all others lie between two of their kind."""
+    row = ArrayParams(period_mm=1.0, length_mm=cells + 2 * rim_mm, width_mm=1.0)
+    at_end = {0, cells - 1} if rim_mm else set()
+    parts = {round(length, 9): count for length, _, count in row.parts() if count}
+    ends = {round(len(at_end) + 2 * rim_mm, 9): 1.0} if at_end else {}
+    inner = {1.0: float(cells - len(at_end))} if cells > len(at_end) else {}
+    assert parts == inner | ends

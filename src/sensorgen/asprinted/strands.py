@@ -95,7 +95,7 @@ def drags(design: Design, source: Source) -> DesignDrags:
     left = np.full(len(row), np.inf)
     for one in set(terminals) - {""}:
         others = (terminal != "") & (terminal != one)
-        left[own == one] = _insulation(place[own == one], lines.of(others))
+        left[own == one] = _insulation(place[own == one], lines.of(others), np.unique(lines.top_mm))
     keys = np.round(np.column_stack([left / _STEP_MM, place[:, 2] / _STEP_MM]))
     touches, strands = travel.gap_mm <= CONTACT_MM, []
     for left_steps, z_steps in np.unique(keys[own != ""], axis=0).tolist():
@@ -106,13 +106,12 @@ def drags(design: Design, source: Source) -> DesignDrags:
     return DesignDrags(**vars(summed(motion, found, machine)), strands=tuple(strands))
 
 
-def _insulation(place_mm: Real, lines: Lines) -> Real:
-    """Height between places and lines straight above or below them; infinite where there are none [mm]."""
+def _insulation(place_mm: Real, lines: Lines, tops_mm: Real) -> Real:
+    """Height between places and lines straight above or below, of layers with some tops; infinite without any [mm]."""
     found = np.full(len(place_mm), np.inf)
     if not len(lines.tool) or not len(place_mm):
         return found
-    tops = np.unique(lines.top_mm)
-    height = np.diff(tops, prepend=0.0)[np.searchsorted(tops, lines.top_mm)]
+    height = np.diff(tops_mm, prepend=0.0)[np.searchsorted(tops_mm, lines.top_mm)]
     ways = shapely.linestrings(np.stack([lines.start_mm, lines.end_mm], axis=1))
     tree = shapely.STRtree(shapely.buffer(ways, lines.width_mm / 2, cap_style="square"))
     point, line = tree.query(shapely.points(place_mm[:, :2]), predicate="intersects")
