@@ -70,7 +70,12 @@ def test_a_pause_lifts_the_tip_and_the_press_is_done_again(tmp_path):
     assert lab.mechanism.violations == []
 
 
-@pytest.mark.parametrize("at_s", np.arange(0.5, 29, 1.5).tolist())
+OFTEN = {0.5, 5.0, 12.5, 17.0, 21.5, 26.0}  # homing, on the way, landing, press, rest, second press
+
+
+@pytest.mark.parametrize("at_s", [
+    pytest.param(at_s, marks=() if at_s in OFTEN else pytest.mark.nightly) for at_s in np.arange(0.5, 29, 1.5).tolist()
+])  # fmt: skip
 def test_a_pause_at_any_time_does_no_harm(tmp_path, at_s):
     lab = laboratory()
     found = done(tmp_path, lab, view=Viewer([(at_s, "pause"), (at_s + 0.3, "pause"), (at_s + 12, "resume")]))

@@ -18,22 +18,21 @@ from sensorgen.measure.virtual.specimen import Specimen, drawn
 from sensorgen.prediction.calibration.fitting import calibrated, prior
 from sensorgen.prediction.calibration.materials import estimate, source_text
 
-COUNT = 60
 MATERIALS = ("resistivity_ohm_m", "relative_permittivity", "youngs_modulus_pa")
 
 
-@pytest.fixture(scope="module")
-def outcomes():
+@pytest.fixture(scope="module", params=[16, pytest.param(60, marks=pytest.mark.nightly)], ids="of {}".format)
+def outcomes(request):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return [truths.outcome(seed) for seed in range(10_000, 10_000 + COUNT)]
+        return [truths.outcome(seed) for seed in range(10_000, 10_000 + request.param)]
 
 
 @pytest.mark.parametrize("level", truths.LEVELS)
 @pytest.mark.parametrize("name", MATERIALS)
 def test_intervals_of_materials_hold_as_often_as_they_say(outcomes, name, level):
     held = sum(one.held[name, level][0] for one in outcomes)
-    low, high = binom.ppf([1e-4, 1 - 1e-4], COUNT, level)
+    low, high = binom.ppf([1e-4, 1 - 1e-4], len(outcomes), level)
     assert low <= held <= high
 
 
@@ -42,7 +41,7 @@ def test_intervals_of_materials_hold_as_often_as_they_say(outcomes, name, level)
 def test_intervals_of_presses_hold_as_often_as_they_say(outcomes, name, level):
     """Presses of one specimen are not independent: the limits are those of its shares."""
     shares = np.array([np.mean(one.held[name, level]) for one in outcomes])
-    assert shares.mean() == pytest.approx(level, abs=4 * shares.std() / COUNT**0.5)
+    assert shares.mean() == pytest.approx(level, abs=4 * shares.std() / len(shares) ** 0.5)
 
 
 def test_they_tell_more_than_was_known(outcomes):
