@@ -18,7 +18,7 @@ def _cases():
             yield pytest.param(kind, moment, id=name, marks=() if moment in often else pytest.mark.nightly)
 
 
-@pytest.mark.parametrize(("kind", "moment"), _cases())
+@pytest.mark.parametrize(("kind", "moment"), list(_cases()))
 def test_every_fault_ends_with_the_tip_up_and_the_reason_told(tmp_path, kind, moment):
     found, lab = outcome(tmp_path, (Planted(what=kind, **moment),))
     assert verdict(found, lab, kind) == []
