@@ -13,7 +13,9 @@ from sensorgen.core.errors import BadInput
 from sensorgen.workflows import demo
 
 PAGE = (Path(__file__).parents[2] / "docs" / "lab.md").read_text("utf-8")
+LONG = "hold_s: [0.3, 10]"
 REAL = "first.yaml --page"  # needs devices
+QUICK = "approach:\n  speed_mm_s: 100\n  landing_mm_s: 20\n  travel_mm_s: 200\n"
 
 
 def commands():
@@ -34,7 +36,8 @@ def test_every_command_of_the_page_works_in_its_order(tmp_path, monkeypatch, sha
         assert done.exit_code == 0, f"{words}: {done.output}"
         said[words[0]] = done.stdout
         if words[:2] == ["new", "experiment"]:
-            (tmp_path / "first.yaml").write_text(experiment, "utf-8")
+            assert LONG in experiment
+            (tmp_path / "first.yaml").write_text(experiment.replace(LONG, "hold_s: [0.3, 3]") + QUICK, "utf-8")
     assert "31 of 31 presses, simulated" in said["bench"]
     assert "youngs_modulus_pa" in said["calibrate"]
     assert "simulated, not measured: recording 1" in said["calibrate"]
@@ -49,6 +52,8 @@ def demonstrated(request, tmp_path_factory):
     with pytest.MonkeyPatch.context() as fewer:
         for name, presses in zip(("KNOWN", "UNKNOWN"), request.param, strict=True):
             fewer.setattr(demo, name, presses)
+        if request.param[0] < 30:
+            fewer.setattr(demo, "_EXPERIMENT", demo._EXPERIMENT.replace("[0.3, 5]", "[0.3, 2]") + QUICK)
         yield folder, demo.demo(folder, count=1)
 
 
