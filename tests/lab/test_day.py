@@ -13,7 +13,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.workflows import demo
 
 PAGE = (Path(__file__).parents[2] / "docs" / "lab.md").read_text("utf-8")
-LONG = "hold_s: [0.3, 10]"
+SLOW = {"hold_s: [0.3, 10]": "hold_s: [0.3, 3]", '.14"}': '.14", settings: {lift_mm_s: 100}}'}
 REAL = "first.yaml --page"  # needs devices
 QUICK = "approach:\n  speed_mm_s: 100\n  landing_mm_s: 20\n  travel_mm_s: 200\n"
 
@@ -36,8 +36,10 @@ def test_every_command_of_the_page_works_in_its_order(tmp_path, monkeypatch, sha
         assert done.exit_code == 0, f"{words}: {done.output}"
         said[words[0]] = done.stdout
         if words[:2] == ["new", "experiment"]:
-            assert LONG in experiment
-            (tmp_path / "first.yaml").write_text(experiment.replace(LONG, "hold_s: [0.3, 3]") + QUICK, "utf-8")
+            for slow, quick in SLOW.items():
+                assert slow in experiment
+                experiment = experiment.replace(slow, quick)
+            (tmp_path / "first.yaml").write_text(experiment + QUICK, "utf-8")
     assert "31 of 31 presses, simulated" in said["bench"]
     assert "youngs_modulus_pa" in said["calibrate"]
     assert "simulated, not measured: recording 1" in said["calibrate"]

@@ -15,6 +15,7 @@ from sensorgen.core import document
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.measure.lab import recorder, run
 from sensorgen.measure.lab.clock import SimulatedClock
+from sensorgen.measure.lab.devices import DeviceFault
 from sensorgen.measure.lab.plans import Choice
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.bench import read_again
@@ -212,6 +213,27 @@ def test_a_loop_that_stood_still_ends_the_run(tmp_path):
     found = done(tmp_path, lab, view=Slow([]))
     assert found.end == "fault"
     assert "stood still" in found.reason
+
+
+def test_a_guardian_that_dies_ends_the_run_with_the_tip_up(tmp_path):
+    class Dying:
+        armed = []
+
+        def arm(self):
+            self.armed.append(True)
+
+        def disarm(self):
+            self.armed.append(False)
+
+        def beat(self):
+            if lab.mechanism.peak_n > 3:
+                raise DeviceFault("guardian: it has died")
+
+    lab = laboratory()
+    found = done(tmp_path, lab, guardian=Dying())
+    assert (found.end, found.tip_up, Dying.armed) == ("fault", True, [True, False])
+    assert "guardian: it has died" in found.reason
+    assert lab.mechanism.tip_mm >= 1.0
 
 
 def _cli(*words):
