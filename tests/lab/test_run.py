@@ -216,14 +216,14 @@ def test_a_loop_that_stood_still_ends_the_run(tmp_path):
 
 
 def test_a_guardian_that_dies_ends_the_run_with_the_tip_up(tmp_path):
-    class Dying:
-        armed = []
+    armed = []
 
+    class Dying:
         def arm(self):
-            self.armed.append(True)
+            armed.append(True)
 
         def disarm(self):
-            self.armed.append(False)
+            armed.append(False)
 
         def beat(self):
             if lab.mechanism.peak_n > 3:
@@ -231,7 +231,7 @@ def test_a_guardian_that_dies_ends_the_run_with_the_tip_up(tmp_path):
 
     lab = laboratory()
     found = done(tmp_path, lab, guardian=Dying())
-    assert (found.end, found.tip_up, Dying.armed) == ("fault", True, [True, False])
+    assert (found.end, found.tip_up, armed) == ("fault", True, [True, False])
     assert "guardian: it has died" in found.reason
     assert lab.mechanism.tip_mm >= 1.0
 
