@@ -25,21 +25,23 @@ from sensorgen.cli import main
 
 OWN = """\
 shape: tri
-parameters: {length_mm: 80, width_mm: 12, electrode_mm: 0.4, period_mm: 2.4, hang_height_mm: 0.6, lower_height_mm: 0.3,
+parameters: {length_mm: 20, width_mm: 12, electrode_mm: 0.4, period_mm: 2.4, hang_height_mm: 0.6, lower_height_mm: 0.3,
   dielectric_mm: 0.3, along: x}
 material_values:
   x60: {relative_permittivity: 3.9, youngs_modulus_pa: 4.5e+6}
   etpu: {resistivity_ohm_m: 0.05, youngs_modulus_pa: 18.0e+6}
 """
 DESIGNS = {
-    "trix": ["tri", "--dielectric", "0.2", "--along", "x"],
-    "triy": ["tri", "--dielectric", "0.2", "--along", "y"],
-    "rect": ["rect", "--dielectric", "0.1"],
-    "reference": ["reference"],
-    "double": ["double"],
-    "own": ["own.yaml"],  # 33 1/3 periods long
-    "compensated": ["tri", "--dielectric", "0.2", "--compensate", "print"],
-    "upside-down": ["tri", "--dielectric", "0.2", "--orientation", "upside-down", "--support", "bvoh"],
+    "trix": ["tri", "--dielectric", "0.2", "--along", "x", "--length", "20"],
+    "triy": ["tri", "--dielectric", "0.2", "--along", "y", "--length", "20"],
+    "rect": ["rect", "--dielectric", "0.1", "--length", "20"],
+    "reference": ["reference", "--length", "20"],
+    "double": ["double", "--length", "20"],
+    "own": ["own.yaml"],  # 8 1/3 periods long
+    "compensated": ["tri", "--dielectric", "0.2", "--length", "20", "--compensate", "print"],
+    "upside-down": [
+        "tri", "--dielectric", "0.2", "--length", "20", "--orientation", "upside-down", "--support", "bvoh",
+    ],
 }
 
 
@@ -455,12 +457,12 @@ def test_a_digit_is_a_difference():
 
 
 REFERENCE = json.loads((Path(__file__).parent / "reference" / "cells.json").read_text("utf-8"))
-PERIODS, CELLS = 10e-3 * 50, 5 * 50  # of 2 mm: metres of prism, and cells of 2 x 2 mm, in 100 x 10 mm
+PERIODS, CELLS = 10e-3 * 10, 5 * 10  # of 2 mm: metres of prism, and cells of 2 x 2 mm, in 20 x 10 mm
 TRUE_F = {
     "trix": REFERENCE["tri"][1]["C_F_per_m"] * PERIODS,
     "triy": REFERENCE["tri"][1]["C_F_per_m"] * PERIODS,
     "rect": REFERENCE["rect"][0]["C_F"] * CELLS,
-    "reference": REFERENCE["plate"]["C_F_per_m2"] * 1e-3,
+    "reference": REFERENCE["plate"]["C_F_per_m2"] * 200e-6,
     "upside-down": REFERENCE["tri"][1]["C_F_per_m"] * PERIODS,
 }
 
