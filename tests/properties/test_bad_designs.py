@@ -179,7 +179,11 @@ def command(monkeypatch, capsys, tmp_path):
 
 
 @counts(80, 400)
-def test_random_command_lines(count, command):
+def test_random_command_lines(count, command, request):
+    """The few are not pressed: that takes seconds for each design that is valid."""
+    if count < 100:
+        request.getfixturevalue("unpressed")
+
     @many(count)
     @given(
         shape=st.sampled_from(["tri", "rect", "reference", "trj", "no.yaml"]),

@@ -1,4 +1,4 @@
-"""Every printable variant of the thesis through both real slicers, in full size: of each shape one, the rest nightly."""
+"""Every printable variant of the thesis through both real slicers, in full size: one of each shape, others nightly."""
 
 from pathlib import Path
 
