@@ -28,12 +28,23 @@ class Page:
         )  # fmt: skip
         os.close(down[0])
         os.close(up[1])
-        self.number, self.rest, self.events, self.session = 0, b"", [], None
+        self.number, self.rest, self.events, self.session, self.context = 0, b"", [], None, None
         target = next(t for t in self.call("Target.getTargets")["targetInfos"] if t["type"] == "page")
-        attached = self.call("Target.attachToTarget", targetId=target["targetId"], flatten=True)
-        self.session = attached["sessionId"]
+        self._attach(target["targetId"])
+
+    def _attach(self, target):
+        self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Runtime", "Network", "Page", "Log"):
             self.call(f"{domain}.enable")
+
+    def renew(self):
+        """Another page of the same browser, in a context of its own: it has nothing of the last one."""
+        self.session = None
+        if self.context:
+            self.call("Target.disposeBrowserContext", browserContextId=self.context)
+        self.context = self.call("Target.createBrowserContext")["browserContextId"]
+        self._attach(self.call("Target.createTarget", url="about:blank", browserContextId=self.context)["targetId"])
+        self.events.clear()
 
     def call(self, method, **params):
         self.number += 1

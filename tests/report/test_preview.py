@@ -7,7 +7,6 @@ import re
 
 import numpy as np
 import pytest
-from browser import Page
 
 from sensorgen.analysis.preview import geometry, shades
 from sensorgen.design.design import make
@@ -22,13 +21,6 @@ PIXELS = """(() => { const c = document.getElementById('model'), gl = c.getConte
   const seen = new Map(); for (let k = 0; k < p.length; k += 4) { const n = p[k] << 16 | p[k + 1] << 8 | p[k + 2];
   seen.set(n, (seen.get(n) || 0) + 1); } return [...seen].sort((a, b) => b[1] - a[1]).slice(0, 12); })()"""
 FRAME = "new Promise(r => requestAnimationFrame(() => requestAnimationFrame(r)))"
-
-
-@pytest.fixture
-def browser(program, tmp_path):
-    page = Page(program("chromium", "chromium", "chromium-browser", "google-chrome"), tmp_path)
-    yield page
-    page.close()
 
 
 @pytest.fixture(scope="module")
