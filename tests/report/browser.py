@@ -103,8 +103,8 @@ class Page:
         """Press the mouse at a place, move it, and let go."""
         self._mouse("mouseMoved", start, 0)
         self._mouse("mousePressed", start, 1)
-        for k in range(1, 11):
-            self._mouse("mouseMoved", [a + (b - a) * k / 10 for a, b in zip(start, end, strict=True)], 1)
+        for k in range(1, 5):  # each is drawn
+            self._mouse("mouseMoved", [a + (b - a) * k / 4 for a, b in zip(start, end, strict=True)], 1)
             time.sleep(0.03)
         self._mouse("mouseReleased", end, 0)
 

@@ -54,7 +54,7 @@ def test_with_recordings(browser, pages):
     sorted_by_mouse_and_key(browser)
     another_choice(browser)
     browser.run("scrollTo(0, 0)")
-    browser.picture(OUT / "recorded-1920.png")
+    browser.picture(OUT / "recorded-1920.png", whole=False)
     on_paper(browser)
     quiet(browser)
 

@@ -24,12 +24,10 @@ FRAME = "new Promise(r => requestAnimationFrame(() => requestAnimationFrame(r)))
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory, _session_cache):
+def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("preview")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("SENSORGEN_CACHE", str(_session_cache))
-        waiver = {"rule": "5-width", "reason": HOSTILE}
-        (folder / "tri.html").write_text(page_of(make({**TRI, "waivers": [waiver]})), "utf-8")
+    waiver = {"rule": "5-width", "reason": HOSTILE}
+    (folder / "tri.html").write_text(page_of(make({**TRI, "waivers": [waiver]})), "utf-8")
     return folder / "tri.html"
 
 
