@@ -14,7 +14,6 @@ from sensorgen.workflows.compensation import BAKE, compensated, found, printable
 
 from .conftest import small
 
-
 SHORT = {"length_mm": 6.0, "width_mm": 4.0}  # three periods, which are found and solved in half the time of six
 
 
