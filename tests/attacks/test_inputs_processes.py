@@ -15,7 +15,7 @@ NAMES = (
     "multiprocessing", "random", "signal", "typing", "numpy", "json", "pickle", "threading", "ctypes", "sitecustomize",
     "sensorgen_plugin", "subprocess", "concurrent", "queue", "build123d",
 )  # fmt: skip
-SWEEP = ("compress", "reference", "--stress", "0:20:20", "--sweep", "dielectric_mm=0.1,0.2", "--jobs", "2")
+SWEEP = ("compress", "tri", "--length", "6", "--stress", "0:20:20", "--sweep", "dielectric_mm=0.1,0.2", "--jobs", "2")
 
 
 @pytest.fixture
