@@ -4,6 +4,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 READY = $(VENV)/.ready
 READY_DEV = $(VENV)/.ready-dev
+unexport PYTHONDONTWRITEBYTECODE  # without bytecode, each of the thousand processes of the tests compiles what it imports
 
 .PHONY: help demo test nightly lint docs site words size bench clean attack mutants lowest pythons wheel hashes sbom
 

@@ -88,7 +88,7 @@ def test_a_budget_that_is_used_up_is_stated(plate):
 
 def test_many_heights_go_to_the_grid_at_once(shared_cache, monkeypatch):
     """Before single steps, of which there may be more than are tried: one alone leaves the findings of the other."""
-    size = {"length_mm": 20.0, "electrode_mm": 0.45, "dielectric_mm": 0.25, "height_mm": 0.35}
+    size = {"length_mm": 6.0, "electrode_mm": 0.45, "dielectric_mm": 0.25, "height_mm": 0.35}
     together = {"electrode_mm": 0.4, "dielectric_mm": 0.2, "height_mm": 0.3}
     design = make({"shape": "cog", "parameters": size})
     left = len(warnings(make({"shape": "cog", "parameters": size | together})))

@@ -96,6 +96,7 @@ def test_a_plate_between_fixed_sides_as_the_closed_form_has_it():
     assert abs(found.rise_f_per_m2[1] - rise) < found.rise_error_f_per_m2[1] < 0.02 * rise
 
 
+@pytest.mark.nightly
 def test_few_loads_are_as_good_as_many():
     few, many = (estimated(0, loads) for loads in ([0.0, 1e4, 1e5], [0.0, 1e3, 3e3, 6e3, 1e4, 1e5]))
     for found in (few, many):

@@ -4,14 +4,14 @@ import importlib.util
 import re
 import runpy
 import shlex
-import subprocess
 import sys
 from pathlib import Path
 
+import click
 import pytest
 
 import virtual_specimen
-from sensorgen.cli import COMMANDS, cli
+from sensorgen.cli import COMMANDS, cli, main
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "docs" / "tutorial.md"]
@@ -19,14 +19,30 @@ READINGS = "re_ohm_1.1kHz,im_ohm_1.1kHz,re_ohm_99.7kHz,im_ohm_99.7kHz\n3000,-2.1
 DESIGN = re.compile(r"```yaml\n# (\S+\.yaml)\n(.*?)```", re.DOTALL)
 
 
-def commands():
-    """Every sensorgen command of the pages that does not need the CAD kernel or write elsewhere."""
-    for page in PAGES:
-        for block in re.findall(r"```sh\n(.*?)```", page.read_text("utf-8"), re.DOTALL):
-            for line in block.replace("\\\n", " ").splitlines():
-                words = shlex.split(line, comments=True)
-                if words[:1] == ["sensorgen"] and ">" not in words:
-                    yield pytest.param(words[1:], id=" ".join(words[1:]))
+NIGHTLY = {  # each guarded by a test of that command, at a smaller design
+    "batch docs/examples/film-study.yaml --no-gcode",
+    "build tri --dielectric 0.2 --compensate print --no-cad",
+    "calibrate S1",
+    "chart tri --quantity line",
+    "compress tri --stress 0:100:10",
+    "fit --iteration 23",
+    "invert S1 measured.csv",
+    "predict flat-tri.yaml --force 0:6:0.1 --position 0:100:1 --plot plots",
+    "predict tri --dielectric 0.1 --slicer prusa",
+    "report --iteration 23",
+    "slice tri --dielectric 0.2",
+    "thesis",
+}
+
+
+def commands(nightly=frozenset()):
+    """Every sensorgen command of the pages once, that writes to no other program."""
+    blocks = [block for page in PAGES for block in re.findall(r"```sh\n(.*?)```", page.read_text("utf-8"), re.DOTALL)]
+    lines = [line for block in blocks for line in block.replace("\\\n", " ").splitlines()]
+    words = [shlex.split(line, comments=True) for line in lines]
+    found = dict.fromkeys(shlex.join(each[1:]) for each in words if each[:1] == ["sensorgen"] and ">" not in each)
+    assert nightly <= set(found)
+    return [pytest.param(line, marks=[pytest.mark.nightly] if line in nightly else [], id=line) for line in found]
 
 
 def test_the_reference_is_what_the_help_texts_say():
@@ -48,55 +64,70 @@ def test_each_command_has_help_and_is_in_the_documents(name):
     )
 
 
-@pytest.fixture(scope="module")
-def kept(tmp_path_factory):
-    """The cache of one who follows the pages: what a command has solved, the next one knows."""
-    return tmp_path_factory.mktemp("cache")
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A folder with the designs that the pages write, and the repository's own."""
+    for page in PAGES:
+        for name, text in DESIGN.findall(page.read_text("utf-8")):
+            (tmp_path / name).write_text(text, "utf-8")
+    for name in ("designs", "docs"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
 
 
-def specimen_on_a_bench(command, folder):
+@pytest.fixture
+def sensorgen(here, monkeypatch, capfd):
+    """Run a command there; fails if it ends otherwise than it may."""
+
+    def run(*words, codes=(0,)):
+        monkeypatch.setattr(sys, "argv", ["sensorgen", *map(str, words)])
+        with pytest.raises(SystemExit) as left:
+            main()
+        assert left.value.code in codes, capfd.readouterr().err
+
+    return run
+
+
+@pytest.mark.parametrize("line", commands())
+def test_every_command_of_the_pages_has_its_options(line, here, monkeypatch):
+    """Words are read, and nothing is done."""
+    monkeypatch.setattr(click.Command, "invoke", lambda *_: None)
+    cli.main(shlex.split(line), prog_name="sensorgen", standalone_mode=False)
+
+
+def specimen_on_a_bench(command, folder, sensorgen):
     """What ``calibrate S1`` and ``invert S1`` start from: known presses in the log, readings beside it."""
-    if command not in ("calibrate", "invert"):
-        return
     lcr, rig = virtual_specimen.recorded(virtual_specimen.drawn(1), folder, 12)
-    sofar = [["log", "specimen", "S1", "--design", "flat-tri.yaml"], ["log", "bench", "S1", lcr, rig]]
-    for words in [*sofar, *([["calibrate", "S1"]] if command == "invert" else [])]:
-        subprocess.run([sys.executable, "-m", "sensorgen", *words], cwd=folder, check=True, capture_output=True)
+    sensorgen("log", "specimen", "S1", "--design", "flat-tri.yaml")
+    sensorgen("log", "bench", "S1", lcr, rig)
+    if command == "invert":
+        sensorgen("calibrate", "S1")
     readings = virtual_specimen.Truth().impedance([0.0, 2.0], [0.05, 0.05])
     virtual_specimen.write_csv(folder / "measured.csv", range(2), readings, virtual_specimen.TONES_HZ, rest=[1, 0])
 
 
-@pytest.mark.parametrize("words", list(commands()))
-def test_every_command_of_the_pages_works(words, tmp_path, program, kept, monkeypatch):
-    monkeypatch.setenv("SENSORGEN_CACHE", str(kept))
+@pytest.mark.usefixtures("shared_cache")
+@pytest.mark.parametrize("line", commands(NIGHTLY))
+def test_every_command_of_the_pages_works(line, here, sensorgen, program, monkeypatch):
+    words = shlex.split(line)
     if words[0] == "slice":
         program("prusa-slicer", "prusa-slicer")
-    for page in PAGES:
-        for name, text in DESIGN.findall(page.read_text("utf-8")):
-            (tmp_path / name).write_text(text, "utf-8")
     for name in ("measured.csv", "flat-tri.csv"):
-        (tmp_path / name).write_text(READINGS, "utf-8")
-    for name in ("designs", "docs"):
-        (tmp_path / name).symlink_to(ROOT / name)
+        (here / name).write_text(READINGS, "utf-8")
     if words[:2] == ["gcode", "check"]:
-        (tmp_path / words[2]).parent.mkdir(parents=True)
-        (tmp_path / words[2]).write_text(runpy.run_path(str(ROOT / "tests" / "gcode" / "good.py"))["MAKER"], "utf-8")
+        (here / words[2]).parent.mkdir(parents=True)
+        (here / words[2]).write_text(runpy.run_path(str(ROOT / "tests" / "gcode" / "good.py"))["MAKER"], "utf-8")
     if words[0] in ("report", "fit") or words[:2] == ["log", "list"]:
-        subprocess.run(
-            [sys.executable, "-m", "sensorgen", "log", "import", "--thesis"], check=True, capture_output=True
-        )
-    (tmp_path / "lcr.csv").write_text("Frequency,Cp,D\n10100,63e-12,0.02\n", "utf-8")
+        sensorgen("log", "import", "--thesis")
+    (here / "lcr.csv").write_text("Frequency,Cp,D\n10100,63e-12,0.02\n", "utf-8")
     if words[:2] == ["log", "import"] and "S1" in words:
-        of = ["log", "specimen", "S1", "--design", "flat-tri.yaml"]
-        subprocess.run([sys.executable, "-m", "sensorgen", *of], cwd=tmp_path, check=True, capture_output=True)
-    if "S1" in words:
-        specimen_on_a_bench(words[0], tmp_path)
-    extra = ["--no-cad"] if words[0] == "build" else []
-    done = subprocess.run(
-        [sys.executable, "-m", "sensorgen", *words, *extra], cwd=tmp_path, capture_output=True, encoding="utf-8"
-    )
+        sensorgen("log", "specimen", "S1", "--design", "flat-tri.yaml")
+    if words[0] in ("calibrate", "invert") and "S1" in words:
+        specimen_on_a_bench(words[0], here, sensorgen)
     finds_faults = words[0] in ("build", "check", "slice", "batch")  # and says so by its exit code
-    assert done.returncode in ({0, 1} if finds_faults else {0}), done.stderr
+    extra = ["--no-cad"] if words[0] == "build" else []
+    sensorgen(*words, *extra, codes=(0, 1) if finds_faults else (0,))
 
 
 def test_links_between_the_pages_lead_somewhere():

@@ -99,6 +99,7 @@ def test_a_bonded_plate_is_stiffer_the_thinner_it_is():
     assert found.force_resolution.print.lower < found.force_resolution.value < found.force_resolution.print.upper
 
 
+@pytest.mark.nightly
 def test_a_pressed_prints_range_is_that_of_cells_drawn_thinner_and_thicker():
     """Cells with the teeth moved by 0.02 mm, solved on another mesh as bodies of their own."""
     body = bodies.estimated(make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}}))

@@ -1,5 +1,6 @@
 """The notebooks of the gallery run as they stand, and a notebook's results show themselves."""
 
+import re
 import runpy
 from pathlib import Path
 
@@ -9,10 +10,23 @@ import sensorgen as sg
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 
+SLOW = {"film_study", "own_gcode"}  # presses of three films and of a print; tests/cli has such presses
+
 pytestmark = pytest.mark.usefixtures("shared_cache")
 
 
-@pytest.mark.parametrize("notebook", sorted(GALLERY.glob("*.py")), ids=lambda path: path.stem)
+NOTEBOOKS = [
+    pytest.param(path, id=path.stem, marks=[pytest.mark.nightly] if path.stem in SLOW else [])
+    for path in sorted(GALLERY.glob("*.py"))
+]
+
+
+def test_notebooks_use_names_that_there_are():
+    used = {name for path in GALLERY.glob("*.py") for name in re.findall(r"\bsg\.(\w+)\(", path.read_text("utf-8"))}
+    assert "slice_design" in used <= set(sg.__all__)
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS)
 def test_a_notebook_runs(notebook, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(notebook))

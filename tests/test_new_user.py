@@ -66,6 +66,7 @@ def test_own_material_printer_and_shape_to_gcode_and_page(sensorgen, tmp_path, p
     assert len(page) < 3_000_000
 
 
+@pytest.mark.nightly  # tests/cli/test_import_command.py walks the same way, but for the wheel and the page
 def test_own_cad_to_gcode_and_page(sensorgen, tmp_path, program):
     program("prusa-slicer", "prusa-slicer")
     work = tmp_path / "work"

@@ -75,6 +75,7 @@ def chosen(model, truth, count):
     return calibrated(model, known)
 
 
+@pytest.mark.nightly
 def test_a_third_of_the_presses_is_enough(model):
     """Median of specimens with all errors at once: 6 chosen presses against 18 random ones."""
     saved = []

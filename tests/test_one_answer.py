@@ -23,24 +23,45 @@ import pytest
 import sensorgen
 from sensorgen.cli import main
 
+VALUES = """\
+shape: reference
+parameters: {length_mm: 21, width_mm: 12, electrode_mm: 0.4}
+material_values:
+  x60: {relative_permittivity: 3.9, youngs_modulus_pa: 4.5e+6}
+  etpu: {resistivity_ohm_m: 0.05, youngs_modulus_pa: 18.0e+6}
+"""
 OWN = """\
 shape: tri
-parameters: {length_mm: 80, width_mm: 12, electrode_mm: 0.4, period_mm: 2.4, hang_height_mm: 0.6, lower_height_mm: 0.3,
+parameters: {length_mm: 20, width_mm: 12, electrode_mm: 0.4, period_mm: 2.4, hang_height_mm: 0.6, lower_height_mm: 0.3,
   dielectric_mm: 0.3, along: x}
 material_values:
   x60: {relative_permittivity: 3.9, youngs_modulus_pa: 4.5e+6}
   etpu: {resistivity_ohm_m: 0.05, youngs_modulus_pa: 18.0e+6}
 """
 DESIGNS = {
-    "trix": ["tri", "--dielectric", "0.2", "--along", "x"],
-    "triy": ["tri", "--dielectric", "0.2", "--along", "y"],
-    "rect": ["rect", "--dielectric", "0.1"],
-    "reference": ["reference"],
-    "double": ["double"],
-    "own": ["own.yaml"],  # 33 1/3 periods long
-    "compensated": ["tri", "--dielectric", "0.2", "--compensate", "print"],
-    "upside-down": ["tri", "--dielectric", "0.2", "--orientation", "upside-down", "--support", "bvoh"],
+    "trix": ["tri", "--dielectric", "0.2", "--along", "x", "--length", "20"],
+    "triy": ["tri", "--dielectric", "0.2", "--along", "y", "--length", "20"],
+    "rect": ["rect", "--dielectric", "0.1", "--length", "20"],
+    "reference": ["reference", "--length", "20"],
+    "double": ["double", "--length", "20"],
+    "values": ["values.yaml"],
+    "baked": ["reference", "--length", "22", "--compensate", "bake"],
+    "own": ["own.yaml"],  # 8 1/3 periods long
+    "compensated": ["tri", "--dielectric", "0.2", "--length", "20", "--compensate", "print"],
+    "upside-down": [
+        "tri",
+        "--dielectric",
+        "0.2",
+        "--length",
+        "20",
+        "--orientation",
+        "upside-down",
+        "--support",
+        "bvoh",
+    ],
 }
+SLOW = ("own", "compensated")  # pressed for 20 s each; `values` and `baked` go the same ways
+FAST = tuple(name for name in DESIGNS if name not in SLOW)
 
 
 @dataclass(frozen=True)
@@ -64,6 +85,7 @@ class Asked:
     def __init__(self, name, folder):
         self.name, self.folder, self._said, self._answers = name, folder, {}, {}
         (folder / "own.yaml").write_text(OWN, "utf-8")
+        (folder / "values.yaml").write_text(VALUES, "utf-8")
 
     def answer(self, entry):
         """What an entry point says, asked once."""
@@ -374,25 +396,24 @@ def asked(tmp_path_factory):
     return of
 
 
-@pytest.fixture(autouse=True)
-def _solved_once(_cache, monkeypatch, tmp_path_factory):
-    """What is solved is kept for all tests of this file."""
-    monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path_factory.getbasetemp() / "one-answer"))
+def _questions():
+    """Quantity, entry and designs; strips are pressed in space, which takes longest, by night."""
+    for quantity, entries in ASKED.items():
+        for entry in entries:
+            slow = (*SLOW, "rect") if entry is compress else SLOW
+            fast = tuple(name for name in DESIGNS if name not in slow)
+            yield pytest.param(quantity, entry, fast, id=f"{quantity}-{entry.__name__}")
+            mark = pytest.mark.nightly
+            yield pytest.param(quantity, entry, slow, id=f"{quantity}-{entry.__name__}-slow", marks=mark)
 
 
-@pytest.mark.parametrize(
-    ("quantity", "entry"),
-    [
-        pytest.param(quantity, entry, id=f"{quantity}-{entry.__name__}")
-        for quantity, entries in ASKED.items()
-        for entry in entries
-    ],
-)
-def test_whoever_is_asked_says_the_same(quantity, entry, asked, monkeypatch, program):
+@pytest.mark.usefixtures("shared_cache")
+@pytest.mark.parametrize(("quantity", "entry", "names"), [*_questions()])
+def test_whoever_is_asked_says_the_same(quantity, entry, names, asked, monkeypatch, program):
     if quantity == "errors":
         program("prusa-slicer", "prusa-slicer")
     differing, known = {}, slice_ if quantity == "errors" else predict
-    for name in DESIGNS:
+    for name in names:
         if name == "double" and entry in (fit, invert):
             continue  # a line needs a capacitance, which three electrodes do not have
         design = asked(name)
@@ -455,12 +476,12 @@ def test_a_digit_is_a_difference():
 
 
 REFERENCE = json.loads((Path(__file__).parent / "reference" / "cells.json").read_text("utf-8"))
-PERIODS, CELLS = 10e-3 * 50, 5 * 50  # of 2 mm: metres of prism, and cells of 2 x 2 mm, in 100 x 10 mm
+PERIODS, CELLS = 10e-3 * 10, 5 * 10  # of 2 mm: metres of prism, and cells of 2 x 2 mm, in 20 x 10 mm
 TRUE_F = {
     "trix": REFERENCE["tri"][1]["C_F_per_m"] * PERIODS,
     "triy": REFERENCE["tri"][1]["C_F_per_m"] * PERIODS,
     "rect": REFERENCE["rect"][0]["C_F"] * CELLS,
-    "reference": REFERENCE["plate"]["C_F_per_m2"] * 1e-3,
+    "reference": REFERENCE["plate"]["C_F_per_m2"] * 200e-6,
     "upside-down": REFERENCE["tri"][1]["C_F_per_m"] * PERIODS,
 }
 
@@ -473,9 +494,10 @@ def test_the_answer_holds_the_independent_solution(name, asked):
     assert model["upper"] / model["lower"] < 1.005
 
 
-def test_a_design_of_which_nobody_says_anything_is_no_agreement(asked):
+@pytest.mark.parametrize("names", [FAST, pytest.param(SLOW, marks=pytest.mark.nightly)], ids=["fast", "slow"])
+def test_a_design_of_which_nobody_says_anything_is_no_agreement(asked, names):
     """None beside None is the same answer, so all but the double sensor must have one."""
-    for name in DESIGNS:
+    for name in names:
         answer = asked(name).answer(predict)
         for body in (answer.printed, answer.drawn):
             missing = {quantity for quantity in ("capacitance", "resistance", "gap") if not body[quantity]}

@@ -17,6 +17,8 @@ from sensorgen.prediction.capacitance import Contradiction, Unpredictable, capac
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.scene.scene import Body, Prism, Scene, box
 
+pytestmark = pytest.mark.own_cache
+
 EPS = {"x60": 4.68, "air": 1.00059}
 PLATE = Scene(
     (

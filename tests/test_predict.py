@@ -169,6 +169,7 @@ def test_the_ranges_of_the_impedance_hold_its_middle():
                 assert part.lower <= alone.lower <= part.value <= alone.upper <= part.upper
 
 
+@pytest.mark.nightly
 def test_ranges_hold_what_each_way_to_print_gives_by_itself():
     """Walls alone decide whether the tips of the triangles are printed, and with them most of the sensitivity."""
     design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}})

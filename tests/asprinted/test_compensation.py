@@ -14,6 +14,8 @@ from sensorgen.workflows.compensation import BAKE, compensated, found, printable
 
 from .conftest import small
 
+SHORT = {"length_mm": 6.0, "width_mm": 4.0}  # three periods, which are found and solved in half the time of six
+
 
 def changed(changes):
     return {c.what: (c.before, c.after) for c in changes}
@@ -27,14 +29,14 @@ def estimated_gap(variant, walls):
     ("film", "walls", "quality"),
     [
         (0.2, "arachne", "fine"),
-        (0.3, "classic", "fine"),
+        pytest.param(0.3, "classic", "fine", marks=pytest.mark.nightly),
         (0.2, "cura-gaps", "fine"),  # nothing is lost, but what is thin swells
-        (0.12, "arachne", "extrafine"),
+        pytest.param(0.12, "arachne", "extrafine", marks=pytest.mark.nightly),
     ],
 )
 def test_gap_and_capacitance_that_were_asked_for_come_out(film, walls, quality):
     """By the prediction of the whole sensor, at another accuracy than the search's."""
-    asked = small(parameters={"dielectric_mm": film}, quality=quality)
+    asked = small(parameters=SHORT | {"dielectric_mm": film}, quality=quality)
     made, changes = compensated(asked, walls)
     assert made.params.dielectric_mm >= 2 * made.layers.layer_mm - 1e-9
     assert estimated_gap(made, walls) == pytest.approx(film, abs=1e-9)
@@ -102,8 +104,11 @@ def test_a_named_design_gets_a_name_of_its_own():
     assert printable(made, bake=True)[0].name == "mine-compensated"
 
 
-def test_what_cannot_be_had_is_refused_with_the_nearest():
-    asked = small(parameters={"dielectric_mm": 0.3, "hang_height_mm": 3.0, "length_mm": 60.0, "width_mm": 4.0})
+def test_what_cannot_be_had_is_refused_with_the_nearest(monkeypatch):
+    """After fewer tries than usual."""
+    monkeypatch.setattr(compensation, "_MOST_TRIED", 60)
+    monkeypatch.setattr(compensation, "_MOST_SOLVED", 8)
+    asked = small(parameters={"dielectric_mm": 0.3, "hang_height_mm": 3.0, "length_mm": 6.0, "width_mm": 4.0})
     with pytest.raises(OutOfRange, match=r"cannot be printed of .*; nearest: "):
         compensated(asked, "classic")
 
@@ -170,5 +175,6 @@ def test_a_stiffness_that_was_asked_for_comes_out_with_gap_and_capacitance(monke
 def test_a_stiffness_that_cannot_be_had_is_refused_with_the_nearest(monkeypatch):
     monkeypatch.setattr(compensation, "_heights", few)
     monkeypatch.setattr(compensation, "found", stiff(lambda height: 10 * height))
+    monkeypatch.setattr(compensation, "_MOST_SOLVED", 8)
     with pytest.raises(OutOfRange, match=r"and 240 kPa/mm cannot be printed.*nearest: a gap of 0\.2 mm, .* kPa/mm by"):
         compensated(small(parameters={"dielectric_mm": 0.2}), stiffness=True)

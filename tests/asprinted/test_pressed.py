@@ -31,9 +31,15 @@ BY_HAND = {
 }
 
 
+@pytest.fixture(scope="module")
+def pressed_once(tmp_path_factory):
+    """What is pressed on these coarse meshes is kept for the tests of this file alone."""
+    return tmp_path_factory.mktemp("pressed")
+
+
 @pytest.fixture(autouse=True)
-def _quick(monkeypatch, tmp_path):
-    monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / "cache"))
+def _quick(monkeypatch, pressed_once):
+    monkeypatch.setenv("SENSORGEN_CACHE", str(pressed_once))
     monkeypatch.setattr(press2d, "Fineness", partial(Fineness, corner_mm=0.08, coarse_mm=0.2))
     monkeypatch.setattr(celllaw, "STRESS_PA", (0.0, 1e4, 2e4))
 

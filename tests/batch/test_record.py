@@ -89,6 +89,7 @@ def test_tools_lots_and_the_checklist(small):
     assert order == sorted(order)
 
 
+@pytest.mark.own_cache
 def test_made_again_it_is_the_same_to_the_byte(small, tmp_path, contents):
     plan = tmp_path / "small.yaml"
     plan.write_bytes((small.folder / "plan.yaml").read_bytes())

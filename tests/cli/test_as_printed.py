@@ -6,7 +6,7 @@ import pytest
 
 SMALL = ["tri", "--size", "12x8"]
 
-pytestmark = pytest.mark.usefixtures("shared_cache")
+pytestmark = pytest.mark.usefixtures("unpressed")  # gaps, capacitances at rest and plates need no mesh
 
 
 def predicted(run, *words):
@@ -110,7 +110,7 @@ def test_the_drawing_has_printed_outlines_and_rule_7(run):
     assert "7-printed" in printed
 
 
-def test_a_build_is_compensated(run, unpressed, contents, tmp_path):
+def test_a_build_is_compensated(run, contents, tmp_path):
     said = run("build", *SMALL, "--dielectric", "0.2", "--no-cad", "--compensate", "print", "--force")
     assert said.code in (0, 1)
     assert "hang_height_mm                 0.5 -> 0.6: gap and capacitance" in said.out
@@ -125,7 +125,7 @@ def test_nothing_to_compensate(run):
     assert "nothing to change" in run("build", "reference", "--size", "12x8", "--no-cad", "--compensate", "print").err
 
 
-def test_the_print_by_any_file(run, unpressed, program, tmp_path):
+def test_the_print_by_any_file(run, program, tmp_path):
     program("prusa-slicer", "prusa-slicer")
     words = [*SMALL, "--dielectric", "0.1"]
     assert run("slice", *words, "--out", str(tmp_path / "elsewhere")).code == 1  # tips are lost

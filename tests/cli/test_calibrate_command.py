@@ -49,6 +49,20 @@ def after(bench, tmp_path, monkeypatch):
     return bench
 
 
+@pytest.fixture(scope="module")
+def told_before():
+    """What ``alone`` was told, once for all tests of this file."""
+    return {}
+
+
+@pytest.fixture
+def alone(bench, told_before):
+    """The record of a calibration by known presses alone, which no test changes."""
+    if not told_before:
+        told_before |= json.loads(bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--dry-run", "--json").out)
+    return told_before
+
+
 def unseen(path, count=100, truth=TRUTH):
     """Readings of other presses, each after one at rest, with what is true beside them."""
     made = session(truth, count, 5, (0.5, 5.5))
@@ -94,11 +108,10 @@ def test_from_files_of_the_bench_to_force_and_place(bench, tmp_path):
     assert covered(pressed, "position", "mm") >= 0.7
 
 
-def test_the_record_of_the_log_says_it_all(bench):
-    found = json.loads(bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--dry-run", "--json").out)
-    assert found["schema"] == 2
-    assert len(found["posterior"]["at"]) == len(found["values"]) == len(found["parameters"])
-    assert found["held_out"]["presses"] == 24
+def test_the_record_of_the_log_says_it_all(bench, alone):
+    assert alone["schema"] == 2
+    assert len(alone["posterior"]["at"]) == len(alone["values"]) == len(alone["parameters"])
+    assert alone["held_out"]["presses"] == 24
     assert "was never calibrated" in bench("invert", "S1", "none.csv").line
 
 
@@ -199,9 +212,8 @@ def told(found, name):
     return next(v for v in found["values"] if v["name"] == name)
 
 
-def test_readings_of_meters_count(bench):
+def test_readings_of_meters_count(bench, alone):
     """The same presses with and without them: R, C and stray of the specimen are known better, and still right."""
-    alone = json.loads(bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--dry-run", "--json").out)
     (c1, d1), (c2, d2) = (meter(TRUTH, f) for f in (1.1e3, 19.9e3))
     for words in (
         ("--C", f"{c1:.6g}pF@1.1kHz", "--D", f"{d1:.6g}@1.1kHz"),
@@ -261,14 +273,14 @@ def test_readings_that_no_specimen_has_are_named(bench):
     assert "fit no specimen of this design" in found.words
 
 
-def test_values_of_materials_are_told_and_become_a_source(bench, tmp_path):
+def test_values_of_materials_are_told_and_become_a_source(bench, alone, tmp_path):
     said = bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--source", "s1.yaml", "--dry-run")
     assert (said.code, said.err) == (0, "")
     assert "material values of this specimen, 95 %" in said.words
     assert "x60: " not in said.words
     text = (tmp_path / "s1.yaml").read_text("utf-8")
     assert "resistivity_ohm_m: {value: " in text
-    found = json.loads(bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--dry-run", "--json").out)["materials"]
+    found = alone["materials"]
     assert [one["quantity"] for one in found] == ["resistivity_ohm_m", "relative_permittivity", "youngs_modulus_pa"]
     assert all(one["lower"] < one["value"] < one["upper"] for one in found)
     assert bench("calibrate", "S1", "S2", "--source", "s1.yaml").code == 2

@@ -36,11 +36,6 @@ PLATES = {
 DANGLING = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}, "profile": {"walls": "classic"}}
 
 
-@pytest.fixture(autouse=True)
-def _own_cache(tmp_path, monkeypatch):
-    monkeypatch.setenv(cache.PLACE, str(tmp_path / "cache"))
-
-
 def target(**changes):
     return checked(Target, PLATES | changes)
 

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-BUILD = ("build", "tri", "--no-cad", "--force", "--name", "x")  # forced, as the print of tri loses its tips
+SIZE = {"length_mm": 6.0, "width_mm": 6.0}
+BUILD = ("build", "tri", "--size", "6x6", "--no-cad", "--force", "--name", "x")  # forced, as a print of tri loses tips
 OLD, NEW = ("--period", "2"), ("--period", "2.5")
 pytestmark = pytest.mark.usefixtures("shared_cache")  # what is written counts, not how it is found
 
@@ -24,7 +25,7 @@ def both(tmp_path_factory):
     from sensorgen.workflows.build import build
 
     def files(period):
-        data = {"shape": "tri", "name": "x", "parameters": {"period_mm": period}}
+        data = {"shape": "tri", "name": "x", "parameters": {"period_mm": period, **SIZE}}
         folder = build(design.make(data), tmp_path_factory.mktemp("both"), cad=False).folder
         return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
@@ -65,13 +66,13 @@ def test_rebuilt_elsewhere_every_byte_is_the_same(start, tmp_path, contents, bot
 
 
 def test_force_writes_a_short_and_predicts_nothing_of_the_drawing(run, tmp_path, contents):
-    said = run("build", "tri", "--dielectric", "0", "--no-cad", "--force")
+    said = run("build", "tri", "--size", "6x6", "--dielectric", "0", "--no-cad", "--force", "--name", "x")
     assert (said.code, said.err) == (0, "")
-    found = contents(tmp_path / "out/trix-d0")
+    found = contents(tmp_path / "out/x")
     drawn = json.loads(found["prediction.json"])["drawn"]
     assert (drawn["status"], drawn["capacitance"]) == ("short", None)
     assert "touch" in drawn["reason"] or "short" in drawn["reason"]
-    assert {"trix-d0.prusa.3mf", "trix-d0.svg", "check.json"} < set(found)
+    assert {"x.prusa.3mf", "x.svg", "check.json"} < set(found)
     assert_manifest_verifies(found)
 
 
@@ -160,7 +161,8 @@ def test_a_write_that_breaks_off(real, built, contents, both, limit):
 def test_drawing_breaks_off(real, tmp_path):
     (tmp_path / "a.svg").write_text("mine")
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))"
-    assert real("draw", "tri", "-o", "a.svg", before=limit).line == "sensorgen: cannot write 'a.svg': File too large"
+    said = real("draw", "tri", "--size", "6x6", "-o", "a.svg", before=limit)
+    assert said.line == "sensorgen: cannot write 'a.svg': File too large"
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("a.svg", "mine")]
 
 
@@ -168,7 +170,7 @@ def test_drawing_breaks_off(real, tmp_path):
 def test_drawing_to_what_is_no_file(run, tmp_path, place):
     (tmp_path / "folder").mkdir()
     os.mkfifo(tmp_path / "pipe")
-    said = run("draw", "tri", "-o", place)
+    said = run("draw", "tri", "--size", "6x6", "-o", place)
     assert said.code == 2
     assert f"cannot write '{place}'" in said.line
     assert (tmp_path / "pipe").is_fifo()  # a device would have been replaced, too
@@ -198,14 +200,15 @@ SIGNALS = {"SIGINT": 130, "SIGTERM": 143, "SIGKILL": -9}
 def writing(process, out):
     """Wait until this build has begun to write (or is done); its folder is there before the prediction."""
     while process.poll() is None and not list(out.glob(f".x.*.{process.pid}.part/x.prusa.3mf")):
-        time.sleep(0.001)
+        time.sleep(0.005)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("name", SIGNALS)
-def test_interrupted_while_writing(start, real, built, contents, both, name):
+@pytest.mark.parametrize("turns", [2, pytest.param(16, marks=pytest.mark.nightly)])
+def test_interrupted_while_writing(start, real, built, contents, both, name, turns):
     rng = random.Random(name)
-    for turn in range(8):
+    for turn in range(turns):
         process = start(*BUILD, *(NEW, OLD)[turn % 2])
         writing(process, built)
         time.sleep(rng.uniform(0.0, 0.15))
@@ -235,7 +238,7 @@ exec("")"""
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
-@pytest.mark.parametrize("turn", [0, 10, 23])
+@pytest.mark.parametrize("turn", [pytest.param(0, marks=pytest.mark.nightly), 10, 23])
 def test_killed_between_two_renames(start, real, built, contents, both, turn):
     before = AT_RENAME.format(turn=turn, name="SIGKILL")
     process = start(*BUILD, *NEW, before=f"exec({before!r})")
@@ -273,8 +276,17 @@ exec("")"""
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
-@pytest.mark.parametrize("error", ["RuntimeError", "OSError", "ImportError"])
-@pytest.mark.parametrize(("name", "said"), [("SIGINT", "interrupted"), ("SIGTERM", "stopped")])
+@pytest.mark.parametrize(
+    ("name", "said", "error"),
+    [
+        ("SIGINT", "interrupted", "OSError"),
+        ("SIGINT", "interrupted", "RuntimeError"),
+        ("SIGTERM", "stopped", "ImportError"),
+        pytest.param("SIGINT", "interrupted", "ImportError", marks=pytest.mark.nightly),
+        pytest.param("SIGTERM", "stopped", "OSError", marks=pytest.mark.nightly),
+        pytest.param("SIGTERM", "stopped", "RuntimeError", marks=pytest.mark.nightly),
+    ],
+)
 def test_an_interruption_of_which_a_library_makes_an_error(real, built, contents, both, name, said, error):
     before = WITHIN_A_LIBRARY.format(name=name, error=error)
     left = real(*BUILD, *NEW, before=f"exec({before!r})")
@@ -284,13 +296,12 @@ def test_an_interruption_of_which_a_library_makes_an_error(real, built, contents
 
 def test_builds_of_one_name_at_once(start, tmp_path, contents, both):
     """Whoever comes last wins, with all of its files."""
-    for _ in range(2):
-        processes = [start(*BUILD, *period) for period in (OLD, NEW, OLD, NEW)]
-        for process in processes:
-            _, err = process.communicate()
-            assert (process.returncode, err) == (0, "")
-        assert contents(tmp_path / "out/x") in both
-        assert [p.name for p in (tmp_path / "out").iterdir()] == ["x"]
+    processes = [start(*BUILD, *period) for period in (OLD, NEW, OLD, NEW)]
+    for process in processes:
+        _, err = process.communicate()
+        assert (process.returncode, err) == (0, "")
+    assert contents(tmp_path / "out/x") in both
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["x"]
 
 
 def test_the_users_own_files_stay(run, tmp_path):

@@ -130,6 +130,18 @@ def gone(pid: int, timeout_s: float = 60.0) -> bool:
     return False
 
 
+def at_rest(rig: Served, timeout_s: float = 20.0) -> bool:
+    """Whether the motor goes off, and leaves the tip up.
+
+    Switching off is not answered: the guardian may have ended before the rig reads its last order, and the motor's
+    force dies away after that.
+    """
+    until = time.monotonic() + timeout_s
+    while abs((state := rig.state())["motor_n"]) >= 1e-3 and time.monotonic() < until:
+        time.sleep(0.02)
+    return state["tip_mm"] >= 1.0 and abs(state["motor_n"]) < 1e-3
+
+
 def reports(run: Started) -> list[dict[str, Any]]:
     """The guardian's reports of its rescues."""
     from sensorgen.measure.lab.guardian import REPORT
@@ -154,7 +166,7 @@ class Killed:
 
     ``way`` is how the run was stopped, ``down`` whether the tip was down then, ``up_s`` the time until the tip was up
     to stay [s], ``raised`` whether the motor is off and the piston reaches nothing after the rescue, ``readings`` how
-    many impedances the files have.
+    many impedances the files have, ``told`` the guardian's last report.
     """
 
     way: str
@@ -162,6 +174,7 @@ class Killed:
     up_s: float
     raised: bool
     readings: int
+    told: dict[str, Any]
 
 
 def killed(rig: Served, run: Started, way: str = "kill") -> Killed:
@@ -176,9 +189,8 @@ def killed(rig: Served, run: Started, way: str = "kill") -> Killed:
         assert rig.state()["tip_mm"] >= 1.0
         os.kill(run.process.pid, signal.SIGKILL)
         run.process.communicate()
-    ended = not guardian or gone(guardian)
-    state = rig.state()
-    return Killed(way, down, up_s, ended and state["tip_mm"] >= 1.0 and abs(state["motor_n"]) < 1e-3, readable(run))
+    raised = (not guardian or gone(guardian)) and at_rest(rig)
+    return Killed(way, down, up_s, raised, readable(run), (reports(run) or [{}])[-1])
 
 
 def many(folder: Path, rig: Served, seed: int, kills: int, ways: tuple[str, ...] = ("kill",)) -> Iterator[Killed]:

@@ -9,8 +9,16 @@ from sensorgen.measure.log.bench import read_again
 _QUESTIONS = (b"M115", b"32 R 0x1000", b"32 R 0x11018", b"32 R 0x21018", b"32 R 0x31018", b"32 R 0x41018")
 
 
-@pytest.mark.parametrize("moment", MOMENTS, ids=lambda each: "-".join(f"{k}-{v}" for k, v in each.items()))
-@pytest.mark.parametrize("kind", [each for each in KINDS if each not in HARMLESS])
+def _cases():
+    """Every kind under a press and at another moment, which differs from kind to kind; nightly at all moments."""
+    for k, kind in enumerate(each for each in KINDS if each not in HARMLESS):
+        often = MOMENTS[-1], MOMENTS[k % (len(MOMENTS) - 1)]
+        for moment in MOMENTS:
+            name = "-".join([kind, *(f"{key}-{value}" for key, value in moment.items())])
+            yield pytest.param(kind, moment, id=name, marks=() if moment in often else pytest.mark.nightly)
+
+
+@pytest.mark.parametrize(("kind", "moment"), list(_cases()))
 def test_every_fault_ends_with_the_tip_up_and_the_reason_told(tmp_path, kind, moment):
     found, lab = outcome(tmp_path, (Planted(what=kind, **moment),))
     assert verdict(found, lab, kind) == []

@@ -24,6 +24,7 @@ def rig():
         yield served
 
 
+@pytest.mark.nightly
 def test_ten_killed_runs_leave_the_tip_up_and_go_on(tmp_path, rig):
     found = list(killing.many(tmp_path, rig, seed=5, kills=10, ways=("kill", "kill", "kill", "kill", "stop")))
     assert len(found) == 10
@@ -49,6 +50,15 @@ def _pressing(tmp_path, rig):
     raise AssertionError(f"no run came to press: {out}")
 
 
+def test_a_killed_run_leaves_the_tip_up(tmp_path, rig):
+    found = killing.killed(rig, _pressing(tmp_path, rig))
+    assert found.raised, found
+    assert found.up_s < 10
+    assert found.readings > 0
+    assert found.told["devices"] == {"actuator": "lifted, motor off", "stage": "raised"}
+
+
+@pytest.mark.nightly
 def test_a_run_ends_with_the_tip_up_when_its_guardian_dies(tmp_path, rig):
     run = _pressing(tmp_path, rig)
     os.kill(run.guardian(), signal.SIGKILL)
@@ -61,7 +71,9 @@ def test_a_run_ends_with_the_tip_up_when_its_guardian_dies(tmp_path, rig):
     assert rig.state()["tip_mm"] >= 1.0
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [
+    signal.SIGTERM, *(pytest.param(each, marks=pytest.mark.nightly) for each in (signal.SIGINT, signal.SIGHUP))
+])  # fmt: skip
 def test_signals_end_a_run_with_the_tip_up_and_the_log_closed(tmp_path, rig, number):
     run = _pressing(tmp_path, rig)
     os.kill(run.process.pid, number)

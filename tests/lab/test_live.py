@@ -132,12 +132,16 @@ def test_each_quantity_is_shown(page, view):
         assert float(number) * {"kohm": 1e3, "Mohm": 1e6}[unit] == pytest.approx(value, rel=1e-3)
 
 
-def test_it_fits_every_width_light_and_dark(page, view):
+@pytest.mark.parametrize("schemes", [
+    {360: ["light"], 1920: ["dark"]},
+    pytest.param({width: ["light", "dark"] for width in (360, 768, 1280, 1920)}, marks=pytest.mark.nightly),
+], ids=["ends", "all"])  # fmt: skip
+def test_it_fits_every_width_light_and_dark(page, view, schemes):
     feed(view, 0, 1300)
     page.until("document.getElementById('step')?.textContent === '15 of 30'")
-    for width in (360, 768, 1280, 1920):
+    for width in schemes:
         page.size(width, 900)
-        for scheme in ("light", "dark"):
+        for scheme in schemes[width]:
             page.media(scheme)
             page.run("show()")
             assert page.run("document.documentElement.scrollWidth") <= width

@@ -15,6 +15,7 @@ from sensorgen.core import document
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.measure.lab import recorder, run, safety
 from sensorgen.measure.lab.clock import SimulatedClock
+from sensorgen.measure.lab.devices import DeviceFault
 from sensorgen.measure.lab.plans import Choice
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.bench import read_again
@@ -70,7 +71,12 @@ def test_a_pause_lifts_the_tip_and_the_press_is_done_again(tmp_path):
     assert lab.mechanism.violations == []
 
 
-@pytest.mark.parametrize("at_s", np.arange(0.5, 29, 1.5).tolist())
+OFTEN = {0.5, 5.0, 12.5, 17.0, 21.5, 26.0}  # homing, on the way, landing, press, rest, second press
+
+
+@pytest.mark.parametrize("at_s", [
+    pytest.param(at_s, marks=() if at_s in OFTEN else pytest.mark.nightly) for at_s in np.arange(0.5, 29, 1.5).tolist()
+])  # fmt: skip
 def test_a_pause_at_any_time_does_no_harm(tmp_path, at_s):
     lab = laboratory()
     found = done(tmp_path, lab, view=Viewer([(at_s, "pause"), (at_s + 0.3, "pause"), (at_s + 12, "resume")]))
@@ -219,6 +225,27 @@ def test_a_loop_that_stood_still_ends_the_run(tmp_path):
     found = done(tmp_path, lab, view=Slow([]))
     assert found.end == "fault"
     assert "stood still" in found.reason
+
+
+def test_a_guardian_that_dies_ends_the_run_with_the_tip_up(tmp_path):
+    armed = []
+
+    class Dying:
+        def arm(self):
+            armed.append(True)
+
+        def disarm(self):
+            armed.append(False)
+
+        def beat(self):
+            if lab.mechanism.peak_n > 3:
+                raise DeviceFault("guardian: it has died")
+
+    lab = laboratory()
+    found = done(tmp_path, lab, guardian=Dying())
+    assert (found.end, found.tip_up, armed) == ("fault", True, [True, False])
+    assert "guardian: it has died" in found.reason
+    assert lab.mechanism.tip_mm >= 1.0
 
 
 def _cli(*words):

@@ -9,7 +9,7 @@ import pytest
 
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
-from sensorgen.measure.virtual.blank import blank
+from sensorgen.measure.virtual.blank import blank, tracks
 from sensorgen.measure.virtual.cell import AIR, EPSILON_0, Raster, Solid, capacitance, conductance, pressed
 from sensorgen.measure.virtual.section import raster
 from sensorgen.measure.virtual.specimen import Specimen, Truth, decades, drawn
@@ -105,10 +105,10 @@ def test_the_print_is_what_the_models_predict(tri):
 
 def test_cogs_along_the_strip_conduct_and_those_across_hardly():
     along, across = (
-        Specimen(make({"shape": "tri", "parameters": {"dielectric_mm": 0.2, "along": axis}})) for axis in ("y", "x")
+        tracks(make({"shape": "tri", "parameters": {"dielectric_mm": 0.2, "along": axis}})) for axis in ("y", "x")
     )
-    assert along.track_ohm_per_m[0] < 0.9 * across.track_ohm_per_m[0]
-    assert across.track_ohm_per_m[1] == pytest.approx(0.2 / (10e-3 * 0.3e-3), rel=1e-6)
+    assert along[0] < 0.9 * across[0]
+    assert across[1] == pytest.approx(0.2 / (10e-3 * 0.3e-3), rel=1e-6)
 
 
 def test_at_rest_it_is_an_open_line(tri):

@@ -16,7 +16,6 @@ from sensorgen.measure.log import Log, Reading, verify
 from sensorgen.measure.log.notes import reading
 
 HERE = Path(__file__).parent
-KILLS, FILES = 200, 600
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals and limits of POSIX")
 
@@ -29,15 +28,16 @@ def seen(program, folder, count):
     return json.loads(done.stdout)
 
 
-def test_killed_at_random_moments(tmp_path):
-    found = seen("kills.py", tmp_path, KILLS)
+@pytest.mark.parametrize("kills", [40, pytest.param(200, marks=pytest.mark.nightly)])
+def test_killed_at_random_moments(tmp_path, kills):
+    found = seen("kills.py", tmp_path, kills)
     assert found["faults"] == []
-    assert found["promised"] > KILLS / 2
+    assert found["promised"] > kills / 2
     assert [p.name for p in tmp_path.glob(".*.part")] == []
 
 
 def test_files_that_were_tampered_with(tmp_path):
-    found = seen("fuzz.py", tmp_path, FILES)
+    found = seen("fuzz.py", tmp_path, 600)
     assert found["faults"] == []
     for name in ("table.csv", "table.parquet", "words.csv", "batch.json", "sound.db"):
         assert found[f"{name} refused"] > 20

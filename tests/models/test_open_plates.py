@@ -98,6 +98,7 @@ def serpentine(low, high):
     return (*turns, box(8, 9, 2, 3, low, high), box(1, 2, 4, 5, low, high))
 
 
+@pytest.mark.nightly
 @solver
 def test_serpentines_are_the_areas_that_overlap_where_the_film_is_thin():
     ratios = []

@@ -491,6 +491,7 @@ def test_two_meshes_lead_to_their_limit():
     assert (one.rise_error_f_per_m2[0], one.displacement_error_m[0]) == (0.0, 0.0)
 
 
+@pytest.mark.nightly
 def test_the_stated_rise_holds_that_of_a_second_program():
     """NGSolve, displacement of order 3 on graded bricks at small strain; a cell unlike the stored ones."""
     reference = json.loads((Path(__file__).parents[1] / "reference" / "rect_rise.json").read_text("utf-8"))

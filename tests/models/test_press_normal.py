@@ -63,6 +63,7 @@ def mirrored():
     return press2d.press(pillars(0.05, 1), SOFT, STRESSES, EPS)
 
 
+@pytest.mark.nightly
 def test_two_pillars_that_bulge_into_each_other_are_one_before_a_mirror(mirrored):
     both = press2d.press(pillars(0.05, 2), SOFT, STRESSES, EPS)
     assert (mirrored.faults, both.faults) == ((), ())
@@ -211,6 +212,7 @@ def test_steps_of_any_length_stick_alike():
     assert moved[0] == pytest.approx(moved[1], rel=0.03)
 
 
+@pytest.mark.nightly
 def test_feet_that_bulge_have_a_capacitance_on_a_fine_mesh():
     """Layers of feet whose sides roll onto the film and under the next layer; half the sizes are 0.1 % apart."""
     feet = [box(0.3, 0.7, 0.1, 0.2), box(0.2, 0.8, 0.2, 0.3)]

@@ -178,6 +178,7 @@ def test_bounds_at_rest_meet_and_are_near_those_in_3d(shape, within):
     assert at_rest.middle() == pytest.approx(in_3d, rel=within)
 
 
+@pytest.mark.nightly
 def test_a_bump_balances_work_and_energy_and_converges_with_its_mesh():
     scene, stress = make({"shape": "bump"}).in_use, [0.0, 1e4, 1e5]
     found = [press_round.press(scene, SOLIDS, stress, fineness=press_round.USUAL.scaled(k)) for k in (2.0, 1.0, 0.7)]

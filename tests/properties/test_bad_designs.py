@@ -21,6 +21,11 @@ def many(n):
     )
 
 
+def counts(few, every):
+    """So many examples each time, and so many nightly."""
+    return pytest.mark.parametrize("count", [few, pytest.param(every, marks=pytest.mark.nightly)])
+
+
 WORDS = st.sampled_from(
     [
         "tri", "rect", "reference", "x60", "etpu", "air", "bvoh", "x60@thesis-4.1", "x60@", "@", "etpu@thesis-c.1-top",
@@ -100,16 +105,14 @@ def test_the_valid_design_is_valid():
     assert design.make(VALID).name == "whole"
 
 
-@many(400)
-@given(st.dictionaries(KEYS, NESTED, max_size=5) | NESTED)
-def test_random_data(data):
-    makes_sense_or_says_why(data)
+@counts(100, 400)
+def test_random_data(count):
+    many(count)(given(st.dictionaries(KEYS, NESTED, max_size=5) | NESTED)(makes_sense_or_says_why))()
 
 
-@many(600)
-@given(mutants())
-def test_random_changes_of_a_valid_design(data):
-    makes_sense_or_says_why(data)
+@counts(150, 600)
+def test_random_changes_of_a_valid_design(count):
+    many(count)(given(mutants())(makes_sense_or_says_why))()
 
 
 PIECES = st.sampled_from(
@@ -121,13 +124,16 @@ PIECES = st.sampled_from(
 )  # fmt: skip
 
 
-@many(600)
-@given(st.lists(PIECES, max_size=25).map("".join) | st.text(max_size=60))
+@counts(150, 600)
+def test_random_yaml(count):
+    many(count)(given(st.lists(PIECES, max_size=25).map("".join) | st.text(max_size=60))(is_read_or_refused))()
+
+
 @example('"\\UFFFFFFFF": 1')
 @example("!!timestamp x")
 @example("? [a]\n: 1")
 @example("[" * 100_000)
-def test_random_yaml(text):
+def is_read_or_refused(text):
     try:
         data = yamlfile.parse(text, "some.yaml")
     except SensorgenError as error:
@@ -172,17 +178,25 @@ def command(monkeypatch, capsys, tmp_path):
     return run
 
 
-@many(400)
-@given(
-    shape=st.sampled_from(["tri", "rect", "reference", "trj", "no.yaml"]),
-    words=st.lists(st.tuples(st.sampled_from(OPTIONS) | st.text(min_size=1, max_size=5), VALUES), max_size=4),
-)
-def test_random_command_lines(command, shape, words):
-    code, err = command(["predict", shape, *(word for pair in words for word in pair)])
-    assert code in (0, 1, 2)
-    if code and not err.startswith("Usage"):
-        assert err.startswith("sensorgen: ")
-        assert err.count("\n") == 1
+@counts(80, 400)
+def test_random_command_lines(count, command, request):
+    """The few are not pressed: that takes seconds for each design that is valid."""
+    if count < 100:
+        request.getfixturevalue("unpressed")
+
+    @many(count)
+    @given(
+        shape=st.sampled_from(["tri", "rect", "reference", "trj", "no.yaml"]),
+        words=st.lists(st.tuples(st.sampled_from(OPTIONS) | st.text(min_size=1, max_size=5), VALUES), max_size=4),
+    )
+    def is_answered_or_refused(shape, words):
+        code, err = command(["predict", shape, *(word for pair in words for word in pair)])
+        assert code in (0, 1, 2)
+        if code and not err.startswith("Usage"):
+            assert err.startswith("sensorgen: ")
+            assert err.count("\n") == 1
+
+    is_answered_or_refused()
 
 
 def test_some_in_processes_of_their_own(tmp_path):

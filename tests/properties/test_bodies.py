@@ -17,7 +17,15 @@ from sensorgen.design.shapes import rect, reference, tri
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.scene import Fill, Scene
 
-stable = settings(deadline=None, derandomize=True, max_examples=150, suppress_health_check=[HealthCheck.too_slow])
+
+def held(check, count):
+    """Assert a property of so many examples."""
+    settings(deadline=None, derandomize=True, max_examples=count, suppress_health_check=[HealthCheck.too_slow])(check)()
+
+
+def counts(few, every):
+    """So many examples each time, and so many nightly."""
+    return pytest.mark.parametrize("count", [few, pytest.param(every, marks=pytest.mark.nightly)])
 
 
 def lengths(low: float, high: float) -> st.SearchStrategy[float]:
@@ -84,9 +92,12 @@ def ridges(end: float, period: float, height: float, apexes: float) -> float:
     return float(np.sum((profile[1:] + profile[:-1]) / 2 * np.diff(places)))
 
 
-@stable
-@given(TRI, FILLS, TURNED)
-def test_tri(options, fill, turned):
+@counts(40, 150)
+def test_tri(count):
+    held(given(TRI, FILLS, TURNED)(tri_is_sound), count)
+
+
+def tri_is_sound(options, fill, turned):
     assume(options["lower_height_mm"] < options["hang_height_mm"])
     p = parameters("tri", options)
     end, depth = (p.length_mm, p.width_mm) if p.along == "x" else (p.width_mm, p.length_mm)
@@ -109,9 +120,12 @@ def covered(end: float, period: float, start: float, width: float) -> float:
     return whole * width + min(max(end - whole * period - start, 0.0), width)
 
 
-@stable
-@given(RECT, FILLS, TURNED)
-def test_rect(options, fill, turned):
+@counts(40, 150)
+def test_rect(count):
+    held(given(RECT, FILLS, TURNED)(rect_is_sound), count)
+
+
+def rect_is_sound(options, fill, turned):
     p = parameters("rect", options)
     etpu, air, x60 = p.etpu_width_mm, p.air_width_mm, p.x60_width_mm
     period, floor = etpu + x60 + 2 * air, p.length_mm * p.width_mm
@@ -136,9 +150,12 @@ def test_rect(options, fill, turned):
     assert_bodies(scene.turned_over() if turned else scene, volumes)
 
 
-@stable
-@given(st.fixed_dictionaries(SIZE | OPTIONS), TURNED)
-def test_plate(options, turned):
+@counts(40, 150)
+def test_plate(count):
+    held(given(st.fixed_dictionaries(SIZE | OPTIONS), TURNED)(plate_is_sound), count)
+
+
+def plate_is_sound(options, turned):
     p = parameters("reference", options)
     floor = p.length_mm * p.width_mm
     scene = reference.scene(p, Fill())
@@ -178,9 +195,12 @@ def gap_mm(design) -> float:
     return p.dielectric_mm + p.hang_height_mm * max(0.0, 1 - end / (p.period_mm / 4))
 
 
-@settings(stable, max_examples=120)
-@given(DESIGNS)
-def test_a_review_finds_no_fault_of_sensorgen(data):
+@counts(30, 120)
+def test_a_review_finds_no_fault_of_sensorgen(count):
+    held(given(DESIGNS)(reviewed), count)
+
+
+def reviewed(data):
     """Whatever else is wrong with a design, its bodies are valid, and its electrodes are apart by the film."""
     design = make(data)
     held = review(design)

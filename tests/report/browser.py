@@ -28,12 +28,23 @@ class Page:
         )  # fmt: skip
         os.close(down[0])
         os.close(up[1])
-        self.number, self.rest, self.events, self.session = 0, b"", [], None
+        self.number, self.rest, self.events, self.session, self.context = 0, b"", [], None, None
         target = next(t for t in self.call("Target.getTargets")["targetInfos"] if t["type"] == "page")
-        attached = self.call("Target.attachToTarget", targetId=target["targetId"], flatten=True)
-        self.session = attached["sessionId"]
+        self._attach(target["targetId"])
+
+    def _attach(self, target):
+        self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Runtime", "Network", "Page", "Log"):
             self.call(f"{domain}.enable")
+
+    def renew(self):
+        """Another page of the same browser, in a context of its own: it has nothing of the last one."""
+        self.session = None
+        if self.context:
+            self.call("Target.disposeBrowserContext", browserContextId=self.context)
+        self.context = self.call("Target.createBrowserContext")["browserContextId"]
+        self._attach(self.call("Target.createTarget", url="about:blank", browserContextId=self.context)["targetId"])
+        self.events.clear()
 
     def call(self, method, **params):
         self.number += 1
@@ -92,8 +103,8 @@ class Page:
         """Press the mouse at a place, move it, and let go."""
         self._mouse("mouseMoved", start, 0)
         self._mouse("mousePressed", start, 1)
-        for k in range(1, 11):
-            self._mouse("mouseMoved", [a + (b - a) * k / 10 for a, b in zip(start, end, strict=True)], 1)
+        for k in range(1, 5):  # each is drawn
+            self._mouse("mouseMoved", [a + (b - a) * k / 4 for a, b in zip(start, end, strict=True)], 1)
             time.sleep(0.03)
         self._mouse("mouseReleased", end, 0)
 

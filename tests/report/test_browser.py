@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 from bench_files import HOSTILE
-from browser import Page
 
 from sensorgen.analysis.report import report, written
 from sensorgen.measure.log import Log, notes
@@ -26,21 +25,14 @@ CAMERA = "JSON.stringify(document.querySelector('[data-key=bodies]')._fullLayout
 
 
 @pytest.fixture(scope="module")
-def pages(recorded, tmp_path_factory):
+def pages(of_recorded, tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
     with Log(folder / "one.db", create=True) as log:
         log.add([notes.reading("40 triX .1mm", "700", "OL")])
-    for name, log, iteration in (("recorded", recorded, 30), ("one", folder / "one.db", 40)):
-        with Log(log) as opened:
-            (folder / f"{name}.html").write_text(written(report(opened, iteration), "html"), "utf-8")
+        of_one = report(log, 40)
+    for name, of in (("recorded", of_recorded), ("one", of_one)):
+        (folder / f"{name}.html").write_text(written(of, "html"), "utf-8")
     return folder
-
-
-@pytest.fixture
-def browser(program, tmp_path):
-    page = Page(program("chromium", "chromium", "chromium-browser", "google-chrome"), tmp_path)
-    yield page
-    page.close()
 
 
 def quiet(page):
@@ -62,7 +54,7 @@ def test_with_recordings(browser, pages):
     sorted_by_mouse_and_key(browser)
     another_choice(browser)
     browser.run("scrollTo(0, 0)")
-    browser.picture(OUT / "recorded-1920.png")
+    browser.picture(OUT / "recorded-1920.png", whole=False)
     on_paper(browser)
     quiet(browser)
 

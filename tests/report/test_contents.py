@@ -17,8 +17,7 @@ from scipy import stats
 
 from sensorgen.analysis.comparison import of_iteration
 from sensorgen.analysis.plots.static import files
-from sensorgen.analysis.report import FORMATS, formats, report, written, yields
-from sensorgen.analysis.report.electrodes import MOST_ROWS
+from sensorgen.analysis.report import FORMATS, electrodes, formats, report, written, yields
 from sensorgen.core.document import shown as shown_as
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Log, notes
@@ -43,12 +42,6 @@ def by_hand():
 def of_thesis(thesis):
     with Log(thesis) as log:
         return report(log, 23)
-
-
-@pytest.fixture(scope="module")
-def of_recorded(recorded):
-    with Log(recorded) as log:
-        return report(log, 30)
 
 
 def has_gap(name):
@@ -178,25 +171,26 @@ def test_a_specimen_counts_once_and_with_its_last_reading(tmp_path):
     assert [(row.by, row.specimens) for row in table(made, "yield").rows] == [("all", 2)]
 
 
-def test_thousands_of_readings(tmp_path, monkeypatch):
+def test_more_readings_than_are_drawn_and_listed(tmp_path, monkeypatch, shared_cache):
     """Of so many only what a browser can bear is drawn and listed, and it says so; the files for programs hold all."""
     monkeypatch.setattr(formats, "MOST_ROWS", 50)
+    monkeypatch.setattr(electrodes, "MOST_ROWS", 40)
     with Log(tmp_path / "log.db", create=True) as log:
-        names = [f"40 {shape} .1mm {k + 1}" for k in range(600) for shape in ("triX", "triY")]
-        log.add([notes.reading(n, f"{700 + k % 99}", "30" if k % 3 else "OL") for k, n in enumerate(names)])
+        names = [f"40 {shape} .1mm {k + 1}" for k in range(60) for shape in ("triX", "triY")]
+        log.add([notes.reading(n, f"{700 + k}", "30" if k % 3 else "OL") for k, n in enumerate(names)])
         made = report(log, 40)
     charts = {chart.key: chart for chart in made.figures}
-    assert [len(charts[key].choices[""][0].y.names) for key in ("residuals", "resistance")] == [MOST_ROWS] * 2
-    assert f"Not drawn: {1200 - MOST_ROWS}" in charts["residuals"].alt
+    assert [len(charts[key].choices[""][0].y.names) for key in ("residuals", "resistance")] == [40] * 2
+    assert "Not drawn: 80 readings" in charts["residuals"].alt
     drawn = [float(x) for t in charts["residuals"].choices[""][0].content if t.kind == "points" for x in t.x]
     every = column(table(made, "readings"), "measured / predicted")
     assert (min(drawn), max(drawn)) == pytest.approx((min(every), max(every)))
-    assert "800 of 1200" in " ".join(made.findings)
-    assert "400 of the 1200" in " ".join(made.headline)
+    assert "80 of 120 " in " ".join(made.findings)
+    assert "40 of the 120 " in " ".join(made.headline)
     page = Page(written(made, "html"))
     assert len(page.cells["readings"]) == 50 + 1
-    assert "the first 50 of 1200 rows" in "".join(page.text)
-    assert written(made, "csv").count("\nreadings,") == 1200 * 16
+    assert "the first 50 of 120 rows" in "".join(page.text)
+    assert written(made, "csv").count("\nreadings,") == 120 * 16
 
 
 def test_ratios_are_measured_over_the_predicted_value(of_thesis):
@@ -418,7 +412,7 @@ def test_recordings_that_are_gone_are_told(recorded, tmp_path):
     )
 
 
-def test_a_bad_recording_is_told_and_the_others_are_reported(recorded, tmp_path, monkeypatch):
+def test_a_bad_recording_is_told_and_the_others_are_reported(recorded, tmp_path, monkeypatch, shared_cache):
     """Parts of a recording with a pause, one of them too short; and faults that nobody foresaw."""
     import shutil
 

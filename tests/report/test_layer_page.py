@@ -5,7 +5,6 @@ import re
 import numpy as np
 import pytest
 import shapely
-from browser import Page
 
 from sensorgen.analysis.plots import layers, pages
 from sensorgen.asprinted.printed import body
@@ -14,13 +13,6 @@ from sensorgen.export.gcode.crossings import Stretches
 from sensorgen.scene.layers import LayerRegions
 
 SHOWN = "[...document.querySelectorAll('#stack g')].map(g => g.getAttribute('class'))"
-
-
-@pytest.fixture
-def browser(program, tmp_path):
-    page = Page(program("chromium", "chromium", "chromium-browser", "google-chrome"), tmp_path)
-    yield page
-    page.close()
 
 
 def test_a_path_is_the_region():

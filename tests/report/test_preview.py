@@ -7,7 +7,6 @@ import re
 
 import numpy as np
 import pytest
-from browser import Page
 
 from sensorgen.analysis.preview import geometry, shades
 from sensorgen.design.design import make
@@ -24,20 +23,11 @@ PIXELS = """(() => { const c = document.getElementById('model'), gl = c.getConte
 FRAME = "new Promise(r => requestAnimationFrame(() => requestAnimationFrame(r)))"
 
 
-@pytest.fixture
-def browser(program, tmp_path):
-    page = Page(program("chromium", "chromium", "chromium-browser", "google-chrome"), tmp_path)
-    yield page
-    page.close()
-
-
 @pytest.fixture(scope="module")
-def made(tmp_path_factory, _session_cache):
+def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("preview")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("SENSORGEN_CACHE", str(_session_cache))
-        waiver = {"rule": "5-width", "reason": HOSTILE}
-        (folder / "tri.html").write_text(page_of(make({**TRI, "waivers": [waiver]})), "utf-8")
+    waiver = {"rule": "5-width", "reason": HOSTILE}
+    (folder / "tri.html").write_text(page_of(make({**TRI, "waivers": [waiver]})), "utf-8")
     return folder / "tri.html"
 
 

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sensorgen.core import yamlfile
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.design import design
 from sensorgen.design.printer import load_printer
@@ -44,18 +45,30 @@ labels: {tab: true}
 LINE_MM = 0.44
 
 
-def made(folder, text, name="plan"):
-    path = folder / f"{name}.yaml"
-    path.write_text(text, "utf-8")
-    return unpressed(path, folder / "out")
+@pytest.fixture(scope="module")
+def without_press(tmp_path_factory):
+    """Makes a batch whose predictions press no cross-section, which no test here looks at; they are kept for all."""
+    cache = str(tmp_path_factory.mktemp("unpressed"))
+
+    def run(plan, out, **more):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setitem(sys.modules, "netgen.geom2d", None)
+            patch.setenv("SENSORGEN_CACHE", cache)
+            return make(plan, out, **more)
+
+    return run
 
 
-def unpressed(plan, out):
-    """A batch whose predictions press no cross-section, which no test here looks at."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(sys.modules, "netgen.geom2d", None)
-        patch.setenv("SENSORGEN_CACHE", str(out.parent / "cache"))
-        return make(plan, out)
+@pytest.fixture(scope="module")
+def made(without_press):
+    """Makes a batch of a plan's text."""
+
+    def run(folder, text):
+        path = folder / "plan.yaml"
+        path.write_text(text, "utf-8")
+        return without_press(path, folder / "out")
+
+    return run
 
 
 def needed(*programs):
@@ -66,16 +79,25 @@ def needed(*programs):
 
 
 @pytest.fixture(scope="module")
-def small(tmp_path_factory):
+def small(tmp_path_factory, made):
     needed("prusa-slicer", "CuraEngine")
     return made(tmp_path_factory.mktemp("small"), SMALL)
 
 
-@pytest.fixture(scope="module")
-def twenty(tmp_path_factory):
-    """The example: twenty sensors of 100 x 10 mm on one plate."""
+@pytest.fixture(scope="module", params=["short", pytest.param("whole", marks=pytest.mark.nightly)])
+def twenty(request, tmp_path_factory, without_press):
+    """Twenty sensors of three designs on one plate, 24 mm long, or the example as it stands; and their length [mm]."""
     needed("prusa-slicer")
-    return unpressed(EXAMPLE, tmp_path_factory.mktemp("twenty") / "out")
+    folder = tmp_path_factory.mktemp("twenty")
+    if request.param == "whole":
+        return without_press(EXAMPLE, folder / "out"), 100.0
+    data = yamlfile.read(EXAMPLE)
+    data["designs"] = [{**data["designs"][k], "replicates": count} for k, count in ((0, 7), (3, 7), (4, 6))]
+    for each in data["designs"]:
+        given = yamlfile.read(EXAMPLE.parent / each.pop("design")) if "design" in each else each
+        each |= {"shape": given["shape"], "parameters": given["parameters"] | {"length_mm": 24.0, "width_mm": 10.0}}
+    (folder / EXAMPLE.name).write_text(json.dumps(data), "utf-8")
+    return without_press(folder / EXAMPLE.name, folder / "out"), 24.0
 
 
 def printed_by(batch, slicer):
@@ -136,32 +158,34 @@ def test_copies_of_a_design_are_printed_alike(small):
     assert one == pytest.approx(other, rel=1e-3)
 
 
-def test_all_but_the_gcode_is_the_same_without_slicing(small, tmp_path):
+def test_all_but_the_gcode_is_the_same_without_slicing(small, tmp_path, without_press):
     path = tmp_path / "plan.yaml"
     path.write_text(SMALL, "utf-8")
-    files = make(path, tmp_path / "out", gcode=False).record.files
+    files = without_press(path, tmp_path / "out", gcode=False).record.files
     assert {name: read(small.folder)["files"][name] for name in files} == files
     more = {"plan.prusa.gcode", "plan.cura.gcode", "prusa/raw.gcode", "prusa/profile.ini", "cura/raw.gcode"}
     assert set(read(small.folder)["files"]) - set(files) == more | {"cura/settings.json"}
 
 
 def test_twenty_sensors_in_one_file(twenty):
-    inside = printed_by(twenty, "prusa")[1]
+    batch, _ = twenty
+    inside = printed_by(batch, "prusa")[1]
     assert len(inside) == 20
     assert (np.sum(list(inside.values()), axis=0) == 1).all()
     assert all(rows.sum() > 500 for rows in inside.values())
-    assert not batch_differences(twenty.folder, RECORD)
+    assert not batch_differences(batch.folder, RECORD)
 
 
 def test_skirt_and_tower_stay_on_the_bed_and_off_the_specimens(twenty):
-    everything = paths.read(twenty.folder / "film-study.prusa.gcode", MACHINE)
+    batch, _ = twenty
+    everything = paths.read(batch.folder / "film-study.prusa.gcode", MACHINE)
     ways = everything.chosen(everything.length_mm() > 0)
     half = np.array(MACHINE.bed_mm) / 2
     assert (np.abs(ways.end_mm[:, :2]) <= half).all()
     names = np.array(ways.kinds)[ways.kind]
     tower_rows = np.char.startswith(names.astype(str), "wipe tower")
     assert tower_rows.any()
-    (kept,) = read(twenty.folder)["tower"]
+    (kept,) = read(batch.folder)["tower"]
     at = ways.end_mm[tower_rows][:, :2]
     assert (at >= [kept["x0"] - 1, kept["y0"] - 1]).all()
     assert (at <= [kept["x1"] + 1, kept["y1"] + 1]).all()
@@ -223,44 +247,44 @@ def test_the_record_says_what_is_printed_of_each_design(small, slicer):
     assert not small.errors(force=True)
 
 
-def test_a_slicer_that_fails_leaves_nothing_and_says_why(tmp_path, monkeypatch):
+def test_a_slicer_that_fails_leaves_nothing_and_says_why(tmp_path, monkeypatch, made):
     stand_in(tmp_path, monkeypatch, "echo 'error: no more tools'; exit 3")
     with pytest.raises(SlicerFailed, match=r"exit code 3: .*no more tools"):
         made(tmp_path, SMALL.replace("[prusa, cura]", "[prusa]"))
     assert list((tmp_path / "out").rglob("*")) == []
 
 
-def test_a_batch_that_fails_leaves_the_earlier_one_as_it_was(tmp_path, monkeypatch):
+def test_a_batch_that_fails_leaves_the_earlier_one_as_it_was(tmp_path, monkeypatch, without_press):
     path = tmp_path / "plan.yaml"
     path.write_text(SMALL, "utf-8")
-    folder = make(path, tmp_path / "out", gcode=False).folder
+    folder = without_press(path, tmp_path / "out", gcode=False).folder
     stand_in(tmp_path, monkeypatch, "exit 1")
     path.write_text(SMALL.replace("seed: 3", "seed: 4"), "utf-8")
     with pytest.raises(SlicerFailed):
-        make(path, tmp_path / "out")
+        without_press(path, tmp_path / "out")
     assert not batch_differences(folder, RECORD)
     assert json.loads((folder / RECORD).read_text("utf-8"))["seed"] == 3
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["plan"]
 
 
-def test_a_slicer_that_hangs_is_ended(tmp_path, monkeypatch):
+def test_a_slicer_that_hangs_is_ended(tmp_path, monkeypatch, without_press):
     said = tmp_path / "said"
     stand_in(tmp_path, monkeypatch, f'[ "$1" = --help ] || {{ echo "still thinking"; touch {said}; sleep 600; }}')
     monkeypatch.setattr(run, "time", SimpleNamespace(monotonic=lambda: 1.0 if said.exists() else 0.0))
     (tmp_path / "plan.yaml").write_text(SMALL, "utf-8")
     with pytest.raises(SlicerFailed, match=r"more than 0.3 s .*still thinking"):
-        make(tmp_path / "plan.yaml", tmp_path / "out", time_limit_s=0.3)
+        without_press(tmp_path / "plan.yaml", tmp_path / "out", time_limit_s=0.3)
     assert list((tmp_path / "out").rglob("*")) == []
 
 
-def test_a_slicer_that_is_missing_leaves_nothing_and_says_what_to_install(tmp_path, monkeypatch):
+def test_a_slicer_that_is_missing_leaves_nothing_and_says_what_to_install(tmp_path, monkeypatch, made):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(SlicerFailed, match="not installed"):
         made(tmp_path, SMALL)
     assert list((tmp_path / "out").rglob("*")) == []
 
 
-def test_faults_of_the_gcode_are_on_record_and_in_the_exit_code(tmp_path, monkeypatch):
+def test_faults_of_the_gcode_are_on_record_and_in_the_exit_code(tmp_path, monkeypatch, made):
     """A stand-in for the slicer prints beside the bed."""
     lines = ["; generated by PrusaSlicer 2.5.0 on some day", "M83", "T2", "G1 Z0.1 F3000", "G1 X900 Y0 E1 F1200"]
     lines.append("M0 H1")
@@ -275,7 +299,7 @@ def test_faults_of_the_gcode_are_on_record_and_in_the_exit_code(tmp_path, monkey
     assert not batch_differences(batch.folder, RECORD)
 
 
-def test_masses_are_those_of_what_the_plan_loads(tmp_path, monkeypatch):
+def test_masses_are_those_of_what_the_plan_loads(tmp_path, monkeypatch, made):
     lines = ["; generated by PrusaSlicer 2.5.0 on some day", "M83", "T0", "G1 Z0.1 F3000", "G1 X9 Y0 E1 F1200"]
     lines.append("M0 H1")
     script = 'while [ "$1" != --output ]; do shift; done\n' + "".join(f"echo '{line}' >> \"$2\"\n" for line in lines)
@@ -287,19 +311,20 @@ def test_masses_are_those_of_what_the_plan_loads(tmp_path, monkeypatch):
 
 
 def test_the_check_of_the_real_files_finds_no_error_and_sums_them_up(small, twenty):
-    for batch, slicer in ((small, "prusa"), (small, "cura"), (twenty, "prusa")):
+    plate, length_mm = twenty
+    for batch, slicer in ((small, "prusa"), (small, "cura"), (plate, "prusa")):
         used = read(batch.folder)["slicers"][slicer]
         assert [f for f in used["findings"] if f["severity"] == "error"] == []
         assert [(t["tool"], t["material"]) for t in used["tools"]] == [(3, "etpu"), (4, "x60")]
-    # Twenty sensors of 100 x 10 mm: what is printed of each material besides purging, near the bodies' volume.
+    # Twenty sensors: what is printed of each material besides purging, near the bodies' volume.
     exact = {3: 0.0, 4: 0.0}
-    for name in read(twenty.folder)["specimens"]:
+    for name in read(plate.folder)["specimens"]:
         shape, film = ("reference", 0.6) if "SX60" in name else ("tri", float(name.split()[2][:2]))
         along = {"along": name.split()[1][-1].lower()} if shape == "tri" else {}
-        sensor = design.make({"shape": shape, "parameters": {"dielectric_mm": film, **along}})
+        sensor = design.make({"shape": shape, "parameters": {"dielectric_mm": film, "length_mm": length_mm, **along}})
         for body in sensor.printed.bodies:
             exact[sensor.tool(body.material)] += body.volume_mm3()
     area_mm2 = np.pi / 4 * MACHINE.filament_mm**2
-    for t in read(twenty.folder)["slicers"]["prusa"]["tools"]:
+    for t in read(plate.folder)["slicers"]["prusa"]["tools"]:
         printed = (t["filament_mm"] - t["purge_mm"]) * area_mm2
         assert printed == pytest.approx(exact[t["tool"]], rel=0.06)

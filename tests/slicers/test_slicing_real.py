@@ -1,8 +1,11 @@
 """Every variant of the thesis, both ways up and in both qualities, through both real slicers to the printer's words.
 
+Nine of these 72 are run each time, all by `make nightly`.
+
 Small sensors of few cells: what their G-code says does not depend on how often the pattern repeats.
 """
 
+from itertools import product
 from pathlib import Path
 
 import extruded
@@ -37,6 +40,22 @@ def slicer(request):
 
 
 both = pytest.mark.parametrize("slicer", sorted(PROGRAMS), indirect=True)
+# Each variant once, and each slicer with both ways up in both qualities; all others are run by `make nightly`.
+NINE = {
+    ("reference.yaml", "as-drawn", "fine", "prusa"),
+    ("23/sqxy-d0.1.yaml", "upside-down", "extrafine", "prusa"),
+    ("23/sqxy-d0.2.yaml", "as-drawn", "fine", "cura"),
+    ("23/sqyx-d0.1.yaml", "upside-down", "extrafine", "cura"),
+    ("23/sqyx-d0.2.yaml", "as-drawn", "fine", "prusa"),
+    ("23/trix-d0.1.yaml", "upside-down", "fine", "prusa"),
+    ("23/trix-d0.2.yaml", "as-drawn", "extrafine", "cura"),
+    ("23/triy-d0.1.yaml", "upside-down", "fine", "cura"),
+    ("23/triy-d0.2.yaml", "as-drawn", "extrafine", "prusa"),
+}
+EVERY = [
+    pytest.param(*case, marks=() if case in NINE else pytest.mark.nightly)
+    for case in product(VARIANTS, ("as-drawn", "upside-down"), ("fine", "extrafine"), sorted(PROGRAMS))
+]
 
 
 def solid_mm3(variant):
@@ -47,10 +66,13 @@ def solid_mm3(variant):
     return found
 
 
-@both
-@pytest.mark.parametrize("quality", ["fine", "extrafine"])
-@pytest.mark.parametrize("orientation", ["as-drawn", "upside-down"])
-@pytest.mark.parametrize("name", VARIANTS)
+def test_nine_cases_are_run_each_time():
+    assert {case.values for case in EVERY} >= NINE
+    assert len(NINE) == len(VARIANTS) == len({name for name, *_ in NINE}) == 9
+    assert len({case[1:] for case in NINE}) == 8
+
+
+@pytest.mark.parametrize(("name", "orientation", "quality", "slicer"), EVERY, indirect=["slicer"])
 def test_each_variant_passes_the_printers_check(name, orientation, quality, slicer, tmp_path):
     variant = small(name, orientation=orientation, quality=quality)
     made = sliced([alone(variant)], slicer, tmp_path)

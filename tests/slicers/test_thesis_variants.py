@@ -1,4 +1,4 @@
-"""Every printable variant of the thesis through both real slicers, in full size."""
+"""Every printable variant of the thesis through both real slicers, in full size: one of each shape, others nightly."""
 
 from pathlib import Path
 
@@ -14,6 +14,10 @@ from sensorgen.workflows.build import build
 
 DESIGNS = Path(__file__).parents[2] / "designs"
 VARIANTS = sorted(p.relative_to(DESIGNS).as_posix() for p in DESIGNS.rglob("*.yaml") if not p.stem.endswith("-d0"))
+ONE_OF_EACH_SHAPE = ("reference.yaml", "23/sqyx-d0.1.yaml", "23/trix-d0.2.yaml")
+variants = pytest.mark.parametrize(
+    "name", [pytest.param(v, marks=() if v in ONE_OF_EACH_SHAPE else pytest.mark.nightly) for v in VARIANTS]
+)
 TOOLS = {2, 3}  # the lab's tools 3 and 4 as a slicer counts
 # Printed over solid volume. A slicer may lose or inflate a layer, but not the sensor; what it does to each
 # layer is a question of its own.
@@ -43,9 +47,10 @@ def judge(record_property, slicer, name, variant, found):
 
 def test_all_printable_variants_are_here():
     assert len(VARIANTS) == 9
+    assert set(ONE_OF_EACH_SHAPE) < set(VARIANTS)
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+@variants
 def test_prusaslicer_prints_every_body_on_its_tool(name, tmp_path, prusa_slicer, record_property):
     variant = design.load(DESIGNS / name)
     folder = build(variant, tmp_path, cad=False).folder
@@ -60,7 +65,7 @@ def test_prusaslicer_prints_every_body_on_its_tool(name, tmp_path, prusa_slicer,
     )
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+@variants
 def test_curaengine_prints_every_body_on_its_tool(name, tmp_path, cura_engine, record_property):
     variant = design.load(DESIGNS / name)
     loads = {variant.tool(m): Load(design.material_files.load(m), source) for m, source in variant.used().items()}

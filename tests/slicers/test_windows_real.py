@@ -101,7 +101,9 @@ def settings(text):
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(("which", "version"), [("own", "2.5.0"), ("newer", "2.9.2")])
+@pytest.mark.parametrize(
+    ("which", "version"), [pytest.param("own", "2.5.0", marks=pytest.mark.nightly), ("newer", "2.9.2")]
+)
 def test_the_window_opens_the_project(which, version, screen, request):
     start, content = request.getfixturevalue(which), slicing.plate_3mf([slicing.alone(SENSOR)], "prusa", "sensor")
     files, picture = opened_and_saved(screen, start, version, content)
@@ -126,6 +128,7 @@ def test_the_window_opens_the_project(which, version, screen, request):
         assert (shown == colour).all(1).sum() > 300, f"{name} in the list of bodies"
 
 
+@pytest.mark.nightly
 def test_without_its_profile_the_newer_window_moves_the_tower(newer, screen):
     content = slicing.plate_3mf([slicing.alone(SENSOR)], "prusa", "sensor")
     _, here, there = newer
@@ -147,6 +150,7 @@ def test_a_window_that_asks_is_found_out(own, screen, monkeypatch):
         opened_and_saved(screen, own, "2.5.0", content)
 
 
+@pytest.mark.nightly
 def test_curas_window_opens_the_sensor_on_our_printer(program, screen, monkeypatch, tmp_path):
     """The printer's profiles, of which Cura finds all, and the bodies, without its assistant of the first start."""
     command, machine, layers = program("cura", "cura"), SENSOR.machine, SENSOR.layers

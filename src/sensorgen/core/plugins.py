@@ -8,10 +8,10 @@ from types import ModuleType
 from sensorgen.core.errors import UnknownName
 
 
+@cache
 def names(package: ModuleType) -> list[str]:
     """Names of the modules in a package, without loading any."""
-    folder = Path(next(iter(package.__path__)))
-    return sorted(p.stem for p in folder.glob("*.py") if not p.stem.startswith("_"))
+    return sorted(p.stem for p in Path(next(iter(package.__path__))).glob("[!_]*.py"))
 
 
 @cache

@@ -6,6 +6,7 @@ where they read it.
 
 import sys
 from collections.abc import Mapping
+from importlib import import_module
 from typing import Protocol, cast
 
 from sensorgen.core import plugins
@@ -45,6 +46,5 @@ def names() -> tuple[str, ...]:
 
 def capacitance_models() -> dict[str, CapacitanceModel]:
     """The models of capacitance by name, loaded."""
-    package = sys.modules[__name__]
-    found = plugins.stating(package, "def capacitance(")
-    return {name: cast(CapacitanceModel, plugins.load(package, name)) for name in found}
+    found = plugins.stating(sys.modules[__name__], "def capacitance(")
+    return {name: cast(CapacitanceModel, import_module(f"{__name__}.{name}")) for name in found}
