@@ -32,6 +32,15 @@ def test_a_notebook_runs(notebook, monkeypatch, tmp_path):
     runpy.run_path(str(notebook))
 
 
+def test_what_was_sliced_is_read_back(program, tmp_path):
+    program("prusa-slicer", "prusa-slicer")
+    design = sg.Design(shape="reference", parameters={"length_mm": 6.0, "width_mm": 6.0})
+    sliced = sg.slice_design(design, tmp_path)
+    body = sg.as_printed(design, sliced.gcode)
+    assert Path(sliced.gcode).name in body.provenance
+    assert sg.predict(body).capacitance.value == pytest.approx(8.854e-12 * 4.68 * 36e-6 / 0.6e-3, rel=0.01, abs=0.0)
+
+
 def test_names_are_imported_when_they_are_used():
     import subprocess
     import sys
