@@ -226,8 +226,10 @@ class Model:
 
 
 @pytest.fixture
-def ladder(monkeypatch):
+def ladder(monkeypatch, tmp_path):
     """A function that puts models, cheapest first, in the place of the registered ones."""
+
+    monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / "cache"))
 
     def put(*found: Model) -> None:
         monkeypatch.setattr(planner, "capacitance_models", lambda: {f"m{k}": m for k, m in enumerate(found)})

@@ -310,8 +310,8 @@ def test_a_sample_of_a_huge_space_proves_nothing():
     )  # fmt: skip
     whole = space(wanted)
     assert whole.size > 4e6
-    first, again = (sample(wanted, whole, 72) for _ in range(2))
-    assert [row.candidate.values for row in first.rows] == [row.candidate.values for row in again.rows]
+    first, again = (sample(wanted, whole, count) for count in (72, 48))
+    assert [row.candidate.values for row in first.rows[:48]] == [row.candidate.values for row in again.rows]
 
     def plate_pf(row):
         v = row.candidate.values

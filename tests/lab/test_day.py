@@ -26,6 +26,7 @@ def commands():
                 yield words[1:]
 
 
+@pytest.mark.nightly
 def test_every_command_of_the_page_works_in_its_order(tmp_path, monkeypatch, shared_cache):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SENSORGEN_LOG", str(tmp_path / "log.db"))

@@ -150,6 +150,7 @@ def test_arrays_at_rest_lie_between_certified_bounds(shape):
     assert bounds.lower * 0.999 < found < bounds.upper * 1.001
 
 
+@pytest.mark.nightly
 def test_rect_sinks_and_rises_as_in_another_program():
     """NGSolve at small strain; press3d's curve up to 100 kPa: displacement to 3 %, rise to 6 %."""
     known = json.loads((REFERENCE / "rect_rise.json").read_text())["cells"][1]
@@ -178,6 +179,7 @@ def test_cells_of_too_many_faces_are_refused():
         bricks(whole, NUMBERS, 0.175, 500)
 
 
+@pytest.mark.nightly
 def test_a_very_soft_dielectric_is_pressed_as_far_as_it_bears(coarse):
     soft = make({**TRI, "material_values": {"x60": {"youngs_modulus_pa": 2e6}}})
     specimen = Specimen(soft)

@@ -162,6 +162,7 @@ def test_modulus_and_permittivity_scale_as_they_should(tri):
     assert thicker.capacitance_f_per_m < 0.98 * tri.capacitance_f_per_m
 
 
+@pytest.mark.nightly
 def test_a_blank_interpolates_what_it_was_not_solved_for():
     other = {"x60": {"youngs_modulus_pa": 6e6 * 0.75, "relative_permittivity": 4.68 * 1.2}}
     solved = blank(make({**TRI, "material_values": other}))

@@ -265,6 +265,7 @@ def test_stairs_as_boxes_are_stairs_as_a_cross_section(lift):
     assert grown[1][2] / grown[1][0] - 1 == pytest.approx(grown[0][2] / grown[0][0] - 1, rel=0.01 if lift else 0.04)
 
 
+@pytest.mark.nightly
 def test_the_side_of_a_foot_that_rolls_onto_the_film_touches_it():
     """A soft foot bulges over the film that it is bonded to: faces that were square as drawn meet."""
     soft, stress = solids(x60=1e6), [0.0, 5e4, 1e5]

@@ -74,6 +74,7 @@ def test_two_pillars_that_bulge_into_each_other_are_one_before_a_mirror(mirrored
     assert both.displacement_m[1:] == pytest.approx(mirrored.displacement_m[1:], rel=0.01)  # the meshes differ
 
 
+@pytest.mark.nightly
 def test_pillars_that_meet_are_stiffer_than_free_ones(mirrored):
     """Rubber that keeps its volume and has nowhere to go hardly gives way; free pillars go on as they began."""
     free, _ = solved(pillars(0.3, 1), STRESSES)

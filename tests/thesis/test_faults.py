@@ -256,7 +256,10 @@ PLANTED_ELSEWHERE = {
 _ALONG_X = drawn(designs.make({"shape": "tri", "parameters": {"dielectric_mm": 0.0, "along": "x"}}))
 
 
-@pytest.mark.parametrize("fault", PLANTED_ELSEWHERE)
+SLOW = {"a one-sided ladder": pytest.mark.nightly}
+
+
+@pytest.mark.parametrize("fault", [pytest.param(k, marks=SLOW.get(k, ())) for k in PLANTED_ELSEWHERE])
 def test_a_fault_turns_figures_tables_and_claims(fault, monkeypatch, rows, cache):
     place, name, wrong, named = PLANTED_ELSEWHERE[fault]
     kind, *numbers = named.split()
