@@ -2,8 +2,8 @@
 
 Usage: ``python scripts/mutants.py [PACKAGE or FILE ...]``, as ``checks`` or ``models/columns.py``; all without a name.
 
-cosmic-ray and mutmut are not used: they generate thousands of faults by syntax alone and run one set of tests for all,
-which takes days here, where each of these faults is one that a refactoring could make, with tests that take seconds.
+cosmic-ray and mutmut are not used, and were not tried: they make thousands of faults by syntax and run one set of tests
+for all, where each of these is a slip that a refactoring could make, with its own test of a few seconds.
 """
 
 import compileall
