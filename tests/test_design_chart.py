@@ -208,6 +208,7 @@ PROBE = """JSON.stringify({names: [...document.querySelectorAll(".plot")].flatMa
   wide: document.documentElement.scrollWidth, ground: getComputedStyle(document.body).backgroundColor})"""
 
 
+@pytest.mark.nightly
 def test_the_command(tmp_path, program):
     """In processes of their own, as a user calls it; the page on a narrow and a wide screen, light and dark."""
     words = ["tri", "--drawn", "--dielectric", "0.15", "--length", "40"]

@@ -21,6 +21,7 @@ DESIGN = re.compile(r"```yaml\n# (\S+\.yaml)\n(.*?)```", re.DOTALL)
 
 NIGHTLY = {  # each guarded by a test of that command, at a smaller design
     "predict flat-tri.yaml",
+    "predict flat-tri.yaml --accuracy 5e-3 --explain",
     "batch docs/examples/film-study.yaml --no-gcode",
     "build tri --dielectric 0.2 --compensate print --no-cad",
     "calibrate S1",

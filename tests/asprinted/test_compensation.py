@@ -30,7 +30,7 @@ def estimated_gap(variant, walls):
     [
         (0.2, "arachne", "fine"),
         pytest.param(0.3, "classic", "fine", marks=pytest.mark.nightly),
-        (0.2, "cura-gaps", "fine"),  # nothing is lost, but what is thin swells
+        pytest.param(0.2, "cura-gaps", "fine", marks=pytest.mark.nightly),  # nothing is lost, but what is thin swells
         pytest.param(0.12, "arachne", "extrafine", marks=pytest.mark.nightly),
     ],
 )

@@ -256,7 +256,7 @@ PLANTED_ELSEWHERE = {
 _ALONG_X = drawn(designs.make({"shape": "tri", "parameters": {"dielectric_mm": 0.0, "along": "x"}}))
 
 
-SLOW = {"a one-sided ladder": pytest.mark.nightly}
+SLOW = dict.fromkeys(("a one-sided ladder", "a cell with twice the displacement"), pytest.mark.nightly)  # pressed anew
 
 
 @pytest.mark.parametrize("fault", [pytest.param(k, marks=SLOW.get(k, ())) for k in PLANTED_ELSEWHERE])
