@@ -24,6 +24,7 @@ nightly: $(READY_DEV) ## the tests that guard more of the same, kills and attack
 	scripts/system-packages --programs
 	scripts/debian13-slicers
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "nightly and not kernel" $(ARGS)
+	$(BIN)/python -m pytest -m "nightly and kernel" tests/geometry $(ARGS)
 	$(BIN)/python bench/coverage.py
 	$(MAKE) attack
 

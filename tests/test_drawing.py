@@ -341,7 +341,7 @@ def test_no_text_runs_into_another(shape: str, layer_mm: float, count: int) -> N
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_any_size_gives_a_page(shape: str, data: st.DataObject) -> None:
     envelope = {

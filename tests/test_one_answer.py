@@ -438,6 +438,7 @@ def build_again(asked):
 SLICED = [build_again, log_predict, cell, invert, python, fit]
 
 
+@pytest.mark.nightly  # a print by its G-code alone: tests/cli/test_as_printed.py
 @pytest.mark.parametrize("entry", SLICED)
 def test_once_there_is_gcode_everybody_speaks_of_it(entry, asked, program):
     program("prusa-slicer", "prusa-slicer")

@@ -284,6 +284,7 @@ def test_a_file_is_written_whole(run, contents, tmp_path):
     assert json.loads(Path("answer.json").read_text(encoding="utf-8"))["model"] == "columns"
 
 
+@pytest.mark.nightly
 def test_ctrl_c_leaves_nothing_half_written(start, contents, tmp_path):
     """Some points are solved by then, and known the next time; others are not, and nobody works on."""
     words = ["cell", "tri", "--sweep", "dielectric_mm=0.1:0.4:0.01", "--accuracy", "1e-5", "--jobs", "2", "-o", "s.csv"]

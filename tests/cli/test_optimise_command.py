@@ -298,6 +298,7 @@ def test_a_huge_space_is_refused_with_its_size():
         candidates(target(parameters=parameters))
 
 
+@pytest.mark.nightly
 def test_a_sample_of_a_huge_space_proves_nothing():
     """Millions of plates; of those that were tried the one with the best C is the best, by the plate capacitor."""
     pytest.importorskip("optuna")

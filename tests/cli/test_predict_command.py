@@ -220,6 +220,7 @@ def test_a_file_is_put_in_place_of_the_old_one(run, tmp_path):
     assert (tmp_path / "link.csv").read_text() == "old"
 
 
+@pytest.mark.nightly
 def test_pictures(run, tmp_path):
     from sensorgen.analysis import plots
 

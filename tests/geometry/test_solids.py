@@ -45,22 +45,26 @@ def choices(params: type) -> Iterator[dict[str, str]]:
     yield from ({"along": value} for value in along.metadata["choices"]) if along else ({},)
 
 
+ALWAYS = ("tri", "bump", "pyramid")  # prisms, a body of revolution, a loft
+
+
 def scenes() -> Iterator[Any]:
     """Every shape, small and cut off within a period; along each axis; full of support; also turned over."""
     for name in registry.names(shapes):
         shape = registry.load(shapes, name)
+        marks = () if name in ALWAYS else pytest.mark.nightly
         for choice in choices(shape.Params):
             params = shape.Params(length_mm=5.3, width_mm=4.7, isolation_mm=0.1, **choice)
             made = shape.scene(params, Fill(support="bvoh"))
             label = "-".join((name, *choice.values()))
-            yield pytest.param(made, id=label)
-            yield pytest.param(made.turned_over(), id=f"{label}-turned")
+            yield pytest.param(made, id=label, marks=marks)
+            yield pytest.param(made.turned_over(), id=f"{label}-turned", marks=marks)
         if name == "porous":
             continue  # its dielectric is whole layers of lines
         films = [f.name for f in fields(shape.Params) if f.name.endswith("dielectric_mm")]
         least = {f.name: f.metadata["range"][0] for f in fields(shape.Params) if f.name in films}
         bare = shape.Params(length_mm=5.3, width_mm=4.7, **least)  # tri: feet touch along edges
-        yield pytest.param(shape.scene(bare, Fill()), id=f"{name}-no-film")
+        yield pytest.param(shape.scene(bare, Fill()), id=f"{name}-no-film", marks=marks)
 
 
 def colours(scene: Scene) -> dict[str, str]:
