@@ -33,7 +33,7 @@ BY_HAND = {
 
 @pytest.fixture(scope="module")
 def pressed_once(tmp_path_factory):
-    """What is pressed on these coarse meshes is kept for the tests of this file alone."""
+    """Presses on these coarse meshes are kept for the tests of this file alone."""
     return tmp_path_factory.mktemp("pressed")
 
 

@@ -51,7 +51,7 @@ def after(bench, tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def told_before():
-    """What ``alone`` was told, once for all tests of this file."""
+    """Output of ``alone``, once for all tests of this file."""
     return {}
 
 

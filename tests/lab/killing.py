@@ -131,7 +131,7 @@ def gone(pid: int, timeout_s: float = 60.0) -> bool:
 
 
 def at_rest(rig: Served, timeout_s: float = 20.0) -> bool:
-    """Whether the motor goes off, and leaves the tip up.
+    """Wait until the motor is off; true if the tip is up.
 
     Switching off is not answered: the guardian may have ended before the rig reads its last order, and the motor's
     force dies away after that.
