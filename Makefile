@@ -17,13 +17,13 @@ demo: $(READY) ## set up (with the solver NGSolve), and build the triangular sen
 test: $(READY_DEV) ## set up, with slicers, ngspice and Chromium where apt may, and run all tests
 	scripts/system-packages --programs
 	scripts/debian13-slicers
-	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
 	$(BIN)/python -m pytest -m "kernel and not nightly" tests/geometry $(ARGS)
 
 nightly: $(READY_DEV) ## the tests that guard more of the same, kills and attacks among them, then the coverage of intervals; hours
 	scripts/system-packages --programs
 	scripts/debian13-slicers
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "nightly and not kernel" $(ARGS)
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "nightly and not kernel" $(ARGS)
 	$(BIN)/python -m pytest -m "nightly and kernel" tests/geometry $(ARGS)
 	$(BIN)/python bench/coverage.py
 	$(MAKE) attack

@@ -124,8 +124,16 @@ def page(results: list[Result], notes: list[str], seconds: float) -> str:
 
 
 def main(names: list[str]) -> int:
-    """Plant the faults of some packages or files, or all; exit code 1 where too many are missed."""
+    """Plant the faults of some packages or files, or all; exit code 1 if too many are missed, 2 at an unknown name."""
     faults, notes = listed()
+    packages, files = {f.package for f in faults}, {f.file for f in faults}
+    if unknown := set(names) - packages - files:
+        print(
+            f"no fault in {', '.join(sorted(unknown))}; expected a file named in {LIST.relative_to(ROOT)},",
+            file=sys.stderr,
+        )
+        print(f"or one of the packages {', '.join(sorted(packages))}", file=sys.stderr)
+        return 2
     chosen = [f for f in faults if not names or {f.package, f.file} & set(names)]
     sound, results, start = dict[str, str](), list[Result](), time.monotonic()
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:

@@ -17,11 +17,12 @@ with suppress(ValueError):  # not in the main thread
 def _own_folders(monkeypatch, tmp_path_factory, cache):
     """Whatever the user, or another test, has kept is out of sight."""
     monkeypatch.setenv("SENSORGEN_CACHE", str(cache))
-    monkeypatch.setenv("SENSORGEN_LOG", str(tmp_path_factory.mktemp("log") / "log.db"))
+    own = tmp_path_factory.mktemp("own")  # one folder: those of ten thousand tests take time to make and to remove
+    monkeypatch.setenv("SENSORGEN_LOG", str(own / "log.db"))
     monkeypatch.setenv("BROWSER", "true")  # opens nothing
     monkeypatch.setenv("SENSORGEN_BUDGET", "0")  # changes of designs are tried by the tests of that alone
-    monkeypatch.setenv("SENSORGEN_MATERIALS", str(tmp_path_factory.mktemp("materials")))
-    monkeypatch.setenv("SENSORGEN_PACKS", str(tmp_path_factory.mktemp("packs")))
+    monkeypatch.setenv("SENSORGEN_MATERIALS", str(own / "materials"))
+    monkeypatch.setenv("SENSORGEN_PACKS", str(own / "packs"))
 
 
 @pytest.fixture(scope="session")
@@ -113,3 +114,20 @@ def pytest_terminal_summary(terminalreporter):
         terminalreporter.section("extruded and exact volume per tool")
         for row in sorted(set(rows)):
             terminalreporter.write_line(row)
+
+
+FIRST = (  # of ten seconds and more of work or waiting: a worker that began one of them last would be left alone with it
+    "test_one_answer", "test_docs", "thesis/test_faults", "lab/test_faults", "report/test_browser", "lab/test_kills",
+    "lab/test_live", "lab/test_run", "lab/test_truths", "lab/test_day", "lab/test_handyscope", "asprinted/test_real",
+    "asprinted/test_compensation", "slicers/test_batch_real", "cli/test_writing", "cli/test_import_command",
+    "cli/test_calibrate_command", "cli/test_characterise_command", "cli/test_optimise_command",
+    "cli/test_invert_command", "cli/test_compress_command", "models/test_press2d", "models/test_press3d",
+    "models/test_press_round", "attacks/test_inputs_fuzz", "test_build", "test_chart", "test_design_chart",
+    "test_calibration", "test_fit", "test_new_user", "test_invert", "test_drawing",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items):
+    """Files that take long first; `make test` keeps that order with ``--no-loadscope-reorder``."""
+    order = {f"tests/{name}.py": k for k, name in enumerate(FIRST)}
+    items.sort(key=lambda item: order.get(item.nodeid.partition("::")[0], len(order)))

@@ -150,26 +150,27 @@ def test_every_body_is_cut(tmp_path, shape):
 
 def test_capacitance_is_the_share_of_the_cells(tmp_path):
     """A plate has the share of its area; a pattern that the border cuts is between what its whole cells have."""
-    path = svg(tmp_path, ELLIPSE, box=(600, 400))
-    plate = rest_state(bodies.drawn(bordered("reference", path))).capacitance
-    eps = next(v.value for v in rest_state(bodies.drawn(bordered("reference", path))).values if v.material == "x60")
-    exact = 8.8541878128e-12 * eps * math.pi * 28 * 18 * 1e-6 / 0.6e-3
+    path = svg(tmp_path, ELLIPSE, width="30mm", height="20mm", box=(600, 400))
+    body = bodies.drawn(bordered("reference", path))
+    at_rest = rest_state(body)
+    plate, eps = at_rest.capacitance, next(v.value for v in at_rest.values if v.material == "x60")
+    exact = 8.8541878128e-12 * eps * math.pi * 14 * 9 * 1e-6 / 0.6e-3
     assert plate.value == pytest.approx(exact, rel=2e-3, abs=0.0)
     assert plate.model.lower < exact < plate.model.upper
-    cell = answer(bodies.drawn(bordered("reference", path)), Asked())
+    cell = answer(body, Asked())
     assert cell.lower_f_per_m2 * cell.area_m2 < exact < cell.upper_f_per_m2 * cell.area_m2
     assert (cell.reached, cell.relative_width > cell.accuracy) == (True, True)
     assert "is inside the border" in cell.doubts[0]
-    tri = make({"shape": "tri", "parameters": {"length_mm": 56.0, "width_mm": 36.0}})
+    tri = make({"shape": "tri", "parameters": {"length_mm": 28.0, "width_mm": 18.0}})
     region = outline_files.read(path)
-    left = share(tri.drawn, region, (2.0, 36.0))
+    left = share(tri.drawn, region, (2.0, 18.0))
     assert left.area == pytest.approx(math.pi / 4, rel=1e-3)
     # A density that varies within the period by any law, integrated over the border: here all at one place of it
-    x = np.linspace(0, 56, 560_001)
-    wide = 36 * np.sqrt(np.clip(1 - ((x - 28) / 28) ** 2, 0, None))
+    x = np.linspace(0, 28, 280_001)
+    wide = 18 * np.sqrt(np.clip(1 - ((x - 14) / 14) ** 2, 0, None))
     for phase in (0.0, 0.5, 1.0, 1.7):
         peak = (np.abs((x - phase) % 2 - 0.05) < 0.05).astype(float)
-        of_all = (peak * wide).sum() / (peak * 36).sum()
+        of_all = (peak * wide).sum() / (peak * 18).sum()
         assert abs(of_all / left.area - 1) <= left.error
     assert left.error < 0.15
 

@@ -44,7 +44,7 @@ def holds(found):
     ]
 
 
-@pytest.mark.parametrize("level", [-1, 0, 2])
+@pytest.mark.parametrize("level", [-1, 0, pytest.param(2, marks=pytest.mark.nightly)])
 def test_intervals_hold_what_another_program_found(level):
     found = estimated(level)
     assert found.found.faults == ()

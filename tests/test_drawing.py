@@ -99,9 +99,11 @@ def area_until(row: list[Column], end_mm: float) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("turned", [False, True])
-@pytest.mark.parametrize("support", ["", "bvoh"])
-def test_areas_are_those_of_the_scene(shape: str, turned: bool, support: str) -> None:
+@pytest.mark.parametrize(("support", "turned"), [
+    ("", False), ("bvoh", True),
+    pytest.param("", True, marks=pytest.mark.nightly), pytest.param("bvoh", False, marks=pytest.mark.nightly),
+])  # fmt: skip
+def test_areas_are_those_of_the_scene(shape: str, support: str, turned: bool) -> None:
     scene = scene_of(shape, Fill(support=support), width_mm=9.0, isolation_mm=0.1)
     scene = scene.turned_over() if turned else scene
     page = drawn(scene)
@@ -324,8 +326,10 @@ def stays_on_page(page: ET.Element) -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("layer_mm", [0.1, 0.06])
-@pytest.mark.parametrize("count", [0, 3, 12])
+@pytest.mark.parametrize(("layer_mm", "count"), [
+    (0.1, 3), (0.06, 12),
+    *(pytest.param(*each, marks=pytest.mark.nightly) for each in ((0.1, 0), (0.06, 0), (0.06, 3), (0.1, 12)))
+])  # fmt: skip
 def test_no_text_runs_into_another(shape: str, layer_mm: float, count: int) -> None:
     scene = scene_of(shape, Fill(support="bvoh"), isolation_mm=0.1)
     long = "The interface at 0.74 mm is off the layer grid and prints as 0.7 mm; " * 4

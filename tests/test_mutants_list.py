@@ -1,6 +1,7 @@
 """The list of `make mutants` fits the code."""
 
 import ast
+import runpy
 from collections import Counter
 from pathlib import Path
 
@@ -25,3 +26,8 @@ def test_a_fault_fits_its_file(fault):
 def test_each_package_has_five():
     assert set(Counter(fault["file"].partition("/")[0] for fault in FAULTS).values()) == {5}
     assert len(FAULTS) == 60
+
+
+def test_a_name_without_faults_is_refused(capsys):
+    assert runpy.run_path(str(ROOT / "scripts" / "mutants.py"))["main"](["models", "modells"]) == 2
+    assert "no fault in modells; expected" in capsys.readouterr().err

@@ -63,6 +63,7 @@ DESIGNS = {
 }
 SLOW = ("own", "compensated")  # pressed for 20 s each; `values`, `partial` and `baked` go the same ways
 FAST = tuple(name for name in DESIGNS if name not in SLOW)
+SLICED_ONE_BY_ONE = ("trix", "baked", "upside-down")  # a clash, none, and support
 
 
 @dataclass(frozen=True)
@@ -402,6 +403,7 @@ def _questions():
     for quantity, entries in ASKED.items():
         for entry in entries:
             slow = (*SLOW, "rect") if entry is compress else SLOW
+            slow = tuple(name for name in DESIGNS if name not in SLICED_ONE_BY_ONE) if quantity == "errors" else slow
             fast = tuple(name for name in DESIGNS if name not in slow)
             yield pytest.param(quantity, entry, fast, id=f"{quantity}-{entry.__name__}")
             mark = pytest.mark.nightly

@@ -247,7 +247,7 @@ def test_of_a_face_at_mid_height_the_body_below_is_printed(printed, walls):
     assert "bottom_electrode" in guess[2].regions
 
 
-@pytest.mark.parametrize("walls", ["arachne", "cura-gaps"])
+@pytest.mark.parametrize("walls", ["arachne", pytest.param("cura-gaps", marks=pytest.mark.nightly)])
 def test_the_range_of_a_sparse_film_holds_the_real_one(printed, walls):
     sizes = {"dielectric_mm": 0.2, "length_mm": 12.0, "width_mm": 10.0}
     sparse = design.make({"shape": "tri", "parameters": sizes, "infill": {"x60": {"percent": 50}}})

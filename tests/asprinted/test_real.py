@@ -123,8 +123,11 @@ def test_crossed_strips(printed, walls, slicer):
 @pytest.mark.parametrize("slicer", ["arachne", "cura-gaps"])
 @pytest.mark.parametrize(
     "variant",
-    [small(orientation="upside-down"), small(quality="extrafine"), small(parameters={"along": "y"})],
-    ids=["upside-down", "extrafine", "triY"],
+    [
+        pytest.param(small(orientation="upside-down"), id="upside-down"),
+        pytest.param(small(quality="extrafine"), id="extrafine", marks=pytest.mark.nightly),
+        pytest.param(small(parameters={"along": "y"}), id="triY", marks=pytest.mark.nightly),
+    ],
 )
 def test_every_variant_is_read_back(printed, slicer, variant):
     variant, made = printed(slicer, variant)

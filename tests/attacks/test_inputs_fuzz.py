@@ -3,7 +3,7 @@
 import fuzz
 import pytest
 
-COUNTS = {"mat": 20, "hdf5": 20, "csv": 10, "rig": 10, "gcode": 40, "printer": 60, "plan": 40, "design": 40}
+COUNTS = {"mat": 10, "hdf5": 10, "csv": 10, "rig": 10, "gcode": 20, "printer": 30, "plan": 20, "design": 20}
 
 
 @pytest.mark.parametrize("kind", COUNTS)

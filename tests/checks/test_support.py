@@ -1,6 +1,7 @@
 """Every shape, filled with support or not, lying either way: no false errors about widths, no missed islands."""
 
 from dataclasses import fields
+from itertools import product
 
 import pytest
 
@@ -11,15 +12,18 @@ from sensorgen.design import design, shapes
 
 SIZES = {shape: {"length_mm": 1.25, "width_mm": 1.25} for shape in ("bump", "cone")}  # one round body
 
+OFTEN = (0.1, "upside-down", "fine"), (0.2, "as-drawn", "extrafine")
+
 
 def errors(**data):
     """Of the drawing; what a slicer loses of it (rule 7) is another matter."""
     return {f.rule for f in review(design.make(data)).findings if f.severity == "error"} - {"7-printed"}
 
 
-@pytest.mark.parametrize("quality", ["fine", "extrafine"])
-@pytest.mark.parametrize("orientation", ["as-drawn", "upside-down"])
-@pytest.mark.parametrize("film_mm", [0.1, 0.2])
+@pytest.mark.parametrize(("film_mm", "orientation", "quality"), [
+    pytest.param(*each, marks=() if each in OFTEN else pytest.mark.nightly)
+    for each in product((0.1, 0.2), ("as-drawn", "upside-down"), ("fine", "extrafine"))
+])  # fmt: skip
 @pytest.mark.parametrize("shape", sorted(catalogue.shapes().entries))
 def test_with_support_every_shape_prints_either_way(shape, film_mm, orientation, quality):
     films = [f.name for f in fields(registry.load(shapes, shape).Params) if f.name.endswith("dielectric_mm")]

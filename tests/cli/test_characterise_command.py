@@ -104,7 +104,7 @@ def test_posterior_against_importance_sampling(study, coupons, truth):
             total = total + np.logaddexp(np.log(0.95) + alive, np.log(0.05) + dead)
         return total
 
-    count, freedom = 8000, 8.0
+    count, freedom = 4000, 8.0
     best = found.modes[0]
     root = np.linalg.cholesky(best.covariance * 1.3)
     normal = rng.normal(size=(count, len(centre)))

@@ -20,7 +20,13 @@ def test_it_prints_tables(run):
     assert max(map(len, said.out.splitlines())) <= 80
 
 
-@pytest.mark.parametrize("words", [("tri", "--dielectric", "0.1"), ("double", "--force", "9mN", "--noise", "90%")])
+@pytest.mark.parametrize(
+    "words",
+    [
+        pytest.param(("tri", "--dielectric", "0.1"), marks=pytest.mark.nightly),
+        ("double", "--force", "9mN", "--noise", "90%"),
+    ],
+)
 def test_cells_of_its_tables_stay_apart(run, words):
     """Each row of a table has as many columns as its neighbours, whatever the size of its numbers."""
     said = run("stack", *words, "--isolation", "0.37", "--frequencies", "1mHz,1GHz").out.splitlines()

@@ -205,7 +205,7 @@ def writing(process, out):
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("name", SIGNALS)
-@pytest.mark.parametrize("turns", [2, pytest.param(16, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("turns", [1, pytest.param(16, marks=pytest.mark.nightly)])
 def test_interrupted_while_writing(start, real, built, contents, both, name, turns):
     rng = random.Random(name)
     for turn in range(turns):

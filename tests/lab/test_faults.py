@@ -10,9 +10,9 @@ _QUESTIONS = (b"M115", b"32 R 0x1000", b"32 R 0x11018", b"32 R 0x21018", b"32 R 
 
 
 def _cases():
-    """Every kind under a press, every third at another moment, which differs from kind to kind; nightly at all."""
+    """Every kind under a press, every sixth at another moment, which differs from kind to kind; nightly at all."""
     for k, kind in enumerate(each for each in KINDS if each not in HARMLESS):
-        often = MOMENTS[-1], MOMENTS[k % (len(MOMENTS) - 1) if k % 3 == 0 else -1]
+        often = MOMENTS[-1], MOMENTS[k % (len(MOMENTS) - 1) if k % 6 == 0 else -1]
         for moment in MOMENTS:
             name = "-".join([kind, *(f"{key}-{value}" for key, value in moment.items())])
             yield pytest.param(kind, moment, id=name, marks=() if moment in often else pytest.mark.nightly)

@@ -10,7 +10,7 @@ from sensorgen.measure.virtual.faults import FAULTS, VirtualSpecimen, rig_of
 from sensorgen.measure.virtual.mechanics import OPEN_OHM, Mechanics, Rig
 from sensorgen.measure.virtual.specimen import Specimen, Truth, drawn
 
-DESIGN = make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}})
+DESIGN = make({"shape": "reference"})
 TONES_HZ = np.array([1.1e3, 99.7e3])
 
 

@@ -55,7 +55,7 @@ def test_the_reference_curve_at_every_load(film):
         pytest.param("roller", BoundaryConditions(base="sliding"), 0.4999, marks=pytest.mark.nightly),
         ("rigid", BoundaryConditions(top="rigid"), 0.4999),
         pytest.param("nu45", BoundaryConditions(), 0.45, marks=pytest.mark.nightly),
-        ("nu499", BoundaryConditions(), 0.499),
+        pytest.param("nu499", BoundaryConditions(), 0.499, marks=pytest.mark.nightly),
     ],
 )
 def test_choices_of_the_boundary(name, held, nu):
@@ -81,7 +81,7 @@ def test_exactly_incompressible_is_the_limit():
     assert moved[0] > moved[1] > moved[2]
 
 
-@pytest.mark.parametrize("softer", [1 / 5, 3.667])
+@pytest.mark.parametrize("softer", [pytest.param(1 / 5, marks=pytest.mark.nightly), 3.667])
 def test_only_stress_over_modulus_counts(softer):
     """Dimensions: the same cell at a share of all moduli and of all stresses gives way as far, by as many steps."""
     one = press2d.press(tri(), solids(), STRESSES[:4])

@@ -1,6 +1,6 @@
 """Stacks of tracks and films against matrix exponentials of 60 digits and more, a nodal ladder, and limits."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import mpmath
 import numpy as np
@@ -109,9 +109,18 @@ STACKS = {
 }
 
 
-@pytest.mark.parametrize("f", FREQUENCIES)
-@pytest.mark.parametrize("name", STACKS)
-@pytest.mark.parametrize("loss", [(0.0, 0.0), (0.02, 0.0), (0.01, 1e-9)], ids=["lossless", "loss", "leak"])
+LOSSES = {"lossless": (0.0, 0.0), "loss": (0.02, 0.0), "leak": (0.01, 1e-9)}
+
+
+def _entries():
+    """Each stack at each frequency and each loss, by turns; nightly all of them with all."""
+    for (i, name), (k, f), (m, loss) in product(*map(enumerate, (STACKS, FREQUENCIES, LOSSES))):
+        yield pytest.param(
+            name, f, LOSSES[loss], id=f"{loss}-{name}-{f}", marks=() if (i + k + m) % 3 == 0 else pytest.mark.nightly
+        )
+
+
+@pytest.mark.parametrize(("name", "f", "loss"), [*_entries()])
 def test_entries_are_exact(name, f, loss):
     tracks, films = STACKS[name]
     tan, leak = loss

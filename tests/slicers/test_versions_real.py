@@ -48,8 +48,12 @@ def volumes(made, variant):
 
 @both
 @pytest.mark.parametrize(
-    "variant", [small("23/trix-d0.2.yaml"), small("23/sqyx-d0.1.yaml", quality="extrafine"), supported()],
-    ids=["tri", "rect", "support"],
+    "variant",
+    [
+        pytest.param(small("23/trix-d0.2.yaml"), id="tri", marks=pytest.mark.nightly),
+        pytest.param(small("23/sqyx-d0.1.yaml", quality="extrafine"), id="rect"),
+        pytest.param(supported(), id="support"),
+    ],
 )  # fmt: skip
 def test_each_variant_passes_the_printers_check(variant, slicer, newer_program, tmp_path):
     made = sliced([alone(variant)], slicer, tmp_path, program=newer_program(PROGRAMS[slicer]))
