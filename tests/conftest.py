@@ -116,7 +116,7 @@ def pytest_terminal_summary(terminalreporter):
             terminalreporter.write_line(row)
 
 
-FIRST = (  # of ten seconds and more of work or waiting: a worker that began one of them last would be left alone with it
+FIRST = (  # ten seconds and more of work or waiting: a worker that began one of them last would be left alone with it
     "test_one_answer", "test_docs", "thesis/test_faults", "lab/test_faults", "report/test_browser", "lab/test_kills",
     "lab/test_live", "lab/test_run", "lab/test_truths", "lab/test_day", "lab/test_handyscope", "asprinted/test_real",
     "asprinted/test_compensation", "slicers/test_batch_real", "cli/test_writing", "cli/test_import_command",

@@ -208,6 +208,19 @@ PROBE = """JSON.stringify({names: [...document.querySelectorAll(".plot")].flatMa
   wide: document.documentElement.scrollWidth, ground: getComputedStyle(document.body).backgroundColor})"""
 
 
+def test_the_command_writes_its_files(tmp_path, monkeypatch, shared_cache):
+    """In this process, of the line alone."""
+    whole = results.chart
+    monkeypatch.setattr(results, "chart", lambda *given, **more: whole(*given, **more, runner=here))
+    words = ["tri", "--drawn", "--dielectric", "0.15", "--quantity", "line", "--budget", "0.02", "-o", str(tmp_path)]
+    done = CliRunner().invoke(command, words)
+    assert done.exit_code == 0, done.output
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["chart.csv", "chart.html", "chart.json", "chart.png"]
+    assert str(tmp_path / "chart.html") in done.stdout.replace("\n", "")
+    assert list(json.loads((tmp_path / "chart.json").read_text("utf-8"))["titles"]) == ["line"]
+    assert (tmp_path / "chart.png").read_bytes().startswith(b"\x89PNG")
+
+
 @pytest.mark.nightly
 def test_the_command(tmp_path, program):
     """In processes of their own, as a user calls it; the page on a narrow and a wide screen, light and dark."""

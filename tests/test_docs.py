@@ -40,9 +40,9 @@ NIGHTLY = {  # each guarded by a test of that command, at a smaller design
 }
 
 
-def commands(nightly=frozenset()):
+def commands(nightly=frozenset(), pages=PAGES):
     """Every sensorgen command of the pages once, that writes to no other program."""
-    blocks = [block for page in PAGES for block in re.findall(r"```sh\n(.*?)```", page.read_text("utf-8"), re.DOTALL)]
+    blocks = [block for page in pages for block in re.findall(r"```sh\n(.*?)```", page.read_text("utf-8"), re.DOTALL)]
     lines = [line for block in blocks for line in block.replace("\\\n", " ").splitlines()]
     words = [shlex.split(line, comments=True) for line in lines]
     found = dict.fromkeys(shlex.join(each[1:]) for each in words if each[:1] == ["sensorgen"] and ">" not in each)
@@ -94,7 +94,7 @@ def sensorgen(here, monkeypatch, capfd):
     return run
 
 
-@pytest.mark.parametrize("line", commands())
+@pytest.mark.parametrize("line", commands(pages=[*PAGES, ROOT / "docs" / "lab.md"]))
 def test_every_command_of_the_pages_has_its_options(line, here, monkeypatch):
     """Words are read, and nothing is done."""
     monkeypatch.setattr(click.Command, "invoke", lambda *_: None)

@@ -220,6 +220,18 @@ def test_a_file_is_put_in_place_of_the_old_one(run, tmp_path):
     assert (tmp_path / "link.csv").read_text() == "old"
 
 
+def test_pictures_are_put_in_their_folder(run, tmp_path, monkeypatch, shared_cache):
+    """Drawn by tests/test_plots.py; here each is its name."""
+    from sensorgen.analysis import plots
+
+    monkeypatch.setattr(plots, "files", lambda *_: [(name, name.encode()) for name in plots.STEPS])
+    said = run("predict", "reference", *PRESSES, "--plot", "a/b")
+    assert (said.code, said.err) == (0, "")
+    assert {p.name: p.read_text() for p in (tmp_path / "a/b").iterdir()} == {name: name for name in plots.STEPS}
+    assert said.out.splitlines() == [f"a/b/{name}" for name in plots.STEPS]
+    assert [p.name for p in tmp_path.iterdir() if p.name not in ("a", "log.db")] == []
+
+
 @pytest.mark.nightly
 def test_pictures(run, tmp_path):
     from sensorgen.analysis import plots
