@@ -13,6 +13,7 @@ from sensorgen.models import columns, fem3d
 from sensorgen.prediction import bodies
 from sensorgen.prediction.compression_law import solved
 from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import TONES_HZ, Query
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import build_sensor, piece
@@ -97,6 +98,17 @@ def test_a_bonded_plate_is_stiffer_the_thinner_it_is():
     assert found.sensitivity.value == near(usual)
     assert (found.sensitivity.print.lower, found.sensitivity.print.upper) == (near(thin), near(thick))
     assert found.force_resolution.print.lower < found.force_resolution.value < found.force_resolution.print.upper
+
+
+def test_a_pressed_plates_range_is_that_of_plates_drawn_thinner_and_thicker():
+    query, responses = Query(law="bonded", force_n=6.0), []
+    for film_mm in (0.6, 0.58, 0.62):
+        plate = bodies.drawn(make({"shape": "reference", "parameters": {"dielectric_mm": film_mm}}))
+        responses.append(abs(sensor_model(plate, query)[0].sensor.response(TONES_HZ, 6.0, 0.05)[0]))
+    change = max(float(abs(z / responses[0] - 1).max()) for z in responses[1:])
+    found = evaluate(bodies.estimated(make({"shape": "reference"})), query)
+    term = next(t for t in found.budget.terms if t.name == "film thickness")
+    assert term.changes.magnitude == near(change, 2e-2)
 
 
 @pytest.mark.nightly

@@ -21,6 +21,7 @@ from sensorgen.design import materials
 from sensorgen.design.design import make
 from sensorgen.models import line
 from sensorgen.prediction import capacitance as planner
+from sensorgen.prediction import quantities
 from sensorgen.prediction.bodies import drawn, estimated
 from sensorgen.prediction.capacitance import Unpredictable, capacitance
 from sensorgen.prediction.evaluate import evaluate
@@ -35,7 +36,9 @@ from sensorgen.prediction.grid import (
     positions_mm,
 )
 from sensorgen.prediction.losses import Lost
+from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import NOISE, TONES_HZ, Query
+from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.results import from_json, to_json
 
 EPS = {"x60": 4.68, "air": 1.00059}
@@ -167,6 +170,20 @@ def test_the_ranges_of_the_impedance_hold_its_middle():
             assert part.lower < part.value < part.upper
             for alone in (part.model, part.print, part.material):
                 assert part.lower <= alone.lower <= part.value <= alone.upper <= part.upper
+
+
+def test_the_range_of_a_response_has_the_ways_to_print_at_its_ends(monkeypatch, shared_cache):
+    """At rest: how each is pressed, which takes seconds, is looked at by night."""
+    design, query = make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}}), Query(law="unconfined", force_n=5.0)
+    model = sensor_model(estimated(design), query)[0]
+    monkeypatch.setattr(quantities, "at_a_few_pressures", lambda *_: model.law)
+    found = [s.capacitance_f() for s in quantities._printed_otherwise(model, query.load(design), query)]
+    each = [
+        rest_state(estimated(design, walls)).capacitance.value for walls in ("arachne", "classic", "cura", "cura-gaps")
+    ]
+    ends = {min(each), max(each)} - {each[0]}
+    assert sorted(found) == pytest.approx(sorted(ends), rel=2e-2, abs=0)
+    assert ends
 
 
 @pytest.mark.nightly

@@ -58,6 +58,21 @@ def test_waiting_takes_nothing_of_the_limit(monkeypatch):
     assert dict(in_parallel(patient, [(k,) for k in range(4)], 2)) == {k: k**2 for k in range(4)}
 
 
+def late(path):
+    if path:
+        time.sleep(3)
+        Path(path).touch()
+    return path
+
+
+def test_who_stops_asking_does_not_wait_for_what_is_under_way(tmp_path):
+    """As Ctrl-C does: processes end at once, and nobody works on."""
+    found = in_parallel(late, [("",), (str(tmp_path / "late"),)], 2)
+    assert next(found) == (0, "")
+    found.close()
+    assert list(tmp_path.iterdir()) == []
+
+
 def where(number):
     return os.getpid(), os.environ["OPENBLAS_NUM_THREADS"]
 

@@ -1,8 +1,12 @@
 """The print beside the drawing: options, exit codes, errors; without a slicer."""
 
 import json
+from hashlib import sha256
 
 import pytest
+
+from sensorgen.design.design import make
+from sensorgen.prediction.bodies import default_body
 
 SMALL = ["tri", "--size", "12x8"]
 
@@ -27,6 +31,20 @@ def test_the_drawing_alone(run):
     found = predicted(run, *SMALL, "--drawn")
     assert (found["body"], found["drawn"]) == ("drawn", None)
     assert found["capacitance"] == predicted(run, *SMALL)["drawn"]["capacitance"]
+
+
+def test_a_sliced_file_of_this_very_design_is_the_body(tmp_path):
+    design, other = (make({"shape": "tri", "parameters": {"dielectric_mm": film}}) for film in (0.1, 0.2))
+    file = tmp_path / "a.prusa.gcode"
+    file.write_text("G28\n")
+    note = {"slicer": {"name": "PrusaSlicer", "version": "2.5"}, "design": design.id()}
+    note["sha256"] = sha256(file.read_bytes()).hexdigest()
+    (tmp_path / "a.prusa.gcode.json").write_text(json.dumps(note))
+    assert default_body(design, tmp_path).provenance == "printed, PrusaSlicer 2.5, a.prusa.gcode"
+    assert default_body(design, tmp_path).kind == "sliced"
+    assert default_body(other, tmp_path).kind == "estimated"
+    file.write_text("G28 X\n")  # no longer what was sliced
+    assert default_body(design, tmp_path).kind == "estimated"
 
 
 def test_a_plate_prints_as_drawn(run):
