@@ -46,8 +46,8 @@ class SVG(str):
 class Slots(Strict):
     """Which material fills which part, each with the source of its values: ``x60`` or ``x60@thesis-4.1``."""
 
-    top_electrode: Slot = "etpu@thesis-c.1-top"
-    bottom_electrode: Slot = "etpu@thesis-c.1-bottom"
+    top_electrode: Slot = "etpu"
+    bottom_electrode: Slot = "etpu"
     film: Slot = "x60"
     dielectric: Slot = Field(default="x60", description="Of film and isolation too, unless they are given.")
     isolation: Slot = "x60"
@@ -273,12 +273,31 @@ class Design(Strict):
 
     def id(self) -> str:
         """Hash of all resolved parameters and material values; not of the design's name, nor of sensorgen's version."""
-        data = _FIRST | self.resolved()
+        data = _FIRST | self._lasting(self.resolved())
         data.pop("own", None)  # values of materials and machines are there without the words around them
         if self._shape_text is not None:
             data["shape_text"] = self._shape_text
         text = json.dumps(data, sort_keys=True, allow_nan=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    def _lasting(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Resolved data, as version 0.1.0 had them where the design takes the same numbers as it did then."""
+        slots = {part: slot for part, slot in self.materials if slot and not self.bodies}
+        now = slots or {name: body.material for name, body in self.bodies.items()}
+        then = now | {part: first for part, first in _FIRST_SLOTS.items() if slots.get(part) == "etpu"}
+        stuff = {name: dict(values) for name, values in data["materials_values"].items()}
+        for part, slot in now.items():
+            (name, _, source), (_, _, first) = slot.partition("@"), then[part].partition("@")
+            material = self.material(name)
+            former = material_files.first_form(material)
+            if former is material or name not in stuff:
+                continue
+            if any(material.chosen(q, source) != former.chosen(q, first) for q in former.properties):
+                return data
+            stuff[name] |= former.model_dump(include={"properties"})
+            stuff[name]["source"] = stuff[name]["source"] or first
+        materials = data["materials"] | {part: slot for part, slot in then.items() if slots}
+        return data | {"materials": materials, "materials_values": stuff}
 
     def waived(self, findings: list[Finding]) -> list[Finding]:
         """The findings, with the reason where the design accepts them."""
@@ -303,6 +322,7 @@ class Design(Strict):
 
 # Version 0.1.0 hashed its own number, and its identities last: the logs, labels and batches that name them stay valid.
 _FIRST = {"sensorgen": "0.1.0"}
+_FIRST_SLOTS = {"top_electrode": "etpu@thesis-c.1-top", "bottom_electrode": "etpu@thesis-c.1-bottom"}
 # What only the check of G-code reads, and how exact the printer is: neither decides a sensor.
 _LIMITS: dict[str, Any] = {
     "control": {"commands", "longest_retraction_mm"}, "print": {"max_flow_mm3_s"}, "tool_height_error_mm": True,
