@@ -27,7 +27,6 @@ def _work(
     as in etpu@fit-23. A quarter of the specimens is held back, to see whether the values predict them; and each shape
     and direction is left out in turn. --thesis is how the default resistivity of PI-eTPU came about.
     """
-    from contextlib import ExitStack
     from dataclasses import replace
 
     from sensorgen.analysis.fit import STEPS, fit, text
@@ -38,11 +37,9 @@ def _work(
     if bool(specimens) + (iteration is not None) + thesis != 1:
         raise BadInput("expected one of specimens, as in 'sensorgen fit S1 S2', --iteration and --thesis")
     bench = options.bench_of(tip_mm, force_offset)
-    with ExitStack() as stack:
-        log = stack.enter_context(_thesis() if thesis else log_words.opened(file))
-        step, share = stack.enter_context(show.progress(STEPS)), 0.0 if thesis else HELD_BACK
-        iteration = 23 if thesis else iteration
-        made = fit(log, iteration, seed, body_options.body_of(), step, bench, specimens=specimens, held_share=share)
+    which, share = _WHICH.get(thesis, (iteration, HELD_BACK))
+    with _opened(file, thesis=thesis) as log, show.progress(STEPS) as step:
+        made = fit(log, which, seed, body_options.body_of(), step, bench, specimens=specimens, held_share=share)
     if made.values and not dry_run:
         path = Path(output) if output else own.path(made.source)
         store.replace(path, text(made).encode())
@@ -52,11 +49,18 @@ def _work(
         render.say(f"take them with {_taken(made)}")
 
 
+_WHICH = {True: (23, 0.0)}  # iteration of --thesis, and the share that is held back
+
+
 @contextmanager
-def _thesis() -> "Iterator[Log]":
-    """A log of Table D.1 alone, which is not kept."""
+def _opened(file: str | None, *, thesis: bool) -> "Iterator[Log]":
+    """The log, or one of Table D.1 alone that is not kept."""
     from sensorgen.measure.log import Log, importing
 
+    if not thesis:
+        with log_words.opened(file) as log:
+            yield log
+        return
     with TemporaryDirectory() as folder, Log(Path(folder) / "log.db", create=True) as log:
         importing.thesis(log)
         yield log

@@ -5,9 +5,11 @@ current through the film (:mod:`sensorgen.measure.signal.leakage`). The log does
 reading allows a range of :math:`\varrho`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, isfinite, isnan, log, nan
+from statistics import fmean
 
 from sensorgen.analysis.comparison.specimens import Compared
 from sensorgen.core.bounds import Bounds
@@ -44,19 +46,23 @@ def allowed(row: Compared, body: Body) -> Allowed | None:
     ry, rz = row.verdict.ry_ohm, row.across_ohm
     if not 0 < ry < inf:
         return None
-    ends, values, leaks = _per_resistivity(body), [], []
-    each = list(zip(ends, ends[::-1], strict=True))
-    for across in (inf, 0.0) if isnan(rz) else (rz,):
-        for this, other in each:
-            electrode, leak = electrode_and_leak(ry, across, other.value / this.value)
-            leaks.append(leak)
-            values.append([log(electrode / per) for per in (this.upper, this.value, this.lower)])
-    area, leak = body.design.area_mm2 * M_PER_MM**2, max(leaks)
-    known = isfinite(leak) and leak > 0
-    middle = sum(value[1] for value in values[: len(each)]) / len(each)
+    ends, area = _per_resistivity(body), body.design.area_mm2 * M_PER_MM**2
+    leak, values = _read(ry, inf if isnan(rz) else rz, ends)
+    more = values if not isnan(rz) else _read(ry, 0.0, ends)[1]
     return Allowed(
-        min(value[0] for value in values), middle, max(value[2] for value in values), log(leak / area) if known else nan
-    )
+        min(value[0] for value in values), fmean(value[1] for value in values), max(value[2] for value in more),
+        log(leak / area) if 0 < leak < inf else nan,
+    )  # fmt: skip
+
+
+def _read(ry: float, rz: float, ends: Sequence[Bounds]) -> tuple[float, list[list[float]]]:
+    """Leak [S], and ln of lowest, best and highest resistivity [ohm m] if either electrode was read."""
+    leaks, values = [], []
+    for this, other in zip(ends, ends[::-1], strict=True):
+        electrode, leak = electrode_and_leak(ry, rz, other.value / this.value)
+        leaks.append(leak)
+        values.append([log(electrode / per) for per in (this.upper, this.value, this.lower)])
+    return max(leaks), values
 
 
 @lru_cache(maxsize=64)

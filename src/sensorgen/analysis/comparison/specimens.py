@@ -141,7 +141,7 @@ def of_iteration(
     alike = Counter(design.name for design in by_id.values())
     names = {name: _label(design, alike) for name, design in by_specimen.items()}
     designs = {label: by_id[key] for label, key in sorted((_label(d, alike), key) for key, d in by_id.items())}
-    ids = {name: {design.id()} for name, design in designs.items()}
+    ids = {name: design.ids() for name, design in designs.items()}
     for specimen in by_specimen.keys() & printed.keys():
         ids[names[specimen]].add(printed[specimen].design_id)  # another version of sensorgen may have named it
     left_out += _other_designs(measured.designs, set().union(*ids.values()))

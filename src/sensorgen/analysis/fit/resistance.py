@@ -6,7 +6,7 @@ from math import exp, isfinite, log, sqrt
 import numpy as np
 
 from sensorgen.analysis.comparison.allowed import Allowed
-from sensorgen.analysis.fit.results import LEVEL, Fitted, LeftOut, Untold
+from sensorgen.analysis.fit.results import LEVEL, Fitted, GroupError, Untold
 from sensorgen.design.materials import FILM_LEAK
 from sensorgen.measure.recording.samples import Real
 
@@ -38,7 +38,7 @@ def resistivity(readings: Sequence[Allowed], material: str) -> Fitted | Untold:
     )  # fmt: skip
 
 
-def by_group(groups: Mapping[str, Sequence[tuple[Allowed, bool]]], material: str) -> Iterator[LeftOut]:
+def by_group(groups: Mapping[str, Sequence[tuple[Allowed, bool]]], material: str) -> Iterator[GroupError]:
     """Readings of each group beside the resistivity of all other groups.
 
     Parameters
@@ -54,7 +54,7 @@ def by_group(groups: Mapping[str, Sequence[tuple[Allowed, bool]]], material: str
             low, high = log(fitted.low), log(fitted.high)
             inside = sum(reading.low <= high and reading.high >= low for reading, _ in group)
             ratio = exp(float(np.median([reading.value for reading, _ in group]))) / fitted.value
-            yield LeftOut(name, len(group), inside, ratio, fitted.value, fitted.low, fitted.high)
+            yield GroupError(name, len(group), inside, ratio, fitted.value, fitted.low, fitted.high)
 
 
 def _medians(values: Real, seed: int) -> Real:
