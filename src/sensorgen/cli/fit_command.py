@@ -35,7 +35,7 @@ def _work(
     from sensorgen.design.materials import own
 
     if bool(specimens) + (iteration is not None) + thesis != 1:
-        raise BadInput("expected one of specimens, as in 'sensorgen fit S1 S2', --iteration and --thesis")
+        raise BadInput("expected either specimens, as in 'sensorgen fit S1 S2', --iteration or --thesis")
     bench = options.bench_of(tip_mm, force_offset)
     which, share = _WHICH.get(thesis, (iteration, HELD_BACK))
     with _opened(file, thesis=thesis) as log, show.progress(STEPS) as step:

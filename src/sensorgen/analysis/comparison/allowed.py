@@ -5,11 +5,9 @@ current through the film (:mod:`sensorgen.measure.signal.leakage`). The log does
 reading allows a range of :math:`\varrho`.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, isfinite, isnan, log, nan
-from statistics import fmean
 
 from sensorgen.analysis.comparison.specimens import Compared
 from sensorgen.core.bounds import Bounds
@@ -22,13 +20,9 @@ from sensorgen.prediction.electrodes import electrode_resistance
 
 @dataclass(frozen=True, slots=True)
 class Allowed:
-    """ln of the resistivities [ohm m] that a reading allows, and of the leak per area [S/m2]; nan where unknown.
-
-    ``value`` is that of the body's best estimate, the mean over both electrodes.
-    """
+    """ln of the resistivities [ohm m] that a reading allows, and of the leak per area [S/m2]; nan where unknown."""
 
     low: float
-    value: float
     high: float
     leak: float
 
@@ -39,30 +33,19 @@ def usable(row: Compared) -> bool:
 
 
 def allowed(row: Compared, body: Body) -> Allowed | None:
-    """Resistivity that a reading allows; None without a reading above 0.
-
-    Without a reading across, the film may be anything from tight, which is taken for the value, to a short.
-    """
+    """Resistivity that a reading allows; None without a reading above 0. A film without a reading is taken for tight."""
     ry, rz = row.verdict.ry_ohm, row.across_ohm
     if not 0 < ry < inf:
         return None
-    ends, area = _per_resistivity(body), body.design.area_mm2 * M_PER_MM**2
-    leak, values = _read(ry, inf if isnan(rz) else rz, ends)
-    more = values if not isnan(rz) else _read(ry, 0.0, ends)[1]
-    return Allowed(
-        min(value[0] for value in values), fmean(value[1] for value in values), max(value[2] for value in more),
-        log(leak / area) if 0 < leak < inf else nan,
-    )  # fmt: skip
-
-
-def _read(ry: float, rz: float, ends: Sequence[Bounds]) -> tuple[float, list[list[float]]]:
-    """Leak [S], and ln of lowest, best and highest resistivity [ohm m] if either electrode was read."""
-    leaks, values = [], []
-    for this, other in zip(ends, ends[::-1], strict=True):
-        electrode, leak = electrode_and_leak(ry, rz, other.value / this.value)
-        leaks.append(leak)
-        values.append([log(electrode / per) for per in (this.upper, this.value, this.lower)])
-    return max(leaks), values
+    ends, design = _per_resistivity(body), body.design
+    area = design.area_mm2 * M_PER_MM**2
+    known = [
+        (this, *electrode_and_leak(ry, inf if isnan(rz) else rz, other.value / this.value))
+        for this, other in zip(ends, ends[::-1], strict=True)
+    ]
+    leak = max(leak for *_, leak in known)
+    low, high = min(ohm / this.upper for this, ohm, _ in known), max(ohm / this.lower for this, ohm, _ in known)
+    return Allowed(log(low), log(high), log(leak / area) if 0 < leak < inf else nan)
 
 
 @lru_cache(maxsize=64)

@@ -27,7 +27,8 @@ def resistivity(readings: Sequence[Allowed], material: str) -> Fitted | Untold:
     count = len(readings)
     if count < LEAST:
         return Untold(f"{RESISTIVITY} along", f"{count} readings of sound electrodes; expected {LEAST} or more")
-    low, at, high = np.array([(r.low, r.value, r.high) for r in readings]).T
+    low, high = np.array([(r.low, r.high) for r in readings]).T
+    at = (low + high) / 2
     middle, scatter = float(np.median(at)), float(np.std(at, ddof=1))
     reach = float(stdtrit(count - 1, (1 + LEVEL) / 2)) * scatter * sqrt(1 + 1 / count)
     return Fitted(
@@ -53,7 +54,7 @@ def by_group(groups: Mapping[str, Sequence[tuple[Allowed, bool]]], material: str
         if isinstance(fitted := resistivity(rest, material), Fitted):
             low, high = log(fitted.low), log(fitted.high)
             inside = sum(reading.low <= high and reading.high >= low for reading, _ in group)
-            ratio = exp(float(np.median([reading.value for reading, _ in group]))) / fitted.value
+            ratio = exp(float(np.median([(reading.low + reading.high) / 2 for reading, _ in group]))) / fitted.value
             yield GroupError(name, len(group), inside, ratio, fitted.value, fitted.low, fitted.high)
 
 
