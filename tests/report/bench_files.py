@@ -16,7 +16,7 @@ TRUTH = {"resistivity": 0.5, "capacitance": 1.3, "leak_s": 2e-9, "stiffness": 0.
 
 
 def ladder(electrode, leak, sections, other=1.0):
-    """R_Y and R_Z of two rows of resistors with resistors between them, by Kirchhoff's law; the second is ``other`` x."""
+    """R_Y and R_Z of two rows of resistors, the second of ``other`` x, with resistors between them, by Kirchhoff."""
     n = sections + 1
     at = np.zeros((2 * n, 2 * n))
 

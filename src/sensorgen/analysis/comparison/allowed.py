@@ -33,7 +33,7 @@ def usable(row: Compared) -> bool:
 
 
 def allowed(row: Compared, body: Body) -> Allowed | None:
-    """Resistivity that a reading allows; None without a reading above 0. A film without a reading is taken for tight."""
+    """Resistivity that a reading allows; None without one above 0. A film without a reading is taken for tight."""
     ry, rz = row.verdict.ry_ohm, row.across_ohm
     if not 0 < ry < inf:
         return None
