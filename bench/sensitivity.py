@@ -17,7 +17,7 @@ from sensorgen.prediction.compression_law import solved
 from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensitivity import BOUNDARIES, Sensitivity, sensitivity
 
-FORCE_N, RHO_OHM_M = 6.0, 0.135
+FORCE_N, RHO_OHM_M = 6.0, 0.042
 RECT_MESH = 1.022  # rise in the limit of fine meshes over that of the default mesh: docs/compression.md
 PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "sensitivity.png"
 DESIGNS = {

@@ -24,8 +24,8 @@ PLATE = {
     "force_n": 6.0,
     "tip_m": 0.01,
     "left_m": 0.045,
-    "top_resistivity_ohm_m": 0.07,
-    "bottom_resistivity_ohm_m": 0.2,
+    "top_resistivity_ohm_m": 0.042,
+    "bottom_resistivity_ohm_m": 0.042,
 }
 
 
@@ -55,7 +55,7 @@ def z(**changes):
 @pytest.mark.parametrize(
     ("term", "ends"),
     [
-        ("resistivity", [dict.fromkeys(RESISTIVITIES, rho) for rho in (0.07, 1 / 1.2)]),
+        ("resistivity", [dict.fromkeys(RESISTIVITIES, rho) for rho in (0.02, 0.088)]),
         ("stiffness", [{"modulus_pa": 1e6}, {"modulus_pa": 6e6}]),
         ("permittivity of x60", [{"eps_r": 4.68}, {"eps_r": 6.33}]),
         ("compression", [{"modulus_pa": 6e6 * 4 / 3 * (1 + (10 / 1.2) ** 2)}]),
@@ -150,7 +150,7 @@ def test_an_accuracy_is_compared_to_the_models_and_to_all_terms():
     assert found("reference").accuracy is None
     got = found("reference", 1e-2)
     assert (got.met_by("model"), got.met_by("model", "print", "material")) == (True, False)
-    assert got.beyond() == ("resistivity", "permittivity of x60")
+    assert got.beyond() == ("permittivity of x60",)  # by the two tests above: 0.4 % of |Z|, and 26 %
     assert found("reference", 10.0).met_by("model", "print", "material")
     tight = found("reference", 1e-4)
     assert not tight.met_by("model")
@@ -181,7 +181,7 @@ def test_ways_to_print_it_are_a_term_of_a_print():
     ("accuracy", "said"),
     [
         (10.0, "accuracy 10 of |Z| reached"),
-        (1e-2, "reached by the models, not by print and material data; larger alone: resistivity, permittivity of x60"),
+        (1e-2, "reached by the models, not by print and material data; larger alone: permittivity of x60"),
         (1e-5, "not reached by the models"),
     ],
 )

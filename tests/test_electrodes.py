@@ -15,7 +15,7 @@ from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.scene.scene import Scene, box
 
-PLATE_OHM = {"top": 0.07 / 3e-5, "bottom": 0.2 / 3e-5}  # rho L / (H W)
+PLATE_OHM = {"top": 0.042 / 3e-5, "bottom": 0.042 / 3e-5}  # rho L / (H W)
 ACROSS, ALONG = 0.845676971, 1 / (1 + 0.125 / 0.3)
 
 
@@ -46,7 +46,8 @@ def test_line_model_and_prediction_have_the_same_resistance(shape):
 
 def test_both_electrodes_have_one_common_resistivity():
     """The weighted mean: what one resistivity of both would have to be for the same loop."""
-    sensor = sensor_model(drawn(design()))[0].sensor
+    slots = {"top_electrode": "etpu@thesis-c.1-top", "bottom_electrode": "etpu@thesis-c.1-bottom"}  # 0.07, 0.2 ohm m
+    sensor = sensor_model(drawn(make({"shape": "tri", "materials": slots})))[0].sensor
     assert sensor.common_resistivity_ohm_m() == pytest.approx((ACROSS * 0.07 + 0.2) / (ACROSS + 1), rel=1e-5)
 
 
@@ -74,12 +75,12 @@ def test_printed_steps_of_a_tooth_by_hand():
 
 def test_the_fit_divides_by_the_same_geometry():
     for along in "xy":
-        body, rho = estimated(design(along=along)), {"top": 0.07, "bottom": 0.2}
-        low, high = _per_resistivity(body)
-        per = {end: r.value / rho[end] for end, r in electrode_resistance(body).items()}
-        assert low <= per["top"] < per["bottom"] <= high
-        assert low > 0.9 * per["top"]
-        assert high == pytest.approx(per["bottom"], rel=1e-3)
+        body = estimated(design(along=along))
+        top, bottom = _per_resistivity(body)
+        per = {end: r.value / 0.042 for end, r in electrode_resistance(body).items()}
+        assert (top.value, bottom.value) == pytest.approx((per["top"], per["bottom"]), rel=1e-12)
+        assert 0.9 * top.value < top.lower <= top.value <= top.upper < bottom.value
+        assert (bottom.lower, bottom.upper) == pytest.approx((1 / 3e-5,) * 2, rel=1e-3)
 
 
 def test_an_electrode_that_is_not_printed_through_is_refused():

@@ -16,7 +16,7 @@ def test_the_plate_of_table_3_1():
     sensor = found.sensor
     assert (sensor.length_m, sensor.width_m) == (0.1, 0.01)
     assert sensor.electrode_m == pytest.approx((3e-4, 3e-4))
-    assert sensor.resistivity_ohm_m == (0.07, 0.2)
+    assert sensor.resistivity_ohm_m == (0.042, 0.042)
     assert sensor.capacitance_f() == pytest.approx(69.06266493984e-12, rel=1e-10, abs=0)
     assert sensor.compression.modulus_pa == 6e6
     assert ("x60", "youngs_modulus_pa", 6e6) in {(t.material, t.quantity, t.value) for t in found.values}

@@ -27,8 +27,8 @@ def test_the_plate_of_the_thesis_tells_neither_force_nor_position():
 
 def test_the_designs_own_resistivity_unless_given():
     own = sensitivity(PLATE, compression.unconfined(6e6), TONES_HZ, 6.0)
-    same = sensitivity(PLATE, compression.unconfined(6e6), TONES_HZ, 6.0, resistivity_ohm_m=0.135)
-    assert own.sigma_position_m == pytest.approx(same.sigma_position_m, rel=1e-9)  # 0.07 and 0.2, whose mean it is
+    same = sensitivity(PLATE, compression.unconfined(6e6), TONES_HZ, 6.0, resistivity_ohm_m=0.042)
+    assert own.sigma_position_m == pytest.approx(same.sigma_position_m, rel=1e-9)
 
 
 @pytest.mark.parametrize("held", BOUNDARIES)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import made
+import numpy as np
 import scipy.io as sio
 
 from sensorgen.analysis.comparison.moved import moved
@@ -12,6 +13,28 @@ from sensorgen.prediction.planning import sensor_model
 HOSTILE = "</script><script>document.title='taken'</script><img src=x onerror=alert(1)> \"'&$\\frac{ =cmd|'/c calc'!A1"
 FORMULA = '=HYPERLINK("http://example.org";"x")'
 TRUTH = {"resistivity": 0.5, "capacitance": 1.3, "leak_s": 2e-9, "stiffness": 0.5}
+
+
+def ladder(electrode, leak, sections, other=1.0):
+    """R_Y and R_Z of two rows of resistors, the second of ``other`` x, with resistors between them, by Kirchhoff."""
+    n = sections + 1
+    at = np.zeros((2 * n, 2 * n))
+
+    def join(a, b, g):
+        at[[a, b], [a, b]] += g
+        at[[a, b], [b, a]] -= g
+
+    for row, ohm in ((0, electrode), (n, other * electrode)):
+        for k in range(sections):
+            join(row + k, row + k + 1, sections / ohm)
+    for k in range(n):
+        join(k, n + k, leak / sections * (0.5 if k in (0, sections) else 1.0))
+    inverse = np.linalg.pinv(at)
+
+    def between(a, b):
+        return inverse[a, a] + inverse[b, b] - 2 * inverse[a, b]
+
+    return between(0, n - 1), between(0, n)
 
 
 def truth(design, resistivity=1.0, capacitance=1.0, leak_s=0.0, stiffness=1.0):

@@ -46,8 +46,8 @@ class SVG(str):
 class Slots(Strict):
     """Which material fills which part, each with the source of its values: ``x60`` or ``x60@thesis-4.1``."""
 
-    top_electrode: Slot = "etpu@thesis-c.1-top"
-    bottom_electrode: Slot = "etpu@thesis-c.1-bottom"
+    top_electrode: Slot = "etpu"
+    bottom_electrode: Slot = "etpu"
     film: Slot = "x60"
     dielectric: Slot = Field(default="x60", description="Of film and isolation too, unless they are given.")
     isolation: Slot = "x60"
@@ -273,12 +273,40 @@ class Design(Strict):
 
     def id(self) -> str:
         """Hash of all resolved parameters and material values; not of the design's name, nor of sensorgen's version."""
-        data = _FIRST | self.resolved()
+        data = _FIRST | self._lasting(self.resolved())
         data.pop("own", None)  # values of materials and machines are there without the words around them
         if self._shape_text is not None:
             data["shape_text"] = self._shape_text
         text = json.dumps(data, sort_keys=True, allow_nan=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    def ids(self) -> set[str]:
+        """Identity of the design, and of what it was while its electrodes had the defaults of version 0.1.0."""
+        slots = {part: slot for part, slot in _FIRST_SLOTS.items() if getattr(self.materials, part) == "etpu"}
+        return {self.id(), self.model_copy(update={"materials": self.materials.model_copy(update=slots)}).id()}
+
+    def _lasting(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Resolved data, as version 0.1.0 had them where the design takes the same numbers as it did then."""
+        slots = dict(self.materials)
+        first = slots | {part: slot for part, slot in _FIRST_SLOTS.items() if slots[part] == "etpu"}
+        filled = self._filled()
+        then = filled if self.bodies else list(filter(None, first.values()))
+        if any(map(self._differs, filled, then)):
+            return data
+        stuff = {name: self._former(name, values, then) for name, values in data["materials_values"].items()}
+        return data | {"materials": first, "materials_values": stuff}
+
+    def _differs(self, slot: str, then: str) -> bool:
+        """Whether a part has another number of any quantity than in version 0.1.0."""
+        (name, _, source), first_source = slot.partition("@"), then.partition("@")[2]
+        now, first = self.material(name), material_files.first_form(self.material(name))
+        return any(now.chosen(q, source) != first.chosen(q, first_source) for q in first.properties)
+
+    def _former(self, name: str, values: dict[str, Any], then: Iterable[str]) -> dict[str, Any]:
+        """Values of a material as version 0.1.0 had them, and the first source of its parts."""
+        sources = (slot.partition("@")[2] for slot in then if slot.partition("@")[0] == name)
+        first = material_files.first_form(self.material(name)).model_dump(include={"properties"})
+        return values | first | {"source": values["source"] or next(filter(None, sources), "")}
 
     def waived(self, findings: list[Finding]) -> list[Finding]:
         """The findings, with the reason where the design accepts them."""
@@ -303,6 +331,7 @@ class Design(Strict):
 
 # Version 0.1.0 hashed its own number, and its identities last: the logs, labels and batches that name them stay valid.
 _FIRST = {"sensorgen": "0.1.0"}
+_FIRST_SLOTS = {"top_electrode": "etpu@thesis-c.1-top", "bottom_electrode": "etpu@thesis-c.1-bottom"}
 # What only the check of G-code reads, and how exact the printer is: neither decides a sensor.
 _LIMITS: dict[str, Any] = {
     "control": {"commands", "longest_retraction_mm"}, "print": {"max_flow_mm3_s"}, "tool_height_error_mm": True,
@@ -486,8 +515,10 @@ def of_resolved(name: str, data: Mapping[str, Any]) -> Design:
     except (AttributeError, KeyError, TypeError):
         raise BadInput(f"{name}: not a resolved design; expected one as batch.json has it") from None
     found = make({"name": name, **{key: data[key] for key in Design.model_fields if key in data}, **names})
-    then, now = ({k: v for k, v in d.items() if k not in ("sensorgen", "own")} for d in (data, found.resolved()))
-    if then != json.loads(json.dumps(now)):
+    now = found.resolved()
+    forms = (data, now, found._lasting(now))
+    then, *here = ({k: v for k, v in d.items() if k not in ("sensorgen", "own")} for d in forms)
+    if then not in json.loads(json.dumps(here)):
         raise BadInput(f"{name}: its materials, printer or quality have other values here than where it was recorded")
     return found
 

@@ -1,15 +1,16 @@
 r"""Resistivity that a multimeter's reading allows.
 
-An electrode's resistance over its resistivity is known between bounds, so that each reading allows a range of
-:math:`\varrho`. A film that leaks evenly lets R_Y read less than the electrode has; a bridge at the contacts does not:
-which it was is not recorded, so the range runs from R_Y as it was read to R_Y as an even leak would have it.
+An electrode's resistance over its resistivity is known between bounds, and R_Z says how far the other electrode carries
+current through the film (:mod:`sensorgen.measure.signal.leakage`). The log does not say which electrode was read: each
+reading allows a range of :math:`\varrho`.
 """
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import isfinite, log
+from math import inf, isfinite, isnan, log, nan
 
 from sensorgen.analysis.comparison.specimens import Compared
+from sensorgen.core.bounds import Bounds
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
 from sensorgen.design.values import resistivities
@@ -32,23 +33,26 @@ def usable(row: Compared) -> bool:
 
 
 def allowed(row: Compared, body: Body) -> Allowed | None:
-    """What a reading allows; None where it is none of a sound electrode."""
-    if not usable(row):
+    """Resistivity that a reading allows; None without one above 0. A film without a reading is taken for tight."""
+    ry, rz = row.verdict.ry_ohm, row.across_ohm
+    if not 0 < ry < inf:
         return None
-    ry, rz = row.verdict.ry_ohm, row.verdict.rz_ohm
-    per, design = _per_resistivity(body), body.design
-    highest, leak = electrode_and_leak(ry, rz) if rz > 0 else (ry, float("nan"))
+    ends, design = _per_resistivity(body), body.design
     area = design.area_mm2 * M_PER_MM**2
-    return Allowed(log(ry / per[1]), log(highest / per[0]), log(leak / area) if leak > 0 else float("nan"))
+    known = [
+        (this, *electrode_and_leak(ry, inf if isnan(rz) else rz, other.value / this.value))
+        for this, other in zip(ends, ends[::-1], strict=True)
+    ]
+    leak = max(leak for *_, leak in known)
+    low, high = min(ohm / this.upper for this, ohm, _ in known), max(ohm / this.lower for this, ohm, _ in known)
+    return Allowed(log(low), log(high), log(leak / area) if 0 < leak < inf else nan)
 
 
 @lru_cache(maxsize=64)
-def _per_resistivity(body: Body) -> tuple[float, float]:
-    """Bounds of an electrode's resistance over its resistivity [1/m]."""
+def _per_resistivity(body: Body) -> list[Bounds]:
+    """Resistance of each electrode over its resistivity, without what the material leaves open [1/m]."""
     rho = resistivities(body.design)
-    found = [
-        end / rho[name].value
-        for name, r in electrode_resistance(body).items()
-        for end in (r.model.lower, r.model.upper, r.print.lower, r.print.upper)
+    return [
+        Bounds.of(r.value, r.unit, model=r.model, print=r.print).times(1 / rho[end].value, "1/m")
+        for end, r in electrode_resistance(body).items()
     ]
-    return min(found), max(found)

@@ -1,10 +1,10 @@
 """What a design should measure: the earliest prediction in the log, else one that is made now and named so."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import log
-from statistics import geometric_mean
+from math import inf, isnan, log
+from statistics import fmean, geometric_mean
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from sensorgen.core.version import __version__
 from sensorgen.design.body import Body
 from sensorgen.measure.log import Entry, Log, Withdrawal
 from sensorgen.measure.log import Prediction as Stored
+from sensorgen.measure.signal.leakage import along_ohm, leak_s
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, from_json
 
@@ -49,20 +50,38 @@ class Predicted:
 
     @cached_property
     def ry_ohm(self) -> Bounds | None:
-        """Along one electrode [ohm]: the geometric mean of all, as the readings do not say which was measured.
+        """Along one electrode, of a tight film [ohm]; None where no resistance is predicted."""
+        return self.along_ohm(inf)
 
-        The range is that of the best and the worst, with the errors of models, print and materials; None where no
-        resistance is predicted.
+    def along_ohm(self, rz_ohm: float) -> Bounds | None:
+        """Reading along an electrode of a film that reads ``rz_ohm`` across; None where no resistance is predicted.
+
+        The film is a ladder of leaks: one electrode where it is tight, both in parallel where it is a short. Without a
+        reading across (nan) it is taken for tight, and the range holds a short too. The value is the geometric mean of
+        both electrodes, as the readings do not say which was measured; the range is that of the best and the worst,
+        with the errors of models, print and materials.
         """
-        ends = self.prediction.resistance.values()
+        ends = list(self.prediction.resistance.values())
         if not ends:
             return None
-        low, high = min(r.lower for r in ends), max(r.upper for r in ends)
-        model, by_print, material = (
-            Interval(min(part.lower for part in of), max(part.upper for part in of))
-            for of in zip(*((r.model, r.print, r.material) for r in ends), strict=True)
-        )
-        return Bounds(geometric_mean(r.value for r in ends), low, high, "ohm", model, by_print, material)
+
+        def reading(of: Callable[[Bounds], float], across: float) -> list[float]:
+            ohms = [of(r) for r in ends]
+            if len(ohms) < 2 or inf in ohms:  # as where walls interrupt an electrode
+                return ohms
+            leak = leak_s(across, fmean(ohms))
+            return [along_ohm(ohm, leak, sum(ohms) / ohm - 1) for ohm in ohms]
+
+        least, most = (0.0, inf) if isnan(rz_ohm) else (rz_ohm, rz_ohm)
+
+        def interval(part: Callable[[Bounds], Bounds | Interval]) -> Interval:
+            low, high = reading(lambda r: part(r).lower, least), reading(lambda r: part(r).upper, most)
+            return Interval(min(low), max(high))
+
+        whole = interval(lambda r: r)
+        parts = (interval(lambda r: r.model), interval(lambda r: r.print), interval(lambda r: r.material))
+        value = geometric_mean(reading(lambda r: r.value, most))
+        return Bounds(value, whole.lower, whole.upper, "ohm", *parts)
 
     @property
     def capacitance_f(self) -> Interval | None:

@@ -5,10 +5,11 @@ from collections import Counter
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import isfinite, log, nan
+from math import isfinite, isnan, log, nan
 
 from sensorgen.analysis.comparison.expected import Predicted, stored_or_made
 from sensorgen.analysis.comparison.measured import Measured, readings
+from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.lazy import Lazy
 from sensorgen.design.body import Body, BodyOf
@@ -43,15 +44,26 @@ class Compared:
     verdict: Verdict
 
     @property
+    def across_ohm(self) -> float:
+        """The least reading between the electrodes [ohm]; without one, 0 where they touch as printed, else nan."""
+        rz = self.verdict.rz_ohm
+        return 0.0 if isnan(rz) and self.evidence.touching else rz
+
+    @property
+    def expected_ohm(self) -> Bounds | None:
+        """Predicted reading along an electrode of the network that was measured [ohm]; None where none is predicted."""
+        return self.predicted.along_ohm(self.across_ohm) if self.predicted else None
+
+    @property
     def residual(self) -> float:
         """Ln of the least R_Y over the predicted value [-]; nan where one is missing."""
-        ry, expected = self.verdict.ry_ohm, self.predicted.ry_ohm if self.predicted else None
+        ry, expected = self.verdict.ry_ohm, self.expected_ohm
         return log(ry / expected.value) if expected and isfinite(ry) and ry > 0 else nan
 
     @property
     def inside(self) -> bool | None:
         """Whether a reading of R_Y lies within the prediction's interval; None where one is missing."""
-        expected = self.predicted.ry_ohm if self.predicted else None
+        expected = self.expected_ohm
         if expected is None or not self.evidence.ry_ohm:
             return None
         return any(expected.lower <= value <= expected.upper for value in self.evidence.ry_ohm)
@@ -129,7 +141,7 @@ def of_iteration(
     alike = Counter(design.name for design in by_id.values())
     names = {name: _label(design, alike) for name, design in by_specimen.items()}
     designs = {label: by_id[key] for label, key in sorted((_label(d, alike), key) for key, d in by_id.items())}
-    ids = {name: {design.id()} for name, design in designs.items()}
+    ids = {name: design.ids() for name, design in designs.items()}
     for specimen in by_specimen.keys() & printed.keys():
         ids[names[specimen]].add(printed[specimen].design_id)  # another version of sensorgen may have named it
     left_out += _other_designs(measured.designs, set().union(*ids.values()))

@@ -9,12 +9,11 @@ from math import isfinite, log, nan, sqrt
 import numpy as np
 
 from sensorgen.analysis.calibration import Bench, Known, known
-from sensorgen.analysis.comparison import Comparison, of_iteration, predicted
+from sensorgen.analysis.comparison import Compared, Comparison, Predicted, of_iteration, predicted
 from sensorgen.analysis.comparison.allowed import Allowed, allowed, usable
 from sensorgen.analysis.comparison.moved import Movable, at_rest
 from sensorgen.analysis.fit import resistance, tones
 from sensorgen.analysis.fit.results import Error, Fit, Fitted, Untold
-from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
@@ -34,6 +33,7 @@ _Which = tuple[int | None, Sequence[str]]  # iteration, or specimens
 def fit(
     log: Log, iteration: int | None, seed: int = SEED, body_of: BodyOf = bodies.default_body,
     step: Callable[[str], None] = lambda _: None, bench: Bench | None = None, *, specimens: Sequence[str] = (),
+    held_share: float = HELD_BACK,
 ) -> Fit:  # fmt: skip
     """Fit material values to the readings and recordings of an iteration or of specimens.
 
@@ -53,6 +53,8 @@ def fit(
         Its tip and force.
     specimens : sequence of str
         Specimens as written, in place of an iteration.
+    held_share : float
+        Share of the specimens that are held back [-].
 
     Raises
     ------
@@ -65,7 +67,8 @@ def fit(
     left_out = list(found.left_out)
     step("recordings")
     measured = list(_measured(log, (iteration, specimens), found, bench or Bench(), body_of, left_out))
-    readings = list(_usable(found))
+    allowing = list(_allowing(found))
+    readings = [(row.reading.specimen, reading) for row, reading in allowing if usable(row)]
     names = sorted({specimen for specimen, _ in readings} | {one.specimen for one, _ in measured})
     if not names:
         of = ", ".join(specimens) or f"iteration {iteration}"
@@ -73,7 +76,7 @@ def fit(
             f"no readings of sound electrodes and no recordings of {of} in {str(log.path)!r}; "
             "expected some to fit to: sensorgen log list shows what there is"
         )
-    kept_back = held_back(names, seed)
+    kept_back, design = held_back(names, seed, held_share), next(iter(found.bodies.values())).design
     step("values")
     values, untold = _fitted(
         [reading for specimen, reading in readings if specimen not in kept_back],
@@ -81,9 +84,13 @@ def fit(
             tones.of_specimen(one, print_, Movable(found.bodies[found.names[one.specimen]]))
             for one, print_ in measured if one.specimen not in kept_back
         ],
-        next(iter(found.bodies.values())).design, seed,
+        design, seed,
     )  # fmt: skip
     step("errors")
+    groups: dict[str, list[tuple[Allowed, bool]]] = {}
+    for row, reading in allowing:
+        groups.setdefault(f"{row.evidence.shape} {row.evidence.axes}".strip(), []).append((reading, usable(row)))
+
     errors = [
         *_reading_errors({specimen for specimen, _ in readings} & kept_back, found, values),
         *_rest_errors([one for one, _ in measured if one.recorded and one.specimen in kept_back], found, values),
@@ -91,6 +98,7 @@ def fit(
     return Fit(
         iteration, specimens, seed, tuple(values), tuple(untold), tuple(errors), len(names) - len(kept_back),
         tuple(sorted(kept_back)), tuple(left_out), _fingerprint(log, (iteration, specimens)),
+        groups=tuple(resistance.by_group(groups, design.slot("top_electrode")[0].name)),
     )  # fmt: skip
 
 
@@ -113,20 +121,20 @@ def _measured(
         yield one, print_ or specimen
 
 
-def _usable(found: Comparison) -> Iterator[tuple[str, Allowed]]:
-    """Specimens, and what each of their readings allows."""
+def _allowing(found: Comparison) -> Iterator[tuple[Compared, Allowed]]:
+    """Readings along electrodes, and what each of them allows."""
     for row in found.rows:
         if row.predicted and (reading := allowed(row, found.bodies[row.predicted.design])):
-            yield row.reading.specimen, reading
+            yield row, reading
 
 
-def held_back(names: Sequence[str], seed: int) -> frozenset[str]:
-    """A quarter of the specimens, drawn by a seed; none of fewer than four.
+def held_back(names: Sequence[str], seed: int, share: float = HELD_BACK) -> frozenset[str]:
+    """A share of the specimens, a quarter if not given, drawn by a seed; none of fewer than four.
 
     >>> len(held_back("abcdefgh", 23))
     2
     """
-    count = round(HELD_BACK * len(names)) if len(names) >= 4 else 0
+    count = round(share * len(names)) if len(names) >= 4 else 0
     drawn = np.random.default_rng(seed).permutation(len(names))[:count]
     return frozenset(sorted(names)[k] for k in drawn.tolist())
 
@@ -137,7 +145,7 @@ def _fitted(
     """All values and all that stays open; of two values of one quantity the one that is known better."""
     electrode, film = design.slot("top_electrode")[0].name, design.slot("film")[0].name
     found = [
-        resistance.resistivity(readings, electrode, seed),
+        resistance.resistivity(readings, electrode),
         *tones.values(fits),
         resistance.leak(readings, film, seed),
     ]
@@ -163,14 +171,14 @@ def with_values(body: Body, values: Sequence[Fitted]) -> Body:
 
 def _reading_errors(specimens: Container[str], found: Comparison, values: Sequence[Fitted]) -> list[Error]:
     """Residuals of what a fit could have used of some specimens, before and after it."""
-    before, residuals, after = array("d"), array("d"), dict[str, Bounds | None]()
+    before, residuals, after = array("d"), array("d"), dict[str, Predicted]()
     for row in found.rows:
         of = row.predicted
         if of is None or row.reading.specimen not in specimens or not usable(row):
             continue
         if of.design not in after:
-            after[of.design] = predicted(with_values(found.bodies[of.design], values)).ry_ohm
-        expected = after[of.design]
+            after[of.design] = predicted(with_values(found.bodies[of.design], values))
+        expected = after[of.design].along_ohm(row.across_ohm)
         before.append(row.residual)
         residuals.append(log(row.verdict.ry_ohm / expected.value) if expected else nan)
     return [Error("R_Y", len(before), _rms(before), _rms(residuals))] if before else []

@@ -1,12 +1,12 @@
 """Resistivity and leak from a multimeter's readings."""
 
-from collections.abc import Sequence
-from math import exp, isfinite
+from collections.abc import Iterator, Mapping, Sequence
+from math import exp, isfinite, log, sqrt
 
 import numpy as np
 
 from sensorgen.analysis.comparison.allowed import Allowed
-from sensorgen.analysis.fit.results import LEVEL, Fitted, Untold
+from sensorgen.analysis.fit.results import LEVEL, Fitted, GroupError, Untold
 from sensorgen.design.materials import FILM_LEAK
 from sensorgen.measure.recording.samples import Real
 
@@ -16,21 +16,46 @@ _DRAWS = 2000
 _PROPERTY = 10.0  # leaks that scatter by more than this factor about their median are no property of a material
 
 
-def resistivity(readings: Sequence[Allowed], material: str, seed: int) -> Fitted | Untold:
-    """One resistivity for both electrodes: the median of the middles; its interval holds the medians of both ends."""
-    if len(readings) < LEAST:
-        return Untold(f"{RESISTIVITY} along", f"{len(readings)} readings of sound electrodes; expected {LEAST} or more")
-    ends = np.array([(r.low, r.high) for r in readings])
-    draws = _medians(ends, seed)
-    outer = 100 * np.array([(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    low, high = np.percentile(draws[:, 0], outer[0]), np.percentile(draws[:, 1], outer[1])
-    middle = float(np.median(ends.mean(axis=1)))
-    scatter = np.exp(np.percentile(_medians(ends.mean(axis=1)[:, None], seed)[:, 0], outer) - middle)
+def resistivity(readings: Sequence[Allowed], material: str) -> Fitted | Untold:
+    """One resistivity for both electrodes: the median of prints, and the interval that holds 95 % of other prints.
+
+    The interval is Student's for one more print, by the scatter of ln of the resistivity; it holds at least the medians
+    of what single readings leave open.
+    """
+    from scipy.special import stdtrit
+
+    count = len(readings)
+    if count < LEAST:
+        return Untold(f"{RESISTIVITY} along", f"{count} readings of sound electrodes; expected {LEAST} or more")
+    low, high = np.array([(r.low, r.high) for r in readings]).T
+    at = (low + high) / 2
+    middle, scatter = float(np.median(at)), float(np.std(at, ddof=1))
+    reach = float(stdtrit(count - 1, (1 + LEVEL) / 2)) * scatter * sqrt(1 + 1 / count)
     return Fitted(
-        material, RESISTIVITY, exp(middle), exp(low), exp(high),
-        f"R_Y of {len(readings)} specimens, along the electrode; scatter alone x {scatter[0]:.3g} to {scatter[1]:.3g}, "
-        "the rest of the interval: which electrode was measured, how it is printed, and how much of R_Y the film took",
+        material, RESISTIVITY, exp(middle), exp(min(middle - reach, np.median(low))),
+        exp(max(middle + reach, np.median(high))),
+        f"R_Y and R_Z of {count} specimens, along the electrode: the median; the interval holds 95 % of prints, which "
+        f"scatter by a factor of {exp(scatter):.3g} (one standard deviation)",
     )  # fmt: skip
+
+
+def by_group(groups: Mapping[str, Sequence[tuple[Allowed, bool]]], material: str) -> Iterator[GroupError]:
+    """Readings of each group beside the resistivity of all other groups.
+
+    Parameters
+    ----------
+    groups : mapping of str to sequence of (Allowed, bool)
+        Readings of a group, and whether the electrode is sound: others are predicted, but not fitted to.
+    material : str
+        Of the electrodes.
+    """
+    for name, group in groups.items():
+        rest = [reading for other, of in groups.items() if other != name for reading, sound in of if sound]
+        if isinstance(fitted := resistivity(rest, material), Fitted):
+            low, high = log(fitted.low), log(fitted.high)
+            inside = sum(reading.low <= high and reading.high >= low for reading, _ in group)
+            ratio = exp(float(np.median([(reading.low + reading.high) / 2 for reading, _ in group]))) / fitted.value
+            yield GroupError(name, len(group), inside, ratio, fitted.value, fitted.low, fitted.high)
 
 
 def _medians(values: Real, seed: int) -> Real:

@@ -63,6 +63,19 @@ class Error:
 
 
 @dataclass(frozen=True)
+class GroupError:
+    """Electrodes of a shape and direction, predicted by the resistivity of all others."""
+
+    group: Annotated[str, Column("group left out")]
+    readings: Annotated[int, Column("readings")]
+    inside: Annotated[int, Column("within", "", "readings that a resistivity within the range explains")]
+    ratio: Annotated[float, Column("ratio", "", "median resistivity of the group over that of the others")]
+    value: Annotated[float, Column("resistivity of the others", "ohm m")]
+    low: Annotated[float, Column("from", "ohm m")]
+    high: Annotated[float, Column("to", "ohm m")]
+
+
+@dataclass(frozen=True)
 class Fit:
     """A fit.
 
@@ -90,6 +103,8 @@ class Fit:
         SHA-256 of what was fitted to: names, readings and raw files.
     file : str or None
         Where the source is kept; None if it is not.
+    groups : tuple of GroupError
+        Each shape and direction, predicted by the others.
     """
 
     iteration: int | None
@@ -103,6 +118,7 @@ class Fit:
     left_out: tuple[tuple[str, str], ...]
     log: str
     file: str | None = None
+    groups: tuple[GroupError, ...] = ()
 
     @property
     def source(self) -> str:
@@ -128,8 +144,14 @@ class Fit:
         for error in self.errors:
             before, after = (f"a factor of {exp(e):.3g}" for e in (error.before, error.after))
             yield f"{error.observable} of {error.count} held back: off by {before} before, {after} after (rms)"
+        yield from self._groups()
         if self.left_out:
             of = f"--iteration {self.iteration}" if self.iteration is not None else " ".join(map(repr, self.names))
             yield f"left out: {len(self.left_out)}; sensorgen report {of} says why"
         if self.file:
             yield f"in {self.file}"
+
+    def _groups(self) -> Iterator[Table]:
+        if self.groups:
+            inside, total = sum(g.inside for g in self.groups), sum(g.readings for g in self.groups)
+            yield Table.of("groups", f"Leaving out a group: {inside} of {total} readings within the range", self.groups)

@@ -7,7 +7,7 @@ from math import comb, nan
 from statistics import geometric_mean, median
 from typing import Annotated
 
-from sensorgen.analysis.comparison import Compared, Comparison, Predicted
+from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.report.electrodes import usable
 from sensorgen.core.document import Column, Table
 
@@ -28,7 +28,7 @@ class DirectionRow:
     others: Annotated[int, Column("specimens of the second")]
     second_ohm: Annotated[float, Column("median of the second", "ohm")]
     ratio: Annotated[float, Column("second / first")]
-    predicted: Annotated[float, Column("ratio predicted", "", "of the better electrodes, as printed")]
+    predicted: Annotated[float, Column("ratio predicted", "", "as printed, and as the films leak")]
     p: Annotated[float, Column("p", "", "Wilcoxon rank-sum test of the plates' medians")]
 
 
@@ -46,7 +46,7 @@ def rows(found: Comparison) -> list[DirectionRow]:
             continue
         (first, ones), (second, others) = sorted(by.items())
         one, other = (_by_plate([last[name] for name in names]) for names in (ones, others))
-        expected = [_predicted([last[name].predicted for name in names]) for names in (ones, others)]
+        expected = [_predicted([last[name] for name in names]) for names in (ones, others)]
         made.append(DirectionRow(
             shape, "unknown" if film_mm is None else f"{film_mm:g} mm", first, len(ones), median(one), second,
             len(others), median(other), median(other) / median(one), expected[1] / expected[0],
@@ -63,10 +63,10 @@ def _by_plate(of: Sequence[Compared]) -> list[float]:
     return [median(values) for values in plates.values()]
 
 
-def _predicted(of: Sequence[Predicted | None]) -> float:
-    """Of the better electrode: the one whose cogs may carry current along it [ohm]."""
-    ends = [min(r.value for r in one.prediction.resistance.values()) for one in of if one and one.ry_ohm]
-    return geometric_mean(ends) if ends else nan
+def _predicted(of: Sequence[Compared]) -> float:
+    """Of the networks that were measured, as films leak [ohm]."""
+    values = [bounds.value for row in of if (bounds := row.expected_ohm)]
+    return geometric_mean(values) if values else nan
 
 
 def table(found: Comparison) -> Table | None:

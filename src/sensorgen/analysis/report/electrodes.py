@@ -20,10 +20,11 @@ VERDICT_COLOURS = dict(zip(WORDS, (PINK, ORANGE, YELLOW, SKY, GREEN, GREY), stri
 MOST_ROWS = 200  # of a figure: more cannot be read
 _ALIKE = 1.05  # ratio up to which two resistances are called alike
 NOTES = (
-    "The predicted interval runs from the better electrode with all its cogs to the worse one without them, because "
-    "the log does not say which of the two was measured. The ratio is that of the least reading and the middle of the "
-    "interval.",
-    "A leaking film lets a part of the current pass through the other electrode: the reading then falls by up to half.",
+    "The prediction is that of the network that was measured: one electrode where the film is tight, both in parallel "
+    "where it is a short, and a ladder of even leaks with the reading between the electrodes in between. Without that "
+    "reading the interval runs from the short to the tight film.",
+    "The interval holds both electrodes, because the log does not say which was measured. The ratio is that of the "
+    "least reading and the predicted value.",
 )
 
 
@@ -74,7 +75,7 @@ def readings(found: Comparison) -> Table:
     def row_of(k: int) -> ReadingRow:
         row = found.direct[k]
         r, v = row.reading, row.verdict
-        expected = row.predicted.ry_ohm if row.predicted else None
+        expected = row.expected_ohm
         bounds = (expected.lower, expected.value, expected.upper) if expected else (nan, nan, nan)
         return ReadingRow(
             r.number, r.specimen, row.predicted.design if row.predicted else "", v.ry_ohm,
@@ -130,8 +131,8 @@ def usable(found: Comparison) -> Lazy[Compared]:
 def headline(found: Comparison) -> Iterator[str]:
     """Measured against predicted, in one sentence."""
     rows = usable(found)
-    if len(rows) == 1 and rows[0].predicted and rows[0].predicted.ry_ohm:
-        expected, where = rows[0].predicted.ry_ohm, "within" if rows[0].inside else "outside"
+    if len(rows) == 1 and (expected := rows[0].expected_ohm):
+        where = "within" if rows[0].inside else "outside"
         yield (
             f"Electrode resistance of {rows[0].reading.specimen}: measured {rows[0].verdict.ry_ohm:.4g} ohm, predicted "
             f"{expected.lower:.4g} to {expected.upper:.4g} ohm ({where} the interval)."
@@ -194,7 +195,7 @@ def _names(rows: Sequence[Compared]) -> tuple[str, ...]:
 
 def _ratios(rows: Sequence[Compared], left_out: str) -> Figure:
     names, values = _names(rows), [exp(row.residual) for row in rows]
-    bounds = [row.predicted.ry_ohm if row.predicted else None for row in rows]
+    bounds = [row.expected_ohm for row in rows]
     low, high = ([getattr(b, end) / b.value if b else 1.0 for b in bounds] for end in ("lower", "upper"))
     curves = [Curve("ranges", "predicted interval", [1.0] * len(rows), names, low, high, colour=GREY)]
     for word in dict.fromkeys(row.verdict.word for row in rows):
@@ -214,7 +215,7 @@ def _ratios(rows: Sequence[Compared], left_out: str) -> Figure:
 
 def _resistances(rows: Sequence[Compared]) -> Figure:
     names = _names(rows)
-    bounds = [row.predicted.ry_ohm for row in rows if row.predicted and row.predicted.ry_ohm]
+    bounds = [bounds for row in rows if (bounds := row.expected_ohm)]
     least, most = [min(r.evidence.ry_ohm) for r in rows], [max(r.evidence.ry_ohm) for r in rows]
     curves = (
         Curve("ranges", "predicted interval", [b.value for b in bounds], names, [b.lower for b in bounds],

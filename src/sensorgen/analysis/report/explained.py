@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import exp, inf, log, nan, sqrt
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.measure.recording.samples import Complex, Real
-from sensorgen.measure.signal.leakage import across_ohm, along_ohm
+from sensorgen.measure.signal.leakage import across_ohm
 from sensorgen.measure.signal.verdicts import INTACT_OHM
 
 RESISTIVITY, PERMITTIVITY, MODULUS, FILM, LEAK = PARAMETERS = (
@@ -99,25 +99,34 @@ def sentences(found: Sequence[Explanation]) -> Iterator[str]:
 def _resistances(found: Comparison) -> Iterator[Kind]:
     """Electrodes, and films up to what the meter can tell from an open circuit."""
 
-    def along(ohm: float, parameter: str, value: float) -> float:
-        return along_ohm(ohm * (value if parameter == RESISTIVITY else 1.0), value if parameter == LEAK else 0.0)
-
     def across(ohm: float, parameter: str, value: float) -> float:
         return min(across_ohm(ohm, value if parameter == LEAK else 0.0), INTACT_OHM)
 
     rows = (
-        (row.verdict.ry_ohm, row.verdict.rz_ohm, row.predicted.ry_ohm.value, not row.evidence.touching)
-        for row in usable(found) if row.predicted and row.predicted.ry_ohm
+        (v.ry_ohm, v.rz_ohm, row.expected_ohm.value, row.predicted.ry_ohm.value, v.leak_s, not row.evidence.touching)
+        for row in usable(found) if row.predicted and row.predicted.ry_ohm and row.expected_ohm for v in (row.verdict,)
     )  # fmt: skip
-    kind = np.dtype([("y", "f8"), ("z", "f8"), ("middle", "f8"), ("apart", "?")])
+    kind = np.dtype([(name, "f8") for name in ("y", "z", "expected", "alone", "leak")] + [("apart", "?")])
     known = np.fromiter(rows, kind)
     if len(known):
-        measured = np.log(known["y"]).astype(complex)
-        yield Kind("electrode resistance", measured, _of_electrodes(known["middle"], along))
+        yield Kind("electrode resistance", np.log(known["y"]).astype(complex), partial(_along, known))
     both = known[(known["z"] > 0) & known["apart"]]
     if len(both):
         measured = np.log(np.minimum(both["z"], INTACT_OHM)).astype(complex)
-        yield Kind("film resistance", measured, _of_electrodes(both["middle"], across))
+        yield Kind("film resistance", measured, _of_electrodes(both["alone"], across))
+
+
+def _along(known: Any, parameter: str, value: float) -> Complex:
+    """Ln of predicted readings along an electrode; a leakage is in addition to what was measured across the film."""
+    leak = np.nan_to_num(known["leak"], posinf=np.inf)
+    more = _carried(known["alone"], leak + (value if parameter == LEAK else 0.0)) / _carried(known["alone"], leak)
+    return np.asarray(np.log(known["expected"] * more * (value if parameter == RESISTIVITY else 1.0) + 0j))
+
+
+def _carried(ohm: Real, leak_s: Real) -> Real:
+    """Share of an electrode's resistance that a reading has, as of :func:`along_ohm` for arrays."""
+    half = np.maximum(np.sqrt(ohm * leak_s / 2), _FLAT)
+    return np.asarray((1 + np.tanh(half) / half) / 2)
 
 
 def _of_electrodes(middles: Real, law: Callable[[float, str, float], float]) -> Model:

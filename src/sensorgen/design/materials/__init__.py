@@ -136,6 +136,13 @@ class Material(Strict):
             )
         return chosen[0]
 
+    def chosen(self, quantity: str, source: str = "") -> float | None:
+        """Number of a quantity as :meth:`value` chooses it; None where it raises."""
+        try:
+            return self.value(quantity, source).value
+        except MissingValue:
+            return None
+
     def print_range(self, quantity: str, around: float) -> tuple[float, float]:
         """Lowest and highest that the sources advise for printing.
 
@@ -316,6 +323,20 @@ def parse(name: str, text: str) -> Material:
             if sum(each.default for each in several) > 1:
                 raise BadInput(f"{file}: {quantity} has two values with default: true; expected one")
     return made
+
+
+def first_form(material: Material) -> Material:
+    """A material with the values that version 0.1.0 had of it, and those of the user's own."""
+    places = resources.files(__name__) / "first" / f"{material.name}.yaml"
+    if material.name not in names() or not places.is_file():
+        return material
+    shipped, then = _shipped(material.name).properties, yamlfile.parse(places.read_text("utf-8"), places.name)
+    changed = {}
+    for quantity, values in then.items():
+        own = [value for value in material.properties[quantity] if value not in shipped[quantity]]
+        at = sum(value.source == SET for value in own)
+        changed[quantity] = [*own[:at], *(Value(**value) for value in values), *own[at:]]
+    return material.model_copy(update={"properties": material.properties | changed})
 
 
 def fault(quantity: str, given: Value, *, advised: bool = False) -> str:

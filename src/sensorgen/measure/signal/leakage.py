@@ -1,12 +1,13 @@
-r"""What a multimeter reads of two equal electrodes of resistance R each, with a film that leaks evenly, G in all.
+r"""Multimeter readings of two electrodes, R and R', with a film that leaks evenly, G in all: a ladder of resistors.
 
-Along one electrode, the other one floating, and between the electrodes at their contacts, with
-:math:`q = \sqrt{2 R G}`:
+Along the electrode R, the other one floating, and between both at their contacts, with :math:`q = \sqrt{(R + R') G}`:
 
-.. math:: R_Y = R \left(\frac12 + \frac{\tanh(q/2)}{q}\right), \qquad R_Z = \frac{2 R}{q \tanh q}
+.. math:: R_Y = \frac{R}{R + R'} \left(R' + R\,\frac{\tanh(q/2)}{q/2}\right), \qquad
+          R_Z = \frac{R + R'}{q \tanh q}
 
-A film that leaks carries a part of the current over to the other electrode and back: R_Y falls to R/2. A small leak
-reads :math:`1/G`.
+They follow from :math:`u'' = (R + R') G\,u / L^2` for the voltage u across the film, and from the current of R' being
+0 at both ends. A film that leaks carries a part of the current over to the other electrode and back: R_Y falls from R
+to both in parallel. A small leak reads :math:`1/G`.
 """
 
 from collections.abc import Callable
@@ -18,7 +19,7 @@ _SMALL, _LARGE = 1e-12, 1e12  # of q: below, the film is tight; above, it is a s
 _STEPS, _ROUNDING = 50, 1e-15
 
 
-def along_ohm(electrode_ohm: float, leak_s: float) -> float:
+def along_ohm(electrode_ohm: float, leak_s: float, other: float = 1.0) -> float:
     """R_Y [ohm].
 
     Parameters
@@ -26,18 +27,20 @@ def along_ohm(electrode_ohm: float, leak_s: float) -> float:
     electrode_ohm : float
         R of one electrode, end to end [ohm].
     leak_s : float
-        G of the whole film [S].
+        G of the whole film, infinite for a short all along [S].
+    other : float
+        Resistance of the other electrode over this one's [-].
 
     Examples
     --------
-    >>> along_ohm(600.0, 0.0), round(along_ohm(600.0, 1e15), 3)
-    (600.0, 300.0)
+    >>> along_ohm(600.0, 0.0), along_ohm(600.0, inf), along_ohm(600.0, inf, other=2.0)
+    (600.0, 300.0, 400.0)
     """
-    return electrode_ohm * _along(sqrt(2 * electrode_ohm * leak_s))
+    return electrode_ohm * _along(sqrt((1 + other) * electrode_ohm * leak_s), other)
 
 
-def _along(q: float) -> float:
-    return 1.0 if q < _SMALL else 0.5 + tanh(q / 2) / q
+def _along(q: float, other: float) -> float:
+    return 1.0 if q < _SMALL else (other + tanh(q / 2) / (q / 2)) / (1 + other)
 
 
 def across_ohm(electrode_ohm: float, leak_s: float) -> float:
@@ -90,18 +93,20 @@ def leak_s(rz_ohm: float, electrode_ohm: float) -> float:
     return q**2 / line
 
 
-def electrode_and_leak(along: float, across: float) -> tuple[float, float]:
+def electrode_and_leak(along: float, across: float, other: float = 1.0) -> tuple[float, float]:
     """The R [ohm] and G [S] that read as R_Y and R_Z.
 
     Parameters
     ----------
     along, across : float
-        R_Y, above 0, and R_Z, above 0, infinite for a tight film [ohm].
+        R_Y, above 0, and R_Z, 0 for a short all along, infinite for a tight film [ohm].
+    other : float
+        Resistance of the other electrode over that of R_Y's [-].
 
     Raises
     ------
     OutOfRange
-        Readings that are not above 0.
+        R_Y is not above 0, or R_Z is below 0.
 
     Examples
     --------
@@ -109,13 +114,13 @@ def electrode_and_leak(along: float, across: float) -> tuple[float, float]:
     >>> round(r, 6), round(g, 9)
     (700.0, 0.001)
     """
-    if not (0 < along < inf and across > 0):
-        raise OutOfRange(f"readings of {along:g} and {across:g} ohm; expected numbers above 0")
-    if across == inf:
-        return along, 0.0
-    q = _root(lambda q: 2 / (q * tanh(q)) / _along(q), across / along)
-    electrode = along / _along(q)
-    return electrode, q**2 / (2 * electrode)
+    if not (0 < along < inf and across >= 0):
+        raise OutOfRange(f"readings of {along:g} and {across:g} ohm; expected R_Y above 0, and R_Z from 0 on")
+    if across in (0, inf):
+        return (along, 0.0) if across else (along / _along(inf, other), inf)
+    q = _root(lambda q: (1 + other) / (q * tanh(q)) / _along(q, other), across / along)
+    electrode = along / _along(q, other)
+    return electrode, q**2 / ((1 + other) * electrode)
 
 
 def _root(falling: Callable[[float], float], value: float) -> float:

@@ -129,8 +129,9 @@ def several_tones() -> list[Part]:
 
 
 def _plate() -> Sensor:
-    """The sensor of Table 3.1, free to widen as in B.49."""
-    return build_sensor(drawn(designs.make({"shape": "reference"})), "unconfined").sensor
+    """The sensor of Table 3.1 with the electrodes of Table C.1, free to widen as in B.49."""
+    slots = {f"{end}_electrode": f"etpu@thesis-c.1-{end}" for end in ("top", "bottom")}
+    return build_sensor(drawn(designs.make({"shape": "reference", "materials": slots})), "unconfined").sensor
 
 
 def impedance() -> list[Part]:

@@ -180,18 +180,19 @@ def earlier(
 
 
 def multimeter(rows: int, y_ohm: dict[str, list[float]], z_ohm: dict[str, list[float]]) -> list[Part]:
-    """Table D.1: its readings, as typed; and cogs along the electrode against cogs across it, by their field."""
+    """Table D.1: its readings, as typed; and cogs along the electrode against cogs across it, by their field.
+
+    Without a film these sensors are shorted: top and bottom electrode are read in parallel.
+    """
     found = _prints()
     orders = [verdict(Evidence(r.written, r.y_ohm, r.z_ohm)).same_order for r in found]
     both = [order for order in orders if order is not None]
     by_name = {reading.written: reading for reading in found}
     y = {axis: median(r.y_ohm[0] for r in found if r.iteration == 23 and r.design == f"tri{axis}-d0") for axis in "xy"}
-    ours: dict[str, Any] = {
-        axis: electrodes.electrode_resistance(drawn(designs.make(
-            {"shape": "tri", "parameters": {"dielectric_mm": 0.0, "along": axis}}
-        )))["top"].value
-        for axis in "xy"
-    }  # fmt: skip
+    ours: dict[str, Any] = {}
+    for axis in "xy":
+        design = designs.make({"shape": "tri", "parameters": {"dielectric_mm": 0.0, "along": axis}})
+        ours[axis] = 1 / sum(1 / r.value for r in electrodes.electrode_resistance(drawn(design)).values())
     return [
         Part("R of 23 triY over 23 triX, medians", "", ours["y"] / ours["x"], y["y"] / y["x"], shown=3),
         Part("rows with both readings, and those whose Z is of Y's order or less", "", [len(both), sum(both)]),
