@@ -176,6 +176,12 @@ def tip(diameter_mm: float, radius_mm: float) -> list[Part]:
     return [Part("radius (ours: half the diameter)", "mm", diameter_mm / 2, radius_mm)]
 
 
+def umbrella(force_n: float, flat_mm: float, range_kpa: list[float]) -> list[Part]:
+    """1.1: the pressure of the bench's largest force on the flat end, over the whole width, against that of gait."""
+    area_m2 = flat_mm * table("C.1")["size_mm"][1] * M_PER_MM**2
+    return [Part("largest pressure of the bench", "Pa", force_n / area_m2, 1e3 * range_kpa[0], shown=_SHOWN)]
+
+
 def flat_end(flat_mm: float) -> list[Part]:
     """5.1.3: what presses, against the length that is pressed by Table C.1."""
     return [Part("flat end (ours: pressed length of Table C.1)", "mm", table("C.1")["tip_mm"], flat_mm)]
