@@ -39,9 +39,8 @@ from sensorgen.scene.sections import sections
 if TYPE_CHECKING:
     from sensorgen.models.press2d import BoundaryConditions, Elastic
 
-SIDES = {"bonded": "", "free": "unconfined", "symmetric": "symmetric"}  # of a sensor, and the law of each
 CLOSED_FORM = ("unconfined", "bonded", "symmetric", "infill")
-LAWS = (*CLOSED_FORM, "solved")
+LAWS = (*CLOSED_FORM, "free", "solved")
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)), 1.2e5)  # 6 N on a tip of 5 x 10 mm are 120 kPa
 _LANDING = f"feet land at negligible force: the rise of C up to {STRESS_PA[1] / 1e3:g} kPa is mostly their fall"
 _STRAIN = np.linspace(0.0, 0.3, 7)  # of infill: lines of its law, which is straight up to there at most
@@ -111,7 +110,9 @@ def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | N
         return _plate(design, moduli, name, piece)
     if name == "bonded":
         raise OutOfRange(f"the law 'bonded' applies to a solid plate; {design.shape} has gaps: expected 'unconfined'")
-    if name == "symmetric":  # cells with gaps are held by their neighbours anyway
+    if name == "free":
+        raise OutOfRange(f"cells of {design.shape} are held by their neighbours: expected the sides bonded or symmetric")
+    if name == "symmetric":  # as the neighbours of a cell with gaps hold it anyway
         name = ""
     if name == "infill":
         if found := infill(design, piece):
@@ -263,7 +264,7 @@ def _plate(design: Design, moduli: Mapping[str, MaterialValue], name: str, piece
     else:
         ends = [_electrode(moduli, piece.scene, end) for end in ("bottom", "top")]
         tied, sliding = (_between(rubber, ends, base) for base in ("bonded", "sliding"))
-    if name == "unconfined":
+    if name in ("unconfined", "free"):
         doubt = "plate free to expand sideways: bonded to its electrodes it would be stiffer"
         return Law(compression.unconfined(e), (soft,), (doubt,), (tied,))
     how = ", ".join(
