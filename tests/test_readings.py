@@ -237,3 +237,17 @@ def test_memory_does_not_grow_with_the_file(tmp_path):
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.2 * peaks[0]
+
+
+def test_sweeps_of_an_lcr_meter_are_samples(tmp_path):
+    path = tmp_path / "lcr.csv"
+    path.write_text("Frequency [kHz];Cp [pF];D\n" + "100;60;0.02\n1;61;0.01\n" * 3)
+    with readings(str(path)) as source:
+        (block,) = source.blocks()
+    assert (source.frequency_hz.tolist(), source.kept) == ([1e3, 1e5], [])
+    omega = 2 * np.pi * source.frequency_hz
+    admittance = omega * np.array([61e-12, 60e-12]) * (np.array([0.01, 0.02]) + 1j)
+    np.testing.assert_allclose(block.impedance_ohm, [1 / admittance] * 3)
+    path.write_text("Frequency [kHz];Cp [pF]\n100;60\n")
+    with pytest.raises(BadInput, match=r"lcr.csv: no two quantities .* as Cp and D"), readings(str(path)):
+        pass

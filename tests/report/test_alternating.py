@@ -1,5 +1,6 @@
 """AC readings in the report: beside the prediction of the print, with their uncertainty, verdicts and flags."""
 
+import cmath
 import itertools
 import math
 from dataclasses import replace
@@ -10,8 +11,7 @@ from sensorgen.analysis.comparison import of_iteration, predicted
 from sensorgen.analysis.report import FORMATS, alternating, report, written
 from sensorgen.design.design import load
 from sensorgen.measure.log import Log, binding, notes
-from sensorgen.prediction import bodies, evaluate
-from sensorgen.prediction.query import Query
+from sensorgen.prediction import bodies
 from sensorgen.workflows.stored_prediction import predicted_rows
 
 PF = 1e-12
@@ -79,7 +79,7 @@ def test_verdicts_go_by_frequency_and_flags_name_what_is_impossible(logged):
     found = {(row.specimen, row.frequency_hz): row for row in rows(made)}
     assert [found["leaky", f].verdict for f in (1e3, 1e4)] == ["leaking", "capacitor"]
     assert found["wrong", 3e6].flag == "negative resistance; outside the range of HP 4284A"
-    assert found["wrong", 3e6].c_predicted_pf is None  # beyond the predicted frequencies
+    assert found["wrong", 3e6].c_predicted_pf == pytest.approx(17.35, rel=1e-3)  # by tanh of the line at 3 MHz
     assert found["alone", 1e3].flag == "negative resistance"
     said = " ".join(made.findings)
     assert "By frequency: leaky: a capacitor from 10kHz on." in said
@@ -111,14 +111,47 @@ def test_dc_resistances_have_the_meters_uncertainty_and_its_ranges(tmp_path, des
     assert "Flagged: a resistance beyond the meter's ranges: S1 (HP 34401A)." in made.findings
 
 
-def test_predictions_between_the_stored_frequencies_are_those_of_the_model(design):
-    body = bodies.default_body(load(design))
-    of, frequencies = predicted(body), (500.0, 1700.0, 15e3, 70e3)
-    exact = evaluate.evaluate(body, Query(frequency_hz=frequencies))
-    for one in exact.impedance:
-        z = of.impedance_at(one.frequency_hz)[0]
-        assert abs(z - complex(one.re.value, one.im.value)) < 0.01 * abs(z)
-    assert of.impedance_at(1e6) is None
+def test_a_reading_at_any_frequency_is_compared_with_the_prediction_at_it(design, logged):
+    frequencies = (500.0, 1700.0, 15e3, 100e3, 1e6)
+    of = predicted(bodies.default_body(load(design)))
+    r, c = (sum(one.value for one in of.prediction.resistance.values()), of.prediction.capacitance.value)
+    for f in frequencies:  # a line of R and C, open at its end, fed at one end of both electrodes
+        gamma = (2j * math.pi * f * r * c) ** 0.5
+        assert of.impedance_at(f)[0] == pytest.approx(r / gamma / cmath.tanh(gamma), rel=1e-9)
+    made, _ = logged(S1=("", {"Cp": ["60pF@100kHz", "60pF@1MHz"], "D": ["0.02@100kHz", "0.02@1MHz"]}))
+    assert all(row.c_from_pf < row.c_predicted_pf < row.c_to_pf for row in rows(made))
+    assert "Capacitance of S1 at 100kHz" in " ".join(made.headline)
+
+
+def test_the_leak_of_a_capacitor_is_judged_by_its_reactance(tmp_path, design):
+    with Log(tmp_path / "log.db", create=True) as log:
+        binding.bind(log, ["S1", "S2"], str(design))
+        log.add([notes.reading(name, "2k", word, log=log) for name, word in (("S1", "45M"), ("S2", "10M"))])
+        made, found = report(log, None), of_iteration(log, None)
+    assert [row.verdict.word for row in found.rows] == ["intact", "leak"]
+    c = found.predictions["plate"].prediction.capacitance.value
+    limit = 10 / (2 * math.pi * 1100 * c)
+    assert abs(1 + 1j * 10) / 10 - 1 == pytest.approx(0.005, rel=0.01)  # of a leak of ten reactances
+    assert f"1 of the 2 testable sensors is intact (film from {limit / 1e6:.3g} Mohm on)" in " ".join(made.headline)
+
+
+def test_bake_shrinkage_and_defects_stand_beside_their_change(tmp_path, design):
+    shrunk = tmp_path / "shrunk.yaml"
+    shrunk.write_text(design.read_text() + "shrinkage: 0.2\n")
+    with Log(tmp_path / "log.db", create=True) as log:
+        binding.bind(log, ["S1"], str(shrunk))
+        for baked, ohm, farad, defects in ((False, "2k", "100pF", ()), (True, "1.5k", "62pF", ("hole",))):
+            one = notes.reading("S1", ohm, "50M", baked=baked, log=log)
+            typed = {"Cp": [f"{farad}@100kHz"], "D": ["0.02@100kHz"]}
+            log.add([notes.with_ac(replace(one, defects=defects), typed)])
+        made = report(log, None, specimens=["S1"])
+    first, second = next(t for t in made.tables if t.key == "changes").rows
+    assert (first.against, first.bake, first.shrinkage_percent) == ("prediction", "not baked", 20)
+    assert (second.against, second.bake, second.defects) == ("reading 1", "baked", "hole")
+    changes = (second.electrode_change, second.film_change, second.capacitance_change, second.expected_change)
+    assert changes == pytest.approx((0.75, 1, 0.62, 0.64))
+    said = "baked, hole) against reading 1: electrode resistance x 0.75, film resistance x 1, C at 100kHz x 0.62"
+    assert said in " ".join(made.findings)
 
 
 def test_one_reading_gets_a_short_page_in_every_format(logged):

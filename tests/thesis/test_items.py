@@ -15,7 +15,7 @@ from sensorgen.verification.thesis.items import CHAPTERS, Item, chapter
 # copy at hand lacks their captions or numbers, and 3.55 though nothing stands beside it.
 LAST = {
     "equation": {"2": 25, "3": 55, "4": 1, "5": 1, "6": 3, "B": 54, "C": 5},
-    "figure": {"2": 16, "3": 11, "4": 4, "5": 11, "6": 33, "7": 3, "B": 6},
+    "figure": {"1": 5, "2": 16, "3": 11, "4": 4, "5": 11, "6": 33, "7": 3, "B": 6},
     "table": {"1": 1, "3": 3, "4": 2, "5": 1, "C": 1, "D": 1},
 }
 ITEMS = [(name, kind, item) for name in CHAPTERS for kind, item in chapter(name).items()]
@@ -29,7 +29,7 @@ def test_every_number_is_there_once(name, kind):
 
 
 def test_there_are_as_many_as_there_are():
-    assert Counter(kind for _, kind, _ in ITEMS) == {"equation": 144, "figure": 84, "table": 9, "claim": 19}
+    assert Counter(kind for _, kind, _ in ITEMS) == {"equation": 144, "figure": 89, "table": 9, "claim": 23}
 
 
 @pytest.mark.parametrize(("name", "kind", "item"), ITEMS, ids=lambda x: x.number if isinstance(x, Item) else str(x))

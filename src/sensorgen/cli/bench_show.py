@@ -14,6 +14,8 @@ from sensorgen.core import units
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from sensorgen.measure.recording.samples import Complex, Real
     from sensorgen.measure.signal.run import Processed
 
@@ -40,17 +42,26 @@ def _show(
 
 def _tables(worked: "Processed", presses: str | None, filtered: str | None) -> list[str]:
     """Write the tables that were asked for; columns of tones as 'invert' and 'log bench' read them."""
+    import numpy as np
+
     from sensorgen.core import files as store
 
     pairs, tones = worked.pairs, worked.recording.tones_hz
     if presses and pairs is None:
         raise BadInput(f"--presses {presses}: {worked.notes[-1]}")
     if presses and pairs is not None:
-        beside = [pairs.time_s, pairs.force_n, pairs.position_mm]
-        store.replace(Path(presses), _csv(("time_s", "force_n", "position_mm"), beside, tones, pairs.pressed_ohm))
+        at_rest = [pairs.time_s, np.ones(len(pairs.time_s)), *np.full((2, len(pairs.time_s)), np.nan)]
+        pressed = [pairs.time_s, np.zeros(len(pairs.time_s)), pairs.force_n, pairs.position_mm]
+        beside, z = _in_turn(np.array([at_rest, pressed])), _in_turn(np.array([pairs.before_ohm.T, pairs.pressed_ohm.T]))
+        store.replace(Path(presses), _csv(("time_s", "rest", "force_n", "position_mm"), [*beside], tones, z.T))
     if filtered:
         store.replace(Path(filtered), _csv(("time_s",), [worked.filtered_s], tones, worked.filtered_ohm))
     return [name for name in (presses, filtered) if name]
+
+
+def _in_turn(two: "NDArray[Any]") -> "NDArray[Any]":
+    """Columns of two tables (2, k, n), a row of the first before each row of the second (k, 2 n)."""
+    return two.transpose(1, 2, 0).reshape(two.shape[1], -1)
 
 
 def _csv(names: tuple[str, ...], beside: "Sequence[Real]", tones_hz: "Real", z: "Complex") -> bytes:
@@ -97,7 +108,7 @@ command = made(
         ["--cutoff", "cutoff_hz"], type=Values(units.FREQUENCY_HZ, zero=False), metavar="HZ",
         help="Of the low-pass; the thesis's 0.2727 Hz if not given.",
     ),
-    click.Option(["--presses"], metavar="FILE.csv", help="Write readings under the presses, as 'invert' takes them."),
+    click.Option(["--presses"], metavar="FILE.csv", help="Write readings before and under each press, as 'invert' takes them."),
     click.Option(["--filtered"], metavar="FILE.csv", help="Write the low-passed readings, their drift left in."),
     click.Option(["--plot"], metavar="DIR", help="Draw readings over time and surfaces of the differences there."),
     *bench_opened.options(),

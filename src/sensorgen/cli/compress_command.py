@@ -22,17 +22,13 @@ OWN: list[click.Parameter] = [
         "--stress", Values(units.STRESS_KPA, zero=True), "Stresses on the top [kPa]; 0 is put before them.",
         default="0:100:10",
     ),
-    option("--base", OneOf(("bonded", "sliding")), "Boundary condition of the bottom.", default="bonded"),
-    option(
-        "--sides period", OneOf(("fixed", "free")), "Sides: fixed, or free to move (with --base sliding).",
-        default="fixed",
-    ),
+    options.sides(),
     option("--top", OneOf(("even", "rigid")), "Even pressure, or a stiff plate.", default="even"),
     option("--contact", OneOf(("frictionless", "stick")), "What faces do that touch.", default="frictionless"),
     option(
-        "--model", OneOf(("press2d", "press3d", "press_round", "springs", "unconfined", "bonded")),
-        "Finite elements of a cross-section, of boxes or of round bodies, springs of columns, or laws of a plate, "
-        "free to widen sideways (B.49) or bonded; the first that fits if not given.",
+        "--model", OneOf(("press2d", "press3d", "press_round", "springs", "unconfined", "bonded", "infill")),
+        "Finite elements of a cross-section, of boxes or of round bodies, springs of columns, or laws of a plate "
+        "(B.49, bonded) or of infill; the first that fits if not given.",
     ),
     options.accuracy(
         "Largest relative error of the rise C(p) - C(0), as 2e-2: the coarsest mesh within it. 1e-2 is the least."
@@ -48,7 +44,7 @@ OWN: list[click.Parameter] = [
 def _work(
     design: "Design", *, stress: tuple[float, ...], model: str | None, accuracy: float | None, explain: bool,
     check_mesh: bool, no_cache: bool, sweep: str | None,
-    jobs: int | None, cluster: str, plot: str | None, **boundary: str,
+    jobs: int | None, cluster: str, plot: str | None, sides: str, **boundary: str,
 ) -> int:  # fmt: skip
     from sensorgen.prediction import compression
 
@@ -60,8 +56,8 @@ def _work(
     if plot and sweep:
         raise BadInput("--plot draws one design; expected --csv or --json with --sweep")
     asked = compression.Asked(
-        compression.stresses_kpa(stress), compression.BoundaryConditions(**boundary), model or "", accuracy or inf,
-        check_mesh=check_mesh, keep=not no_cache,
+        compression.stresses_kpa(stress), compression.boundary(sides, **boundary), model or "", accuracy or inf,
+        check_mesh=check_mesh, keep=not no_cache, sides=sides,
     )  # fmt: skip
     of = body_options.body_of()
     found: Any

@@ -233,7 +233,7 @@ def _perfect(
     from sensorgen.prediction.planning import sensor_model
     from sensorgen.prediction.query import NOISE
 
-    with readings(measured) as source, ExitStack() as stack:
+    with readings(measured, beside=(_REST,)) as source, ExitStack() as stack:
         model = sensor_model(body, query)[0]
         limit = one("--force-limit", force_limit_n) if force_limit_n else FORCE_LIMIT_N
         estimator = Estimator(
@@ -244,10 +244,11 @@ def _perfect(
         step = stack.enter_context(show.progress(["reading"]))
         write(answers.header(source.kept))
         for block in source.blocks():
-            found = estimator.batch(block.impedance_ohm)
+            under_load = np.flatnonzero(~_beside(source, block)[0])
+            found = estimator.batch(block.impedance_ohm[under_load])
             summary.add(found)
             step(f"{summary.samples} samples")
-            write(answers.rows(block.kept, found, prior=estimator.prior is not None))
+            write(answers.rows([block.kept[k] for k in under_load], found, prior=estimator.prior is not None))
     _said(summary.result(), terminal, output)
     return 0
 

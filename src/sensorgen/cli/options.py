@@ -41,6 +41,15 @@ def compression(
     return option("--compression", OneOf(("unconfined", "bonded", *laws)), about)
 
 
+def sides() -> click.Option:
+    """``--sides``, one of the boundary conditions."""
+    about = (
+        "Sides of the sensor: bonded, its solids stick to electrodes and base, and a plate bulges at its edges; free, it "
+        "widens as it likes (B.49); symmetric, one of unlimited cells."
+    )
+    return option("--sides", OneOf(("bonded", "free", "symmetric")), about, default="bonded")
+
+
 def force() -> click.Option:
     """``--force``, one [N]."""
     return option("--force force_n", Values(units.FORCE_N, zero=False), "Force of the press.", default="6N")

@@ -40,7 +40,7 @@ OWN: list[click.Parameter] = [
         "or solved (needs NGSolve; seconds in a cross-section, up to minutes in 3D); if not given, solved in a "
         "cross-section.",
     ),
-    options.noise(),
+    options.sides(), options.noise(),
     option(
         "--profile", OneOf(("uniform", "hertz", "parabola")),
         "Pressure under the tip: of a flat one, of a round one on a thick body, of a round one on a thin film.",
@@ -59,13 +59,15 @@ OWN: list[click.Parameter] = [
 def _work(
     design: "Design", *, frequency_hz: Sequence[float] | None, force_n: Sequence[float] | None,
     position_mm: Sequence[float] | None, tip_mm: float | None, radius_mm: float | None, compression: str | None,
-    profile: str, accuracy: float | None, noise: float, explain: bool, plot: str | None,
+    sides: str, profile: str, accuracy: float | None, noise: float, explain: bool, plot: str | None,
     sweep: str | None, jobs: int | None, cluster: str,
 ) -> int:  # fmt: skip
     if plot:
         render.refuse_beside("--plot")
     options.refuse_explain(explain, many=bool(plot or sweep))
     proper("--noise", noise)
+    if compression and sides != "bonded":
+        raise BadInput("--compression and --sides at once; expected one of them")
     from sensorgen.prediction.evaluate import evaluate
     from sensorgen.prediction.query import DEFAULT, TIP_M, Query, Tip
     from sensorgen.prediction.results import Prediction
@@ -75,7 +77,7 @@ def _work(
         None if radius_mm is None else radius_mm * units.M_PER_MM,
     )  # fmt: skip
     frequencies = tuple(frequency_hz or DEFAULT.frequency_hz)
-    query = Query(frequencies, tip=tip, law=compression or "", accuracy=accuracy, noise=noise)
+    query = Query(frequencies, tip=tip, law=compression or sides * (sides != "bonded"), accuracy=accuracy, noise=noise)
     if sweep:
         return _sweep(design, sweep, query, sweeps.at_once(jobs), cluster, alone=not (force_n or position_mm or plot))
     found: Prediction | Loaded
@@ -89,7 +91,7 @@ def _work(
             prediction = found.prediction
         else:
             found = prediction = evaluate(body, query)
-            asked = compression or tip_mm is not None or radius_mm is not None
+            asked = query.law or tip_mm is not None or radius_mm is not None
             if found.capacitance and not found.budget and asked:
                 raise BadInput(found.reason)
     if plot and not isinstance(found, Prediction):

@@ -19,7 +19,7 @@ from sensorgen.measure.input_file import checked_head
 MOST_BYTES = 16_000_000
 EXPECTED = "a header such as Frequency,Cp,D with numbers below it"
 OVERLOAD = 9.9e37  # SCPI's number for no value
-_HEADER_LINES = 200  # within which the header stands
+_HEADER_LINES, _HEAD_BYTES = 200, 100_000  # within which the header stands
 _COMMENTS = ("#", "!", "%", "//", "*")
 _NAMES = {
     "frequency": "frequency freq f testfrequency frequenz fréquence",
@@ -145,15 +145,16 @@ def read(path: Path) -> LcrTable:
 def looks_like(path: Path) -> bool:
     """Whether a file has the header of an LCR meter's export."""
     try:
-        header = _header(_lines(path))
+        header = _header(_lines(path, _HEAD_BYTES))
     except BadInput:
         return False
     return header is not None and any(column.quantity == "frequency" for column in header.columns)
 
 
-def _lines(path: Path) -> list[str]:
+def _lines(path: Path, most_bytes: int = MOST_BYTES) -> list[str]:
     checked_head(path, MOST_BYTES, EXPECTED)
-    content = path.read_bytes()
+    with path.open("rb") as file:
+        content = file.read(most_bytes)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -164,7 +165,10 @@ def _lines(path: Path) -> list[str]:
 
 
 def _cells(line: str, separator: str) -> list[str]:
-    cells = [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
+    try:
+        cells = [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
+    except csv.Error as error:
+        raise BadInput(f"{error}; expected {EXPECTED}") from None
     while cells and not cells[-1]:
         cells.pop()
     return cells

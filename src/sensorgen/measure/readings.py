@@ -8,14 +8,16 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput, within
-from sensorgen.measure import csv_table
+from sensorgen.measure import csv_table, lcr
 from sensorgen.measure.csv_table import BLOCK_ROWS, SAME_NAMES, Table, listed
+from sensorgen.measure.immittance import impedance, pair
 
 _IMPEDANCE = re.compile(r"(re|im)_ohm_(.*)", re.IGNORECASE)
 _EXPECTED = "expected two columns per frequency, as re_ohm_1.1kHz and im_ohm_1.1kHz"
@@ -87,14 +89,60 @@ class Readings:
             yield Block(block.rows, impedance, block.text, block.numbers[:, 2 * m :])
 
 
+class Sweeps:
+    """Sweeps of an LCR meter as readings: one sample each, without other columns.
+
+    Parameters
+    ----------
+    table : LcrTable
+        Its export. A frequency that returns begins the next sweep.
+
+    Attributes
+    ----------
+    frequency_hz, kept, numbers
+        As of :class:`Readings`.
+
+    Raises
+    ------
+    BadInput
+        No two quantities that determine an impedance.
+    """
+
+    def __init__(self, table: lcr.LcrTable) -> None:
+        self._sweeps: list[dict[float, dict[str, float]]] = []
+        before = 0.0
+        for one in table.readings:
+            last = self._sweeps[-1] if self._sweeps else {}
+            again = one.frequency_hz in last and (before != one.frequency_hz or one.quantity in last[before])
+            if again or not self._sweeps:
+                self._sweeps.append({})
+            self._sweeps[-1].setdefault(one.frequency_hz, {})[one.quantity] = one.value
+            before = one.frequency_hz
+        self.frequency_hz = np.array(sorted(set().union(*self._sweeps)))
+        self.kept: list[str] = []
+        self.numbers: list[str] = []
+        if pair({one.quantity for one in table.readings}) is None:
+            raise BadInput("no two quantities that determine an impedance; expected two, as Cp and D")
+
+    def blocks(self, size: int = BLOCK_ROWS) -> Iterator[Block]:
+        """All sweeps, up to ``size`` at a time."""
+        for start in range(0, len(self._sweeps), size):
+            some = self._sweeps[start : start + size]
+            z = [[impedance(sweep.get(f, {}), f) or np.nan for f in self.frequency_hz.tolist()] for sweep in some]
+            rows = list(range(start + 1, start + len(some) + 1))
+            yield Block(rows, np.array(z, np.complex128), [[]] * len(some), np.empty((len(some), 0)))
+
+
 @contextmanager
-def readings(path: str, columns: Mapping[str, str] = SAME_NAMES, beside: Sequence[str] = ()) -> Iterator[Readings]:
+def readings(
+    path: str, columns: Mapping[str, str] = SAME_NAMES, beside: Sequence[str] = ()
+) -> Iterator[Readings | Sweeps]:
     """Open a file of impedance readings; "-" is the standard input.
 
     Parameters
     ----------
     path : str
-        CSV file.
+        CSV file, or the export of an LCR meter.
     columns : mapping of str to str
         From the file's column names to sensorgen's.
     beside : sequence of str
@@ -105,6 +153,11 @@ def readings(path: str, columns: Mapping[str, str] = SAME_NAMES, beside: Sequenc
     BadInput
         A file that cannot be read; a header without impedances, with half an impedance, or with one twice.
     """
+    if path != "-" and not columns and lcr.looks_like(Path(path)):
+        with within(path):
+            sweeps = Sweeps(lcr.read(Path(path)))
+        yield sweeps
+        return
     with csv_table.opened(path, columns) as table:
         yield Readings(table, beside)
 

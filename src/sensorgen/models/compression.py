@@ -18,7 +18,7 @@ from sensorgen.core.errors import MissingValue, OutOfRange
 if TYPE_CHECKING:
     from sensorgen.solvers.contact.pressed import Pressed
 
-SOURCE = "Thesis Eq. B.49; Gent and Lindley (1959) for the bonded plate; solved cells as their file says"
+SOURCE = "Thesis Eq. B.49; Gent and Lindley (1959), Chalhoub and Kelly (1991) for the bonded plate; solved cells as their file says"
 COST = 0
 
 PROTOTYPE_PA = 6e6  # Young's modulus of the films of the stored cells [Pa]
@@ -26,6 +26,7 @@ SOLVED_RATIO = 0.4999  # Poisson's ratio of all materials of the stored cells [-
 REACH = 3.0  # factor on its last stress up to which a curve is extrapolated by its last slope [-]
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _SAME = 1e-6  # relative difference up to which two parameters are one
+_STIFF = 1e-3  # decay below which a plate counts as incompressible: 4e-7 of the modulus [-]
 _EARLY = np.array([1 / 16, 1 / 4])  # of the first stress: knots of a curve that begins with a power of the stress
 
 
@@ -187,28 +188,50 @@ def unconfined(youngs_modulus_pa: float) -> Plate:
     return Plate("unconfined", "thesis B.49: strain = stress / E, free to expand sideways", youngs_modulus_pa)
 
 
-def bonded(youngs_modulus_pa: float, width_m: float, thickness_m: float) -> Plate:
-    r"""A long incompressible plate bonded to stiff faces: the stiffest case.
+def bonded(youngs_modulus_pa: float, width_m: float, thickness_m: float, bulk_pa: float = np.inf) -> Plate:
+    r"""A long plate bonded to stiff faces: the stiffest case.
 
-    .. math:: \frac{\sigma}{\varepsilon} = \frac{4}{3} E (1 + S^2), \quad S = \frac{W}{2 d}
+    .. math:: \frac{\sigma}{\varepsilon} = \frac{4}{3} E + K \left(1 - \frac{\tanh \lambda}{\lambda}\right),
+              \quad \lambda = \frac{W}{d} \sqrt{\frac{E}{K}}
 
     Parameters
     ----------
     youngs_modulus_pa, width_m, thickness_m : float
         E [Pa]; W and d [m].
+    bulk_pa : float
+        K; infinite for an incompressible plate [Pa].
 
     Notes
     -----
-    Gent and Lindley, Proc. Inst. Mech. Eng. 173, 111 (1959), plane strain. At nu = 0.45 the film is at most 3.8 times
-    as stiff as E, however thin: the two laws bracket a plate.
+    Chalhoub and Kelly, J. Eng. Mech. 117, 1961 (1991), plane strain. Incompressible it is Gent and Lindley, Proc. Inst.
+    Mech. Eng. 173, 111 (1959): :math:`\frac{4}{3} E (1 + S^2)`, S = W / 2d. Electrodes that the film stretches:
+    :mod:`sensorgen.models.sandwich`.
 
     Examples
     --------
     >>> round(bonded(1.0, 10e-3, 0.6e-3).modulus_pa, 1)
     93.9
+    >>> round(bonded(6e6, 10e-3, 0.6e-3, 1e10).modulus_pa / 6e6, 1)
+    88.1
     """
-    stiffer = 4 / 3 * (1 + (width_m / (2 * thickness_m)) ** 2)
-    return Plate("bonded", f"bonded and incompressible: {stiffer:.4g} E", stiffer * youngs_modulus_pa)
+    e = youngs_modulus_pa
+    decay = width_m / thickness_m * (e / bulk_pa) ** 0.5
+    film = e * (width_m / thickness_m) ** 2 / 3 if decay < _STIFF else bulk_pa * (1 - np.tanh(decay) / decay)
+    stiffer = 4 / 3 + float(film) / e
+    return Plate("bonded", f"bonded to stiff faces: {stiffer:.4g} E", stiffer * e)
+
+
+def symmetric(youngs_modulus_pa: float, poisson_ratio: float) -> Plate:
+    """A plate that its neighbours keep from widening: the modulus of one of unlimited cells, (K + 4 G / 3) [Pa].
+
+    >>> round(symmetric(6e6, 0.4999).modulus_pa / 1e10, 3)
+    1.0
+    """
+    nu = poisson_ratio
+    if not 0 <= nu < 0.5:
+        raise OutOfRange(f"a Poisson's ratio of {nu:g}, and sides that do not move: expected one from 0, below 0.5")
+    modulus = youngs_modulus_pa * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
+    return Plate("symmetric", f"no sideways expansion: {modulus / youngs_modulus_pa:.4g} E", modulus)
 
 
 def curve(name: str, source: str, stress_pa: Sequence[float], ratio: Sequence[float]) -> Curve:

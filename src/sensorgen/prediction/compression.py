@@ -5,6 +5,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf, isfinite, nan
 
+import numpy as np
+
 from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.display import Displayed
@@ -74,6 +76,8 @@ class Asked:
         Hold the displacement against the next coarser mesh.
     keep : bool
         Read cached solutions, and store new ones.
+    sides : str
+        "bonded": a plate follows the law of one that bulges at its edges; else ``boundary`` holds for it, too.
     """
 
     stress_kpa: tuple[float, ...]
@@ -82,6 +86,12 @@ class Asked:
     accuracy: float = inf
     check_mesh: bool = False
     keep: bool = True
+    sides: str = "bonded"
+
+
+def boundary(sides: str, **others: str) -> BoundaryConditions:
+    """Boundary conditions of a cell, by those of the sensor's sides; ``others`` are top and contact."""
+    return BoundaryConditions(*(("sliding", "free") if sides == "free" else ("bonded", "fixed")), **others)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -216,7 +226,7 @@ def answer(body: Body, asked: Asked, *, step: Step | None = None) -> Compression
     try:
         if asked.accuracy < inf:
             return _within(body, asked, step)
-        model = _model(piece_of(body), asked)
+        model = _model(body, asked)
         if model in closed_form.MODELS:
             return _closed_form(body, asked, model)
         case = _case(body, asked)
@@ -257,7 +267,12 @@ def planned(body: Body, asked: Asked) -> Plan:
     if not asked.accuracy > 0:
         raise OutOfRange(f"an accuracy of {asked.accuracy:g}; expected a number above 0, as 1e-2")
     piece = piece_of(body)
-    model = _model(piece, asked)
+    model = _model(body, asked)
+    if model in (*closed_form.PLATES, "infill"):
+        raise BadInput(
+            f"an accuracy of C, which follows the law {model}, a closed form, between its bounds: leave out --accuracy, "
+            "or solve one of unlimited cells with --sides symmetric"
+        )
     if model in closed_form.MODELS:
         why = f"--model {model}" if asked.model else why_not_applicable(piece, MODELS[0])
         raise BadInput(f"an accuracy of C, and {why}: {model} tells {_NO_C}; leave out --accuracy")
@@ -274,7 +289,11 @@ def planned(body: Body, asked: Asked) -> Plan:
     return Plan(asked.accuracy, f"the rise of C up to {asked.stress_kpa[-1]:g} kPa", (level,))
 
 
-def _model(piece: Piece, asked: Asked) -> str:
+def _model(body: Body, asked: Asked) -> str:
+    piece = piece_of(body)
+    if not asked.model and asked.sides == "bonded" and asked.boundary.period == "fixed" and not asked.check_mesh:
+        if law := closed_form.law_name(body.design, piece):
+            return law
     return asked.model or next((name for name in MODELS if not why_not_applicable(piece, name)), closed_form.FIRST)
 
 
@@ -315,7 +334,7 @@ def _case(body: Body, asked: Asked) -> Case:
     if asked.boundary.period == "free" and asked.boundary.base == "bonded":
         raise BadInput("free sides over a bonded base are not possible: expected base 'sliding' with them")
     permittivity = {t.material: t.value for t in permittivities(body.design)}
-    return Case(piece, _model(piece, asked), elastic(body.design, piece.scene), permittivity, asked.boundary)
+    return Case(piece, _model(body, asked), elastic(body.design, piece.scene), permittivity, asked.boundary)
 
 
 def _estimated(case: Case, asked: Asked, level: int, step: Step | None) -> Estimate:
@@ -359,14 +378,22 @@ def _known(values: Real) -> tuple[float | None, ...]:
 
 
 def _closed_form(body: Body, asked: Asked, model: str) -> CompressionResult:
-    """What a law knows that solves no field: a displacement, and no capacitance."""
-    unknown = (None,) * len(asked.stress_kpa)
+    """Displacement, and of a plate or infill the capacitance, by a law that solves no field."""
     found = closed_form.MODELS[model](body.design, piece_of(body), [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
+    unknown = np.full(len(asked.stress_kpa), nan)
+    rise = off = lower = upper = unknown
+    if found.rises:
+        rest = at_rest.answer(body, at_rest.Asked(keep=asked.keep))
+        ends = rest.lower_f_per_m2 or nan, rest.upper_f_per_m2 or nan
+        rises = np.array(found.rises)
+        rise, off = sum(ends) / 2 * rises[0], sum(ends) / 2 * abs(rises - rises[0]).max(0)
+        lower, upper = ends[0] * (1 + rises.min(0)), ends[1] * (1 + rises.max(0))
     return CompressionResult(
         design=body.design.name, body=body.provenance, model=model, held=found.boundary, stress_kpa=asked.stress_kpa,
-        displacement_um=tuple((found.displacement_m * _UM_PER_M).tolist()), displacement_error_um=unknown,
-        rise_f_per_m2=unknown, rise_error_f_per_m2=unknown, lower_f_per_m2=unknown, upper_f_per_m2=unknown,
-        converged_kpa=asked.stress_kpa[-1], doubts=found.doubts, bounds="none",
+        displacement_um=tuple((found.displacement_m * _UM_PER_M).tolist()), displacement_error_um=_known(unknown),
+        rise_f_per_m2=_known(rise), rise_error_f_per_m2=_known(off), lower_f_per_m2=_known(lower),
+        upper_f_per_m2=_known(upper), converged_kpa=asked.stress_kpa[-1], doubts=found.doubts,
+        bounds="of the capacitance, by the law between its bounds" if found.rises else "none",
     )  # fmt: skip
 
 

@@ -1,10 +1,11 @@
 """Choose the pressure law of a cell, with its uncertainty.
 
-A plate is bracketed by two laws, free to expand sideways and bonded. Solutions of the prototypes' cells are stored; any
+A printed plate is bonded to its electrodes (thesis 4.2: layers adhere to each other), and bracketed by how its faces are
+held. Solutions of the prototypes' cells are stored; any
 other cell with gaps is solved on request, and kept.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from hashlib import sha256
@@ -13,11 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
+from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.values import MaterialValue, film, of_all_materials, permittivities
-from sensorgen.models import compression
+from sensorgen.models import compression, sandwich
 from sensorgen.models.compression import Compression, Curve, curve_of
 from sensorgen.prediction.capacitance import Answer, is_plate
 from sensorgen.prediction.mesh_ladder import (
@@ -38,8 +39,8 @@ from sensorgen.scene.sections import sections
 if TYPE_CHECKING:
     from sensorgen.models.press2d import BoundaryConditions, Elastic
 
-CLOSED_FORM = ("unconfined", "bonded", "infill")
-LAWS = (*CLOSED_FORM, "solved")
+CLOSED_FORM = ("unconfined", "bonded", "symmetric", "infill")
+LAWS = (*CLOSED_FORM, "free", "solved")
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)), 1.2e5)  # 6 N on a tip of 5 x 10 mm are 120 kPa
 _LANDING = f"feet land at negligible force: the rise of C up to {STRESS_PA[1] / 1e3:g} kPa is mostly their fall"
 _STRAIN = np.linspace(0.0, 0.3, 7)  # of infill: lines of its law, which is straight up to there at most
@@ -109,6 +110,10 @@ def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | N
         return _plate(design, moduli, name, piece)
     if name == "bonded":
         raise OutOfRange(f"the law 'bonded' applies to a solid plate; {design.shape} has gaps: expected 'unconfined'")
+    if name == "free":
+        raise OutOfRange(f"cells of {design.shape} are held by their neighbours: expected the sides bonded or symmetric")
+    if name == "symmetric":  # as the neighbours of a cell with gaps hold it anyway
+        name = ""
     if name == "infill":
         if found := infill(design, piece):
             return found
@@ -121,6 +126,8 @@ def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | N
         return _cell(known, moduli)
     if name == "solved":
         return solved(design, printed)
+    if not name and piece.period_mm is None and (found := infill(design, piece)):
+        return found
     soft = moduli[film(design)]
     doubt = (
         f"{design.shape} approximated by a free solid plate of {soft.material} (B.49): its cell was not solved; "
@@ -241,15 +248,53 @@ def content(piece: Piece) -> str:
 
 
 def _plate(design: Design, moduli: Mapping[str, MaterialValue], name: str, piece: Piece) -> Law:
-    """A plate, free or bonded; the other law brackets it."""
+    """A plate: bonded to electrodes that it stretches, on a base that holds the lower one; or as ``name`` says."""
     if name in ("infill", "solved"):
-        raise OutOfRange(f"{design.shape} is a solid plate: expected the law 'unconfined' or 'bonded'")
-    soft = moduli[film(design)]
-    free = compression.unconfined(soft.value)
-    tied = compression.bonded(soft.value, design.params.width_mm * M_PER_MM, gap_m(piece.scene))
-    if name == "bonded":
-        return Law(tied, (soft,), others=(free,))
-    return Law(free, (soft,), ("plate free to expand sideways: bonded to its electrodes it would be stiffer",), (tied,))
+        raise OutOfRange(f"{design.shape} is a solid plate: expected the law 'unconfined', 'bonded' or 'symmetric'")
+    soft, ratio = moduli[film(design)], poisson_ratio(design, film(design))
+    e = soft.value
+    if name == "symmetric":
+        return Law(compression.symmetric(e, ratio), (soft,))
+    width = min(design.params.width_mm, design.params.length_mm) * M_PER_MM
+    bulk = e / (3 * (1 - 2 * ratio)) if ratio < 0.5 else np.inf
+    rubber = e, width, gap_m(piece.scene), bulk
+    stiff = compression.bonded(*rubber)
+    if any(body.material not in moduli for body in piece.scene.bodies if body.terminal):
+        tied = sliding = stiff
+    else:
+        ends = [_electrode(moduli, piece.scene, end) for end in ("bottom", "top")]
+        tied, sliding = (_between(rubber, ends, base) for base in ("bonded", "sliding"))
+    if name in ("unconfined", "free"):
+        doubt = "plate free to expand sideways: bonded to its electrodes it would be stiffer"
+        return Law(compression.unconfined(e), (soft,), (doubt,), (tied,))
+    how = ", ".join(
+        f"{law.modulus_pa / e:.3g} E {where}"
+        for law, where in ((tied, "on a base that holds the lower one"), (sliding, "on one that slides"),
+                           (stiff, "between stiff faces"))
+    )  # fmt: skip
+    return Law(tied, (soft,), (f"plate bonded to electrodes that it stretches: {how}",), (sliding, stiff))
+
+
+def _between(rubber: tuple[float, ...], ends: Sequence[tuple[float, float]], base: str) -> compression.Plate:
+    """A film between its electrodes on a base."""
+    (low_pa, low_m), (top_pa, top_m) = ends
+    modulus = sandwich.modulus_pa(*rubber, electrode_pa=(low_pa, top_pa), electrode_m=(low_m, top_m), base=base)
+    return compression.Plate("bonded", f"bonded to both electrodes: {modulus / rubber[0]:.4g} E", modulus)
+
+
+def poisson_ratio(design: Design, material: str) -> float:
+    """Poisson's ratio [-]; that of rubber where no source gives one."""
+    try:
+        return design.material(material).value("poisson_ratio", design.used()[material]).value
+    except MissingValue:
+        return 0.5
+
+
+def _electrode(moduli: Mapping[str, MaterialValue], scene: Scene, end: str) -> tuple[float, float]:
+    """Young's modulus [Pa] and thickness [m] of an electrode."""
+    bodies = [body for body in scene.bodies if body.terminal == end]
+    spans = [p.span("z") for body in bodies for p in body.pieces]
+    return moduli[bodies[0].material].value, (max(z for _, z in spans) - min(z for z, _ in spans)) * M_PER_MM
 
 
 def _cell(found: Curve, moduli: Mapping[str, MaterialValue]) -> Law:
@@ -338,6 +383,8 @@ def at_a_few_pressures(
 
     if name == "infill":
         return infill(design, printed)
+    if name in ("bonded", "symmetric") and not is_plate(answer, printed.scene):
+        name = ""
     known = law_of(design, answer, name, printed=printed)
     model = model_of(printed, quick=True)
     if known.bounded or model == "press3d":

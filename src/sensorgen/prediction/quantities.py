@@ -96,6 +96,14 @@ def _at_rest(found: Prediction, body: Body, rest: RestState, frequency_hz: tuple
     )  # fmt: skip
 
 
+def impedance_at(found: Prediction, frequency_hz: float, gone: Lost) -> Impedance | None:
+    """Impedance at rest of a predicted sensor at any frequency; None where it is no line of two electrodes."""
+    if found.capacitance is None or set(found.resistance) != set(ENDS):
+        return None
+    whole = _in_series(found.resistance["top"], found.resistance["bottom"])
+    return _impedance(frequency_hz, whole, found.capacitance, gone)
+
+
 def _in_series(one: Bounds, other: Bounds) -> Bounds:
     def added(a: Interval, b: Interval) -> Interval:
         return Interval(a.lower + b.lower, a.upper + b.upper)

@@ -6,16 +6,16 @@ from functools import cached_property
 from math import inf, isnan, log
 from statistics import fmean, geometric_mean
 
-import numpy as np
-
 from sensorgen.core.bounds import Bounds, Interval
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.core.version import __version__
 from sensorgen.design.body import Body
 from sensorgen.measure.log import Entry, Log, Withdrawal
 from sensorgen.measure.log import Prediction as Stored
 from sensorgen.measure.signal.leakage import along_ohm, leak_s
 from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.losses import Lost, lost
+from sensorgen.prediction.quantities import impedance_at
 from sensorgen.prediction.results import Prediction, from_json
 
 
@@ -38,6 +38,8 @@ class Predicted:
         proves nothing.
     order : str
         Its place in that order, in words.
+    losses : Lost
+        Of its dielectrics.
     """
 
     design: str
@@ -47,6 +49,7 @@ class Predicted:
     version: str
     before: bool | None = False
     order: str = ""
+    losses: Lost = Lost()
 
     @cached_property
     def ry_ohm(self) -> Bounds | None:
@@ -102,25 +105,13 @@ class Predicted:
     def impedance_at(self, frequency_hz: float) -> tuple[complex, complex, complex] | None:
         """Predicted Z, and the ends of its range, R and -X at their least and at their largest [ohm].
 
-        Power laws between the predicted frequencies, and below the lowest; None above the highest, where the
-        line's far end drops out, and of what is no capacitor.
+        Of the line at this frequency, whichever the prediction lists; None of what is no capacitor.
         """
-        known = self.prediction.impedance
-        if len(known) < 2 or frequency_hz > known[-1].frequency_hz * (1 + 1e-9):
+        at = impedance_at(self.prediction, frequency_hz, self.losses)
+        if at is None or at.im.value >= 0:
             return None
-        ln_f = np.log([one.frequency_hz for one in known])
-        at = min(max(int(np.searchsorted(ln_f, log(frequency_hz))), 1), len(known) - 1)
-        share = (log(frequency_hz) - ln_f[at - 1]) / (ln_f[at] - ln_f[at - 1])
-
-        def part(values: Sequence[float]) -> float:
-            low, high = values[at - 1], values[at]
-            return float(low * (high / low) ** share if low * high > 0 else low + (high - low) * share)
-
-        ends = [
-            complex(part([getattr(one.re, r) for one in known]), part([getattr(one.im, x) for one in known]))
-            for r, x in (("value", "value"), ("lower", "upper"), ("upper", "lower"))
-        ]  # fmt: skip
-        return (ends[0], ends[1], ends[2]) if ends[0].imag < 0 else None
+        re, im = at.re, at.im
+        return complex(re.value, im.value), complex(re.lower, im.upper), complex(re.upper, im.lower)
 
     @property
     def reason(self) -> str:
@@ -137,7 +128,7 @@ class Predicted:
 
 def predicted(body: Body) -> Predicted:
     """A prediction that is made now."""
-    return Predicted(body.design.name, body.design.id(), evaluate(body), "", __version__)
+    return Predicted(body.design.name, body.design.id(), evaluate(body), "", __version__, losses=_losses(body))
 
 
 def stored_or_made(
@@ -178,5 +169,15 @@ def stored_or_made(
             anchor, later = proof
             place += f"; anchored {anchor.logged_at} in {anchor.file}"
             place += f", {later} record{'s' * (later > 1)} later" if later else ""
-        return Predicted(body.design.name, body.design.id(), found, first.logged_at, first.version, before, place)
+        return Predicted(
+            body.design.name, body.design.id(), found, first.logged_at, first.version, before, place, _losses(body)
+        )  # fmt: skip
     return predicted(body)
+
+
+def _losses(body: Body) -> Lost:
+    """Losses of the dielectrics; none where they are not known."""
+    try:
+        return lost(body.design)
+    except SensorgenError:
+        return Lost()

@@ -15,10 +15,20 @@ from sensorgen.core.lazy import Lazy
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
 from sensorgen.design.specimen_name import Specimen, design_of, parse
+from sensorgen.measure import accuracy
 from sensorgen.measure.log import BenchRun, Entry, Log, Prediction, Print, Reading, Withdrawal
 from sensorgen.measure.log.batches import designs as on_beds
-from sensorgen.measure.signal.verdicts import Evidence, Verdict, expected_from, least, verdict
+from sensorgen.measure.signal.verdicts import (
+    INTACT_OHM,
+    Evidence,
+    Verdict,
+    expected_from,
+    intact_ohm,
+    least,
+    verdict,
+)
 from sensorgen.prediction import bodies
+from sensorgen.prediction.query import TONES_HZ
 
 _MOST_LEFT_OUT = 1000  # readings that are listed for one reason
 _KEPT = 120_000  # rows that are kept, in 0.1 GB: a report reads each some 16 times
@@ -165,7 +175,7 @@ def of_iteration(
         reading = measured.rows[place]
         of = found.get(names.get(reading.specimen, ""))
         evidence = _evidence(reading, of, usual[reading.shape])
-        row = Compared(reading, of, evidence, verdict(evidence))
+        row = Compared(reading, of, evidence, verdict(evidence, _intact_ohm(of, reading.words.instrument)))
         if len(kept) < _KEPT:
             kept[place] = row
         return row
@@ -284,6 +294,13 @@ def _evidence(reading: Measured, of: Predicted | None, expected_ohm: float = nan
         words.specimen, ry, rz, expected_ohm, words.shape, words.film_mm, words.remark, touches, words.axes,
         words.batch, words.baked, words.defects,
     )  # fmt: skip
+
+
+def _intact_ohm(of: Predicted | None, instrument: str) -> float:
+    """Least resistance of a film that is intact, by the meter and the design [ohm]."""
+    meter, c = accuracy.find(instrument) if instrument else None, of.prediction.capacitance if of else None
+    highest = meter.ranges[-1].ohm if meter and meter.ranges else INTACT_OHM
+    return intact_ohm(c.value if c else 0.0, TONES_HZ[0], highest)
 
 
 def _unused(rows: Iterable[Compared], alternating: Container[int]) -> Iterator[tuple[str, str]]:

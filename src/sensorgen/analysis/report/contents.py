@@ -15,6 +15,7 @@ from sensorgen.analysis.report import (
     direction,
     electrodes,
     explained,
+    history,
     recordings,
     variants,
     yields,
@@ -150,6 +151,7 @@ def report(
     verdicts = (*yields.headline(found),) if found.direct else ()
     shorts = (*yields.findings(found), *direction.findings(found)) if found.direct else ()
     ac = alternating.rows(found)
+    changes = history.rows(found, ac)
     headline = (*electrodes.headline(found), *verdicts, *alternating.headline(ac))
     by_frequency = (
         *alternating.findings(ac),
@@ -158,11 +160,11 @@ def report(
         *recordings.findings(recorded, impedances),
     )
     findings = (
-        *calibrations.findings(calibrated), *shorts, *by_frequency, *explained.sentences(explanations),
+        *calibrations.findings(calibrated), *shorts, *history.findings(changes), *by_frequency, *explained.sentences(explanations),
         *electrodes.findings(found),
     )  # fmt: skip
     step("variants")
-    sections = list(_sections(log, found, recorded, explanations, impedances, ac, calibrated, left_out))
+    sections = list(_sections(log, found, recorded, explanations, impedances, ac, changes, calibrated, left_out))
     step("page")
     return Report(
         iteration, specimens, datetime.now(UTC).isoformat(timespec="seconds"),
@@ -183,8 +185,8 @@ def _basis(found: Comparison, recorded: Sequence[Run]) -> Iterator[str]:
 
 def _sections(
     log: Log, found: Comparison, recorded: Sequence[Run], explanations: Sequence[explained.Explanation],
-    impedances: Table | None, ac: Sequence[alternating.AcRow], calibrated: Sequence[Calibration],
-    left_out: Sequence[tuple[str, str]],
+    impedances: Table | None, ac: Sequence[alternating.AcRow], changes: Sequence[history.HistoryRow],
+    calibrated: Sequence[Calibration], left_out: Sequence[tuple[str, str]],
 ) -> Iterator[Section]:  # fmt: skip
     alone = len(found.rows) <= 1 and not recorded  # a short page
     figures = (*electrodes.figures(found), *(recordings.residuals(impedances) if impedances else ()))
@@ -200,6 +202,9 @@ def _sections(
         tables = (*filter(None, grouped), electrodes.reasons(found))
         notes = () if alone else yields.notes(found)
         yield Section("verdicts", "Verdicts and yield", yields.figures(found), tables, notes)
+    if changes:
+        tables = (history.table(changes),)
+        yield Section("changes", "Bake, shrinkage and defects", (), tables, () if alone else (history.NOTE,))
     if explanations:
         tables, title = (explained.table(explanations),), "Which parameter explains the residuals"
         yield Section("explained-by", title, (), tables, (explained.NOTE,))

@@ -9,8 +9,9 @@ from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, Axis, Curve, Figure, Panel
 from sensorgen.analysis.report.electrodes import VERDICT_COLOURS
 from sensorgen.core.document import Cell, Column, Table
-from sensorgen.measure.signal.verdicts import ORDER, WORDS, Evidence
+from sensorgen.measure.signal.verdicts import ORDER, REACTANCES, WORDS, Evidence
 from sensorgen.measure.signal.yields import Group, Share, dependence, groups
+from sensorgen.prediction.query import TONES_HZ
 
 MOST_POINTS = 3000  # that a browser draws at once
 _SYMBOLS = {"tri": "circle", "rect": "square", "reference": "diamond", "double": "cross"}
@@ -77,11 +78,22 @@ def headline(found: Comparison) -> Iterator[str]:
     """The yield, in one sentence."""
     whole = everything(found).intact
     if len(found.last) == 1:
-        yield f"Verdict of {found.last[0].reading.specimen}: {found.last[0].verdict.word}."
+        row = found.last[0]
+        limit = f" (film intact from {_intact(found)} on)" if row.verdict.film in ("intact", "leak") else ""
+        yield f"Verdict of {row.reading.specimen}: {row.verdict.word}{limit}."
     elif whole.total:
         which = "None" if not whole.count else "All" if whole.count == whole.total else f"{whole.count}"
         verb = "is" if whole.count in (0, 1) and which != "All" else "are"
-        yield f"{which} of the {whole.total} testable sensors {verb} intact: yield {_range(whole)}, 95 % confidence."
+        yield (
+            f"{which} of the {whole.total} testable sensors {verb} intact (film from {_intact(found)} on): yield "
+            f"{_range(whole)}, 95 % confidence."
+        )
+
+
+def _intact(found: Comparison) -> str:
+    """Least resistances of intact films, in words."""
+    ends = [of(row.verdict.intact_ohm for row in found.last) / 1e6 for of in (min, max)]
+    return " to ".join(dict.fromkeys(f"{value:.3g}" for value in ends)) + " Mohm"
 
 
 def findings(found: Comparison) -> Iterator[str]:
@@ -143,8 +155,9 @@ def notes(found: Comparison) -> tuple[str, ...]:
     """How verdicts come about, and what is counted."""
     how = (
         "The verdict is the gravest of the electrode's and the film's. An electrode is compared with the median of its "
-        "own shape. A film resistance up to that of two electrodes in series is a short; above, and below the meter's "
-        "highest range, the film leaks."
+        "own shape. A film resistance up to that of two electrodes in series is a short. A film is intact from "
+        f"{REACTANCES:g} times its predicted reactance at {TONES_HZ[0] / 1e3:g} kHz on, where a leak changes the "
+        f"impedance by {50 / REACTANCES**2:g} %, or from the meter's highest range on; between, it leaks."
     )
     if len(found.last) == 1:
         return (how,)

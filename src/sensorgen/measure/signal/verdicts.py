@@ -7,7 +7,7 @@ reads :math:`2 R_Y x / L`: a reading below :math:`2 R_Y` may be a short, a readi
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, isnan, nan
+from math import inf, isnan, nan, pi
 from statistics import median
 
 from sensorgen.core.errors import OutOfRange
@@ -17,6 +17,7 @@ WORDS = ("open electrode", "short", "leak", "dry joint", "intact", "unknown")
 """Verdicts, the gravest first; unknown where a reading is missing."""
 
 INTACT_OHM = 1e8  # highest range of a bench multimeter
+REACTANCES = 10.0  # of a film: a leak of so many in parallel changes its impedance by 1/2/10**2, 0.5 %
 ORDER = 10.0  # largest factor of one order of magnitude
 _DRY, _OPEN, _LOW = 3.0, 100.0, 0.1  # of the expected resistance
 _APART = 2.0  # factor between readings of one electrode beyond which the contact is bad
@@ -79,6 +80,8 @@ class Verdict:
         Leakage of the whole film with that reading [S]; inf for a reading of 0.
     reasons : tuple of str
         Reasons with numbers.
+    intact_ohm : float
+        Least resistance of an intact film [ohm].
     """
 
     word: str
@@ -89,11 +92,34 @@ class Verdict:
     ratio: float
     leak_s: float
     reasons: tuple[str, ...]
+    intact_ohm: float = INTACT_OHM
 
     @property
     def same_order(self) -> bool | None:
         """Whether R_Z is below ten times R_Y; None where one is missing."""
         return None if isnan(self.ratio) else self.ratio <= ORDER
+
+
+def intact_ohm(capacitance_f: float, lowest_hz: float, meter_ohm: float = INTACT_OHM) -> float:
+    r"""Least resistance of an intact film [ohm]: :math:`10 / (\omega C)`, or what the meter can show.
+
+    A leak of resistance R in parallel with C raises the admittance's magnitude by :math:`1/(2 (\omega C R)^2)`.
+
+    Parameters
+    ----------
+    capacitance_f : float
+        Of the film [F]; 0 if unknown.
+    lowest_hz : float
+        Lowest frequency of the readout [Hz].
+    meter_ohm : float
+        Highest range of the meter [ohm].
+
+    Examples
+    --------
+    >>> round(intact_ohm(60e-12, 1e3) / 1e6, 1), intact_ohm(0.0, 1e3)
+    (26.5, 100000000.0)
+    """
+    return min(meter_ohm, REACTANCES / (2 * pi * lowest_hz * capacitance_f)) if capacitance_f else meter_ohm
 
 
 def verdict(of: Evidence, intact_ohm: float = INTACT_OHM) -> Verdict:
@@ -126,7 +152,7 @@ def verdict(of: Evidence, intact_ohm: float = INTACT_OHM) -> Verdict:
     ratio = nan if isnan(ry) or isnan(rz) or ry in (0, inf) else rz / ry
     grave = [word for word in WORDS[:4] if word in (electrode, film)]
     word = grave[0] if grave else "unknown" if "unknown" in (electrode, film) else "intact"
-    return Verdict(word, electrode, film, ry, rz, ratio, leak, (why_electrode, why_film))
+    return Verdict(word, electrode, film, ry, rz, ratio, leak, (why_electrode, why_film), intact_ohm)
 
 
 def _electrode(of: Evidence, ry: float) -> tuple[str, str]:

@@ -73,7 +73,7 @@ def cell_of(scene: Scene, period_mm: float | None) -> Cell:
     scene : Scene
         As drawn or as printed, without its support.
     period_mm : float or None
-        Period of the pattern; None for a scene without one, as a plate [mm].
+        Period of the pattern; None for a scene without one: a piece of a plate as long as high, else all of it [mm].
 
     Raises
     ------
@@ -88,7 +88,8 @@ def cell_of(scene: Scene, period_mm: float | None) -> Cell:
         raise BadInput(f"compression needs one cross-section; this scene has {len(found)}: it must be solved in 3D")
     whole = columns(found[0])
     start, end = whole[0].left_mm, whole[-1].right_mm
-    period = period_mm or min(end - start, max(whole[0].layers[-1].top_mm))
+    uniform = len(_strips(whole, start, end)) == 1
+    period = period_mm or (min(end - start, max(whole[0].layers[-1].top_mm)) if uniform else end - start)
     if period > (end - start) * (1 + 1e-9):
         raise BadInput(f"the sensor is {end - start:g} mm long, less than its period of {period:g} mm")
     axes = {place for c in whole for place in (c.left_mm, (c.left_mm + c.right_mm) / 2)}

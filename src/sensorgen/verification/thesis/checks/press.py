@@ -33,7 +33,7 @@ def _pressed(
     """A cell under 100 kPa, of the cache where it was solved before."""
     made = designs.make({"shape": shape, "parameters": parameters})
     found = compressed.answer(
-        drawn(made), compressed.Asked((0.0, _KPA), compressed.BoundaryConditions(base=base, period=period))
+        drawn(made), compressed.Asked((0.0, _KPA), compressed.BoundaryConditions(base=base, period=period), sides="symmetric")
     )
     if found.faults:
         raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {found.faults[0]}")
@@ -175,6 +175,12 @@ def piston(mass_kg: float, force_n: float) -> list[Part]:
 def tip(diameter_mm: float, radius_mm: float) -> list[Part]:
     """5.6: outer diameter of the extension, and a radius of the whole."""
     return [Part("radius (ours: half the diameter)", "mm", diameter_mm / 2, radius_mm)]
+
+
+def umbrella(force_n: float, flat_mm: float, range_kpa: list[float]) -> list[Part]:
+    """1.1: the pressure of the bench's largest force on the flat end, over the whole width, against that of gait."""
+    area_m2 = flat_mm * table("C.1")["size_mm"][1] * M_PER_MM**2
+    return [Part("largest pressure of the bench", "Pa", force_n / area_m2, 1e3 * range_kpa[0], shown=_SHOWN)]
 
 
 def flat_end(flat_mm: float) -> list[Part]:

@@ -21,11 +21,14 @@ from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.query import TIP_M, TONES_HZ
 from sensorgen.verification.thesis.checks._columns import FILM_MM
 from sensorgen.verification.thesis.checks._text import table
+from sensorgen.verification.thesis.items import chapter
 from sensorgen.verification.thesis.verdicts import Part
 
 _UNITS = {"_pa": "Pa", "_kg_m3": "kg/m3", "_c": "°C", "_percent": "%"}  # by the ending of a quantity
 _PRINTER = "diabase-h5"
 _SENSOR_M2 = 1e-3  # 100 mm by 10 mm
+
+_PA_PER_PSI = 6894.757
 
 Printed = dict[str, float]
 
@@ -67,6 +70,27 @@ def beside(other: str, **said: Printed) -> list[Part]:
         for quantity, value in values.items()
         for name, unit in [_named(material, quantity)]
         if quantity in there.get(material, {})
+    ]
+
+
+def mat(
+    points: float, per_cm2: float, size_cm: list[float], range_kpa: list[float], range_psi: list[float]
+) -> list[Part]:
+    """Table 1.1: its count by its density and area, and its pressures, which are round numbers of psi."""
+    return [
+        Part("sensing points (ours: density times area)", "", per_cm2 * size_cm[0] * size_cm[1], points, shown=3),
+        Part("range (ours: 50 and 160 psi)", "Pa", [_PA_PER_PSI * p for p in range_psi],
+             [1e3 * p for p in range_kpa]),
+    ]  # fmt: skip
+
+
+def elements(element_mm: float) -> list[Part]:
+    """1.1: an element is a period of the rectangular cell; that of the mat is what its density gives."""
+    strip = next(item.given for item in chapter("2").figures if item.number == "2.14")
+    period = strip["etpu_width_mm"] + strip["x60_width_mm"] + 2 * strip["air_width_mm"]
+    return [
+        Part("element (ours: sum of the strips' widths)", "mm", period, element_mm),
+        Part("element of the mat", "mm", 10 / table("1.1")["per_cm2"] ** 0.5),
     ]
 
 

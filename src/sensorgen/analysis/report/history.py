@@ -1,0 +1,110 @@
+"""Bake, shrinkage and defects of each specimen, beside the change that they made."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import isfinite, nan
+from typing import Annotated
+
+from sensorgen.analysis.comparison import Compared, Comparison
+from sensorgen.analysis.report.alternating import AcRow, at_text
+from sensorgen.core.document import Cell, Column, Table
+
+NOTE = (
+    "A change is the ratio to the specimen's reading before, in its earlier state; of its first reading, to the "
+    "prediction. The bake shrinks a sensor in its plane: a share s takes C to (1 - s)^2 of it, and leaves the "
+    "resistance along the electrodes. A defect's change holds whatever else happened between the two readings."
+)
+_BAKE = {True: "baked", False: "not baked", None: ""}
+
+
+@dataclass(frozen=True)
+class HistoryRow:
+    """A reading in a new state of its specimen."""
+
+    number: Annotated[int, Column("reading", "", "number in the log")]
+    specimen: Annotated[str, Column("specimen")]
+    bake: Annotated[str, Column("bake")]
+    shrinkage_percent: Annotated[Cell, Column("shrinkage", "%", "of the bake in the plane, by the design")]
+    defects: Annotated[str, Column("defects")]
+    remark: Annotated[str, Column("remark")]
+    against: Annotated[str, Column("compared with")]
+    electrode_change: Annotated[float, Column("electrode resistance changed", "", "ratio")]
+    film_change: Annotated[float, Column("film resistance changed", "", "ratio")]
+    capacitance_change: Annotated[float, Column("C changed", "", "ratio, at the lowest common frequency")]
+    at: Annotated[str, Column("at")]
+    expected_change: Annotated[Cell, Column("C expected to change", "", "by the shrinkage")]
+    verdict: Annotated[str, Column("verdict")]
+
+
+def rows(found: Comparison, ac: Sequence[AcRow]) -> list[HistoryRow]:
+    """A row for each reading of which a bake, shrinkage, a defect or a remark is known and new."""
+    measured: dict[int, dict[float, tuple[float, float]]] = {}
+    for one in ac:
+        measured.setdefault(one.number, {})[one.frequency_hz] = one.c_pf, one.c_ratio
+    made, before = [], dict[str, tuple[Compared, dict[float, float]]]()
+    for row in found.rows:
+        words, name = row.reading.words, row.reading.specimen
+        body = found.bodies.get(found.names.get(name, ""))
+        shrinkage = body.design.shrinkage if body else 0.0
+        earlier, c = before.get(name), measured.get(row.reading.number, {})
+        state = (words.baked, words.defects, words.remark)
+        known = (words.defects or words.remark or words.baked is not None or shrinkage) and (
+            not earlier or state != _state(earlier[0])
+        )
+        if known:
+            made.append(_row(row, earlier, c, shrinkage))
+        values = {f: pf for f, (pf, _) in c.items()}
+        before[name] = row, {**(earlier[1] if earlier and not known else {}), **values}
+    return made
+
+
+def _state(row: Compared) -> tuple[bool | None, str, str]:
+    words = row.reading.words
+    return words.baked, words.defects, words.remark
+
+
+def _row(
+    row: Compared, earlier: tuple[Compared, dict[float, float]] | None, c: dict[float, tuple[float, float]],
+    shrinkage: float,
+) -> HistoryRow:  # fmt: skip
+    words, now = row.reading.words, row.verdict
+    if earlier:
+        was, known = earlier[0].verdict, {f: pf / earlier[1][f] for f, (pf, _) in c.items() if f in earlier[1]}
+        electrode, film = _ratio(now.ry_ohm, was.ry_ohm), _ratio(now.rz_ohm, was.rz_ohm)
+        against = f"reading {earlier[0].reading.number}"
+    else:
+        expected = row.predicted.ry_ohm if row.predicted else None
+        electrode, film = _ratio(now.ry_ohm, expected.value if expected else nan), nan
+        known, against = {f: ratio for f, (_, ratio) in c.items()}, "prediction"
+    lowest = min(known, default=None)
+    baked = bool(earlier and earlier[0].reading.words.baked is False and words.baked)
+    return HistoryRow(
+        row.reading.number, row.reading.specimen, _BAKE[words.baked], 100 * shrinkage if shrinkage else None,
+        words.defects, words.remark, against, electrode, film, known[lowest] if lowest else nan,
+        at_text(lowest) if lowest else "", (1 - shrinkage) ** 2 if baked and shrinkage else None, now.word,
+    )  # fmt: skip
+
+
+def _ratio(now: float, before: float) -> float:
+    return now / before if isfinite(now) and isfinite(before) and before > 0 else nan
+
+
+def findings(made: Sequence[HistoryRow]) -> Iterator[str]:
+    """What bakes and defects changed, a sentence for each specimen of a few."""
+    if len({row.specimen for row in made}) > 1:
+        return
+    for row in made:
+        changes = {
+            "electrode resistance": row.electrode_change, "film resistance": row.film_change,
+            f"C at {row.at}": row.capacitance_change,
+        }  # fmt: skip
+        said = ", ".join(f"{name} x {value:.3g}" for name, value in changes.items() if isfinite(value))
+        state = ", ".join(filter(None, (row.bake, row.defects, row.remark)))
+        shrunk = f"; its shrinkage alone makes C x {row.expected_change:.3g}" if row.expected_change else ""
+        if said and state:
+            yield f"Reading {row.number} ({state}) against {row.against}: {said}{shrunk}."
+
+
+def table(made: Sequence[HistoryRow]) -> Table:
+    """The rows as a table."""
+    return Table.of("changes", "Bake, shrinkage and defects, and the change that they made", tuple(made))
