@@ -204,11 +204,14 @@ def _mean(values: Real, otherwise: tuple[float, float]) -> tuple[float, float]:
     return (float(seen.mean()), float(seen.std())) if len(seen) >= _FEWEST_COURSES else otherwise
 
 
+def rest_gain(model: SpecimenModel) -> Real:
+    """Covariance of the parts of a reading at rest by the gain alone (2 m, 2 m)."""
+    m = len(model.frequency_hz)
+    return np.asarray(model.spread.gain**2 / 2 * np.kron(np.eye(2), np.eye(m) + np.ones((m, m))))
+
+
 def _rest_covariance(model: SpecimenModel, data: Data) -> Real:
-    m, gain = len(data.rest), model.spread.gain
-    common = np.kron(np.eye(2), np.ones((m, m)))
-    noise = np.tile(np.maximum(data.rest_noise, _FLOOR), 2) ** 2
-    return np.asarray(np.diag(noise + gain**2 / 2) + common * gain**2 / 2)
+    return np.diag(np.tile(np.maximum(data.rest_noise, _FLOOR), 2) ** 2) + rest_gain(model)
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,7 +297,7 @@ def _descended(
         gradient = np.einsum("nia,nij,nj->a", slopes, weight, ratio, optimize=True)
         gradient = gradient + rest_slopes.T @ rest - inverse @ (at - middle)
         step = np.linalg.solve(found + damping * np.eye(len(at)), gradient)
-        step *= min(1.0, 3.0 / np.abs(step).max())
+        step *= 3.0 / max(3.0, np.abs(step).max())
         tried = off(at + step)
         if tried[2] <= cost:
             at, (ratio, rest, cost), damping = at + step, tried, damping / 10
@@ -340,10 +343,8 @@ def _components(model: SpecimenModel, data: Data, at: Real, before: tuple[Real, 
 
 def gain(model: SpecimenModel, data: Data, at: Real) -> Complex:
     """Most probable ln of each tone's gain (m,), phase as imaginary part, given the other parameters."""
-    m, sd = len(data.rest), model.spread.gain
-    own = sd**2 / 2 * np.kron(np.eye(2), np.eye(m) + np.ones((m, m)))
-    left = parts(data.rest - model.rest(at))
-    found = own @ np.linalg.solve(_rest_covariance(model, data), left)
+    m, left = len(data.rest), parts(data.rest - model.rest(at))
+    found = rest_gain(model) @ np.linalg.solve(_rest_covariance(model, data), left)
     return np.asarray(found[:m] + 1j * found[m:])
 
 
