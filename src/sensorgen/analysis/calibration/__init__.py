@@ -4,6 +4,7 @@ import uuid
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from math import hypot, log
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from sensorgen.analysis.calibration.meters import readings_of
 from sensorgen.analysis.calibration.pairs import known_presses, nothing_recorded
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Part
-from sensorgen.core.errors import BadInput, MissingValue, within
+from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, within
 from sensorgen.core.version import __version__
 from sensorgen.design.body import BodyOf
 from sensorgen.design.design import Design
@@ -25,7 +26,7 @@ from sensorgen.prediction.calibration.fitting import Data, calibrated, gain, sha
 from sensorgen.prediction.calibration.inversion import Found
 from sensorgen.prediction.calibration.materials import links
 from sensorgen.prediction.calibration.rest import checked
-from sensorgen.prediction.calibration.specimen import SpecimenModel, Spread
+from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, Spread
 from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import TIP_M, TONES_HZ, Query, Tip
@@ -138,12 +139,46 @@ def spread_of(predicted: SensorModel, bench: Bench) -> Spread:
     usual, c = Spread(), predicted.rest.capacitance
     ends = [np.log(end / r.value) for r in predicted.rest.resistance.values() for end in (r.lower, r.upper)]
     moduli = [v for v in predicted.values if v.quantity == "youngs_modulus_pa"]
+    middle, by_print, by_print_shape = print_spread(predicted)
     return replace(
         usual, force_n=sd, force_offset_n=mean,
         resistance=max(usual.resistance, float(np.ptp(ends)) / _SURE) if ends else usual.resistance,
         capacitance=max(usual.capacitance, float(np.log(c.upper / c.lower)) / _SURE),
-        law=usual.law if moduli else 2 * usual.law,
+        law=hypot(usual.law if moduli else 2 * usual.law, by_print), law_middle=middle,
+        law_shape=hypot(usual.law_shape, by_print_shape),
     )  # fmt: skip
+
+
+def print_spread(predicted: SensorModel) -> tuple[float, float, float]:
+    """Mean of ln of the rise by what is printed, and standard deviations as a whole and from force to force.
+
+    The estimate of a print is one of several cells: electrodes between the least and the largest gap of the rules of
+    slicers, the film thinner or thicker, and at best the cell as drawn. Between gaps the rise is taken to change with
+    their square at most: the field over the gap, and the displacement of a film that gets thinner. All 0 for a drawing.
+    """
+    if predicted.body.is_drawn:
+        return 0.0, 0.0, 0.0
+    by_drawing = _ln_rise_as_drawn(predicted)
+    ends = [0.0, *by_drawing.tolist()]
+    cells = predicted.body.cells
+    error, (first, *_) = cells.film.error_mm if cells.film else 0.0, cells.gap_mm.values()
+    gaps = [gap for gap in cells.gap_mm.values() if error < gap < np.inf]
+    if first in gaps:
+        ends += [2 * log(first / end) for end in (min(gaps) - error, max(gaps) + error)]
+    return (max(ends) + min(ends)) / 2, (max(ends) - min(ends)) / _SURE, float(np.ptp(by_drawing)) / _SURE
+
+
+def _ln_rise_as_drawn(predicted: SensorModel) -> Real:
+    """Ln of the rise of the cell as drawn over the predicted one, at forces that both laws know; 0 without a law."""
+    sensor = predicted.sensor
+    try:
+        drawn = sensor_model(bodies.drawn(predicted.body.design), Query(tip=Tip(sensor.tip_m)))[0].sensor
+    except SensorgenError:
+        return np.zeros(1)
+    models = [SpecimenModel(one, np.array(TONES_HZ), Spread()) for one in (drawn, sensor)]
+    stress = np.minimum(np.array(FORCES_N) / (sensor.width_m * sensor.tip_m), min(one.most_pa for one in models))
+    shares = [one.compression.capacitive_strain(stress)[0] for one in (drawn, sensor)]
+    return np.asarray(np.subtract(*(np.log(share / (1 - share)) for share in shares)))
 
 
 @dataclass(frozen=True, eq=False)

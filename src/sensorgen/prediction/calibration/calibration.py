@@ -136,7 +136,7 @@ class Calibration:
         scales = {  # unit, what multiplies the exponential, standard deviation of the logarithm
             "resistance": ("ohm", sensor.resistance_ohm(), spread.resistance),
             "capacitance": ("pF", sensor.capacitance_f() * 1e12, spread.capacitance),
-            "rise": ("predicted", 1.0, spread.law),
+            "rise": ("predicted", exp(spread.law_middle), spread.law),
             "leak": ("", spread.leak, spread.leak_spread),
             "dispersion": ("", spread.dispersion * exp(-0.5), 1.0),
             "lead": ("ohm", spread.lead_ohm * exp(-0.5), 1.0),
@@ -171,7 +171,7 @@ class Calibration:
         weights = self.model.law_weights()[knot]
         at, sd = float(weights @ self.posterior.at), sqrt(weights @ self.posterior.covariance @ weights)
         before = sqrt(weights @ weights)
-        return np.array([at, at - NORMAL_90 * sd, at + NORMAL_90 * sd, -NORMAL_90 * before, NORMAL_90 * before])
+        return self.model.spread.law_middle + np.array([at, at - NORMAL_90 * sd, at + NORMAL_90 * sd, -NORMAL_90 * before, NORMAL_90 * before])
 
     @property
     def unidentified(self) -> tuple[str, ...]:

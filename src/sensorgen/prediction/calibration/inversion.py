@@ -28,11 +28,11 @@ _MOST = 128, 96  # forces and positions of the grid
 _LEAST = 40, 32
 _BLOCK = 128  # readings at a time
 _FEW_TONES = 2
-OTHERWISE = 0.25  # probability, until a recheck, that something besides the known press makes a part of the reading
+OTHERWISE = 0.1  # probability, until a recheck, that something else than the press makes a part of the reading: a guess
 _BELOW = 0.3  # share of what lies outside an interval that is below it, where that something is allowed for
 _MORE = 3.2905267314919255  # standard deviations that noise exceeds once in a thousand
-_BELOW_REST = 4.5  # standard deviations that noise exceeds in three readings of a million
-_DOUBTED = 200  # readings after one below its rest
+_BELOW_REST = 4.0  # standard deviations that noise exceeds in three readings of 100 000
+_DOUBTED = 200  # readings beside one below its rest, whose rest was probably read the same way
 _PLACES = 7  # of a second press, along the sensor
 
 
@@ -49,7 +49,7 @@ class Verdict(IntEnum):
     STALE_REST = 4
     """The reading at rest is too old."""
     LOADED_REST = 5
-    """This reading, or one of the last ``_DOUBTED``, lies below its reading at rest: something lay on the sensor then."""
+    """This reading, or one of ``_DOUBTED`` beside it, lies below its reading at rest: something lay on the sensor then."""
     MORE = 6
     """Another capacitance besides one press: a second press, or a hand."""
     NO_FIT = 7
@@ -133,8 +133,9 @@ class Inverter:
     level : float
         Probability of the intervals [-].
     otherwise : float
-        Probability that the press makes an unknown share of a reading alone, any one alike [-]: the sensor is softer
-        or the tip wider than in the calibration, or something else is there, and the frequencies cannot tell.
+        Probability that the press makes a share of a reading alone [-]: the sensor is softer or the tip wider than in
+        the calibration, or something else is there, and the frequencies cannot tell. The share is below s with the
+        probability sqrt(s).
 
     Attributes
     ----------
@@ -267,8 +268,8 @@ class Inverter:
         if not self._otherwise:
             return _quantiles(self.force_n, force, (out / 2, 1 - out / 2))
         edges = _edges(self.force_n)
-        low, high = edges[:-1], np.maximum(edges[1:], 1e-9)
-        share = np.clip((np.minimum(high[:, None], high) - low[:, None]) / high, 0.0, None)  # of a force below another
+        low, high = np.sqrt(edges[:-1]), np.sqrt(np.maximum(edges[1:], 1e-9))
+        share = np.clip((np.minimum(high[:, None], high) - low[:, None]) / high, 0.0, None)  # of forces below another
         mixed = (1 - self._otherwise) * force + self._otherwise * share @ force
         return _quantiles(self.force_n, mixed, (_BELOW * out, 1 - (1 - _BELOW) * out))
 
@@ -312,7 +313,7 @@ class Inverter:
 
 
 def doubt_rest(found: Found, rest: Mask, left: int) -> int:
-    """Mark readings below their reading at rest, and those after them, whose rest was read the same way.
+    """Mark readings below their reading at rest, and those near them, whose rest was read the same way.
 
     Parameters
     ----------
@@ -329,8 +330,10 @@ def doubt_rest(found: Found, rest: Mask, left: int) -> int:
         Readings that are left to be marked after these.
     """
     count = np.cumsum(~rest)
-    last = np.maximum.accumulate(np.where(found.below > _BELOW_REST, count, left - _DOUBTED))
-    doubted = ~rest & (count - last < _DOUBTED)
+    low = found.below > _BELOW_REST
+    last = np.maximum.accumulate(np.where(low, count, left - _DOUBTED))
+    following = np.minimum.accumulate(np.where(low, count, count[-1:] + _DOUBTED)[::-1])[::-1]
+    doubted = ~rest & ((count - last < _DOUBTED) | (following - count < _DOUBTED))
     found.verdict[doubted] = np.maximum(found.verdict[doubted], Verdict.LOADED_REST)
     return max(int(_DOUBTED - (count[-1] - last[-1])), 0) if len(count) else left
 
