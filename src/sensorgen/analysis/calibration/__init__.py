@@ -20,9 +20,10 @@ from sensorgen.measure.log import BenchRun, Log, Reading, batches, notes
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log.entries import Specimen
 from sensorgen.prediction import bodies
+from sensorgen.prediction.calibration.baseline import Change
 from sensorgen.prediction.calibration.calibration import BEYOND, Calibration, from_json
 from sensorgen.prediction.calibration.coverage import coverage_of, held_out
-from sensorgen.prediction.calibration.fitting import Data, calibrated, gain, shared, widened
+from sensorgen.prediction.calibration.fitting import Data, calibrated, gain, loosened, shared, widened
 from sensorgen.prediction.calibration.inversion import Found
 from sensorgen.prediction.calibration.materials import links
 from sensorgen.prediction.calibration.rest import checked
@@ -320,8 +321,9 @@ def calibrate(
         calibration = Calibration(
             one.specimen, one.design.name, one.design.id(), one.model, posterior, most, held[0] if held else None,
             one.rows, tuple(gain(one.model, one.data, posterior.at).tolist()) if one.recorded else (), notes,
-            links(one.predicted),
+            links(one.predicted, print_spread(one.predicted)[1:]),
         )  # fmt: skip
+        calibration = replace(calibration, notes=(*notes, *calibration.departures()))
         made.append(Made(calibration, one.data, held[1] if held else None))
     return made
 
@@ -370,17 +372,20 @@ class Recheck:
         Known ones, and those of them in their intervals by the old calibration.
     z : float
         Mean of force less median over its standard deviation, times the root of the number of presses [-].
+    change : Change
+        Of the reading at rest.
     """
 
     calibration: Calibration
     presses: int
     inside: int
     z: float
+    change: Change
 
     @property
     def alarm(self) -> bool:
-        """Whether the old calibration no longer holds."""
-        return abs(self.z) > _ALARM
+        """The old calibration no longer holds."""
+        return abs(self.z) > _ALARM or bool(self.change)
 
     def document(self) -> Iterator[Part]:
         """What the presses say."""
@@ -389,12 +394,15 @@ class Recheck:
             f"{said}: {self.inside} of {self.presses} known forces in their 90 % intervals, their mean off by "
             f"{self.z:+.1f} standard errors"
         )
+        if self.change:
+            yield f"{self.change.words}; mended by {self.presses} presses alone, 30 make a calibration of it"
         yield from self.calibration.document()
 
     def to_json(self) -> str:
         """The mended calibration, and what the presses said of the old one."""
         return self.calibration.shown_json(recheck={"presses": self.presses, "inside": self.inside, "z": self.z,
-                                                    "alarm": self.alarm})  # fmt: skip
+                                                    "alarm": self.alarm,
+                                                    "at_rest": self.change.words if self.change else ""})  # fmt: skip
 
 
 def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
@@ -425,7 +433,7 @@ def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
         order = checked(tones, old.model.frequency_hz)
     data = replace(
         data, ratio=data.ratio[:, order], noise=data.noise[:, order], rest=data.rest[order],
-        rest_noise=np.ones(len(tones)),  # the gain behind it is known from the first calibration
+        rest_noise=data.rest_noise[order],
     )  # fmt: skip
     count = len(data.presses.force_n)
     if count < FEWEST_RECHECK:
@@ -433,16 +441,22 @@ def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
             f"{name}: {count} new known presses; expected {FEWEST_RECHECK} to 5, spread over force and place"
         )
     most = max(old.force_n, float(data.presses.force_n.max()))
-    at = old.inverter(np.median(data.noise, axis=0), limit_n=BEYOND * most).batch(data.ratio)
+    known = replace(old, rechecked=True)  # without the allowance that these presses decide on
+    at = known.inverter(np.median(data.noise, axis=0), limit_n=BEYOND * most).batch(data.ratio)
     sd = np.ptp(at.force_90_n, axis=1) / _SURE
     z = float(np.mean((data.presses.force_n - at.force_n) / sd) * np.sqrt(count))
-    posterior = calibrated(old.model, data, widened(old.model, old.posterior))
+    change = old.baseline.change(np.exp(data.rest), data.rest_noise)
+    if change:
+        posterior = calibrated(old.model, data)
+    else:  # the gain behind the reading at rest is known from the first calibration
+        start = widened(old.model, old.posterior) if abs(z) > _ALARM else loosened(old.model, old.posterior)
+        posterior = calibrated(old.model, replace(data, rest_noise=np.ones(len(tones))), start)
     new = replace(
-        old, posterior=posterior, force_n=most, held_out=None,
-        rows=(*old.rows, *(row.uid for row in rows)),
-        notes=(*left_out, f"mended by {count} presses after a recheck"),
+        known, posterior=posterior, force_n=most, held_out=None, rows=(*old.rows, *(row.uid for row in rows)),
+        gain=tuple(gain(old.model, data, posterior.at).tolist()),
     )  # fmt: skip
-    return Recheck(new, count, coverage_of(at, data.presses).force, z)
+    new = replace(new, notes=(*left_out, f"mended by {count} presses after a recheck", *new.departures()))
+    return Recheck(new, count, coverage_of(at, data.presses).force, z, change)
 
 
 def rows(log: Log, calibrations: Sequence[Calibration]) -> list[Row]:

@@ -81,8 +81,13 @@ class Baseline:
             return slopes[:, model.names.index(name)], float(np.exp(at[model.names.index(name)] - 0.5))
 
         (lead, lead_share), (stray, stray_share) = by("lead"), by("stray")
-        lead, stray = lead * _LEAD_OHM / (spread.lead_ohm * lead_share), stray * _STRAY_F / (spread.stray_f * stray_share)
-        self._weights = np.stack([by("capacitance")[0] / spread.capacitance, by("resistance")[0] / spread.resistance], 1)
+        lead, stray = (
+            lead * _LEAD_OHM / (spread.lead_ohm * lead_share),
+            stray * _STRAY_F / (spread.stray_f * stray_share),
+        )
+        self._weights = np.stack(
+            [by("capacitance")[0] / spread.capacitance, by("resistance")[0] / spread.resistance], 1
+        )
         self._covariance = np.outer(lead, lead) + np.outer(stray, stray) + _METER**2 * np.eye(2 * m)
         if gain is None:
             self._covariance += slopes @ posterior.covariance @ slopes.T + rest_gain(model)
@@ -99,7 +104,9 @@ class Baseline:
         """
         kept = np.flatnonzero(np.tile(np.isfinite(z_ohm), 2))
         off = parts(np.log(z_ohm) - self._ln_z)[kept]
-        covariance = self._covariance + np.diag(np.broadcast_to(np.tile(noise, 2 if np.ndim(noise) else 1), len(self._covariance)) ** 2)
+        covariance = self._covariance + np.diag(
+            np.broadcast_to(np.tile(noise, 2 if np.ndim(noise) else 1), len(self._covariance)) ** 2
+        )
         weights, inverse = self._weights[kept], np.linalg.inv(covariance[np.ix_(kept, kept)])
         variance = np.linalg.pinv(weights.T @ inverse @ weights)
         found = variance @ weights.T @ inverse @ off

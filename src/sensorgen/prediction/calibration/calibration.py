@@ -88,6 +88,19 @@ class Calibration:
         """Values of the materials that this specimen has, with intervals of 95 %."""
         return [estimate(self.model, self.posterior, link) for link in self.links]
 
+    def departures(self) -> tuple[str, ...]:
+        """Remarks on values that no longer lie where they were expected."""
+        found: dict[str, Value | MaterialEstimate] = {
+            (f"{one.name} [{one.unit}]" if one.unit else one.name): one for one in self.values()
+        }
+        found |= {f"{one.material} {one.quantity}": one for one in self.materials()}
+        return tuple(
+            f"{name}: {one.value:.3g} ({one.lower:.3g} to {one.upper:.3g}) has left what was expected, "
+            f"{one.before_lower:.3g} to {one.before_upper:.3g}: doubt the design, film (a hole leaks), tip or bench"
+            for name, one in found.items()
+            if one.lower > one.before_upper or one.upper < one.before_lower
+        )
+
     def source(self) -> str:
         """A source of material values, as a design names it: those that the readings tell."""
         return source_text(f"calibration of {self.specimen}, design {self.design}", self.materials())
@@ -117,12 +130,12 @@ class Calibration:
 
     @property
     def allowance(self) -> tuple[str, ...]:
-        """What the intervals of the force allow for, in words, until known presses of a later session narrow them."""
+        """Allowance of the intervals of the force until known presses of a later session narrow them, in words."""
         if self.rechecked or not self.posterior.presses:
             return ()
         return (
-            f"lower ends of the force allow, by {OTHERWISE:.0%}, for what no reading shows: a film that has softened, a "
-            "wider tip, a hand or a second press; 3 to 5 known presses narrow them (sensorgen calibrate --recheck)",
+            f"lower ends of the force allow, by {OTHERWISE:.0%}, for what no reading shows: a softer film, a wider tip, a "
+            "hand, a second press; 3 to 5 known presses narrow them (sensorgen calibrate --recheck)",
         )
 
     @property
@@ -171,7 +184,9 @@ class Calibration:
         weights = self.model.law_weights()[knot]
         at, sd = float(weights @ self.posterior.at), sqrt(weights @ self.posterior.covariance @ weights)
         before = sqrt(weights @ weights)
-        return self.model.spread.law_middle + np.array([at, at - NORMAL_90 * sd, at + NORMAL_90 * sd, -NORMAL_90 * before, NORMAL_90 * before])
+        return self.model.spread.law_middle + np.array(
+            [at, at - NORMAL_90 * sd, at + NORMAL_90 * sd, -NORMAL_90 * before, NORMAL_90 * before]
+        )
 
     @property
     def unidentified(self) -> tuple[str, ...]:

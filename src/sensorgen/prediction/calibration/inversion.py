@@ -49,11 +49,11 @@ class Verdict(IntEnum):
     STALE_REST = 4
     """The reading at rest is too old."""
     LOADED_REST = 5
-    """This reading, or one of ``_DOUBTED`` beside it, lies below its reading at rest: something lay on the sensor then."""
-    MORE = 6
-    """Another capacitance besides one press: a second press, or a hand."""
-    NO_FIT = 7
+    """This reading, or one of ``_DOUBTED`` beside it, lies below its reading at rest: that was read under a load."""
+    NO_FIT = 6
     """No press explains the reading."""
+    MORE = 7
+    """Another capacitance besides one press explains it: a second press, or a hand."""
     CHANGED = 8
     """At rest, the sensor is not the one that was calibrated."""
     MISSING = 9
@@ -66,8 +66,8 @@ class Verdict(IntEnum):
 
 
 _WORDS = (
-    "ok", "force only", "at the end", "not calibrated", "stale rest", "rest under load", "more than one press",
-    "no fit", "changed since calibration", "missing",
+    "ok", "force only", "at the end", "not calibrated", "stale rest", "rest under load", "no fit",
+    "more than one press", "changed since calibration", "missing",
 )  # fmt: skip
 
 
@@ -201,7 +201,7 @@ class Inverter:
             if pattern.sum() >= _FEW_TONES:
                 self._put(found, rows, ratio, pattern)
         found.below[:] = parts(ratio) @ self._fall
-        bad = np.flatnonzero(found.chi2 > chi2_limit(2 * found.tones - 2))
+        bad = np.flatnonzero(~_one_press(found) & ~_more(found))
         if bad.size:
             self._without_one(found, bad, ratio, measured)
         stale = np.zeros(len(ratio), bool) if rest_age_s is None else ~(rest_age_s <= STALE_S)
@@ -273,7 +273,7 @@ class Inverter:
         mixed = (1 - self._otherwise) * force + self._otherwise * share @ force
         return _quantiles(self.force_n, mixed, (_BELOW * out, 1 - (1 - _BELOW) * out))
 
-    def _towards_more(self, root: Real, points: Sequence[int], kept: NDArray[np.intp]) -> Real:
+    def _towards_more(self, root: NDArray[np.float32], points: Sequence[int], kept: NDArray[np.intp]) -> Real:
         """Unit vectors, whitened, in which another capacitance moves a reading the most, and no press (points, k)."""
         tangent = root @ self._tangents[points][:, kept]
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True) + 1e-300
@@ -301,8 +301,8 @@ class Inverter:
             (Verdict.AT_THE_END, found.force_90_n[:, 1] > self.force_n[-2]),
             (Verdict.NOT_CALIBRATED, np.full(len(wide), self._posterior.presses == 0)),
             (Verdict.STALE_REST, stale),
-            (Verdict.MORE, found.more > _MORE),
-            (Verdict.NO_FIT, (found.chi2 > chi2_limit(2 * found.tones - 2)) & ~(found.more > _MORE)),
+            (Verdict.NO_FIT, ~_one_press(found)),
+            (Verdict.MORE, _more(found)),
             (Verdict.CHANGED, changed),
             (Verdict.MISSING, found.tones < _FEW_TONES),
         )
@@ -310,6 +310,17 @@ class Inverter:
         for verdict, applies in rules:
             found.verdict[applies] = verdict
         return found
+
+
+def _one_press(found: Found) -> Mask:
+    """Readings that are not known to be of anything but one press."""
+    return ~(found.chi2 > chi2_limit(2 * found.tones - 2))
+
+
+def _more(found: Found) -> Mask:
+    """Readings that another capacitance besides a press explains, and a press alone does not."""
+    left = found.chi2 - np.square(found.more)
+    return (found.more > _MORE) & (left <= chi2_limit(2 * found.tones - 3))
 
 
 def doubt_rest(found: Found, rest: Mask, left: int) -> int:
@@ -345,7 +356,15 @@ def nothing(n: int) -> Found:
         return np.full(shape, np.nan)
 
     return Found(
-        nan(n), nan(n), nan(n, 2), nan(n, 2), nan(n), nan(n), nan(n), np.zeros(n, np.intp), np.full(n, Verdict.MISSING, np.uint8)
+        nan(n),
+        nan(n),
+        nan(n, 2),
+        nan(n, 2),
+        nan(n),
+        nan(n),
+        nan(n),
+        np.zeros(n, np.intp),
+        np.full(n, Verdict.MISSING, np.uint8),
     )
 
 

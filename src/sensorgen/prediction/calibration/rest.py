@@ -44,8 +44,7 @@ class Rest:
         self._loaded = True  # since the latest reading at rest
         if given is not None:
             self._take(np.where(given == 0, np.nan, given), np.full(len(given), at_s))
-            if baseline:
-                self._compare(*self.mean())
+            self._compare(*self.mean())
             self._loaded = True
 
     def ratios(self, impedance_ohm: Complex, rest: Mask, time_s: Real) -> tuple[Complex, Real, Mask]:
@@ -63,7 +62,7 @@ class Rest:
         Returns
         -------
         (n, m) array, (n,) array, (n,) array of bool
-            Ratios, nan for readings at rest and before the first of them; ages [s], 0 where they are not judged; whether
+            Ratios, nan for readings at rest and before the first of them; ages [s], 0 where they are not judged; where
             the readings at rest are of another sensor than the baseline.
         """
         z = np.where(impedance_ohm == 0, np.nan, impedance_ohm)
@@ -77,7 +76,7 @@ class Rest:
             else:
                 if self._latest:
                     mean, count = self.mean()
-                    if self._baseline and not self._loaded:
+                    if not self._loaded:
                         self._compare(mean, count)
                     with np.errstate(invalid="ignore"):
                         ratio[start:end] = np.log(z[start:end] / mean)
@@ -87,7 +86,7 @@ class Rest:
         return ratio, age, changed
 
     def _compare(self, mean: Complex, count: int) -> None:
-        change = self._baseline.change(mean, self.noise() / count**0.5)
+        change = self._baseline.change(mean, self.noise() / count**0.5) if self._baseline else None
         self._changed = bool(change)
         self.change = self.change or (change if change else None)
 

@@ -237,7 +237,12 @@ class SpecimenModel:
         share, _ = sensor.compression.capacitive_strain(np.minimum(stress, self.most_pa))
         first = self._at[f"rise at {FORCES_N[0]:g} N"]
         knots = spread.law_shape * (at[..., first : first + len(FORCES_N)] @ self._shapes.T)
-        ln_rise = rise + spread.law_middle + spread.law * value["rise"] + _interpolated(np.log(np.maximum(force, _NOTHING_N)), knots)
+        ln_rise = (
+            rise
+            + spread.law_middle
+            + spread.law * value["rise"]
+            + _interpolated(np.log(np.maximum(force, _NOTHING_N)), knots)
+        )
         for name, course in (("hysteresis", presses.unloading), ("creep", presses.decades)):
             ln_rise = ln_rise + getattr(spread, name) * np.exp(value[name] - 0.5) * np.nan_to_num(course)
         lifted = 1 + share / (1 - share) * np.maximum(stress / self.most_pa, 1.0) * np.exp(ln_rise)
