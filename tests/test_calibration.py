@@ -212,8 +212,8 @@ def test_the_latest_reading_at_rest_counts():
     z = np.array([[100.0], [102.0], [50.0], [0.0], [200.0], [50.0]], complex)
     at_rest = np.array([True, True, False, False, True, False])
     rest = Rest()
-    ratio, age = rest.ratios(z[:3], at_rest[:3], np.arange(3.0))
-    more, later = rest.ratios(z[3:], at_rest[3:], np.array([3.0, 4.0, 9.0]))
+    ratio, age, _ = rest.ratios(z[:3], at_rest[:3], np.arange(3.0))
+    more, later, _ = rest.ratios(z[3:], at_rest[3:], np.array([3.0, 4.0, 9.0]))
     found = np.exp(np.concatenate([ratio, more])[:, 0])
     assert found[[2, 5]] == pytest.approx([50 / 101, 0.25])
     assert np.isnan(found[[0, 1, 3, 4]]).all()
@@ -224,11 +224,11 @@ def test_old_readings_at_rest_and_those_of_before_do_not_count():
     """Of a drifting specimen, only rest readings of the last 15 s are averaged; the stream's replace a given file."""
     z = np.array([[100.0], [200.0], [202.0], [50.0]], complex)
     at_rest = np.array([True, True, True, False])
-    ratio, _ = Rest().ratios(z, at_rest, np.array([0.0, 100.0, 101.0, 102.0]))
+    ratio, *_ = Rest().ratios(z, at_rest, np.array([0.0, 100.0, 101.0, 102.0]))
     assert np.exp(ratio[3, 0]) == pytest.approx(50 / 201)
     given = Rest(np.full((9, 1), 400 + 0j))
-    first, _ = given.ratios(z[3:], at_rest[3:], np.full(1, np.nan))
-    later, age = given.ratios(z[1:], at_rest[1:], np.array([100.0, 101.0, 130.0]))
+    first, *_ = given.ratios(z[3:], at_rest[3:], np.full(1, np.nan))
+    later, age, _ = given.ratios(z[1:], at_rest[1:], np.array([100.0, 101.0, 130.0]))
     assert np.exp([first[0, 0], later[2, 0]]) == pytest.approx([50 / 400, 50 / 201])
     assert age[2] == 29
 

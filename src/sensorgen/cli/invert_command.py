@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from sensorgen.core.document import Documented
     from sensorgen.design.design import Design
     from sensorgen.measure.readings import Block, Readings
+    from sensorgen.prediction.calibration.baseline import Baseline
     from sensorgen.prediction.calibration.inversion import Inverter
     from sensorgen.prediction.calibration.rest import Rest
     from sensorgen.prediction.inverse import Prior
@@ -99,7 +100,7 @@ def _work(
         known = fitting.by_rest(model, np.log(mean), noise / count**0.5, noise)
         return Inverter(model, known, _prior(how["prior"]), limit), limit, 0, found.doubts
 
-    return _by_ratio(design.name, inverter, measured, output, rest_file, None, how["noise"], how["force_limit_n"])
+    return _by_ratio(design.name, inverter, measured, output, rest_file, None, how["noise"], how["force_limit_n"], None)
 
 
 def _specimen(
@@ -130,46 +131,50 @@ def _specimen(
         limit = limit_n or known.limit_n
         made = known.inverter(noise, _prior(prior), limit)
         beyond = (f"forces above {known.force_n:.3g} N were not calibrated",) if limit > known.limit_n else ()
-        return made, limit, known.posterior.presses, beyond
+        return made, limit, known.posterior.presses, (*beyond, *known.allowance)
 
-    return _by_ratio(of, inverter, measured, output, rest_file, known.model.frequency_hz, noise, force_limit_n)
+    return _by_ratio(
+        of, inverter, measured, output, rest_file, known.model.frequency_hz, noise, force_limit_n, known.baseline
+    )
 
 
 def _by_ratio(
     of: str, inverter: "Callable[[Rest, Any, Any, float | None], tuple[Inverter, float, int, Any]]", measured: str,
     output: str | None, rest_file: str | None, tones_hz: Any, noise: float | None,
-    force_limit_n: tuple[float, ...] | None,
+    force_limit_n: tuple[float, ...] | None, baseline: "Baseline | None",
 ) -> int:  # fmt: skip
     """Ratios to the latest reading at rest, row by row; the inverter is made when the first of them is there."""
     from sensorgen.measure.readings import readings
     from sensorgen.prediction.calibration import answers
-    from sensorgen.prediction.calibration.inversion import nothing
+    from sensorgen.prediction.calibration.inversion import doubt_rest, nothing
     from sensorgen.prediction.calibration.rest import Rest, checked
 
     limit_n = one("--force-limit", force_limit_n) if force_limit_n else None
     if noise is not None and not 0 < noise <= 1:
         raise BadInput(f"a noise of {noise:g}; expected a share above 0, up to 100 %")
     with readings(measured, beside=(_REST, _TIME)) as source, ExitStack() as stack:
+        tones_hz = source.frequency_hz if tones_hz is None else tones_hz
         with within(measured):
-            order = checked(source.frequency_hz, source.frequency_hz if tones_hz is None else tones_hz)
+            order = checked(source.frequency_hz, tones_hz)
         if rest_file is None and _REST not in source.numbers:
             raise BadInput(
                 f"{measured}: no reading at rest; expected a column 'rest' with 1 where nothing was on the sensor, or "
                 "--rest FILE.csv: what counts is the ratio to it (or --perfect, as if the sensor were as predicted)"
             )
-        rest = _taken_apart(rest_file, source.frequency_hz) if rest_file else Rest()
-        summary, made, told = answers.Summary(), None, False
+        rest = Rest(*(_taken_apart(rest_file, tones_hz) if rest_file else (None, np.nan)), baseline)
+        summary, made, told, doubted = answers.Summary(), None, False, 0
         write, terminal = _writer(stack, measured, output)
         step = stack.enter_context(show.progress(["reading"]))
         kept = [_TIME] * (_TIME in source.numbers) + source.kept
         write(answers.header(kept))
         for block in source.blocks():
             at_rest, time_s = _beside(source, block)
-            ratio, age_s = rest.ratios(block.impedance_ohm, at_rest, time_s)
+            ratio, age_s, changed = rest.ratios(block.impedance_ohm[:, order], at_rest, time_s)
             if rest and not at_rest.all() and (made is None or (rest.tells_noise and not told and noise is None)):
                 told, single = rest.tells_noise, np.sqrt(1 + 1 / rest.mean()[1]) * (noise or rest.noise())
-                made = inverter(rest, source.frequency_hz, np.broadcast_to(single, order.shape)[order], limit_n)
-            found = made[0].batch(ratio[:, order], age_s) if made else nothing(len(ratio))
+                made = inverter(rest, tones_hz, np.broadcast_to(single, order.shape), limit_n)
+            found = made[0].batch(ratio, age_s, changed) if made else nothing(len(ratio))
+            doubted = doubt_rest(found, at_rest, doubted)
             summary.add(found, at_rest)
             step(f"{summary.samples} samples")
             own = [[repr(t) if np.isfinite(t) else ""] if _TIME in source.numbers else [] for t in time_s.tolist()]
@@ -177,7 +182,8 @@ def _by_ratio(
         if made is None and summary.samples:
             raise BadInput(f"{measured}: nothing at rest before readings under load; expected 1 in column 'rest' first")
     sigma = noise or float(np.nanmedian(rest.noise()))
-    result = summary.result(of, made[2] if made else 0, made[1] if made else 0.0, sigma, made[3] if made else ())
+    notes = (*([rest.change.words] if rest.change else []), *(made[3] if made else ()))
+    result = summary.result(of, made[2] if made else 0, made[1] if made else 0.0, sigma, notes)
     _said(result, terminal, output)
     return 0
 
@@ -189,9 +195,10 @@ def _beside(source: "Readings", block: "Block") -> tuple[Any, Any]:
     return np.nan_to_num(columns.get(_REST, nothing)) != 0, columns.get(_TIME, nothing)
 
 
-def _taken_apart(path: str, tones_hz: Any) -> "Rest":
+def _taken_apart(path: str, tones_hz: Any) -> tuple[Any, float]:
+    """Readings at rest of a file, and the time of the last of them [s]."""
     from sensorgen.measure.readings import readings
-    from sensorgen.prediction.calibration.rest import Rest, checked
+    from sensorgen.prediction.calibration.rest import checked
 
     with readings(path, beside=(_TIME,)) as source:
         with within(path):
@@ -200,7 +207,7 @@ def _taken_apart(path: str, tones_hz: Any) -> "Rest":
         if not blocks:
             raise BadInput(f"{path}: no readings; expected some with nothing on the sensor")
         times = blocks[-1].numbers[-1] if source.numbers else np.array([np.nan])
-        return Rest(np.concatenate([block.impedance_ohm for block in blocks])[:, order], float(times[0]))
+        return np.concatenate([block.impedance_ohm for block in blocks])[:, order], float(times[0])
 
 
 def _writer(stack: ExitStack, measured: str, output: str | None) -> tuple[Callable[[str], None], bool]:

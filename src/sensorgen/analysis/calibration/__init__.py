@@ -4,6 +4,7 @@ import uuid
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from math import hypot, log
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from sensorgen.analysis.calibration.meters import readings_of
 from sensorgen.analysis.calibration.pairs import known_presses, nothing_recorded
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Part
-from sensorgen.core.errors import BadInput, MissingValue, within
+from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, within
 from sensorgen.core.version import __version__
 from sensorgen.design.body import BodyOf
 from sensorgen.design.design import Design
@@ -19,13 +20,14 @@ from sensorgen.measure.log import BenchRun, Log, Reading, batches, notes
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log.entries import Specimen
 from sensorgen.prediction import bodies
+from sensorgen.prediction.calibration.baseline import Change
 from sensorgen.prediction.calibration.calibration import BEYOND, Calibration, from_json
 from sensorgen.prediction.calibration.coverage import coverage_of, held_out
-from sensorgen.prediction.calibration.fitting import Data, calibrated, gain, shared, widened
+from sensorgen.prediction.calibration.fitting import Data, calibrated, gain, loosened, shared, widened
 from sensorgen.prediction.calibration.inversion import Found
 from sensorgen.prediction.calibration.materials import links
 from sensorgen.prediction.calibration.rest import checked
-from sensorgen.prediction.calibration.specimen import SpecimenModel, Spread
+from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, Spread
 from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import TIP_M, TONES_HZ, Query, Tip
@@ -138,12 +140,46 @@ def spread_of(predicted: SensorModel, bench: Bench) -> Spread:
     usual, c = Spread(), predicted.rest.capacitance
     ends = [np.log(end / r.value) for r in predicted.rest.resistance.values() for end in (r.lower, r.upper)]
     moduli = [v for v in predicted.values if v.quantity == "youngs_modulus_pa"]
+    middle, by_print, by_print_shape = print_spread(predicted)
     return replace(
         usual, force_n=sd, force_offset_n=mean,
         resistance=max(usual.resistance, float(np.ptp(ends)) / _SURE) if ends else usual.resistance,
         capacitance=max(usual.capacitance, float(np.log(c.upper / c.lower)) / _SURE),
-        law=usual.law if moduli else 2 * usual.law,
+        law=hypot(usual.law if moduli else 2 * usual.law, by_print), law_middle=middle,
+        law_shape=hypot(usual.law_shape, by_print_shape),
     )  # fmt: skip
+
+
+def print_spread(predicted: SensorModel) -> tuple[float, float, float]:
+    """Mean of ln of the rise by what is printed, and standard deviations as a whole and from force to force.
+
+    The estimate of a print is one of several cells: electrodes between the least and the largest gap of the rules of
+    slicers, the film thinner or thicker, and at best the cell as drawn. Between gaps the rise is taken to change with
+    their square at most: the field over the gap, and the displacement of a film that gets thinner. All 0 for a drawing.
+    """
+    if predicted.body.is_drawn:
+        return 0.0, 0.0, 0.0
+    by_drawing = _ln_rise_as_drawn(predicted)
+    ends = [0.0, *by_drawing.tolist()]
+    cells = predicted.body.cells
+    error, (first, *_) = cells.film.error_mm if cells.film else 0.0, cells.gap_mm.values()
+    gaps = [gap for gap in cells.gap_mm.values() if error < gap < np.inf]
+    if first in gaps:
+        ends += [2 * log(first / end) for end in (min(gaps) - error, max(gaps) + error)]
+    return (max(ends) + min(ends)) / 2, (max(ends) - min(ends)) / _SURE, float(np.ptp(by_drawing)) / _SURE
+
+
+def _ln_rise_as_drawn(predicted: SensorModel) -> Real:
+    """Ln of the rise of the cell as drawn over the predicted one, at forces that both laws know; 0 without a law."""
+    sensor = predicted.sensor
+    try:
+        drawn = sensor_model(bodies.drawn(predicted.body.design), Query(tip=Tip(sensor.tip_m)))[0].sensor
+    except SensorgenError:
+        return np.zeros(1)
+    models = [SpecimenModel(one, np.array(TONES_HZ), Spread()) for one in (drawn, sensor)]
+    stress = np.minimum(np.array(FORCES_N) / (sensor.width_m * sensor.tip_m), min(one.most_pa for one in models))
+    shares = [one.compression.capacitive_strain(stress)[0] for one in (drawn, sensor)]
+    return np.asarray(np.subtract(*(np.log(share / (1 - share)) for share in shares)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,8 +321,9 @@ def calibrate(
         calibration = Calibration(
             one.specimen, one.design.name, one.design.id(), one.model, posterior, most, held[0] if held else None,
             one.rows, tuple(gain(one.model, one.data, posterior.at).tolist()) if one.recorded else (), notes,
-            links(one.predicted),
+            links(one.predicted, print_spread(one.predicted)[1:]),
         )  # fmt: skip
+        calibration = replace(calibration, notes=(*notes, *calibration.departures()))
         made.append(Made(calibration, one.data, held[1] if held else None))
     return made
 
@@ -335,17 +372,20 @@ class Recheck:
         Known ones, and those of them in their intervals by the old calibration.
     z : float
         Mean of force less median over its standard deviation, times the root of the number of presses [-].
+    change : Change
+        Of the reading at rest.
     """
 
     calibration: Calibration
     presses: int
     inside: int
     z: float
+    change: Change
 
     @property
     def alarm(self) -> bool:
-        """Whether the old calibration no longer holds."""
-        return abs(self.z) > _ALARM
+        """The old calibration no longer holds."""
+        return abs(self.z) > _ALARM or bool(self.change)
 
     def document(self) -> Iterator[Part]:
         """What the presses say."""
@@ -354,12 +394,15 @@ class Recheck:
             f"{said}: {self.inside} of {self.presses} known forces in their 90 % intervals, their mean off by "
             f"{self.z:+.1f} standard errors"
         )
+        if self.change:
+            yield f"{self.change.words}; mended by {self.presses} presses alone, 30 make a calibration of it"
         yield from self.calibration.document()
 
     def to_json(self) -> str:
         """The mended calibration, and what the presses said of the old one."""
         return self.calibration.shown_json(recheck={"presses": self.presses, "inside": self.inside, "z": self.z,
-                                                    "alarm": self.alarm})  # fmt: skip
+                                                    "alarm": self.alarm,
+                                                    "at_rest": self.change.words if self.change else ""})  # fmt: skip
 
 
 def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
@@ -390,7 +433,7 @@ def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
         order = checked(tones, old.model.frequency_hz)
     data = replace(
         data, ratio=data.ratio[:, order], noise=data.noise[:, order], rest=data.rest[order],
-        rest_noise=np.ones(len(tones)),  # the gain behind it is known from the first calibration
+        rest_noise=data.rest_noise[order],
     )  # fmt: skip
     count = len(data.presses.force_n)
     if count < FEWEST_RECHECK:
@@ -398,16 +441,22 @@ def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
             f"{name}: {count} new known presses; expected {FEWEST_RECHECK} to 5, spread over force and place"
         )
     most = max(old.force_n, float(data.presses.force_n.max()))
-    at = old.inverter(np.median(data.noise, axis=0), limit_n=BEYOND * most).batch(data.ratio)
+    known = replace(old, rechecked=True)  # without the allowance that these presses decide on
+    at = known.inverter(np.median(data.noise, axis=0), limit_n=BEYOND * most).batch(data.ratio)
     sd = np.ptp(at.force_90_n, axis=1) / _SURE
     z = float(np.mean((data.presses.force_n - at.force_n) / sd) * np.sqrt(count))
-    posterior = calibrated(old.model, data, widened(old.model, old.posterior))
+    change = old.baseline.change(np.exp(data.rest), data.rest_noise)
+    if change:
+        posterior = calibrated(old.model, data)
+    else:  # the gain behind the reading at rest is known from the first calibration
+        start = widened(old.model, old.posterior) if abs(z) > _ALARM else loosened(old.model, old.posterior)
+        posterior = calibrated(old.model, replace(data, rest_noise=np.ones(len(tones))), start)
     new = replace(
-        old, posterior=posterior, force_n=most, held_out=None,
-        rows=(*old.rows, *(row.uid for row in rows)),
-        notes=(*left_out, f"mended by {count} presses after a recheck"),
+        known, posterior=posterior, force_n=most, held_out=None, rows=(*old.rows, *(row.uid for row in rows)),
+        gain=tuple(gain(old.model, data, posterior.at).tolist()),
     )  # fmt: skip
-    return Recheck(new, count, coverage_of(at, data.presses).force, z)
+    new = replace(new, notes=(*left_out, f"mended by {count} presses after a recheck", *new.departures()))
+    return Recheck(new, count, coverage_of(at, data.presses).force, z, change)
 
 
 def rows(log: Log, calibrations: Sequence[Calibration]) -> list[Row]:

@@ -98,13 +98,20 @@ def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = n
         raise faults[0]
     best = min(offsets, key=lambda offset: (offset.by_chance, offset.error_s))
     if best.by_chance or (stamped and abs(best.offset_s) > within_s):  # its refinement looks beyond
-        if not common_clock:
+        if not common_clock and not _overlap(times[0], rig):
             raise BadInput(
                 f"the force explains {best.explained:.1%} of the readings: too little to find the offset of the "
-                "clocks, and the recording has no time stamps to go by"
+                "clocks; expected time stamps, or times of both files that count from the same moment"
             )
         best = replace(best, offset_s=0.0, error_s=np.nan, skew=0.0, skew_error=np.nan)
     return tuple(_joined(one, rig, time, best) for one, time in zip(recordings, times, strict=True))
+
+
+def _overlap(time: Real, rig: RigLog) -> bool:
+    """Whether half of the shorter record lies in the other, as with clocks that agree."""
+    rows = rig.sound()[0]
+    common = min(time[-1], rows[-1]) - max(time[0], rows[0])
+    return bool(common >= 0.5 * min(np.ptp(time), np.ptp(rows)))
 
 
 def _joined(recording: Recording, rig: RigLog, time: Real, offset: Offset) -> Joined:

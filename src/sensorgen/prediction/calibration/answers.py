@@ -98,10 +98,16 @@ class CalibratedInversion:
         most = self.samples / 2
         if self.statuses.get(Verdict.STALE_REST.words, 0) > most:
             yield f"most readings at rest are older than {STALE_S:g} s: take one before each press"
-        if self.statuses.get(Verdict.NO_FIT.words, 0) > most:
+        if self.statuses.get(Verdict.LOADED_REST.words, 0):
             yield (
-                "most readings fit no press: another specimen or tip, or a change of the sensor; recheck it with 3 "
-                "to 5 known presses (sensorgen calibrate --recheck)"
+                "readings lie below their reading at rest: something lay on the sensor when that was taken, or it has "
+                "drifted since; lift everything off for it"
+            )
+        unfit = sum(self.statuses.get(v.words, 0) for v in (Verdict.NO_FIT, Verdict.MORE, Verdict.CHANGED))
+        if unfit > most:
+            yield (
+                "most readings are of no single press on the calibrated sensor: another specimen or tip, a hand, or a "
+                "change; recheck it with 3 to 5 known presses (sensorgen calibrate --recheck)"
             )
         yield from (f"note: {note}" for note in self.notes)
 

@@ -14,9 +14,10 @@ from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.models.compression import Curve, Plate
 from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.calibration.baseline import Baseline
 from sensorgen.prediction.calibration.coverage import FEWEST, Coverage
 from sensorgen.prediction.calibration.fitting import Posterior
-from sensorgen.prediction.calibration.inversion import Inverter
+from sensorgen.prediction.calibration.inversion import OTHERWISE, Inverter
 from sensorgen.prediction.calibration.materials import Link, MaterialEstimate, estimate, source_text
 from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, Spread
 from sensorgen.prediction.inverse.prior import Prior
@@ -66,6 +67,8 @@ class Calibration:
         What was left out, what is to be doubted.
     links : tuple of Link
         How parameters depend on values of materials.
+    rechecked : bool
+        Known presses of a later session agreed with it, or mended it.
     """
 
     specimen: str
@@ -79,10 +82,24 @@ class Calibration:
     gain: tuple[complex, ...] = ()
     notes: tuple[str, ...] = ()
     links: tuple[Link, ...] = ()
+    rechecked: bool = False
 
     def materials(self) -> list[MaterialEstimate]:
         """Values of the materials that this specimen has, with intervals of 95 %."""
         return [estimate(self.model, self.posterior, link) for link in self.links]
+
+    def departures(self) -> tuple[str, ...]:
+        """Remarks on values that no longer lie where they were expected."""
+        found: dict[str, Value | MaterialEstimate] = {
+            (f"{one.name} [{one.unit}]" if one.unit else one.name): one for one in self.values()
+        }
+        found |= {f"{one.material} {one.quantity}": one for one in self.materials()}
+        return tuple(
+            f"{name}: {one.value:.3g} ({one.lower:.3g} to {one.upper:.3g}) has left what was expected, "
+            f"{one.before_lower:.3g} to {one.before_upper:.3g}: doubt the design, film (a hole leaks), tip or bench"
+            for name, one in found.items()
+            if one.lower > one.before_upper or one.upper < one.before_lower
+        )
 
     def source(self) -> str:
         """A source of material values, as a design names it: those that the readings tell."""
@@ -108,7 +125,23 @@ class Calibration:
         known = self.posterior
         if noise is not None:
             known = replace(known, noise=np.broadcast_to(noise, known.noise.shape))
-        return Inverter(self.model, known, prior, limit_n or self.limit_n)
+        otherwise = OTHERWISE if self.allowance else 0.0
+        return Inverter(self.model, known, prior, limit_n or self.limit_n, otherwise=otherwise)
+
+    @property
+    def allowance(self) -> tuple[str, ...]:
+        """Allowance of the intervals of the force until known presses of a later session narrow them, in words."""
+        if self.rechecked or not self.posterior.presses:
+            return ()
+        return (
+            f"lower ends of the force allow, by {OTHERWISE:.0%}, for what no reading shows: a softer film, a wider tip, a "
+            "hand, a second press; 3 to 5 known presses narrow them (sensorgen calibrate --recheck)",
+        )
+
+    @property
+    def baseline(self) -> Baseline:
+        """The reading at rest that later ones are compared with."""
+        return Baseline(self.model, self.posterior, np.array(self.gain) if self.gain else None)
 
     def values(self) -> list[Value]:
         """Parameters in their units."""
@@ -116,7 +149,7 @@ class Calibration:
         scales = {  # unit, what multiplies the exponential, standard deviation of the logarithm
             "resistance": ("ohm", sensor.resistance_ohm(), spread.resistance),
             "capacitance": ("pF", sensor.capacitance_f() * 1e12, spread.capacitance),
-            "rise": ("predicted", 1.0, spread.law),
+            "rise": ("predicted", exp(spread.law_middle), spread.law),
             "leak": ("", spread.leak, spread.leak_spread),
             "dispersion": ("", spread.dispersion * exp(-0.5), 1.0),
             "lead": ("ohm", spread.lead_ohm * exp(-0.5), 1.0),
@@ -151,7 +184,9 @@ class Calibration:
         weights = self.model.law_weights()[knot]
         at, sd = float(weights @ self.posterior.at), sqrt(weights @ self.posterior.covariance @ weights)
         before = sqrt(weights @ weights)
-        return np.array([at, at - NORMAL_90 * sd, at + NORMAL_90 * sd, -NORMAL_90 * before, NORMAL_90 * before])
+        return self.model.spread.law_middle + np.array(
+            [at, at - NORMAL_90 * sd, at + NORMAL_90 * sd, -NORMAL_90 * before, NORMAL_90 * before]
+        )
 
     @property
     def unidentified(self) -> tuple[str, ...]:
@@ -205,7 +240,7 @@ class Calibration:
             "posterior": {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in vars(p).items()},
             "force_n": self.force_n, "held_out": asdict(self.held_out) if self.held_out else None,
             "rows": self.rows, "gain": [[g.real, g.imag] for g in self.gain], "notes": self.notes,
-            "links": [asdict(link) for link in self.links],
+            "links": [asdict(link) for link in self.links], "rechecked": self.rechecked,
         }  # fmt: skip
         return json.dumps(data, ensure_ascii=False)
 
@@ -246,7 +281,7 @@ def from_json(text: str) -> Calibration:
             data["specimen"], data["design"], data["design_id"], model, posterior, float(data["force_n"]),
             Coverage(**data["held_out"]) if data["held_out"] else None, tuple(data["rows"]),
             tuple(complex(*pair) for pair in data["gain"]), tuple(data["notes"]),
-            tuple(Link(**link) for link in data.get("links", [])),
+            tuple(Link(**link) for link in data.get("links", [])), bool(data.get("rechecked", False)),
         )  # fmt: skip
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise BadInput(f"no calibration that can be read ({type(error).__name__}: {str(error)[:80]})") from None

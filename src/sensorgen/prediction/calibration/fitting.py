@@ -17,6 +17,7 @@ NOISE = 1e-3  # of the parts of a ratio, where no press tells
 _FEWEST_COURSES = 10  # presses from which on their usual course is known
 _FLOOR = 1e-5  # of ln Z: no bench is right to more
 _USUAL = (0.25, 0.25), (0.5, 0.6)  # mean and standard deviation of how presses come about: unloading, decades
+_SHAPE = 0.1  # of ln of the rise: what a tip changes from force to force, and what a few presses do not show
 _LN_SPREAD = 1.5  # of ln of each variance component's standard deviation, before calibration
 _LN_LOOSE = 3.0  # the same where presses tell: tighter, a specimen that never wanders gets the interval of one that may
 
@@ -204,11 +205,14 @@ def _mean(values: Real, otherwise: tuple[float, float]) -> tuple[float, float]:
     return (float(seen.mean()), float(seen.std())) if len(seen) >= _FEWEST_COURSES else otherwise
 
 
+def rest_gain(model: SpecimenModel) -> Real:
+    """Covariance of the parts of a reading at rest by the gain alone (2 m, 2 m)."""
+    m = len(model.frequency_hz)
+    return np.asarray(model.spread.gain**2 / 2 * np.kron(np.eye(2), np.eye(m) + np.ones((m, m))))
+
+
 def _rest_covariance(model: SpecimenModel, data: Data) -> Real:
-    m, gain = len(data.rest), model.spread.gain
-    common = np.kron(np.eye(2), np.ones((m, m)))
-    noise = np.tile(np.maximum(data.rest_noise, _FLOOR), 2) ** 2
-    return np.asarray(np.diag(noise + gain**2 / 2) + common * gain**2 / 2)
+    return np.diag(np.tile(np.maximum(data.rest_noise, _FLOOR), 2) ** 2) + rest_gain(model)
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,7 +298,7 @@ def _descended(
         gradient = np.einsum("nia,nij,nj->a", slopes, weight, ratio, optimize=True)
         gradient = gradient + rest_slopes.T @ rest - inverse @ (at - middle)
         step = np.linalg.solve(found + damping * np.eye(len(at)), gradient)
-        step *= min(1.0, 3.0 / np.abs(step).max())
+        step *= 3.0 / max(3.0, np.abs(step).max())
         tried = off(at + step)
         if tried[2] <= cost:
             at, (ratio, rest, cost), damping = at + step, tried, damping / 10
@@ -320,6 +324,8 @@ def _components(model: SpecimenModel, data: Data, at: Real, before: tuple[Real, 
     vectors = model.scatters(at, data.presses)
 
     def cost(ln: Real) -> float:
+        if (usual * np.exp(ln)).max() > 1:  # no press explains these readings, and the covariance would be singular
+            return np.inf
         covariance = covariances(model, at, data, usual * np.exp(ln), vectors)
         root = np.linalg.inv(np.linalg.cholesky(covariance))
         white, by = np.einsum("nij,nj->ni", root, left), root @ slopes
@@ -340,10 +346,8 @@ def _components(model: SpecimenModel, data: Data, at: Real, before: tuple[Real, 
 
 def gain(model: SpecimenModel, data: Data, at: Real) -> Complex:
     """Most probable ln of each tone's gain (m,), phase as imaginary part, given the other parameters."""
-    m, sd = len(data.rest), model.spread.gain
-    own = sd**2 / 2 * np.kron(np.eye(2), np.eye(m) + np.ones((m, m)))
-    left = parts(data.rest - model.rest(at))
-    found = own @ np.linalg.solve(_rest_covariance(model, data), left)
+    m, left = len(data.rest), parts(data.rest - model.rest(at))
+    found = rest_gain(model) @ np.linalg.solve(_rest_covariance(model, data), left)
     return np.asarray(found[:m] + 1j * found[m:])
 
 
@@ -382,5 +386,14 @@ def widened(model: SpecimenModel, posterior: Posterior) -> Posterior:
     loose = np.setdiff1d(np.arange(len(model.names)), kept)
     covariance = posterior.covariance.copy()
     covariance[loose] = covariance[:, loose] = 0.0
-    covariance[loose, loose] = 1.0
+    usual = min(_SHAPE / model.spread.law_shape, 1.0)  # a print's laws differ by more than those of two tips
+    covariance[loose, loose] = [usual**2 if model.names[k].startswith("rise at") else 1.0 for k in loose]
+    return replace(posterior, covariance=covariance)
+
+
+def loosened(model: SpecimenModel, posterior: Posterior) -> Posterior:
+    """A posterior whose rise may have changed by what a recheck of a few presses does not show."""
+    covariance = posterior.covariance.copy()
+    k = model.names.index("rise")
+    covariance[k, k] += (_SHAPE / model.spread.law) ** 2
     return replace(posterior, covariance=covariance)

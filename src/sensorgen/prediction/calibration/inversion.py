@@ -4,6 +4,7 @@ The posterior over force and position is worked out on a grid as fine as the rea
 at each of its points the expected ratio and the covariance of readings about it are known beforehand.
 """
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import IntEnum
@@ -27,6 +28,12 @@ _MOST = 128, 96  # forces and positions of the grid
 _LEAST = 40, 32
 _BLOCK = 128  # readings at a time
 _FEW_TONES = 2
+OTHERWISE = 0.1  # probability, until a recheck, that something else than the press makes a part of the reading: a guess
+_BELOW = 0.3  # share of what lies outside an interval that is below it, where that something is allowed for
+_MORE = 3.2905267314919255  # standard deviations that noise exceeds once in a thousand
+_BELOW_REST = 4.0  # standard deviations that noise exceeds in three readings of 100 000
+_DOUBTED = 200  # readings beside one below its rest, whose rest was probably read the same way
+_PLACES = 7  # of a second press, along the sensor
 
 
 class Verdict(IntEnum):
@@ -41,9 +48,15 @@ class Verdict(IntEnum):
     """The interval is what the prediction alone allows."""
     STALE_REST = 4
     """The reading at rest is too old."""
-    NO_FIT = 5
+    LOADED_REST = 5
+    """This reading, or one of ``_DOUBTED`` beside it, lies below its reading at rest: that was read under a load."""
+    NO_FIT = 6
     """No press explains the reading."""
-    MISSING = 6
+    MORE = 7
+    """Another capacitance besides one press explains it: a second press, or a hand."""
+    CHANGED = 8
+    """At rest, the sensor is not the one that was calibrated."""
+    MISSING = 9
     """Too little was measured."""
 
     @property
@@ -52,7 +65,10 @@ class Verdict(IntEnum):
         return _WORDS[self]
 
 
-_WORDS = ("ok", "force only", "at the end", "not calibrated", "stale rest", "no fit", "missing")
+_WORDS = (
+    "ok", "force only", "at the end", "not calibrated", "stale rest", "rest under load", "no fit",
+    "more than one press", "changed since calibration", "missing",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +83,10 @@ class Found:
         5 % and 95 % quantiles, or those of the inverter's level [N], [m].
     chi2 : (n,) array
         Least squared distance of the reading from what a press makes, over its covariance [-].
+    more : (n,) array
+        Deviation there towards another capacitance elsewhere, in standard deviations [-].
+    below : (n,) array
+        Capacitance by which the reading lies below its reading at rest, in standard deviations [-].
     tones : (n,) array
         Number of frequencies that count.
     verdict : (n,) array
@@ -78,6 +98,8 @@ class Found:
     force_90_n: Real
     position_90_m: Real
     chi2: Real
+    more: Real
+    below: Real
     tones: NDArray[np.intp]
     verdict: NDArray[np.uint8]
 
@@ -91,6 +113,8 @@ class _Table(NamedTuple):
     """(points, k)."""
     ln_density: Real
     """(points,), without the distance."""
+    more: Real
+    """(points, k), unit vectors, whitened, towards another capacitance elsewhere; nan where not computed yet."""
 
 
 class Inverter:
@@ -108,6 +132,10 @@ class Inverter:
         Largest force to look for [N].
     level : float
         Probability of the intervals [-].
+    otherwise : float
+        Probability that the press makes a share of a reading alone [-]: the sensor is softer or the tip wider than in
+        the calibration, or something else is there, and the frequencies cannot tell. The share is below s with the
+        probability sqrt(s).
 
     Attributes
     ----------
@@ -119,9 +147,9 @@ class Inverter:
 
     def __init__(
         self, model: SpecimenModel, posterior: Posterior, prior: Prior | None = None,
-        force_limit_n: float = FORCE_LIMIT_N, level: float = LEVEL,
+        force_limit_n: float = FORCE_LIMIT_N, level: float = LEVEL, otherwise: float = 0.0,
     ) -> None:  # fmt: skip
-        self.level = level
+        self.level, self._otherwise = level, otherwise
         self._posterior, self._length = posterior, model.sensor.length_m
         coarse = np.linspace(0, 1, _COARSE[0]) ** 2 * force_limit_n, np.linspace(0, self._length, _COARSE[1])
         mean, covariance = readings(model, posterior, *coarse)
@@ -136,8 +164,17 @@ class Inverter:
                 at = _pairs(self.force_n, self.position_m)[axis]
                 self._weight = self._weight - ((at - normal[0]) / normal[1]) ** 2 / 2
         self._tables: dict[bytes, _Table] = {}
+        shaped = self._mean.reshape(len(self.force_n), len(self.position_m), -1)
+        grid = (self.force_n, self.position_m)
+        self._tangents = np.stack([np.gradient(shaped, at, axis=k) for k, at in enumerate(grid)], -1).reshape(
+            *self._mean.shape, 2
+        )
+        self._elsewhere = _elsewhere(model, posterior, force_limit_n)
+        fall = -model.scatters(posterior.at, _of(posterior, np.zeros(1), np.full(1, self._length / 2)))[0, :, 1]
+        weighted = np.linalg.solve(self._covariances[0], fall)
+        self._fall = weighted / np.sqrt(fall @ weighted)
 
-    def batch(self, ratio: Complex, rest_age_s: Real | None = None) -> Found:
+    def batch(self, ratio: Complex, rest_age_s: Real | None = None, changed: Mask | None = None) -> Found:
         """Presses behind readings.
 
         Parameters
@@ -146,6 +183,8 @@ class Inverter:
             Ln of the reading over the latest reading at rest; nan where a tone was not measured.
         rest_age_s : (n,) array, optional
             Age of that reading at rest [s].
+        changed : (n,) array of bool, optional
+            Where that reading is of another sensor than the calibrated one, see :class:`Rest`.
 
         Raises
         ------
@@ -161,19 +200,21 @@ class Inverter:
             rows = np.flatnonzero((measured == pattern).all(axis=1))
             if pattern.sum() >= _FEW_TONES:
                 self._put(found, rows, ratio, pattern)
-        bad = np.flatnonzero(found.chi2 > chi2_limit(2 * found.tones - 2))
+        found.below[:] = parts(ratio) @ self._fall
+        bad = np.flatnonzero(~_one_press(found) & ~_more(found))
         if bad.size:
             self._without_one(found, bad, ratio, measured)
         stale = np.zeros(len(ratio), bool) if rest_age_s is None else ~(rest_age_s <= STALE_S)
-        return self._judged(found, stale)
+        return self._judged(found, stale, np.zeros(len(ratio), bool) if changed is None else changed)
 
     def _put(self, found: Found, rows: NDArray[np.intp], ratio: Complex, tones: Mask) -> None:
-        table = self._table(tones)
+        kept = np.flatnonzero(np.tile(tones, 2))
+        table = self._table(tones, kept)
 
         def block(some: NDArray[np.intp]) -> None:
-            values = self._block(parts(ratio[some][:, tones]), table)
+            values = self._block(parts(ratio[some][:, tones]), table, kept)
             for name, value in zip(
-                ("force_n", "position_m", "force_90_n", "position_90_m", "chi2"), values, strict=True
+                ("force_n", "position_m", "force_90_n", "position_90_m", "chi2", "more"), values, strict=True
             ):
                 getattr(found, name)[some] = value
             found.tones[some] = tones.sum()
@@ -202,45 +243,110 @@ class Inverter:
         for name, value in vars(best).items():
             getattr(found, name)[rows[good]] = value[good]
 
-    def _block(self, reading: Real, table: _Table) -> tuple[Real, ...]:
+    def _block(self, reading: Real, table: _Table, kept: NDArray[np.intp]) -> tuple[Real, ...]:
         k = reading.shape[1]
         white = (table.root @ reading.T.astype(np.float32)).reshape(-1, k, len(reading))
         white -= table.mean[:, :, None]
-        np.square(white, out=white)
-        chi2 = white.sum(1, dtype=np.float64)
-        least = chi2.min(0)
+        chi2 = np.square(white).sum(1, dtype=np.float64)
+        best = chi2.argmin(0)
+        each = np.arange(len(best))
+        if fresh := [int(point) for point in np.unique(best) if np.isnan(table.more[point, 0])]:
+            table.more[fresh] = self._towards_more(table.root.reshape(-1, k, k)[fresh], fresh, kept)
+        more = np.abs(np.einsum("nk,nk->n", table.more[best], white[best, :, each]))
         ln = table.ln_density[:, None] - chi2 / 2
         ln -= ln.max(0)
         density = np.exp(ln).reshape(len(self.force_n), len(self.position_m), -1)
         force, position = density.sum(1), density.sum(0)
-        ends = [_quantiles(grid, d, self.level) for grid, d in ((self.force_n, force), (self.position_m, position))]
-        return ends[0][:, 1], ends[1][:, 1], ends[0][:, ::2], ends[1][:, ::2], least
+        return (
+            _quantiles(self.force_n, force, (0.5,))[:, 0], _quantiles(self.position_m, position, (0.5,))[:, 0],
+            self._force_ends(force), _densest(self.position_m, position, self.level), chi2[best, each], more,
+        )  # fmt: skip
 
-    def _table(self, tones: Mask) -> _Table:
+    def _force_ends(self, force: Real) -> Real:
+        """Ends of the interval of the force (n, 2), of probabilities of the grid's forces (f, n)."""
+        out = 1 - self.level
+        if not self._otherwise:
+            return _quantiles(self.force_n, force, (out / 2, 1 - out / 2))
+        edges = _edges(self.force_n)
+        low, high = np.sqrt(edges[:-1]), np.sqrt(np.maximum(edges[1:], 1e-9))
+        share = np.clip((np.minimum(high[:, None], high) - low[:, None]) / high, 0.0, None)  # of forces below another
+        mixed = (1 - self._otherwise) * force + self._otherwise * share @ force
+        return _quantiles(self.force_n, mixed, (_BELOW * out, 1 - (1 - _BELOW) * out))
+
+    def _towards_more(self, root: NDArray[np.float32], points: Sequence[int], kept: NDArray[np.intp]) -> Real:
+        """Unit vectors, whitened, in which another capacitance moves a reading the most, and no press (points, k)."""
+        tangent = root @ self._tangents[points][:, kept]
+        tangent /= np.linalg.norm(tangent, axis=1, keepdims=True) + 1e-300
+        other = root @ self._elsewhere[kept]
+        for _ in range(2):  # to rounding
+            other = other - tangent @ (np.linalg.pinv(tangent) @ other)
+        return np.asarray(np.linalg.svd(other, full_matrices=False)[0][:, :, 0])
+
+    def _table(self, tones: Mask, kept: NDArray[np.intp]) -> _Table:
         key = tones.tobytes()
         if key not in self._tables:
-            kept = np.flatnonzero(np.tile(tones, 2))
             covariance = self._covariances[:, kept[:, None], kept]
             root = np.linalg.inv(np.linalg.cholesky(covariance))
             ln = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(1) + self._weight
             mean = np.einsum("gij,gj->gi", root, self._mean[:, kept])
-            self._tables[key] = _Table(root.reshape(-1, len(kept)).astype(np.float32), mean.astype(np.float32), ln)
+            self._tables[key] = _Table(
+                root.reshape(-1, len(kept)).astype(np.float32), mean.astype(np.float32), ln, np.full(mean.shape, np.nan)
+            )
         return self._tables[key]
 
-    def _judged(self, found: Found, stale: Mask) -> Found:
+    def _judged(self, found: Found, stale: Mask, changed: Mask) -> Found:
         wide = np.ptp(found.position_90_m, axis=1) > 0.8 * self._length
         rules = (
             (Verdict.FORCE_ONLY, wide),
             (Verdict.AT_THE_END, found.force_90_n[:, 1] > self.force_n[-2]),
             (Verdict.NOT_CALIBRATED, np.full(len(wide), self._posterior.presses == 0)),
             (Verdict.STALE_REST, stale),
-            (Verdict.NO_FIT, found.chi2 > chi2_limit(2 * found.tones - 2)),
+            (Verdict.NO_FIT, ~_one_press(found)),
+            (Verdict.MORE, _more(found)),
+            (Verdict.CHANGED, changed),
             (Verdict.MISSING, found.tones < _FEW_TONES),
         )
         found.verdict[:] = Verdict.OK
         for verdict, applies in rules:
             found.verdict[applies] = verdict
         return found
+
+
+def _one_press(found: Found) -> Mask:
+    """Readings that are not known to be of anything but one press."""
+    return ~(found.chi2 > chi2_limit(2 * found.tones - 2))
+
+
+def _more(found: Found) -> Mask:
+    """Readings that another capacitance besides a press explains, and a press alone does not."""
+    left = found.chi2 - np.square(found.more)
+    return (found.more > _MORE) & (left <= chi2_limit(2 * found.tones - 3))
+
+
+def doubt_rest(found: Found, rest: Mask, left: int) -> int:
+    """Mark readings below their reading at rest, and those near them, whose rest was read the same way.
+
+    Parameters
+    ----------
+    found : Found
+        Results in the order of time; their verdicts change.
+    rest : (n,) array of bool
+        Readings at rest.
+    left : int
+        Readings that those before these leave to be marked.
+
+    Returns
+    -------
+    int
+        Readings that are left to be marked after these.
+    """
+    count = np.cumsum(~rest)
+    low = found.below > _BELOW_REST
+    last = np.maximum.accumulate(np.where(low, count, left - _DOUBTED))
+    following = np.minimum.accumulate(np.where(low, count, count[-1:] + _DOUBTED)[::-1])[::-1]
+    doubted = ~rest & ((count - last < _DOUBTED) | (following - count < _DOUBTED))
+    found.verdict[doubted] = np.maximum(found.verdict[doubted], Verdict.LOADED_REST)
+    return max(int(_DOUBTED - (count[-1] - last[-1])), 0) if len(count) else left
 
 
 def nothing(n: int) -> Found:
@@ -250,7 +356,15 @@ def nothing(n: int) -> Found:
         return np.full(shape, np.nan)
 
     return Found(
-        nan(n), nan(n), nan(n, 2), nan(n, 2), nan(n), np.zeros(n, np.intp), np.full(n, Verdict.MISSING, np.uint8)
+        nan(n),
+        nan(n),
+        nan(n, 2),
+        nan(n, 2),
+        nan(n),
+        nan(n),
+        nan(n),
+        np.zeros(n, np.intp),
+        np.full(n, Verdict.MISSING, np.uint8),
     )
 
 
@@ -317,19 +431,47 @@ def _refined(coarse: tuple[Real, Real], fine: tuple[Real, Real], values: Real) -
     return np.asarray(shaped.reshape(len(fine[0]) * len(fine[1]), *values.shape[1:]))
 
 
+def _elsewhere(model: SpecimenModel, posterior: Posterior, force_n: float) -> Real:
+    """Parts that a hand at the contacts, and presses along the sensor, add to a reading (2 m, 1 + places)."""
+    places = np.linspace(0, model.sensor.length_m, _PLACES)
+    presses = model.ratio(posterior.at, _of(posterior, np.full(_PLACES, force_n / 4), places))
+    omega = 2 * np.pi * model.frequency_hz
+    by_hand = -1j * omega * np.exp(model.rest(posterior.at)) * model.spread.stray_f
+    return parts(np.concatenate([by_hand[None], presses])).T
+
+
+def _edges(at: Real) -> Real:
+    """Borders of the cells of a grid's points, half of the way to either neighbour."""
+    return np.concatenate([at[:1], (at[1:] + at[:-1]) / 2, at[-1:]])
+
+
 def _steps(at: Real) -> Real:
-    """Weight of each point of a grid: half of the way to either neighbour."""
-    middles = np.concatenate([at[:1], (at[1:] + at[:-1]) / 2, at[-1:]])
-    return np.diff(middles)
+    """Weight of each point of a grid."""
+    return np.diff(_edges(at))
 
 
-def _quantiles(grid: Real, density: Real, level: float) -> Real:
-    """Ends of an interval and the median between them (n, 3), of probabilities of a grid's points (k, n)."""
-    edges = np.concatenate([grid[:1], (grid[1:] + grid[:-1]) / 2, grid[-1:]])
+def _densest(grid: Real, probability: Real, level: float) -> Real:
+    """Ends of the most probable part of a grid (n, 2), of probabilities of its points (k, n): an end may belong to it.
+
+    Between quantiles no reading of little information would have a press near an end.
+    """
+    share = probability / probability.sum(0)
+    order = np.argsort(-share / np.maximum(_steps(grid), 1e-300)[:, None], axis=0)
+    ranked = np.take_along_axis(share, order, 0)
+    inside = np.cumsum(ranked, 0) - ranked < level
+    edges = _edges(grid)
+    return np.stack([
+        np.where(inside, edges[:-1][order], np.inf).min(0), np.where(inside, edges[1:][order], -np.inf).max(0)
+    ], 1)  # fmt: skip
+
+
+def _quantiles(grid: Real, density: Real, shares: Sequence[float]) -> Real:
+    """Quantiles (n, q) of probabilities of a grid's points (k, n)."""
+    edges = _edges(grid)
     total = np.concatenate([np.zeros((1, density.shape[1])), np.cumsum(density, 0)])
     total /= total[-1]
-    found = np.empty((density.shape[1], 3))
-    for k, share in enumerate(((1 - level) / 2, 0.5, (1 + level) / 2)):
+    found = np.empty((density.shape[1], len(shares)))
+    for k, share in enumerate(shares):
         at = np.clip((total < share).sum(0), 1, len(grid))
         low, high = total[at - 1, np.arange(len(found))], total[at, np.arange(len(found))]
         part = np.clip((share - low) / np.maximum(high - low, 1e-300), 0, 1)

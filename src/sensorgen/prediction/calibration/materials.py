@@ -7,7 +7,7 @@ and of the models. Both are normal in the logarithm.
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, log, sqrt
+from math import exp, hypot, log, sqrt
 from typing import Annotated
 
 import numpy as np
@@ -111,13 +111,15 @@ def source_text(about: str, estimates: Sequence[MaterialEstimate]) -> str:
     return "\n".join(rows) + "\n"
 
 
-def links(predicted: SensorModel) -> tuple[Link, ...]:
+def links(predicted: SensorModel, by_print: tuple[float, float] = (0.0, 0.0)) -> tuple[Link, ...]:
     """What a calibration of a body can tell of its materials; without those that no source gives a value of.
 
     Parameters
     ----------
     predicted : SensorModel
         Of the body.
+    by_print : (float, float)
+        Standard deviation of ln of the rise by what is printed: as a whole, and from one force to another [-].
     """
     design, found = predicted.body.design, list[Link]()
     electrodes = [design.slot(f"{end}_electrode") for end in ("bottom", "top")]
@@ -129,7 +131,8 @@ def links(predicted: SensorModel) -> tuple[Link, ...]:
         _link(design, dielectric, "relative_permittivity", "capacitance", *_capacitance(predicted, dielectric))
     )
     if any(v.material == dielectric and v.quantity == "youngs_modulus_pa" for v in predicted.values):
-        found.append(_link(design, dielectric, "youngs_modulus_pa", "rise", -1.0, _PRESS, shape=_PRESS_SHAPE))
+        error, shape = hypot(_PRESS, by_print[0]), hypot(_PRESS_SHAPE, by_print[1])
+        found.append(_link(design, dielectric, "youngs_modulus_pa", "rise", -1.0, error, shape=shape))
     return tuple(found)
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
+from sensorgen.prediction.calibration.baseline import Baseline, Change
 
 LATEST = 64  # readings at rest that count, of those since the last press
 FEWEST = 8  # differences of successive ones from which noise can be told
@@ -24,18 +25,30 @@ class Rest:
         Readings at rest that were taken apart [ohm]; those of the stream replace them.
     at_s : float
         When the last of them was taken [s]; nan if unknown, and then their age is never judged.
+    baseline : Baseline, optional
+        Reading at rest of the calibration, in the order of the readings' tones.
+
+    Attributes
+    ----------
+    change : Change or None
+        The first reading at rest that was of another sensor than the calibrated one, or of one that has changed.
     """
 
-    def __init__(self, given: Complex | None = None, at_s: float = np.nan) -> None:
+    def __init__(
+        self, given: Complex | None = None, at_s: float = np.nan, baseline: Baseline | None = None
+    ) -> None:  # fmt: skip
+        self._baseline, self._changed = baseline, False
+        self.change: Change | None = None
         self._latest: deque[tuple[float, Complex]] = deque(maxlen=LATEST)
         self._squares: deque[Real] = deque(maxlen=_MOST_STEPS)
         self._loaded = True  # since the latest reading at rest
         if given is not None:
             self._take(np.where(given == 0, np.nan, given), np.full(len(given), at_s))
+            self._compare(*self.mean())
             self._loaded = True
 
-    def ratios(self, impedance_ohm: Complex, rest: Mask, time_s: Real) -> tuple[Complex, Real]:
-        """Ln of each reading over the readings at rest before it, and the age of the last of them.
+    def ratios(self, impedance_ohm: Complex, rest: Mask, time_s: Real) -> tuple[Complex, Real, Mask]:
+        """Ln of each reading over the readings at rest before it, the age of the last of them, and whether they differ.
 
         Parameters
         ----------
@@ -48,11 +61,12 @@ class Rest:
 
         Returns
         -------
-        (n, m) array, (n,) array
-            Ratios, nan for readings at rest and before the first of them; ages [s], 0 where they are not judged.
+        (n, m) array, (n,) array, (n,) array of bool
+            Ratios, nan for readings at rest and before the first of them; ages [s], 0 where they are not judged; where
+            the readings at rest are of another sensor than the baseline.
         """
         z = np.where(impedance_ohm == 0, np.nan, impedance_ohm)
-        ratio, age = np.full(z.shape, complex(np.nan, np.nan)), np.zeros(len(z))
+        ratio, age, changed = np.full(z.shape, complex(np.nan, np.nan)), np.zeros(len(z)), np.zeros(len(z), bool)
         edges = np.flatnonzero(np.diff(rest.astype(np.int8))) + 1
         for start, end in zip([0, *edges.tolist()], [*edges.tolist(), len(z)], strict=True):
             if start == end:
@@ -60,12 +74,21 @@ class Rest:
             if rest[start]:
                 self._take(z[start:end], time_s[start:end])
             else:
-                self._loaded = True
                 if self._latest:
+                    mean, count = self.mean()
+                    if not self._loaded:
+                        self._compare(mean, count)
                     with np.errstate(invalid="ignore"):
-                        ratio[start:end] = np.log(z[start:end] / self.mean()[0])
+                        ratio[start:end] = np.log(z[start:end] / mean)
                     age[start:end] = np.nan_to_num(time_s[start:end] - self._latest[-1][0])
-        return ratio, age
+                    changed[start:end] = self._changed
+                self._loaded = True
+        return ratio, age, changed
+
+    def _compare(self, mean: Complex, count: int) -> None:
+        change = self._baseline.change(mean, self.noise() / count**0.5) if self._baseline else None
+        self._changed = bool(change)
+        self.change = self.change or (change if change else None)
 
     def _take(self, z: Complex, time_s: Real) -> None:
         """Readings at rest; the first ones after a press replace those before it."""

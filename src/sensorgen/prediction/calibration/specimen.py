@@ -37,6 +37,8 @@ class Spread:
         Of ln resistivity along the strip: of one half wave; of k of them 1/k of it [-].
     law, law_shape : float
         Of ln of the capacitance's rise: as a whole, and from one force to another [-].
+    law_middle : float
+        Mean of ln of the rise over the predicted one [-].
     leak, leak_spread : float
         Leakage conductance of the film over its susceptance at the lowest tone: median [-], and of its ln.
     dispersion : float
@@ -63,6 +65,7 @@ class Spread:
     profile: float = 0.1
     law: float = 0.2
     law_shape: float = 0.1
+    law_middle: float = 0.0
     leak: float = 1e-3
     leak_spread: float = 2.0
     dispersion: float = 0.01
@@ -81,7 +84,7 @@ class Spread:
         """Refuse what is no spread."""
         for one in fields(self):
             value = getattr(self, one.name)
-            if not np.isfinite(value) or (value <= 0 and one.name != "force_offset_n"):
+            if not np.isfinite(value) or (value <= 0 and one.name not in ("force_offset_n", "law_middle")):
                 raise BadInput(f"{one.name} of a calibration's prior is {value:g}; expected a number above 0")
 
 
@@ -234,7 +237,12 @@ class SpecimenModel:
         share, _ = sensor.compression.capacitive_strain(np.minimum(stress, self.most_pa))
         first = self._at[f"rise at {FORCES_N[0]:g} N"]
         knots = spread.law_shape * (at[..., first : first + len(FORCES_N)] @ self._shapes.T)
-        ln_rise = rise + spread.law * value["rise"] + _interpolated(np.log(np.maximum(force, _NOTHING_N)), knots)
+        ln_rise = (
+            rise
+            + spread.law_middle
+            + spread.law * value["rise"]
+            + _interpolated(np.log(np.maximum(force, _NOTHING_N)), knots)
+        )
         for name, course in (("hysteresis", presses.unloading), ("creep", presses.decades)):
             ln_rise = ln_rise + getattr(spread, name) * np.exp(value[name] - 0.5) * np.nan_to_num(course)
         lifted = 1 + share / (1 - share) * np.maximum(stress / self.most_pa, 1.0) * np.exp(ln_rise)
