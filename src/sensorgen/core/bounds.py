@@ -1,7 +1,7 @@
 """A number known to lie between two others, or near one."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, floor, isinf, log10, prod
 from typing import Literal
 
@@ -115,6 +115,13 @@ class Bounds:
             with_leads(self.print), with_leads(self.material), self.certified, self.open,
             Interval(self.value + least, self.value + most),
         )  # fmt: skip
+
+    def alone(self) -> "Bounds":
+        """The quantity without what leads may add or take, as with four wires."""
+        if self.leads is None:
+            return self
+        lower, upper = self.lower - (self.leads.lower - self.value), self.upper - (self.leads.upper - self.value)
+        return replace(self, lower=lower, upper=upper, leads=None)
 
     def times(self, factor: float, unit: str) -> "Bounds":
         """The quantity scaled by a positive factor, in another unit."""

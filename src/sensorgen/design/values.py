@@ -24,7 +24,7 @@ _METAL_OHM_M = 1e-4  # resistivity below which a contact is one of metals
 _LACKING = {
     "relative_permittivity": (4.5, 2.5, 8.0),  # elastomers that are printed or cast
     "resistivity_ohm_m": (0.26, 0.0055, 12.6),  # mean of ln of the conductive filaments that ship, deviation 1.97
-    "youngs_modulus_pa": (27e6, 1.1e6, 640e6),  # mean of ln of the filaments that ship, deviation 1.62
+    "youngs_modulus_pa": (27e6, 1.1e6, 4e9),  # mean of ln of the filaments that ship, deviation 1.62; rigid plastics
     "poisson_ratio": (0.48, 0.45, 0.4999),  # of a rubber-like solid
 }
 _RIGID_PA, _RIGID_RATIO = 500e6, (0.38, 0.30, 0.45)  # modulus above which a plastic is no elastomer

@@ -20,6 +20,7 @@ from sensorgen.design.materials import PIEZORESISTANCE
 from sensorgen.design.values import ENDS, MaterialValue, material_value, piezoresistance, resistivities, spread
 from sensorgen.models.pressure import PROFILES
 from sensorgen.models.sensor import UNIFORM, Sensor
+from sensorgen.prediction.compression_law import CLOSED_FORM
 from sensorgen.prediction.leads import added
 from sensorgen.prediction.query import Load
 from sensorgen.prediction.rest_state import permittivity_ratios
@@ -212,6 +213,8 @@ def modulus_range(model: SensorModel) -> tuple[float, float, str]:
             for quantity in ("youngs_modulus_pa", "poisson_ratio")
         )
         (low, high), (least, most) = spread(design, e), spread(design, nu)
+        if model.law.compression.name in CLOSED_FORM:  # of plates: Young's modulus alone
+            least = most = nu.value
         softest = min(softest, low / value.value / (1 + _BY_RATIO * (nu.value - least)))
         stiffest = max(stiffest, high / value.value * (1 + _BY_RATIO * (most - nu.value)))
         ratio = f", Poisson's ratio {least:.4g} to {most:.4g}" if least < most else ""

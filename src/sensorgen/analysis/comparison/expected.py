@@ -54,15 +54,18 @@ class Predicted:
         The range is that of the best and the worst, with the errors of models, print and materials; None where no
         resistance is predicted.
         """
-        ends = self.prediction.resistance.values()
-        if not ends:
+        with_leads = self.prediction.resistance.values()
+        if not with_leads:
             return None
+        ends = [r.alone() for r in with_leads]
         low, high = min(r.lower for r in ends), max(r.upper for r in ends)
         model, by_print, material = (
             Interval(min(part.lower for part in of), max(part.upper for part in of))
             for of in zip(*((r.model, r.print, r.material) for r in ends), strict=True)
         )
-        return Bounds(geometric_mean(r.value for r in ends), low, high, "ohm", model, by_print, material)
+        alone = Bounds(geometric_mean(r.value for r in ends), low, high, "ohm", model, by_print, material)
+        leads = [r.leads.upper - r.value for r in with_leads if r.leads]
+        return alone.plus(0.0, 0.0, max(leads)) if leads else alone
 
     @property
     def capacitance_f(self) -> Interval | None:
