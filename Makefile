@@ -37,6 +37,7 @@ lint: $(READY_DEV) ## style, types, which module may import which, and the lines
 
 docs: $(READY_DEV) ## write docs/reference.md from the --help texts, and the pictures of README and docs
 	$(BIN)/python docs/generate.py
+	$(BIN)/python docs/validation.py
 	$(BIN)/python docs/pictures.py
 	$(BIN)/python docs/screenshot.py
 

@@ -106,11 +106,23 @@ def test_the_conductivity_printed_for_x60_is_kept_but_never_a_default():
             x60.value("resistivity_ohm_m", source)
 
 
-def test_a_value_that_no_source_gives_is_missing():
-    """PLA as a film: nobody states its permittivity, and it is not taken for 0 or 1."""
-    found = prediction(make({"shape": "tri", "materials": {"film": "pla"}}))
-    assert (found.capacitance, found.status) == (None, "not predicted")
-    assert "pla has no default relative_permittivity" in found.reason
+def test_a_value_that_no_source_gives_is_a_range_that_is_named():
+    """PLA as a film: the range holds its permittivity by handbooks, 2.5 to 3.5, and the verdict is conditional."""
+    from dataclasses import replace
+
+    from sensorgen.design.values import spread
+
+    design = make({"shape": "tri", "materials": {"film": "pla"}})
+    found = prediction(design)
+    value = next(v for v in found.values if (v.material, v.quantity) == ("pla", "relative_permittivity"))
+    low, high = spread(design, value)
+    assert low <= 2.5
+    assert high >= 3.5
+    assert any(a.startswith("relative_permittivity of pla") and "no source gives it" in a for a in found.assumptions)
+    assert found.conditional
+    assert found.identifiability.senses_force is None
+    assert "no source gives" in found.identifiability.assumed
+    assert not replace(found, values=()).conditional
 
 
 @pytest.mark.parametrize("shape", ["tri", "rect", "reference"])

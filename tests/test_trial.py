@@ -51,16 +51,24 @@ def test_a_short_print_changes_the_verdict():
     assert found.with_short(()) == ()
 
 
-def test_without_electrical_numbers_no_design_is_plainly_printed():
-    """A film of PLA, whose permittivity nobody states: the verdict was PRINT."""
-    design = make({"shape": "reference", "materials": {"dielectric": "pla"}})
+def test_without_electrical_numbers_no_design_is_plainly_printed(tmp_path):
+    """A film of two permittivities of which none is the default: the verdict was PRINT."""
+    (tmp_path / "materials").mkdir()
+    values = "[{value: 3.0, source: a}, {value: 5.0, source: b}]"
+    (tmp_path / "materials" / "film.yaml").write_text(
+        "title: film\nabout: film\ncolour: '#cccccc'\nconductor: false\ncitations: {a: a, b: b}\n"
+        f"properties: {{relative_permittivity: {values}}}\n", "utf-8",
+    )  # fmt: skip
+    design = make(
+        {"shape": "reference", "materials": {"dielectric": "film"}, "tools": {"film": 2}}, str(tmp_path / "d.yaml")
+    )
     tried = trial(design)
     assert tried.printed.capacitance is None
     assert tried.verdict == "PRINT WITH WARNINGS"
     assert [f.rule for f in tried.findings if f.severity == "warning"] == ["12-numbers"]
     said = " ".join(" ".join(text(decision(design, review(design), 0.0).document())).split())
     assert said.startswith("PRINT WITH WARNINGS")
-    assert "not predicted: pla has no default relative_permittivity" in said
+    assert "not predicted: film has no default relative_permittivity" in said
     alone = " ".join(text(decision(design, review(design), 0.0, predict=False).document()))
     assert "not predicted: checks alone" in alone
 

@@ -403,8 +403,7 @@ def test_a_wrong_command_is_refused_in_one_line(run, tmp_path, words, message):
 
 def test_source_with_an_interval_is_as_uncertain_as_that(tmp_path):
     from sensorgen.design.design import make
-    from sensorgen.design.values import resistivities
-    from sensorgen.prediction.spread import spread
+    from sensorgen.design.values import resistivities, spread
 
     (tmp_path / "materials").mkdir()
     (tmp_path / "materials" / "lab-1.yaml").write_text(

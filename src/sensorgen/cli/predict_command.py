@@ -50,6 +50,7 @@ OWN: list[click.Parameter] = [
         "Of |Z|: cell, compression and line by the least expensive models that together meet it. Exit code 1 where "
         "they do not."
     ),
+    click.Option(["--details"], is_flag=True, help="Also print impedance, a perfect model's resolution, error budget."),
     options.explain(), *body_options.body_options(), *sweeps.options(),
     option("--plot", None, "Draw R, X, sensitivities and inverse maps there, as PNG and HTML.", metavar="DIR"),
     *render.options(csv="Print R and X as CSV, a row per force and position."),
@@ -59,7 +60,7 @@ OWN: list[click.Parameter] = [
 def _work(
     design: "Design", *, frequency_hz: Sequence[float] | None, force_n: Sequence[float] | None,
     position_mm: Sequence[float] | None, tip_mm: float | None, radius_mm: float | None, compression: str | None,
-    sides: str, profile: str, accuracy: float | None, noise: float, explain: bool, plot: str | None,
+    sides: str, profile: str, accuracy: float | None, noise: float, explain: bool, details: bool, plot: str | None,
     sweep: str | None, jobs: int | None, cluster: str,
 ) -> int:  # fmt: skip
     if plot:
@@ -70,7 +71,7 @@ def _work(
         raise BadInput("--compression and --sides at once; expected one of them")
     from sensorgen.prediction.evaluate import evaluate
     from sensorgen.prediction.query import DEFAULT, TIP_M, Query, Tip
-    from sensorgen.prediction.results import Prediction
+    from sensorgen.prediction.results import Overview, Prediction
 
     tip = Tip(
         TIP_M if tip_mm is None else tip_mm * units.M_PER_MM, profile,
@@ -94,6 +95,7 @@ def _work(
             asked = query.law or tip_mm is not None or radius_mm is not None
             if found.capacitance and not found.budget and asked:
                 raise BadInput(found.reason)
+            found = prediction if details or explain else Overview(**vars(prediction))
     if plot and not isinstance(found, Prediction):
         _plot(found, Path(plot))
     else:

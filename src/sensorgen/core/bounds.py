@@ -1,7 +1,7 @@
 """A number known to lie between two others, or near one."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, floor, isinf, log10, prod
 from typing import Literal
 
@@ -68,6 +68,8 @@ class Bounds:
         Whether the model's interval is a proven bound; else an estimate.
     open : str
         "lower" or "upper" where a value beyond that end is possible, by how much is unknown; "" if none is.
+    leads : Interval or None
+        With what leads, contacts and the fringe at the edge may add alone [unit]; None where they add nothing.
     """
 
     value: float
@@ -79,6 +81,7 @@ class Bounds:
     material: Interval
     certified: bool = False
     open: Literal["", "lower", "upper"] = ""
+    leads: Interval | None = None
 
     @classmethod
     def of(
@@ -91,19 +94,40 @@ class Bounds:
         material: Interval | None = None,
         certified: bool = False,
         open: Literal["", "lower", "upper"] = "",  # noqa: A002 - the field's own word
+        leads: Interval | None = None,
     ) -> "Bounds":
         """A positive quantity whose relative errors multiply; what is not given adds none."""
         exact = Interval(value, value)
         parts = (model or exact, print or exact, material or exact)
-        lower = value * prod(min(part.lower / value, 1.0) for part in parts) if value else 0.0
-        upper = value * prod(max(part.upper / value, 1.0) for part in parts) if value else 0.0
-        return cls(value, lower, upper, unit, *parts, certified, open)
+        all_ = (*parts, leads or exact)
+        lower = value * prod(min(part.lower / value, 1.0) for part in all_) if value else 0.0
+        upper = value * prod(max(part.upper / value, 1.0) for part in all_) if value else 0.0
+        return cls(value, lower, upper, unit, *parts, certified, open, leads)
+
+    def plus(self, value: float, least: float, most: float) -> "Bounds":
+        """The quantity with leads in series or in parallel that add a value between two others [unit]."""
+
+        def with_leads(part: Interval) -> Interval:
+            return Interval(part.lower + value, part.upper + value)
+
+        return Bounds(
+            self.value + value, self.lower + least, self.upper + most, self.unit, with_leads(self.model),
+            with_leads(self.print), with_leads(self.material), self.certified, self.open,
+            Interval(self.value + least, self.value + most),
+        )  # fmt: skip
+
+    def alone(self) -> "Bounds":
+        """The quantity without what leads may add or take, as with four wires."""
+        if self.leads is None:
+            return self
+        lower, upper = self.lower - (self.leads.lower - self.value), self.upper - (self.leads.upper - self.value)
+        return replace(self, lower=lower, upper=upper, leads=None)
 
     def times(self, factor: float, unit: str) -> "Bounds":
         """The quantity scaled by a positive factor, in another unit."""
         parts = (self.model.times(factor), self.print.times(factor), self.material.times(factor))
         ends = (factor * self.value, factor * self.lower, factor * self.upper)
-        return Bounds(*ends, unit, *parts, self.certified, self.open)
+        return Bounds(*ends, unit, *parts, self.certified, self.open, self.leads and self.leads.times(factor))
 
     def words(self) -> str:
         """Best value, and the range in the same unit; lengths in mm.

@@ -54,6 +54,18 @@ class Slots(Strict):
     support: Slot | None = Field(default=None, description="Fills the air while printing; left empty when not given.")
 
 
+class Leads(Strict):
+    """What lies between the sensor and the meter: in parallel, in series, and whether a guard is driven."""
+
+    capacitance_pf: Annotated[float, Field(ge=0)] | None = Field(
+        default=None, description="Of the leads; 0 to 5 pF when not given, to 0.1 with a driven guard [pF]."
+    )
+    resistance_ohm: Annotated[float, Field(ge=0)] | None = Field(
+        default=None, description="Of leads and both contacts; 0 with four wires. A range when not given [ohm]."
+    )
+    guard: Literal["driven", "none"] = "none"
+
+
 class Infill(Strict):
     """How densely one material is printed."""
 
@@ -107,6 +119,7 @@ class Design(Strict):
     )
     profile: Profile = Profile()
     waivers: tuple[Waiver, ...] = Field(default=(), strict=False)  # YAML has lists only
+    leads: Leads = Leads()
     own: dict[Kind, dict[str, str]] = Field(
         default={}, description="Text of each file that the design takes from packs that do not ship, by kind and name."
     )
@@ -263,7 +276,7 @@ class Design(Strict):
 
     def _plain(self) -> set[str]:
         """Parts that have come later and are not used: without them the identities of older designs last."""
-        usual = {"profile": Profile(), "own": {}, "geometry": None, "bodies": {}, "border": None}
+        usual = {"profile": Profile(), "own": {}, "geometry": None, "bodies": {}, "border": None, "leads": Leads()}
         return {key for key, value in usual.items() if getattr(self, key) == value}
 
     @property

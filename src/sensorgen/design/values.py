@@ -1,18 +1,35 @@
 """Values of a design's materials, each with its source: permittivities, moduli, piezoresistance."""
 
 from dataclasses import dataclass
-from math import log
+from math import exp, log
 
 from sensorgen.core.errors import MissingValue
 from sensorgen.design.design import Design
-from sensorgen.design.materials import PIEZORESISTANCE, Material
+from sensorgen.design.materials import PIEZORESISTANCE, SD_95, SET, Material
 
+ASSUMED = "assumed: no source gives it"
 ENDS = ("top", "bottom")  # electrodes
 LN_SPREAD = {"resistivity_ohm_m": 0.5, "relative_permittivity": 0.1, "youngs_modulus_pa": 0.25}
 """Standard deviations of ln of a material's value from one print to another, where its source gives no range: sources
 of resistivity differ by a factor of 12 (etpu.yaml), those of permittivity from 4.68 to 6.33 (x60.yaml); moduli of
 printed elastomers vary by some 25 %."""
-_RANGE = 2 * 1.959963984540054  # standard deviations in a source's range: it holds 95 %
+LN_SOURCES = {"resistivity_ohm_m": 1.24, "relative_permittivity": 0.13, "youngs_modulus_pa": 0.69,
+              "poisson_ratio": 0.053, "density_kg_m3": 0.12}  # fmt: skip
+"""Standard deviations of ln of what sources say of one material, pooled over the materials that ship and have several
+sources: by 2, 4 (dielectrics), 9, 2 and 2 degrees of freedom. What one source alone says is as uncertain."""
+UNGUARDED_PF, GUARDED_PF = 5.0, 0.1  # most that leads add: air plates of student laboratories 2.6 to 12 pF; a guess
+CONTACTS_OHM, METAL_CONTACTS_OHM = 4.3e3, 1.0  # both contacts: strips of direct.mit.edu/view-large/3728479; clips
+STATED = 1.1  # factor that a stated lead is known to
+_METAL_OHM_M = 1e-4  # resistivity below which a contact is one of metals
+_LACKING = {
+    "relative_permittivity": (4.5, 2.5, 8.0),  # elastomers that are printed or cast
+    "resistivity_ohm_m": (0.26, 0.0055, 12.6),  # mean of ln of the conductive filaments that ship, deviation 1.97
+    "youngs_modulus_pa": (27e6, 1.1e6, 4e9),  # mean of ln of the filaments that ship, deviation 1.62; rigid plastics
+    "poisson_ratio": (0.48, 0.45, 0.4999),  # of a rubber-like solid
+}
+_RIGID_PA, _RIGID_RATIO = 500e6, (0.38, 0.30, 0.45)  # modulus above which a plastic is no elastomer
+_LN_HARDNESS = 0.88  # of a modulus by hardness: the five filaments that ship and have both
+_RUBBER = 0.4999  # Poisson's ratio that no solid exceeds here
 
 
 @dataclass(frozen=True)
@@ -36,9 +53,63 @@ class MaterialValue:
 
 
 def material_value(material: Material, source: str, quantity: str) -> MaterialValue:
-    """The value of one quantity by a source, "" for the default; raises MissingValue where no source gives it."""
-    value = material.value(quantity, source)
+    """The value of one quantity by a source, "" for the default, assumed where no plausible source gives any.
+
+    Raises
+    ------
+    MissingValue
+        Sources give it, but none of them is the default; or it cannot be assumed.
+    """
+    try:
+        value = material.value(quantity, source)
+    except MissingValue:
+        if quantity not in _LACKING or any(not v.implausible for v in material.properties.get(quantity, ())):
+            raise
+        return MaterialValue(material.name, quantity, _lacking(material, quantity)[0], ASSUMED)
     return MaterialValue(material.name, quantity, value.value, value.source)
+
+
+def _lacking(material: Material, quantity: str) -> tuple[float, float, float]:
+    """Value and range of a quantity that no source gives, the modulus by the hardness where that is known.
+
+    Notes
+    -----
+    Gent (1958), Rubber Chem. Technol. 31, 896: E [MPa] = 0.0981 (56 + 7.62336 S) / (0.137505 (254 - 2.54 S)) of a
+    Shore A hardness S.
+    """
+    shore = material.properties.get("hardness_shore_a")
+    if quantity == "youngs_modulus_pa" and shore:
+        s, factor = min(shore[0].value, 99.0), exp(SD_95 * _LN_HARDNESS)
+        modulus_pa = 1e6 * 0.0981 * (56 + 7.62336 * s) / (0.137505 * (254 - 2.54 * s))
+        return modulus_pa, modulus_pa / factor, modulus_pa * factor
+    if quantity == "poisson_ratio" and material_value(material, "", "youngs_modulus_pa").value > _RIGID_PA:
+        return _RIGID_RATIO
+    return _LACKING[quantity]
+
+
+def spread(design: Design, value: MaterialValue) -> tuple[float, float]:
+    """Lowest and highest of a value: 95 % of prints.
+
+    A source's own interval, as from coupons or a fit, counts alone. Else it is what all sources give, and at least
+    what prints differ by (``LN_SPREAD``); of one source alone, what sources differ by (``LN_SOURCES``). What the user
+    set differs from print to print.
+    """
+    material, quantity, at = design.material(value.material), value.quantity, value.value
+    if value.source == ASSUMED:
+        return _lacking(material, quantity)[1:]
+    low, high = _own_range(material, value)
+    if low is not None and high is not None:
+        return min(at, low), max(at, high)
+    given = [v.value for v in material.properties.get(quantity, ()) if not v.implausible]
+    several = [] if value.source == SET else [at, *given]
+    factor = exp(SD_95 * (LN_SOURCES if len(set(several)) == 1 else LN_SPREAD).get(quantity, 0.0))
+    if quantity == "relative_permittivity" and at > 1:  # of the excess over vacuum
+        low, high = 1 + (at - 1) / factor, 1 + (at - 1) * factor
+    else:
+        low, high = at / factor, at * factor
+    if quantity == "poisson_ratio":
+        high = max(at, min(high, _RUBBER))
+    return min([low, *several]), max([high, *several])
 
 
 def ln_spread(material: Material, source: str, quantity: str) -> tuple[float, float]:
@@ -46,10 +117,36 @@ def ln_spread(material: Material, source: str, quantity: str) -> tuple[float, fl
 
     Of a source with a range they are those of the normal distribution with 95 % in it; else 0 and ``LN_SPREAD``.
     """
-    value = material.value(quantity, source)
-    if value.low and value.high and value.low < value.high:
-        return log(value.low * value.high) / 2 - log(value.value), log(value.high / value.low) / _RANGE
+    at = material_value(material, source, quantity)
+    low, high = _lacking(material, quantity)[1:] if at.source == ASSUMED else _own_range(material, at)
+    if low and high and low < high:
+        return log(low * high) / 2 - log(at.value), log(high / low) / (2 * SD_95)
     return 0.0, LN_SPREAD[quantity]
+
+
+def _own_range(material: Material, at: MaterialValue) -> tuple[float | None, float | None]:
+    """Ends of the interval that the source of a value gives itself."""
+    own = next((v for v in material.properties.get(at.quantity, ()) if v.source == at.source), None)
+    return (own.low, own.high) if own else (None, None)
+
+
+def lead_ranges(design: Design) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Capacitance [F] and resistance [ohm] of leads and contacts: value, least, most.
+
+    What a design states is known to ``STATED``. Else the contacts of a clip or a track's end with a filled polymer are
+    anything up to the largest intercept of published printed strips; whole tracks of 0.4 kohm have been measured, so
+    that they may be next to nothing too.
+    """
+    leads = design.leads
+    rho = max(value.value for value in resistivities(design).values())
+    most_pf = GUARDED_PF if leads.guard == "driven" else UNGUARDED_PF
+    most_ohm = CONTACTS_OHM if rho > _METAL_OHM_M else METAL_CONTACTS_OHM
+    stated = (leads.capacitance_pf, most_pf, 1e-12), (leads.resistance_ohm, most_ohm, 1.0)
+    farad, ohm = (
+        (0.0, 0.0, most * unit) if at is None else (at * unit, at * unit / STATED, at * unit * STATED)
+        for at, most, unit in stated
+    )
+    return farad, ohm
 
 
 def dielectrics(design: Design) -> set[str]:

@@ -68,6 +68,8 @@ class Sensor:
         Relative rise of the top and the bottom resistivity per pressure under the tip, of either sign [1/Pa].
     far_end : str or float
         "open", "short", or a resistor [ohm].
+    lead_ohm, lead_f : float
+        Resistance of leads and contacts in series, and capacitance of the leads in parallel with the sensor [ohm], [F].
     """
 
     length_m: float
@@ -84,6 +86,8 @@ class Sensor:
     leak_s_per_m: float = 0.0
     piezoresistance_per_pa: tuple[float, float] = (0.0, 0.0)
     far_end: str | float = "open"
+    lead_ohm: float = 0.0
+    lead_f: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
@@ -204,11 +208,22 @@ class Sensor:
         OutOfRange
             As :meth:`patch`, :meth:`check_tracks` and the law of compression.
         """
-        return line_tip.impedance(*self._pressed(frequency_hz, force_n, position_m))
+        return self.at_leads(line_tip.impedance(*self._pressed(frequency_hz, force_n, position_m)), frequency_hz)
 
     def response(self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> Response:
         """Impedance and its exact derivatives by force and position.
 
         Parameters and errors as :meth:`impedance`; also OutOfRange where Z is infinite.
         """
-        return Response(*line_tip.response(*self._pressed(frequency_hz, force_n, position_m)))
+        z, *slopes = line_tip.response(*self._pressed(frequency_hz, force_n, position_m))
+        if not self.lead_f and not self.lead_ohm:
+            return Response(z, *slopes)
+        share = 1 / (1 + 2j * np.pi * np.asarray(frequency_hz) * self.lead_f * z)  # of the current through the sensor
+        return Response(self.at_leads(z, frequency_hz), *(share**2 * slope for slope in slopes))
+
+    def at_leads(self, impedance_ohm: Complex, frequency_hz: ArrayLike) -> Complex:
+        """Impedance at the meter of a sensor at the end of its leads [ohm], in the broadcast shape."""
+        if not self.lead_f and not self.lead_ohm:
+            return impedance_ohm
+        parallel = 1 + 2j * np.pi * np.asarray(frequency_hz) * self.lead_f * impedance_ohm
+        return np.asarray(self.lead_ohm + impedance_ohm / parallel)

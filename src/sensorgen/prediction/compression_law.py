@@ -17,7 +17,7 @@ import numpy as np
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
-from sensorgen.design.values import MaterialValue, film, of_all_materials, permittivities
+from sensorgen.design.values import MaterialValue, film, material_value, of_all_materials, permittivities
 from sensorgen.models import compression, sandwich
 from sensorgen.models.compression import Compression, Curve, curve_of
 from sensorgen.prediction.capacitance import Answer, is_plate
@@ -411,7 +411,7 @@ def elastic(design: Design, scene: Scene) -> "dict[str, Elastic]":
     used = design.used()
     loaded = {name: design.material(name) for name in sorted({body.material for body in scene.bodies})}
     return {
-        name: Elastic(m.value("youngs_modulus_pa", used[name]).value, m.value("poisson_ratio", used[name]).value)
+        name: Elastic(*(material_value(m, used[name], q).value for q in ("youngs_modulus_pa", "poisson_ratio")))
         for name, m in loaded.items()
     }
 

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.body import Body
-from sensorgen.design.values import ENDS, resistivities
+from sensorgen.design.values import ENDS, resistivities, spread
 from sensorgen.models import conduction
-from sensorgen.prediction.spread import spread
 from sensorgen.scene.scene import Scene
 
 

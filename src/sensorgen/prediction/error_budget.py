@@ -3,13 +3,12 @@
 Terms of the models are ``cell`` (bounds of the capacitance), ``compression`` (error of the law), ``boundary`` (boundary
 and contact conditions of the cell), ``line`` (sections under the tip) and ``tip`` (profile of its pressure); ``print``
 is what slicers and walls differ by, ``film thickness`` what the heights of two tools do; the others are material values
-on which sources disagree.
+on which sources disagree, and what leads, contacts and the edge may add.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from math import inf
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +17,18 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import Design
 from sensorgen.design.materials import PIEZORESISTANCE
-from sensorgen.design.values import ENDS, MaterialValue, material_value, piezoresistance, resistivities
+from sensorgen.design.values import ENDS, MaterialValue, material_value, piezoresistance, resistivities, spread
 from sensorgen.models.pressure import PROFILES
 from sensorgen.models.sensor import UNIFORM, Sensor
+from sensorgen.prediction.compression_law import CLOSED_FORM
+from sensorgen.prediction.leads import added
 from sensorgen.prediction.query import Load
 from sensorgen.prediction.rest_state import permittivity_ratios
 from sensorgen.prediction.results import Changes, ErrorBudget, Term
 from sensorgen.prediction.sensor_model import SensorModel
-from sensorgen.prediction.spread import spread
 
 _NEAR = 1.01  # ratio of moduli that are not told apart
+_BY_RATIO = 2.2  # relative deformation per Poisson's ratio below that taken [-]
 _RICHARDSON = 4 / 3  # of what halving changes, where errors fall by four
 
 Real = NDArray[np.float64]
@@ -151,20 +152,21 @@ def _print(
 
 def _materials(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
     for ends in material_ends(model, reference):
-        yield Term(ends.name, ends.what, "material", reference.change(*ends.sensors), at_least=ends.at_least)
+        yield Term(ends.name, ends.what, ends.kind, reference.change(*ends.sensors), at_least=ends.at_least)
 
 
 class Ends(NamedTuple):
-    """A material value on which sources disagree, and the sensor with it at its ends."""
+    """An uncertain value of a material or of the leads, and the sensor with it at its ends."""
 
     name: str
     what: str
     sensors: Sequence[Sensor]
     at_least: bool = False
+    kind: Literal["material", "leads"] = "material"
 
 
 def material_ends(model: SensorModel, reference: ReferenceLoad) -> Iterator[Ends]:
-    """Material values on which sources disagree, of a sensor under the load of the reference."""
+    """Uncertain values of materials and leads, of a sensor under the load of the reference."""
     design, sensor = model.body.design, model.sensor
     tracks = [spread(design, value) for value in resistivities(design).values()]
     if any(low < high for low, high in tracks):
@@ -181,7 +183,13 @@ def material_ends(model: SensorModel, reference: ReferenceLoad) -> Iterator[Ends
         value = next(v for v in model.rest.values if v.material == name and v.quantity == "relative_permittivity")
         low, high = spread(design, value)
         ends = [replace(sensor, capacitance_f_per_m=sensor.capacitance_f_per_m * ratio) for ratio in ratios]
-        yield Ends(f"permittivity of {name}", f"{low:g} to {high:g}", ends)
+        yield Ends(f"permittivity of {name}", f"{low:.3g} to {high:.3g}", ends)
+    farad, ohm = added(model.body)
+    ends = [replace(sensor, lead_f=end) for end in farad[1:]]
+    yield Ends("lead capacitance", f"leads and edge, {_range_text([(1e12 * farad.least, 1e12 * farad.most)])} pF", ends,
+               kind="leads")  # fmt: skip
+    ends = [replace(sensor, lead_ohm=end) for end in ohm[1:]]
+    yield Ends("contact resistance", f"leads and contacts, {_range_text([ohm[1:]])} ohm", ends, kind="leads")
 
 
 def _piezoresistance_range(design: Design, end: str) -> tuple[float, float]:
@@ -191,22 +199,37 @@ def _piezoresistance_range(design: Design, end: str) -> tuple[float, float]:
     return spread(design, value)
 
 
+def modulus_range(model: SensorModel) -> tuple[float, float, str]:
+    """Least and largest factor on all moduli at once that any material may have, Poisson's ratio included; in words.
+
+    A cell whose ratio is lower by 0.05 deforms by 11 % more (two meshes of tri 0.1, 0.4999 and 0.45).
+    """
+    design, used, softest, stiffest, parts = model.body.design, model.body.design.used(), 1.0, 1.0, []
+    for value in model.law.taken:
+        if value.quantity != "youngs_modulus_pa":
+            continue
+        e, nu = (
+            material_value(design.material(value.material), used[value.material], quantity)
+            for quantity in ("youngs_modulus_pa", "poisson_ratio")
+        )
+        (low, high), (least, most) = spread(design, e), spread(design, nu)
+        if model.law.compression.name in CLOSED_FORM:  # of plates: Young's modulus alone
+            least = most = nu.value
+        softest = min(softest, low / value.value / (1 + _BY_RATIO * (nu.value - least)))
+        stiffest = max(stiffest, high / value.value * (1 + _BY_RATIO * (most - nu.value)))
+        ratio = f", Poisson's ratio {least:.4g} to {most:.4g}" if least < most else ""
+        parts.append(f"{value.material} {low / 1e6:.3g} to {high / 1e6:.3g} MPa{ratio}")
+    return softest, stiffest, ", ".join(parts)
+
+
 def _stiffness(model: SensorModel, reference: ReferenceLoad) -> Iterator[Ends]:
     """All moduli at once, scaled by the largest change that any of them may have."""
-    design, sensor = model.body.design, model.sensor
-    used, softest, stiffest, parts = design.used(), inf, 0.0, []
-    for value in model.law.taken:
-        if value.quantity == "youngs_modulus_pa":
-            named = material_value(design.material(value.material), used[value.material], value.quantity)
-            low, high = spread(design, named)
-            softest, stiffest = min(softest, low / value.value), max(stiffest, high / value.value)
-            parts.append(f"{value.material} {low / 1e6:g} to {high / 1e6:g} MPa")
+    sensor, (softest, stiffest, what) = model.sensor, modulus_range(model)
     if softest < stiffest:
         least = _least_modulus(sensor, softest, reference)
         ends = [replace(sensor, compression=sensor.compression.scaled_modulus(factor)) for factor in (least, stiffest)]
         beyond = f": below {least:.2g} of it the load exceeds the compression law" if least > softest else ""
-        what = ", ".join(parts) + beyond
-        yield Ends("stiffness", what, ends, at_least=least > softest)
+        yield Ends("stiffness", what + beyond, ends, at_least=least > softest)
 
 
 def _least_modulus(sensor: Sensor, softest: float, reference: ReferenceLoad) -> float:

@@ -12,24 +12,25 @@ from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
-from sensorgen.design.values import ENDS, material_value
+from sensorgen.design.values import ASSUMED, ENDS, lead_ranges, spread
 from sensorgen.models import line
 from sensorgen.models.compression import Compression
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.capacitance import Unpredictable
 from sensorgen.prediction.compression_law import CLOSED_FORM, at_a_few_pressures
 from sensorgen.prediction.electrodes import electrode_resistance
-from sensorgen.prediction.error_budget import ReferenceLoad, error_budget, material_ends
+from sensorgen.prediction.error_budget import ReferenceLoad, error_budget, material_ends, modulus_range
 from sensorgen.prediction.identifiability.fisher import Setup
 from sensorgen.prediction.identifiability.identify import identify
+from sensorgen.prediction.leads import Added, added
 from sensorgen.prediction.losses import Lost, lost
+from sensorgen.prediction.narrowing import narrowings
 from sensorgen.prediction.plan import Plan
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import FORCE_N, Load, Query
 from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.prediction.results import SCHEMA, Impedance, Prediction
 from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
-from sensorgen.prediction.spread import spread
 from sensorgen.scene.slabs import is_open
 
 Otherwise = tuple[Sequence[Sensor | None], Sequence[Sensor | None]]  # by other walls; with other films
@@ -85,14 +86,15 @@ def _gap(body: Body) -> Bounds | None:
 
 def _at_rest(found: Prediction, body: Body, rest: RestState, frequency_hz: tuple[float, ...]) -> Prediction:
     """Capacitance, resistance, corner frequency and impedance without a load."""
-    resistance, c, gone = rest.resistance, rest.capacitance, lost(body.design)
+    r_only, c_only, gone, (farad, ohm) = rest.resistance, rest.capacitance, lost(body.design), added(body)
+    resistance, c = {end: r.plus(*ohm) for end, r in r_only.items()}, c_only.plus(*farad)
     if set(resistance) != set(ENDS):
         return replace(found, capacitance=c, resistance=resistance)
-    r = _in_series(resistance["top"], resistance["bottom"])
-    corner = _of_line(r, c, lambda ohm, farad: line.corner_frequency_hz(ohm, farad), "Hz")
+    r = _in_series(r_only["top"], r_only["bottom"])
+    corner = _of_line(r, c_only, lambda ohm, farad: line.corner_frequency_hz(ohm, farad), "Hz")
     return replace(
         found, capacitance=c, resistance=resistance, corner_frequency=corner,
-        impedance=tuple(_impedance(f, r, c, gone) for f in frequency_hz),
+        impedance=tuple(_impedance(f, r, c_only, gone, farad, ohm) for f in frequency_hz),
     )  # fmt: skip
 
 
@@ -129,16 +131,28 @@ def _of_line(r: Bounds, c: Bounds, of: Callable[[float, float], float], unit: st
     )  # fmt: skip
 
 
-def _impedance(frequency_hz: float, r: Bounds, c: Bounds, gone: Lost) -> Impedance:
-    """Of the unloaded line at one frequency; r and c of the whole sensor."""
+def _impedance(frequency_hz: float, r: Bounds, c: Bounds, gone: Lost, lead_f: Added, lead_ohm: Added) -> Impedance:
+    """Of the unloaded line at one frequency, at the end of its leads; r and c of the whole sensor."""
+    omega = 2 * pi * frequency_hz
 
-    def z(ohm: float, farad: float) -> complex:
-        admittance = 2 * pi * frequency_hz * farad * (1j + gone.tan_delta) + gone.leak_s
-        return complex(line.cascade([ohm], [np.array([admittance])], [1.0])[0])
+    def z(ohm: float, farad: float, parallel: float = lead_f.value, series: float = lead_ohm.value) -> complex:
+        admittance = omega * farad * (1j + gone.tan_delta) + gone.leak_s
+        own = complex(line.cascade([ohm], [np.array([admittance])], [1.0])[0])
+        return series + own / (1 + 1j * omega * parallel * own)
 
-    re = _of_line(r, c, lambda ohm, farad: z(ohm, farad).real, "ohm")
-    im = _of_line(r, c, lambda ohm, farad: z(ohm, farad).imag, "ohm")
-    return Impedance(frequency_hz, re, im)
+    leads = list(product(lead_f[1:], lead_ohm[1:]))
+    ends = [z(*of, *by) for of in product((r.lower, r.upper), (c.lower, c.upper)) for by in leads]
+    alone = [z(r.value, c.value, *by) for by in leads]
+
+    def part(name: str) -> Bounds:
+        known, over, by = (
+            _of_line(r, c, lambda ohm, farad: float(getattr(z(ohm, farad), name)), "ohm"),
+            [float(getattr(one, name)) for one in ends], [float(getattr(one, name)) for one in alone],
+        )  # fmt: skip
+        low, high = min(known.lower, *over), max(known.upper, *over)
+        return replace(known, lower=low, upper=high, leads=Interval(min(by), max(by)))
+
+    return Impedance(frequency_hz, part("real"), part("imag"))
 
 
 def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) -> Prediction:
@@ -153,7 +167,7 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
     try:
         made = identify(
             model.sensor, load.frequency_hz, query.noise, force_n=load.force_n, position_m=load.position_m,
-            stiffest=stiffest, assumed="" if law.bounded else _ASSUMED,
+            stiffest=stiffest, assumed=_unknown(model),
         )  # fmt: skip
         others: Otherwise = ([None], [None])
         if law.bounded:
@@ -168,6 +182,14 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
         return _resolution(found, model, load, query, others)
     except SensorgenError as error:
         return replace(found, reason=str(error))
+
+
+def _unknown(model: SensorModel) -> str:
+    """Why a verdict is conditional: a law of unknown error, or values that no source gives; or ""."""
+    lacking = [f"{v.quantity} of {v.material}" for v in model.values if v.source == ASSUMED]
+    if not model.law.bounded:
+        return _ASSUMED
+    return f"no source gives {' and '.join(lacking)}, assumed within a range" if lacking else ""
 
 
 def _free_sides(body: Body) -> str:
@@ -276,26 +298,32 @@ def _resolution(found: Prediction, model: SensorModel, load: Load, query: Query,
     by_law = [errors(replace(model.sensor, compression=other)) for other in law.others] if law.bounded else [(nan, nan)]
     by_print = [[errors(sensor) for sensor in sensors] for sensors in others]
     values = list(material_ends(model, ReferenceLoad(model.sensor, load)))
-    by_material = [[errors(sensor) for sensor in ends.sensors] for ends in values]
+    by_value = [[errors(sensor) for sensor in ends.sensors] for ends in values]
 
-    def bounds(which: int, unit: str) -> Bounds | None:
+    def of(which: int, unit: str) -> tuple[Bounds | None, dict[str, Interval]]:
         value = own[which]
         if isnan(value):
-            return None
+            return None, {}
 
         def spread_of(each: Sequence[tuple[float, float]]) -> Interval:
             return _range([value, *(e[which] for e in each)])
 
-        return Bounds.of(
-            value,
-            unit,
-            model=spread_of(by_law),
-            print=_compounded(value, map(spread_of, by_print)),
-            material=_compounded(value, map(spread_of, by_material)),
-            open="lower" if any(ends.at_least for ends in values) else "",  # softer: more is resolved
-        )
+        by_cause = {ends.name: spread_of(each) for ends, each in zip(values, by_value, strict=True)}
+        by_cause |= {"law": spread_of(by_law), **dict(zip(("width", "film"), map(spread_of, by_print), strict=True))}
 
-    return replace(found, force_resolution=bounds(0, "N"), position_resolution=bounds(1, "m"))
+        def compounded(*kinds: str) -> Interval:
+            return _compounded(value, (by_cause[ends.name] for ends in values if ends.kind in kinds))
+
+        whole = Bounds.of(
+            value, unit, model=by_cause["law"], print=_compounded(value, (by_cause["width"], by_cause["film"])),
+            material=compounded("material"), leads=compounded("leads"),
+            open="lower" if any(ends.at_least for ends in values) else "",  # softer: more is resolved
+        )  # fmt: skip
+        return whole, by_cause
+
+    (force, of_force), (position, of_position) = of(0, "N"), of(1, "m")
+    found = replace(found, force_resolution=force, position_resolution=position)
+    return replace(found, narrowing=tuple(narrowings(found, model.body, of_force, of_position)))
 
 
 def _compounded(value: float, parts: Iterable[Interval]) -> Interval:
@@ -319,15 +347,8 @@ def _span(value: float, of: Callable[[Compression], float], laws: Iterable[Compr
 
 
 def _moduli(model: SensorModel) -> list[Compression]:
-    """The law of compression with all moduli at the ends of what the sources say."""
-    design, used = model.body.design, model.body.design.used()
-    factors = {
-        end / value.value
-        for value in model.law.taken
-        if value.quantity == "youngs_modulus_pa"
-        for end in spread(design, material_value(design.material(value.material), used[value.material], value.quantity))
-    }
-    return [model.law.compression.scaled_modulus(factor) for factor in sorted(factors) if factor != 1]
+    """The law of compression with all moduli at the ends of their ranges."""
+    return [model.law.compression.scaled_modulus(factor) for factor in modulus_range(model)[:2] if factor != 1]
 
 
 def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
@@ -335,8 +356,19 @@ def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
     if is_open(body.cells.first()):
         yield "electrodes are equipotential for the capacitance, and the fringe at their edges is in free air"
     else:
-        yield "electrodes are equipotential for the capacitance, and the field has no fringe at the sensor's edge"
+        yield "electrodes are equipotential for the capacitance; the fringe at the sensor's edge is in the range alone"
     yield "electrode resistance from end face to end face, cogs included"
+    for value in model.values if model else ():
+        if value.source == ASSUMED:
+            low, high = spread(body.design, value)
+            yield (
+                f"{value.quantity} of {value.material} {value.value:.3g} ({low:.3g} to {high:.4g}): no source gives it"
+            )
+    farad, ohm = lead_ranges(body.design)
+    yield (
+        f"leads of {1e12 * farad[1]:.3g} to {1e12 * farad[2]:.3g} pF, with contacts {ohm[1]:.3g} to {ohm[2]:.3g} ohm: "
+        "'leads' of the design states them"
+    )
     if not body.is_drawn:
         yield "contacts between extruded lines cost no resistance: no source gives their resistivity"
     gone = lost(body.design).taken

@@ -8,12 +8,13 @@ from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.body import Body, Cells
 from sensorgen.design.design import Design
-from sensorgen.design.values import ENDS, MaterialValue, permittivities, resistivities
+from sensorgen.design.values import ENDS, MaterialValue, permittivities, resistivities, spread
 from sensorgen.prediction.capacitance import PLANE, Answer, Unpredictable, capacitance, default_width, of_sensor
 from sensorgen.prediction.electrodes import electrode_resistance
-from sensorgen.prediction.spread import spread
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.slabs import is_open
+
+_TOLD_APART = 1.001  # ratio of permittivities from which on a range counts: that of air does not
 
 
 @dataclass(frozen=True)
@@ -158,7 +159,7 @@ def permittivity_ratios(design: Design, scene: Scene) -> dict[str, tuple[float, 
     found = {}
     for value in values:
         low, high = spread(design, value)
-        if low < high:
+        if high > _TOLD_APART * low:
             ends = (
                 capacitance(scene, eps | {value.material: end}).capacitance_f.middle() / usual for end in (low, high)
             )

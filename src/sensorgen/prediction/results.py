@@ -12,7 +12,7 @@ from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
-from sensorgen.design.values import MaterialValue
+from sensorgen.design.values import ASSUMED, MaterialValue
 from sensorgen.prediction.identifiability.results import GUESS, Identifiability, of_schema_1
 from sensorgen.prediction.plan import Plan, without_times
 
@@ -57,7 +57,7 @@ class Term:
     name, what : str
         Which, and what was moved between which ends.
     kind : str
-        "model", "print" or "material".
+        "model", "print", "material" or "leads".
     changes : Changes or None
         Its effect; None where it is unknown.
     at_least : bool
@@ -66,7 +66,7 @@ class Term:
 
     name: str
     what: str
-    kind: Literal["model", "print", "material"]
+    kind: Literal["model", "print", "material", "leads"]
     changes: Changes | None
     at_least: bool = False
 
@@ -129,12 +129,30 @@ class ErrorBudget:
         if not self.accuracy:
             return
         beyond = f"; larger alone: {', '.join(self.beyond())}" if self.beyond() else ""
-        if self.met_by("model", "print", "material"):
+        if self.met_by("model", "print", "material", "leads"):
             yield f"accuracy {self.accuracy:g} of |Z| reached"
         elif self.met_by("model"):
-            yield f"accuracy {self.accuracy:g} of |Z| reached by the models, not by print and material data{beyond}"
+            yield f"accuracy {self.accuracy:g} of |Z| reached by the models, not by print, material and leads{beyond}"
         else:
             yield f"accuracy {self.accuracy:g} of |Z| not reached by the models{beyond}"
+
+
+@dataclass(frozen=True)
+class Narrowing:
+    """The one measurement that narrows a range most.
+
+    Attributes
+    ----------
+    quantity, measurement : str
+        Which, and by what.
+    factor, left : float
+        Upper over lower end of the range, now and then [-]; infinite where an end is unknown.
+    """
+
+    quantity: str
+    measurement: str
+    factor: float
+    left: float
 
 
 @dataclass(frozen=True)
@@ -201,6 +219,8 @@ class Prediction(Displayed):
         Why numbers under load, or the choice of the cell, may be wrong by more than their ranges say.
     drawn : Prediction or None
         The drawing's, beside that of a print.
+    narrowing : tuple of Narrowing
+        What narrows ranges that span a factor above 3.
     """
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
@@ -228,6 +248,22 @@ class Prediction(Displayed):
     assumptions: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     drawn: "Prediction | None" = None
+    narrowing: tuple[Narrowing, ...] = ()
+
+    def bench(self) -> tuple[Bounds | None, Bounds | None]:
+        """Standard errors of force and position on a bench, after known presses [N], [m]."""
+        known = self.identifiability.calibrated if self.identifiability else None
+        force, position = (known.sigma_force_n, known.sigma_position_m) if known else (None, None)
+        return on_bench(self.force_resolution, force), on_bench(self.position_resolution, position)
+
+    @property
+    def conditional(self) -> bool:
+        """Whether it rests on values that no source gives."""
+        return any(value.source == ASSUMED for value in self.values)
+
+    def resolved(self, which: int, most: float, cannot: str) -> str:
+        """Standard error of force (0) or position (1) on a bench, in words."""
+        return resolved(self.bench()[which], most, cannot, conditional=self.conditional)
 
     def summary(self) -> Iterator[Part]:
         """Quantities of the print beside the drawing's: the best value and the range with all errors."""
@@ -238,12 +274,16 @@ class Prediction(Displayed):
             ("capacitance", *(p.capacitance.words() if p.capacitance else p.status for p in shown)),
             *((f"{end} electrode", *(_words(p.resistance.get(end)) for p in shown)) for end in self.resistance),
             ("sensitivity [1/kPa]", *((_words(p.sensitivity) or "–").replace(" 1/kPa", "") for p in shown)),
-            ("force resolution", *(resolved(p.force_resolution, p.force_n, "cannot sense force") for p in shown)),
-            ("position resolution", *(resolved(p.position_resolution, length_m, "cannot locate") for p in shown)),
+            ("force resolution", *(p.resolved(0, p.force_n, "cannot sense force") for p in shown)),
+            ("position resolution", *(p.resolved(1, length_m, "cannot locate") for p in shown)),
         ]
         columns = (Column(""), *(Column(p.body.partition(",")[0]) for p in shown))
         yield Table("quantities", "", columns, tuple(rows))
-        yield f"(resolution at {self.force_n:g} N and {self.position_m * 1e3:g} mm; {self.body})"
+        yield caption_of(self.force_n, self.position_m, self.body)
+        if self.narrowing:
+            columns = (Column("range that spans"), Column("a factor"), Column("narrowed most by"), Column("to"))
+            rows_ = ((n.quantity, _times(n.factor), n.measurement, _times(n.left)) for n in self.narrowing)
+            yield Table("narrowing", "", columns, tuple(rows_))
 
     def document(self) -> Iterator[Part]:
         """The prediction, what its ranges hold, impedance, identifiability and error budget."""
@@ -255,14 +295,7 @@ class Prediction(Displayed):
         yield self.design
         yield from self.summary()
         yield ""
-        certified = " (certified)" if self.capacitance.certified else ""
-        heads = ("range of", f"model{certified}", "print", "material")
-        quantities = {"capacitance": self.capacitance, **{f"{e} electrode": r for e, r in self.resistance.items()}}
-        ranges = (
-            (name, *(_change(part, b.value) for part in (b.model, b.print, b.material)))
-            for name, b in quantities.items() if b.value
-        )  # fmt: skip
-        yield Table("ranges", "", tuple(map(Column, heads)), tuple(ranges))
+        yield self._ranges()
         if self.impedance:
             yield f"corner frequency {_words(self.corner_frequency) or 'undefined'}"
             yield ""
@@ -278,6 +311,22 @@ class Prediction(Displayed):
         yield ""
         yield from self.judgement()
         yield ""
+        yield from self.remarks()
+
+    def _ranges(self) -> Table:
+        """What the ranges of capacitance and resistance hold."""
+        c = self.capacitance or Bounds.of(0.0, "F")
+        certified = " (certified)" if c.certified else ""
+        heads = ("range of", f"model{certified}", "print", "material", "leads, edge")
+        quantities = {"capacitance": c, **{f"{e} electrode": r for e, r in self.resistance.items()}}
+        ranges = (
+            (name, *(_change(part, b.value) if part else "" for part in (b.model, b.print, b.material, b.leads)))
+            for name, b in quantities.items() if b.value
+        )  # fmt: skip
+        return Table("ranges", "", tuple(map(Column, heads)), tuple(ranges))
+
+    def remarks(self) -> Iterator[Part]:
+        """What is assumed, and what is doubtful."""
         yield from (f"assumed: {assumption}" for assumption in self.assumptions)
         yield from (f"doubtful: {doubt}" for doubt in self.doubts)
 
@@ -319,24 +368,61 @@ class Prediction(Displayed):
         return ("; ".join((f"accuracy {accuracy:g} not reached: {best}", *(self.plan.shares() if self.plan else ()))),)
 
 
+class Overview(Prediction):
+    """A prediction whose document is its first screen."""
+
+    def document(self) -> Iterator[Part]:
+        """Numbers on a bench, what narrows them, what their ranges hold, and what is assumed."""
+        if self.capacitance is None:
+            yield from super().document()
+            return
+        yield self.design
+        yield from self.summary()
+        yield ""
+        yield self._ranges()
+        if self.reason and not self.identifiability:
+            yield f"no load: {self.reason}"
+        yield ""
+        yield from self.remarks()
+        yield "(--details: impedance, a perfect model's resolution, what improves it, error budget)"
+
+
+def caption_of(force_n: float, position_m: float, body: str) -> str:
+    """For which press, after what calibration and of which body resolutions are stated."""
+    return f"(resolution after 30 known presses, at {force_n:g} N and {position_m * 1e3:g} mm; {body})"
+
+
+def on_bench(exact: Bounds | None, calibrated: float | None) -> Bounds | None:
+    """Standard error after known presses, its relative range that of a perfect model; of that where it has no other."""
+    if exact is None or calibrated is None:
+        return exact
+    return exact.times(calibrated / exact.value, exact.unit)
+
+
+def _times(factor: float) -> str:
+    return f"x {factor:.2f}" if factor < 2 else f"x {factor:.2g}" if factor < 100 else "x > 100"
+
+
 def unpredicted(reason: str) -> Finding:
     """That a sensor's verdict rests on its checks alone."""
     advice = "see what is missing; until then the verdict is that of the checks alone"
     return Finding(UNPREDICTED, "warning", "sensor", f"no electrical numbers: {reason}", advice)
 
 
-def resolved(error: Bounds | None, most: float, cannot: str) -> str:
+def resolved(error: Bounds | None, most: float, cannot: str, *, conditional: bool = False) -> str:
     """A standard error in words; where it is that of a reading without information, what the sensor cannot do.
+
+    Where the error is conditional, as on values that no source gives, that is said of all of its range alone.
 
     >>> resolved(Bounds.of(8580.0, "m"), 0.1, "cannot locate"), resolved(Bounds.of(0.2, "N"), 6.0, "cannot sense")
     ('cannot locate', '200 mN')
     """
     if error is None:
         return "–"
-    if not error.value < GUESS * most:
+    if not (error.lower if conditional else error.value) < GUESS * most:
         return cannot
     if error.upper > most:
-        error = replace(error, upper=most, open="upper")
+        error = replace(error, value=min(error.value, most), upper=most, open="upper")
     return error.words()
 
 

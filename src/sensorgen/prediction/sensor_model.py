@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
-from sensorgen.design.values import ENDS, MaterialValue, of_all_materials, piezoresistance
+from sensorgen.design.values import ENDS, MaterialValue, lead_ranges, of_all_materials, piezoresistance
 from sensorgen.design.values import film as film_of
 from sensorgen.models import pressure
 from sensorgen.models.sensor import Sensor
@@ -93,6 +93,7 @@ def build_sensor(
     if reason := _no_line(body, rest):
         raise OutOfRange(reason)
     p, gone, rises = body.design.params, lost(body.design), piezoresistance(body.design)
+    (lead_f, *_), (lead_ohm, *_) = lead_ranges(body.design)
     pressed = piece(body)
     if not isinstance(law, Law):
         law = law_of(body.design, rest.answer, law, printed=None if body.is_drawn else pressed)
@@ -109,6 +110,8 @@ def build_sensor(
         tan_delta=gone.tan_delta,
         leak_s_per_m=gone.leak_s / (p.length_mm * M_PER_MM),
         piezoresistance_per_pa=tuple(rises[end].value if end in rises else 0.0 for end in ENDS),  # type: ignore[arg-type]
+        lead_ohm=lead_ohm,
+        lead_f=lead_f,
     )
     return SensorModel(body, sensor, rest, law, gone, rises)
 

@@ -17,7 +17,7 @@ from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Finding, Refused, Verdict, counted, counts, grouped, listed, verdict
 from sensorgen.design.design import Design
 from sensorgen.prediction.identifiability.results import FORCE_SHARE, GUESS
-from sensorgen.prediction.results import UNPREDICTED, resolved, unpredicted
+from sensorgen.prediction.results import UNPREDICTED, caption_of, resolved, unpredicted
 from sensorgen.workflows.trial import Numbers, Trial, trial
 
 if TYPE_CHECKING:
@@ -314,7 +314,7 @@ def table(tried: Trial) -> Iterator[Part]:
     if tried.toolpath:
         rows.append(("print time", "", f"at least {tried.toolpath.time_s / 60:.0f} min"))
     yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
-    yield f"(resolution at {tried.force_n:g} N and {tried.position_m * 1e3:g} mm; {tried.body})"
+    yield caption_of(tried.force_n, tried.position_m, tried.body)
     if tried.reason and tried.status != "not predicted":
         yield tried.reason
     yield from (f"doubtful: {doubt}" for doubt in tried.doubts)
@@ -327,17 +327,17 @@ def words_of(tried: Trial) -> str:
     force, place = _force(printed, tried.force_n), _place(printed, 2 * tried.position_m)
     return ", ".join((
         f"C {_best(c)}" if c else tried.status,
-        force if force.startswith("cannot") else f"force {_best(printed.force_resolution)}",
-        place if place.startswith("cannot") else f"position {_best(printed.position_resolution)}",
+        force if force.startswith("cannot") else f"force {_best(printed.bench()[0])}",
+        place if place.startswith("cannot") else f"position {_best(printed.bench()[1])}",
     ))  # fmt: skip
 
 
 def _force(numbers: Numbers, force_n: float) -> str:
-    return resolved(numbers.force_resolution, force_n, "cannot sense force")
+    return resolved(numbers.bench()[0], force_n, "cannot sense force", conditional=numbers.conditional)
 
 
 def _place(numbers: Numbers, length_m: float) -> str:
-    return resolved(numbers.position_resolution, length_m, "cannot locate")
+    return resolved(numbers.bench()[1], length_m, "cannot locate", conditional=numbers.conditional)
 
 
 def _words(bounds: Bounds | None) -> str:

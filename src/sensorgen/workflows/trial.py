@@ -20,7 +20,7 @@ from sensorgen.export.slicers import SLICERS
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import DEFAULT, Query
-from sensorgen.prediction.results import Prediction, resolved
+from sensorgen.prediction.results import Prediction, on_bench, resolved
 
 if TYPE_CHECKING:
     from sensorgen.export.gcode.drags import OfTool
@@ -46,6 +46,8 @@ class Numbers:
         The same after 30 known presses of a specimen, the best value alone [N], [m].
     force_typical, position_typical : float or None
         Median of the standard errors over all forces and positions [N], [m].
+    conditional : bool
+        Whether they rest on values that no source gives.
     """
 
     gap: Bounds | None = None
@@ -59,6 +61,7 @@ class Numbers:
     position_calibrated: float | None = None
     force_typical: float | None = None
     position_typical: float | None = None
+    conditional: bool = False
 
     @classmethod
     def of(cls, found: Prediction) -> "Numbers":
@@ -70,7 +73,15 @@ class Numbers:
             found.sensitivity, found.force_resolution, found.position_resolution,
             bench.sigma_force_n if bench else None, bench.sigma_position_m if bench else None,
             known.map.of_force.median if known else None, known.map.of_position.median if known else None,
+            found.conditional,
         )  # fmt: skip
+
+    def bench(self) -> tuple[Bounds | None, Bounds | None]:
+        """Standard errors of force and position on a bench, after known presses [N], [m]."""
+        return (
+            on_bench(self.force_resolution, self.force_calibrated),
+            on_bench(self.position_resolution, self.position_calibrated),
+        )
 
 
 UNITS = {"force_calibrated": "N", "position_calibrated": "m", "force_typical": "N", "position_typical": "m"}
@@ -160,7 +171,7 @@ class Trial(Displayed):
         yield ""
         rows = (
             (f.name.replace("_", " "), *(self._shown(f.name, n) for n in (self.drawn, self.printed)))
-            for f in fields(Numbers)
+            for f in fields(Numbers) if f.name != "conditional"
         )  # fmt: skip
         yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
         yield f"(at {self.force_n:g} N and {self.position_m * 1e3:g} mm; {self.body})"

@@ -27,7 +27,7 @@ from sensorgen.prediction.calibration.fitting import Data, calibrated, gain, loo
 from sensorgen.prediction.calibration.inversion import Found
 from sensorgen.prediction.calibration.materials import links
 from sensorgen.prediction.calibration.rest import checked
-from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, Spread
+from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, Spread, spread_at
 from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import TIP_M, TONES_HZ, Query, Tip
@@ -137,7 +137,7 @@ def design_of(log: Log, specimen: str) -> tuple[str, Design]:
 def spread_of(predicted: SensorModel, bench: Bench) -> Spread:
     """Spread of the specimens of a design, from what its prediction leaves open."""
     mean, sd = bench.force_offset_n
-    usual, c = Spread(), predicted.rest.capacitance
+    usual, c = spread_at(predicted.sensor), predicted.rest.capacitance
     ends = [np.log(end / r.value) for r in predicted.rest.resistance.values() for end in (r.lower, r.upper)]
     moduli = [v for v in predicted.values if v.quantity == "youngs_modulus_pa"]
     middle, by_print, by_print_shape = print_spread(predicted)

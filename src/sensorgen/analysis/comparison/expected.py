@@ -64,9 +64,10 @@ class Predicted:
         both electrodes, as the readings do not say which was measured; the range is that of the best and the worst,
         with the errors of models, print and materials.
         """
-        ends = list(self.prediction.resistance.values())
-        if not ends:
+        with_leads = list(self.prediction.resistance.values())
+        if not with_leads:
             return None
+        ends = [r.alone() for r in with_leads]
 
         def reading(of: Callable[[Bounds], float], across: float) -> list[float]:
             ohms = [of(r) for r in ends]
@@ -83,8 +84,9 @@ class Predicted:
 
         whole = interval(lambda r: r)
         parts = (interval(lambda r: r.model), interval(lambda r: r.print), interval(lambda r: r.material))
-        value = geometric_mean(reading(lambda r: r.value, most))
-        return Bounds(value, whole.lower, whole.upper, "ohm", *parts)
+        alone = Bounds(geometric_mean(reading(lambda r: r.value, most)), whole.lower, whole.upper, "ohm", *parts)
+        leads = [r.leads.upper - r.value for r in with_leads if r.leads]
+        return alone.plus(0.0, 0.0, max(leads)) if leads else alone
 
     @property
     def capacitance_f(self) -> Interval | None:

@@ -76,6 +76,8 @@ class Compared:
         expected = self.expected_ohm
         if expected is None or not self.evidence.ry_ohm:
             return None
+        if self.reading.words.wires == 4:
+            expected = expected.alone()
         return any(expected.lower <= value <= expected.upper for value in self.evidence.ry_ohm)
 
 

@@ -9,10 +9,10 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from functools import cache, lru_cache
 from importlib import resources
-from math import inf, isinf
-from typing import Annotated
+from math import exp, inf, isinf
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
@@ -23,6 +23,7 @@ from sensorgen.design.packs import Kind
 FILM_LEAK = "leak_s_per_m2"  # leak of a film per area; a matter of how it was printed: no source that ships gives one
 PIEZORESISTANCE = "piezoresistance_per_pa"  # relative rise of an electrode's resistivity with pressure: none either
 INTERFACE_GAP = "interface_gap_m"  # air between electrode and dielectric; a fit of none is below 0 as often as above
+SD_95 = 1.959963984540054  # standard deviations on either side that hold 95 %
 SET = "set by the user"  # source of a value that stands in a design itself
 _RANGES = {  # finite ends belong to it; anything else is above 0
     "poisson_ratio": (-1.0, 0.5),
@@ -53,25 +54,38 @@ _PLAUSIBLE = {  # of any solid, foam or gel, and of any print; what is beyond ha
 }
 
 
-class Value(Strict):
-    """One number as one source gives it; the property's name carries the unit."""
+class OwnValue(Strict):
+    """One number of a source of the user's own, with the range that holds 95 % of prints or their standard deviation.
+
+    A value above 0 with ``sd`` gets ``low`` and ``high`` by it, as of a logarithmic normal distribution.
+    """
 
     value: float
+    note: str = ""
+    low: float | None = None
+    high: float | None = None
+    sd: Annotated[float, Field(ge=0)] | None = Field(default=None, exclude=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _ends(cls, data: Any) -> Any:
+        if not isinstance(data, dict) or data.get("sd") is None:
+            return data
+        value, sd = data.get("value"), data["sd"]
+        if "low" in data or "high" in data:
+            raise ValueError("sd beside low or high; expected one of both")
+        if not (isinstance(value, float) and isinstance(sd, float | int) and value > 0):
+            return data
+        factor = exp(SD_95 * sd / value)
+        return {**data, "low": value / factor, "high": value * factor}
+
+
+class Value(OwnValue):
+    """One number as one source gives it; the property's name carries the unit."""
+
     source: str
     default: bool = False
     implausible: bool = False
-    note: str = ""
-    low: float | None = None
-    high: float | None = None
-
-
-class OwnValue(Strict):
-    """One number of a source of the user's own."""
-
-    value: float
-    note: str = ""
-    low: float | None = None
-    high: float | None = None
 
 
 class Own(Strict):

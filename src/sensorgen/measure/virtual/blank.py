@@ -15,7 +15,7 @@ from sensorgen.core import cache as answers
 from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
-from sensorgen.design.values import film, of_all_materials, resistivities
+from sensorgen.design.values import film, material_value, of_all_materials, resistivities
 from sensorgen.measure.virtual.bricks import bricks
 from sensorgen.measure.virtual.cell import AIR, Bricks, Raster, Solid, capacitance, conductance, pressed
 from sensorgen.measure.virtual.section import FINE_MM, raster, section_of
@@ -28,7 +28,6 @@ PRESSURES_PA = tuple(1e3 * p for p in (0, 2.5, 5, 10, 20, 35, 60, 100, 150, 200,
 _LN_PERMITTIVITY = (-0.4, 0.0, 0.4)
 _LN_MODULUS = (-0.7, 0.0, 0.7)  # of the dielectric alone
 _ORDER = 4 / 3  # of convergence: energy of a field at a corner of 270 degrees
-_POISSON = 0.4999  # of rubber, where no source gives it
 _FEWEST = 6  # pressures that a cell has to bear: up to 35 kPa
 _PRESSED, _AT_REST = (0.175, 500), (0.07, 5500)  # longest edge [mm] and number of the coarser bricks
 
@@ -229,8 +228,10 @@ def _solids(design: Design) -> Mapping[str, Solid]:
     found = {}
     for name, modulus in of_all_materials(design, "youngs_modulus_pa").items():
         material = design.material(name)
-        eps = material.value("relative_permittivity", design.used()[name]).value if not material.conductor else 1.0
-        nu = material.properties.get("poisson_ratio")
-        poisson = material.value("poisson_ratio", design.used()[name]).value if nu else _POISSON
-        found[name] = Solid(modulus.value, poisson, eps)
+        eps = 1.0 if material.conductor else _value(design, name, "relative_permittivity")
+        found[name] = Solid(modulus.value, _value(design, name, "poisson_ratio"), eps)
     return found
+
+
+def _value(design: Design, name: str, quantity: str) -> float:
+    return material_value(design.material(name), design.used()[name], quantity).value

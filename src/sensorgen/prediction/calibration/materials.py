@@ -16,7 +16,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import Design
-from sensorgen.design.values import film, ln_spread
+from sensorgen.design.values import film, ln_spread, material_value
 from sensorgen.prediction.calibration.fitting import Posterior
 from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel
 from sensorgen.prediction.rest_state import rest_state
@@ -142,9 +142,8 @@ def _link(
 ) -> Link:  # fmt: skip
     material, source = design.material(name), design.used()[name]
     middle, spread = ln_spread(material, source, quantity)
-    return Link(
-        name, quantity, parameter, value or material.value(quantity, source).value, middle, spread, slope, error, shape
-    )
+    own = value or material_value(material, source, quantity).value
+    return Link(name, quantity, parameter, own, middle, spread, slope, error, shape)
 
 
 def _capacitance(predicted: SensorModel, dielectric: str) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from sensorgen.core.errors import SensorgenError
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.calibration.fitting import Data, Posterior, covariances, information, prior
 from sensorgen.prediction.calibration.inversion import readings
-from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel
+from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, spread_at
 
 PRESSES = 30
 _STEP = 1e-3  # of the force and of the length, for differences
@@ -42,7 +42,7 @@ def outlook(
     if not force_n > 0:
         return None
     try:
-        model = SpecimenModel(sensor, frequency_hz)
+        model = SpecimenModel(sensor, frequency_hz, spread_at(sensor))
         sigma = np.full(len(model.frequency_hz), noise * 1.1**0.5)
         before = prior(model, sigma)
         return _errors(model, _planned(model, before, force_n), force_n, position_m), _errors(

@@ -4,7 +4,7 @@ Each parameter is a standard normal number before calibration; its unit is the s
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -86,6 +86,12 @@ class Spread:
             value = getattr(self, one.name)
             if not np.isfinite(value) or (value <= 0 and one.name not in ("force_offset_n", "law_middle")):
                 raise BadInput(f"{one.name} of a calibration's prior is {value:g}; expected a number above 0")
+
+
+def spread_at(sensor: Sensor) -> Spread:
+    """Spread of a bench whose leads a design states; the usual one where it does not."""
+    usual = Spread()
+    return replace(usual, lead_ohm=sensor.lead_ohm or usual.lead_ohm, stray_f=sensor.lead_f or usual.stray_f)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design, make
-from sensorgen.design.values import MaterialValue
+from sensorgen.design.values import MaterialValue, material_value
 from sensorgen.models.sensor import Sensor
 from sensorgen.models.stack import Film, Press, Stack, Track
 from sensorgen.prediction import bodies
@@ -68,7 +68,7 @@ def stacked(
     material, source = design.slot("isolation")
     taken = {value for half in found for value in half.values}
     return Stacked(
-        own, double, tip_m, material.value("relative_permittivity", source).value,
+        own, double, tip_m, material_value(material, source, "relative_permittivity").value,
         tuple(sorted(taken, key=lambda value: tuple(vars(value).values()))),
         tuple(dict.fromkeys(doubt for half in found for doubt in half.doubts)),
     )  # fmt: skip

@@ -58,12 +58,11 @@ class Forward:
         pressed = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * (self.susceptance / (1 - thinning))
         under = self.track + stress * self.track_per_pascal
         right = np.maximum(sensor.length_m - patch.left_m - patch.length_m, 0.0)
-        return np.log(
-            line.cascade(
-                [self.track, under, self.track], [self.loose, pressed, self.loose],
-                [patch.left_m, patch.length_m, right], sensor.far_end,
-            )
+        z = line.cascade(
+            [self.track, under, self.track], [self.loose, pressed, self.loose],
+            [patch.left_m, patch.length_m, right], sensor.far_end,
         )  # fmt: skip
+        return np.log(sensor.at_leads(z, self.frequency_hz))
 
     def force_limit_n(self, most_n: float = FORCE_LIMIT_N) -> float:
         """The largest force up to ``most_n`` that the sensor bears anywhere, the tip half over its end [N]."""
@@ -132,7 +131,7 @@ class Scalar:
         self._sensor = forward.sensor
         self._susceptance = forward.susceptance.tolist()
         self._loose = forward.loose.tolist()
-        self._track = forward.track, forward.track_per_pascal
+        self._track, self._frequency_hz = (forward.track, forward.track_per_pascal), forward.frequency_hz
         far_ohm = complex(line.cascade([0.0], [0.0], [0.0], self._sensor.far_end))  # of no line: what lies behind it
         self._load = None if cmath.isinf(far_ohm) else far_ohm
 
@@ -155,7 +154,11 @@ class Scalar:
                 step = self._open if self._load is None else self._closed
                 passed = [step(q, y_k, r, length) for q, y_k in zip(passed, y, strict=True)]
         sign = -1.0 if self._load is None else 1.0
-        return [sign * cmath.log(q) for q in passed]
+        if not self._sensor.lead_f and not self._sensor.lead_ohm:
+            return [sign * cmath.log(q) for q in passed]
+        z = np.array([q if sign > 0 else 1 / q for q in passed], np.complex128)
+        at_meter = self._sensor.at_leads(z, self._frequency_hz)
+        return [cmath.log(z) for z in at_meter.tolist()]
 
     @staticmethod
     def _open(q: complex, y: complex, r: float, length: float) -> complex:
