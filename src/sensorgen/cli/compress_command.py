@@ -27,7 +27,7 @@ OWN: list[click.Parameter] = [
         "--sides period", OneOf(("fixed", "free")), "Sides: fixed, or free to move (with --base sliding).",
         default="fixed",
     ),
-    option("--top", OneOf(("even", "rigid")), "Even pressure, or a stiff plate.", default="even"),
+    options.of_design_tip(),
     option("--contact", OneOf(("frictionless", "stick")), "What faces do that touch.", default="frictionless"),
     option(
         "--model", OneOf(("press2d", "press3d", "press_round", "springs", "unconfined", "bonded")),

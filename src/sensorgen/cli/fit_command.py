@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
 
 def _work(
-    specimens: tuple[str, ...], iteration: int | None, file: str | None, output: str | None, seed: int, tip_mm: float,
-    force_offset: str, *, dry_run: bool,
+    specimens: tuple[str, ...], iteration: int | None, file: str | None, output: str | None, seed: int,
+    tip: dict[str, object] | None, force_offset: str, *, dry_run: bool,
 ) -> None:  # fmt: skip
     """Fit material values to what was measured of specimens or of an iteration, and keep them as a source.
 
@@ -30,7 +30,7 @@ def _work(
 
     if bool(specimens) == (iteration is not None):
         raise BadInput("expected either specimens, as in 'sensorgen fit S1 S2', or --iteration")
-    bench = options.bench_of(tip_mm, force_offset)
+    bench = options.bench_of(tip, force_offset)
     with log_words.opened(file) as log, show.progress(STEPS) as step:
         made = fit(log, iteration, seed, body_options.body_of(), step, bench, specimens=specimens)
     if made.values and not dry_run:

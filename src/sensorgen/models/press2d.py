@@ -138,7 +138,7 @@ def _field(
     if deformed.misfit(outline, mesh, u_m) > _MISFIT:
         return None, outline
     try:
-        return plane_field.capacitance(outline, permittivity, cell.width_mm() / 4, growth), outline
+        return plane_field.capacitance(outline.without_block(), permittivity, cell.width_mm() / 4, growth), outline
     except Unmeshed:
         return None, outline
 

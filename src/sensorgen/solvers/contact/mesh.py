@@ -11,7 +11,7 @@ from sensorgen.core.errors import BadInput, NotInstalled
 from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.scene import Point
 from sensorgen.solvers.contact import rings
-from sensorgen.solvers.contact.cell import OUTSIDE, Cell, Edge
+from sensorgen.solvers.contact.cell import BLOCK, OUTSIDE, Cell, Edge
 from sensorgen.solvers.contact.element import TRIANGLE, ElementMesh
 
 Run = tuple[int, int]
@@ -20,6 +20,7 @@ _SAME = 1e-9  # of the cell's size: places nearer than this are one
 _RINGS = 4  # around a notch
 _LEVEL = 0.1  # slope of the first chord of a dome, at most [-]
 _SIDES = ((0, 1), (1, 2), (2, 0))
+_BLOCK = 0.5  # largest triangle of a block on the top, over growth and the cell's width [-]
 
 
 class Unmeshed(BadInput):
@@ -138,14 +139,20 @@ def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
     exposed = {p for edge in faces for p in edge}
     sizes = dict.fromkeys(exposed, fineness.corner_mm) | dict.fromkeys(sharp, fineness.apex_mm)
     pieces: dict[Edge, tuple[int, int]] = {}
+    blocks = {k for k, region in enumerate(cell.regions, 1) if region.material == BLOCK}
+    top_mm = max(z for edge in cell.edges for _, z in edge)
+    wide = replace(fineness, coarse_mm=max(fineness.coarse_mm, _BLOCK * fineness.growth * cell.width_mm()))
     for (a, b), sides in cell.edges.items():
-        ends = [sizes.get(p, fineness.coarse_mm) for p in (a, b)]
-        shares = cuts(float(np.hypot(b[0] - a[0], b[1] - a[1])), ends[0], ends[1], fineness)
+        of_block = blocks and set(sides) <= {OUTSIDE, *blocks}
+        far = [wide.coarse_mm if of_block and p[1] == top_mm else fineness.coarse_mm for p in (a, b)]
+        ends = [sizes.get(p, size) for p, size in zip((a, b), far, strict=True)]
+        length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+        shares = cuts(length, ends[0], ends[1], wide if of_block else fineness)
         places = [a, *((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])) for t in shares), b]
         open_sides = (sides[0] * cell.solid(sides[0]), sides[1] * cell.solid(sides[1]))
         if open_sides != (OUTSIDE, OUTSIDE):
             pieces |= dict.fromkeys(pairwise(places), open_sides)
-    net = triangulated(pieces, fineness.coarse_mm, fineness.growth)
+    net = triangulated(pieces, fineness.coarse_mm, fineness.growth, dict.fromkeys(blocks, wide.coarse_mm))
     for place in sharp:
         if cell.turned and _is_flat(cell, place):
             net = _parted(net, nearest(net.points_m, place))
@@ -167,9 +174,13 @@ def _parted(net: Net, node: int) -> Net:
     return replace(net, points_m=np.vstack([net.points_m, net.points_m[node]]), corners=corners)
 
 
-def triangulated(edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth: float, *, quick: bool = False) -> Net:
+def triangulated(
+    edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth: float,
+    coarser_mm: Mapping[int, float] | None = None, *, quick: bool = False,
+) -> Net:  # fmt: skip
     """Mesh what edges with a region to their left and right enclose; regions from 0 down are left open.
 
+    ``coarser_mm`` is the largest triangle of regions that may have larger ones than ``coarse_mm``.
     ``quick`` makes Delaunay triangles with one optimisation step; for potentials they are as good as a front.
     """
     geometry = netgen()()
@@ -180,6 +191,10 @@ def triangulated(edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth
                 numbers[p] = geometry.AppendPoint(*p)
         domains = {"leftdomain": max(left, 0), "rightdomain": max(right, 0)}
         geometry.Append(["line", numbers[a], numbers[b]], **domains)
+    if coarser_mm:
+        for region in {k for sides in edges.values() for k in sides if k > 0}:
+            geometry.SetDomainMaxH(region, coarser_mm.get(region, coarse_mm))
+        coarse_mm = max(coarse_mm, *coarser_mm.values())
     try:
         made = geometry.GenerateMesh(maxh=coarse_mm, grading=growth, optsteps2d=1 if quick else 3, delaunay2d=quick)
     except Exception as error:  # the mesher's own kind of exception, known only where it is installed
