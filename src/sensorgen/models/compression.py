@@ -301,9 +301,9 @@ def _curve(cell: Mapping[str, Any], scale: float) -> Curve:
     """A stored cell's curve, its moduli multiplied by a factor."""
     stress = [kpa * _PA_PER_KPA * scale for kpa in cell["stress_kpa"]]
     found = curve("solved", cell["source"], stress, [1 + percent / 100 for percent in cell["rise_percent"]])
-    changes = dict(cell["held"])
+    changes = dict(cell.get("held", {}))
     return replace(
-        found, within=cell["within"], stiff_change=changes.pop("stiff tip"), boundary_changes=tuple(changes.values()),
+        found, within=cell["within"], stiff_change=cell["stiff"], boundary_changes=tuple(changes.values()),
         displacement_m=cell["displacement_um"] / _UM_PER_M, doubts=tuple(cell.get("doubts", ())),
     )  # fmt: skip
 

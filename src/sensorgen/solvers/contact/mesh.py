@@ -7,10 +7,9 @@ from itertools import pairwise
 import numpy as np
 
 from sensorgen.core.arrays import Mask, Real, Whole
-from sensorgen.core.errors import BadInput, NotInstalled
 from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.scene import Point
-from sensorgen.solvers.contact import rings
+from sensorgen.solvers.contact import mesher, rings
 from sensorgen.solvers.contact.cell import BLOCK, OUTSIDE, Cell, Edge
 from sensorgen.solvers.contact.element import TRIANGLE, ElementMesh
 
@@ -21,10 +20,6 @@ _RINGS = 4  # around a notch
 _LEVEL = 0.1  # slope of the first chord of a dome, at most [-]
 _SIDES = ((0, 1), (1, 2), (2, 0))
 _BLOCK = 0.5  # largest triangle of a block on the top, over growth and the cell's width [-]
-
-
-class Unmeshed(BadInput):
-    """No sound mesh of these outlines was found."""
 
 
 @dataclass(frozen=True)
@@ -94,16 +89,6 @@ def pinches(cell: Cell) -> set[Point]:
             for point in edge:
                 seen[point] = seen.get(point, 0) + 1
     return {point for point, edges in seen.items() if edges >= 4}
-
-
-def netgen() -> type:
-    """The 2D mesher; raises NotInstalled where it is not installed."""
-    try:
-        from netgen.geom2d import SplineGeometry
-    except ImportError:
-        raise NotInstalled("meshes need NGSolve: pip install 'sensorgen[fem]'") from None
-    found: type = SplineGeometry
-    return found
 
 
 @dataclass(frozen=True)
@@ -183,31 +168,13 @@ def triangulated(
     ``coarser_mm`` is the largest triangle of regions that may have larger ones than ``coarse_mm``.
     ``quick`` makes Delaunay triangles with one optimisation step; for potentials they are as good as a front.
     """
-    geometry = netgen()()
-    numbers: dict[Point, int] = {}
-    for (a, b), (left, right) in edges.items():
-        for p in (a, b):
-            if p not in numbers:
-                numbers[p] = geometry.AppendPoint(*p)
-        domains = {"leftdomain": max(left, 0), "rightdomain": max(right, 0)}
-        geometry.Append(["line", numbers[a], numbers[b]], **domains)
-    if coarser_mm:
-        for region in {k for sides in edges.values() for k in sides if k > 0}:
-            geometry.SetDomainMaxH(region, coarser_mm.get(region, coarse_mm))
-        coarse_mm = max(coarse_mm, *coarser_mm.values())
-    try:
-        made = geometry.GenerateMesh(maxh=coarse_mm, grading=growth, optsteps2d=1 if quick else 3, delaunay2d=quick)
-    except Exception as error:  # the mesher's own kind of exception, known only where it is installed
-        raise Unmeshed(f"these outlines cannot be meshed ({error}): do bodies overlap, or leave slivers?") from None
-    elements, sides = made.Elements2D().NumPy(), made.Elements1D().NumPy()
-    points = np.asarray(made.Coordinates(), float)[:, :2] * M_PER_MM
+    made = mesher.mesh([*edges.items()], coarse_mm, growth, coarser_mm or {}, quick=quick)
     behind = [min(pair) for pair in edges.values()]
     marked: dict[int, list[Run]] = {}
-    for (a, b), number in zip((sides["nodes"][:, :2] - 1).tolist(), sides["index"].tolist(), strict=True):
+    for (a, b), number in zip(made.sides.tolist(), made.edge.tolist(), strict=True):
         if behind[number - 1] < 0:
             marked.setdefault(behind[number - 1], []).append((a, b))
-    corners = elements["nodes"][:, :3].astype(np.int64) - 1
-    return Net(points, corners, elements["index"].astype(np.int64), marked)
+    return Net(made.points * M_PER_MM, made.corners, made.region, marked)
 
 
 def nearest(points_m: Real, place_mm: Point) -> int:
