@@ -44,6 +44,7 @@ def main() -> None:
                 continue
             if key in before:
                 found[key] = with_stiff(before[key], design, cell)
+                FILE.write_text(HEAD + "".join((before | found).values()), "utf-8")
                 continue
             name = f"tri repeating along {along}, film {film:g}{what} mm, {quality}, {walls}"
             try:
@@ -71,9 +72,9 @@ def with_stiff(entry: str, design: Design, cell: Piece) -> str:
         return entry
     rises = []
     for block in (EVEN, STIFF):
-        found = pressed(case_of(design, cell, model_of(cell), Tip(block=block)), [0.0, 3e4, 6e4], COARSEST)
-        start, *_, end = found.capacitance_f_per_m2
-        rises.append(end.middle() - start.middle())
+        found = pressed(case_of(design, cell, model_of(cell), Tip(block=block)), [0.0, 6e4], COARSEST)
+        start, end = (c.middle() for c in found.capacitance_f_per_m2 if c)
+        rises.append(end - start)
     print(entry.partition("\n")[0], rises[1] / rises[0] - 1, flush=True)
     return f"{entry}    stiff: {rises[1] / rises[0] - 1:.4g}\n"
 

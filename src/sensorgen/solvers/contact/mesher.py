@@ -1,6 +1,6 @@
 """Netgen's 2D mesher in a process of its own: some outlines end its process, or keep it busy without end.
 
-Run as a program it is the far end of :func:`mesh`, which starts it when it is first needed, and anew after it has ended.
+Run as a program it is the far end of :func:`mesh`, which starts it when needed, and anew after it has ended.
 """
 
 import atexit
@@ -32,7 +32,7 @@ class Unmeshed(BadInput):
 
 
 class Made(NamedTuple):
-    """Output of the mesher: places (n, 2), corners (m, 3) and regions (m,) of triangles, sides (k, 2), their edge (k,)."""
+    """Output of the mesher: places (n, 2), corners (m, 3) and regions (m,) of triangles, sides (k, 2) and their edge."""
 
     points: Real
     corners: Whole
@@ -42,7 +42,8 @@ class Made(NamedTuple):
 
 
 def mesh(
-    edges: Sequence[tuple[Edge, tuple[int, int]]], size: float, growth: float, sizes: Mapping[int, float], *, quick: bool
+    edges: Sequence[tuple[Edge, tuple[int, int]]], size: float, growth: float, sizes: Mapping[int, float], *,
+    quick: bool,
 ) -> Made:  # fmt: skip
     """Mesh the regions to the left and right of edges; those from 0 down are left open.
 
@@ -148,7 +149,7 @@ def _made(
         return str(error)
     elements, sides = made.Elements2D().NumPy(), made.Elements1D().NumPy()
     return (
-        np.asarray(made.Coordinates(), float)[:, :2],
+        np.array(made.Coordinates(), float)[:, :2].copy(),  # Netgen frees its own with the mesh
         elements["nodes"][:, :3].astype(np.int64) - 1,
         elements["index"].astype(np.int64),
         sides["nodes"][:, :2].astype(np.int64) - 1,
