@@ -10,9 +10,10 @@ from json import dumps
 from pathlib import Path
 
 from sensorgen.design.design import Design, make
+from sensorgen.design.tip import EVEN, STIFF, Tip
 from sensorgen.prediction.bodies import WALLS, estimated
-from sensorgen.prediction.compression_law import content, solved
-from sensorgen.prediction.mesh_ladder import Piece
+from sensorgen.prediction.compression_law import case_of, content, solved
+from sensorgen.prediction.mesh_ladder import COARSEST, Piece, model_of, pressed
 from sensorgen.prediction.sensor_model import piece
 
 FILE = Path(__file__).parents[1] / "src" / "sensorgen" / "models" / "solved_prints.yaml"
@@ -20,12 +21,12 @@ HEAD = """\
 # Rise of the capacitance of printed triangular cells with stress, as bench/solved_prints.py solved it: by press2d, its
 # usual mesh, held against the next coarser one ("within"); layers of 0.1 and 0.06 mm, walls as named, and of Arachne's
 # walls the film as thin and as thick as the printer's tools may make it. Keys are the content of the cross-section.
-# "held" are the changes under other boundary and contact conditions of the drawn cell.
+# "stiff" is the change under a stiff plate, from the even pressure of the curve, at 60 kPa on the coarsest mesh.
 source: plane-strain finite elements with frictionless contact, neo-Hookean, nu 0.4999, of the printed cell
 youngs_modulus_pa: {etpu: 22.0e6, x60: 6.0e6}
-held: {stick: -0.038, stiff tip: 0.017, base sliding: 0.003, free sideways: -0.011}
 cells:
 """
+EVEN_PRESSURE = Tip(block=EVEN)
 
 
 def main() -> None:
@@ -42,25 +43,40 @@ def main() -> None:
             if key in found:
                 continue
             if key in before:
-                found[key] = before[key]
+                found[key] = with_stiff(before[key], design, cell)
+                FILE.write_text(HEAD + "".join((before | found).values()), "utf-8")
                 continue
             name = f"tri repeating along {along}, film {film:g}{what} mm, {quality}, {walls}"
             try:
-                law = solved(design, cell)
+                law = solved(design, cell, tip=EVEN_PRESSURE)
             except Exception as error:  # a cell that cannot be solved stays unsolved
                 print(name, error, flush=True)
                 continue
             curve = law.compression
-            found[key] = (
+            found[key] = with_stiff(
                 f"  {key}:  # {name}\n"
                 f"    displacement_um: {curve.displacement_m * 1e6:.5g}\n"
                 f"    stress_kpa: {[round(p / 1e3, 6) for p in curve.stress_pa]}\n"
                 f"    rise_percent: {[round(100 * (r - 1), 6) for r in curve.ratio]}\n"
-                f"    within: {curve.within:.4g}\n" + (f"    doubts: {dumps(law.doubts)}\n" if law.doubts else "")
-            )
+                f"    within: {curve.within:.4g}\n" + (f"    doubts: {dumps(law.doubts)}\n" if law.doubts else ""),
+                design, cell,
+            )  # fmt: skip
             print(name, key, law.doubts, flush=True)
             FILE.write_text(HEAD + "".join((before | found).values()), "utf-8")
     FILE.write_text(HEAD + "".join(found.values()), "utf-8")
+
+
+def with_stiff(entry: str, design: Design, cell: Piece) -> str:
+    """A cell's entry with the change of its rise under a stiff plate."""
+    if "    stiff: " in entry:
+        return entry
+    rises = []
+    for block in (EVEN, STIFF):
+        found = pressed(case_of(design, cell, model_of(cell), Tip(block=block)), [0.0, 6e4], COARSEST)
+        start, end = (c.middle() for c in found.capacitance_f_per_m2 if c)
+        rises.append(end - start)
+    print(entry.partition("\n")[0], rises[1] / rises[0] - 1, flush=True)
+    return f"{entry}    stiff: {rises[1] / rises[0] - 1:.4g}\n"
 
 
 def cells(design: Design, walls: str) -> Iterator[tuple[str, Piece]]:

@@ -52,7 +52,7 @@ def without_press(tmp_path_factory):
 
     def run(plan, out, **more):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setitem(sys.modules, "netgen.geom2d", None)
+            patch.setitem(sys.modules, "netgen", None)
             patch.setenv("SENSORGEN_CACHE", cache)
             return make(plan, out, **more)
 

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 
 def _work(
-    specimens: tuple[str, ...], tip_mm: float, force_offset: str, recordings: tuple[int, ...], page: str | None,
-    source: str | None, file: str | None, *, again: bool, dry_run: bool,
+    specimens: tuple[str, ...], tip: dict[str, object] | None, force_offset: str, recordings: tuple[int, ...],
+    page: str | None, source: str | None, file: str | None, *, again: bool, dry_run: bool,
 ) -> int:  # fmt: skip
     """Calibrate specimens by recordings with known presses, and by readings of meters, that the log has of them.
 
@@ -25,13 +25,13 @@ def _work(
     """
     from sensorgen.analysis import calibration
 
-    bench = options.bench_of(tip_mm, force_offset)
+    bench = options.bench_of(tip, force_offset)
     if again and len(specimens) > 1:
         raise BadInput(f"--recheck of {len(specimens)} specimens; expected one")
     if source and len(specimens) > 1:
         raise BadInput(f"--source of {len(specimens)} specimens; expected one; 'sensorgen fit' takes several")
     given = click.get_current_context().get_parameter_source
-    if again and any(given(name) is ParameterSource.COMMANDLINE for name in ("tip_mm", "force_offset")):
+    if again and any(given(name) is ParameterSource.COMMANDLINE for name in ("tip", "force_offset")):
         raise BadInput("--recheck goes on with tip and offset of the calibration; expected no --tip, no --force-offset")
     with log_words.opened(file) as log, show.progress(["calibrating"]) as step:
         made: list[Made | Recheck]

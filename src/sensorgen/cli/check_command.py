@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import render, settings, show
+from sensorgen.cli import options, render, settings, show
 from sensorgen.cli.designs import DesignGroup
 
 if TYPE_CHECKING:
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 OWN: list[click.Parameter] = [
     click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
+    options.of_design_tip(),
     *settings.advice_options(),
     *render.options(),
 ]

@@ -23,7 +23,7 @@ OWN: list[click.Parameter] = [
         default="0:100:10",
     ),
     options.sides(),
-    option("--top", OneOf(("even", "rigid")), "Even pressure, or a stiff plate.", default="even"),
+    options.of_design_tip(),
     option("--contact", OneOf(("frictionless", "stick")), "What faces do that touch.", default="frictionless"),
     option(
         "--model", OneOf(("press2d", "press3d", "press_round", "springs", "unconfined", "bonded", "infill")),

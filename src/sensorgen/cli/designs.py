@@ -85,6 +85,7 @@ class DesignGroup(click.Group):
     def _command(self, name: str, module: "Shape | ModuleType | None", base: Data) -> click.Command:
         def run(**given: Any) -> int:
             own = {p.name: given.pop(p.name) for p in self.own if p.name in given}
+            given["tip"] = own.pop("tip", None)
             return self.work(_design(base, given, name), **own)
 
         others = [*_design_options(), *self.own]
@@ -251,6 +252,8 @@ def _changes(base: Data, given: Data) -> Data:
     }
     if given["border"] is not None:
         changes["border"] = str(Path(given["border"]).absolute())
+    if given["tip"]:
+        changes["tip"] = given["tip"]
     for key, value in pairs(given["settings"], "--set"):
         changes = merged(changes, setting(key, value, known))
     return {k: v for k, v in changes.items() if v != {}}

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 
 def _work(
-    specimens: tuple[str, ...], iteration: int | None, file: str | None, output: str | None, seed: int, tip_mm: float,
-    force_offset: str, *, thesis: bool, dry_run: bool,
+    specimens: tuple[str, ...], iteration: int | None, file: str | None, output: str | None, seed: int,
+    tip: dict[str, object] | None, force_offset: str, *, thesis: bool, dry_run: bool,
 ) -> None:  # fmt: skip
     """Fit material values to what was measured of specimens or of an iteration, and keep them as a source.
 
@@ -36,7 +36,7 @@ def _work(
 
     if bool(specimens) + (iteration is not None) + thesis != 1:
         raise BadInput("expected either specimens, as in 'sensorgen fit S1 S2', --iteration or --thesis")
-    bench = options.bench_of(tip_mm, force_offset)
+    bench = options.bench_of(tip, force_offset)
     which, share = _WHICH.get(thesis, (iteration, HELD_BACK))
     with _opened(file, thesis=thesis) as log, show.progress(STEPS) as step:
         made = fit(log, which, seed, body_options.body_of(), step, bench, specimens=specimens, held_share=share)

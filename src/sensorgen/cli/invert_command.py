@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from sensorgen.cli import body_options, log_words, render, show
+from sensorgen.cli import body_options, log_words, options, render, show
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.words import Length, OneOf, Share, Values, one
+from sensorgen.cli.words import OneOf, Share, Values, one
 from sensorgen.core import files as store
 from sensorgen.core import plugins as registry
 from sensorgen.core import units
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 _NORMAL = re.compile(r"(force|position)=(.+?)(?:\+-|±)(.+)")
 _REST, _TIME = "rest", "time_s"
-_TIP = click.Option(["--tip", "tip_mm"], type=Length(), default="10mm", show_default=True, help="Length of the tip.")
 
 _COMMON: list[click.Parameter] = [
     click.Argument(["measured"], metavar="MEASURED.csv"),
@@ -61,7 +60,7 @@ OWN: list[click.Parameter] = [
         ["--perfect"], is_flag=True,
         help="As if the sensor were exactly as predicted, and no reading at rest were needed: what noise alone leaves.",
     ),
-    _TIP,
+    options.of_design_tip(),
     click.Option(
         ["--compression"], type=OneOf(("unconfined", "bonded")),
         help="Compression law of a plate; the best of the cell if not given.",
@@ -72,12 +71,12 @@ OWN: list[click.Parameter] = [
 
 
 def _work(
-    design: "Design", *, measured: str, output: str | None, perfect: bool, rest_file: str | None, tip_mm: float,
+    design: "Design", *, measured: str, output: str | None, perfect: bool, rest_file: str | None,
     compression: str | None, **how: Any,
 ) -> int:  # fmt: skip
-    from sensorgen.prediction.query import Query, Tip
+    from sensorgen.prediction.query import Query
 
-    query = Query(tip=Tip(tip_mm * units.M_PER_MM), law=compression or "")
+    query = Query(law=compression or "")
     body = body_options.body_of()(design)
     if perfect:
         if rest_file:
@@ -93,7 +92,7 @@ def _work(
         from sensorgen.prediction.inverse import FORCE_LIMIT_N
 
         found, _ = sensor_model(body, query)
-        model = SpecimenModel(found.sensor, tones_hz, spread_of(found, Bench(query.tip.length_m)))
+        model = SpecimenModel(found.sensor, tones_hz, spread_of(found, Bench()))
         limit, (mean, count) = limit_n or FORCE_LIMIT_N, rest.mean()
         if not np.isfinite(mean).all():
             raise BadInput(f"{measured}: a frequency without a reading at rest; expected one at each")

@@ -22,6 +22,7 @@ def _optimise(
     no_cache: bool,
     no_build: bool,
     no_gcode: bool,
+    tip: dict[str, object] | None,
 ) -> int:
     """Find the designs of a space that no other is better than, as printed, and write the files of up to three.
 
@@ -35,7 +36,7 @@ def _optimise(
     with _progress() as step:
         found = optimise(
             Path(target), Path(out), Workers(sweeps.at_once(jobs), cluster), count=sample or 0, keep=not no_cache,
-            built=not no_build, sliced=not no_gcode, progress=step,
+            built=not no_build, sliced=not no_gcode, tip=tip, progress=step,
         )  # fmt: skip
     render.deliver(found)
     return render.verdict(*(() if found.front else ("no design meets the target",)))
@@ -73,7 +74,7 @@ command = click.Command(
             ["--sample"], type=click.IntRange(1, 20_000), default=None, metavar="N",
             help="Try N designs that NSGA-II chooses, of a space too large to try all; nothing is then proven.",
         ),
-        *sweeps.workers(), options.no_cache(),
+        options.of_design_tip(), *sweeps.workers(), options.no_cache(),
         click.Option(["--no-build"], is_flag=True, help="Do not build the recommended designs."),
         click.Option(["--no-gcode"], is_flag=True, help="Do not slice them."),
         *render.options(csv="Print every design as CSV, all digits."),

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sensorgen.cli import render
-from sensorgen.cli.words import Length, OneOf, Ratio, Share, Values
+from sensorgen.cli.words import OneOf, Ratio, Share, TipWords, Values
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
 
@@ -55,6 +55,15 @@ def force() -> click.Option:
     return option("--force force_n", Values(units.FORCE_N, zero=False), "Force of the press.", default="6N")
 
 
+def of_design_tip() -> click.Option:
+    """``--tip`` of the design: :class:`sensorgen.cli.designs.DesignGroup` sets it."""
+    about = (
+        "What presses: its width, then stiff, even or a block's material with its height, as 5mm,stiff or "
+        "ninjaflex,10mm; the design's if not given."
+    )
+    return option("--tip", TipWords(), about)
+
+
 def tip(flags: str, about: str) -> click.Option:
     """Length of a tip, one [mm]."""
     return option(flags, Values(units.LENGTH_MM, zero=False), about, default="10mm", metavar="MM")
@@ -63,7 +72,7 @@ def tip(flags: str, about: str) -> click.Option:
 def bench() -> list[click.Parameter]:
     """``--tip`` and ``--force-offset`` of the bench that pressed; :func:`bench_of` reads them."""
     return [
-        option("--tip tip_mm", Length(), "Length of the tip.", default="10mm"),
+        of_design_tip(),
         option(
             "--force-offset", None, "Force above what the rig says, as its piston's weight: 0.9+-0.1 for the thesis's.",
             default="0+-0.1", metavar="N+-N",
@@ -71,7 +80,7 @@ def bench() -> list[click.Parameter]:
     ]  # fmt: skip
 
 
-def bench_of(tip_mm: float, force_offset: str) -> "Bench":
+def bench_of(tip: dict[str, Any] | None, force_offset: str) -> "Bench":
     """The bench that the options say."""
     from sensorgen.analysis.calibration import Bench
 
@@ -79,7 +88,10 @@ def bench_of(tip_mm: float, force_offset: str) -> "Bench":
     if not mark:
         raise BadInput(f"--force-offset {force_offset!r:.40}: expected mean and standard deviation, as 0.9+-0.1 (N)")
     try:
-        return Bench(tip_mm * units.M_PER_MM, (units.force_n(mean), units.force_n(spread)))
+        block = dict(tip or {})
+        width = block.pop("width_mm", None)
+        offset = units.force_n(mean), units.force_n(spread)
+        return Bench(None if width is None else width * units.M_PER_MM, offset, block)
     except BadInput as error:
         raise error.within("--force-offset") from None
 

@@ -1,6 +1,7 @@
 """``sensorgen predict``: what the bench should measure."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,7 +30,7 @@ OWN: list[click.Parameter] = [
         "--position position_mm", Values(units.LENGTH_MM, zero=True),
         "Positions of the tip's middle [mm]; the whole sensor in 100 steps where only forces are given.",
     ),
-    options.frequencies(), option("--tip tip_mm", Length(), "Length of the tip.  [default: 10 mm]"),
+    options.frequencies(), options.of_design_tip(),
     option(
         "--tip-radius radius_mm", Length(),
         "Radius of a hard round tip across the sensor, with --profile hertz or parabola: its contact grows with "
@@ -43,8 +44,8 @@ OWN: list[click.Parameter] = [
     options.sides(), options.noise(),
     option(
         "--profile", OneOf(("uniform", "hertz", "parabola")),
-        "Pressure under the tip: of a flat one, of a round one on a thick body, of a round one on a thin film.",
-        default="uniform",
+        "Pressure under the tip: of a flat one, of a round one on a thick body, of a round one on a thin film; the "
+        "design's if not given.",
     ),
     options.accuracy(
         "Of |Z|: cell, compression and line by the least expensive models that together meet it. Exit code 1 where "
@@ -59,8 +60,8 @@ OWN: list[click.Parameter] = [
 
 def _work(
     design: "Design", *, frequency_hz: Sequence[float] | None, force_n: Sequence[float] | None,
-    position_mm: Sequence[float] | None, tip_mm: float | None, radius_mm: float | None, compression: str | None,
-    sides: str, profile: str, accuracy: float | None, noise: float, explain: bool, details: bool, plot: str | None,
+    position_mm: Sequence[float] | None, radius_mm: float | None, compression: str | None, sides: str,
+    profile: str | None, accuracy: float | None, noise: float, explain: bool, details: bool, plot: str | None,
     sweep: str | None, jobs: int | None, cluster: str,
 ) -> int:  # fmt: skip
     if plot:
@@ -70,13 +71,13 @@ def _work(
     if compression and sides != "bonded":
         raise BadInput("--compression and --sides at once; expected one of them")
     from sensorgen.prediction.evaluate import evaluate
-    from sensorgen.prediction.query import DEFAULT, TIP_M, Query, Tip
+    from sensorgen.prediction.query import DEFAULT, FLAT, Query
     from sensorgen.prediction.results import Overview, Prediction
 
-    tip = Tip(
-        TIP_M if tip_mm is None else tip_mm * units.M_PER_MM, profile,
-        None if radius_mm is None else radius_mm * units.M_PER_MM,
-    )  # fmt: skip
+    tip = design.tip.tip()
+    tip = replace(
+        tip, profile=profile or tip.profile, radius_m=None if radius_mm is None else radius_mm * units.M_PER_MM
+    )
     frequencies = tuple(frequency_hz or DEFAULT.frequency_hz)
     query = Query(frequencies, tip=tip, law=compression or sides * (sides != "bonded"), accuracy=accuracy, noise=noise)
     if sweep:
@@ -92,7 +93,7 @@ def _work(
             prediction = found.prediction
         else:
             found = prediction = evaluate(body, query)
-            asked = query.law or tip_mm is not None or radius_mm is not None
+            asked = query.law or tip != FLAT
             if found.capacitance and not found.budget and asked:
                 raise BadInput(found.reason)
             found = prediction if details or explain else Overview(**vars(prediction))

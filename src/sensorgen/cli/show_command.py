@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import render, show
+from sensorgen.cli import options, render, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.core.errors import BadInput
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from sensorgen.design.design import Design
 
 OWN: list[click.Parameter] = [
+    options.of_design_tip(),
     click.Option(["--output", "-o"], metavar="FILE", help="Page to write; NAME.html here if not given."),
     click.Option(["--no-open"], is_flag=True, help="Write the page without opening it in the browser."),
 ]

@@ -25,6 +25,34 @@ class Length(click.ParamType):  # type: ignore[type-arg]
             raise error.within(_said(param)) from None
 
 
+class TipWords(click.ParamType):  # type: ignore[type-arg]
+    """A tip: lengths, and what it is made of, with commas."""
+
+    name = "WIDTH,BLOCK,HEIGHT"
+
+    def convert(
+        self,
+        value: Any,
+        param: click.Parameter | None,
+        ctx: click.Context | None,  # noqa: ARG002
+    ) -> dict[str, Any]:
+        """Read ``5mm,stiff`` or ``10,ninjaflex,10`` as keys of a design file's tip."""
+        if isinstance(value, dict):
+            return value
+        found: dict[str, Any] = {}
+        for word in value.replace(" ", ",").split(","):
+            key = "block" if word[:1].isalpha() else "height_mm" if "block" in found else "width_mm"
+            if not word or key in found:
+                raise BadInput(
+                    f"{_said(param)} {value!r:.60}: expected as 10mm, 5mm,stiff, even or 10mm,ninjaflex,10mm"
+                )
+            try:
+                found[key] = word if key == "block" else units.length_mm(word)
+            except BadInput as error:
+                raise error.within(_said(param)) from None
+        return found
+
+
 class NumberRange(click.FloatRange):
     """A number within limits; ``nan``, which is below no limit, is none."""
 

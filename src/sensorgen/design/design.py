@@ -22,6 +22,7 @@ from sensorgen.design import materials as material_files
 from sensorgen.design.packs import Kind
 from sensorgen.design.printer import Pattern, Printer, Quality, load_printer, load_quality
 from sensorgen.design.profile import Profile, with_own
+from sensorgen.design.tip import EVEN, STIFF, TipData
 from sensorgen.scene.scene import Envelope, Fill, Scene
 
 if TYPE_CHECKING:
@@ -118,6 +119,7 @@ class Design(Strict):
         default=0.0, description="Share that the bake takes off in the plane; the print is made larger by it [-]."
     )
     profile: Profile = Profile()
+    tip: TipData = Field(default=TipData(), description="What presses it; no part of its identity.")
     waivers: tuple[Waiver, ...] = Field(default=(), strict=False)  # YAML has lists only
     leads: Leads = Leads()
     own: dict[Kind, dict[str, str]] = Field(
@@ -276,7 +278,10 @@ class Design(Strict):
 
     def _plain(self) -> set[str]:
         """Parts that have come later and are not used: without them the identities of older designs last."""
-        usual = {"profile": Profile(), "own": {}, "geometry": None, "bodies": {}, "border": None, "leads": Leads()}
+        usual = {
+            "profile": Profile(), "tip": TipData(), "own": {}, "geometry": None, "bodies": {}, "border": None,
+            "leads": Leads(),
+        }  # fmt: skip
         return {key for key, value in usual.items() if getattr(self, key) == value}
 
     @property
@@ -287,7 +292,8 @@ class Design(Strict):
     def id(self) -> str:
         """Hash of all resolved parameters and material values; not of the design's name, nor of sensorgen's version."""
         data = _FIRST | self._lasting(self.resolved())
-        data.pop("own", None)  # values of materials and machines are there without the words around them
+        for key in ("own", "tip"):  # values of materials and machines are there without the words around them
+            data.pop(key, None)
         if self._shape_text is not None:
             data["shape_text"] = self._shape_text
         text = json.dumps(data, sort_keys=True, allow_nan=True)
@@ -553,7 +559,8 @@ def _check_names(design: Design) -> None:
     _one_source_each(design)
     _soluble(design)
     _refuse_stacks(design)
-    for name in (*design.tools, *design.infill, *design.profile.materials()):
+    block = {design.tip.block} - {EVEN, STIFF}
+    for name in (*design.tools, *design.infill, *design.profile.materials(), *block):
         design.material(name)
     machine = design.machine
     for name, tool in design.tools.items():

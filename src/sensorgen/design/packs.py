@@ -411,6 +411,8 @@ def _other_materials(data: Mapping[str, Any]) -> Iterator[str]:
     if isinstance(profile, dict):
         tables += [profile.get(key) for key in ("wall_lines", "line_mm", "infill_angle_deg")]
     yield from (name for table in tables if isinstance(table, dict) for name in table)
+    if isinstance(data.get("tip"), dict) and data["tip"].get("block", "even") not in ("even", "stiff"):
+        yield data["tip"]["block"]
 
 
 def _add(texts: dict[Kind, dict[str, Any]], kind: Kind, word: str, folder: Path) -> str:

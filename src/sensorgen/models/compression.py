@@ -83,8 +83,10 @@ class Curve:
         Stress from 0 on [Pa]; C'(stress)/C'(0) [-], from 1 on, and its derivative [1/Pa].
     within : float
         Relative error of the rise [-].
+    stiff_change : float
+        Relative change of the rise under a stiff plate, from that under an even pressure [-].
     boundary_changes : tuple of float
-        Relative changes of the rise under other boundary and contact conditions [-].
+        Relative changes of the rise under other boundary and contact conditions of this cell [-].
     displacement_m : float or None
         Of the top at the last stress [m]; None if unknown.
     doubts : tuple of str
@@ -105,6 +107,7 @@ class Curve:
     ratio: tuple[float, ...]
     slope_per_pa: tuple[float, ...]
     within: float = 0.0
+    stiff_change: float = 0.0
     boundary_changes: tuple[float, ...] = ()
     displacement_m: float | None = None
     onset: float = 1.0
@@ -321,10 +324,10 @@ def _curve(cell: Mapping[str, Any], scale: float) -> Curve:
     """A stored cell's curve, its moduli multiplied by a factor."""
     stress = [kpa * _PA_PER_KPA * scale for kpa in cell["stress_kpa"]]
     found = curve("solved", cell["source"], stress, [1 + percent / 100 for percent in cell["rise_percent"]])
-    changes, displacement_m = tuple(cell["held"].values()), cell["displacement_um"] / _UM_PER_M
+    changes = dict(cell.get("held", {}))
     return replace(
-        found, within=cell["within"], boundary_changes=changes, displacement_m=displacement_m,
-        doubts=tuple(cell.get("doubts", ())),
+        found, within=cell["within"], stiff_change=cell["stiff"], boundary_changes=tuple(changes.values()),
+        displacement_m=cell["displacement_um"] / _UM_PER_M, doubts=tuple(cell.get("doubts", ())),
     )  # fmt: skip
 
 

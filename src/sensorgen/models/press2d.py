@@ -15,7 +15,8 @@ from sensorgen.scene.scene import Scene
 from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.solvers.contact.cell import Cell
 from sensorgen.solvers.contact.cell import cell_of as cell
-from sensorgen.solvers.contact.mesh import Fineness, Mesh, Unmeshed, mesh_of, pinches
+from sensorgen.solvers.contact.mesh import Fineness, Mesh, mesh_of, pinches
+from sensorgen.solvers.contact.mesher import Unmeshed
 from sensorgen.solvers.contact.pressed import Elastic, Pressed, Run, check, compared, joined, solve, with_capacitances
 
 SOURCE = (
@@ -138,7 +139,7 @@ def _field(
     if deformed.misfit(outline, mesh, u_m) > _MISFIT:
         return None, outline
     try:
-        return plane_field.capacitance(outline, permittivity, cell.width_mm() / 4, growth), outline
+        return plane_field.capacitance(outline.without_block(), permittivity, cell.width_mm() / 4, growth), outline
     except Unmeshed:
         return None, outline
 

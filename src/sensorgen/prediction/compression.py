@@ -13,13 +13,13 @@ from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput, MissingValue, NotInstalled, OutOfRange
 from sensorgen.design.body import Body
-from sensorgen.design.values import permittivities
+from sensorgen.design.tip import Tip
 from sensorgen.models import press2d
 from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.prediction import capacitance_answer as at_rest
 from sensorgen.prediction import closed_form_compression as closed_form
 from sensorgen.prediction.capacitance import Unpredictable
-from sensorgen.prediction.compression_law import elastic
+from sensorgen.prediction.compression_law import case_of
 from sensorgen.prediction.mesh_ladder import (
     MODELS,
     USUAL,
@@ -67,7 +67,7 @@ class Asked:
     stress_kpa : tuple of float
         Rising, 0 first [kPa].
     boundary : BoundaryConditions
-        Base, period, top and contact.
+        Base, period and contact.
     model : str
         One of ``ALL``, or "" for the first that applies to the scene.
     accuracy : float
@@ -78,6 +78,8 @@ class Asked:
         Read cached solutions, and store new ones.
     sides : str
         "bonded": a plate follows the law of one that bulges at its edges; else ``boundary`` holds for it, too.
+    tip : Tip or None
+        What presses; the design's own if None.
     """
 
     stress_kpa: tuple[float, ...]
@@ -87,10 +89,11 @@ class Asked:
     check_mesh: bool = False
     keep: bool = True
     sides: str = "bonded"
+    tip: Tip | None = None
 
 
 def boundary(sides: str, **others: str) -> BoundaryConditions:
-    """Boundary conditions of a cell, by those of the sensor's sides; ``others`` are top and contact."""
+    """Boundary conditions of a cell, by those of the sensor's sides; ``others`` are those of the contact."""
     return BoundaryConditions(*(("sliding", "free") if sides == "free" else ("bonded", "fixed")), **others)
 
 
@@ -333,8 +336,7 @@ def _case(body: Body, asked: Asked) -> Case:
         )
     if asked.boundary.period == "free" and asked.boundary.base == "bonded":
         raise BadInput("free sides over a bonded base are not possible: expected base 'sliding' with them")
-    permittivity = {t.material: t.value for t in permittivities(body.design)}
-    return Case(piece, _model(body, asked), elastic(body.design, piece.scene), permittivity, asked.boundary)
+    return case_of(body.design, piece, _model(body, asked), asked.tip or body.design.tip.tip(), asked.boundary)
 
 
 def _estimated(case: Case, asked: Asked, level: int, step: Step | None) -> Estimate:
@@ -347,7 +349,7 @@ def _result(body: Body, case: Case, estimate: Estimate, asked: Asked) -> Compres
 
     The rise of a sensor of whole and broken periods, of which one was pressed, is scaled by what both differ at rest.
     """
-    found, first = estimate.found, estimate.found.capacitance_f_per_m2[0]
+    found, first, tip = estimate.found, estimate.found.capacitance_f_per_m2[0], asked.tip or body.design.tip.tip()
     try:
         rest = at_rest.answer(body, at_rest.Asked(keep=asked.keep))
     except Unpredictable:
@@ -361,7 +363,8 @@ def _result(body: Body, case: Case, estimate: Estimate, asked: Asked) -> Compres
     lower, upper = (rise - off + known.lower, rise + off + known.upper) if known else (nan + rise, nan + rise)
     down, up = estimate.relative() if not found.faults else (inf, inf)
     return CompressionResult(
-        design=body.design.name, body=body.provenance, model=case.model, held=dict(vars(case.boundary)),
+        design=body.design.name, body=body.provenance, model=case.model,
+        held=vars(case.boundary) | {"top": tip.material},
         stress_kpa=tuple(p / _PA_PER_KPA for p in found.stress_pa.tolist()),
         displacement_um=tuple(d * _UM_PER_M for d in found.displacement_m.tolist()),
         displacement_error_um=_known(_UM_PER_M * estimate.displacement_error_m),

@@ -6,17 +6,20 @@ other cell with gaps is solved on request, and kept.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from hashlib import sha256
 from json import dumps
+from math import ceil, log
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
+from sensorgen.design.tip import EVEN, STIFF, Tip
 from sensorgen.design.values import MaterialValue, film, material_value, of_all_materials, permittivities
 from sensorgen.models import compression, sandwich
 from sensorgen.models.compression import Compression, Curve, curve_of
@@ -33,15 +36,23 @@ from sensorgen.prediction.mesh_ladder import (
     model_of,
     pressed,
 )
-from sensorgen.scene.scene import Scene
+from sensorgen.prediction.query import FLAT
+from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.scene.sections import sections
+from sensorgen.solvers.contact.boundary import BoundaryConditions
+from sensorgen.solvers.contact.cell import BLOCK
 
 if TYPE_CHECKING:
-    from sensorgen.models.press2d import BoundaryConditions, Elastic
+    from sensorgen.models.press2d import Elastic
 
 CLOSED_FORM = ("unconfined", "bonded", "symmetric", "infill")
 LAWS = (*CLOSED_FORM, "free", "solved")
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)), 1.2e5)  # 6 N on a tip of 5 x 10 mm are 120 kPa
+_FURTHER = 1.25  # ratio of stresses beyond those
+_PAST = 1.25  # pressure over the last one of a stored curve up to which it is extended [-]
+_COARSE = (0.0, 0.25, 0.5, 1.0)  # stresses at which tops are compared, over the last one [-]
+_PERIODS = 1.5  # height of a block, over the period, above which its pressure is even: exp(-3 pi) [-]
+_HEIGHTS = 2.0  # the same over the cell's height, where no period is known [-]
 _LANDING = f"feet land at negligible force: the rise of C up to {STRESS_PA[1] / 1e3:g} kPa is mostly their fall"
 _STRAIN = np.linspace(0.0, 0.3, 7)  # of infill: lines of its law, which is straight up to there at most
 _SAME_RATIO = 1e-3  # difference of Poisson's ratios: 0.4999 and 0.5 are one cell, 0.45 deforms by 11 % more
@@ -68,8 +79,10 @@ class Law:
         Limits of its validity.
     others : tuple of Compression
         Laws within its error: of the mesh, or the other law of a plate.
+    tops : mapping of str to Compression
+        The cell under an even pressure and under a stiff plate, by ``EVEN`` and ``STIFF``; empty of a solid plate.
     other_boundaries : tuple of Compression
-        The same cell under other boundary and contact conditions.
+        The cell under other boundary and contact conditions.
     bounded : bool
         Whether its error is known: not where a cell with gaps is approximated by a plate.
     """
@@ -78,11 +91,15 @@ class Law:
     taken: tuple[MaterialValue, ...]
     doubts: tuple[str, ...] = ()
     others: tuple[Compression, ...] = ()
+    tops: Mapping[str, Compression] = field(default_factory=dict)
     other_boundaries: tuple[Compression, ...] = ()
     bounded: bool = True
 
 
-def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | None = None) -> Law:
+def law_of(
+    design: Design, answer: Answer, name: str = "", *, printed: Piece | None = None, tip: Tip = FLAT,
+    until_pa: float = 0.0,
+) -> Law:  # fmt: skip
     """The best available pressure law of a design; "solved" takes a minute or two.
 
     Parameters
@@ -95,6 +112,10 @@ def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | N
         One of ``LAWS``, or "" for the best available without solving.
     printed : Piece, optional
         As printed; as drawn where not given.
+    tip : Tip
+        What presses.
+    until_pa : float
+        Pressure up to which it is wanted, if more than usual [Pa].
 
     Raises
     ------
@@ -122,10 +143,10 @@ def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | N
         )
     values = {n: t.value for n, t in moduli.items()}
     known = _stored_print(design, printed, values) if printed else _stored(design, values)
-    if known and name != "unconfined":
-        return _cell(known, moduli)
+    if known and name != "unconfined" and until_pa <= _PAST * known.stress_pa[-1]:
+        return _stored_law(known, moduli, tip)
     if name == "solved":
-        return solved(design, printed)
+        return solved(design, printed, tip=tip, until_pa=until_pa)
     if not name and piece.period_mm is None and (found := infill(design, piece)):
         return found
     soft = moduli[film(design)]
@@ -158,11 +179,14 @@ class Option:
     find: Callable[[], Law]
 
 
-def options(design: Design, answer: Answer, name: str = "", *, printed: Piece | None = None) -> list[Option]:
+def options(
+    design: Design, answer: Answer, name: str = "", *, printed: Piece | None = None, tip: Tip = FLAT,
+    until_pa: float = 0.0,
+) -> list[Option]:  # fmt: skip
     """The available laws of a design, the least expensive first; parameters and errors as of :func:`law_of`."""
     piece, moduli = printed or drawn(design), of_all_materials(design, "youngs_modulus_pa")
     asked = name == "solved" and not is_plate(answer, piece.scene)
-    at_once = law_of(design, answer, "" if asked else name, printed=printed)
+    at_once = law_of(design, answer, "" if asked else name, printed=printed, tip=tip, until_pa=until_pa)
     known = Option(at_once.compression.name, 0.0, at_once, lambda: at_once)
     if at_once.bounded or name == "unconfined":
         return [known]
@@ -172,9 +196,9 @@ def options(design: Design, answer: Answer, name: str = "", *, printed: Piece | 
             mesh.name,
             mesh.seconds,
             _cell(expected(design, mesh), moduli),
-            partial(solved, design, printed, mesh.level, model=model),
+            partial(solved, design, printed, mesh.level, model=model, tip=tip, until_pa=until_pa),
         )
-        for mesh in mesh_levels(piece, model, len(STRESS_PA) - 1)
+        for mesh in mesh_levels(piece, model, len(stresses_pa(until_pa)) - 1)
     ]
     return meshes if asked else [known, *meshes]
 
@@ -297,19 +321,36 @@ def _electrode(moduli: Mapping[str, MaterialValue], scene: Scene, end: str) -> t
     return moduli[bodies[0].material].value, (max(z for _, z in spans) - min(z for z, _ in spans)) * M_PER_MM
 
 
-def _cell(found: Curve, moduli: Mapping[str, MaterialValue]) -> Law:
+def _cell(found: Curve, moduli: Mapping[str, MaterialValue], tops: Mapping[str, Curve] | None = None) -> Law:
     """Law of a solved cell, with the errors of its rise and onset, and under other boundary conditions."""
     others = tuple(replace(found.scaled_rise(1 + sign * found.within), onset=1 + sign * _ONSET) for sign in (-1, 1))
     other_boundaries = tuple(found.scaled_rise(1 + change) for change in found.boundary_changes)
-    return Law(found, tuple(moduli.values()), found.doubts, others, other_boundaries)
+    return Law(found, tuple(moduli.values()), found.doubts, others, tops or {}, other_boundaries)
+
+
+def _stored_law(even: Curve, moduli: Mapping[str, MaterialValue], tip: Tip) -> Law:
+    """Law of a stored cell, solved under an even pressure; a block's lies between that and a stiff plate's."""
+    tops = {EVEN: even, STIFF: even.scaled_rise(1 + even.stiff_change)}
+    own = tops.get(tip.block, even.scaled_rise(1 + even.stiff_change / 2))
+    within = even.within + abs(even.stiff_change) / 2 * tip.soft
+    return _cell(replace(own, within=within), moduli, tops)
+
+
+def stresses_pa(until_pa: float) -> tuple[float, ...]:
+    """Pressures at which a cell is solved, from 0 to the usual last one or beyond [Pa]."""
+    more = max(0, ceil(log(max(until_pa, 1.0) / STRESS_PA[-1]) / log(_FURTHER)))
+    return (*STRESS_PA, *(STRESS_PA[-1] * _FURTHER**k for k in range(1, more + 1)))
 
 
 def solved(
     design: Design,
     printed: Piece | None = None,
     level: int = USUAL,
-    boundary: "BoundaryConditions | None" = None,
+    boundary: BoundaryConditions | None = None,
     model: str = "",
+    *,
+    tip: Tip = FLAT,
+    until_pa: float = 0.0,
 ) -> Law:
     """The law of a cell by finite elements on one mesh, its error by the next coarser one.
 
@@ -322,25 +363,28 @@ def solved(
     level : int
         Of the mesh, as of :func:`sensorgen.prediction.mesh_ladder.pressed`.
     boundary : BoundaryConditions, optional
-        Boundary and contact conditions.
+        Boundary and contact conditions, in place of those of the tip.
     model : str, optional
         One that applies to the cell; the first if not given.
+    tip : Tip
+        What presses.
+    until_pa : float
+        Pressure up to which it is wanted, if more than usual [Pa].
 
     Raises
     ------
     MissingValue, BadInput, OutOfRange
         No modulus or Poisson's ratio, no NGSolve; a cell that is no prism; a solution that is not to be trusted.
     """
-    from sensorgen.models.press2d import BoundaryConditions
-
     moduli, ratios = of_all_materials(design, "youngs_modulus_pa"), of_all_materials(design, "poisson_ratio")
     piece = printed or drawn(design)
     model = model or model_of(piece)
-    case = _case(design, piece, model, boundary or BoundaryConditions())
-    estimate = estimated(case, STRESS_PA, level, sound=True)
+    loads = stresses_pa(until_pa)
+    case = _case(design, piece, model, boundary) if boundary else case_of(design, piece, model, tip)
+    estimate = estimated(case, loads, level, sound=True)
     found = estimate.found
-    if found.converged_pa < _ENOUGH * STRESS_PA[-1]:
-        found = pressed(case, STRESS_PA, level)
+    if found.converged_pa < _ENOUGH * max(until_pa, STRESS_PA[-1]):
+        found = pressed(case, loads, level)
     curve = curve_of(found)
     shares = estimate.rise_error_f_per_m2[1:] / estimate.rise_f_per_m2[1:]
     known = shares[np.isfinite(shares)]
@@ -349,17 +393,43 @@ def solved(
     curve = replace(
         curve,
         within=float(known.max()),
-        boundary_changes=compression.prototype(_LIKE[model]).boundary_changes,
         displacement_m=float(found.displacement_m[-1]) - found.fall_m,
     )
-    short = curve.stress_pa[-1] < STRESS_PA[-1]
+    short = curve.stress_pa[-1] < loads[-1]
     ended = [f"the solution of the cell ended at {curve.stress_pa[-1] / 1e3:.3g} kPa"] if short else []
     doubts = (*found.doubts, *([_LANDING] if found.fall_m else []), *ended)
-    return _cell(replace(curve, doubts=doubts), {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}})
+    tops = {} if boundary else _tops(design, piece, model, tip, curve)
+    return _cell(replace(curve, doubts=doubts), {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, tops)
+
+
+def _tops(design: Design, piece: Piece, model: str, tip: Tip, own: Curve) -> dict[str, Curve]:
+    """Curves under an even pressure and a stiff plate, by the ratio of rises on the coarsest mesh."""
+    loads = [own.stress_pa[-1] * share for share in _COARSE]
+
+    def rise(block: str) -> Real:
+        try:
+            found = pressed(case_of(design, piece, model, replace(tip, block=block)), loads, COARSEST).sound()
+        except SensorgenError:
+            return np.zeros(0)
+        values = np.array([c.middle() if c else np.nan for c in found.capacitance_f_per_m2])
+        rises: Real = values[1:] - values[0]
+        return rises
+
+    reference, curves = rise(tip.block), {tip.block: own} if not tip.soft else {}
+    for block in {EVEN, STIFF} - {tip.block}:
+        other = rise(block)
+        n = min(len(reference), len(other))
+        if n and np.isfinite(ratio := other[:n] / reference[:n]).all():
+            known = [p for p in own.stress_pa if p <= loads[n]]
+            rises = (np.array(own.ratio[: len(known)]) - 1) * np.interp(known, loads[1 : n + 1], ratio)
+            curves[block] = replace(
+                compression.curve(own.name, own.source, known, (1 + rises).tolist()), within=own.within
+            )
+    return curves
 
 
 def at_a_few_pressures(
-    design: Design, printed: Piece, answer: Answer, stress_pa: float, name: str = ""
+    design: Design, printed: Piece, answer: Answer, stress_pa: float, name: str = "", *, tip: Tip = FLAT,
 ) -> Law | None:  # fmt: skip
     """The stored law of a printed cell; else a section or round cell solved at a few pressures on the coarsest mesh.
 
@@ -373,24 +443,24 @@ def at_a_few_pressures(
         As of :func:`law_of`.
     stress_pa : float
         Up to which it is wanted [Pa].
+    tip : Tip
+        What presses.
 
     Returns
     -------
     Law or None
         None where there is none, and where the solver gives up.
     """
-    from sensorgen.models.press2d import BoundaryConditions
-
     if name == "infill":
         return infill(design, printed)
     if name in ("bonded", "symmetric") and not is_plate(answer, printed.scene):
         name = ""
-    known = law_of(design, answer, name, printed=printed)
+    known = law_of(design, answer, name, printed=printed, tip=tip, until_pa=stress_pa)
     model = model_of(printed, quick=True)
     if known.bounded or model == "press3d":
         return known if known.bounded else infill(design, printed)
     try:
-        case = _case(design, printed, model, BoundaryConditions())
+        case = case_of(design, printed, model, tip)
         found = pressed(case, [stress_pa * part for part in (0, 0.5, 1, 1.25)], COARSEST)
         curve = curve_of(found)
     except SensorgenError:
@@ -399,9 +469,59 @@ def at_a_few_pressures(
     return replace(known, compression=replace(curve, displacement_m=fallen_m), doubts=())
 
 
-def _case(design: Design, piece: Piece, model: str, boundary: "BoundaryConditions") -> Case:
+def _case(design: Design, piece: Piece, model: str, boundary: BoundaryConditions) -> Case:
     eps = {t.material: t.value for t in permittivities(design)}
     return Case(piece, model, elastic(design, piece.scene), eps, boundary)
+
+
+def case_of(
+    design: Design, piece: Piece, model: str, tip: Tip, boundary: BoundaryConditions | None = None
+) -> Case:  # fmt: skip
+    """A piece under a tip: an even pressure, a stiff plate, or a block that is bonded to its top.
+
+    Parameters
+    ----------
+    design, piece, model
+        As of :class:`sensorgen.prediction.mesh_ladder.Case`.
+    tip : Tip
+        What presses; of a high block the part that spreads the pressure.
+    boundary : BoundaryConditions, optional
+        All but the top.
+
+    Raises
+    ------
+    MissingValue, UnknownName
+        A modulus or Poisson's ratio that no source gives; no such material.
+    """
+    boundary = replace(boundary or BoundaryConditions(), top="rigid" if tip.block == STIFF else "even")
+    case = _case(design, piece, model, boundary)
+    if not tip.soft or _is_layered(piece.scene):
+        return case
+    from sensorgen.models.press2d import Elastic
+
+    material = design.material(tip.block)
+    block = Elastic(*(material.value(q).value for q in ("youngs_modulus_pa", "poisson_ratio")))
+    return replace(
+        case, piece=_under_block(piece, tip.height_m / M_PER_MM), solids={**case.solids, BLOCK: block},
+        permittivity={**case.permittivity, BLOCK: 1.0},
+    )  # fmt: skip
+
+
+def _is_layered(scene: Scene) -> bool:
+    """Whether every body is a layer over the whole plan, which any top presses evenly."""
+    plans = {(p.is_box(), p.span("x"), p.span("y")) for body in scene.bodies for p in body.pieces}
+    return len(plans) == 1 and all(is_box for is_box, *_ in plans)
+
+
+def _under_block(piece: Piece, height_mm: float) -> Piece:
+    """A piece with a block on all of its top."""
+    parts = [p for body in piece.scene.bodies for p in body.pieces]
+    (x0, x1), (y0, y1), (z0, z1) = (
+        (min(a for a, _ in spans), max(b for _, b in spans)) for spans in ([p.span(n) for p in parts] for n in "xyz")
+    )
+    height_mm = min(height_mm, _PERIODS * piece.period_mm if piece.period_mm else _HEIGHTS * (z1 - z0))
+    block = Body(BLOCK, BLOCK, (box(x0, x1, y0, y1, z1, round(z1 + height_mm, 6)),))
+    return replace(piece, scene=replace(piece.scene, bodies=(*piece.scene.bodies, block)))
 
 
 def elastic(design: Design, scene: Scene) -> "dict[str, Elastic]":

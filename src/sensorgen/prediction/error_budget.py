@@ -17,6 +17,7 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import Design
 from sensorgen.design.materials import PIEZORESISTANCE
+from sensorgen.design.tip import TOPS
 from sensorgen.design.values import ENDS, MaterialValue, material_value, piezoresistance, resistivities, spread
 from sensorgen.models.pressure import PROFILES
 from sensorgen.models.sensor import UNIFORM, Sensor
@@ -119,9 +120,12 @@ def _models(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
     if law.others and law.others[0].name != law.compression.name:
         why = f"{law.compression.name} or {law.others[0].name}"
     yield Term("compression", why, "model", others)
-    if law.other_boundaries:
-        held = reference.change(*(replace(sensor, compression=o) for o in law.other_boundaries))
-        yield Term("boundary", "faces that stick, a stiff tip, or a cell free to widen", "model", held)
+    if law.tops or law.other_boundaries:
+        held = (*law.tops.values(), *law.other_boundaries)
+        what = "even pressure or a stiff plate on the top"
+        more = ", faces that stick, or a cell free to widen" if law.other_boundaries else ""
+        changes = reference.change(*(replace(sensor, compression=o) for o in held))
+        yield Term("boundary", what + more, "model", changes, at_least=len(law.tops) < len(TOPS))
     if sensor.profile == UNIFORM:
         yield Term("line", "one section under the tip is exact", "model", reference.change(sensor))
     else:

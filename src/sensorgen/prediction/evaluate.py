@@ -33,6 +33,7 @@ def evaluate(body: Body, query: Query = DEFAULT, *, keep: bool = True, beside: b
     OutOfRange, BadInput, UnknownName
         A query that no sensor can answer: an accuracy or a noise that is not above 0, a tip that does not fit.
     """
+    query = query.of(body.design)
     found = _stored(body, query) if keep else _computed(body, query)
     if body.is_drawn or not beside:
         return found

@@ -139,7 +139,8 @@ def loaded(body: Body, query: Query, force_n: Sequence[float] = (), position_mm:
     axes = query.frequency_hz, tuple(force_n) or grid.FORCES_N, tuple(position_mm) or grid.positions_mm(body.design)
     reference = grid.hardest(*axes)
     query = replace(query, force_n=reference.force_n, position_m=reference.position_m)
-    grid.check_presses(rough_sensor(body, query.law, query.tip).sensor, axes[1], [x * M_PER_MM for x in axes[2]])
+    rough = rough_sensor(body, query.law, query.tip_of(body.design), query.force_n)
+    grid.check_presses(rough.sensor, axes[1], [x * M_PER_MM for x in axes[2]])
     return Loaded(evaluate(body, query), sensor_model(body, query)[0], axes, query.noise)
 
 

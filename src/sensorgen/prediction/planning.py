@@ -18,7 +18,7 @@ from sensorgen.prediction.error_budget import ReferenceLoad
 from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, run_until_within
 from sensorgen.prediction.query import DEFAULT, FLAT, Load, Query, Tip
 from sensorgen.prediction.rest_state import rest_state
-from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
+from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece, pressure_pa
 
 ACCURACY = 1e-2  # of abs(Z), where none is asked for: material data are not that accurate
 SECTIONS = (4, 8, 16, 32, 64, 128, 256)  # that a tip whose pressure is not uniform may be cut into
@@ -57,12 +57,13 @@ class PredictionPlan:
 
 def sensor_model(body: Body, query: Query = DEFAULT) -> tuple[SensorModel, Plan]:
     """The line-sensor model behind a prediction, and its plan; raises SensorgenError where there is none."""
-    return execute(plan(body, query.load(body.design), query.accuracy, query.law, query.tip))
+    return execute(plan(body, query.load(body.design), query.accuracy, query.law, query.tip_of(body.design)))
 
 
-def rough_sensor(body: Body, law: str = "", tip: Tip = FLAT) -> SensorModel:
-    """The sensor by closed-form models; parameters and errors as of :func:`plan`."""
-    return build_sensor(body, "" if law == "solved" else law, tip, rest=rest_state(body, inf))
+def rough_sensor(body: Body, law: str = "", tip: Tip = FLAT, force_n: float = 0.0) -> SensorModel:
+    """The sensor by closed-form models, up to a force [N]; other parameters and errors as of :func:`plan`."""
+    until_pa = pressure_pa(body, tip, force_n)
+    return build_sensor(body, "" if law == "solved" else law, tip, rest=rest_state(body, inf), until_pa=until_pa)
 
 
 def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", tip: Tip = FLAT) -> PredictionPlan:
@@ -92,7 +93,8 @@ def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", t
     if accuracy is not None and not accuracy > 0:
         raise OutOfRange(f"an accuracy of {accuracy:g}; expected a number above 0, as 1e-3")
     wanted, thorough = accuracy or ACCURACY, bool(accuracy or law == "solved")
-    rough = rough_sensor(body, law, tip)
+    rough = rough_sensor(body, law, tip, load.force_n)
+    until_pa = pressure_pa(body, tip, load.force_n)
     sensor = rough.sensor
     line = _expected(_line(sensor, load, wanted / 3))
     share = (wanted - min(_reach(line), wanted / 3)) / 2
@@ -100,7 +102,7 @@ def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", t
     printed = None if body.is_drawn else piece(body)
 
     def laws(answer: Answer) -> list[Option]:
-        found = options(body.design, answer, law, printed=printed)
+        found = options(body.design, answer, law, printed=printed, tip=tip, until_pa=until_pa)
         return found if thorough else _inexpensive(found, body)
 
     width = min(wanted, 2 * share / by_capacitance, default_width(body.cells.first()))

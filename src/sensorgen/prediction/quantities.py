@@ -3,8 +3,10 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from math import inf, isnan, nan, pi, prod
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +14,7 @@ from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
+from sensorgen.design.tip import WORDS
 from sensorgen.design.values import ASSUMED, ENDS, lead_ranges, spread
 from sensorgen.models import line
 from sensorgen.models.compression import Compression
@@ -29,7 +32,7 @@ from sensorgen.prediction.plan import Plan
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import FORCE_N, Load, Query
 from sensorgen.prediction.rest_state import RestState, rest_state
-from sensorgen.prediction.results import SCHEMA, Impedance, Prediction
+from sensorgen.prediction.results import SCHEMA, Impedance, Prediction, UnderTop
 from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
 from sensorgen.scene.slabs import is_open
 
@@ -37,6 +40,7 @@ Otherwise = tuple[Sequence[Sensor | None], Sequence[Sensor | None]]  # by other 
 
 _ASSUMED = "the cell was not solved, and is taken to deform as a solid plate"
 _PA_PER_KPA = 1e3
+_UNITS = {"force_resolution": "N", "position_resolution": "m", "sensitivity": "1/kPa"}
 _PERIODS = 1.5  # under the tip, from which on the cell is taken as one of an endless pattern
 _SAME = 0.05  # capacitances that differ by less are not told apart: solving takes seconds
 
@@ -179,7 +183,7 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
             doubts=(*found.doubts, *filter(None, pressed)),
             budget=error_budget(model, query.load(model.body.design), query.accuracy, *others),
         )  # fmt: skip
-        return _resolution(found, model, load, query, others)
+        return _with_tops(_resolution(found, model, load, query, others), model, load, query)
     except SensorgenError as error:
         return replace(found, reason=str(error))
 
@@ -204,7 +208,7 @@ def _few_periods(body: Body, query: Query) -> str:
     period_mm = getattr(body.design.params, "period_mm", None)
     if not period_mm or getattr(body.design.params, "along", "") == "y":
         return ""
-    count = query.tip.length_m / (period_mm * M_PER_MM)
+    count = query.tip_of(body.design).length_m / (period_mm * M_PER_MM)
     if count > _PERIODS - 1e-9:
         return ""
     return (
@@ -226,13 +230,14 @@ def _printed_otherwise(model: SensorModel, load: Load, query: Query) -> Iterator
     pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
     for _, other, rest in ends.values():
         if other is not body:
-            law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa, _closed_form(model))
-            yield build_sensor(other, law, query.tip, rest=rest).sensor if law else None
+            tip = query.tip_of(body.design)
+            law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa, _closed_form(model), tip=tip)
+            yield build_sensor(other, law, tip, rest=rest).sensor if law else None
 
 
 def _other_films(model: SensorModel, load: Load, query: Query) -> Iterator[Sensor | None]:
     """Sensors with the thickest and the thinnest film; None where one is not known under pressure."""
-    body, rest = model.body, model.rest
+    body, rest, tip = model.body, model.rest, query.tip_of(model.body.design)
     film = body.cells.film
     pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
     for scene, farad in ((film.thicker, rest.by_film.lower), (film.thinner, rest.by_film.upper)) if film else ():
@@ -241,9 +246,9 @@ def _other_films(model: SensorModel, load: Load, query: Query) -> Iterator[Senso
             continue
         cells = replace(body.cells, scenes={"film": scene}, film=None)
         other = replace(body, make=lambda cells=cells: cells)  # type: ignore[misc]
-        law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa, _closed_form(model))
+        law = at_a_few_pressures(body.design, piece(other), rest.answer, pressure_pa, _closed_form(model), tip=tip)
         at_rest = replace(rest, capacitance=replace(rest.capacitance, value=farad))
-        yield build_sensor(other, law, query.tip, rest=at_rest).sensor if law else None
+        yield build_sensor(other, law, tip, rest=at_rest).sensor if law else None
 
 
 def _closed_form(model: SensorModel) -> str:
@@ -257,15 +262,35 @@ def _end(found: list[tuple[float, Body, RestState]], *, least: bool) -> tuple[fl
     return next(pick for pick in found if abs(pick[0] / value - 1) < _SAME)
 
 
+def _with_tops(found: Prediction, model: SensorModel, load: Load, query: Query) -> Prediction:
+    """Widen ranges by an even pressure and a stiff plate, and list these where they differ by more than the error.
+
+    Under another top the relative errors are those under the tip.
+    """
+    tip = query.tip_of(model.body.design)
+    own = {name: bounds for name in _UNITS if (bounds := getattr(found, name)) and bounds.value}
+    tops = [UnderTop(tip.material, **own)]
+    for name, law in model.law.tops.items():
+        sensor = replace(model.sensor, compression=law)
+        values = *_errors(sensor, load, query), _mean_slope(law, _range_pa(sensor, load, query))
+        ratios = {key: value / own[key].value for key, value in zip(tuple(_UNITS), values, strict=True) if key in own}
+        if name != tip.block and not any(isnan(ratio) for ratio in ratios.values()):
+            tops.append(UnderTop(WORDS[name], **{k: own[k].times(r, _UNITS[k]) for k, r in ratios.items()}))
+    wider: dict[str, Any] = {}
+    apart = False
+    for key, bounds in own.items():
+        under = [getattr(top, key).value for top in tops]
+        apart |= not bounds.model.lower <= min(under) <= max(under) <= bounds.model.upper
+        wider[key] = Bounds.of(
+            bounds.value, bounds.unit, model=_compounded(bounds.value, [bounds.model, _range(under)]),
+            print=bounds.print, material=bounds.material, certified=bounds.certified, open=bounds.open,
+        )  # fmt: skip
+    return replace(found, **wider, tops=tuple(tops) if apart else ())
+
+
 def _sensitivity(model: SensorModel, load: Load, query: Query, others: Otherwise) -> Bounds:
     """(C(p) / C(q) - 1) / (p - q); of the reference load from rest unless the query has pressures [1/kPa]."""
-    usual = 0.0, float(model.sensor.stress_pa(load.force_n, load.position_m))
-    low_pa, high_pa = (_PA_PER_KPA * p for p in query.range_kpa) if query.range_kpa else usual
-
-    def of(law: Compression) -> float:
-        low, high = law.capacitive_strain(np.array([low_pa, high_pa]))[0].tolist()
-        return float(((1 - low) / (1 - high) - 1) / (high_pa - low_pa) * _PA_PER_KPA)
-
+    of = partial(_mean_slope, range_pa=_range_pa(model.sensor, load, query))
     value, moduli = of(model.law.compression), _moduli(model)
     by_print = [_range([value, *(of(s.compression) if s else nan for s in sensors)]) for sensors in others]
     return Bounds.of(
@@ -273,6 +298,18 @@ def _sensitivity(model: SensorModel, load: Load, query: Query, others: Otherwise
         print=_compounded(value, by_print),
         open="upper" if any(_is_beyond(of, law) for law in moduli) else "",
     )  # fmt: skip
+
+
+def _range_pa(sensor: Sensor, load: Load, query: Query) -> tuple[float, float]:
+    """Pressures between which the sensitivity is stated [Pa]."""
+    low_kpa, high_kpa = query.range_kpa or (0.0, float(sensor.stress_pa(load.force_n, load.position_m)) / _PA_PER_KPA)
+    return _PA_PER_KPA * low_kpa, _PA_PER_KPA * high_kpa
+
+
+def _mean_slope(law: Compression, range_pa: tuple[float, float]) -> float:
+    """Relative rise of the capacitance between two pressures, over their difference [1/kPa]."""
+    low, high = law.capacitive_strain(np.array(range_pa))[0].tolist()
+    return float(((1 - low) / (1 - high) - 1) / (range_pa[1] - range_pa[0]) * _PA_PER_KPA)
 
 
 def _is_beyond(of: Callable[[Compression], float], law: Compression) -> bool:
@@ -286,14 +323,7 @@ def _is_beyond(of: Callable[[Compression], float], law: Compression) -> bool:
 
 def _resolution(found: Prediction, model: SensorModel, load: Load, query: Query, others: Otherwise) -> Prediction:
     """Standard errors of force and position from one reading, with what they are of sensors within the errors."""
-
-    def errors(sensor: Sensor | None) -> tuple[float, float]:
-        if sensor is None:
-            return nan, nan
-        press = Setup(sensor, load.frequency_hz, query.noise, load.force_n, load.position_m, inf)
-        force, position, _ = press.bounds()
-        return float(force), float(position)
-
+    errors = partial(_errors, load=load, query=query)
     own, law = errors(model.sensor), model.law
     by_law = [errors(replace(model.sensor, compression=other)) for other in law.others] if law.bounded else [(nan, nan)]
     by_print = [[errors(sensor) for sensor in sensors] for sensors in others]
@@ -324,6 +354,15 @@ def _resolution(found: Prediction, model: SensorModel, load: Load, query: Query,
     (force, of_force), (position, of_position) = of(0, "N"), of(1, "m")
     found = replace(found, force_resolution=force, position_resolution=position)
     return replace(found, narrowing=tuple(narrowings(found, model.body, of_force, of_position)))
+
+
+def _errors(sensor: Sensor | None, load: Load, query: Query) -> tuple[float, float]:
+    """Standard errors of force and position [N], [m]; NaN where the sensor is not known under pressure."""
+    if sensor is None:
+        return nan, nan
+    press = Setup(sensor, load.frequency_hz, query.noise, load.force_n, load.position_m, inf)
+    force, position, _ = press.bounds()
+    return float(force), float(position)
 
 
 def _compounded(value: float, parts: Iterable[Interval]) -> Interval:

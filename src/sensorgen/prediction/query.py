@@ -1,36 +1,15 @@
 """What is asked of a body; the default is the same for every command."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
+from sensorgen.design.tip import TIP_M, Tip
 
 TONES_HZ = (1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3)  # thesis, Table 5.1, its 4990 corrected
 FORCE_N = 6.0  # thesis 5.2: presses of 0 to 6 N
 NOISE = 1e-3  # of Re Z and of Im Z, each, relative to abs(Z)
-TIP_M = 0.01  # thesis, Table C.1: L_press
-
-
-@dataclass(frozen=True)
-class Tip:
-    """What presses.
-
-    Attributes
-    ----------
-    length_m : float
-        Along the sensor [m].
-    profile : str
-        How its pressure is spread: one of :data:`sensorgen.models.pressure.PROFILES`.
-    radius_m : float or None
-        Of a hard round tip, whose contact grows with the force up to ``length_m`` [m]; None where all of it touches.
-    """
-
-    length_m: float = TIP_M
-    profile: str = "uniform"
-    radius_m: float | None = None
-
-
 FLAT = Tip()  # the default
 
 
@@ -54,8 +33,8 @@ class Query:
     force_n, position_m : float or None
         The reference load, at which resolution and error budget are stated [N], [m]; in the sensor's middle if no
         position is given.
-    tip : Tip
-        What presses.
+    tip : Tip or None
+        What presses; the design's own if None.
     law : str
         Law of compression, as of :func:`sensorgen.prediction.planning.plan`.
     accuracy : float or None
@@ -69,7 +48,7 @@ class Query:
     frequency_hz: tuple[float, ...] = TONES_HZ
     force_n: float = FORCE_N
     position_m: float | None = None
-    tip: Tip = field(default_factory=Tip)
+    tip: Tip | None = None
     law: str = ""
     accuracy: float | None = None
     noise: float = NOISE
@@ -81,6 +60,14 @@ class Query:
             low, high = self.range_kpa
             raise OutOfRange(f"sensitivity from {low:g} to {high:g} kPa; expected pressures that rise from 0 or more")
 
+    def tip_of(self, design: Design) -> Tip:
+        """What presses a design."""
+        return self.tip or design.tip.tip()
+
+    def of(self, design: Design) -> "Query":
+        """The query with the tip that presses a design."""
+        return replace(self, tip=self.tip_of(design))
+
     def load(self, design: Design) -> Load:
         """The reference load."""
         middle = design.params.length_mm * M_PER_MM / 2
@@ -88,3 +75,4 @@ class Query:
 
 
 DEFAULT = Query()
+__all__ = ["DEFAULT", "FLAT", "FORCE_N", "NOISE", "TIP_M", "TONES_HZ", "Load", "Query", "Tip"]

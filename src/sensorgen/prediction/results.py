@@ -12,6 +12,7 @@ from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
+from sensorgen.core.units import si
 from sensorgen.design.values import ASSUMED, MaterialValue
 from sensorgen.prediction.identifiability.results import GUESS, Identifiability, of_schema_1
 from sensorgen.prediction.plan import Plan, without_times
@@ -173,6 +174,29 @@ class Impedance:
 
 
 @dataclass(frozen=True)
+class UnderTop:
+    """Numbers under one top of the cell, without what other tops would change.
+
+    Attributes
+    ----------
+    name : str
+        As "stiff plate".
+    force_resolution, position_resolution, sensitivity : Bounds or None
+        As of :class:`Prediction` [N], [m], [1/kPa].
+    """
+
+    name: str
+    force_resolution: Bounds | None = None
+    position_resolution: Bounds | None = None
+    sensitivity: Bounds | None = None
+
+    def words(self) -> str:
+        """Name and resolutions."""
+        values = (b.value for b in (self.force_resolution, self.position_resolution) if b)
+        return f"{self.name} {', '.join(si(v, u, 3) for v, u in zip(values, ('N', 'm'), strict=False))}"
+
+
+@dataclass(frozen=True)
 class Prediction(Displayed):
     """What a sensor should measure.
 
@@ -205,6 +229,9 @@ class Prediction(Displayed):
     force_resolution, position_resolution : Bounds or None
         Standard errors of force and position there, from one reading [N], [m]; None where undefined. The range holds
         what ways to print it differ by, and is infinite where that is not known.
+    tops : tuple of UnderTop
+        Those numbers under the tip, an even pressure and a stiff plate, where they differ by more than the models'
+        error; the ranges of the numbers above hold all of them.
     identifiability : Identifiability or None
         How precisely impedance determines force and position.
     budget : ErrorBudget or None
@@ -241,6 +268,7 @@ class Prediction(Displayed):
     sensitivity: Bounds | None = None
     force_resolution: Bounds | None = None
     position_resolution: Bounds | None = None
+    tops: tuple[UnderTop, ...] = ()
     identifiability: Identifiability | None = None
     budget: ErrorBudget | None = None
     plan: Plan | None = None
@@ -280,6 +308,8 @@ class Prediction(Displayed):
         columns = (Column(""), *(Column(p.body.partition(",")[0]) for p in shown))
         yield Table("quantities", "", columns, tuple(rows))
         yield caption_of(self.force_n, self.position_m, self.body)
+        if self.tops:
+            yield f"it depends on the tip: {'; '.join(top.words() for top in self.tops)}"
         if self.narrowing:
             columns = (Column("range that spans"), Column("a factor"), Column("narrowed most by"), Column("to"))
             rows_ = ((n.quantity, _times(n.factor), n.measurement, _times(n.left)) for n in self.narrowing)

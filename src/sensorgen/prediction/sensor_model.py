@@ -18,6 +18,8 @@ from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.scene.sections import square_to
 from sensorgen.scene.slabs import is_open
 
+_PEAK = 1.5  # pressure in the middle of a parabola over its mean; of a Hertzian one 4 / pi [-]
+
 
 @dataclass(frozen=True)
 class SensorModel:
@@ -63,8 +65,14 @@ def piece(body: Body) -> Piece:
     return Piece(body.cells.first(), body.cells.period_mm)
 
 
+def pressure_pa(body: Body, tip: Tip, force_n: float) -> float:
+    """Largest pressure under a tip, a round one all touching [Pa]."""
+    area_m2 = tip.length_m * body.design.params.width_mm * M_PER_MM
+    return force_n / area_m2 * (1.0 if tip.profile == "uniform" else _PEAK)
+
+
 def build_sensor(
-    body: Body, law: str | Law = "", tip: Tip = FLAT, *, rest: RestState | None = None
+    body: Body, law: str | Law = "", tip: Tip = FLAT, *, rest: RestState | None = None, until_pa: float = 0.0
 ) -> SensorModel:  # fmt: skip
     """The line-sensor model of a body.
 
@@ -79,6 +87,8 @@ def build_sensor(
         What presses.
     rest : RestState, optional
         What :func:`sensorgen.prediction.rest_state.rest_state` says, if it is at hand.
+    until_pa : float
+        Pressure up to which the law is wanted, if more than usual [Pa].
 
     Raises
     ------
@@ -96,7 +106,8 @@ def build_sensor(
     (lead_f, *_), (lead_ohm, *_) = lead_ranges(body.design)
     pressed = piece(body)
     if not isinstance(law, Law):
-        law = law_of(body.design, rest.answer, law, printed=None if body.is_drawn else pressed)
+        printed = None if body.is_drawn else pressed
+        law = law_of(body.design, rest.answer, law, printed=printed, tip=tip, until_pa=until_pa)
     sensor = Sensor(
         length_m=p.length_mm * M_PER_MM,
         width_m=p.width_mm * M_PER_MM,

@@ -65,12 +65,18 @@ class Numbers:
 
     @classmethod
     def of(cls, found: Prediction) -> "Numbers":
-        """The numbers of a prediction."""
+        """The numbers of a prediction, under the worse top where they depend on it."""
         known = found.identifiability
         bench = known.calibrated if known else None
+
+        def worst(key: str) -> Bounds | None:
+            values: list[Bounds] = [b for top in found.tops or (found,) if (b := getattr(top, key))]
+            sign = 1 if key == "sensitivity" else -1
+            return min(values, key=lambda b: sign * b.value, default=None)
+
         return cls(
             found.gap, found.capacitance, found.resistance.get("top"), found.resistance.get("bottom"),
-            found.sensitivity, found.force_resolution, found.position_resolution,
+            worst("sensitivity"), worst("force_resolution"), worst("position_resolution"),
             bench.sigma_force_n if bench else None, bench.sigma_position_m if bench else None,
             known.map.of_force.median if known else None, known.map.of_position.median if known else None,
             found.conditional,

@@ -1,10 +1,11 @@
 """Calibrate specimens by what the log has of them, and keep the result there."""
 
 import uuid
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import hypot, log
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from sensorgen.prediction.calibration.rest import checked
 from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, Spread, spread_at
 from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
 from sensorgen.prediction.planning import sensor_model
-from sensorgen.prediction.query import TIP_M, TONES_HZ, Query, Tip
+from sensorgen.prediction.query import TONES_HZ, Query, Tip
 from sensorgen.prediction.sensor_model import SensorModel
 
 FEWEST_RECHECK = 3  # presses from which on a change can be told
@@ -90,22 +91,30 @@ class Bench:
 
     Attributes
     ----------
-    tip_m : float
-        Length of the tip along the sensor [m].
+    tip_m : float or None
+        Length of the tip along the sensor [m]; the design's if None.
     force_offset_n : (float, float)
         Mean and standard deviation of what the sensor feels above the force that the rig says [N].
+    block : mapping
+        ``block`` and ``height_mm`` of the tip, in place of the design's.
     """
 
-    tip_m: float = TIP_M
+    tip_m: float | None = None
     force_offset_n: tuple[float, float] = (0.0, 0.1)
+    block: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse what is no tip and no deviation."""
-        if not self.tip_m > 0 or not self.force_offset_n[1] > 0:
+        if not (self.tip_m is None or self.tip_m > 0) or not self.force_offset_n[1] > 0:
             raise BadInput(
-                f"a tip of {self.tip_m * 1e3:g} mm and an offset of {self.force_offset_n[0]:g} +- "
+                f"a tip of {(self.tip_m or 0.0) * 1e3:g} mm and an offset of {self.force_offset_n[0]:g} +- "
                 f"{self.force_offset_n[1]:g} N; expected a length and a deviation above 0"
             )
+
+    def tip(self, design: Design) -> Tip:
+        """The tip that presses a design."""
+        tip = design.tip.model_copy(update=dict(self.block)).tip()
+        return tip if self.tip_m is None else replace(tip, length_m=self.tip_m)
 
 
 def design_of(log: Log, specimen: str) -> tuple[str, Design]:
@@ -226,7 +235,7 @@ def known(
     name, design = design_of(log, specimen)
     rows = _chosen(log, name, recordings)
     body = body_of(design)
-    predicted, _ = sensor_model(body, Query(tip=Tip(bench.tip_m)))
+    predicted, _ = sensor_model(body, Query(tip=bench.tip(design)))
     meter, read, unfit = readings_of(log, name, body_of, predicted.sensor.common_resistivity_ohm_m())
     if rows or meter is None:
         with within("; ".join(unfit)):

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf, isnan, log
+from math import inf, isnan
 from statistics import fmean, geometric_mean
 
 from sensorgen.core.bounds import Bounds, Interval

@@ -1,7 +1,7 @@
 """Unit cell of a cross-section as edges with a region on each side, for a mesher; of any prismatic scene."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import shapely
@@ -12,6 +12,7 @@ from sensorgen.scene.sections import Column, columns, sections
 
 OUTSIDE = 0  # the region beyond the cell
 AIR = "air"
+BLOCK = "tip"  # material of a block on the top, which presses and carries no field
 _DIGITS = 9  # of a coordinate [mm]: places nearer than a picometre are one
 _SLIVER_MM = 1e-9
 
@@ -54,6 +55,12 @@ class Cell:
     def width_mm(self) -> float:
         """Its width [mm]."""
         return self.right_mm - self.left_mm
+
+    def without_block(self) -> "Cell":
+        """The cell without the block on its top."""
+        own = [k for k, region in enumerate(self.regions, 1) if region.material == BLOCK]
+        edges = {edge: tuple(OUTSIDE if k in own else k for k in sides) for edge, sides in self.edges.items()}
+        return replace(self, edges={edge: (a, b) for edge, (a, b) in edges.items() if a != b})
 
     @property
     def air(self) -> int:

@@ -7,11 +7,10 @@ from itertools import pairwise
 import numpy as np
 
 from sensorgen.core.arrays import Mask, Real, Whole
-from sensorgen.core.errors import BadInput, NotInstalled
 from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.scene import Point
-from sensorgen.solvers.contact import rings
-from sensorgen.solvers.contact.cell import OUTSIDE, Cell, Edge
+from sensorgen.solvers.contact import mesher, rings
+from sensorgen.solvers.contact.cell import BLOCK, OUTSIDE, Cell, Edge
 from sensorgen.solvers.contact.element import TRIANGLE, ElementMesh
 
 Run = tuple[int, int]
@@ -20,10 +19,7 @@ _SAME = 1e-9  # of the cell's size: places nearer than this are one
 _RINGS = 4  # around a notch
 _LEVEL = 0.1  # slope of the first chord of a dome, at most [-]
 _SIDES = ((0, 1), (1, 2), (2, 0))
-
-
-class Unmeshed(BadInput):
-    """No sound mesh of these outlines was found."""
+_BLOCK = 0.5  # largest triangle of a block on the top, over growth and the cell's width [-]
 
 
 @dataclass(frozen=True)
@@ -95,16 +91,6 @@ def pinches(cell: Cell) -> set[Point]:
     return {point for point, edges in seen.items() if edges >= 4}
 
 
-def netgen() -> type:
-    """The 2D mesher; raises NotInstalled where it is not installed."""
-    try:
-        from netgen.geom2d import SplineGeometry
-    except ImportError:
-        raise NotInstalled("meshes need NGSolve: pip install 'sensorgen[fem]'") from None
-    found: type = SplineGeometry
-    return found
-
-
 @dataclass(frozen=True)
 class Fineness:
     """Sizes of triangles: where solids meet in one point, at the other ends of gaps, and far from both [mm].
@@ -138,14 +124,20 @@ def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
     exposed = {p for edge in faces for p in edge}
     sizes = dict.fromkeys(exposed, fineness.corner_mm) | dict.fromkeys(sharp, fineness.apex_mm)
     pieces: dict[Edge, tuple[int, int]] = {}
+    blocks = {k for k, region in enumerate(cell.regions, 1) if region.material == BLOCK}
+    top_mm = max(z for edge in cell.edges for _, z in edge)
+    wide = replace(fineness, coarse_mm=max(fineness.coarse_mm, _BLOCK * fineness.growth * cell.width_mm()))
     for (a, b), sides in cell.edges.items():
-        ends = [sizes.get(p, fineness.coarse_mm) for p in (a, b)]
-        shares = cuts(float(np.hypot(b[0] - a[0], b[1] - a[1])), ends[0], ends[1], fineness)
+        of_block = blocks and set(sides) <= {OUTSIDE, *blocks}
+        far = [wide.coarse_mm if of_block and p[1] == top_mm else fineness.coarse_mm for p in (a, b)]
+        ends = [sizes.get(p, size) for p, size in zip((a, b), far, strict=True)]
+        length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+        shares = cuts(length, ends[0], ends[1], wide if of_block else fineness)
         places = [a, *((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])) for t in shares), b]
         open_sides = (sides[0] * cell.solid(sides[0]), sides[1] * cell.solid(sides[1]))
         if open_sides != (OUTSIDE, OUTSIDE):
             pieces |= dict.fromkeys(pairwise(places), open_sides)
-    net = triangulated(pieces, fineness.coarse_mm, fineness.growth)
+    net = triangulated(pieces, fineness.coarse_mm, fineness.growth, dict.fromkeys(blocks, wide.coarse_mm))
     for place in sharp:
         if cell.turned and _is_flat(cell, place):
             net = _parted(net, nearest(net.points_m, place))
@@ -167,32 +159,22 @@ def _parted(net: Net, node: int) -> Net:
     return replace(net, points_m=np.vstack([net.points_m, net.points_m[node]]), corners=corners)
 
 
-def triangulated(edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth: float, *, quick: bool = False) -> Net:
+def triangulated(
+    edges: Mapping[Edge, tuple[int, int]], coarse_mm: float, growth: float,
+    coarser_mm: Mapping[int, float] | None = None, *, quick: bool = False,
+) -> Net:  # fmt: skip
     """Mesh what edges with a region to their left and right enclose; regions from 0 down are left open.
 
+    ``coarser_mm`` is the largest triangle of regions that may have larger ones than ``coarse_mm``.
     ``quick`` makes Delaunay triangles with one optimisation step; for potentials they are as good as a front.
     """
-    geometry = netgen()()
-    numbers: dict[Point, int] = {}
-    for (a, b), (left, right) in edges.items():
-        for p in (a, b):
-            if p not in numbers:
-                numbers[p] = geometry.AppendPoint(*p)
-        domains = {"leftdomain": max(left, 0), "rightdomain": max(right, 0)}
-        geometry.Append(["line", numbers[a], numbers[b]], **domains)
-    try:
-        made = geometry.GenerateMesh(maxh=coarse_mm, grading=growth, optsteps2d=1 if quick else 3, delaunay2d=quick)
-    except Exception as error:  # the mesher's own kind of exception, known only where it is installed
-        raise Unmeshed(f"these outlines cannot be meshed ({error}): do bodies overlap, or leave slivers?") from None
-    elements, sides = made.Elements2D().NumPy(), made.Elements1D().NumPy()
-    points = np.asarray(made.Coordinates(), float)[:, :2] * M_PER_MM
+    made = mesher.mesh([*edges.items()], coarse_mm, growth, coarser_mm or {}, quick=quick)
     behind = [min(pair) for pair in edges.values()]
     marked: dict[int, list[Run]] = {}
-    for (a, b), number in zip((sides["nodes"][:, :2] - 1).tolist(), sides["index"].tolist(), strict=True):
+    for (a, b), number in zip(made.sides.tolist(), made.edge.tolist(), strict=True):
         if behind[number - 1] < 0:
             marked.setdefault(behind[number - 1], []).append((a, b))
-    corners = elements["nodes"][:, :3].astype(np.int64) - 1
-    return Net(points, corners, elements["index"].astype(np.int64), marked)
+    return Net(made.points * M_PER_MM, made.corners, made.region, marked)
 
 
 def nearest(points_m: Real, place_mm: Point) -> int:

@@ -23,7 +23,8 @@ from sensorgen.solvers.contact import rings
 from sensorgen.solvers.contact.cell import OUTSIDE, Cell, Edge
 from sensorgen.solvers.contact.element import triangle_gradients, triangle_points, triangle_values
 from sensorgen.solvers.contact.factors import solved_by_lu
-from sensorgen.solvers.contact.mesh import Mesh, Net, Unmeshed, nearest, of_triangles, triangulated
+from sensorgen.solvers.contact.mesh import Mesh, Net, nearest, of_triangles, triangulated
+from sensorgen.solvers.contact.mesher import Unmeshed
 from sensorgen.solvers.contact.wedge import Wedge, filled, wedges
 
 Edges = Mapping[Edge, tuple[int, int]]

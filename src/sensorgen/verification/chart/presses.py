@@ -17,7 +17,7 @@ from sensorgen.design.shapes import tri
 from sensorgen.models import compression, fem2d, press2d, press3d, springs, thesis_cells, thesis_swept
 from sensorgen.models.press2d import Elastic, Fineness
 from sensorgen.scene.scene import Fill, Scene
-from sensorgen.solvers.contact.mesh import netgen
+from sensorgen.solvers.contact import mesher
 from sensorgen.verification.chart.measured import Ladder, Level, Point, climbed, relative
 
 Real = NDArray[np.float64]
@@ -145,7 +145,7 @@ def _scene(known: Known) -> Scene:
 def has_mesher() -> bool:
     """Whether the mesher of cells that are pressed is installed; it is loaded then."""
     try:
-        netgen()
+        mesher.check()
     except MissingValue:
         return False
     return True

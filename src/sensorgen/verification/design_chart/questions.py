@@ -109,7 +109,7 @@ def questions(body: Body, query: Query) -> list[Question]:
         Nothing can be predicted of it, as of a short; a load that the sensor cannot take.
     """
     load = query.load(body.design)
-    sensor = planning.rough_sensor(body, "", query.tip).sensor
+    sensor = planning.rough_sensor(body, "", query.tip_of(body.design)).sensor
     stress_pa = float(sensor.stress_pa(load.force_n, load.position_m))
     return [
         _capacitance(body), _compression(body, stress_pa), _line(sensor, query, body), _prediction(body, query),
@@ -284,7 +284,7 @@ def _prediction(body: Body, query: Query) -> Question:
 
 def _seconds(body: Body, query: Query) -> float:
     """Expected time of a prediction [s]."""
-    plan = planning.plan(body, query.load(body.design), query.accuracy, query.law, query.tip).plan
+    plan = planning.plan(body, query.load(body.design), query.accuracy, query.law, query.tip_of(body.design)).plan
     chosen = (next(c for c in level.candidates if c.model == level.chosen) for level in plan.levels)
     return sum(c.expected_seconds or 0.0 for c in chosen)
 

@@ -248,7 +248,7 @@ def _from(runs: Sequence[tuple[Series, str, Run]]) -> Iterator[Reference]:
 
 def composed(body: Body, query: Query, best: dict[str, list[Reference]]) -> Iterator[Reference]:
     """Impedance of a line in many digits, with the best capacitance and the best rise of the others."""
-    model = rough_sensor(body, "", query.tip)
+    model = rough_sensor(body, "", query.tip_of(body.design))
     load = query.load(body.design)
     query = replace(query, position_m=load.position_m)
     if not all(best[key] for key in KEYS[:2]):

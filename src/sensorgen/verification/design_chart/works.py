@@ -82,7 +82,7 @@ def predicted(body: "Body", query: "Query", *, rough: bool = False) -> Answer:
 
     load, width = query.load(body.design), None
     if rough:
-        model = planning.rough_sensor(body, query.law, query.tip)
+        model = planning.rough_sensor(body, query.law, query.tip_of(body.design))
     else:
         model, plan = planning.sensor_model(body, query)
         width = plan.width

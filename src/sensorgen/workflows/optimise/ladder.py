@@ -1,7 +1,7 @@
 """Knowledge of one design, the least expensive first: design rules, bounds at rest, a coarse mesh, everything."""
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache as once
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,13 +15,14 @@ from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
+from sensorgen.design.tip import TOPS
 from sensorgen.design.walls import rules as wall_rules
 from sensorgen.prediction import bodies
 from sensorgen.prediction.compression_law import at_a_few_pressures
 from sensorgen.prediction.identifiability.fisher import bounds, slopes
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.rest_state import rest_state
-from sensorgen.prediction.sensor_model import build_sensor, piece
+from sensorgen.prediction.sensor_model import build_sensor, piece, pressure_pa
 from sensorgen.workflows.optimise.target import NUMBERS
 from sensorgen.workflows.trial import Numbers, Trial, trial
 
@@ -32,7 +33,7 @@ AT_REST = frozenset({"gap_mm", "capacitance_pf", "top_electrode_ohm", "bottom_el
 COARSE = AT_REST | {"force_resolution_n", "position_resolution_mm", "sensitivity_per_kpa"}
 _NO_FOLDER = Path("/dev/null")  # holds no G-code: the print is estimated
 _PA_PER_KPA = 1e3
-_TRIAL = 2  # version of the stored trials
+_TRIAL = 3  # version of the stored trials
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,7 @@ def known(design: Design, query: Query, solve: bool) -> dict[str, Known]:
 
     Empty where no model applies, as of a short.
     """
+    query = query.of(design)
     body = bodies.estimated(design, wall_rules(design.profile.walls)[0])  # the most likely way to print it alone
     question = {"what": "known", "body": body.identity, "query": asdict(query), "solve": solve}
 
@@ -95,25 +97,30 @@ def _known(body: Body, query: Query, solve: bool) -> dict[str, Known]:
             found[key] = Known(value.model.lower, value.model.upper, value.certified)
     if not solve:
         return found
-    load, p = query.load(body.design), body.design.params
-    pressure_pa = load.force_n / (query.tip.length_m * p.width_mm * M_PER_MM)
-    low_pa, high_pa = (_PA_PER_KPA * kpa for kpa in query.range_kpa) if query.range_kpa else (0.0, pressure_pa)
-    law = at_a_few_pressures(body.design, piece(body), rest.answer, max(pressure_pa, high_pa))
-    if law is None:
-        return found
-    sensor = build_sensor(body, law, query.tip, rest=rest).sensor
-    at = slopes(sensor, load.frequency_hz, load.force_n, load.position_m)
-    force_n, position_m, _ = bounds(at, query.noise)
-    low, high = law.compression.capacitive_strain(np.array([low_pa, high_pa]))[0].tolist()
-    rough = {
-        "force_resolution_n": float(force_n), "position_resolution_mm": float(position_m) / M_PER_MM,
-        "sensitivity_per_kpa": ((1 - low) / (1 - high) - 1) / (high_pa - low_pa) * _PA_PER_KPA,
-    }  # fmt: skip
-    return found | {key: Known(value, value, False) for key, value in rough.items() if np.isfinite(value)}
+    load, tip = query.load(body.design), query.tip_of(body.design)
+    pressed_pa = pressure_pa(body, tip, load.force_n)
+    low_pa, high_pa = (_PA_PER_KPA * kpa for kpa in query.range_kpa) if query.range_kpa else (0.0, pressed_pa)
+    worst: dict[str, float] = {}
+    for block in TOPS:  # a block's answer lies between, or near one of both
+        top = replace(tip, block=block)
+        law = at_a_few_pressures(body.design, piece(body), rest.answer, max(pressed_pa, high_pa), tip=top)
+        if law is None:
+            continue
+        sensor = build_sensor(body, law, top, rest=rest).sensor
+        at = slopes(sensor, load.frequency_hz, load.force_n, load.position_m)
+        force_n, position_m, _ = bounds(at, query.noise)
+        low, high = law.compression.capacitive_strain(np.array([low_pa, high_pa]))[0].tolist()
+        rise = ((1 - low) / (1 - high) - 1) / (high_pa - low_pa) * _PA_PER_KPA
+        worst["force_resolution_n"] = max(worst.get("force_resolution_n", 0.0), float(force_n))
+        position_mm = float(position_m) / M_PER_MM
+        worst["position_resolution_mm"] = max(worst.get("position_resolution_mm", 0.0), position_mm)
+        worst["sensitivity_per_kpa"] = min(worst.get("sensitivity_per_kpa", np.inf), rise)
+    return found | {key: Known(value, value, False) for key, value in worst.items() if np.isfinite(value)}
 
 
 def everything(design: Design, query: Query, slicer: str) -> Trial:
     """The design tried: estimated, or sliced now."""
+    query = query.of(design)
     question: dict[str, Any] = {
         "what": "trial",
         "version": _TRIAL,

@@ -1,6 +1,8 @@
 """From a target's file to its answer: table, page, and the files of the designs to print."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from sensorgen.core import document
 from sensorgen.core import files as store
@@ -16,7 +18,7 @@ from sensorgen.workflows.optimise.target import load
 
 def optimise(
     path: Path, out: Path, workers: Workers = HERE, *, count: int = 0, keep: bool = True, built: bool = True,
-    sliced: bool = True, progress: Progress = lambda *_: None,
+    sliced: bool = True, tip: Mapping[str, Any] | None = None, progress: Progress = lambda *_: None,
 ) -> Optimised:  # fmt: skip
     """The best printable designs for a target; page, JSON and CSV are written into ``out``.
 
@@ -32,13 +34,15 @@ def optimise(
         As of :func:`sensorgen.workflows.optimise.search.search`.
     built, sliced : bool
         Build the recommended designs, and slice them.
+    tip : mapping, optional
+        Keys of the tip, in place of the design's.
 
     Raises
     ------
     SensorgenError
         A target that is none, or an empty or too large space; a cluster that goes away.
     """
-    target, name = load(path), path.stem
+    target, name = load(path, tip), path.stem
     chosen: tuple[Recommended, ...] = ()
     with within(str(path)):
         designs = space(target, path.parent) if count else candidates(target, path.parent)

@@ -1,5 +1,6 @@
 """A target as it is written, in a YAML file: what to vary, what to reach, and what is not accepted."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -16,7 +17,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import with_own_files
 from sensorgen.export.slicers import SLICERS
 from sensorgen.prediction.identifiability.results import GUESS
-from sensorgen.prediction.query import DEFAULT, FORCE_N, NOISE, TIP_M, Query, Tip
+from sensorgen.prediction.query import DEFAULT, FORCE_N, NOISE, Query
 from sensorgen.workflows.trial import Numbers, Toolpath, Trial
 
 
@@ -129,7 +130,9 @@ class Loading(Strict):
     position_mm: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = Field(
         default=None, description="The sensor's middle if not given [mm]."
     )
-    tip_mm: Annotated[float, Field(gt=0, allow_inf_nan=False)] = TIP_M / M_PER_MM
+    tip_mm: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = Field(
+        default=None, description="Of the tip along the sensor; the design's own if not given [mm]."
+    )
     noise: Annotated[float, Field(gt=0, lt=1)] = NOISE
     pressures_kpa: Annotated[tuple[float, ...], Field(min_length=2, max_length=2, strict=False)] | None = Field(
         default=None, description="Of the sensitivity; from rest to the load if not given [kPa]."
@@ -186,8 +189,7 @@ class Target(Strict):
         load = self.load
         at = None if load.position_mm is None else load.position_mm * M_PER_MM
         pressures = None if load.pressures_kpa is None else (load.pressures_kpa[0], load.pressures_kpa[1])
-        tip = Tip(load.tip_mm * M_PER_MM)
-        return Query(DEFAULT.frequency_hz, load.force_n, at, tip, noise=load.noise, range_kpa=pressures)
+        return Query(DEFAULT.frequency_hz, load.force_n, at, noise=load.noise, range_kpa=pressures)
 
     def badness(self, key: str, value: Interval) -> Interval:
         """An objective's interval, the lower the better."""
@@ -222,8 +224,15 @@ class Target(Strict):
         return severity == "error" or (severity == "warning" and rule in self.refuse_warnings)
 
 
-def load(path: Path) -> Target:
+def load(path: Path, tip: Mapping[str, Any] | None = None) -> Target:
     """Read a target; its design file is seen from its own folder.
+
+    Parameters
+    ----------
+    path : Path
+        Its file.
+    tip : mapping, optional
+        Keys of the design's tip, in place of the file's.
 
     Raises
     ------
@@ -236,6 +245,10 @@ def load(path: Path) -> Target:
             file = path.parent / target.design
             data = with_own_files({k: v for k, v in yamlfile.read(file).items() if k != "name"}, file.parent)
             target = target.model_copy(update={"design": data})
+        width = {} if target.load.tip_mm is None else {"width_mm": target.load.tip_mm}
+        if (changed := width | dict(tip or {})) and isinstance(target.design, dict):
+            own = target.design.get("tip") or {}
+            target = target.model_copy(update={"design": target.design | {"tip": own | changed}})
     except SensorgenError as error:
         raise error.within(str(path)) from None
     if target.slicer and target.slicer not in SLICERS:

@@ -1,0 +1,175 @@
+"""Netgen's 2D mesher in a process of its own: some outlines end its process, or keep it busy without end.
+
+Run as a program it is the far end of :func:`mesh`, which starts it when needed, and anew after it has ended.
+"""
+
+import atexit
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sensorgen.core.arrays import Real, Whole
+from sensorgen.core.errors import BadInput, NotInstalled
+from sensorgen.core.leash import end_with_parent
+
+Edge = tuple[tuple[float, float], tuple[float, float]]
+
+_TIMEOUT_S = 120.0  # of one mesh, which takes at most seconds
+_WORKER = ("-P", "-m", "sensorgen.solvers.contact.mesher")  # -P: no module of the user's current folder takes part
+
+
+class Unmeshed(BadInput):
+    """No sound mesh of these outlines was found."""
+
+
+class Made(NamedTuple):
+    """Output of the mesher: places (n, 2), corners (m, 3) and regions (m,) of triangles, sides (k, 2) and their edge."""
+
+    points: Real
+    corners: Whole
+    region: Whole
+    sides: Whole
+    edge: Whole
+
+
+def mesh(
+    edges: Sequence[tuple[Edge, tuple[int, int]]], size: float, growth: float, sizes: Mapping[int, float], *,
+    quick: bool,
+) -> Made:  # fmt: skip
+    """Mesh the regions to the left and right of edges; those from 0 down are left open.
+
+    Parameters
+    ----------
+    edges : sequence of (edge, (int, int))
+        Each with the regions to its left and right.
+    size, growth : float
+        Largest triangle, in the unit of the edges, and by how much triangles grow per distance [-].
+    sizes : mapping of int to float
+        Largest triangle of a region, where it is another one.
+    quick : bool
+        Delaunay triangles with one optimisation step in place of an advancing front with three.
+
+    Raises
+    ------
+    NotInstalled
+        Netgen is not installed.
+    Unmeshed
+        The mesher refuses these outlines, ends its process, or has no answer within two minutes.
+    """
+    check()
+    with _LOCK:
+        answer = _exchange((list(edges), size, growth, dict(sizes), quick))
+    if isinstance(answer, str):
+        raise Unmeshed(f"these outlines cannot be meshed ({answer}): do bodies overlap, or leave slivers?")
+    return Made(*answer)
+
+
+def check() -> None:
+    """Raise NotInstalled without Netgen."""
+    if find_spec("netgen") is None:
+        raise NotInstalled("meshes need NGSolve: pip install 'sensorgen[fem]'")
+
+
+_LOCK = threading.Lock()
+_running: dict[int, "subprocess.Popen[bytes]"] = {}  # by the process that started it
+
+
+def _exchange(question: tuple[Any, ...]) -> Any:
+    """The mesher's answer; a text where it has none."""
+    process = _running.get(os.getpid()) or _started()
+    stdin, stdout = process.stdin, process.stdout
+    assert stdin is not None and stdout is not None  # noqa: PT018, S101  (both are pipes)
+    until = time.monotonic() + _TIMEOUT_S
+    clock = threading.Timer(_TIMEOUT_S, process.kill)
+    clock.start()
+    try:
+        stdin.write(pickle.dumps(question))
+        stdin.flush()
+        return pickle.load(stdout)  # noqa: S301  (from the process that we started)
+    except (OSError, EOFError, pickle.UnpicklingError):
+        late = time.monotonic() >= until
+        _stop()
+        code = process.returncode
+        ended = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        return f"the mesher took more than {_TIMEOUT_S:g} s" if late else f"the mesher ended with {ended}"
+    finally:
+        clock.cancel()
+
+
+def _started() -> "subprocess.Popen[bytes]":
+    if not _running:
+        atexit.register(_stop)
+    process = subprocess.Popen(  # noqa: S603  (this Python, and a module of our own)
+        [sys.executable, *_WORKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+    _running[os.getpid()] = process
+    return process
+
+
+def _stop() -> None:
+    process = _running.pop(os.getpid(), None)
+    if process:
+        process.kill()
+        for pipe in (process.stdin, process.stdout):
+            if pipe:
+                pipe.close()
+        process.wait()
+
+
+def _made(
+    edges: list[tuple[Edge, tuple[int, int]]], size: float, growth: float, sizes: dict[int, float], quick: bool
+) -> tuple[Any, ...] | str:  # fmt: skip
+    """Mesh in this process; a text where Netgen refuses."""
+    from netgen.geom2d import SplineGeometry
+
+    geometry, numbers = SplineGeometry(), dict[tuple[float, float], int]()
+    for (a, b), (left, right) in edges:
+        for p in (a, b):
+            if p not in numbers:
+                numbers[p] = geometry.AppendPoint(*p)
+        domains = {"leftdomain": max(left, 0), "rightdomain": max(right, 0)}
+        geometry.Append(["line", numbers[a], numbers[b]], **domains)
+    if sizes:
+        for region in {k for _, sides in edges for k in sides if k > 0}:
+            geometry.SetDomainMaxH(region, sizes.get(region, size))
+    try:
+        made = geometry.GenerateMesh(
+            maxh=max(size, *sizes.values(), 0.0), grading=growth, optsteps2d=1 if quick else 3, delaunay2d=quick
+        )
+    except Exception as error:
+        return str(error)
+    elements, sides = made.Elements2D().NumPy(), made.Elements1D().NumPy()
+    return (
+        np.array(made.Coordinates(), float)[:, :2].copy(),  # Netgen frees its own with the mesh
+        elements["nodes"][:, :3].astype(np.int64) - 1,
+        elements["index"].astype(np.int64),
+        sides["nodes"][:, :2].astype(np.int64) - 1,
+        sides["index"].astype(np.int64),
+    )
+
+
+def main() -> None:
+    """Answer each question on standard input until it ends."""
+    end_with_parent()
+    with os.fdopen(os.dup(1), "wb") as answers:
+        os.dup2(2, 1)  # what Netgen prints is no answer
+        while True:
+            try:
+                question = pickle.load(sys.stdin.buffer)  # noqa: S301  (from the process that started this one)
+            except EOFError:
+                return
+            pickle.dump(_made(*question), answers)
+            answers.flush()
+
+
+if __name__ == "__main__":
+    main()
