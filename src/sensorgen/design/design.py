@@ -19,6 +19,7 @@ from sensorgen.core.findings import Finding
 from sensorgen.core.records import Strict, checked, shown
 from sensorgen.design import borders, imported, packs, shapes
 from sensorgen.design import materials as material_files
+from sensorgen.design.effects import Effects
 from sensorgen.design.packs import Kind
 from sensorgen.design.printer import Pattern, Printer, Quality, load_printer, load_quality
 from sensorgen.design.profile import Profile, with_own
@@ -106,6 +107,7 @@ class Design(Strict):
         default=0.0, description="Share that the bake takes off in the plane; the print is made larger by it [-]."
     )
     profile: Profile = Profile()
+    effects: Effects = Field(default=Effects(), description="What readings depend on beside the press.")
     waivers: tuple[Waiver, ...] = Field(default=(), strict=False)  # YAML has lists only
     own: dict[Kind, dict[str, str]] = Field(
         default={}, description="Text of each file that the design takes from packs that do not ship, by kind and name."
@@ -263,7 +265,7 @@ class Design(Strict):
 
     def _plain(self) -> set[str]:
         """Parts that have come later and are not used: without them the identities of older designs last."""
-        usual = {"profile": Profile(), "own": {}, "geometry": None, "bodies": {}, "border": None}
+        usual = {"profile": Profile(), "effects": Effects(), "own": {}, "geometry": None, "bodies": {}, "border": None}
         return {key for key, value in usual.items() if getattr(self, key) == value}
 
     @property

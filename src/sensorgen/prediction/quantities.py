@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
-from math import inf, isnan, nan, pi, prod
+from math import inf, isnan, nan, pi, prod, tan
 
 import numpy as np
 
@@ -19,13 +19,14 @@ from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.capacitance import Unpredictable
 from sensorgen.prediction.compression_law import CLOSED_FORM, at_a_few_pressures
 from sensorgen.prediction.electrodes import electrode_resistance
-from sensorgen.prediction.error_budget import ReferenceLoad, error_budget, material_ends
+from sensorgen.prediction.error_budget import error_budget, material_ends
 from sensorgen.prediction.identifiability.fisher import Setup
 from sensorgen.prediction.identifiability.identify import identify
-from sensorgen.prediction.losses import Lost, lost
+from sensorgen.prediction.losses import LOWEST_HZ, Lost, lost
 from sensorgen.prediction.plan import Plan
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import FORCE_N, Load, Query
+from sensorgen.prediction.reference_load import ReferenceLoad
 from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.prediction.results import SCHEMA, Impedance, Prediction
 from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
@@ -92,7 +93,7 @@ def _at_rest(found: Prediction, body: Body, rest: RestState, frequency_hz: tuple
     corner = _of_line(r, c, lambda ohm, farad: line.corner_frequency_hz(ohm, farad), "Hz")
     return replace(
         found, capacitance=c, resistance=resistance, corner_frequency=corner,
-        impedance=tuple(_impedance(f, r, c, gone) for f in frequency_hz),
+        impedance=tuple(_impedance(f, r, c, gone, body.design.effects.permittivity_dispersion) for f in frequency_hz),
     )  # fmt: skip
 
 
@@ -121,16 +122,24 @@ def _of_line(r: Bounds, c: Bounds, of: Callable[[float, float], float], unit: st
     )  # fmt: skip
 
 
-def _impedance(frequency_hz: float, r: Bounds, c: Bounds, gone: Lost) -> Impedance:
-    """Of the unloaded line at one frequency; r and c of the whole sensor."""
+def _impedance(frequency_hz: float, r: Bounds, c: Bounds, gone: Lost, dispersion: float) -> Impedance:
+    """Of the unloaded line at one frequency; r and c of the whole sensor.
 
-    def z(ohm: float, farad: float) -> complex:
-        admittance = 2 * pi * frequency_hz * farad * (1j + gone.tan_delta) + gone.leak_s
+    A permittivity that falls as f^-n loses tan(n pi / 2) at least: the best value has none, the range up to that.
+    """
+
+    def z(ohm: float, farad: float, n: float) -> complex:
+        tan_delta, fallen = gone.tan_delta + tan(n * pi / 2), (frequency_hz / LOWEST_HZ) ** -n
+        admittance = 2 * pi * frequency_hz * farad * fallen * (1j + tan_delta) + gone.leak_s
         return complex(line.cascade([ohm], [np.array([admittance])], [1.0])[0])
 
-    re = _of_line(r, c, lambda ohm, farad: z(ohm, farad).real, "ohm")
-    im = _of_line(r, c, lambda ohm, farad: z(ohm, farad).imag, "ohm")
-    return Impedance(frequency_hz, re, im)
+    def part(of: Callable[[complex], float]) -> Bounds:
+        best, lossy = (_of_line(r, c, lambda ohm, farad, n=n: of(z(ohm, farad, n)), "ohm") for n in (0.0, dispersion))  # type: ignore[misc]
+        least, most = min(best.lower, lossy.lower), max(best.upper, lossy.upper)
+        ends = best.material.lower, best.material.upper, lossy.material.lower, lossy.material.upper
+        return replace(best, lower=least, upper=most, material=Interval(min(ends), max(ends)))
+
+    return Impedance(frequency_hz, part(lambda value: value.real), part(lambda value: value.imag))
 
 
 def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) -> Prediction:
@@ -155,7 +164,7 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
         found = replace(
             found, identifiability=made, sensitivity=_sensitivity(model, load, query, others),
             doubts=(*found.doubts, *filter(None, pressed)),
-            budget=error_budget(model, query.load(model.body.design), query.accuracy, *others),
+            budget=error_budget(model, query.load(model.body.design), query.accuracy, *others, query.noise),
         )  # fmt: skip
         return _resolution(found, model, load, query, others)
     except SensorgenError as error:

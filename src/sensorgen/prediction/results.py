@@ -25,7 +25,7 @@ SCHEMA = 3  # 1 was a JSON of the drawing alone, of version 0.1.0; 2 had resolut
 
 @dataclass(frozen=True)
 class Changes:
-    """Largest relative changes over the frequencies [-].
+    """Largest changes over the frequencies, relative ones but for the last two [-].
 
     Attributes
     ----------
@@ -33,12 +33,19 @@ class Changes:
         Of abs(Z), Re Z and Im Z.
     by_force : float
         Of dZ/dF.
+    capacitance : float
+        Of the capacitance at rest.
+    force_n, position_m : float
+        By which a press at the load is read wrongly, the reading held against the one at rest [N], [m].
     """
 
     magnitude: float = 0.0
     re: float = 0.0
     im: float = 0.0
     by_force: float = 0.0
+    capacitance: float = 0.0
+    force_n: float = 0.0
+    position_m: float = 0.0
 
     def __add__(self, other: "Changes") -> "Changes":
         return Changes(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
@@ -57,27 +64,44 @@ class Term:
     name, what : str
         Which, and what was moved between which ends.
     kind : str
-        "model", "print" or "material".
+        Where it comes from.
     changes : Changes or None
         Its effect; None where it is unknown.
     at_least : bool
         Whether it may be larger: the load at one end is beyond the models' range.
+    source : str
+        Where its range comes from, or "guess".
+    turns : str
+        What a press would no longer be told, by this alone: "force", "place", both, or "".
     """
 
     name: str
     what: str
-    kind: Literal["model", "print", "material"]
+    kind: Literal["model", "print", "material", "tip", "meter", "drift", "person"]
     changes: Changes | None
     at_least: bool = False
+    source: str = ""
+    turns: str = ""
 
     def magnitude(self) -> float:
         """Relative change of abs(Z), infinite where it is unknown [-]."""
         return inf if self.changes is None or self.at_least else self.changes.magnitude
 
+    def words(self) -> str:
+        """What is moved between which ends, and by how much a press is then read wrongly."""
+        c = self.changes or Changes()
+        return f"{self.name} ({self.what}; {self.source}): {c.force_n:.2g} N, {1e3 * c.position_m:.2g} mm"
+
+    def remark(self) -> str:
+        """That it is unknown, may be larger, or alone turns what is told of a press."""
+        if self.changes is None:
+            return "unknown"
+        return "; ".join((*(["at least"] if self.at_least else ()), *([f"no {self.turns}"] if self.turns else ())))
+
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """All sources of error of the impedance at a load.
+    """All that the numbers at a load rest on, each moved to the ends of its range.
 
     Attributes
     ----------
@@ -104,6 +128,15 @@ class ErrorBudget:
         """The term with the largest effect on abs(Z)."""
         return max(self.terms, key=Term.magnitude)
 
+    def by_press(self) -> tuple[Term, ...]:
+        """Terms with a known effect on what a press is read as, the largest share of the load first."""
+
+        def effect(term: Term) -> float:
+            c = term.changes or Changes()
+            return max(c.force_n / (self.force_n or inf), c.position_m / (self.position_m or inf))
+
+        return tuple(sorted((t for t in self.terms if effect(t) > 0), key=effect, reverse=True))
+
     def met_by(self, *kinds: str) -> bool:
         """Whether the terms of some kinds together are within the accuracy."""
         return sum(t.magnitude() for t in self.terms if t.kind in kinds) <= (self.accuracy or 0.0)
@@ -114,16 +147,17 @@ class ErrorBudget:
 
     def document(self) -> Iterator[Part]:
         """Each term, their sum, the largest, and whether the accuracy is reached."""
-        rows = [(t.name, t.changes, t.at_least) for t in self.terms]
-        rows += [("all at their worst", self.total, self.at_least)] if self.total else []
-        cells = (
-            (name, *((100 * v for v in astuple(changes)) if changes else (None,) * 4),
-             "unknown" if changes is None else "at least" if at_least else "")
-            for name, changes, at_least in rows
+        rows = [(t.name, *_percent(t.changes), *_press(t.changes), t.remark(), t.source) for t in self.terms]
+        if self.total:
+            rows.append(("all at their worst", *_percent(self.total), None, None, self.at_least and "at least", ""))
+        percents = (Column(f, "%", digits=2) for f in ("|Z|", "R", "X", "dZ/dF", "C"))
+        columns = (
+            Column("assumption"), *percents, Column("force", "N", digits=2), Column("place", "mm", digits=2),
+            Column(""), Column("source"),
         )  # fmt: skip
-        columns = (Column("error"), *(Column(f, "%", digits=2) for f in ("|Z|", "R", "X", "dZ/dF")), Column(""))
         caption = f"error budget at {self.force_n:g} N and {self.position_m * 1e3:g} mm, at the worst frequency"
-        yield Table("budget", caption, columns, tuple(cells))
+        yield Table("budget", caption, columns, tuple(rows))
+        yield "(force and place: by how much a press is read wrongly, its readings held against those at rest)"
         largest = self.largest()
         yield f"largest: {largest.name} ({largest.what})"
         if not self.accuracy:
@@ -135,6 +169,14 @@ class ErrorBudget:
             yield f"accuracy {self.accuracy:g} of |Z| reached by the models, not by print and material data{beyond}"
         else:
             yield f"accuracy {self.accuracy:g} of |Z| not reached by the models{beyond}"
+
+
+def _percent(changes: Changes | None) -> tuple[float | None, ...]:
+    return tuple(100 * v for v in astuple(changes)[:5]) if changes else (None,) * 5
+
+
+def _press(changes: Changes | None) -> tuple[float | None, ...]:
+    return (changes.force_n, 1e3 * changes.position_m) if changes else (None, None)
 
 
 @dataclass(frozen=True)

@@ -315,6 +315,8 @@ def table(tried: Trial) -> Iterator[Part]:
         rows.append(("print time", "", f"at least {tried.toolpath.time_s / 60:.0f} min"))
     yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
     yield f"(resolution at {tried.force_n:g} N and {tried.position_m * 1e3:g} mm; {tried.body})"
+    if tried.rests_on:
+        yield f"a press is read most wrongly by: {tried.rests_on}"
     if tried.reason and tried.status != "not predicted":
         yield tried.reason
     yield from (f"doubtful: {doubt}" for doubt in tried.doubts)
