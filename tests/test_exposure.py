@@ -65,9 +65,9 @@ def misread(**changed):
 @pytest.mark.parametrize(
     ("name", "effects", "changed"),
     [
-        ("permittivity by temperature", {"temperature_k": 2, "permittivity_per_k": 5e-4},
+        ("permittivity, temperature", {"temperature_k": 2, "permittivity_per_k": 5e-4},
          [{"eps": 1.001}, {"eps": 0.999}]),
-        ("resistivity by humidity", {"humidity_percent": 2, "resistivity_per_percent": 2.5e-4},
+        ("resistivity, humidity", {"humidity_percent": 2, "resistivity_per_percent": 2.5e-4},
          [{"rho": 1.0005}, {"rho": 0.9995}]),
         ("piezoresistance", {"piezoresistance": 0.002}, [{"under": 1.002}, {"under": 0.998}]),
         ("hysteresis", {"hysteresis": 0.1}, [{"rise": 1.1}]),
@@ -141,5 +141,5 @@ def test_dispersion_by_kramers_and_kronig():
 
 def test_what_alone_turns_a_verdict_is_named():
     """Drift of 10 % in C since the rest reading is more than any press of a stiff plate: no force is told."""
-    assert terms(temperature_k=50, permittivity_per_k=2e-3)["permittivity by temperature"].turns == "force and place"
-    assert terms(temperature_k=1e-3)["permittivity by temperature"].turns == ""
+    assert terms(temperature_k=50, permittivity_per_k=2e-3)["permittivity, temperature"].turns == "both"
+    assert terms(temperature_k=1e-3)["permittivity, temperature"].turns == ""

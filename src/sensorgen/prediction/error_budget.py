@@ -115,7 +115,7 @@ def _print(
     if rest.by_width.lower < rest.by_width.upper:
         what = f"line widths of {', '.join(model.body.cells.scenes)}"
         others = ends(rest.by_width, otherwise)
-        yield reference.term("print", what, "print", others, at_least=None in otherwise, source="ways to lay lines")
+        yield reference.term("print", what, "print", others, at_least=None in otherwise, source="slicers")
     if film:
         what = f"heights of the tools differ by up to {film.error_mm:g} mm ({model.body.design.machine.name})"
         at_least = film.thinner is None or None in films

@@ -69,13 +69,13 @@ def _drift(e: Effects, model: SensorModel, reference: ReferenceLoad) -> Iterator
     sensor = model.sensor
     warmer, moister = f"{e.temperature_k:g} K", f"{e.humidity_percent:g} % of humidity"
     for name, cause, of, share, keys in (
-        ("permittivity by temperature", warmer, _permittivity, e.permittivity_per_k * e.temperature_k,
+        ("permittivity, temperature", warmer, _permittivity, e.permittivity_per_k * e.temperature_k,
          ("permittivity_per_k", "temperature_k")),
-        ("permittivity by humidity", moister, _permittivity, e.permittivity_per_percent * e.humidity_percent,
+        ("permittivity, humidity", moister, _permittivity, e.permittivity_per_percent * e.humidity_percent,
          ("permittivity_per_percent", "humidity_percent")),
-        ("resistivity by temperature", warmer, _resistivity, e.resistivity_per_k * e.temperature_k,
+        ("resistivity, temperature", warmer, _resistivity, e.resistivity_per_k * e.temperature_k,
          ("resistivity_per_k", "temperature_k")),
-        ("resistivity by humidity", moister, _resistivity, e.resistivity_per_percent * e.humidity_percent,
+        ("resistivity, humidity", moister, _resistivity, e.resistivity_per_percent * e.humidity_percent,
          ("resistivity_per_percent", "humidity_percent")),
     ):  # fmt: skip
         ends = [of(sensor, 1 + sign * share) for sign in (-1, 1) if share]

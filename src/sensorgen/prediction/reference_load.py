@@ -16,7 +16,7 @@ from sensorgen.prediction.losses import LOWEST_HZ
 from sensorgen.prediction.query import NOISE, Load
 from sensorgen.prediction.results import Changes, Term
 
-SOURCES = "sources disagree"
+SOURCES = "sources"
 _STEPS = 4  # of Gauss and Newton, to a press that is misread
 _PARALLEL = 1e-9  # of the larger direction, below which another one does not tell
 _MOST = 20.0  # force that a press is misread as, over its own [-]
@@ -140,7 +140,7 @@ class ReferenceLoad:
         return float(force), float(np.nan_to_num(found.position_m, nan=np.inf) / (GUESS * sensor.length_m))
 
     def turns(self, changes: Changes | None, others: Sequence[Sensor] = ()) -> str:
-        """What is told of a press, and would not be by a change alone: "force", "place", both, or ""."""
+        """What is told of a press, and would not be by a change alone: "force", "place", "both", or ""."""
         if changes is None or not self.force_n:
             return ""
         wrong = changes.force_n / (GUESS * self.force_n), changes.position_m / (GUESS * self.sensor.length_m)
@@ -149,7 +149,7 @@ class ReferenceLoad:
         except OutOfRange:
             return ""
         lost = [own < 1 <= max(end[k] for end in ends) for k, own in enumerate(self._told)]
-        return " and ".join(name for name, gone in zip(("force", "place"), lost, strict=True) if gone)
+        return {(True, True): "both", (True, False): "force", (False, True): "place"}.get((lost[0], lost[1]), "")
 
 
 def _parts(values: Complex) -> Real:

@@ -13,14 +13,17 @@ from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
 from sensorgen.design.values import MaterialValue
-from sensorgen.prediction.identifiability.results import GUESS, Identifiability, of_schema_1
+from sensorgen.prediction.identifiability.results import GUESS, Identifiability, metres, newtons, of_schema_1
 from sensorgen.prediction.plan import Plan, without_times
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
+_LEAST_N, _LEAST_M = 1e-3, 1e-5  # by which a press is read wrongly: less is not said
 UNPREDICTED = "12-numbers"  # rule of the finding that there are none
-SCHEMA = 3  # 1 was a JSON of the drawing alone, of version 0.1.0; 2 had resolutions without their range
+SCHEMA = (
+    4  # 1 was a JSON of the drawing alone, of version 0.1.0; 2 had resolutions without their range; 3 no misread press
+)
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,7 @@ class Term:
     source : str
         Where its range comes from, or "guess".
     turns : str
-        What a press would no longer be told, by this alone: "force", "place", both, or "".
+        What a press would no longer be told, by this alone: "force", "place", "both", or "".
     """
 
     name: str
@@ -88,15 +91,14 @@ class Term:
         return inf if self.changes is None or self.at_least else self.changes.magnitude
 
     def words(self) -> str:
-        """What is moved between which ends, and by how much a press is then read wrongly."""
+        """By how much a press is read wrongly, and what gave the range."""
         c = self.changes or Changes()
-        return f"{self.name} ({self.what}; {self.source}): {c.force_n:.2g} N, {1e3 * c.position_m:.2g} mm"
+        wrong = [newtons(c.force_n)] * (c.force_n > _LEAST_N) + [metres(c.position_m)] * (c.position_m > _LEAST_M)
+        return f"{self.name} ({self.source}), {' and '.join(wrong)}"
 
     def remark(self) -> str:
-        """That it is unknown, may be larger, or alone turns what is told of a press."""
-        if self.changes is None:
-            return "unknown"
-        return "; ".join((*(["at least"] if self.at_least else ()), *([f"no {self.turns}"] if self.turns else ())))
+        """That it is unknown, or may be larger."""
+        return "unknown" if self.changes is None else "at least" if self.at_least else ""
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,8 @@ class ErrorBudget:
             c = term.changes or Changes()
             return max(c.force_n / (self.force_n or inf), c.position_m / (self.position_m or inf))
 
-        return tuple(sorted((t for t in self.terms if effect(t) > 0), key=effect, reverse=True))
+        seen = [t for t in self.terms if (c := t.changes) and (c.force_n > _LEAST_N or c.position_m > _LEAST_M)]
+        return tuple(sorted(seen, key=effect, reverse=True))
 
     def met_by(self, *kinds: str) -> bool:
         """Whether the terms of some kinds together are within the accuracy."""
@@ -147,17 +150,13 @@ class ErrorBudget:
 
     def document(self) -> Iterator[Part]:
         """Each term, their sum, the largest, and whether the accuracy is reached."""
-        rows = [(t.name, *_percent(t.changes), *_press(t.changes), t.remark(), t.source) for t in self.terms]
-        if self.total:
-            rows.append(("all at their worst", *_percent(self.total), None, None, self.at_least and "at least", ""))
-        percents = (Column(f, "%", digits=2) for f in ("|Z|", "R", "X", "dZ/dF", "C"))
-        columns = (
-            Column("assumption"), *percents, Column("force", "N", digits=2), Column("place", "mm", digits=2),
-            Column(""), Column("source"),
-        )  # fmt: skip
+        terms = (
+            *self.terms,
+            *([Term("all at their worst", "", "model", self.total, self.at_least)] if self.total else ()),
+        )
+        columns = (Column("error"), *(Column(f, "%", digits=2) for f in ("|Z|", "R", "X", "dZ/dF")), Column(""))
         caption = f"error budget at {self.force_n:g} N and {self.position_m * 1e3:g} mm, at the worst frequency"
-        yield Table("budget", caption, columns, tuple(rows))
-        yield "(force and place: by how much a press is read wrongly, its readings held against those at rest)"
+        yield Table("budget", caption, columns, tuple((t.name, *_percent(t, 4), t.remark()) for t in terms))
         largest = self.largest()
         yield f"largest: {largest.name} ({largest.what})"
         if not self.accuracy:
@@ -170,13 +169,24 @@ class ErrorBudget:
         else:
             yield f"accuracy {self.accuracy:g} of |Z| not reached by the models{beyond}"
 
+    def assumed(self) -> Iterator[Part]:
+        """What each assumption alone does at the ends of its range, the largest effect on a press first."""
+        columns = (
+            Column("assumption"), Column("C", "%", digits=2), Column("R", "%", digits=2), Column("F", "N", digits=2),
+            Column("x", "mm", digits=2), Column("loses"), Column("source"),
+        )  # fmt: skip
+        rows = (
+            (t.name, 100 * c.capacitance, 100 * c.re, c.force_n, 1e3 * c.position_m, t.turns, t.source)
+            for t in self.by_press()
+            if (c := t.changes)
+        )
+        caption = "a press read wrongly by one assumption at an end of its range (F, x)"
+        yield Table("assumptions", caption, columns, tuple(rows))
+        yield "(readings held against those at rest; loses: what could not be told by this alone)"
 
-def _percent(changes: Changes | None) -> tuple[float | None, ...]:
-    return tuple(100 * v for v in astuple(changes)[:5]) if changes else (None,) * 5
 
-
-def _press(changes: Changes | None) -> tuple[float | None, ...]:
-    return (changes.force_n, 1e3 * changes.position_m) if changes else (None, None)
+def _percent(term: Term, count: int) -> tuple[float | None, ...]:
+    return tuple(100 * v for v in astuple(term.changes)[:count]) if term.changes else (None,) * count
 
 
 @dataclass(frozen=True)
@@ -336,6 +346,8 @@ class Prediction(Displayed):
         if self.budget:
             yield ""
             yield from self.budget.document()
+            yield ""
+            yield from self.budget.assumed()
 
     def to_json(self) -> str:
         """Indented JSON of the published schema."""
@@ -429,7 +441,7 @@ def from_json(text: str) -> Prediction:
             return _of_schema_1(data)
         if isinstance(data, dict) and data["schema"] == 2:
             return adapter().validate_python(_of_schema_2(data), strict=False)
-        if isinstance(data, dict) and data["schema"] != SCHEMA:
+        if isinstance(data, dict) and data["schema"] not in (3, SCHEMA):
             raise BadInput(f"a prediction of schema {data['schema']}; this version reads {SCHEMA} and older: update")
         return adapter().validate_json(text)
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError) as error:
