@@ -130,6 +130,7 @@ def test_a_press_beyond_the_law_at_its_soft_end_is_bounded_from_below():
     assert "exceeds the compression law" in term.what
     assert got.largest().name == "stiffness"
     assert next(line for line in lines(got) if line.startswith("stiffness")).endswith("  at least")
+    assert term.turns == "force"
     assert shares(found("tri", force=3.0), "stiffness").by_force > 0.5
 
 
@@ -176,7 +177,7 @@ def test_an_accuracy_is_compared_to_the_models_and_to_all_terms():
     assert found("reference").accuracy is None
     got = found("reference", 1e-2)
     assert (got.met_by("model"), got.met_by("model", "print", "material")) == (True, False)
-    assert got.beyond() == ("permittivity of x60", "lead capacitance", "contact resistance")
+    assert got.beyond() == ("permittivity of x60", "lead capacitance", "contact resistance", "dispersion")
     assert found("reference", 10.0).met_by("model", "print", "material", "leads")
     tight = found("reference", 1e-4)
     assert not tight.met_by("model")
@@ -194,7 +195,7 @@ def test_ways_to_print_it_are_a_term_of_a_print():
     from sensorgen.prediction.sensor_model import build_sensor
 
     model = build_sensor(estimated(make({"shape": "tri"})), "unconfined")
-    width, film = [t for t in budget(model).terms if t.kind == "print"]
+    width, film, *_ = [t for t in budget(model).terms if t.kind == "print"]
     rest = model.rest
     c = rest.capacitance
     assert (width.name, film.name) == ("print", "film thickness")

@@ -19,6 +19,7 @@ from sensorgen.core.findings import Finding
 from sensorgen.core.records import Strict, checked, shown
 from sensorgen.design import borders, imported, packs, shapes
 from sensorgen.design import materials as material_files
+from sensorgen.design.effects import Effects
 from sensorgen.design.packs import Kind
 from sensorgen.design.printer import Pattern, Printer, Quality, load_printer, load_quality
 from sensorgen.design.profile import Profile, with_own
@@ -120,6 +121,7 @@ class Design(Strict):
     )
     profile: Profile = Profile()
     tip: TipData = Field(default=TipData(), description="What presses it; no part of its identity.")
+    effects: Effects = Field(default=Effects(), description="What readings depend on beside the press.")
     waivers: tuple[Waiver, ...] = Field(default=(), strict=False)  # YAML has lists only
     leads: Leads = Leads()
     own: dict[Kind, dict[str, str]] = Field(
@@ -279,8 +281,8 @@ class Design(Strict):
     def _plain(self) -> set[str]:
         """Parts that have come later and are not used: without them the identities of older designs last."""
         usual = {
-            "profile": Profile(), "tip": TipData(), "own": {}, "geometry": None, "bodies": {}, "border": None,
-            "leads": Leads(),
+            "profile": Profile(), "tip": TipData(), "effects": Effects(), "own": {}, "geometry": None, "bodies": {},
+            "border": None, "leads": Leads(),
         }  # fmt: skip
         return {key for key, value in usual.items() if getattr(self, key) == value}
 

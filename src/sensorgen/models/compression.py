@@ -3,7 +3,7 @@
 A plate of the same capacitance is thinner by this share.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from importlib import resources
@@ -27,6 +27,7 @@ REACH = 3.0  # factor on its last stress up to which a curve is extrapolated by 
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _SAME = 1e-6  # relative difference up to which two parameters are one
 _STIFF = 1e-3  # decay below which a plate counts as incompressible: 4e-7 of the modulus [-]
+_NODES = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25])  # of an average, over its last pressure
 _EARLY = np.array([1 / 16, 1 / 4])  # of the first stress: knots of a curve that begins with a power of the stress
 
 
@@ -256,6 +257,28 @@ def curve(name: str, source: str, stress_pa: Sequence[float], ratio: Sequence[fl
     if not (len(p) == len(g) > 1 and p[0] == 0 and g[0] == 1 and (np.diff(p) > 0).all() and (np.diff(g) > 0).all()):
         raise OutOfRange(f"{name}: expected stress from 0 and ratio C/C(0) from 1, two points or more, both rising")
     return Curve(name, source, tuple(p.tolist()), tuple(g.tolist()), tuple(_slopes(p, g).tolist()))
+
+
+def averaged(law: Compression, shares: Callable[[float], Real], last_pa: float) -> Curve:
+    """The law of a sensor with uneven pressure over its width: parts beside each other, each at its own pressure.
+
+    Parameters
+    ----------
+    law : Compression
+        Of each part.
+    shares : function
+        Pressures of equal parts over their mean (n,) [-], by that mean [Pa].
+    last_pa : float
+        Last mean pressure [Pa].
+
+    Raises
+    ------
+    OutOfRange
+        The highest pressure is beyond the law.
+    """
+    stress = last_pa * _NODES
+    ratio = [float(np.mean(1 / (1 - law.capacitive_strain(shares(p) * p)[0]))) for p in stress[1:].tolist()]
+    return curve(f"{law.name}, averaged", law.source, stress.tolist(), [1.0, *ratio])
 
 
 def curve_of(pressed: "Pressed", name: str = "solved") -> Curve:

@@ -16,6 +16,7 @@ from sensorgen.core.errors import OutOfRange, UnknownName
 SOURCE = "Hertz (1882) for a round tip on a thick soft body; Johnson, Contact Mechanics (1985), 5.8 for a thin one"
 COST = 0
 
+_ACROSS = (np.arange(400) + 0.5) / 400 - 0.5  # of the width, from its middle
 BLUNT_M = 1e-6  # a round tip touches over this length at least, so that no force is a point's
 
 
@@ -248,3 +249,38 @@ def _shares(name: str, count: int, ends: tuple[Real, Real]) -> tuple[Real, Real,
     at = begin + (end - begin) * places
     share = profile(name).share(at)
     return np.diff(places), at, share, share[..., -1:] - share[..., :1]
+
+
+def off_middle(off: float) -> Real:
+    r"""Pressure over its mean across the width, under a stiff tip that is free to turn and pressed off the middle.
+
+    Linear, :math:`1 + 12 e y / W^2`, as long as no side lifts (e up to W/6); else a triangle as wide as
+    :math:`3 (W / 2 - e)`: balance of force and moment.
+
+    Parameters
+    ----------
+    off : float
+        e/W, below 1/2 [-].
+    """
+    if off <= 1 / 6:
+        return np.asarray(1 + 12 * off * _ACROSS)
+    wide = 3 * (0.5 - off)
+    return np.asarray(2 / wide * np.clip(1 - (0.5 - _ACROSS) / wide, 0, None))
+
+
+def tilted(rise_pa: float, mean_pa: float) -> Real:
+    """Pressure over its mean across the width, under a tip that is held at an angle: linear, 0 where it does not touch.
+
+    Parameters
+    ----------
+    rise_pa : float
+        Rise of the pressure from side to side, were all of it to touch: the foundation's and the tip's stiffness in
+        series, times the width and the tangent of the angle [Pa].
+    mean_pa : float
+        Mean pressure, above 0 [Pa].
+    """
+    slope = rise_pa / mean_pa
+    if slope <= 2:
+        return np.asarray(1 + slope * _ACROSS)
+    wide = (2 / slope) ** 0.5
+    return np.asarray(slope * np.clip(wide - (0.5 - _ACROSS), 0, None))

@@ -2,19 +2,17 @@
 
 Terms of the models are ``cell`` (bounds of the capacitance), ``compression`` (error of the law), ``boundary`` (boundary
 and contact conditions of the cell), ``line`` (sections under the tip) and ``tip`` (profile of its pressure); ``print``
-is what slicers and walls differ by, ``film thickness`` what the heights of two tools do; the others are material values
-on which sources disagree, and what leads, contacts and the edge may add.
+is what slicers and walls differ by, ``film thickness`` what the heights of two tools do; then come material values on
+which sources disagree, what leads, contacts and the edge may add, and what a reading is exposed to
+(:mod:`sensorgen.prediction.exposure`).
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
 
 from sensorgen.core.bounds import Interval
-from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import Design
 from sensorgen.design.materials import PIEZORESISTANCE
 from sensorgen.design.tip import TOPS
@@ -22,23 +20,23 @@ from sensorgen.design.values import ENDS, MaterialValue, material_value, piezore
 from sensorgen.models.pressure import PROFILES
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.compression_law import CLOSED_FORM
+from sensorgen.prediction.exposure import exposed
 from sensorgen.prediction.leads import added
-from sensorgen.prediction.query import Load
+from sensorgen.prediction.query import NOISE, Load
+from sensorgen.prediction.reference_load import ReferenceLoad
 from sensorgen.prediction.rest_state import permittivity_ratios
 from sensorgen.prediction.results import Changes, ErrorBudget, Term
 from sensorgen.prediction.sensor_model import SensorModel
 
 _NEAR = 1.01  # ratio of moduli that are not told apart
+_MODEL = "model"
 _BY_RATIO = 2.2  # relative deformation per Poisson's ratio below that taken [-]
 _RICHARDSON = 4 / 3  # of what halving changes, where errors fall by four
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 def error_budget(
     model: SensorModel, load: Load, accuracy: float | None = None, otherwise: Sequence[Sensor | None] = (),
-    films: Sequence[Sensor | None] = (),
+    films: Sequence[Sensor | None] = (), noise: float = NOISE,
 ) -> ErrorBudget:  # fmt: skip
     """The error budget of a load.
 
@@ -54,56 +52,25 @@ def error_budget(
         The sensor as it may be printed otherwise; None where one is not known under pressure.
     films : sequence of Sensor or None
         The same with the thickest and the thinnest film.
+    noise : float
+        Of a reading, relative to abs(Z) [-].
 
     Raises
     ------
     OutOfRange
         A load that the sensor cannot take.
     """
-    reference = ReferenceLoad(model.sensor, load)
-    terms = (*_models(model, reference), *_print(model, reference, otherwise, films), *_materials(model, reference))
+    reference = ReferenceLoad(model.sensor, load, noise)
+    terms = (
+        *_models(model, reference), *_print(model, reference, otherwise, films), *_materials(model, reference),
+        *exposed(model, reference),
+    )  # fmt: skip
     total = Changes()
     for term in terms:
         total = total + (term.changes or Changes())
     known = all(t.changes for t in terms)
     at_least = any(t.at_least for t in terms)
     return ErrorBudget(load.force_n, load.position_m, terms, total if known else None, at_least, accuracy)
-
-
-class ReferenceLoad:
-    """The response to a load, to which responses of other sensors are compared.
-
-    Raises
-    ------
-    OutOfRange
-        A load that the sensor cannot take.
-    """
-
-    def __init__(self, sensor: Sensor, load: Load) -> None:
-        self._load = np.asarray(load.frequency_hz, float), load.force_n, load.position_m
-        self._z, self._slope = self._response(sensor)
-
-    def _response(self, sensor: Sensor) -> tuple[Complex, Complex]:
-        z, by_force, _ = sensor.response(*self._load)
-        return z, by_force
-
-    def change(self, *others: Sensor, factor: float = 1.0) -> Changes | None:
-        """Largest relative changes over some other sensors; None where one of them cannot take the load."""
-        found = Changes()
-        for other in others:
-            try:
-                z, slope = self._response(other)
-            except OutOfRange:
-                return None
-            parts = [_difference(part(z), part(self._z)) for part in (np.abs, np.real, np.imag)]
-            found = found.max(Changes(*(factor * d for d in (*parts, _difference(slope, self._slope)))))
-        return found
-
-
-def _difference(one: NDArray[Any], other: NDArray[Any]) -> float:
-    """Largest relative difference, 0 where both are 0 and inf where only the other is."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return float(np.max(np.where(one == other, 0.0, np.abs(one - other) / np.abs(other)), initial=0.0))
 
 
 def _with_capacitances(model: SensorModel, values_f: Sequence[float]) -> list[Sensor]:
@@ -114,26 +81,31 @@ def _with_capacitances(model: SensorModel, values_f: Sequence[float]) -> list[Se
 def _models(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
     sensor, law, c = model.sensor, model.law, model.rest.capacitance
     ends = _with_capacitances(model, (c.model.lower, c.model.upper))
-    yield Term("cell", f"capacitance between its bounds ({model.rest.answer.model})", "model", reference.change(*ends))
-    others = reference.change(*(replace(sensor, compression=o) for o in law.others)) if law.bounded else None
+    yield reference.term(
+        "cell", f"capacitance between its bounds ({model.rest.answer.model})", "model", ends, source=_MODEL
+    )
     why = "error of the law" if law.bounded else "law of a solid plate (B.49) on a cell with gaps: error unknown"
     if law.others and law.others[0].name != law.compression.name:
         why = f"{law.compression.name} or {law.others[0].name}"
-    yield Term("compression", why, "model", others)
-    if law.tops or law.other_boundaries:
-        held = (*law.tops.values(), *law.other_boundaries)
-        what = "even pressure or a stiff plate on the top"
-        more = ", faces that stick, or a cell free to widen" if law.other_boundaries else ""
-        changes = reference.change(*(replace(sensor, compression=o) for o in held))
-        yield Term("boundary", what + more, "model", changes, at_least=len(law.tops) < len(TOPS))
-    if sensor.profile == UNIFORM:
-        yield Term("line", "one section under the tip is exact", "model", reference.change(sensor))
+    if law.bounded:
+        others = [replace(sensor, compression=o) for o in law.others]
+        yield reference.term("compression", why, "model", others, source=_MODEL)
     else:
-        finer = reference.change(replace(sensor, pieces=2 * sensor.pieces), factor=_RICHARDSON)
-        yield Term("line", f"{sensor.pieces} sections under the tip", "model", finer)
+        yield Term("compression", why, "model", None, source=_MODEL)
+    if law.tops or law.other_boundaries:
+        held = [replace(sensor, compression=o) for o in (*law.tops.values(), *law.other_boundaries)]
+        more = ", faces that stick, or a cell free to widen" if law.other_boundaries else ""
+        what = f"even pressure or a stiff plate on the top{more}"
+        yield reference.term("boundary", what, "model", held, at_least=len(law.tops) < len(TOPS), source=_MODEL)
+    if sensor.profile == UNIFORM:
+        yield reference.term("line", "one section under the tip is exact", "model", [sensor], source=_MODEL)
+    else:
+        finer = [replace(sensor, pieces=2 * sensor.pieces)]
+        why = f"{sensor.pieces} sections under the tip"
+        yield reference.term("line", why, "model", finer, factor=_RICHARDSON, source=_MODEL)
     profiles = [replace(sensor, profile=name) for name in PROFILES if name != sensor.profile]
     what = f"pressure distributed like {', '.join(s.profile for s in profiles)}"
-    yield Term("tip", what, "model", reference.change(*profiles))
+    yield reference.term("tip", what, "model", profiles, source=_MODEL)
 
 
 def _print(
@@ -142,21 +114,25 @@ def _print(
     """Line widths, and the film's thickness: by the capacitance, and by the law of compression where that is known."""
     rest, film = model.rest, model.body.cells.film
 
-    def changes(span: Interval, sensors: Sequence[Sensor | None]) -> Changes | None:
-        return reference.change(*_with_capacitances(model, (span.lower, span.upper)), *(s for s in sensors if s))
+    def ends(span: Interval, sensors: Sequence[Sensor | None]) -> list[Sensor]:
+        return [*_with_capacitances(model, (span.lower, span.upper)), *(s for s in sensors if s)]
 
     if rest.by_width.lower < rest.by_width.upper:
         what = f"line widths of {', '.join(model.body.cells.scenes)}"
-        yield Term("print", what, "print", changes(rest.by_width, otherwise), at_least=None in otherwise)
+        others = ends(rest.by_width, otherwise)
+        yield reference.term("print", what, "print", others, at_least=None in otherwise, source="slicers")
     if film:
         what = f"heights of the tools differ by up to {film.error_mm:g} mm ({model.body.design.machine.name})"
         at_least = film.thinner is None or None in films
-        yield Term("film thickness", what, "print", changes(rest.by_film, films), at_least=at_least)
+        others = ends(rest.by_film, films)
+        yield reference.term(
+            "film thickness", what, "print", others, at_least=at_least, source=model.body.design.machine.name
+        )
 
 
 def _materials(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
     for ends in material_ends(model, reference):
-        yield Term(ends.name, ends.what, ends.kind, reference.change(*ends.sensors), at_least=ends.at_least)
+        yield reference.term(ends.name, ends.what, ends.kind, ends.sensors, at_least=ends.at_least)
 
 
 class Ends(NamedTuple):

@@ -14,9 +14,9 @@ from sensorgen.design.body import Body
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.capacitance import Answer, default_width, weighed
 from sensorgen.prediction.compression_law import Law, Option, infill, options
-from sensorgen.prediction.error_budget import ReferenceLoad
 from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, run_until_within
 from sensorgen.prediction.query import DEFAULT, FLAT, Load, Query, Tip
+from sensorgen.prediction.reference_load import ReferenceLoad
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece, pressure_pa
 

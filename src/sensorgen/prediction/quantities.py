@@ -5,7 +5,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from itertools import product
-from math import inf, isnan, nan, pi, prod
+from math import inf, isnan, nan, pi, prod, tan
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
+from sensorgen.design.effects import Effects
 from sensorgen.design.tip import WORDS
 from sensorgen.design.values import ASSUMED, ENDS, lead_ranges, spread
 from sensorgen.models import line
@@ -22,15 +23,16 @@ from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.capacitance import Unpredictable
 from sensorgen.prediction.compression_law import CLOSED_FORM, at_a_few_pressures
 from sensorgen.prediction.electrodes import electrode_resistance
-from sensorgen.prediction.error_budget import ReferenceLoad, error_budget, material_ends, modulus_range
+from sensorgen.prediction.error_budget import error_budget, material_ends, modulus_range
 from sensorgen.prediction.identifiability.fisher import Setup
 from sensorgen.prediction.identifiability.identify import identify
 from sensorgen.prediction.leads import Added, added
-from sensorgen.prediction.losses import Lost, lost
+from sensorgen.prediction.losses import LOWEST_HZ, Lost, lost
 from sensorgen.prediction.narrowing import narrowings
 from sensorgen.prediction.plan import Plan
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import FORCE_N, Load, Query
+from sensorgen.prediction.reference_load import ReferenceLoad
 from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.prediction.results import SCHEMA, Impedance, Prediction, UnderTop
 from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
@@ -98,7 +100,10 @@ def _at_rest(found: Prediction, body: Body, rest: RestState, frequency_hz: tuple
     corner = _of_line(r, c_only, lambda ohm, farad: line.corner_frequency_hz(ohm, farad), "Hz")
     return replace(
         found, capacitance=c, resistance=resistance, corner_frequency=corner,
-        impedance=tuple(_impedance(f, r, c_only, gone, farad, ohm) for f in frequency_hz),
+        impedance=tuple(
+            _impedance(f, r, c_only, gone, (farad, ohm), body.design.effects.permittivity_dispersion)
+            for f in frequency_hz
+        ),
     )  # fmt: skip
 
 
@@ -106,8 +111,16 @@ def impedance_at(found: Prediction, frequency_hz: float, gone: Lost) -> Impedanc
     """Impedance at rest of a predicted sensor at any frequency; None where it is no line of two electrodes."""
     if found.capacitance is None or set(found.resistance) != set(ENDS):
         return None
-    whole = _in_series(found.resistance["top"], found.resistance["bottom"])
-    return _impedance(frequency_hz, whole, found.capacitance, gone)
+    c, ends = found.capacitance, [found.resistance[end] for end in ENDS]
+    leads = _beyond(c), _beyond(ends[0])
+    whole = _in_series(ends[0].alone(), ends[1].alone())
+    return _impedance(frequency_hz, whole, c.alone(), gone, leads, Effects().permittivity_dispersion)
+
+
+def _beyond(quantity: Bounds) -> Added:
+    """Least and most that leads may add to the value of a quantity."""
+    found = quantity.leads or Interval(quantity.value, quantity.value)
+    return Added(0.0, found.lower - quantity.value, found.upper - quantity.value)
 
 
 def _in_series(one: Bounds, other: Bounds) -> Bounds:
@@ -135,26 +148,35 @@ def _of_line(r: Bounds, c: Bounds, of: Callable[[float, float], float], unit: st
     )  # fmt: skip
 
 
-def _impedance(frequency_hz: float, r: Bounds, c: Bounds, gone: Lost, lead_f: Added, lead_ohm: Added) -> Impedance:
-    """Of the unloaded line at one frequency, at the end of its leads; r and c of the whole sensor."""
-    omega = 2 * pi * frequency_hz
+def _impedance(
+    frequency_hz: float, r: Bounds, c: Bounds, gone: Lost, leads: tuple[Added, Added], dispersion: float = 0.0
+) -> Impedance:  # fmt: skip
+    """Of the unloaded line at one frequency, at the end of its leads; r and c of the whole sensor.
 
-    def z(ohm: float, farad: float, parallel: float = lead_f.value, series: float = lead_ohm.value) -> complex:
-        admittance = omega * farad * (1j + gone.tan_delta) + gone.leak_s
+    A permittivity that falls as f^-n loses tan(n pi / 2) at least: the best value has none, the range up to that.
+    """
+    omega, (lead_f, lead_ohm) = 2 * pi * frequency_hz, leads
+
+    def z(
+        ohm: float, farad: float, parallel: float = lead_f.value, series: float = lead_ohm.value, n: float = 0.0
+    ) -> complex:  # fmt: skip
+        lossy = 1j + gone.tan_delta + tan(n * pi / 2)
+        admittance = omega * farad * (frequency_hz / LOWEST_HZ) ** -n * lossy + gone.leak_s
         own = complex(line.cascade([ohm], [np.array([admittance])], [1.0])[0])
         return series + own / (1 + 1j * omega * parallel * own)
 
-    leads = list(product(lead_f[1:], lead_ohm[1:]))
-    ends = [z(*of, *by) for of in product((r.lower, r.upper), (c.lower, c.upper)) for by in leads]
-    alone = [z(r.value, c.value, *by) for by in leads]
+    by_leads = list(product(lead_f[1:], lead_ohm[1:]))
+    rest = list(product((r.lower, r.upper), (c.lower, c.upper)))
+    ends = [z(*of, *by, n) for of in rest for by in by_leads for n in (0.0, dispersion)]
+    alone = [z(r.value, c.value, *by) for by in by_leads]
 
     def part(name: str) -> Bounds:
-        known, over, by = (
-            _of_line(r, c, lambda ohm, farad: float(getattr(z(ohm, farad), name)), "ohm"),
-            [float(getattr(one, name)) for one in ends], [float(getattr(one, name)) for one in alone],
-        )  # fmt: skip
+        known = _of_line(r, c, lambda ohm, farad: float(getattr(z(ohm, farad), name)), "ohm")
+        over, by = ([float(getattr(one, name)) for one in many] for many in (ends, alone))
+        lost = float(getattr(z(r.value, c.value, n=dispersion), name))
+        material = Interval(min(known.material.lower, lost), max(known.material.upper, lost))
         low, high = min(known.lower, *over), max(known.upper, *over)
-        return replace(known, lower=low, upper=high, leads=Interval(min(by), max(by)))
+        return replace(known, lower=low, upper=high, material=material, leads=Interval(min(by), max(by)))
 
     return Impedance(frequency_hz, part("real"), part("imag"))
 
@@ -181,7 +203,7 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
         found = replace(
             found, identifiability=made, sensitivity=_sensitivity(model, load, query, others),
             doubts=(*found.doubts, *filter(None, pressed)),
-            budget=error_budget(model, query.load(model.body.design), query.accuracy, *others),
+            budget=error_budget(model, query.load(model.body.design), query.accuracy, *others, query.noise),
         )  # fmt: skip
         return _with_tops(_resolution(found, model, load, query, others), model, load, query)
     except SensorgenError as error:

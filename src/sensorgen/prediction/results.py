@@ -14,19 +14,22 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
 from sensorgen.core.units import si
 from sensorgen.design.values import ASSUMED, MaterialValue
-from sensorgen.prediction.identifiability.results import GUESS, Identifiability, of_schema_1
+from sensorgen.prediction.identifiability.results import GUESS, Identifiability, metres, newtons, of_schema_1
 from sensorgen.prediction.plan import Plan, without_times
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
+_LEAST_N, _LEAST_M = 1e-3, 1e-5  # by which a press is read wrongly: less is not said
 UNPREDICTED = "12-numbers"  # rule of the finding that there are none
-SCHEMA = 3  # 1 was a JSON of the drawing alone, of version 0.1.0; 2 had resolutions without their range
+SCHEMA = (
+    4  # 1 was a JSON of the drawing alone, of version 0.1.0; 2 had resolutions without their range; 3 no misread press
+)
 
 
 @dataclass(frozen=True)
 class Changes:
-    """Largest relative changes over the frequencies [-].
+    """Largest changes over the frequencies, relative ones but for the last two [-].
 
     Attributes
     ----------
@@ -34,12 +37,19 @@ class Changes:
         Of abs(Z), Re Z and Im Z.
     by_force : float
         Of dZ/dF.
+    capacitance : float
+        Of the capacitance at rest.
+    force_n, position_m : float
+        By which a press at the load is read wrongly, the reading held against the one at rest [N], [m].
     """
 
     magnitude: float = 0.0
     re: float = 0.0
     im: float = 0.0
     by_force: float = 0.0
+    capacitance: float = 0.0
+    force_n: float = 0.0
+    position_m: float = 0.0
 
     def __add__(self, other: "Changes") -> "Changes":
         return Changes(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
@@ -58,27 +68,43 @@ class Term:
     name, what : str
         Which, and what was moved between which ends.
     kind : str
-        "model", "print", "material" or "leads".
+        Where it comes from.
     changes : Changes or None
         Its effect; None where it is unknown.
     at_least : bool
         Whether it may be larger: the load at one end is beyond the models' range.
+    source : str
+        Where its range comes from, or "guess".
+    turns : str
+        What a press would no longer be told, by this alone: "force", "place", "both", or "".
     """
 
     name: str
     what: str
-    kind: Literal["model", "print", "material", "leads"]
+    kind: Literal["model", "print", "material", "leads", "tip", "meter", "drift", "person"]
     changes: Changes | None
     at_least: bool = False
+    source: str = ""
+    turns: str = ""
 
     def magnitude(self) -> float:
         """Relative change of abs(Z), infinite where it is unknown [-]."""
         return inf if self.changes is None or self.at_least else self.changes.magnitude
 
+    def words(self) -> str:
+        """By how much a press is read wrongly, and what gave the range."""
+        c = self.changes or Changes()
+        wrong = [newtons(c.force_n)] * (c.force_n > _LEAST_N) + [metres(c.position_m)] * (c.position_m > _LEAST_M)
+        return f"{self.name} ({self.source}), {' and '.join(wrong)}"
+
+    def remark(self) -> str:
+        """That it is unknown, or may be larger."""
+        return "unknown" if self.changes is None else "at least" if self.at_least else ""
+
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """All sources of error of the impedance at a load.
+    """All that the numbers at a load rest on, each moved to the ends of its range.
 
     Attributes
     ----------
@@ -105,6 +131,16 @@ class ErrorBudget:
         """The term with the largest effect on abs(Z)."""
         return max(self.terms, key=Term.magnitude)
 
+    def by_press(self) -> tuple[Term, ...]:
+        """Terms with a known effect on what a press is read as, the largest share of the load first."""
+
+        def effect(term: Term) -> float:
+            c = term.changes or Changes()
+            return max(c.force_n / (self.force_n or inf), c.position_m / (self.position_m or inf))
+
+        seen = [t for t in self.terms if (c := t.changes) and (c.force_n > _LEAST_N or c.position_m > _LEAST_M)]
+        return tuple(sorted(seen, key=effect, reverse=True))
+
     def met_by(self, *kinds: str) -> bool:
         """Whether the terms of some kinds together are within the accuracy."""
         return sum(t.magnitude() for t in self.terms if t.kind in kinds) <= (self.accuracy or 0.0)
@@ -115,16 +151,13 @@ class ErrorBudget:
 
     def document(self) -> Iterator[Part]:
         """Each term, their sum, the largest, and whether the accuracy is reached."""
-        rows = [(t.name, t.changes, t.at_least) for t in self.terms]
-        rows += [("all at their worst", self.total, self.at_least)] if self.total else []
-        cells = (
-            (name, *((100 * v for v in astuple(changes)) if changes else (None,) * 4),
-             "unknown" if changes is None else "at least" if at_least else "")
-            for name, changes, at_least in rows
-        )  # fmt: skip
+        terms = (
+            *self.terms,
+            *([Term("all at their worst", "", "model", self.total, self.at_least)] if self.total else ()),
+        )
         columns = (Column("error"), *(Column(f, "%", digits=2) for f in ("|Z|", "R", "X", "dZ/dF")), Column(""))
         caption = f"error budget at {self.force_n:g} N and {self.position_m * 1e3:g} mm, at the worst frequency"
-        yield Table("budget", caption, columns, tuple(cells))
+        yield Table("budget", caption, columns, tuple((t.name, *_percent(t, 4), t.remark()) for t in terms))
         largest = self.largest()
         yield f"largest: {largest.name} ({largest.what})"
         if not self.accuracy:
@@ -136,6 +169,25 @@ class ErrorBudget:
             yield f"accuracy {self.accuracy:g} of |Z| reached by the models, not by print, material and leads{beyond}"
         else:
             yield f"accuracy {self.accuracy:g} of |Z| not reached by the models{beyond}"
+
+    def assumed(self) -> Iterator[Part]:
+        """What each assumption alone does at the ends of its range, the largest effect on a press first."""
+        columns = (
+            Column("assumption"), Column("C", "%", digits=2), Column("R", "%", digits=2), Column("F", "N", digits=2),
+            Column("x", "mm", digits=2), Column("loses"), Column("source"),
+        )  # fmt: skip
+        rows = (
+            (t.name, 100 * c.capacitance, 100 * c.re, c.force_n, 1e3 * c.position_m, t.turns, t.source)
+            for t in self.by_press()
+            if (c := t.changes)
+        )
+        caption = "a press read wrongly by one assumption at an end of its range (F, x)"
+        yield Table("assumptions", caption, columns, tuple(rows))
+        yield "(readings held against those at rest; loses: what could not be told by this alone)"
+
+
+def _percent(term: Term, count: int) -> tuple[float | None, ...]:
+    return tuple(100 * v for v in astuple(term.changes)[:count]) if term.changes else (None,) * count
 
 
 @dataclass(frozen=True)
@@ -373,6 +425,8 @@ class Prediction(Displayed):
         if self.budget:
             yield ""
             yield from self.budget.document()
+            yield ""
+            yield from self.budget.assumed()
 
     def to_json(self) -> str:
         """Indented JSON of the published schema."""
@@ -503,7 +557,7 @@ def from_json(text: str) -> Prediction:
             return _of_schema_1(data)
         if isinstance(data, dict) and data["schema"] == 2:
             return adapter().validate_python(_of_schema_2(data), strict=False)
-        if isinstance(data, dict) and data["schema"] != SCHEMA:
+        if isinstance(data, dict) and data["schema"] not in (3, SCHEMA):
             raise BadInput(f"a prediction of schema {data['schema']}; this version reads {SCHEMA} and older: update")
         return adapter().validate_json(text)
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError) as error:

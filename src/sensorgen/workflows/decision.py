@@ -9,7 +9,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from sensorgen.checks.review import CheckReport, Review
+from sensorgen.checks.review import CheckReport, Review, review
 from sensorgen.core import cache as answers
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.document import Column, Facts, Part, Table
@@ -18,6 +18,7 @@ from sensorgen.core.findings import Finding, Refused, Verdict, counted, counts, 
 from sensorgen.design.design import Design
 from sensorgen.prediction.identifiability.results import FORCE_SHARE, GUESS
 from sensorgen.prediction.results import UNPREDICTED, caption_of, resolved, unpredicted
+from sensorgen.workflows.moves import changed
 from sensorgen.workflows.trial import Numbers, Trial, trial
 
 if TYPE_CHECKING:
@@ -151,6 +152,8 @@ class Decision(CheckReport):
         Why nothing is predicted, or "".
     advice : Advice or None
         Changes that were tried; None where none was looked for.
+    turned_by : str
+        Fault of the print that alone turns the verdict into CHANGE, and its finding; "" where none of those tried does.
     """
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
@@ -159,6 +162,7 @@ class Decision(CheckReport):
     trial: Trial | None = None
     reason: str = ""
     advice: Advice | None = None
+    turned_by: str = ""
 
     def document(self) -> Iterator[Part]:
         """Verdict, numbers, findings and changes."""
@@ -181,6 +185,8 @@ class Decision(CheckReport):
 
     def numbers(self) -> Iterator[Part]:
         """The numbers that decide; why there are none."""
+        if self.turned_by:
+            yield f"it would be CHANGE with {self.turned_by}"
         if self.trial:
             yield from table(self.trial)
         elif self.reason:
@@ -247,10 +253,27 @@ def decision(
         findings = (*(f for f in made.findings if f.rule in _OF_PRINT and f not in findings), *findings)
         step("changes")
         advice = advised(design, made, budget_s, step, time.process_time() - start_s)
+    said = verdict(findings)
     return Decision(
         design.name, design.id(), design.machine.name, design.layers.name, counts(findings), findings,
-        verdict(findings), made, reason, advice,
+        said, made, reason, advice, _turned_by(design) if said != "CHANGE" else "",
     )  # fmt: skip
+
+
+def _turned_by(design: Design) -> str:
+    """A film one layer thinner than drawn, where the checks then have an error, and that error; else ""."""
+    film_mm = getattr(design.params, "dielectric_mm", 0.0)
+    thinner = round(film_mm - design.layers.layer_mm, 9)
+    if not film_mm:
+        return ""
+    fault = "a film one layer thinner"
+    if thinner <= 0:
+        return f"{fault}: none is left"
+    try:
+        found = review(changed(design, {("parameters", "dielectric_mm"): thinner})).findings
+    except SensorgenError as error:
+        return f"{fault}: {error}"
+    return next((f"{fault}: {f.message}" for f in found if f.severity == "error" and not f.waiver), "")
 
 
 def advised(
@@ -315,6 +338,8 @@ def table(tried: Trial) -> Iterator[Part]:
         rows.append(("print time", "", f"at least {tried.toolpath.time_s / 60:.0f} min"))
     yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
     yield caption_of(tried.force_n, tried.position_m, tried.body)
+    if tried.rests_on and any(grade(tried)):
+        yield f"largest assumption: a press is read wrongly by {tried.rests_on}"
     if tried.reason and tried.status != "not predicted":
         yield tried.reason
     yield from (f"doubtful: {doubt}" for doubt in tried.doubts)

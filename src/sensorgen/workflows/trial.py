@@ -148,6 +148,8 @@ class Trial(Displayed):
         Why the print's numbers may be wrong by more than their ranges say.
     toolpath : Toolpath or None
         Of the G-code; None for an estimate.
+    rests_on : str
+        Assumption that a press is read most wrongly by, and by how much; "" where none is known.
     """
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
@@ -166,6 +168,7 @@ class Trial(Displayed):
     printed: Numbers
     doubts: tuple[str, ...] = ()
     toolpath: Toolpath | None = None
+    rests_on: str = ""
 
     def errors(self) -> tuple[Finding, ...]:
         """Findings that are errors."""
@@ -246,10 +249,12 @@ def trial(
         (body, path), found = _at_hand(design, folder), held.findings
     predicted = evaluate(body, query, keep=keep, beside=drawn)
     findings = tuple(f for f in predicted.with_short(found) if not f.waiver)
+    assumed = predicted.budget.by_press()[:1] if predicted.budget else ()
     return Trial(
         design.name, design.id(), body.provenance, predicted.status, predicted.reason, verdict(findings), findings,
         predicted.force_n, predicted.position_m, design.params.length_mm * M_PER_MM,
         Numbers.of(predicted.drawn) if predicted.drawn else Numbers(), Numbers.of(predicted), predicted.doubts, path,
+        "".join(term.words() for term in assumed),
     )  # fmt: skip
 
 

@@ -14,8 +14,11 @@ from sensorgen.checks.review import Review, draw
 from sensorgen.core import document
 from sensorgen.core.document import Part
 from sensorgen.core.findings import SEVERITIES, Finding, grouped
-from sensorgen.prediction.results import Prediction
+from sensorgen.prediction.identifiability.results import metres, newtons
+from sensorgen.prediction.results import Changes, Prediction, Term
 from sensorgen.scene.scene import SLIVER_MM
+
+_SEEN = 1.0  # per cent: shorter bars are left out
 
 
 @dataclass(frozen=True)
@@ -80,13 +83,33 @@ def page(
         sheet=base64.b64encode(sheet.encode()).decode(), data=base64.b64encode(data).decode(),
         numbers=_html(numbers), advice=_html(advice), listed=listed, severities=SEVERITIES,
         known=predicted.identifiability, maps=shades.maps(predicted.identifiability),
-        reason=predicted.reason, assumptions=predicted.assumptions,
+        reason=predicted.reason, assumptions=predicted.assumptions, tornado=tuple(_tornado(predicted)),
     )  # fmt: skip
 
 
 def _html(parts: Iterable[Part]) -> Markup:
     """Parts as HTML; :func:`sensorgen.core.document.html` escapes their text."""
     return Markup(document.html(parts))  # noqa: S704 - escaped there
+
+
+@dataclass(frozen=True)
+class Bar:
+    """An assumption, and by how much a press is read wrongly at the ends of its range: in words, and as shares [%]."""
+
+    term: Term
+    words: tuple[str, str]
+    shares: tuple[float, float]
+
+
+def _tornado(predicted: Prediction) -> Iterator[Bar]:
+    """Assumptions, the largest effect first, as shares of the load and of the sensor's length."""
+    budget = predicted.budget
+    for term in budget.by_press() if budget else ():
+        c = term.changes or Changes()
+        shares = c.force_n / budget.force_n, c.position_m / (2 * budget.position_m)  # type: ignore[union-attr]
+        force, place = (min(100.0, round(100 * share, 1)) for share in shares)
+        if max(force, place) >= _SEEN:
+            yield Bar(term, (newtons(c.force_n), metres(c.position_m)), (force, place))
 
 
 def _bodies(printed: Printed) -> Iterator[BodyShown]:

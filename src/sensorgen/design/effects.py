@@ -1,0 +1,58 @@
+"""Effects on a reading beside the press: drift since the last reading at rest, dispersion, memory, tip, meter, person.
+
+No source of the materials gives them: the defaults are guesses, for filaments of TPU on a bench in a room. A design
+states its own under ``effects:``.
+"""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from sensorgen.core.records import Strict
+
+GUESS = "guess"
+GIVEN = "the design"
+
+Size = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class Effects(Strict):
+    """Sizes of the effects, either sign; 0 leaves one out."""
+
+    temperature_k: Size = Field(default=1.0, description="Change of temperature since the last reading at rest [K].")
+    humidity_percent: Size = Field(
+        default=2.0, description="Change of relative humidity since the last reading at rest [percent]."
+    )
+    permittivity_per_k: Size = Field(default=2e-3, description="Relative change of the permittivity [1/K].")
+    permittivity_per_percent: Size = Field(
+        default=1e-3, description="Relative change of the permittivity per percent of humidity [-]."
+    )
+    resistivity_per_k: Size = Field(default=3e-3, description="Relative change of the resistivity [1/K].")
+    resistivity_per_percent: Size = Field(
+        default=1e-3, description="Relative change of the resistivity per percent of humidity [-]."
+    )
+    permittivity_dispersion: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        default=0.01,
+        description="n of a permittivity that falls as frequency^-n, with the loss that belongs to it [-].",
+    )
+    resistivity_dispersion: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        default=0.005, description="Largest n of a resistivity that falls as frequency^-n [-]."
+    )
+    piezoresistance: Size = Field(
+        default=0.1, description="Relative change of the resistivity under the tip at the reference load [-]."
+    )
+    hysteresis: Size = Field(default=0.15, description="Relative change of the rise of C after a higher load [-].")
+    creep: Size = Field(default=0.05, description="Relative change of the rise of C under a load that lasts [-].")
+    off_middle_mm: Size = Field(default=2.0, description="Tip off the middle of the width [mm].")
+    tilt_deg: Annotated[float, Field(ge=0, lt=45)] = Field(
+        default=2.0, description="Tilt of the tip across the sensor [degree]."
+    )
+    meter: Size = Field(default=1e-3, description="Gain error of the meter, relative [-].")
+    squeezed_mm: Size = Field(default=0.05, description="First layer squeezed by this much [mm].")
+    bed_mm: Size = Field(default=0.05, description="Height of the bed differs over the sensor by this much [mm].")
+    person_n: Size = Field(default=0.1, description="Error of the force that a person notes [N].")
+    person_mm: Size = Field(default=1.0, description="Error of the place that a person sets [mm].")
+
+    def source(self, *names: str) -> str:
+        """Source of some of them: the design where it states one, else a guess."""
+        return GIVEN if self.model_fields_set & set(names) else GUESS

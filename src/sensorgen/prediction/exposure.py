@@ -1,0 +1,157 @@
+"""What a reading is exposed to beside the press: the design's ``effects``, as terms of the error budget."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import chain
+from math import radians, tan
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sensorgen.core.arrays import Real
+from sensorgen.core.errors import MissingValue, OutOfRange
+from sensorgen.core.units import M_PER_MM
+from sensorgen.design.effects import Effects
+from sensorgen.models import pressure
+from sensorgen.models.compression import averaged
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.compression_law import gap_m
+from sensorgen.prediction.reference_load import Dispersed, ReferenceLoad
+from sensorgen.prediction.results import Changes, Term
+from sensorgen.prediction.sensor_model import SensorModel, piece
+
+_EDGE = 0.45  # of the width: farthest that a tip is pressed off the middle
+_TIP_M, _TIP_PA = 0.01, 12e6  # thesis: a block of NinjaFlex; its modulus by the maker's tensile data
+
+
+class Exposure(NamedTuple):
+    """An effect.
+
+    ``keys`` are the design's of its size, ``sensors`` those at its ends: none where it is left out, None where they
+    are not known. ``since_rest`` if it came after the last reading at rest.
+    """
+
+    keys: tuple[str, ...]
+    name: str
+    what: str
+    kind: Any
+    sensors: Sequence[Sensor] | None
+    since_rest: bool = True
+
+
+def exposed(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
+    """Terms of what a reading depends on beside the press; none without a press."""
+    effects = model.body.design.effects
+    if not reference.force_n > 0:
+        return
+    for one in chain(_drift(effects, model, reference), _memory(effects, reference), _tip(effects, model, reference),
+                     _first_layer(effects, model.sensor)):  # fmt: skip
+        source = effects.source(*one.keys)
+        if one.sensors is None:
+            yield Term(one.name, one.what, one.kind, None, source=source)
+        elif one.sensors:
+            yield reference.term(
+                one.name, one.what, one.kind, one.sensors, since_rest=one.since_rest, source=source
+            )  # fmt: skip
+    if effects.meter:
+        gain = Changes(*(effects.meter,) * 5)  # the same at rest: the press is read as it is
+        what = f"{effects.meter:.2g} of every reading"
+        yield Term("meter's gain", what, "meter", gain, source=effects.source("meter"))
+    if effects.person_n or effects.person_mm:
+        press = Changes(force_n=effects.person_n, position_m=effects.person_mm * M_PER_MM)
+        what = f"press noted {effects.person_n:g} N and {effects.person_mm:g} mm off"
+        source = effects.source("person_n", "person_mm")
+        yield Term("person", what, "person", press, source=source, turns=reference.turns(press))
+
+
+def _drift(e: Effects, model: SensorModel, reference: ReferenceLoad) -> Iterator[Exposure]:
+    """Drift of permittivity and resistivity, dispersion, and piezoresistance under the tip."""
+    sensor = model.sensor
+    warmer, moister = f"{e.temperature_k:g} K", f"{e.humidity_percent:g} % of humidity"
+    for name, cause, of, share, keys in (
+        ("permittivity, temperature", warmer, _permittivity, e.permittivity_per_k * e.temperature_k,
+         ("permittivity_per_k", "temperature_k")),
+        ("permittivity, humidity", moister, _permittivity, e.permittivity_per_percent * e.humidity_percent,
+         ("permittivity_per_percent", "humidity_percent")),
+        ("resistivity, temperature", warmer, _resistivity, e.resistivity_per_k * e.temperature_k,
+         ("resistivity_per_k", "temperature_k")),
+        ("resistivity, humidity", moister, _resistivity, e.resistivity_per_percent * e.humidity_percent,
+         ("resistivity_per_percent", "humidity_percent")),
+    ):  # fmt: skip
+        ends = [of(sensor, 1 + sign * share) for sign in (-1, 1) if share]
+        yield Exposure(keys, name, f"{share:.2g} by {cause} since the reading at rest", "drift", ends)
+    n, m = e.permittivity_dispersion, e.resistivity_dispersion
+    dispersed = [Dispersed(**vars(sensor), permittivity_power=n, resistivity_power=m)] if n or m else []
+    what = f"permittivity as f^-{n:g}, resistivity as f^-{m:g}"
+    yield Exposure(
+        ("permittivity_dispersion", "resistivity_dispersion"), "dispersion", what, "drift", dispersed, since_rest=False
+    )
+    if not model.piezoresistance:
+        per_pa = e.piezoresistance / reference.stress_pa()
+        ends = [replace(sensor, piezoresistance_per_pa=(s * per_pa, s * per_pa)) for s in (-1, 1) if per_pa]
+        what = f"resistivity under the tip {e.piezoresistance:g} lower or higher"
+        yield Exposure(("piezoresistance",), "piezoresistance", what, "drift", ends)
+
+
+def _memory(e: Effects, reference: ReferenceLoad) -> Iterator[Exposure]:
+    """Memory of the film: of a higher load, and of the time under this one."""
+    for name, share, when in (
+        ("hysteresis", e.hysteresis, "after a higher load"), ("creep", e.creep, "under a load that lasts"),
+    ):  # fmt: skip
+        ends = _with_law(reference, lambda _: np.ones(1), 1 + share) if share else []
+        yield Exposure((name,), name, f"rise of C {share:.2g} larger {when}", "drift", ends)
+
+
+def _tip(e: Effects, model: SensorModel, reference: ReferenceLoad) -> Iterator[Exposure]:
+    """Uneven pressure across the sensor: a tip off the middle, or tilted."""
+    width_m = model.sensor.width_m
+    if e.off_middle_mm:
+        across = pressure.off_middle(min(e.off_middle_mm * M_PER_MM / width_m, _EDGE))
+        ends = _with_law(reference, lambda _: across)
+        yield Exposure(("off_middle_mm",), "tip off the middle", f"by {e.off_middle_mm:g} mm across", "tip", ends)
+    if e.tilt_deg:
+        ends = _tilted(model, reference, tan(radians(e.tilt_deg)) * width_m)
+        yield Exposure(("tilt_deg",), "tip tilted", f"by {e.tilt_deg:g} degrees across", "tip", ends)
+
+
+def _first_layer(e: Effects, sensor: Sensor) -> Iterator[Exposure]:
+    """A bottom electrode thinner than drawn: its first layer squeezed, or the bed uneven."""
+    top, bottom = sensor.electrode_m
+    for key, least_mm, name in (
+        ("squeezed_mm", e.squeezed_mm, "first layer squeezed"), ("bed_mm", e.bed_mm, "bed uneven"),
+    ):  # fmt: skip
+        thinner = bottom - least_mm * M_PER_MM
+        ends = None if thinner <= 0 else [replace(sensor, electrode_m=(top, thinner))] if least_mm else []
+        what = f"by {least_mm:g} mm: bottom electrode thinner"
+        yield Exposure((key,), name, what, "print", ends, since_rest=False)
+
+
+def _permittivity(sensor: Sensor, factor: float) -> Sensor:
+    return replace(sensor, capacitance_f_per_m=sensor.capacitance_f_per_m * factor)
+
+
+def _resistivity(sensor: Sensor, factor: float) -> Sensor:
+    top, bottom = sensor.resistivity_ohm_m
+    return replace(sensor, resistivity_ohm_m=(top * factor, bottom * factor))
+
+
+def _with_law(
+    reference: ReferenceLoad, shares: Callable[[float], Real], scale: float = 1.0
+) -> list[Sensor] | None:  # fmt: skip
+    """The sensor with the rise of its parts at uneven pressures, times a scale; None beyond its law."""
+    sensor = reference.sensor
+    try:
+        law = averaged(sensor.compression, shares, reference.stress_pa())
+    except OutOfRange:
+        return None
+    return [replace(sensor, compression=law.scaled_rise(scale))]
+
+
+def _tilted(model: SensorModel, reference: ReferenceLoad, difference_m: float) -> list[Sensor] | None:
+    """Under a tip that is held so many metres lower at one side; None where it is not known how the film yields."""
+    try:
+        film_pa_per_m = model.sensor.compression.foundation_stiffness_pa_per_m(gap_m(piece(model.body).scene))
+    except (MissingValue, OutOfRange):
+        return None
+    rise_pa = difference_m / (1 / film_pa_per_m + _TIP_M / _TIP_PA)
+    return _with_law(reference, lambda mean_pa: pressure.tilted(rise_pa, mean_pa))

@@ -1,0 +1,162 @@
+"""Response to a load, and by how much another sensor's differs: as readings, and as a press that is read from them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import pi, tan
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensorgen.core.errors import OutOfRange
+from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.identifiability.fisher import bounds, slopes
+from sensorgen.prediction.identifiability.results import GUESS
+from sensorgen.prediction.losses import LOWEST_HZ
+from sensorgen.prediction.query import NOISE, Load
+from sensorgen.prediction.results import Changes, Term
+
+SOURCES = "sources"
+_STEPS = 4  # of Gauss and Newton, to a press that is misread
+_PARALLEL = 1e-9  # of the larger direction, below which another one does not tell
+_MOST = 20.0  # force that a press is misread as, over its own [-]
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class Reading(NamedTuple):
+    """Impedance under the load, its derivatives by force and position, and that at rest; a value per frequency."""
+
+    pressed: Complex
+    by_force: Complex
+    by_position: Complex
+    rest: Complex
+
+    def told(self) -> Real:
+        """What a press is told by: the logarithm of pressed over rest, its real parts before its imaginary ones."""
+        return _parts(np.log(self.pressed / self.rest))
+
+
+@dataclass(frozen=True)
+class Dispersed(Sensor):
+    """A sensor whose permittivity and resistivity fall as powers of the frequency from ``LOWEST_HZ`` on.
+
+    The permittivity has the loss that goes with its power by Kramers and Kronig, tan(n pi / 2) at every frequency.
+    """
+
+    permittivity_power: float = 0.0
+    resistivity_power: float = 0.0
+
+    def at(self, frequency_hz: float) -> Sensor:
+        """The sensor at a frequency [Hz]."""
+        over = frequency_hz / LOWEST_HZ
+        top, bottom = (rho * over**-self.resistivity_power for rho in self.resistivity_ohm_m)
+        return replace(
+            self, tan_delta=self.tan_delta + tan(self.permittivity_power * pi / 2), resistivity_ohm_m=(top, bottom),
+            capacitance_f_per_m=self.capacitance_f_per_m * over**-self.permittivity_power,
+        )  # fmt: skip
+
+
+class ReferenceLoad:
+    """The response to a load, to which responses of other sensors are compared.
+
+    Raises
+    ------
+    OutOfRange
+        A load that the sensor cannot take.
+    """
+
+    def __init__(self, sensor: Sensor, load: Load, noise: float = NOISE) -> None:
+        self.sensor, self.force_n, self._noise = sensor, load.force_n, noise
+        self.at = load.force_n, load.position_m
+        self._frequency = np.asarray(load.frequency_hz, float)
+        self._own = self._read(sensor)
+        self._told = self._grades(sensor)
+
+    def _read(self, sensor: Sensor) -> Reading:
+        """Values of a sensor; of one whose values depend on the frequency, by that of each tone."""
+        tones = [(sensor, self._frequency)]
+        if isinstance(sensor, Dispersed):
+            tones = [(sensor.at(f), np.array([f])) for f in self._frequency.tolist()]
+        read = [(*s.response(f, *self.at), s.impedance(f, 0.0, self.at[1])) for s, f in tones]
+        return Reading(*(np.concatenate(parts) for parts in zip(*read, strict=True)))
+
+    def stress_pa(self) -> float:
+        """Highest pressure under the tip [Pa]."""
+        return float(np.max(self.sensor.stress_pa(*self.at)))
+
+    def term(
+        self, name: str, what: str, kind: Any, others: Sequence[Sensor], *, factor: float = 1.0,
+        since_rest: bool = False, at_least: bool = False, source: str = SOURCES,
+    ) -> Term:  # fmt: skip
+        """An assumption by the sensors at the ends of its range; parameters as :meth:`change` and of the term."""
+        changes = self.change(*others, factor=factor, since_rest=since_rest)
+        return Term(name, what, kind, changes, at_least, source, self.turns(changes, others))
+
+    def change(self, *others: Sensor, factor: float = 1.0, since_rest: bool = False) -> Changes | None:
+        """Largest changes over some other sensors, times a factor; None where one of them cannot take the load.
+
+        ``since_rest`` if the sensor became another one after it was read at rest.
+        """
+        found = Changes()
+        for other in others:
+            try:
+                read = self._read(other)
+            except OutOfRange:
+                return None
+            parts = [_difference(part(read.pressed), part(self._own.pressed)) for part in (np.abs, np.real, np.imag)]
+            c = abs(other.capacitance_f_per_m / self.sensor.capacitance_f_per_m - 1)
+            press = self._misread(read._replace(rest=self._own.rest) if since_rest else read)
+            slope = _difference(read.by_force, self._own.by_force)
+            found = found.max(Changes(*(factor * d for d in (*parts, slope, c, *press))))
+        return found
+
+    def _misread(self, read: Reading) -> tuple[float, float]:
+        """By how much force and position [N], [m] are wrong that the sensor's own model finds in a reading.
+
+        Least squares of the logarithms, by Gauss-Newton steps that stay on the sensor and within its law.
+        """
+        force, place = self.at
+        if not force > 0:
+            return 0.0, 0.0
+        own, sought, scale = self._own, read.told(), np.array([force, self.sensor.length_m])
+        at = np.array(self.at)
+        for _ in range(_STEPS):
+            by = np.column_stack([_parts(own.by_force / own.pressed), _parts(own.by_position / own.pressed)])
+            step = np.linalg.lstsq(by * scale, sought - own.told(), rcond=_PARALLEL)[0]
+            after = np.clip(at + step * scale, 0.0, [_MOST * force, self.sensor.length_m])
+            try:
+                pressed = self.sensor.response(self._frequency, *after.tolist())
+            except OutOfRange:
+                break
+            own, at = Reading(*pressed, own.rest), after
+        return abs(float(at[0]) - force), abs(float(at[1]) - place)
+
+    def _grades(self, sensor: Sensor) -> tuple[float, float]:
+        """Standard errors of force and position, over what a reading without information has."""
+        found = bounds(slopes(sensor, self._frequency, *self.at), self._noise)
+        force = np.nan_to_num(found.force_n, nan=np.inf) / (GUESS * self.force_n or 1.0)
+        return float(force), float(np.nan_to_num(found.position_m, nan=np.inf) / (GUESS * sensor.length_m))
+
+    def turns(self, changes: Changes | None, others: Sequence[Sensor] = ()) -> str:
+        """What is told of a press, and would not be by a change alone: "force", "place", "both", or ""."""
+        if changes is None or not self.force_n:
+            return ""
+        wrong = changes.force_n / (GUESS * self.force_n), changes.position_m / (GUESS * self.sensor.length_m)
+        try:
+            ends = [wrong, *(self._grades(other) for other in others)]
+        except OutOfRange:
+            return ""
+        lost = [own < 1 <= max(end[k] for end in ends) for k, own in enumerate(self._told)]
+        return {(True, True): "both", (True, False): "force", (False, True): "place"}.get((lost[0], lost[1]), "")
+
+
+def _parts(values: Complex) -> Real:
+    return np.concatenate([values.real, values.imag])
+
+
+def _difference(one: NDArray[Any], other: NDArray[Any]) -> float:
+    """Largest relative difference, 0 where both are 0 and inf where only the other is."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.max(np.where(one == other, 0.0, np.abs(one - other) / np.abs(other)), initial=0.0))
