@@ -101,14 +101,17 @@ def test_a_bonded_plate_is_stiffer_the_thinner_it_is():
 
 
 def test_a_pressed_plates_range_is_that_of_plates_drawn_thinner_and_thicker():
-    query, responses = Query(law="bonded", force_n=6.0), []
+    query, responses, resolutions = Query(law="bonded", force_n=6.0), [], []
     for film_mm in (0.6, 0.58, 0.62):
         plate = bodies.drawn(make({"shape": "reference", "parameters": {"dielectric_mm": film_mm}}))
+        resolutions.append(evaluate(plate, query).force_resolution.value)
         responses.append(abs(sensor_model(plate, query)[0].sensor.response(TONES_HZ, 6.0, 0.05)[0]))
     change = max(float(abs(z / responses[0] - 1).max()) for z in responses[1:])
     found = evaluate(bodies.estimated(make({"shape": "reference"})), query)
     term = next(t for t in found.budget.terms if t.name == "film thickness")
     assert term.changes.magnitude == near(change, 2e-2)
+    ends = found.force_resolution.print
+    assert (ends.lower, ends.upper) == (near(min(resolutions), 2e-3), near(max(resolutions), 2e-3))
 
 
 @pytest.mark.nightly

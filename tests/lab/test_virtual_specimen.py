@@ -9,6 +9,7 @@ import pytest
 
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
+from sensorgen.measure.virtual import blank as tables
 from sensorgen.measure.virtual.blank import blank, tracks
 from sensorgen.measure.virtual.cell import AIR, EPSILON_0, Raster, Solid, capacitance, conductance, pressed
 from sensorgen.measure.virtual.section import raster
@@ -160,6 +161,19 @@ def test_modulus_and_permittivity_scale_as_they_should(tri):
     assert 0.07 < np.log(denser.capacitance_f_per_m / tri.capacitance_f_per_m) < 0.1
     thicker = replace(tri, truth=Truth(film_mm=0.02))
     assert thicker.capacitance_f_per_m < 0.98 * tri.capacitance_f_per_m
+
+
+def test_a_blank_has_its_own_values_at_each_place_of_its_table():
+    rng, count = np.random.default_rng(3), len(tables.PRESSURES_PA) - 1
+    rest, rise = np.array([1.0, 1.2, 1.5]), rng.uniform(0.01, 0.1, (3, 3, count))
+    whole = rest[None, :, None] * np.concatenate([np.ones((3, 3, 1)), 1 + rise], axis=2)
+    made = tables.Blank(tuple(tuple(map(tuple, of)) for of in whole.tolist()), (1.0, 1.0), 0.0)
+    for j, permittivity in enumerate(tables._LN_PERMITTIVITY):
+        assert made.capacitance_f_per_m(permittivity) == pytest.approx(rest[j])
+        for i, modulus in enumerate(tables._LN_MODULUS):
+            pressure, found = made.rise(permittivity, modulus)
+            assert found[1:] == pytest.approx(rise[i, j])
+            assert pressure == pytest.approx(np.array(tables.PRESSURES_PA) * np.exp(modulus))
 
 
 @pytest.mark.nightly
