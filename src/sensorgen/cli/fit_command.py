@@ -22,10 +22,9 @@ def _work(
 ) -> None:  # fmt: skip
     """Fit material values to what was measured of specimens or of an iteration, and keep them as a source.
 
-    Each specimen that the bench or an LCR meter has measured is calibrated, as by 'sensorgen calibrate'; the values
-    hold for all prints, and their intervals the scatter between them. A design takes them where it names the source,
-    as in etpu@fit-23. A quarter of the specimens is held back, to see whether the values predict them; and each shape
-    and direction is left out in turn. --thesis is how the default resistivity of PI-eTPU came about.
+    Specimens that the bench or an LCR meter measured are calibrated, as by 'sensorgen calibrate'; the values hold for
+    all prints, their intervals the scatter between them. A design takes them by the source's name, as etpu@fit-23. A
+    quarter of the specimens is held back to test the values, and each shape and direction is left out in turn.
     """
     from dataclasses import replace
 
