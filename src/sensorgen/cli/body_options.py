@@ -58,12 +58,22 @@ def body_of() -> "BodyOf":
     option, value = click.get_current_context().meta.get(_BODY, ("", ""))
     ways: dict[str, BodyOf] = {
         "": bodies.default_body,
-        "--drawn": bodies.drawn,
+        "--drawn": _drawn,
         "--gcode": partial(bodies.from_gcode, file=value),
         "--slicer": partial(_sliced, value),
         "--walls": partial(bodies.estimated, walls=value),
     }
     return ways[option]
+
+
+def _drawn(design: "Design") -> "Body":
+    """The drawing, which is solid: infill that was asked for on the command line would do nothing."""
+    from sensorgen.prediction import bodies
+
+    given = click.get_current_context().params
+    if given.get("infill") or given.get("infill_pattern"):
+        raise BadInput("--drawn and --infill at once: a drawing is solid; leave out --drawn to predict the print")
+    return bodies.drawn(design)
 
 
 def compensate_option() -> click.Option:

@@ -165,7 +165,9 @@ def _meshes(cell: "_Cell", layers: Layers, beside_mm: Sequence[float]) -> tuple[
     With air around it, the flux stays in that air, and the potential is constant beyond: a conductor that floats.
     """
     far_mm, loose_mm = np.inf if cell.air_mm else _FAR * cell.gap_mm, _LOOSE * cell.gap_mm
-    is_sound = not cell.outer and plan(layers, (), _GRID_MM).slenderness_mm() > _SLENDER_MM
+    is_sound = False
+    with suppress(fem.Unsolved):  # the grid is too fine, as coarser ones below may not be
+        is_sound = not cell.outer and plan(layers, (), _GRID_MM).slenderness_mm() > _SLENDER_MM
     for times in _STRETCHED if is_sound else ():
         with suppress(fem.Unsolved):
             beside = [times * far for far in beside_mm]

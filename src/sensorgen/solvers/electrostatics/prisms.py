@@ -144,11 +144,12 @@ def plan(cell: Layers, beside_mm: Sequence[float], grid_mm: float) -> Plan:
     corners = np.rint(shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3])
     points, triangles = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
     triangles = triangles.reshape(-1, 3)
-    one, two = (points[triangles[:, k]] - points[triangles[:, 0]] for k in (1, 2))
+    whole = points.astype(np.int64)  # products of 1e8 and more are no whole numbers in doubles
+    one, two = (whole[triangles[:, k]] - whole[triangles[:, 0]] for k in (1, 2))
     area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
     triangles = np.where((area > 0)[:, None], triangles, triangles[:, ::-1])
-    if np.abs(area).sum() != 2 * x * y or not area.all():
-        raise Unsolved("the triangles of the plan do not fill it: outlines nearer than the grid; report this scene")
+    if int(np.abs(area).sum()) != 2 * int(x) * int(y) or not area.all():
+        raise Unsolved(f"outlines nearer to each other than the grid of {grid_mm:g} mm: triangles do not fill the plan")
     return Plan(points * pitch, triangles, _filled(layers, faces, cell)[:, of_face])
 
 
