@@ -160,7 +160,8 @@ def _by_ratio(
                 f"{measured}: no reading at rest; expected a column 'rest' with 1 where nothing was on the sensor, or "
                 "--rest FILE.csv: what counts is the ratio to it (or --perfect, as if the sensor were as predicted)"
             )
-        rest = Rest(*(_taken_apart(rest_file, tones_hz) if rest_file else (None, np.nan)), baseline)
+        apart, at_s = _taken_apart(rest_file, tones_hz) if rest_file else (None, np.nan)
+        rest = Rest(apart, at_s, baseline)
         summary, made, told, doubted = answers.Summary(), None, False, 0
         write, terminal = _writer(stack, measured, output)
         step = stack.enter_context(show.progress(["reading"]))

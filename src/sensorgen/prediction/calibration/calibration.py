@@ -134,8 +134,8 @@ class Calibration:
         if self.rechecked or not self.posterior.presses:
             return ()
         return (
-            f"lower ends of the force allow, by {OTHERWISE:.0%}, for what no reading shows: a softer film, a wider tip, a "
-            "hand, a second press; 3 to 5 known presses narrow them (sensorgen calibrate --recheck)",
+            "lower ends of the force allow for what no reading shows, until 3 to 5 known presses narrow them ("
+            "sensorgen calibrate --recheck): a softer film, a wider tip, a hand, a second press",
         )
 
     @property

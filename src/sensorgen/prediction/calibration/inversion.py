@@ -33,6 +33,7 @@ _BELOW = 0.3  # share of what lies outside an interval that is below it, where t
 _MORE = 3.2905267314919255  # standard deviations that noise exceeds once in a thousand
 _BELOW_REST = 4.0  # standard deviations that noise exceeds in three readings of 100 000
 _DOUBTED = 200  # readings beside one below its rest, whose rest was probably read the same way
+_UNLIKE = 0.2  # share of the squared distance that another capacitance, of unknown place and size, may leave
 _PLACES = 7  # of a second press, along the sensor
 
 
@@ -320,7 +321,7 @@ def _one_press(found: Found) -> Mask:
 def _more(found: Found) -> Mask:
     """Readings that another capacitance besides a press explains, and a press alone does not."""
     left = found.chi2 - np.square(found.more)
-    return (found.more > _MORE) & (left <= chi2_limit(2 * found.tones - 3))
+    return (found.more > _MORE) & (left <= np.maximum(chi2_limit(2 * found.tones - 3), _UNLIKE * found.chi2))
 
 
 def doubt_rest(found: Found, rest: Mask, left: int) -> int:
