@@ -64,8 +64,7 @@ class Predicted:
             for of in zip(*((r.model, r.print, r.material) for r in ends), strict=True)
         )
         alone = Bounds(geometric_mean(r.value for r in ends), low, high, "ohm", model, by_print, material)
-        leads = [r.leads.upper - r.value for r in with_leads if r.leads]
-        return alone.plus(0.0, 0.0, max(leads)) if leads else alone
+        return alone.plus(0.0, 0.0, max(r.upper for r in with_leads) - high)
 
     @property
     def capacitance_f(self) -> Interval | None:
