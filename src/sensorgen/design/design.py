@@ -57,7 +57,7 @@ class Slots(Strict):
 
 
 class Leads(Strict):
-    """What lies between the sensor and the meter: in parallel, in series, and whether a guard is driven."""
+    """Leads between the sensor and the meter: in parallel, in series, and the state of their guard."""
 
     capacitance_pf: Annotated[float, Field(ge=0)] | None = Field(
         default=None, description="Of the leads; 0 to 5 pF when not given, to 0.1 with a driven guard [pF]."

@@ -1,7 +1,7 @@
 """Values of a design's materials, each with its source: permittivities, moduli, piezoresistance."""
 
 from dataclasses import dataclass
-from math import exp, log
+from math import exp, inf, log
 
 from sensorgen.core.errors import MissingValue
 from sensorgen.design.design import Design
@@ -102,14 +102,17 @@ def spread(design: Design, value: MaterialValue) -> tuple[float, float]:
         return min(at, low), max(at, high)
     given = [v.value for v in material.properties.get(quantity, ()) if not v.implausible]
     several = [] if value.source == SET else [at, *given]
-    factor = exp(SD_95 * (LN_SOURCES if len(set(several)) == 1 else LN_SPREAD).get(quantity, 0.0))
-    if quantity == "relative_permittivity" and at > 1:  # of the excess over vacuum
-        low, high = 1 + (at - 1) / factor, 1 + (at - 1) * factor
-    else:
-        low, high = at / factor, at * factor
-    if quantity == "poisson_ratio":
-        high = max(at, min(high, _RUBBER))
-    return min([low, *several]), max([high, *several])
+    ends = _around(quantity, at, (LN_SOURCES if len(set(several)) == 1 else LN_SPREAD).get(quantity, 0.0))
+    return min([*ends, *several]), max([*ends, *several])
+
+
+def _around(quantity: str, at: float, deviation: float) -> tuple[float, float]:
+    """Ends by a deviation of ln: of a permittivity's excess over vacuum, of a ratio up to that of rubber."""
+    factor = exp(SD_95 * deviation)
+    if quantity == "relative_permittivity" and at > 1:
+        return 1 + (at - 1) / factor, 1 + (at - 1) * factor
+    most = max(at, _RUBBER) if quantity == "poisson_ratio" else inf
+    return at / factor, min(at * factor, most)
 
 
 def ln_spread(material: Material, source: str, quantity: str) -> tuple[float, float]:

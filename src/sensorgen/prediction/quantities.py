@@ -14,9 +14,10 @@ from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
+from sensorgen.design.design import Design
 from sensorgen.design.effects import Effects
 from sensorgen.design.tip import WORDS
-from sensorgen.design.values import ASSUMED, ENDS, lead_ranges, spread
+from sensorgen.design.values import ASSUMED, ENDS, MaterialValue, lead_ranges, spread
 from sensorgen.models import line
 from sensorgen.models.compression import Compression
 from sensorgen.models.sensor import Sensor
@@ -211,7 +212,7 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
 
 
 def _unknown(model: SensorModel) -> str:
-    """Why a verdict is conditional: a law of unknown error, or values that no source gives; or ""."""
+    """Reason for a conditional verdict: a law of unknown error, or values that no source gives; or ""."""
     lacking = [f"{v.quantity} of {v.material}" for v in model.values if v.source == ASSUMED]
     if not model.law.bounded:
         return _ASSUMED
@@ -412,6 +413,20 @@ def _moduli(model: SensorModel) -> list[Compression]:
     return [model.law.compression.scaled_modulus(factor) for factor in modulus_range(model)[:2] if factor != 1]
 
 
+def _ranges_assumed(design: Design, values: Iterable[MaterialValue]) -> Iterator[str]:
+    """Ranges in place of values that no source gives, and of leads."""
+    for value in values:
+        if value.source == ASSUMED:
+            low, high = spread(design, value)
+            about = f"{value.quantity} of {value.material} {value.value:.3g}"
+            yield f"{about} ({low:.3g} to {high:.4g}): no source gives it"
+    farad, ohm = lead_ranges(design)
+    yield (
+        f"leads of {1e12 * farad[1]:.3g} to {1e12 * farad[2]:.3g} pF, with contacts {ohm[1]:.4g} to {ohm[2]:.4g} ohm: "
+        "'leads' of the design states them"
+    )
+
+
 def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
     """What is taken for granted."""
     if is_open(body.cells.first()):
@@ -419,17 +434,7 @@ def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
     else:
         yield "electrodes are equipotential for the capacitance; the fringe at the sensor's edge is in the range alone"
     yield "electrode resistance from end face to end face, cogs included"
-    for value in model.values if model else ():
-        if value.source == ASSUMED:
-            low, high = spread(body.design, value)
-            yield (
-                f"{value.quantity} of {value.material} {value.value:.3g} ({low:.3g} to {high:.4g}): no source gives it"
-            )
-    farad, ohm = lead_ranges(body.design)
-    yield (
-        f"leads of {1e12 * farad[1]:.3g} to {1e12 * farad[2]:.3g} pF, with contacts {ohm[1]:.3g} to {ohm[2]:.3g} ohm: "
-        "'leads' of the design states them"
-    )
+    yield from _ranges_assumed(body.design, model.values if model else ())
     if not body.is_drawn:
         yield "contacts between extruded lines cost no resistance: no source gives their resistivity"
     gone = lost(body.design).taken

@@ -338,7 +338,7 @@ class Prediction(Displayed):
 
     @property
     def conditional(self) -> bool:
-        """Whether it rests on values that no source gives."""
+        """True where it rests on values that no source gives."""
         return any(value.source == ASSUMED for value in self.values)
 
     def resolved(self, which: int, most: float, cannot: str) -> str:
@@ -396,7 +396,7 @@ class Prediction(Displayed):
         yield from self.remarks()
 
     def _ranges(self) -> Table:
-        """What the ranges of capacitance and resistance hold."""
+        """Causes of the ranges of capacitance and resistance."""
         c = self.capacitance or Bounds.of(0.0, "F")
         certified = " (certified)" if c.certified else ""
         heads = ("range of", f"model{certified}", "print", "material", "leads, edge")
@@ -408,7 +408,7 @@ class Prediction(Displayed):
         return Table("ranges", "", tuple(map(Column, heads)), tuple(ranges))
 
     def remarks(self) -> Iterator[Part]:
-        """What is assumed, and what is doubtful."""
+        """Assumptions and doubts."""
         yield from (f"assumed: {assumption}" for assumption in self.assumptions)
         yield from (f"doubtful: {doubt}" for doubt in self.doubts)
 

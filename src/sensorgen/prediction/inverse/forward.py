@@ -154,10 +154,13 @@ class Scalar:
                 step = self._open if self._load is None else self._closed
                 passed = [step(q, y_k, r, length) for q, y_k in zip(passed, y, strict=True)]
         sign = -1.0 if self._load is None else 1.0
+        return self._at_leads([sign * cmath.log(q) for q in passed])
+
+    def _at_leads(self, ln_z: list[complex]) -> list[complex]:
+        """Natural logarithm of Z/ohm at the meter, of that of the sensor."""
         if not self._sensor.lead_f and not self._sensor.lead_ohm:
-            return [sign * cmath.log(q) for q in passed]
-        z = np.array([q if sign > 0 else 1 / q for q in passed], np.complex128)
-        at_meter = self._sensor.at_leads(z, self._frequency_hz)
+            return ln_z
+        at_meter = self._sensor.at_leads(np.exp(ln_z), self._frequency_hz)
         return [cmath.log(z) for z in at_meter.tolist()]
 
     @staticmethod
