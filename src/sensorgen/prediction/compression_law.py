@@ -406,11 +406,11 @@ def solved(
 
 def _tops(design: Design, piece: Piece, model: str, tip: Tip, own: Curve) -> dict[str, Curve]:
     """Curves under an even pressure and a stiff plate, by the ratio of rises on the coarsest mesh."""
-    loads = [own.stress_pa[-1] * share for share in _COARSE]
+    loads, level = [own.stress_pa[-1] * share for share in _COARSE], USUAL - 1 if model == "press3d" else COARSEST
 
     def rise(block: str) -> Real:
         try:
-            found = pressed(case_of(design, piece, model, replace(tip, block=block)), loads, COARSEST).sound()
+            found = pressed(case_of(design, piece, model, replace(tip, block=block)), loads, level).sound()
         except SensorgenError:
             return np.zeros(0)
         values = np.array([c.middle() if c else np.nan for c in found.capacitance_f_per_m2])

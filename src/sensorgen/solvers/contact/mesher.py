@@ -32,7 +32,7 @@ class Unmeshed(BadInput):
 
 
 class Made(NamedTuple):
-    """Output of the mesher: places (n, 2), corners (m, 3) and regions (m,) of triangles, sides (k, 2) and their edge."""
+    """Output of the mesher: places (n, 2), corners (m, 3) and regions (m,) of triangles, sides (k, 2), their edges."""
 
     points: Real
     corners: Whole
