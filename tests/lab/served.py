@@ -9,10 +9,11 @@ from contextlib import ExitStack
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
+import serving
 from laboratory import LIMIT_N, specimen
 
 from sensorgen.measure.lab.clock import RealClock
-from sensorgen.measure.virtual import mechanics, reprap, serving
+from sensorgen.measure.virtual import mechanics, reprap
 from sensorgen.measure.virtual.reprap import RepRapFirmware
 from sensorgen.measure.virtual.scpi import LcrMeter
 from sensorgen.measure.virtual.smac import SmacController

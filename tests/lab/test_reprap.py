@@ -5,6 +5,7 @@ import re
 from contextlib import suppress
 
 import pytest
+from serving import http_server, pseudo_terminal
 
 from lab.spring_plant import SpringPlant
 from sensorgen.core.errors import BadInput, OutOfRange
@@ -13,7 +14,6 @@ from sensorgen.measure.lab.clock import RealClock, SimulatedClock
 from sensorgen.measure.lab.devices import DeviceFault, WrongDevice
 from sensorgen.measure.lab.port import HttpPort, SerialPort, SimulatedPort, SimulatedWeb
 from sensorgen.measure.virtual.reprap import FAULTS, RepRapFirmware
-from sensorgen.measure.virtual.serving import http_server, pseudo_terminal
 
 WAYS = ("serial", "http")
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from serving import tcp_server
 
 from lab.spring_plant import SpringPlant
 from sensorgen.core.errors import OutOfRange
@@ -13,7 +14,6 @@ from sensorgen.measure.lab.clock import RealClock, SimulatedClock
 from sensorgen.measure.lab.devices import DeviceFault, WrongDevice
 from sensorgen.measure.lab.port import SimulatedPort, VisaPort
 from sensorgen.measure.virtual import scpi
-from sensorgen.measure.virtual.serving import tcp_server
 
 TONES = np.array([1000.0, 1e5])
 MODELS = {"hp-4284a": lcr_meter.HP_4284A, "keysight-e4980a": lcr_meter.E4980A}

@@ -4,6 +4,7 @@ import math
 from contextlib import suppress
 
 import pytest
+from serving import pseudo_terminal
 
 from lab.spring_plant import SpringPlant
 from sensorgen.core.errors import OutOfRange
@@ -11,7 +12,6 @@ from sensorgen.measure.lab import smac
 from sensorgen.measure.lab.clock import SimulatedClock
 from sensorgen.measure.lab.devices import DeviceFault, WrongDevice
 from sensorgen.measure.lab.port import SerialPort, SimulatedPort
-from sensorgen.measure.virtual.serving import pseudo_terminal
 from sensorgen.measure.virtual.smac import FAULTS, SmacController
 
 ASKED = b"32 R 0x1000\r32 R 0x11018\r"
