@@ -134,7 +134,7 @@ def changes_text(specimens):
     head = (
         "\n## Changed after the calibration\n\n"
         f"Design: tri 0.2 mm, 100 mm, told a tip of 5 mm (4.6 to 5.5 mm), seven tones, noise 0.1 %; {specimens} "
-        f"specimens of a simulator that shares no code, {AFTER} presses each on another day: 1.5 K, 5 ohm and 0.1 pF off. "
+        f"specimens of a simulator that shares no code, {AFTER} presses each on another day: 1.5 K, 5 ohm, 0.1 pF off. "
         "Prints have gaps of 0.18 to 0.42 mm, every third is as drawn. Answered: ok or force only; covered: the 90 % "
         "interval of the force (and of the position) holds it, of a changed sensor among those answered.\n\n"
         "| body | sensor | before: answered | covered | now: answered (ok) | covered | median width |\n"
