@@ -26,7 +26,7 @@ C_F_PER_M, R_OHM_PER_M, MODULUS_PA, TIP_M, WIDTH_M, LENGTH_M = (
 
 def terms(**effects):
     design = make({"shape": "reference", "material_values": VALUES, "effects": STILL | effects})
-    budget = error_budget(sensor_of(design), Load(TONES_HZ, FORCE_N, PLACE_M))
+    budget = error_budget(sensor_of(design, "unconfined"), Load(TONES_HZ, FORCE_N, PLACE_M))
     return {t.name: t for t in budget.terms}
 
 
@@ -98,7 +98,7 @@ def test_what_a_design_leaves_out_is_no_term_and_what_it_states_has_it_as_source
         == make({"shape": "reference", "effects": {}}).id()
         != make({"shape": "reference", "effects": STILL}).id()
     )
-    budget = error_budget(sensor_of(own), Load(TONES_HZ, FORCE_N, PLACE_M))
+    budget = error_budget(sensor_of(own, "unconfined"), Load(TONES_HZ, FORCE_N, PLACE_M))
     assert {t.source for t in budget.terms if t.kind in ("drift", "tip", "person", "meter")} == {"guess"}
 
 
