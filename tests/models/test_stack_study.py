@@ -96,7 +96,9 @@ def test_the_force_of_a_known_shift_is_read_back():
 
 
 def test_a_double_design_has_the_halves_of_two_plates():
-    design = make({"shape": "double", "parameters": {"lower_dielectric_mm": 0.3, "upper_dielectric_mm": 0.9}})
+    slots = {"bottom_electrode": "etpu@thesis-c.1-bottom"}
+    given = {"lower_dielectric_mm": 0.3, "upper_dielectric_mm": 0.9}
+    design = make({"shape": "double", "parameters": given, "materials": slots})
     lower, upper = stacked(design).double.films
     for film, thickness in ((lower, 0.3), (upper, 0.9)):
         assert film.capacitance_f_per_m == pytest.approx(8.8541878128e-12 * 4.68 * 10.0 / thickness, rel=1e-9)
