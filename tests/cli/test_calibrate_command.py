@@ -126,6 +126,16 @@ def test_the_report_has_it(after):
     assert "## Calibrated specimens" in said.out
 
 
+def test_the_readings_of_another_specimen_are_called_so(after, tmp_path):
+    unseen(tmp_path / "m.csv", 20, replace(TRUTH, capacitance=TRUTH.capacitance + 0.1))
+    said = after("invert", "S1", "m.csv", "-o", "o.csv")
+    assert said.code == 0, said.err
+    assert "20 changed since calibration" in said.words
+    assert "note: C +1" in said.words
+    assert "at rest since the calibration: a load or moisture on it, or another specimen" in said.words
+    assert {row["status"] for row in rows(tmp_path / "o.csv")[1::2]} == {"changed since calibration"}
+
+
 def test_a_recheck_with_another_tip_alarms_and_mends(after, tmp_path):
     other = replace(TRUTH, tip_m=9e-3)
     recorded(other, tmp_path, 5, 9, name="again")

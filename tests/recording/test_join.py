@@ -131,6 +131,9 @@ def test_a_sensor_that_does_not_answer_leaves_the_clocks_as_they_are(tmp_path, r
 
     with pytest.raises(BadInput, match="too little to find the offset"):
         joined(recording(dead, stamped=False), log)
+    shown, *others = made.rig_rows(MADE)
+    same = rig(made.write_rig(tmp_path / "same.csv", [shown - made.EPOCH_S, *others]))
+    assert "assumed to agree" in joined(recording(dead, stamped=False), same).clock_text()  # both count from 0
     far = rig(made.write_rig(tmp_path / "far.csv", made.rig_rows(MADE, 9000.0)))
     with pytest.raises(BadInput, match="do not overlap within 1 s"):
         joined(recording(run), far, within_s=1.0)

@@ -59,7 +59,8 @@ def known_presses(log: Log, name: str, rows: Sequence[BenchRun]) -> tuple[Data, 
                     ]
                     pairs = done.pairs if done.by_force else None
                     if with_rig is not None and np.isnan(with_rig.offset_error_s):
-                        left_out.append(f"recording {row.number}: no response to the force, {with_rig.clock_text()}")
+                        left_out.append(f"recording {row.number}: {with_rig.clock_text()}")
+                        pairs = pairs if np.isfinite(recording.epoch_s) else None
                     found.append((recording.tones_hz, pairs, *_rest(done.recording, done.pairs)))
         except SensorgenError as error:
             left_out.append(f"recording {row.number} left out: {error}")

@@ -135,8 +135,8 @@ class Inverter:
         Probability of the intervals [-].
     otherwise : float
         Probability that the press makes a share of a reading alone [-]: the sensor is softer or the tip wider than in
-        the calibration, or something else is there, and the frequencies cannot tell. The share is below s with the
-        probability sqrt(s).
+        the calibration, or something else is there, and the frequencies do not separate these. The share is below s
+        with the probability sqrt(s).
 
     Attributes
     ----------
