@@ -274,7 +274,7 @@ def test_other_tones():
 def plate():
     """The plate of Table 3.1, free to expand (B.49), and its design."""
     design = make({"shape": "reference"})
-    return design, sensor_of(design)
+    return design, sensor_of(design, "unconfined")
 
 
 def exact(f, force, x_mm):

@@ -52,7 +52,10 @@ def _tables(worked: "Processed", presses: str | None, filtered: str | None) -> l
     if presses and pairs is not None:
         at_rest = [pairs.time_s, np.ones(len(pairs.time_s)), *np.full((2, len(pairs.time_s)), np.nan)]
         pressed = [pairs.time_s, np.zeros(len(pairs.time_s)), pairs.force_n, pairs.position_mm]
-        beside, z = _in_turn(np.array([at_rest, pressed])), _in_turn(np.array([pairs.before_ohm.T, pairs.pressed_ohm.T]))
+        beside, z = (
+            _in_turn(np.array([at_rest, pressed])),
+            _in_turn(np.array([pairs.before_ohm.T, pairs.pressed_ohm.T])),
+        )
         store.replace(Path(presses), _csv(("time_s", "rest", "force_n", "position_mm"), [*beside], tones, z.T))
     if filtered:
         store.replace(Path(filtered), _csv(("time_s",), [worked.filtered_s], tones, worked.filtered_ohm))

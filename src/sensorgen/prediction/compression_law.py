@@ -111,7 +111,9 @@ def law_of(design: Design, answer: Answer, name: str = "", *, printed: Piece | N
     if name == "bonded":
         raise OutOfRange(f"the law 'bonded' applies to a solid plate; {design.shape} has gaps: expected 'unconfined'")
     if name == "free":
-        raise OutOfRange(f"cells of {design.shape} are held by their neighbours: expected the sides bonded or symmetric")
+        raise OutOfRange(
+            f"cells of {design.shape} are held by their neighbours: expected the sides bonded or symmetric"
+        )
     if name == "symmetric":  # as the neighbours of a cell with gaps hold it anyway
         name = ""
     if name == "infill":
