@@ -10,6 +10,7 @@ from sensorgen.asprinted import film
 from sensorgen.design.body import DRAWN
 from sensorgen.design.design import make
 from sensorgen.models import columns, fem3d
+from sensorgen.models import sandwich
 from sensorgen.prediction import bodies
 from sensorgen.prediction.compression_law import solved
 from sensorgen.prediction.evaluate import evaluate
@@ -91,9 +92,13 @@ def test_a_film_that_may_be_none_has_no_upper_bound():
 
 
 def test_a_bonded_plate_is_stiffer_the_thinner_it_is():
-    """Gent and Lindley: modulus 4/3 E (1 + (W / 2 d)^2), at 0.58 and 0.62 mm."""
+    """As the law of tests/models/test_sandwich.py is, at 0.58 and 0.62 mm."""
     found = evaluate(bodies.estimated(make({"shape": "reference"})), Query(law="bonded", force_n=6.0))
-    strain = [60e3 / (4 / 3 * 6e6 * (1 + (10 / (2 * d)) ** 2)) for d in (0.58, 0.6, 0.62)]
+    electrodes = {"electrode_pa": (22e6, 22e6), "electrode_m": (3e-4, 3e-4)}
+    strain = [
+        60e3 / sandwich.modulus_pa(6e6, 0.01, d * 1e-3, 6e6 / (3 * (1 - 2 * 0.4999)), **electrodes)
+        for d in (0.58, 0.6, 0.62)
+    ]
     thin, usual, thick = (s / (1 - s) / 60 for s in strain)
     assert found.sensitivity.value == near(usual)
     assert (found.sensitivity.print.lower, found.sensitivity.print.upper) == (near(thin), near(thick))

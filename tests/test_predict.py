@@ -305,7 +305,7 @@ def test_other_tones():
 def plate():
     """The plate of Table 3.1 with the electrodes of Table C.1, free to expand (B.49), and its design."""
     design = make({"shape": "reference", "materials": TABLE_C_1})
-    return design, sensor_of(design)
+    return design, sensor_of(design, "unconfined")
 
 
 def exact(f, force, x_mm):

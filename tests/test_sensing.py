@@ -18,13 +18,10 @@ def test_the_plate_of_table_3_1():
     assert sensor.electrode_m == pytest.approx((3e-4, 3e-4))
     assert sensor.resistivity_ohm_m == (0.042, 0.042)
     assert sensor.capacitance_f() == pytest.approx(69.06266493984e-12, rel=1e-10, abs=0)
-    assert sensor.compression.modulus_pa == 6e6
+    assert sensor.compression.modulus_pa == pytest.approx(11.77 * 6e6, rel=0.04)  # tests/reference/bonded_plates.json
+    assert sensed("reference", "unconfined").sensor.compression.modulus_pa == 6e6
     assert ("x60", "youngs_modulus_pa", 6e6) in {(t.material, t.quantity, t.value) for t in found.values}
     assert "bonded" in found.doubts[0]
-
-
-def test_a_bonded_plate_is_94_times_stiffer():
-    assert sensed("reference", "bonded").sensor.compression.modulus_pa == pytest.approx(94 * 6e6, rel=2e-3)
 
 
 @pytest.mark.parametrize(("shape", "film"), [("tri", 0.1), ("tri", 0.2), ("rect", 0.1), ("rect", 0.2)])
@@ -73,10 +70,10 @@ def test_a_round_tip_on_the_film_and_on_the_cell_as_a_bed():
     """Length of the contact at 6 N over 10 mm: Hertz's with E / (1 - nu^2), a bed's with pressure over displacement."""
     plate, tri = make({"shape": "reference"}), make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})
     load, radius = 6 / 0.01, 0.05
-    thick = sensor_of(plate, profile="hertz", radius_m=radius).sensor
+    thick = sensor_of(plate, "unconfined", profile="hertz", radius_m=radius).sensor
     assert float(thick.contact_m(6.0)[0]) == pytest.approx(4 * (load * radius / (3.14159265 * 8e6)) ** 0.5, rel=1e-3)
     for design, bed in ((plate, 6e6 / 6e-4), (tri, 1e5 / 33.12e-6)):
-        found = sensor_of(design, profile="parabola", radius_m=radius).sensor
+        found = sensor_of(design, "unconfined" if design is plate else "", profile="parabola", radius_m=radius).sensor
         assert float(found.contact_m(6.0)[0]) == pytest.approx(2 * (1.5 * radius * load / bed) ** (1 / 3), rel=1e-6)
     stiff = sensor_of(plate, "bonded", profile="parabola", radius_m=radius).sensor
     assert stiff.contact_m(6.0)[0] < thick.contact_m(6.0)[0]

@@ -11,10 +11,11 @@ import click
 import numpy as np
 import pytest
 
+from sensorgen.models import sandwich
 from sensorgen.solvers.electrostatics.bounds import CrossedBounds
 
 needs_mesher = pytest.mark.skipif("not __import__('importlib').util.find_spec('netgen')", reason="needs NGSolve")
-PLATE = ("compress", "reference", "--stress", "100", "--json")
+PLATE = ("compress", "reference", "--sides", "symmetric", "--stress", "100", "--json")
 
 
 @pytest.fixture(autouse=True)
@@ -48,7 +49,7 @@ def test_values_of_materials_are_taken(run):
 
 @needs_mesher
 def test_sides_that_give_way(run):
-    free = json.loads(run(*PLATE, "--sides", "free", "--base", "sliding").out)
+    free = json.loads(run(*PLATE[:2], "--sides", "free", *PLATE[4:]).out)
     fixed = json.loads(run(*PLATE).out)
     assert free["held"] == {"base": "sliding", "period": "free", "top": "even", "contact": "frictionless"}
     assert free["displacement_um"][1] > 400 * fixed["displacement_um"][1]
@@ -56,7 +57,7 @@ def test_sides_that_give_way(run):
 
 @needs_mesher
 def test_the_table_and_the_picture(run, tmp_path):
-    said = run("compress", "reference", "--stress", "0.1MPa", "--plot", "a.png")
+    said = run("compress", "reference", "--sides", "symmetric", "--stress", "0.1MPa", "--plot", "a.png")
     assert said.code == 0
     assert "converged up to 100 kPa" in said.out
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
@@ -66,7 +67,7 @@ def test_the_table_and_the_picture(run, tmp_path):
 @needs_mesher
 def test_a_picture_that_has_no_place(run, tmp_path):
     (tmp_path / "a.png").mkdir()
-    said = run("compress", "reference", "--stress", "100", "--plot", "a.png")
+    said = run("compress", "reference", "--sides", "symmetric", "--stress", "100", "--plot", "a.png")
     assert said.code == 2
     assert "it is a folder" in said.line
 
@@ -114,7 +115,7 @@ def test_a_shape_that_a_model_cannot_speak_of_is_refused(run):
         (["--stress", "much"], "is not a stress"),
         (["--stress", "10:0:5"], "--stress"),
         (["--stress", "5mm"], "is not a stress"),
-        (["--base", "glued"], "bonded"),
+        (["--sides", "glued"], "bonded"),
         (["--contact", "slippy"], "frictionless"),
         (["--model", "press4d"], "press2d"),
         (["--set", "nu_x60=0.6"], "0.5"),
@@ -123,7 +124,6 @@ def test_a_shape_that_a_model_cannot_speak_of_is_refused(run):
         (["--material", "dielectric=bvoh"], "bvoh"),
         (["--model", "springs", "--stress", "9000MPa"], "flat"),
         (["--set", "youngs_modulus_x60=5e4"], "100 kPa on x60 of 50 kPa"),
-        (["--sides", "free"], "expected base 'sliding'"),
         (["--plot", "a.pdf"], ".png"),
         (["--drawn", "--walls", "cura"], "--drawn and --walls at once; expected one"),
         (["--slicer", "cura", "--walls", "cura"], "--slicer and --walls at once; expected one"),
@@ -187,13 +187,14 @@ def test_without_the_mesher_a_model_that_was_named_and_an_accuracy_are_not_met(r
 
 
 def test_laws_of_a_plate(run):
-    """B.49: thickness times stress over E. Bonded: Gent and Lindley, 93.9 times as stiff where it is 10 x 0.6 mm."""
+    """B.49: thickness times stress over E; bonded, the law of tests/models/test_sandwich.py."""
     moved = {
         law: json.loads(run(*PLATE, "--model", law, "--set", "youngs_modulus_x60=3e6").out)["displacement_um"]
         for law in ("unconfined", "bonded")
     }
     assert moved["unconfined"] == pytest.approx([0.0, 600 * 1e5 / 3e6])
-    assert moved["bonded"] == pytest.approx([0.0, 600 * 1e5 / 3e6 / 93.9], rel=1e-3)
+    tied = sandwich.modulus_pa(3e6, 0.01, 6e-4, 5e9, electrode_pa=(22e6, 22e6), electrode_m=(3e-4, 3e-4))
+    assert moved["bonded"] == pytest.approx([0.0, 600 * 1e5 / tied], rel=1e-3)
     for law in moved:
         assert "applies to a solid plate of one material, tri is none" in run("compress", "tri", "--model", law).line
     two = ("--isolation", "0.2", "--material", "isolation=pla", "--set", "eps_pla=4")
@@ -214,7 +215,7 @@ def test_what_is_not_to_be_trusted_is_said_with_exit_code_1(run, monkeypatch):
         return replace(solved(*args, **more), faults=("converged up to 5 of 100 kPa",))
 
     monkeypatch.setattr(press2d, "press", stalled)
-    found = run("compress", "reference", "--stress", "5")
+    found = run("compress", "reference", "--sides", "symmetric", "--stress", "5")
     assert found.code == 1
     assert "not to be trusted: converged up to 5 of 100 kPa" in found.line
 
@@ -232,7 +233,7 @@ def test_the_bar_goes_on_where_a_cell_is_pressed_again_on_another_mesh(monkeypat
     assert shown == [1, 2, 2, 2, 3, 4]
 
 
-PLATE_1 = ("compress", "reference", "--stress", "100", "--accuracy")
+PLATE_1 = ("compress", "reference", "--sides", "symmetric", "--stress", "100", "--accuracy")
 
 
 @needs_mesher
@@ -291,7 +292,18 @@ def test_loads_of_next_to_nothing(run):
     assert found["displacement_um"][2] == pytest.approx(100 * found["displacement_um"][1], rel=0.02)
 
 
-MODULI = ("compress", "reference", "--stress", "50,100", "--sweep", "youngs_modulus_x60=1e4,3e6,6e6", "--jobs", "1")
+MODULI = (
+    "compress",
+    "reference",
+    "--sides",
+    "symmetric",
+    "--stress",
+    "50,100",
+    "--sweep",
+    "youngs_modulus_x60=1e4,3e6,6e6",
+    "--jobs",
+    "1",
+)
 
 
 @pytest.fixture
@@ -394,7 +406,7 @@ def test_bounds_that_cross_stop_a_sweep_and_what_was_solved_is_known(run, asked)
 def test_a_sweep_in_processes_is_what_each_point_is_alone(run, asked, monkeypatch):
     """The stub is of this process alone, which solves nothing."""
     monkeypatch.setattr("os.cpu_count", lambda: 2)
-    words = ("compress", "reference", "--stress", "100", "--json")
+    words = ("compress", "reference", "--sides", "symmetric", "--stress", "100", "--json")
     rows = json.loads(run(*words, "--sweep", "eps_x60=2.34,4.68").out)
     assert [row["lower_f_per_m2"][0] * 4e-6 for row in rows] == pytest.approx(
         [0.27625066e-12 / 2, 0.27625066e-12], rel=1e-6, abs=0
@@ -427,3 +439,20 @@ def test_one_design_as_csv_is_a_row_per_stress(run):
     rows = list(csv.DictReader(io.StringIO(run("compress", "reference", "--model", "springs", "--csv").out)))
     assert [float(row["stress_kpa"]) for row in rows] == [10 * k for k in range(11)]
     assert {row["model"] for row in rows} == {"springs"}
+
+
+@pytest.mark.parametrize("body", [("--drawn",), (), ("--infill", "80")])
+def test_predict_and_compress_give_a_plate_one_answer(run, body):
+    curve = json.loads(run("compress", "reference", *body, "--stress", "60", "--json").out)
+    rest = (curve["lower_f_per_m2"][0] + curve["upper_f_per_m2"][0]) / 2
+    found = json.loads(run("predict", "reference", *body, "--json").out)
+    assert curve["rise_f_per_m2"][1] / rest / 60 == pytest.approx(found["sensitivity"]["value"], rel=1e-3)
+    assert curve["model"] == ("infill" if "--infill" in body else "bonded")
+    assert found["sensitivity"]["value"] == pytest.approx(
+        2.1e-4 if "--infill" in body else 1.42e-5, rel=0.05
+    )  # 11.77 E
+
+
+def test_infill_beside_the_drawing_is_refused(run):
+    for command in ("predict", "compress"):
+        assert "a drawing is solid" in run(command, "reference", "--drawn", "--infill", "20").line

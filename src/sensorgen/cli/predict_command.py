@@ -37,7 +37,7 @@ OWN: list[click.Parameter] = [
         "the force up to the tip's length. All of the tip touches if not given.",
     ),
     options.compression(
-        "infill", "solved", about="How the cell deforms: as a plate, free or bonded, as infill of flat electrodes, "
+        "symmetric", "infill", "free", "solved", about="How the cell deforms: as a plate, free or bonded, as infill of flat electrodes, "
         "or solved (needs NGSolve; seconds in a cross-section, up to minutes in 3D); if not given, solved in a "
         "cross-section.",
     ),
