@@ -57,7 +57,7 @@ class Predicted:
         with_leads = self.prediction.resistance.values()
         if not with_leads:
             return None
-        ends = [r.alone() for r in with_leads]
+        ends = list(map(Bounds.alone, with_leads))
         low, high = min(r.lower for r in ends), max(r.upper for r in ends)
         model, by_print, material = (
             Interval(min(part.lower for part in of), max(part.upper for part in of))
