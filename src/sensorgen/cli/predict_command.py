@@ -93,7 +93,7 @@ def _work(
             asked = compression or tip_mm is not None or radius_mm is not None
             if found.capacitance and not found.budget and asked:
                 raise BadInput(found.reason)
-            found = prediction if details or explain or accuracy else Overview(**vars(prediction))
+            found = prediction if details or explain or accuracy or frequency_hz else Overview(**vars(prediction))
     if plot and not isinstance(found, Prediction):
         _plot(found, Path(plot))
     else:
