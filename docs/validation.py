@@ -26,8 +26,8 @@ SERIES = 23  # of Table D.1
 PDMS_KPA = (0.0, 10.0)
 HEAD = """# Validation
 
-Written by `make docs`: what others measured beside our predictions, with 95 % ranges of what is not stated. Facts and
-sources: `tests/reference/published.yaml`; Table D.1: `tests/reference/table_d1.csv`.
+Written by `make docs`: measured by others, predicted by us, with 95 % ranges. Facts and sources:
+`tests/reference/published.yaml`, `tests/reference/table_d1.csv`.
 """
 
 

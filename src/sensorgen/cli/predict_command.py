@@ -96,7 +96,7 @@ def _work(
             asked = query.law or tip != FLAT
             if found.capacitance and not found.budget and asked:
                 raise BadInput(found.reason)
-            found = prediction if details or explain or accuracy else Overview(**vars(prediction))
+            found = prediction if details or explain or accuracy or frequency_hz else Overview(**vars(prediction))
     if plot and not isinstance(found, Prediction):
         _plot(found, Path(plot))
     else:
