@@ -12,7 +12,7 @@ from sensorgen.design.body import Body
 from sensorgen.measure.log import Entry, Log, Withdrawal
 from sensorgen.measure.log import Prediction as Stored
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.losses import Lost, lost
+from sensorgen.prediction.losses import NOTHING_LOST, Lost, lost
 from sensorgen.prediction.quantities import impedance_at
 from sensorgen.prediction.results import Prediction, from_json
 
@@ -47,7 +47,7 @@ class Predicted:
     version: str
     before: bool | None = False
     order: str = ""
-    losses: Lost = Lost()
+    losses: Lost = NOTHING_LOST
 
     @cached_property
     def ry_ohm(self) -> Bounds | None:
