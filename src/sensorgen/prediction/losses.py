@@ -102,6 +102,9 @@ class Lost:
     doubts: tuple[str, ...] = ()
 
 
+NOTHING_LOST = Lost()
+
+
 def lost(design: Design) -> Lost:
     r"""What the dielectrics of a design lose, as far as the design or a source that it names says.
 

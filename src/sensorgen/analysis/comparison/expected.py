@@ -14,7 +14,7 @@ from sensorgen.measure.log import Entry, Log, Withdrawal
 from sensorgen.measure.log import Prediction as Stored
 from sensorgen.measure.signal.leakage import along_ohm, leak_s
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.losses import Lost, lost
+from sensorgen.prediction.losses import NOTHING_LOST, Lost, lost
 from sensorgen.prediction.quantities import impedance_at
 from sensorgen.prediction.results import Prediction, from_json
 
@@ -49,7 +49,7 @@ class Predicted:
     version: str
     before: bool | None = False
     order: str = ""
-    losses: Lost = Lost()
+    losses: Lost = NOTHING_LOST
 
     @cached_property
     def ry_ohm(self) -> Bounds | None:

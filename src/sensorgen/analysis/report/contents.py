@@ -160,7 +160,8 @@ def report(
         *recordings.findings(recorded, impedances),
     )
     findings = (
-        *calibrations.findings(calibrated), *shorts, *history.findings(changes), *by_frequency, *explained.sentences(explanations),
+        *calibrations.findings(calibrated), *shorts, *history.findings(changes), *by_frequency,
+        *explained.sentences(explanations),
         *electrodes.findings(found),
     )  # fmt: skip
     step("variants")
