@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from sensorgen.cli import main
+from sensorgen.design.design import make
 
 OLD = Path(__file__).parents[1] / "reference" / "0645a80"
 TABLES = ("batches", "bench-runs", "predictions", "prints", "raw-files", "readings")
@@ -171,6 +172,14 @@ def test_the_old_record_of_a_batch_is_imported(command, path):
 def test_old_designs_are_the_same_designs(command, file, key):
     """Their identity is what finds stored predictions."""
     assert json.loads(command("check", OLD / file, "--json", code=None))["design"] == key
+
+
+def test_a_design_of_default_electrodes_knows_what_it_was():
+    """Their default resistivity is another one since: another sensor; stored predictions are found."""
+    now, named = make({"shape": "tri"}), dict.fromkeys(("top_electrode", "bottom_electrode"), "etpu@thesis-d.1")
+    assert now.id() != "7f4cf270ac4e80a1"
+    assert now.ids() == {now.id(), "7f4cf270ac4e80a1"}
+    assert make({"shape": "tri", "materials": named}).id() not in now.ids()
 
 
 def test_an_old_fit_is_a_source(command, monkeypatch, tmp_path):
