@@ -6,7 +6,7 @@ and of the models. Both are normal in the logarithm.
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp, hypot, log, sqrt
 from typing import Annotated
 
@@ -50,6 +50,8 @@ class Link:
         pressure [-].
     error, shape : float
         Standard deviation of ln of the parameter for other reasons: as a whole, and from one force to another [-].
+    mean : float
+        Of ln of the parameter for those [-].
     """
 
     material: str
@@ -61,6 +63,7 @@ class Link:
     slope: float
     error: float
     shape: float = 0.0
+    mean: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -111,15 +114,15 @@ def source_text(about: str, estimates: Sequence[MaterialEstimate]) -> str:
     return "\n".join(rows) + "\n"
 
 
-def links(predicted: SensorModel, by_print: tuple[float, float] = (0.0, 0.0)) -> tuple[Link, ...]:
+def links(predicted: SensorModel, by_print: tuple[float, float, float] = (0.0,) * 3) -> tuple[Link, ...]:
     """What a calibration of a body can tell of its materials; without those that no source gives a value of.
 
     Parameters
     ----------
     predicted : SensorModel
         Of the body.
-    by_print : (float, float)
-        Standard deviation of ln of the rise by what is printed: as a whole, and from one force to another [-].
+    by_print : (float, float, float)
+        Ln of the rise by what is printed: mean, standard deviation as a whole, and from one force to another [-].
     """
     design, found = predicted.body.design, list[Link]()
     electrodes = [design.slot(f"{end}_electrode") for end in ("bottom", "top")]
@@ -131,8 +134,9 @@ def links(predicted: SensorModel, by_print: tuple[float, float] = (0.0, 0.0)) ->
         _link(design, dielectric, "relative_permittivity", "capacitance", *_capacitance(predicted, dielectric))
     )
     if any(v.material == dielectric and v.quantity == "youngs_modulus_pa" for v in predicted.values):
-        error, shape = hypot(_PRESS, by_print[0]), hypot(_PRESS_SHAPE, by_print[1])
-        found.append(_link(design, dielectric, "youngs_modulus_pa", "rise", -1.0, error, shape=shape))
+        error, shape = hypot(_PRESS, by_print[1]), hypot(_PRESS_SHAPE, by_print[2])
+        link = _link(design, dielectric, "youngs_modulus_pa", "rise", -1.0, error, shape=shape)
+        found.append(replace(link, mean=by_print[0]))
     return tuple(found)
 
 
@@ -181,12 +185,13 @@ def estimate(model: SpecimenModel, posterior: Posterior, link: Link) -> Material
     )
     inverse = np.linalg.inv(link.spread**2 * np.outer(slope, slope) + own)
     covariance = np.linalg.inv(information + inverse)
-    prior_mean = link.middle * slope
+    middle = model.spread.law_middle if link.parameter == "rise" else 0.0
+    prior_mean = link.middle * slope + link.mean - middle
     at = covariance @ (precision @ mean + inverse @ prior_mean)
     by = link.spread**2 * slope @ inverse
-    middle = link.middle + float(by @ (at - prior_mean))
+    ln_value = link.middle + float(by @ (at - prior_mean))
     sd = sqrt(float(link.spread**2 - link.spread**2 * (by @ slope) + by @ covariance @ by))
-    value, lower, upper = (link.value * exp(middle + k * NORMAL_95 * sd) for k in (0, -1, 1))
+    value, lower, upper = (link.value * exp(ln_value + k * NORMAL_95 * sd) for k in (0, -1, 1))
     first, last = (link.value * exp(link.middle + k * NORMAL_95 * link.spread) for k in (-1, 1))
     by_what = _BY_READINGS if sd < _TOLD * link.spread else "prediction"
     return MaterialEstimate(link.material, link.quantity, value, lower, upper, first, last, by_what)
