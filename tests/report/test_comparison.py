@@ -77,7 +77,9 @@ def test_a_plain_electrode_has_its_own_resistance_and_the_spread_of_the_sources(
     p = design.params
     squares = p.length_mm / (p.electrode_mm * p.width_mm) * 1e3
     found = predicted(default_body(design)).ry_ohm
-    assert (found.lower, found.upper) == (pytest.approx(0.07 * squares), pytest.approx(squares / 1.2))
+    least = 0.07 * np.exp(-1.959964 * 0.5)  # prints differ by ln 0.5; contacts of two wires add up to 4.3 kohm
+    assert (found.lower, found.upper) == (pytest.approx(least * squares), pytest.approx(squares / 1.2 + 4300))
+    assert found.alone().upper == pytest.approx(squares / 1.2)
     assert found.value == pytest.approx(sqrt(0.07 * 0.2) * squares)
 
 
