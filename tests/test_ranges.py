@@ -100,7 +100,7 @@ def test_edge_of_plates_by_kirchhoff():
     """Round thin plates (1877): C = eps0 pi R^2 / d + eps0 R (ln(16 pi R / d) - 1); Palmer's is of a strip."""
     for d in (1e-4, 1e-3, 5e-3):
         disc = EPS0 * 0.05 * (log(16 * pi * 0.05 / d) - 1)
-        assert edge_fringe_f(2 * pi * 0.05, d, 0.1) == pytest.approx(disc, rel=0.15)
+        assert disc < edge_fringe_f(2 * pi * 0.05, d, 0.1) < 1.15 * disc
     assert edge_fringe_f(1.0, 1e-3, 0.1, 1e-3) > edge_fringe_f(1.0, 1e-3, 0.1)
 
 
@@ -174,7 +174,7 @@ def test_a_wide_range_names_the_measurement_that_narrows_it(tmp_path):
 def test_force_of_a_soft_print_is_narrowed_by_a_weight():
     found = evaluate(bodies.estimated(make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}})))
     by = {n.quantity: n for n in found.narrowing}
-    assert by["force resolution"].measurement == WEIGHT
+    assert by["force resolution"].measurement == by["sensitivity"].measurement == WEIGHT
     assert by["force resolution"].left < by["force resolution"].factor < inf
 
 

@@ -77,7 +77,9 @@ def test_a_plain_electrode_has_its_own_resistance_and_the_spread_of_the_sources(
     p = design.params
     squares = p.length_mm / (p.electrode_mm * p.width_mm) * 1e3
     found = predicted(default_body(design)).ry_ohm
-    assert (found.lower, found.upper) == (pytest.approx(0.02 * squares), pytest.approx(0.088 * squares))
+    # prints differ by 0.02 to 0.088 ohm m; contacts of two wires add up to 4.3 kohm
+    assert (found.lower, found.upper) == (pytest.approx(0.02 * squares), pytest.approx(0.088 * squares + 4300))
+    assert found.alone().upper == pytest.approx(0.088 * squares)
     assert found.value == pytest.approx(0.042 * squares)
 
 

@@ -98,11 +98,10 @@ class Bounds:
     ) -> "Bounds":
         """A positive quantity whose relative errors multiply; what is not given adds none."""
         exact = Interval(value, value)
-        parts = (model or exact, print or exact, material or exact)
-        all_ = (*parts, leads or exact)
-        lower = value * prod(min(part.lower / value, 1.0) for part in all_) if value else 0.0
-        upper = value * prod(max(part.upper / value, 1.0) for part in all_) if value else 0.0
-        return cls(value, lower, upper, unit, *parts, certified, open, leads)
+        parts = (model or exact, print or exact, material or exact, leads or exact)
+        lower = value * prod(min(part.lower / value, 1.0) for part in parts) if value else 0.0
+        upper = value * prod(max(part.upper / value, 1.0) for part in parts) if value else 0.0
+        return cls(value, lower, upper, unit, *parts[:3], certified, open, leads)
 
     def plus(self, value: float, least: float, most: float) -> "Bounds":
         """The quantity with leads in series or in parallel that add a value between two others [unit]."""
