@@ -234,7 +234,7 @@ def test_pictures(run, tmp_path):
 
 WRONG = [
     (["--noise", "300%"], "--noise 3; expected a share above 0 and below 1"),
-    (["--tip=-1"], "a tip of -1 mm; expected up to the sensor's 100 mm"),
+    (["--tip=-1"], "tip.width_mm is -1.0; expected a number above 0"),
     (["--compression", "solved"], "reference is a solid plate: expected the law 'unconfined' or 'bonded'"),
     (["--force", "0:6:0"], "--force: '0:6:0': expected a step above 0"),
     (["--force", "2,1"], "--force: '2,1': 1 stands after 2; expected rising values, each once"),
@@ -250,7 +250,9 @@ WRONG = [
     (["--force", "0:700:100", "--position", "50"], "force 600 N at position 50 mm: the stress thins the film by 1: "),
     (["--plot", "p", "--force", "0:700:100"], "force 300 N at position 0 mm: the stress thins the film by 1: "),
     (["--force", "1", "--tip", "120"], "a tip of 120 mm; expected up to the sensor's 100 mm"),
-    (["--force", "1", "--tip", "0"], "a tip of 0 mm"),
+    (["--force", "1", "--tip", "0"], "tip.width_mm is 0.0; expected a number above 0"),
+    (["--tip", "5,stiff,even"], "--tip '5,stiff,even': expected as 10mm, 5mm,stiff, even or 10mm,ninjaflex,10mm"),
+    (["--tip", "rubber"], "unknown material 'rubber'"),
     (["--force", "1", "--compression", "bond"], "unknown --compression 'bond'; did you mean 'bonded'?"),
     (["--force", "1", "--json", "--csv"], "--json and --csv at once; expected one of them"),
     (["--plot", "p", "--csv"], "--csv and --plot at once"),
