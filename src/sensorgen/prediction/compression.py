@@ -330,6 +330,8 @@ def _result(body: Body, case: Case, estimate: Estimate, asked: Asked) -> Compres
 
     The rise of a sensor of whole and broken periods, of which one was pressed, is scaled by what both differ at rest.
     """
+    from sensorgen.solvers.contact.cell import BLOCK
+
     found, first, tip = estimate.found, estimate.found.capacitance_f_per_m2[0], asked.tip or body.design.tip.tip()
     try:
         rest = at_rest.answer(body, at_rest.Asked(keep=asked.keep))
@@ -345,7 +347,7 @@ def _result(body: Body, case: Case, estimate: Estimate, asked: Asked) -> Compres
     down, up = estimate.relative() if not found.faults else (inf, inf)
     return CompressionResult(
         design=body.design.name, body=body.provenance, model=case.model,
-        held=vars(case.boundary) | {"top": tip.material},
+        held=vars(case.boundary) | ({"top": tip.material} if BLOCK in case.solids else {}),
         stress_kpa=tuple(p / _PA_PER_KPA for p in found.stress_pa.tolist()),
         displacement_um=tuple(d * _UM_PER_M for d in found.displacement_m.tolist()),
         displacement_error_um=_known(_UM_PER_M * estimate.displacement_error_m),

@@ -435,7 +435,8 @@ def case_of(
     design, piece, model
         As of :class:`sensorgen.prediction.mesh_ladder.Case`.
     tip : Tip
-        What presses; of a high block the part that spreads the pressure.
+        What presses; of a high block the part that spreads the pressure, and none where sides are free or every body
+        is a layer, which any top presses evenly.
     boundary : BoundaryConditions, optional
         All but the top.
 
@@ -449,7 +450,7 @@ def case_of(
 
     boundary = replace(boundary or BoundaryConditions(), top="rigid" if tip.block == STIFF else "even")
     case = _case(design, piece, model, boundary)
-    if not tip.soft or _is_layered(piece.scene):
+    if not tip.soft or boundary.period == "free" or _is_layered(piece.scene):
         return case
     material = design.material(tip.block)
     block = Elastic(*(material.value(q).value for q in ("youngs_modulus_pa", "poisson_ratio")))

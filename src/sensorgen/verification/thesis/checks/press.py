@@ -33,7 +33,8 @@ def _pressed(
     """A cell under 100 kPa, of the cache where it was solved before."""
     made = designs.make({"shape": shape, "parameters": parameters})
     found = compressed.answer(
-        drawn(made), compressed.Asked((0.0, _KPA), compressed.BoundaryConditions(base=base, period=period))
+        drawn(made),
+        compressed.Asked((0.0, _KPA), compressed.BoundaryConditions(base=base, period=period), tip=Tip(block=EVEN)),
     )
     if found.faults:
         raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {found.faults[0]}")
