@@ -9,6 +9,8 @@ from itertools import product
 from json import dumps
 from pathlib import Path
 
+import numpy as np
+
 from sensorgen.design.design import Design, make
 from sensorgen.design.tip import EVEN, STIFF, Tip
 from sensorgen.prediction.bodies import WALLS, estimated
@@ -72,11 +74,13 @@ def with_stiff(entry: str, design: Design, cell: Piece) -> str:
         return entry
     rises = []
     for block in (EVEN, STIFF):
-        found = pressed(case_of(design, cell, model_of(cell), Tip(block=block)), [0.0, 6e4], COARSEST)
-        start, end = (c.middle() for c in found.capacitance_f_per_m2 if c)
-        rises.append(end - start)
-    print(entry.partition("\n")[0], rises[1] / rises[0] - 1, flush=True)
-    return f"{entry}    stiff: {rises[1] / rises[0] - 1:.4g}\n"
+        found = pressed(case_of(design, cell, model_of(cell), Tip(block=block)), [0.0, 2e4, 4e4, 6e4], COARSEST)
+        values = [c.middle() if c else np.nan for c in found.capacitance_f_per_m2]
+        rises.append(np.append(values, [np.nan] * (4 - len(values)))[1:] - values[0])
+    changes = rises[1] / rises[0] - 1
+    change = changes[np.isfinite(changes)][-1]  # at the highest pressure at which both are known
+    print(entry.partition("\n")[0], changes, flush=True)
+    return f"{entry}    stiff: {change:.4g}\n"
 
 
 def cells(design: Design, walls: str) -> Iterator[tuple[str, Piece]]:

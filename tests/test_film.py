@@ -9,8 +9,7 @@ import pytest
 from sensorgen.asprinted import film
 from sensorgen.design.body import DRAWN
 from sensorgen.design.design import make
-from sensorgen.models import columns, fem3d
-from sensorgen.models import sandwich
+from sensorgen.models import columns, fem3d, sandwich
 from sensorgen.prediction import bodies
 from sensorgen.prediction.compression_law import solved
 from sensorgen.prediction.evaluate import evaluate

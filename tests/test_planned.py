@@ -80,7 +80,7 @@ def test_an_unknown_cell_is_pressed_no_more_finely_than_it_takes(monkeypatch):
 
 
 def test_a_plate_is_known_no_better_than_how_it_is_held():
-    """At a low tone all is C: under the tip it rises by s/(1 - s), on a base that slides or holds (11.77 and 2.87 E)."""
+    """At a low tone all is C: under the tip it rises by s/(1 - s); a base slides or holds (11.77 and 2.87 E)."""
     press = Press((1.0,), 6.0, 0.05)
     _, plan = worked_out(make({"shape": "reference"}), 1e-5, press)
     share, stress = 0.1, 6.0 / 1e-4

@@ -51,7 +51,12 @@ def test_values_of_materials_are_taken(run):
 def test_sides_that_give_way(run):
     free = json.loads(run(*PLATE[:2], "--sides", "free", *PLATE[4:]).out)
     fixed = json.loads(run(*PLATE).out)
-    assert free["held"] == {"base": "sliding", "period": "free", "top": "even", "contact": "frictionless"}
+    assert free["held"] == {
+        "base": "sliding",
+        "period": "free",
+        "top": "ninjaflex block of 10 mm",
+        "contact": "frictionless",
+    }
     assert free["displacement_um"][1] > 400 * fixed["displacement_um"][1]
 
 
@@ -377,7 +382,7 @@ def test_a_sweep_as_csv_and_table(run, asked):
     assert float(upper) == pytest.approx(1e9 * float(rows[3]["upper_f_per_m2"]), rel=1e-6)
     below = " ".join(" ".join(table[8:]).split())
     assert below.startswith("no answer: 100 kPa on x60")
-    assert "(youngs_modulus_x60 10000) press2d: base bonded, period fixed, top even, contact frictionless" in below
+    assert "(youngs_modulus_x60 10000) press2d: base bonded, period fixed, top ninjaflex block of 10 mm" in below
     assert "(youngs_modulus_x60 3e+06, 6e+06) body: printed, estimated (" in below
 
 

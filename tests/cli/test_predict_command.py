@@ -98,7 +98,8 @@ def test_json_and_csv_say_the_same(run):
 @pytest.mark.parametrize(
     ("words", "stiffer", "tip"),
     [
-        ([], BONDED, 10.0), (["--compression", "bonded"], BONDED, 10.0), (["--sides", "free", "--tip", "2cm"], 1.0, 20.0),
+        ([], BONDED, 10.0), (["--compression", "bonded"], BONDED, 10.0),
+        (["--sides", "free", "--tip", "2cm"], 1.0, 20.0),
         (["--compression", "unconfined", "--tip", "5"], 1.0, 5.0),
     ],
 )  # fmt: skip
@@ -122,10 +123,10 @@ def test_axes_that_are_not_named(run):
 
 def test_without_a_load(run):
     said = run("predict", "reference", "--sides", "free", "--drawn")
-    least, most = 1 + 3.68 / math.exp(0.196), 6.33  # permittivity, of 4.68 in 69.06 pF; leads of 5 pF and the edge beyond
+    least, most = 1 + 3.68 / math.exp(0.196), 6.33  # permittivity, of 4.68 in 69.06 pF; leads and the edge beyond
     assert f"capacitance          69.1 pF ({math.floor(69.06 * least / 4.68)} to 110)" in said.out
     assert 69.06 * most / 4.68 + 5 < 110
-    assert "top electrode        1.4 kohm (0.66 to 7.3)" in said.out  # 0.042 (0.02 to 0.088) ohm m, contacts of 4.3 kohm
+    assert "top electrode        1.4 kohm (0.66 to 7.3)" in said.out  # 0.042 (0.02 to 0.088) ohm m, 4.3 kohm
     found = json.loads(run("predict", "reference", "--sides", "free", "--json", "--frequencies", "1kHz,1MHz").out)
     assert [row["frequency_hz"] for row in found["impedance"]] == [1e3, 1e6]
     assert "1 MHz" in run("predict", "reference", "--sides", "free", "--frequencies", "1MHz").out
@@ -261,7 +262,7 @@ def test_pictures(run, tmp_path):
 
 WRONG = [
     (["--noise", "300%"], "--noise 3; expected a share above 0 and below 1"),
-    (["--tip=-1"], "a tip of -1 mm; expected up to the sensor's 100 mm"),
+    (["--tip=-1"], "tip.width_mm is -1.0; expected a number above 0"),
     (["--compression", "solved"], "--compression and --sides at once"),
     (["--force", "0:6:0"], "--force: '0:6:0': expected a step above 0"),
     (["--force", "2,1"], "--force: '2,1': 1 stands after 2; expected rising values, each once"),
@@ -277,7 +278,9 @@ WRONG = [
     (["--force", "0:700:100", "--position", "50"], "force 600 N at position 50 mm: the stress thins the film by 1: "),
     (["--plot", "p", "--force", "0:700:100"], "force 300 N at position 0 mm: the stress thins the film by 1: "),
     (["--force", "1", "--tip", "120"], "a tip of 120 mm; expected up to the sensor's 100 mm"),
-    (["--force", "1", "--tip", "0"], "a tip of 0 mm"),
+    (["--force", "1", "--tip", "0"], "tip.width_mm is 0.0; expected a number above 0"),
+    (["--tip", "5,stiff,even"], "--tip '5,stiff,even': expected as 10mm, 5mm,stiff, even or 10mm,ninjaflex,10mm"),
+    (["--tip", "rubber"], "unknown material 'rubber'"),
     (["--force", "1", "--compression", "bond"], "unknown --compression 'bond'; did you mean 'bonded'?"),
     (["--force", "1", "--json", "--csv"], "--json and --csv at once; expected one of them"),
     (["--plot", "p", "--csv"], "--csv and --plot at once"),

@@ -235,7 +235,8 @@ MALFORMED = [
     {"capacitance_f": {"lower": "a", "upper": "b"}}, {"capacitance_f": "x"}, {"corner_frequency_hz": 3},
     {"corner_frequency_hz": {"lower": None, "upper": "x"}}, {"identifiability": 5}, {"identifiability": [1]},
     {"identifiability": {"press": 5}}, {"identifiability": {"press": [1]}}, {"identifiability": "x"},
-    {"schema": 3}, {"schema": 4}, {"schema": 5}, {"schema": 2}, {"schema": "3"}, {"schema": None}, {"schema": 3, "design": 5},
+    {"schema": 3}, {"schema": 4}, {"schema": 5}, {"schema": 2}, {"schema": "3"}, {"schema": None},
+    {"schema": 3, "design": 5},
     {"schema": 3, "capacitance": {"value": "x"}}, {"schema": 2, "force_resolution_n": "x"}, {"schema": [3]},
     {"schema": 3, "status": "fine"},
 ]  # fmt: skip

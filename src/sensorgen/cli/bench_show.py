@@ -111,7 +111,9 @@ command = made(
         ["--cutoff", "cutoff_hz"], type=Values(units.FREQUENCY_HZ, zero=False), metavar="HZ",
         help="Of the low-pass; the thesis's 0.2727 Hz if not given.",
     ),
-    click.Option(["--presses"], metavar="FILE.csv", help="Write readings before and under each press, as 'invert' takes them."),
+    click.Option(
+        ["--presses"], metavar="FILE.csv", help="Write readings before and under each press, as 'invert' takes them."
+    ),
     click.Option(["--filtered"], metavar="FILE.csv", help="Write the low-passed readings, their drift left in."),
     click.Option(["--plot"], metavar="DIR", help="Draw readings over time and surfaces of the differences there."),
     *bench_opened.options(),

@@ -44,8 +44,8 @@ def compression(
 def sides() -> click.Option:
     """``--sides``, one of the boundary conditions."""
     about = (
-        "Sides of the sensor: bonded, its solids stick to electrodes and base, and a plate bulges at its edges; free, it "
-        "widens as it likes (B.49); symmetric, one of unlimited cells."
+        "Sides of the sensor: bonded, its solids stick to electrodes and base, and a plate bulges at its edges; free, "
+        "it widens as it likes (B.49); symmetric, one of unlimited cells."
     )
     return option("--sides", OneOf(("bonded", "free", "symmetric")), about, default="bonded")
 

@@ -37,8 +37,9 @@ OWN: list[click.Parameter] = [
         "the force up to the tip's length. All of the tip touches if not given.",
     ),
     options.compression(
-        "symmetric", "infill", "free", "solved", about="How the cell deforms: as a plate, free or bonded, as infill of flat electrodes, "
-        "or solved (needs NGSolve; seconds in a cross-section, up to minutes in 3D); if not given, solved in a "
+        "symmetric", "infill", "free", "solved",
+        about="How the cell deforms: as a plate, free or bonded, as infill of flat electrodes, or solved (needs "
+        "NGSolve; seconds in a cross-section, up to minutes in 3D); if not given, solved in a "
         "cross-section.",
     ),
     options.sides(), options.noise(),

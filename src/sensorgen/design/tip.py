@@ -50,7 +50,7 @@ class Tip:
 
     @property
     def soft(self) -> bool:
-        """Whether its block deforms."""
+        """True of a block that deforms."""
         return self.block not in (EVEN, STIFF)
 
     @property

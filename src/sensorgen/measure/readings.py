@@ -89,7 +89,7 @@ class Readings:
             yield Block(block.rows, impedance, block.text, block.numbers[:, 2 * m :])
 
 
-class Sweeps:
+class Sweeps(Readings):
     """Sweeps of an LCR meter as readings: one sample each, without other columns.
 
     Parameters
@@ -134,9 +134,7 @@ class Sweeps:
 
 
 @contextmanager
-def readings(
-    path: str, columns: Mapping[str, str] = SAME_NAMES, beside: Sequence[str] = ()
-) -> Iterator[Readings | Sweeps]:
+def readings(path: str, columns: Mapping[str, str] = SAME_NAMES, beside: Sequence[str] = ()) -> Iterator[Readings]:
     """Open a file of impedance readings; "-" is the standard input.
 
     Parameters

@@ -18,7 +18,10 @@ from sensorgen.core.errors import MissingValue, OutOfRange
 if TYPE_CHECKING:
     from sensorgen.solvers.contact.pressed import Pressed
 
-SOURCE = "Thesis Eq. B.49; Gent and Lindley (1959), Chalhoub and Kelly (1991) for the bonded plate; solved cells as their file says"
+SOURCE = (
+    "Thesis Eq. B.49; Gent and Lindley (1959), Chalhoub and Kelly (1991) for the bonded plate; solved cells as their "
+    "file says"
+)
 COST = 0
 
 PROTOTYPE_PA = 6e6  # Young's modulus of the films of the stored cells [Pa]

@@ -273,8 +273,8 @@ def planned(body: Body, asked: Asked) -> Plan:
     model = _model(body, asked)
     if model in (*closed_form.PLATES, "infill"):
         raise BadInput(
-            f"an accuracy of C, which follows the law {model}, a closed form, between its bounds: leave out --accuracy, "
-            "or solve one of unlimited cells with --sides symmetric"
+            f"an accuracy of C, which follows the law {model}, a closed form, between its bounds: leave out "
+            "--accuracy, or solve one of unlimited cells with --sides symmetric"
         )
     if model in closed_form.MODELS:
         why = f"--model {model}" if asked.model else why_not_applicable(piece, MODELS[0])
@@ -294,10 +294,11 @@ def planned(body: Body, asked: Asked) -> Plan:
 
 def _model(body: Body, asked: Asked) -> str:
     piece = piece_of(body)
-    if not asked.model and asked.sides == "bonded" and asked.boundary.period == "fixed" and not asked.check_mesh:
-        if law := closed_form.law_name(body.design, piece):
-            return law
-    return asked.model or next((name for name in MODELS if not why_not_applicable(piece, name)), closed_form.FIRST)
+    usual = asked.sides == "bonded" and asked.boundary.period == "fixed"
+    law = closed_form.law_name(body.design, piece) if usual and not asked.model and not asked.check_mesh else ""
+    return (
+        law or asked.model or next((name for name in MODELS if not why_not_applicable(piece, name)), closed_form.FIRST)
+    )
 
 
 def _mesh_levels(piece: Piece, model: str, asked: Asked) -> list[MeshLevel]:
@@ -349,6 +350,8 @@ def _result(body: Body, case: Case, estimate: Estimate, asked: Asked) -> Compres
 
     The rise of a sensor of whole and broken periods, of which one was pressed, is scaled by what both differ at rest.
     """
+    from sensorgen.solvers.contact.cell import BLOCK
+
     found, first, tip = estimate.found, estimate.found.capacitance_f_per_m2[0], asked.tip or body.design.tip.tip()
     try:
         rest = at_rest.answer(body, at_rest.Asked(keep=asked.keep))
@@ -364,7 +367,7 @@ def _result(body: Body, case: Case, estimate: Estimate, asked: Asked) -> Compres
     down, up = estimate.relative() if not found.faults else (inf, inf)
     return CompressionResult(
         design=body.design.name, body=body.provenance, model=case.model,
-        held=vars(case.boundary) | {"top": tip.material},
+        held=vars(case.boundary) | ({"top": tip.material} if BLOCK in case.solids else {}),
         stress_kpa=tuple(p / _PA_PER_KPA for p in found.stress_pa.tolist()),
         displacement_um=tuple(d * _UM_PER_M for d in found.displacement_m.tolist()),
         displacement_error_um=_known(_UM_PER_M * estimate.displacement_error_m),

@@ -1,8 +1,7 @@
 """Choose the pressure law of a cell, with its uncertainty.
 
-A printed plate is bonded to its electrodes (thesis 4.2: layers adhere to each other), and bracketed by how its faces are
-held. Solutions of the prototypes' cells are stored; any
-other cell with gaps is solved on request, and kept.
+A printed plate is bonded to its electrodes (thesis 4.2: layers adhere to each other), and bracketed by how its faces
+are held. Solutions of the prototypes' cells are stored; any other cell with gaps is solved on request, and kept.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -39,11 +38,9 @@ from sensorgen.prediction.mesh_ladder import (
 from sensorgen.prediction.query import FLAT
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.scene.sections import sections
-from sensorgen.solvers.contact.boundary import BoundaryConditions
-from sensorgen.solvers.contact.cell import BLOCK
 
 if TYPE_CHECKING:
-    from sensorgen.models.press2d import Elastic
+    from sensorgen.models.press2d import BoundaryConditions, Elastic
 
 CLOSED_FORM = ("unconfined", "bonded", "symmetric", "infill")
 LAWS = (*CLOSED_FORM, "free", "solved")
@@ -129,12 +126,9 @@ def law_of(
     moduli, piece = of_all_materials(design, "youngs_modulus_pa"), printed or drawn(design)
     if is_plate(answer, piece.scene):
         return _plate(design, moduli, name, piece)
-    if name == "bonded":
-        raise OutOfRange(f"the law 'bonded' applies to a solid plate; {design.shape} has gaps: expected 'unconfined'")
-    if name == "free":
-        raise OutOfRange(
-            f"cells of {design.shape} are held by their neighbours: expected the sides bonded or symmetric"
-        )
+    if name in ("bonded", "free"):
+        held = "the law 'bonded' applies to a solid plate" if name == "bonded" else "cells are held by their neighbours"
+        raise OutOfRange(f"{held}; {design.shape} has gaps: expected 'unconfined' or the sides symmetric")
     if name == "symmetric":  # as the neighbours of a cell with gaps hold it anyway
         name = ""
     if name == "infill":
@@ -348,7 +342,7 @@ def solved(
     design: Design,
     printed: Piece | None = None,
     level: int = USUAL,
-    boundary: BoundaryConditions | None = None,
+    boundary: "BoundaryConditions | None" = None,
     model: str = "",
     *,
     tip: Tip = FLAT,
@@ -471,13 +465,13 @@ def at_a_few_pressures(
     return replace(known, compression=replace(curve, displacement_m=fallen_m), doubts=())
 
 
-def _case(design: Design, piece: Piece, model: str, boundary: BoundaryConditions) -> Case:
+def _case(design: Design, piece: Piece, model: str, boundary: "BoundaryConditions") -> Case:
     eps = {t.material: t.value for t in permittivities(design)}
     return Case(piece, model, elastic(design, piece.scene), eps, boundary)
 
 
 def case_of(
-    design: Design, piece: Piece, model: str, tip: Tip, boundary: BoundaryConditions | None = None
+    design: Design, piece: Piece, model: str, tip: Tip, boundary: "BoundaryConditions | None" = None
 ) -> Case:  # fmt: skip
     """A piece under a tip: an even pressure, a stiff plate, or a block that is bonded to its top.
 
@@ -486,7 +480,8 @@ def case_of(
     design, piece, model
         As of :class:`sensorgen.prediction.mesh_ladder.Case`.
     tip : Tip
-        What presses; of a high block the part that spreads the pressure.
+        What presses; of a high block the part that spreads the pressure, and none where sides are free or every body
+        is a layer, which any top presses evenly.
     boundary : BoundaryConditions, optional
         All but the top.
 
@@ -495,34 +490,35 @@ def case_of(
     MissingValue, UnknownName
         A modulus or Poisson's ratio that no source gives; no such material.
     """
+    from sensorgen.models.press2d import BoundaryConditions, Elastic
+    from sensorgen.solvers.contact.cell import BLOCK
+
     boundary = replace(boundary or BoundaryConditions(), top="rigid" if tip.block == STIFF else "even")
     case = _case(design, piece, model, boundary)
-    if not tip.soft or _is_layered(piece.scene):
+    if not tip.soft or boundary.period == "free" or _is_layered(piece.scene):
         return case
-    from sensorgen.models.press2d import Elastic
-
     material = design.material(tip.block)
     block = Elastic(*(material.value(q).value for q in ("youngs_modulus_pa", "poisson_ratio")))
     return replace(
-        case, piece=_under_block(piece, tip.height_m / M_PER_MM), solids={**case.solids, BLOCK: block},
+        case, piece=_under_block(piece, tip.height_m / M_PER_MM, BLOCK), solids={**case.solids, BLOCK: block},
         permittivity={**case.permittivity, BLOCK: 1.0},
     )  # fmt: skip
 
 
 def _is_layered(scene: Scene) -> bool:
-    """Whether every body is a layer over the whole plan, which any top presses evenly."""
+    """True where every body is a layer over the whole plan: any top presses it evenly."""
     plans = {(p.is_box(), p.span("x"), p.span("y")) for body in scene.bodies for p in body.pieces}
     return len(plans) == 1 and all(is_box for is_box, *_ in plans)
 
 
-def _under_block(piece: Piece, height_mm: float) -> Piece:
-    """A piece with a block on all of its top."""
+def _under_block(piece: Piece, height_mm: float, name: str) -> Piece:
+    """A piece with a block of some name and material on all of its top."""
     parts = [p for body in piece.scene.bodies for p in body.pieces]
     (x0, x1), (y0, y1), (z0, z1) = (
         (min(a for a, _ in spans), max(b for _, b in spans)) for spans in ([p.span(n) for p in parts] for n in "xyz")
     )
     height_mm = min(height_mm, _PERIODS * piece.period_mm if piece.period_mm else _HEIGHTS * (z1 - z0))
-    block = Body(BLOCK, BLOCK, (box(x0, x1, y0, y1, z1, round(z1 + height_mm, 6)),))
+    block = Body(name, name, (box(x0, x1, y0, y1, z1, round(z1 + height_mm, 6)),))
     return replace(piece, scene=replace(piece.scene, bodies=(*piece.scene.bodies, block)))
 
 

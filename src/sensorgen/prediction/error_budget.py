@@ -11,7 +11,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
-
 from sensorgen.core.bounds import Interval
 from sensorgen.design.design import Design
 from sensorgen.design.materials import PIEZORESISTANCE

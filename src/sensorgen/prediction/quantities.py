@@ -1,6 +1,6 @@
 """Quantities of a prediction, each with its range: gap, capacitance, resistance, impedance, sensitivity, resolution."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -292,13 +292,10 @@ def _with_tops(found: Prediction, model: SensorModel, load: Load, query: Query) 
     """
     tip = query.tip_of(model.body.design)
     own = {name: bounds for name in _UNITS if (bounds := getattr(found, name)) and bounds.value}
-    tops = [UnderTop(tip.material, **own)]
-    for name, law in model.law.tops.items():
-        sensor = replace(model.sensor, compression=law)
-        values = *_errors(sensor, load, query), _mean_slope(law, _range_pa(sensor, load, query))
-        ratios = {key: value / own[key].value for key, value in zip(tuple(_UNITS), values, strict=True) if key in own}
-        if name != tip.block and not any(isnan(ratio) for ratio in ratios.values()):
-            tops.append(UnderTop(WORDS[name], **{k: own[k].times(r, _UNITS[k]) for k, r in ratios.items()}))
+    others = (
+        _under_top(name, law, own, model, load, query) for name, law in model.law.tops.items() if name != tip.block
+    )
+    tops = [UnderTop(tip.material, **own), *filter(None, others)]
     wider: dict[str, Any] = {}
     apart = False
     for key, bounds in own.items():
@@ -309,6 +306,21 @@ def _with_tops(found: Prediction, model: SensorModel, load: Load, query: Query) 
             print=bounds.print, material=bounds.material, certified=bounds.certified, open=bounds.open,
         )  # fmt: skip
     return replace(found, **wider, tops=tuple(tops) if apart else ())
+
+
+def _under_top(
+    name: str, law: Compression, own: Mapping[str, Bounds], model: SensorModel, load: Load, query: Query
+) -> UnderTop | None:  # fmt: skip
+    """Numbers under another top; None where it cannot take the load."""
+    sensor = replace(model.sensor, compression=law)
+    try:
+        values = *_errors(sensor, load, query), _mean_slope(law, _range_pa(sensor, load, query))
+    except OutOfRange:
+        return None
+    ratios = {key: value / own[key].value for key, value in zip(_UNITS, values, strict=True) if key in own}
+    if any(map(isnan, ratios.values())):
+        return None
+    return UnderTop(WORDS[name], **{key: own[key].times(ratio, _UNITS[key]) for key, ratio in ratios.items()})
 
 
 def _sensitivity(model: SensorModel, load: Load, query: Query, others: Otherwise) -> Bounds:

@@ -61,7 +61,7 @@ class Query:
             raise OutOfRange(f"sensitivity from {low:g} to {high:g} kPa; expected pressures that rise from 0 or more")
 
     def tip_of(self, design: Design) -> Tip:
-        """What presses a design."""
+        """Tip that presses a design."""
         return self.tip or design.tip.tip()
 
     def of(self, design: Design) -> "Query":

@@ -123,10 +123,23 @@ def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
     ]
     exposed = {p for edge in faces for p in edge}
     sizes = dict.fromkeys(exposed, fineness.corner_mm) | dict.fromkeys(sharp, fineness.apex_mm)
-    pieces: dict[Edge, tuple[int, int]] = {}
     blocks = {k for k, region in enumerate(cell.regions, 1) if region.material == BLOCK}
-    top_mm = max(z for edge in cell.edges for _, z in edge)
     wide = replace(fineness, coarse_mm=max(fineness.coarse_mm, _BLOCK * fineness.growth * cell.width_mm()))
+    pieces = _cut(cell, sizes, fineness, wide, blocks)
+    net = triangulated(pieces, fineness.coarse_mm, fineness.growth, dict.fromkeys(blocks, wide.coarse_mm))
+    for place in sharp:
+        if cell.turned and _is_flat(cell, place):
+            net = _parted(net, nearest(net.points_m, place))
+    tips = [nearest(net.points_m, place) for place in rings.notches(cell)]
+    return of_triangles(*rings.ringed(net.points_m, net.corners, net.region, tips, _RINGS), turned=cell.turned)
+
+
+def _cut(
+    cell: Cell, sizes: Mapping[Point, float], fineness: Fineness, wide: Fineness, blocks: set[int]
+) -> dict[Edge, tuple[int, int]]:
+    """Pieces of the edges of solids, with their regions; of a block on the top they grow to ``wide``."""
+    pieces: dict[Edge, tuple[int, int]] = {}
+    top_mm = max(z for edge in cell.edges for _, z in edge)
     for (a, b), sides in cell.edges.items():
         of_block = blocks and set(sides) <= {OUTSIDE, *blocks}
         far = [wide.coarse_mm if of_block and p[1] == top_mm else fineness.coarse_mm for p in (a, b)]
@@ -137,12 +150,7 @@ def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
         open_sides = (sides[0] * cell.solid(sides[0]), sides[1] * cell.solid(sides[1]))
         if open_sides != (OUTSIDE, OUTSIDE):
             pieces |= dict.fromkeys(pairwise(places), open_sides)
-    net = triangulated(pieces, fineness.coarse_mm, fineness.growth, dict.fromkeys(blocks, wide.coarse_mm))
-    for place in sharp:
-        if cell.turned and _is_flat(cell, place):
-            net = _parted(net, nearest(net.points_m, place))
-    tips = [nearest(net.points_m, place) for place in rings.notches(cell)]
-    return of_triangles(*rings.ringed(net.points_m, net.corners, net.region, tips, _RINGS), turned=cell.turned)
+    return pieces
 
 
 def _is_flat(cell: Cell, place: Point) -> bool:

@@ -129,18 +129,9 @@ def _made(
     edges: list[tuple[Edge, tuple[int, int]]], size: float, growth: float, sizes: dict[int, float], quick: bool
 ) -> tuple[Any, ...] | str:  # fmt: skip
     """Mesh in this process; a text where Netgen refuses."""
-    from netgen.geom2d import SplineGeometry
-
-    geometry, numbers = SplineGeometry(), dict[tuple[float, float], int]()
-    for (a, b), (left, right) in edges:
-        for p in (a, b):
-            if p not in numbers:
-                numbers[p] = geometry.AppendPoint(*p)
-        domains = {"leftdomain": max(left, 0), "rightdomain": max(right, 0)}
-        geometry.Append(["line", numbers[a], numbers[b]], **domains)
-    if sizes:
-        for region in {k for _, sides in edges for k in sides if k > 0}:
-            geometry.SetDomainMaxH(region, sizes.get(region, size))
+    geometry = _geometry(edges)
+    for region in {k for _, sides in edges for k in sides if k > 0} if sizes else ():
+        geometry.SetDomainMaxH(region, sizes.get(region, size))
     try:
         made = geometry.GenerateMesh(
             maxh=max(size, *sizes.values(), 0.0), grading=growth, optsteps2d=1 if quick else 3, delaunay2d=quick
@@ -155,6 +146,19 @@ def _made(
         sides["nodes"][:, :2].astype(np.int64) - 1,
         sides["index"].astype(np.int64),
     )
+
+
+def _geometry(edges: list[tuple[Edge, tuple[int, int]]]) -> Any:
+    from netgen.geom2d import SplineGeometry
+
+    geometry, numbers = SplineGeometry(), dict[tuple[float, float], int]()
+    for (a, b), (left, right) in edges:
+        for p in (a, b):
+            if p not in numbers:
+                numbers[p] = geometry.AppendPoint(*p)
+        domains = {"leftdomain": max(left, 0), "rightdomain": max(right, 0)}
+        geometry.Append(["line", numbers[a], numbers[b]], **domains)
+    return geometry
 
 
 def main() -> None:

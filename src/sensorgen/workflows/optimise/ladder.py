@@ -21,7 +21,7 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.compression_law import at_a_few_pressures
 from sensorgen.prediction.identifiability.fisher import bounds, slopes
 from sensorgen.prediction.query import Query
-from sensorgen.prediction.rest_state import rest_state
+from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.prediction.sensor_model import build_sensor, piece, pressure_pa
 from sensorgen.workflows.optimise.target import NUMBERS
 from sensorgen.workflows.trial import Numbers, Trial, trial
@@ -97,25 +97,33 @@ def _known(body: Body, query: Query, solve: bool) -> dict[str, Known]:
             found[key] = Known(value.model.lower, value.model.upper, value.certified)
     if not solve:
         return found
-    load, tip = query.load(body.design), query.tip_of(body.design)
+    return found | {k: Known(v, v, False) for k, v in _under_load(body, rest, query).items() if np.isfinite(v)}
+
+
+def _under_load(body: Body, rest: RestState, query: Query) -> dict[str, float]:
+    """Numbers under the reference load on the coarsest mesh, the worse of an even pressure and a stiff plate.
+
+    Those of a block lie between, or near one of both.
+    """
+    load, tip, found = query.load(body.design), query.tip_of(body.design), list[tuple[float, float, float]]()
     pressed_pa = pressure_pa(body, tip, load.force_n)
     low_pa, high_pa = (_PA_PER_KPA * kpa for kpa in query.range_kpa) if query.range_kpa else (0.0, pressed_pa)
-    worst: dict[str, float] = {}
-    for block in TOPS:  # a block's answer lies between, or near one of both
-        top = replace(tip, block=block)
+    for top in (replace(tip, block=block) for block in TOPS):
         law = at_a_few_pressures(body.design, piece(body), rest.answer, max(pressed_pa, high_pa), tip=top)
-        if law is None:
-            continue
-        sensor = build_sensor(body, law, top, rest=rest).sensor
-        at = slopes(sensor, load.frequency_hz, load.force_n, load.position_m)
-        force_n, position_m, _ = bounds(at, query.noise)
-        low, high = law.compression.capacitive_strain(np.array([low_pa, high_pa]))[0].tolist()
-        rise = ((1 - low) / (1 - high) - 1) / (high_pa - low_pa) * _PA_PER_KPA
-        worst["force_resolution_n"] = max(worst.get("force_resolution_n", 0.0), float(force_n))
-        position_mm = float(position_m) / M_PER_MM
-        worst["position_resolution_mm"] = max(worst.get("position_resolution_mm", 0.0), position_mm)
-        worst["sensitivity_per_kpa"] = min(worst.get("sensitivity_per_kpa", np.inf), rise)
-    return found | {key: Known(value, value, False) for key, value in worst.items() if np.isfinite(value)}
+        if law:
+            sensor = build_sensor(body, law, top, rest=rest).sensor
+            force_n, position_m, _ = bounds(
+                slopes(sensor, load.frequency_hz, load.force_n, load.position_m), query.noise
+            )
+            low, high = law.compression.capacitive_strain(np.array([low_pa, high_pa]))[0].tolist()
+            rise = ((1 - low) / (1 - high) - 1) / (high_pa - low_pa) * _PA_PER_KPA
+            found.append((float(force_n), float(position_m) / M_PER_MM, rise))
+    if not found:
+        return {}
+    forces, places, rises = zip(*found, strict=True)
+    return {
+        "force_resolution_n": max(forces), "position_resolution_mm": max(places), "sensitivity_per_kpa": min(rises),
+    }  # fmt: skip
 
 
 def everything(design: Design, query: Query, slicer: str) -> Trial:

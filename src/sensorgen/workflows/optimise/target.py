@@ -245,12 +245,18 @@ def load(path: Path, tip: Mapping[str, Any] | None = None) -> Target:
             file = path.parent / target.design
             data = with_own_files({k: v for k, v in yamlfile.read(file).items() if k != "name"}, file.parent)
             target = target.model_copy(update={"design": data})
-        width = {} if target.load.tip_mm is None else {"width_mm": target.load.tip_mm}
-        if (changed := width | dict(tip or {})) and isinstance(target.design, dict):
-            own = target.design.get("tip") or {}
-            target = target.model_copy(update={"design": target.design | {"tip": own | changed}})
+        target = _with_tip(target, tip or {})
     except SensorgenError as error:
         raise error.within(str(path)) from None
     if target.slicer and target.slicer not in SLICERS:
         raise BadInput(f"{path}: slicer {target.slicer!r}; expected one of {', '.join(SLICERS)}")
     return target
+
+
+def _with_tip(target: Target, tip: Mapping[str, Any]) -> Target:
+    """The target with a tip of other keys, and with the width that its load names."""
+    width = {} if target.load.tip_mm is None else {"width_mm": target.load.tip_mm}
+    if not isinstance(target.design, dict) or not (width or tip):
+        return target
+    own = target.design.get("tip") or {}
+    return target.model_copy(update={"design": target.design | {"tip": own | width | dict(tip)}})

@@ -7,11 +7,12 @@ import numpy as np
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
+from sensorgen.design.tip import EVEN
 from sensorgen.measure.signal import lowpass
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import compression as compressed
 from sensorgen.prediction.bodies import drawn
-from sensorgen.prediction.query import TONES_HZ
+from sensorgen.prediction.query import TONES_HZ, Tip
 from sensorgen.prediction.sensor_model import build_sensor
 from sensorgen.verification.thesis.checks._text import table
 from sensorgen.verification.thesis.verdicts import Part
@@ -34,7 +35,12 @@ def _pressed(
     made = designs.make({"shape": shape, "parameters": parameters})
     found = compressed.answer(
         drawn(made),
-        compressed.Asked((0.0, _KPA), compressed.BoundaryConditions(base=base, period=period), sides="symmetric"),
+        compressed.Asked(
+            (0.0, _KPA),
+            compressed.BoundaryConditions(base=base, period=period),
+            sides="symmetric",
+            tip=Tip(block=EVEN),
+        ),
     )
     if found.faults:
         raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {found.faults[0]}")
