@@ -21,9 +21,8 @@ from sensorgen.design.values import ENDS, MaterialValue, material_value, piezore
 from sensorgen.models.pressure import PROFILES
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.compression_law import CLOSED_FORM
-from sensorgen.prediction.leads import added
 from sensorgen.prediction.query import Load
-from sensorgen.prediction.rest_state import permittivity_ratios
+from sensorgen.prediction.rest_state import added, permittivity_ratios
 from sensorgen.prediction.results import Changes, ErrorBudget, Term
 from sensorgen.prediction.sensor_model import SensorModel
 
