@@ -14,7 +14,7 @@ from sensorgen.design import materials, packs, values
 from sensorgen.design.design import make
 from sensorgen.design.materials import Value
 from sensorgen.design.values import lead_ranges, material_value, spread
-from sensorgen.models.fringe import edge_fringe_f
+from sensorgen.models.overlap import edge_fringe_f
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.inverse.forward import Forward, Scalar

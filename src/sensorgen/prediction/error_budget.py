@@ -20,10 +20,9 @@ from sensorgen.models.pressure import PROFILES
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.compression_law import CLOSED_FORM
 from sensorgen.prediction.exposure import exposed
-from sensorgen.prediction.leads import added
 from sensorgen.prediction.query import NOISE, Load
 from sensorgen.prediction.reference_load import ReferenceLoad
-from sensorgen.prediction.rest_state import permittivity_ratios
+from sensorgen.prediction.rest_state import added, permittivity_ratios
 from sensorgen.prediction.results import Changes, ErrorBudget, Term
 from sensorgen.prediction.sensor_model import SensorModel
 

@@ -27,14 +27,13 @@ from sensorgen.prediction.electrodes import electrode_resistance
 from sensorgen.prediction.error_budget import error_budget, material_ends, modulus_range
 from sensorgen.prediction.identifiability.fisher import Setup
 from sensorgen.prediction.identifiability.identify import identify
-from sensorgen.prediction.leads import Added, added
 from sensorgen.prediction.losses import LOWEST_HZ, Lost, lost
 from sensorgen.prediction.narrowing import narrowings
 from sensorgen.prediction.plan import Plan
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import FORCE_N, Load, Query
 from sensorgen.prediction.reference_load import ReferenceLoad
-from sensorgen.prediction.rest_state import RestState, rest_state
+from sensorgen.prediction.rest_state import Added, RestState, added, rest_state
 from sensorgen.prediction.results import SCHEMA, Impedance, Prediction, UnderTop
 from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
 from sensorgen.scene.slabs import is_open

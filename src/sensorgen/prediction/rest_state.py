@@ -3,12 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, prod
+from typing import NamedTuple
 
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import OutOfRange
+from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body, Cells
 from sensorgen.design.design import Design
-from sensorgen.design.values import ENDS, MaterialValue, permittivities, resistivities, spread
+from sensorgen.design.values import ENDS, MaterialValue, lead_ranges, permittivities, resistivities, spread
+from sensorgen.models.overlap import edge_fringe_f
 from sensorgen.prediction.capacitance import PLANE, Answer, Unpredictable, capacitance, default_width, of_sensor
 from sensorgen.prediction.electrodes import electrode_resistance
 from sensorgen.scene.scene import Scene
@@ -165,3 +168,30 @@ def permittivity_ratios(design: Design, scene: Scene) -> dict[str, tuple[float, 
             )
             found[value.material] = (next(ends), next(ends))
     return found
+
+
+class Added(NamedTuple):
+    """Value, least and most of what is added to a sensor."""
+
+    value: float
+    least: float
+    most: float
+
+
+def added(body: Body) -> tuple[Added, Added]:
+    """Capacitance in parallel [F], with the fringe of equal plates at most, and resistance in series [ohm].
+
+    Raises
+    ------
+    MissingValue
+        No source gives a permittivity or resistivity.
+    """
+    farad, ohm = (Added(*of) for of in lead_ranges(body.design))
+    p, gap_mm = body.design.params, next(iter(body.cells.gap_mm.values()), 0.0)
+    if is_open(body.cells.first()) or not 0 < gap_mm < p.width_mm:
+        return farad, ohm  # electrodes whose fringe is in the capacitance already
+    eps = max(value.value for value in permittivities(body.design))
+    around, gap, across, high = (
+        s * M_PER_MM for s in (2 * (p.length_mm + p.width_mm), gap_mm, p.width_mm, p.electrode_mm)
+    )
+    return farad._replace(most=farad.most + edge_fringe_f(around, gap, across, high, eps)), ohm
