@@ -186,6 +186,18 @@ def test_a_hole_is_calibrated_and_named(model, ohm):
     assert np.isfinite(posterior.covariance).all()
 
 
+@pytest.mark.parametrize(
+    ("answer", "jump", "tones", "noise"), [(1, 0.05, 1, 0.05), (1, 0.3, 7, 0.01), (0, 0.0, 1, 1.0)]
+)
+def test_readings_that_no_specimen_gives_are_no_singular_matrix(model, answer, jump, tones, noise):
+    """Rests that jump by 5 or 30 %, of little noise; no answer to the force at all."""
+    known = data_of(run(replace(drawn_at_random(2), hole_ohm=1e4), 24, 2), NOISE)
+    ratio = answer * known.ratio + jump * np.random.default_rng(1).standard_normal((24, tones))
+    posterior = calibrated(model, replace(known, ratio=ratio, noise=noise * known.noise))
+    assert np.isfinite(posterior.at).all()
+    assert np.linalg.eigvalsh(posterior.covariance).min() > 0
+
+
 def test_what_a_calibration_allows_for_ends_with_a_recheck(model, specimens):
     made = records.Calibration("S1", "mine", "0" * 16, model, specimens[0][2], 6.0, None, ("a",))
     assert not made.departures()

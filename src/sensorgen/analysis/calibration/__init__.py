@@ -330,7 +330,7 @@ def calibrate(
         calibration = Calibration(
             one.specimen, one.design.name, one.design.id(), one.model, posterior, most, held[0] if held else None,
             one.rows, tuple(gain(one.model, one.data, posterior.at).tolist()) if one.recorded else (), notes,
-            links(one.predicted, print_spread(one.predicted)),
+            links(one.predicted),
         )  # fmt: skip
         calibration = replace(calibration, notes=(*notes, *calibration.departures()))
         made.append(Made(calibration, one.data, held[1] if held else None))

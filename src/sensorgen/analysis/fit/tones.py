@@ -82,7 +82,8 @@ def _stiffness(known: Known, found: Posterior) -> tuple[float, float]:
     weights = model.law_weights()
     prior = np.linalg.inv(weights @ weights.T)
     posterior = np.linalg.inv(weights @ found.covariance @ weights.T)
-    by_readings, pull = posterior - prior, posterior @ (weights @ found.at)  # of the readings alone
+    by_readings = posterior - prior  # of the readings alone, over the predicted rise
+    pull = posterior @ (weights @ found.at) + by_readings.sum(1) * model.spread.law_middle
     common = weights[:, model.names.index("rise")]
     shape = np.linalg.inv(weights @ weights.T - np.outer(common, common))
     through = shape @ np.linalg.inv(by_readings + shape)

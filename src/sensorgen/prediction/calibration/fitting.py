@@ -13,6 +13,7 @@ from sensorgen.prediction.calibration.specimen import STEP, Presses, SpecimenMod
 ROUNDS = 3  # Gauss-Newton and variance components in turn
 _STEPS = 12
 _SETTLED = 1e-3  # of a standard deviation
+_FARTHEST = 8.0  # standard deviations: beyond, readings that no specimen gives lead to numbers that no line takes
 NOISE = 1e-3  # of the parts of a ratio, where no press tells
 _FEWEST_COURSES = 10  # presses from which on their usual course is known
 _FLOOR = 1e-5  # of ln Z: no bench is right to more
@@ -299,9 +300,10 @@ def _descended(
         gradient = gradient + rest_slopes.T @ rest - inverse @ (at - middle)
         step = np.linalg.solve(found + damping * np.eye(len(at)), gradient)
         step *= 3.0 / max(3.0, np.abs(step).max())
-        tried = off(at + step)
+        further = np.clip(at + step, -_FARTHEST, _FARTHEST)
+        tried = off(further)
         if tried[2] <= cost:
-            at, (ratio, rest, cost), damping = at + step, tried, damping / 10
+            at, (ratio, rest, cost), damping = further, tried, damping / 10
             if np.abs(step).max() < _SETTLED:
                 break
         else:

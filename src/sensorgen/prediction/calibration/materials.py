@@ -6,8 +6,8 @@ and of the models. Both are normal in the logarithm.
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from math import exp, hypot, log, sqrt
+from dataclasses import dataclass
+from math import exp, log, sqrt
 from typing import Annotated
 
 import numpy as np
@@ -50,8 +50,6 @@ class Link:
         pressure [-].
     error, shape : float
         Standard deviation of ln of the parameter for other reasons: as a whole, and from one force to another [-].
-    mean : float
-        Of ln of the parameter for those [-].
     """
 
     material: str
@@ -63,7 +61,6 @@ class Link:
     slope: float
     error: float
     shape: float = 0.0
-    mean: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -114,15 +111,13 @@ def source_text(about: str, estimates: Sequence[MaterialEstimate]) -> str:
     return "\n".join(rows) + "\n"
 
 
-def links(predicted: SensorModel, by_print: tuple[float, float, float] = (0.0,) * 3) -> tuple[Link, ...]:
+def links(predicted: SensorModel) -> tuple[Link, ...]:
     """What a calibration of a body can tell of its materials; without those that no source gives a value of.
 
     Parameters
     ----------
     predicted : SensorModel
         Of the body.
-    by_print : (float, float, float)
-        Ln of the rise by what is printed: mean, standard deviation as a whole, and from one force to another [-].
     """
     design, found = predicted.body.design, list[Link]()
     electrodes = [design.slot(f"{end}_electrode") for end in ("bottom", "top")]
@@ -134,9 +129,7 @@ def links(predicted: SensorModel, by_print: tuple[float, float, float] = (0.0,) 
         _link(design, dielectric, "relative_permittivity", "capacitance", *_capacitance(predicted, dielectric))
     )
     if any(v.material == dielectric and v.quantity == "youngs_modulus_pa" for v in predicted.values):
-        error, shape = hypot(_PRESS, by_print[1]), hypot(_PRESS_SHAPE, by_print[2])
-        link = _link(design, dielectric, "youngs_modulus_pa", "rise", -1.0, error, shape=shape)
-        found.append(replace(link, mean=by_print[0]))
+        found.append(_link(design, dielectric, "youngs_modulus_pa", "rise", -1.0, _PRESS, shape=_PRESS_SHAPE))
     return tuple(found)
 
 
@@ -186,7 +179,7 @@ def estimate(model: SpecimenModel, posterior: Posterior, link: Link) -> Material
     inverse = np.linalg.inv(link.spread**2 * np.outer(slope, slope) + own)
     covariance = np.linalg.inv(information + inverse)
     middle = model.spread.law_middle if link.parameter == "rise" else 0.0
-    prior_mean = link.middle * slope + link.mean - middle
+    prior_mean = link.middle * slope - middle  # of a print that is as estimated
     at = covariance @ (precision @ mean + inverse @ prior_mean)
     by = link.spread**2 * slope @ inverse
     ln_value = link.middle + float(by @ (at - prior_mean))

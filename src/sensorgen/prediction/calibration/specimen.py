@@ -275,7 +275,7 @@ class SpecimenModel:
         sensor, spread, lowest = self.sensor, self.spread, 2 * np.pi * self.frequency_hz.min()
         per_m = (sensor.capacitance_f_per_m * np.exp(spread.capacitance * value["capacitance"] + c))[..., None]
         leak = spread.leak * np.exp(spread.leak_spread * value["leak"])[..., None] * lowest * per_m
-        exponent = spread.dispersion * np.exp(value["dispersion"] - 0.5)[..., None]
+        exponent = np.minimum(spread.dispersion * np.exp(value["dispersion"] - 0.5), 1.0)[..., None]
         stored = 1j * omega * (omega / lowest) ** -exponent * np.exp(-0.5j * np.pi * exponent)
         return sensor.leak_s_per_m + leak, (stored + sensor.tan_delta * omega) * per_m
 
