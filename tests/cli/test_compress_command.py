@@ -54,7 +54,7 @@ def test_sides_that_give_way(run):
     assert free["held"] == {
         "base": "sliding",
         "period": "free",
-        "top": "ninjaflex block of 10 mm",
+        "top": "even",
         "contact": "frictionless",
     }
     assert free["displacement_um"][1] > 400 * fixed["displacement_um"][1]
@@ -382,7 +382,7 @@ def test_a_sweep_as_csv_and_table(run, asked):
     assert float(upper) == pytest.approx(1e9 * float(rows[3]["upper_f_per_m2"]), rel=1e-6)
     below = " ".join(" ".join(table[8:]).split())
     assert below.startswith("no answer: 100 kPa on x60")
-    assert "(youngs_modulus_x60 10000) press2d: base bonded, period fixed, top ninjaflex block of 10 mm" in below
+    assert "(youngs_modulus_x60 10000) press2d: base bonded, period fixed, top even, contact frictionless" in below
     assert "(youngs_modulus_x60 3e+06, 6e+06) body: printed, estimated (" in below
 
 
