@@ -89,7 +89,7 @@ class Readings:
             yield Block(block.rows, impedance, block.text, block.numbers[:, 2 * m :])
 
 
-class Sweeps(Readings):
+class LcrReadings(Readings):
     """Sweeps of an LCR meter as readings: one sample each, without other columns.
 
     Parameters
@@ -153,7 +153,7 @@ def readings(path: str, columns: Mapping[str, str] = SAME_NAMES, beside: Sequenc
     """
     if path != "-" and not columns and lcr.looks_like(Path(path)):
         with within(path):
-            sweeps = Sweeps(lcr.read(Path(path)))
+            sweeps = LcrReadings(lcr.read(Path(path)))
         yield sweeps
         return
     with csv_table.opened(path, columns) as table:

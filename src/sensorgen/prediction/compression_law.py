@@ -275,15 +275,7 @@ def _plate(design: Design, moduli: Mapping[str, MaterialValue], name: str, piece
     e = soft.value
     if name == "symmetric":
         return Law(compression.symmetric(e, ratio), (soft,))
-    width = min(design.params.width_mm, design.params.length_mm) * M_PER_MM
-    bulk = e / (3 * (1 - 2 * ratio)) if ratio < 0.5 else np.inf
-    rubber = e, width, gap_m(piece.scene), bulk
-    stiff = compression.bonded(*rubber)
-    if any(body.material not in moduli for body in piece.scene.bodies if body.terminal):
-        tied = sliding = stiff
-    else:
-        ends = [_electrode(moduli, piece.scene, end) for end in ("bottom", "top")]
-        tied, sliding = (_between(rubber, ends, base) for base in ("bonded", "sliding"))
+    tied, sliding, stiff = _bonded(design, moduli, piece.scene, e, ratio)
     if name in ("unconfined", "free"):
         doubt = "plate free to expand sideways: bonded to its electrodes it would be stiffer"
         return Law(compression.unconfined(e), (soft,), (doubt,), (tied,))
@@ -293,6 +285,19 @@ def _plate(design: Design, moduli: Mapping[str, MaterialValue], name: str, piece
                            (stiff, "between stiff faces"))
     )  # fmt: skip
     return Law(tied, (soft,), (f"plate bonded to electrodes that it stretches: {how}",), (sliding, stiff))
+
+
+def _bonded(
+    design: Design, moduli: Mapping[str, MaterialValue], scene: Scene, e: float, ratio: float
+) -> tuple[compression.Plate, compression.Plate, compression.Plate]:
+    """A bonded plate on a base that holds the lower electrode, on one that slides, and between stiff faces."""
+    width = min(design.params.width_mm, design.params.length_mm) * M_PER_MM
+    rubber = e, width, gap_m(scene), e / (3 * (1 - 2 * ratio)) if ratio < 0.5 else np.inf
+    stiff = compression.bonded(*rubber)
+    if any(body.material not in moduli for body in scene.bodies if body.terminal):
+        return stiff, stiff, stiff
+    ends = [_electrode(moduli, scene, end) for end in ("bottom", "top")]
+    return _between(rubber, ends, "bonded"), _between(rubber, ends, "sliding"), stiff
 
 
 def _between(rubber: tuple[float, ...], ends: Sequence[tuple[float, float]], base: str) -> compression.Plate:

@@ -1,4 +1,4 @@
-"""What a reading is exposed to beside the press: the design's ``effects``, as terms of the error budget."""
+"""Exposures of a reading beside the press: the design's ``effects``, as terms of the error budget."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace

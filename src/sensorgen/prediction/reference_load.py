@@ -34,7 +34,7 @@ class Reading(NamedTuple):
     rest: Complex
 
     def told(self) -> Real:
-        """What a press is told by: the logarithm of pressed over rest, its real parts before its imaginary ones."""
+        """Logarithm of pressed over rest, by which a press is told: its real parts before its imaginary ones."""
         return _parts(np.log(self.pressed / self.rest))
 
 
@@ -140,7 +140,7 @@ class ReferenceLoad:
         return float(force), float(np.nan_to_num(found.position_m, nan=np.inf) / (GUESS * sensor.length_m))
 
     def turns(self, changes: Changes | None, others: Sequence[Sensor] = ()) -> str:
-        """What is told of a press, and would not be by a change alone: "force", "place", "both", or ""."""
+        """Parts of a press that are told, and would not be by a change alone: "force", "place", "both", or ""."""
         if changes is None or not self.force_n:
             return ""
         wrong = changes.force_n / (GUESS * self.force_n), changes.position_m / (GUESS * self.sensor.length_m)

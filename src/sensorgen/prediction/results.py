@@ -171,7 +171,7 @@ class ErrorBudget:
             yield f"accuracy {self.accuracy:g} of |Z| not reached by the models{beyond}"
 
     def assumed(self) -> Iterator[Part]:
-        """What each assumption alone does at the ends of its range, the largest effect on a press first."""
+        """Effects of each assumption alone at the ends of its range, the largest on a press first."""
         columns = (
             Column("assumption"), Column("C", "%", digits=2), Column("R", "%", digits=2), Column("F", "N", digits=2),
             Column("x", "mm", digits=2), Column("loses"), Column("source"),

@@ -255,16 +255,16 @@ def decision(
         advice = advised(design, made, budget_s, step, time.process_time() - start_s)
     said = verdict(findings)
     return Decision(
-        design.name, design.id(), design.machine.name, design.layers.name, counts(findings), findings,
-        said, made, reason, advice, _turned_by(design) if said != "CHANGE" else "",
+        design.name, design.id(), design.machine.name, design.layers.name, counts(findings), findings, said, made,
+        reason, advice, _turned_by(design, said),
     )  # fmt: skip
 
 
-def _turned_by(design: Design) -> str:
+def _turned_by(design: Design, said: Verdict) -> str:
     """A film one layer thinner than drawn, where the checks then have an error, and that error; else ""."""
     film_mm = getattr(design.params, "dielectric_mm", 0.0)
     thinner = round(film_mm - design.layers.layer_mm, 9)
-    if not film_mm:
+    if not film_mm or said == "CHANGE":
         return ""
     fault = "a film one layer thinner"
     if thinner <= 0:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.report.alternating import AcRow, at_text
@@ -14,6 +14,8 @@ NOTE = (
     "prediction. The bake shrinks a sensor in its plane: a share s takes C to (1 - s)^2 of it, and leaves the "
     "resistance along the electrodes. A defect's change holds whatever else happened between the two readings."
 )
+_Before = tuple[Compared, dict[float, float]]  # the reading before, and C by frequency in its state [pF]
+_UNTOLD = None, "", ""  # bake, defects and remark of a reading of which none is known
 _BAKE = {True: "baked", False: "not baked", None: ""}
 
 
@@ -41,20 +43,18 @@ def rows(found: Comparison, ac: Sequence[AcRow]) -> list[HistoryRow]:
     measured: dict[int, dict[float, tuple[float, float]]] = {}
     for one in ac:
         measured.setdefault(one.number, {})[one.frequency_hz] = one.c_pf, one.c_ratio
-    made, before = [], dict[str, tuple[Compared, dict[float, float]]]()
+    made, before = [], dict[str, _Before]()
     for row in found.rows:
-        words, name = row.reading.words, row.reading.specimen
+        name = row.reading.specimen
         body = found.bodies.get(found.names.get(name, ""))
         shrinkage = body.design.shrinkage if body else 0.0
         earlier, c = before.get(name), measured.get(row.reading.number, {})
-        state = (words.baked, words.defects, words.remark)
-        known = (words.defects or words.remark or words.baked is not None or shrinkage) and (
-            not earlier or state != _state(earlier[0])
-        )
+        state = _state(row)
+        known = (state != _UNTOLD or shrinkage) and not (earlier and state == _state(earlier[0]))
         if known:
             made.append(_row(row, earlier, c, shrinkage))
-        values = {f: pf for f, (pf, _) in c.items()}
-        before[name] = row, {**(earlier[1] if earlier and not known else {}), **values}
+        kept = earlier[1] if earlier and not known else {}
+        before[name] = row, {**kept, **{f: pf for f, (pf, _) in c.items()}}
     return made
 
 
@@ -64,25 +64,40 @@ def _state(row: Compared) -> tuple[bool | None, str, str]:
 
 
 def _row(
-    row: Compared, earlier: tuple[Compared, dict[float, float]] | None, c: dict[float, tuple[float, float]],
-    shrinkage: float,
+    row: Compared, earlier: _Before | None, c: dict[float, tuple[float, float]], shrinkage: float
 ) -> HistoryRow:  # fmt: skip
-    words, now = row.reading.words, row.verdict
-    if earlier:
-        was, known = earlier[0].verdict, {f: pf / earlier[1][f] for f, (pf, _) in c.items() if f in earlier[1]}
-        electrode, film = _ratio(now.ry_ohm, was.ry_ohm), _ratio(now.rz_ohm, was.rz_ohm)
-        against = f"reading {earlier[0].reading.number}"
-    else:
-        expected = row.predicted.ry_ohm if row.predicted else None
-        electrode, film = _ratio(now.ry_ohm, expected.value if expected else nan), nan
-        known, against = {f: ratio for f, (_, ratio) in c.items()}, "prediction"
-    lowest = min(known, default=None)
-    baked = bool(earlier and earlier[0].reading.words.baked is False and words.baked)
+    words, change = row.reading.words, _since(row, *earlier, c) if earlier else _by_prediction(row, c)
+    lowest = min(change.c, default=None)
     return HistoryRow(
-        row.reading.number, row.reading.specimen, _BAKE[words.baked], 100 * shrinkage if shrinkage else None,
-        words.defects, words.remark, against, electrode, film, known[lowest] if lowest else nan,
-        at_text(lowest) if lowest else "", (1 - shrinkage) ** 2 if baked and shrinkage else None, now.word,
+        row.reading.number, row.reading.specimen, _BAKE[words.baked], 100 * shrinkage or None, words.defects,
+        words.remark, change.against, change.electrode, change.film, change.c.get(lowest or nan, nan),
+        at_text(lowest) if lowest else "", (1 - shrinkage) ** 2 if change.baked and shrinkage else None,
+        row.verdict.word,
     )  # fmt: skip
+
+
+class _Change(NamedTuple):
+    """Ratios of electrode, film and C by frequency, to what they are compared with; whether it was baked between."""
+
+    against: str
+    electrode: float
+    film: float
+    c: dict[float, float]
+    baked: bool = False
+
+
+def _since(row: Compared, was: Compared, pf: dict[float, float], c: dict[float, tuple[float, float]]) -> _Change:
+    now, then = row.verdict, was.verdict
+    baked = bool(was.reading.words.baked is False and row.reading.words.baked)
+    ratios = {f: value / pf[f] for f, (value, _) in c.items() if f in pf}
+    electrode, film = _ratio(now.ry_ohm, then.ry_ohm), _ratio(now.rz_ohm, then.rz_ohm)
+    return _Change(f"reading {was.reading.number}", electrode, film, ratios, baked)
+
+
+def _by_prediction(row: Compared, c: dict[float, tuple[float, float]]) -> _Change:
+    expected = row.predicted.ry_ohm if row.predicted else None
+    electrode = _ratio(row.verdict.ry_ohm, expected.value if expected else nan)
+    return _Change("prediction", electrode, nan, {f: ratio for f, (_, ratio) in c.items()})
 
 
 def _ratio(now: float, before: float) -> float:
@@ -90,7 +105,7 @@ def _ratio(now: float, before: float) -> float:
 
 
 def findings(made: Sequence[HistoryRow]) -> Iterator[str]:
-    """What bakes and defects changed, a sentence for each specimen of a few."""
+    """Sentences about changes by bakes and defects, where one specimen has them."""
     if len({row.specimen for row in made}) > 1:
         return
     for row in made:

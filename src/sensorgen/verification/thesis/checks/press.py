@@ -12,7 +12,7 @@ from sensorgen.measure.signal import lowpass
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import compression as compressed
 from sensorgen.prediction.bodies import drawn
-from sensorgen.prediction.query import TONES_HZ, Tip
+from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor
 from sensorgen.verification.thesis.checks._text import table
 from sensorgen.verification.thesis.verdicts import Part
