@@ -205,7 +205,7 @@ def test_the_budget_has_what_sources_disagree_on(top, bottom, ends):
     values = {"a": -K, "b": 3 * K}
     named = {f"{end}_electrode": source(name, values[name]) for end, name in (("top", top), ("bottom", bottom)) if name}
     drawn = design(materials=named)
-    sensed = sensor_of(drawn)
+    sensed = sensor_of(drawn, "unconfined")
     load = Load(tuple(TONES), 6.0, 0.05)
     terms = {term.name: term for term in error_budget(sensed, load).terms}
     rho = dict(zip(("top_resistivity_ohm_m", "bottom_resistivity_ohm_m"), sensed.sensor.resistivity_ohm_m, strict=True))

@@ -190,7 +190,7 @@ def test_the_range_of_a_response_has_the_ways_to_print_at_its_ends(monkeypatch, 
     """At rest: how each is pressed, which takes seconds, is looked at by night."""
     design, query = make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}}), Query(law="unconfined", force_n=5.0)
     model = sensor_model(estimated(design), query)[0]
-    monkeypatch.setattr(quantities, "at_a_few_pressures", lambda *_: model.law)
+    monkeypatch.setattr(quantities, "at_a_few_pressures", lambda *_, **__: model.law)
     found = [s.capacitance_f() for s in quantities._printed_otherwise(model, query.load(design), query)]
     each = [
         rest_state(estimated(design, walls)).capacitance.value for walls in ("arachne", "classic", "cura", "cura-gaps")

@@ -49,7 +49,7 @@ def test_spread_of_one_source_is_that_of_materials_with_several(quantity):
 
 def test_one_source_or_its_own_deviation_is_the_range(tmp_path):
     """1.96 deviations of ln on either side; one that the file states goes before the packs'."""
-    for text, factor in (("", exp(1.96 * 1.24)), (", sd: 0.05", exp(1.96 * 0.1)), (", low: 0.4, high: 0.6", 1.2)):
+    for text, factor in (("", exp(1.96 * 1.32)), (", sd: 0.05", exp(1.96 * 0.1)), (", low: 0.4, high: 0.6", 1.2)):
         design = own(tmp_path, True, f"resistivity_ohm_m: [{{value: 0.5, source: lab, default: true{text}}}]")
         ends = spread(design, values.resistivities(design)["top"])
         assert ends[1] == pytest.approx(0.5 * factor, rel=1e-3)

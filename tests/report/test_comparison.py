@@ -43,7 +43,7 @@ def test_a_reading_is_of_one_electrode_of_both_in_parallel_or_in_between():
     """1 and 3 kohm, by hand: 0.75 kohm in parallel. The range of a film without a reading holds all of it."""
     found = predicted(drawn(make({"shape": "tri"})))
     ends = {name: dataclasses.replace(r, value=ohm, lower=ohm, upper=ohm, model=Interval(ohm, ohm),
-                                      print=Interval(ohm, ohm), material=Interval(ohm, ohm))
+                                      print=Interval(ohm, ohm), material=Interval(ohm, ohm), leads=None)
             for (name, r), ohm in zip(found.prediction.resistance.items(), (1000.0, 3000.0), strict=True)}  # fmt: skip
     found = dataclasses.replace(found, prediction=dataclasses.replace(found.prediction, resistance=ends))
     short, tight, unknown = (found.along_ohm(rz) for rz in (0.0, inf, nan))

@@ -13,7 +13,7 @@ LN_SPREAD = {"resistivity_ohm_m": 0.5, "relative_permittivity": 0.1, "youngs_mod
 """Standard deviations of ln of a material's value from one print to another, where its source gives no range: sources
 of resistivity differ by a factor of 12 (etpu.yaml), those of permittivity from 4.68 to 6.33 (x60.yaml); moduli of
 printed elastomers vary by some 25 %."""
-LN_SOURCES = {"resistivity_ohm_m": 1.24, "relative_permittivity": 0.13, "youngs_modulus_pa": 0.69,
+LN_SOURCES = {"resistivity_ohm_m": 1.32, "relative_permittivity": 0.13, "youngs_modulus_pa": 0.69,
               "poisson_ratio": 0.053, "density_kg_m3": 0.12}  # fmt: skip
 """Standard deviations of ln of what sources say of one material, pooled over the materials that ship and have several
 sources: by 2, 4 (dielectrics), 9, 2 and 2 degrees of freedom. What one source alone says is as uncertain."""
