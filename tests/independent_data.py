@@ -13,7 +13,10 @@ from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import Query, Tip
 
-DESIGN = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
+DESIGN = {  # the independent strip's electrodes are those of the thesis's Table C.1: 8.64 kohm
+    "shape": "tri", "parameters": {"dielectric_mm": 0.2},
+    "materials": {"top_electrode": "etpu@thesis-c.1-top", "bottom_electrode": "etpu@thesis-c.1-bottom"},
+}  # fmt: skip
 
 
 def model_of(printed):
