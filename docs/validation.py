@@ -135,7 +135,7 @@ def page(rows: list[Row]) -> str:
         measured = ",".join(f"{m:.3g}" for m in r.measured)
         cells = (r.device, r.quantity, measured, f"{r.value:.3g}", f"{r.lower:.3g}–{r.upper:.3g}",
                  f"{r.inside()}/{len(r.measured)}")  # fmt: skip
-        lines.append("|" + "|".join(cell.replace(" ", "&nbsp;") for cell in cells) + "|")
+        lines.append("|" + "|".join(cells) + "|")
     return "\n".join(lines) + "\n"
 
 
