@@ -20,6 +20,7 @@ from sensorgen.prediction.plan import Plan, without_times
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
+_SHORT = 60  # characters that say what an assumption is, on a first screen
 _LEAST_N, _LEAST_M = 1e-3, 1e-5  # by which a press is read wrongly: less is not said
 UNPREDICTED = "12-numbers"  # rule of the finding that there are none
 SCHEMA = (
@@ -95,7 +96,8 @@ class Term:
         """By how much a press is read wrongly, and what gave the range."""
         c = self.changes or Changes()
         wrong = [newtons(c.force_n)] * (c.force_n > _LEAST_N) + [metres(c.position_m)] * (c.position_m > _LEAST_M)
-        return f"{self.name} ({self.source}), {' and '.join(wrong)}"
+        what = f": {self.what}" * (len(self.what) <= _SHORT)
+        return f"{self.name}{what} ({self.source}), {' and '.join(wrong)}"
 
     def remark(self) -> str:
         """That it is unknown, or may be larger."""
