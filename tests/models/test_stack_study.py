@@ -151,7 +151,9 @@ def test_the_table_of_what_a_second_film_tells():
 
 def test_the_table_of_what_a_touch_does():
     """docs/stack.md, row by row; the plate is free at its sides, as in the table of the second film."""
-    designs = iter([({"shape": "reference"}, "unconfined"), ({"shape": "tri", "parameters": {"dielectric_mm": 0.1}}, "")])
+    designs = iter(
+        [({"shape": "reference"}, "unconfined"), ({"shape": "tri", "parameters": {"dielectric_mm": 0.1}}, "")]
+    )
     rows = [row for row in ROWS if len(row) == 7 and row[1] in {w.words for w in WIRINGS}]
     assert len(rows) == 2 * len(WIRINGS)
     for row, wiring in zip(rows, 2 * WIRINGS, strict=True):
