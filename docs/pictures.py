@@ -21,16 +21,16 @@ from sensorgen.prediction.sensor_model import build_sensor
 
 PICTURES = DOCS / "pictures"
 SENSORS = {
-    "plate": ("solid plate, 0.6 mm", {"shape": "reference"}),
-    "tri": ("triangles over 0.1 mm", {"shape": "tri", "parameters": {"dielectric_mm": 0.1}}),
+    "plate": ("solid plate, 0.6 mm, free sides", {"shape": "reference"}, "unconfined"),
+    "tri": ("triangles over 0.1 mm", {"shape": "tri", "parameters": {"dielectric_mm": 0.1}}, ""),
 }
 PREDICTED = ("inverse-position",)
 
 
 def identifiability(name: str) -> None:
     """Resolution of force and position of one sensor."""
-    title, data = SENSORS[name]
-    shown = figure(build_sensor(drawn(make(data))).sensor, TONES_HZ, title=title)
+    title, data, law = SENSORS[name]
+    shown = figure(build_sensor(drawn(make(data)), law).sensor, TONES_HZ, title=title)
     (PICTURES / f"identifiability-{name}.png").write_bytes(static.png(shown))
 
 
@@ -57,8 +57,8 @@ def touch() -> None:
     """Apparent force of a touch through an isolation layer of X60, by wiring."""
     drawn = Figure(figsize=(9, 3.6), layout="constrained")
     thickness_mm = np.geomspace(0.02, 10, 40)
-    for axes, (title, data) in zip(drawn.subplots(1, 2, sharey=True), SENSORS.values(), strict=True):
-        found = stacked(make(data))
+    for axes, (title, data, law) in zip(drawn.subplots(1, 2, sharey=True), SENSORS.values(), strict=True):
+        found = stacked(make(data), law)
         press = press_at(found, 6.0, 0.045)
         touching = Touching(found.own, found.isolation_eps_r, np.array(TONES_HZ), press, 1e-3, Body())
         for wiring in WIRINGS:

@@ -8,6 +8,7 @@ from drawn_sensor import sensor_of
 
 from sensorgen.design import materials
 from sensorgen.design.design import make
+from sensorgen.design.tip import EVEN, STIFF
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.identifiability import changes
@@ -15,7 +16,7 @@ from sensorgen.prediction.identifiability.changes import CHANGES, most_helpful, 
 from sensorgen.prediction.identifiability.fisher import Setup
 from sensorgen.prediction.identifiability.identify import identify
 from sensorgen.prediction.identifiability.verdict import required
-from sensorgen.prediction.query import TONES_HZ
+from sensorgen.prediction.query import FLAT, TONES_HZ
 
 EPS0 = 8.8541878128e-12
 PLATE = Sensor(
@@ -87,13 +88,15 @@ def test_half_the_width_is_half_the_capacitance_twice_the_stress():
 
 
 def test_the_cell_is_the_one_that_a_design_makes():
-    """Its capacitance lies within the bounds of the columns, and its curve is the solved one."""
+    """Its capacitance is within the bounds of the columns, its curve the solved one; no tip makes it another cell."""
     design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})
     made, cell = sensor_of(design).sensor, cell_sensor()
     assert cell.compression == made.compression
     assert cell.capacitance_f_per_m == pytest.approx(made.capacitance_f_per_m, rel=0.05)
     assert cell.capacitance_f() == pytest.approx(79.8e-12, rel=1e-3)  # solved: 159.65204 pF/m per 2 mm
-    assert changes.cell(setup(made)) == setup(made)
+    for block in (EVEN, STIFF, FLAT.block):
+        own = sensor_of(design, block=block).sensor
+        assert changes.cell(setup(own)) == setup(own)
 
 
 def test_the_far_end_gets_the_electrodes_own_resistance():

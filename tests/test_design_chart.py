@@ -108,7 +108,12 @@ def of(found, model):
 
 
 def test_the_chart_of_an_own_design(unpressed):
-    found = results.chart(bodies.drawn(small()), QUERY, ("capacitance", "line"), budget_s=0.05, runner=here)
+    """Electrodes as resistive as Table 3.2's: in ngspice's finest ladder conductances of those that print outweigh the
+    film's susceptance by 1e11, and doubles round the resistance by some 1e-5.
+    """
+    slots = {"top_electrode": "etpu@thesis-3.2", "bottom_electrode": "etpu@thesis-3.2"}  # less rounding in ngspice
+    resistive = make({"shape": "tri", "parameters": vars(small().params), "materials": slots})
+    found = results.chart(bodies.drawn(resistive), QUERY, ("capacitance", "line"), budget_s=0.05, runner=here)
     assert not found.problems()
     assert not [p for p in found.points if p.contradicted]
     for p in found.points:

@@ -41,7 +41,7 @@ def test_it_says_what_the_plate_cannot_do():
     assert "position to 225 mm" in said
     assert "(213 N, 21 m)" in said
     assert (
-        "1. triangles 2 mm apart over a film of 0.1 mm (tri), as drawn, in place of this cell: 0.15 N, 8.3 mm" in said
+        "1. triangles 2 mm apart over a film of 0.1 mm (tri), as drawn, in place of this cell: 0.15 N, 8.2 mm" in said
     )
     assert "all together:" in said
     assert "99.7 kHz (6 N, 258 mm); 49.9 + 99.7 kHz" in said

@@ -48,7 +48,7 @@ TONES, FORCES, AT = (10.1e3, 99.7e3), (0.0, 2.0, 4.0, 6.0), (0.0, 20.0, 40.0, 60
 @pytest.fixture(scope="module")
 def sensor():
     slots = {"top_electrode": "etpu@thesis-c.1-top", "bottom_electrode": "etpu@thesis-c.1-bottom"}
-    return sensor_of(make({"shape": "reference", "materials": slots})).sensor
+    return sensor_of(make({"shape": "reference", "materials": slots}), "unconfined").sensor
 
 
 @pytest.fixture(scope="module")

@@ -188,8 +188,9 @@ def test_steps_of_any_size_lead_to_the_same_place():
 
 
 def test_the_multimeter_reads_the_bottom_electrode():
+    """Resistivity, length, width and thickness by hand, without the leads where four wires are used."""
     found = Rig(Specimen(DESIGN, Truth(lead_ohm=30.0)))
-    assert found.resistance(wires=4) == pytest.approx(0.2 * 0.1 / (10e-3 * 0.3e-3), rel=1e-6)
+    assert found.resistance(wires=4) == pytest.approx(0.042 * 0.1 / (10e-3 * 0.3e-3), rel=1e-6)
     assert found.resistance(wires=2) - found.resistance(wires=4) == pytest.approx(30.0)
 
 

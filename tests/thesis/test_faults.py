@@ -271,6 +271,9 @@ def test_a_fault_turns_figures_tables_and_claims(fault, monkeypatch, rows, cache
 
 # A number of the thesis that turns a verdict when it is another one, where no model is held against it.
 SAYS_ELSE = [
+    ("table", "1.1", "points", None, 4224.0),
+    ("table", "1.1", "range_kpa", 1, 1000.0),
+    ("claim", "1.1a", "element_mm", None, 2.5),
     ("table", "3.1", "x60", "youngs_modulus_pa", 6.1e6),
     ("table", "3.1", "sizes", "electrode_mm", 0.31),
     ("table", "3.2", "conductivity", "x60", 0.0),

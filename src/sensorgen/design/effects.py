@@ -1,6 +1,6 @@
 """Effects on a reading beside the press: drift since the last reading at rest, dispersion, memory, tip, meter, person.
 
-No source of the materials gives them: the defaults are guesses, for filaments of TPU on a bench in a room. A design
+No source of the materials gives them: the defaults are assumed, for filaments of TPU on a bench in a room. A design
 states its own under ``effects:``.
 """
 
@@ -54,5 +54,5 @@ class Effects(Strict):
     person_mm: Size = Field(default=1.0, description="Error of the place that a person sets [mm].")
 
     def source(self, *names: str) -> str:
-        """Source of some of them: the design where it states one, else a guess."""
+        """Source of some of them: the design where it states one, else an assumption."""
         return GIVEN if self.model_fields_set & set(names) else GUESS

@@ -7,7 +7,7 @@ the sideways displacement is a parabola over the height (shear modulus G, of ele
           4 (G_e - G) t u'' - t p' = \frac{G}{d} (u - u_b) + \frac{d}{2} p', \qquad
           (q + q_b + t u)' + \frac{d}{K} p = w
 
-with what flows sideways in the film, q, and in the lower electrode, :math:`q_b`; w is how far the tip comes down. At
+with what flows sideways in the film, q, and in the lower electrode, :math:`q_b`; w is the displacement of the tip. At
 the sides p = 0 and the electrode is free. A base that holds the lower electrode leaves it its shear alone; on one that
 slides both electrodes are alike. Between stiff faces it is :func:`sensorgen.models.compression.bonded`.
 """

@@ -1,7 +1,7 @@
 """Choose the pressure law of a cell, with its uncertainty.
 
-A printed plate is bonded to its electrodes (thesis 4.2: layers adhere to each other), and bracketed by how its faces
-are held. Solutions of the prototypes' cells are stored; any other cell with gaps is solved on request, and kept.
+A printed plate is bonded to its electrodes (thesis 4.2: layers adhere to each other), and bracketed by boundary
+conditions. Solutions of the prototypes' cells are stored; any other cell with gaps is solved on request, and kept.
 """
 
 from collections.abc import Callable, Mapping, Sequence

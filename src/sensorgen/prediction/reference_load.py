@@ -33,8 +33,8 @@ class Reading(NamedTuple):
     by_position: Complex
     rest: Complex
 
-    def told(self) -> Real:
-        """Logarithm of pressed over rest, by which a press is told: its real parts before its imaginary ones."""
+    def shift(self) -> Real:
+        """Logarithm of pressed over rest, by which a press is detected: its real parts before its imaginary ones."""
         return _parts(np.log(self.pressed / self.rest))
 
 
@@ -120,11 +120,11 @@ class ReferenceLoad:
         force, place = self.at
         if not force > 0:
             return 0.0, 0.0
-        own, sought, scale = self._own, read.told(), np.array([force, self.sensor.length_m])
+        own, sought, scale = self._own, read.shift(), np.array([force, self.sensor.length_m])
         at = np.array(self.at)
         for _ in range(_STEPS):
             by = np.column_stack([_parts(own.by_force / own.pressed), _parts(own.by_position / own.pressed)])
-            step = np.linalg.lstsq(by * scale, sought - own.told(), rcond=_PARALLEL)[0]
+            step = np.linalg.lstsq(by * scale, sought - own.shift(), rcond=_PARALLEL)[0]
             after = np.clip(at + step * scale, 0.0, [_MOST * force, self.sensor.length_m])
             try:
                 pressed = self.sensor.response(self._frequency, *after.tolist())
@@ -140,7 +140,7 @@ class ReferenceLoad:
         return float(force), float(np.nan_to_num(found.position_m, nan=np.inf) / (GUESS * sensor.length_m))
 
     def turns(self, changes: Changes | None, others: Sequence[Sensor] = ()) -> str:
-        """Parts of a press that are told, and would not be by a change alone: "force", "place", "both", or ""."""
+        """Parts of a press that are measured, and would not be by a change alone: "force", "place", "both", or ""."""
         if changes is None or not self.force_n:
             return ""
         wrong = changes.force_n / (GUESS * self.force_n), changes.position_m / (GUESS * self.sensor.length_m)

@@ -41,7 +41,7 @@ class Changes:
     capacitance : float
         Of the capacitance at rest.
     force_n, position_m : float
-        By which a press at the load is read wrongly, the reading held against the one at rest [N], [m].
+        By which a press at the load is read wrongly, the reading compared with the one at rest [N], [m].
     """
 
     magnitude: float = 0.0
@@ -75,9 +75,9 @@ class Term:
     at_least : bool
         Whether it may be larger: the load at one end is beyond the models' range.
     source : str
-        Where its range comes from, or "guess".
+        Where its range comes from: also the design, or an assumption.
     turns : str
-        What a press would no longer be told, by this alone: "force", "place", "both", or "".
+        What could no longer be determined of a press, by this alone: "force", "place", "both", or "".
     """
 
     name: str
@@ -185,7 +185,7 @@ class ErrorBudget:
         )
         caption = "a press read wrongly by one assumption at an end of its range (F, x)"
         yield Table("assumptions", caption, columns, tuple(rows))
-        yield "(readings held against those at rest; loses: what could not be told by this alone)"
+        yield "(readings compared with those at rest; loses: what this alone makes impossible to determine)"
 
 
 def _percent(term: Term, count: int) -> tuple[float | None, ...]:

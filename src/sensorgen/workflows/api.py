@@ -113,7 +113,7 @@ def predict(
     --------
     >>> p = predict(Design(shape="reference"))
     >>> p.status, round(p.drawn.resistance["top"].value)  # ohm
-    ('predicted', 2333)
+    ('predicted', 1400)
     """
     body = _body(what)
     query = Query(tuple(frequency_hz), law=law, tip=tip, accuracy=accuracy, noise=noise)

@@ -11,7 +11,7 @@ import numpy as np
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models import compression
-from sensorgen.models.compression import Plate
+from sensorgen.models.compression import Curve, Plate
 from sensorgen.prediction.identifiability.fisher import Bounds, Setup, standard_errors
 from sensorgen.prediction.identifiability.frequencies import spread
 from sensorgen.prediction.identifiability.results import ChangeResult
@@ -127,10 +127,14 @@ def thin_electrodes(setup: Setup) -> Setup:
 
 
 def cell(setup: Setup) -> Setup:
-    """The solved cell of triangles in place of what is there."""
+    """The solved cell of triangles under the usual block, in place of what is there; that cell under any tip stays."""
     sensor = setup.sensor
-    law = compression.solved("tri", _CELL, _CELL_PA)
-    if law is None or law == sensor.compression or setup.assumed:  # the gain over an unsolved cell is unknown
+    even = compression.solved("tri", _CELL, _CELL_PA)
+    if even is None or setup.assumed:  # the gain over an unsolved cell is unknown
+        return setup
+    tops = [even.scaled_rise(1 + share * even.stiff_change) for share in (0.0, 0.5, 1.0)]  # even, block, stiff
+    law = replace(tops[1], within=even.within + abs(even.stiff_change) / 2)
+    if isinstance(sensor.compression, Curve) and replace(sensor.compression, within=even.within) in tops:
         return setup
     return setup.on(replace(sensor, capacitance_f_per_m=CELL_F_PER_M2 * sensor.width_m, compression=law))
 
