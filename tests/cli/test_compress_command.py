@@ -352,7 +352,7 @@ def test_a_sweep_solves_only_what_is_not_known(run, asked, monkeypatch):
     for row, modulus in zip(rest, (3e6, 6e6), strict=True):
         assert row["youngs_modulus_x60"] == modulus
         assert row["displacement_um"] == pytest.approx([600 * p / modulus for p in (0, 5e4, 1e5)])
-    alone = json.loads(run(*PLATE[:2], "--stress", "50,100", "--set", "youngs_modulus_x60=6e6", "--json").out)
+    alone = json.loads(run(*PLATE[:4], "--stress", "50,100", "--set", "youngs_modulus_x60=6e6", "--json").out)
     assert rest[1] == alone | {key: rest[1][key] for key in ("youngs_modulus_x60", "design")}
     longer = json.loads(run(*MODULI, "--json", "--sweep", "youngs_modulus_x60=3e6,5e6,6e6").out)
     assert asked == [3e6, 6e6, 5e6]
