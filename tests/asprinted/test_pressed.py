@@ -179,6 +179,17 @@ def test_a_plate_has_no_period():
     assert sensed.sensor.capacitance_f() == pytest.approx(69.06266e-12 * 20 * 10 / 1000, rel=1e-6, abs=0)
 
 
+def test_infill_is_pressed_as_the_sensor_that_it_makes():
+    """Its cell and its sensor at rest and under 60 kPa, by one law."""
+    design = small("reference", {"length_mm": 12.0, "width_mm": 6.0}, infill={"x60": {"percent": 80}})
+    printed = estimated(design)
+    found, law = answered(printed, 60.0), build_sensor(printed).sensor.compression
+    thinning, _ = law.capacitive_strain(np.array([6e4]))
+    rest = (found.lower_f_per_m2[0] + found.upper_f_per_m2[0]) / 2
+    assert (found.model, law.name) == ("infill", "infill")
+    assert found.rise_f_per_m2[1] / rest == pytest.approx(thinning[0] / (1 - thinning[0]), rel=1e-6)
+
+
 def test_a_print_that_no_model_can_speak_of_is_refused():
     design = small("double", {"length_mm": 12.0, "width_mm": 8.0})
     with pytest.raises(SensorgenError, match="two electrodes"):

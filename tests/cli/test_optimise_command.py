@@ -228,7 +228,9 @@ def test_a_design_that_cannot_be_made_has_its_reason():
 
 
 def test_an_accepted_doubt_that_nothing_has_is_named():
-    answer = result.result("plates", found(parameters={"dielectric_mm": [0.2]}, accept_doubts=["plate bonded", "plaet"]))
+    answer = result.result(
+        "plates", found(parameters={"dielectric_mm": [0.2]}, accept_doubts=["plate bonded", "plaet"])
+    )
     assert [remark[:30] for remark in answer.remarks] == ["accept_doubts: 'plaet' is part"]
     assert any("plaet" in str(part) for part in answer.document())
 
