@@ -136,7 +136,9 @@ def test_the_stiffness_is_that_of_the_solved_cell():
     asked = design.make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}})
     assert found(drawn(asked), stiffness=True).stiffness_kpa_per_mm == pytest.approx(100 / 36.44e-3, rel=0.03)
     plate = found(drawn(design.make({"shape": "reference"})), stiffness=True)
-    assert plate.stiffness_kpa_per_mm == pytest.approx(6e3 / 0.6)  # 6 MPa over 0.6 mm
+    # 6 MPa over 0.6 mm, times 11.77 of finite elements where it is bonded (reference/bonded_plates.json), which the
+    # closed form of such plates holds to 4 %
+    assert plate.stiffness_kpa_per_mm == pytest.approx(11.7667 * 6e3 / 0.6, rel=0.04)
 
 
 def test_a_stiffness_of_a_cell_in_3d_is_refused():

@@ -7,6 +7,7 @@ import pytest
 
 from sensorgen.asprinted.printed import body
 from sensorgen.core.errors import SensorgenError
+from sensorgen.design.tip import Tip
 from sensorgen.design.walls import WALLS
 from sensorgen.models import press2d, press3d
 from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
@@ -22,6 +23,7 @@ from .conftest import small
 needs_mesher = pytest.mark.skipif("not __import__('importlib').util.find_spec('netgen')", reason="needs NGSolve")
 SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
 EPS = {"x60": 4.68, "air": 1.00059}
+EVENLY = Tip(block="even")
 QUICK = Fineness(corner_mm=0.08, coarse_mm=0.2)
 # Half widths by layer of 0.1 mm from the film up, of both kinds of feet, found by hand from sliced triX; of the film's
 # own feet by the slicer's rules.
@@ -66,8 +68,8 @@ def built(widths, film=0.1):
     return press2d.cell(Scene(bodies, (2.0, 8.0, roof + 0.3)), 2.0)
 
 
-def answered(body, *kpa):
-    return compressed.answer(body, Asked((0.0, *kpa), BoundaryConditions()))
+def answered(body, *kpa, tip=None):
+    return compressed.answer(body, Asked((0.0, *kpa), BoundaryConditions(), tip=tip))
 
 
 @needs_mesher
@@ -75,7 +77,7 @@ def answered(body, *kpa):
 def test_a_printed_cell_gives_way_like_one_built_by_hand(walls, fall_um):
     """Classic walls lose the foot's lowest layer too: it hangs free, and falls by what was lost."""
     design = small()
-    found = answered(estimated(design, walls), 20.0)
+    found = answered(estimated(design, walls), 20.0, tip=EVENLY)  # no block stands on the one by hand
     both, low = BY_HAND[walls]
     hand = press2d.press(built({"cog": both, "feet": both, "low": low}), SOLIDS, [0.0, 2e4], EPS, fineness=QUICK)
     assert (found.model, found.faults, hand.faults) == ("press2d", (), ())
@@ -102,11 +104,19 @@ def test_a_foot_of_a_lines_width_is_stiffer_than_a_sharp_one():
 def test_the_printed_sensor_has_the_law_of_its_own_cell():
     """Its rise is what compressing the print says, and its capacitance lies between all widths of a line."""
     printed = estimated(small(), "arachne")
-    sensed = build_sensor(printed, "solved")
-    found = answered(printed, 10.0, 20.0)
-    middle = (np.array(found.lower_f_per_m2) + np.array(found.upper_f_per_m2)) / 2
-    thinning, _ = sensed.sensor.compression.capacitive_strain(np.array([1e4, 2e4]))
-    assert 1 / (1 - thinning) == pytest.approx(middle[1:] / middle[0], rel=1e-4)
+    sensed = build_sensor(printed, "solved", EVENLY)
+
+    def compared(tip, *laws):
+        """Rises that compressing the print says, and of each law."""
+        found, stress_pa = answered(printed, 10.0, 20.0, tip=tip), np.array([1e4, 2e4])
+        middle = (np.array(found.lower_f_per_m2) + np.array(found.upper_f_per_m2)) / 2
+        return middle[1:] / middle[0] - 1, *(1 / (1 - law.capacitive_strain(stress_pa)[0]) - 1 for law in laws)
+
+    said, own = compared(EVENLY, sensed.sensor.compression)
+    assert 1 + own == pytest.approx(1 + said, rel=1e-4)
+    said, low, high = compared(Tip(), *build_sensor(printed, "solved").law.others)  # the stored law knows no block
+    assert (low < said).all()
+    assert (said < high).all()
     assert sensed.law.bounded
     c = sensed.rest.capacitance
     assert sensed.sensor.capacitance_f() == pytest.approx(c.value, rel=1e-12, abs=0)
@@ -159,12 +169,25 @@ def test_the_staircase_whose_cog_ends_short_of_the_film():
 
 
 def test_a_plate_has_no_period():
-    design = small("reference", {"length_mm": 20.0, "width_mm": 8.0})
+    """Free its modulus is that of the material; bonded 11.77 E by finite elements, the closed form to 4 %."""
+    design = small("reference", {"length_mm": 20.0, "width_mm": 10.0})
     printed = estimated(design)
     assert piece(printed).period_mm is None
     sensed = build_sensor(printed)
-    assert sensed.sensor.compression.modulus_pa == 6e6
-    assert sensed.sensor.capacitance_f() == pytest.approx(69.06266e-12 * 20 * 8 / 1000, rel=1e-6, abs=0)
+    assert sensed.sensor.compression.modulus_pa == pytest.approx(11.7667 * 6e6, rel=0.04)  # bonded_plates.json
+    assert build_sensor(printed, "unconfined").sensor.compression.modulus_pa == 6e6
+    assert sensed.sensor.capacitance_f() == pytest.approx(69.06266e-12 * 20 * 10 / 1000, rel=1e-6, abs=0)
+
+
+def test_infill_is_pressed_as_the_sensor_that_it_makes():
+    """Its cell and its sensor at rest and under 60 kPa, by one law."""
+    design = small("reference", {"length_mm": 12.0, "width_mm": 6.0}, infill={"x60": {"percent": 80}})
+    printed = estimated(design)
+    found, law = answered(printed, 60.0), build_sensor(printed).sensor.compression
+    thinning, _ = law.capacitive_strain(np.array([6e4]))
+    rest = (found.lower_f_per_m2[0] + found.upper_f_per_m2[0]) / 2
+    assert (found.model, law.name) == ("infill", "infill")
+    assert found.rise_f_per_m2[1] / rest == pytest.approx(thinning[0] / (1 - thinning[0]), rel=1e-6)
 
 
 def test_a_print_that_no_model_can_speak_of_is_refused():

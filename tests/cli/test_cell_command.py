@@ -24,6 +24,7 @@ def answer(said):
     return json.loads(said.out)
 
 
+@pytest.mark.own_cache
 @pytest.mark.parametrize("film", [0.1, 0.2])
 @pytest.mark.parametrize("accuracy", ["1e-2", "1e-6"])
 def test_bounds_hold_the_reference_and_are_as_near_as_asked(run, film, accuracy):

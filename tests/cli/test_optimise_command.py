@@ -32,8 +32,9 @@ PLATES = {
     "design": {"shape": "reference"},
     "parameters": {"dielectric_mm": {"from": 0.1, "to": 0.4}, "electrode_mm": {"from": 0.2, "to": 0.4}},
     "objectives": {"capacitance_pf": "maximise", "bottom_electrode_ohm": "maximise"},
-    "accept_doubts": ["plate free"],
+    "accept_doubts": ["plate bonded"],
 }
+BONDED = json.loads((Path(__file__).parents[1] / "reference" / "bonded_plates.json").read_text())["plates"]
 DANGLING = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}, "profile": {"walls": "classic"}}
 
 
@@ -92,11 +93,16 @@ def test_feet_in_free_fall_lose():
     assert any(name.startswith("doubt: feet hang free") for name in wanted.violated(trial))
 
 
-def test_sensitivity_on_the_coarse_mesh_is_that_of_a_free_plate():
-    """C(p)/C(0) = 1/(1 - p/E), with E = 6 MPa: the relative change from 300 to 1200 kPa, per kPa."""
-    low, high = 300 / 6000, 1200 / 6000
+def test_sensitivity_on_the_coarse_mesh_is_that_of_a_bonded_plate():
+    """C(p)/C(0) = 1/(1 - p/M): the relative change from 300 to 1200 kPa, per kPa.
+
+    M of finite elements of another program, 10 mm wide between electrodes of 0.3 mm; the closed form of such plates is
+    within 4 % of them.
+    """
+    modulus_kpa = next(p["modulus_over_e"] for p in BONDED if (p["electrode_mm"], p["base"]) == (0.3, "held")) * 6000
+    low, high = 300 / modulus_kpa, 1200 / modulus_kpa
     of = ladder.known(make({"shape": "reference"}), Query(range_kpa=(300.0, 1200.0)), True)["sensitivity_per_kpa"]
-    assert of.lower == of.upper == pytest.approx(((1 - low) / (1 - high) - 1) / 900, rel=1e-9)
+    assert of.lower == of.upper == pytest.approx(((1 - low) / (1 - high) - 1) / 900, rel=0.04)
 
 
 def test_limits_are_proven_before_anything_is_evaluated():
@@ -222,7 +228,9 @@ def test_a_design_that_cannot_be_made_has_its_reason():
 
 
 def test_an_accepted_doubt_that_nothing_has_is_named():
-    answer = result.result("plates", found(parameters={"dielectric_mm": [0.2]}, accept_doubts=["plate free", "plaet"]))
+    answer = result.result(
+        "plates", found(parameters={"dielectric_mm": [0.2]}, accept_doubts=["plate bonded", "plaet"])
+    )
     assert [remark[:30] for remark in answer.remarks] == ["accept_doubts: 'plaet' is part"]
     assert any("plaet" in str(part) for part in answer.document())
 

@@ -107,6 +107,9 @@ profile: {walls: classic}
 own: {}
 orientation: upside-down
 shrinkage: 0.02
+tip: {shape: hertz, width_mm: 5, block: stiff}
+effects: {temperature_k: 3}
+leads: {capacitance_pf: 2.5, guard: driven}
 waivers:
   - {rule: 5-width, body: film, reason: seen on the bench}
   - {rule: "9", reason: seen on the bench}
@@ -124,6 +127,8 @@ def test_a_file_with_every_key(taken, tmp_path):
     assert (design.name, design.params.dielectric_mm, design.tools) == ("whole", 0.1, {"x60": 3})
     assert design.material("x60").value("relative_permittivity", "thesis-4.1").value == 3.0
     assert [w.rule for w in design.waivers] == ["5-width", "9"]
+    assert (design.tip.width_mm, design.tip.block, design.effects.temperature_k) == (5.0, "stiff", 3.0)
+    assert (design.leads.capacitance_pf, design.leads.guard) == (2.5, "driven")
 
 
 def test_a_file_is_named_by_itself_until_an_option_changes_it(taken, tmp_path):

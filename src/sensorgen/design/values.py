@@ -1,5 +1,6 @@
 """Values of a design's materials, each with its source: permittivities, moduli, piezoresistance."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import exp, inf, log
 
@@ -113,6 +114,15 @@ def _around(quantity: str, at: float, deviation: float) -> tuple[float, float]:
         return 1 + (at - 1) / factor, 1 + (at - 1) * factor
     most = max(at, _RUBBER) if quantity == "poisson_ratio" else inf
     return at / factor, min(at * factor, most)
+
+
+def assumed(design: Design, values: Iterable[MaterialValue]) -> Iterator[str]:
+    """Each value that no source gives, with its range, in words."""
+    for value in values:
+        if value.source == ASSUMED:
+            low, high = spread(design, value)
+            about = f"{value.quantity} of {value.material} {value.value:.3g}"
+            yield f"{about} ({low:.3g} to {high:.4g}): no source gives it"
 
 
 def ln_spread(material: Material, source: str, quantity: str) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain
 from math import inf, isfinite, nan
 
 import numpy as np
@@ -13,7 +14,9 @@ from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput, MissingValue, NotInstalled, OutOfRange
 from sensorgen.design.body import Body
+from sensorgen.design.design import Design
 from sensorgen.design.tip import Tip
+from sensorgen.design.values import assumed, of_all_materials, permittivities
 from sensorgen.models import press2d
 from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.prediction import capacitance_answer as at_rest
@@ -373,9 +376,16 @@ def _result(body: Body, case: Case, estimate: Estimate, asked: Asked) -> Compres
         displacement_error_um=_known(_UM_PER_M * estimate.displacement_error_m),
         rise_f_per_m2=_known(rise), rise_error_f_per_m2=_known(off),
         lower_f_per_m2=_known(lower), upper_f_per_m2=_known(upper),
-        converged_kpa=found.converged_pa / _PA_PER_KPA, faults=found.faults, doubts=found.doubts, bounds=_OF_BOTH,
+        converged_kpa=found.converged_pa / _PA_PER_KPA, faults=found.faults, bounds=_OF_BOTH,
+        doubts=(*found.doubts, *_assumed(body.design)),
         largest_rise_error=up if up < inf else None, largest_displacement_error=down if down < inf else None,
     )  # fmt: skip
+
+
+def _assumed(design: Design) -> Iterator[str]:
+    """Values of the cell that no source gives, with their ranges."""
+    elastic = (of_all_materials(design, q).values() for q in ("youngs_modulus_pa", "poisson_ratio"))
+    return assumed(design, (*chain.from_iterable(elastic), *permittivities(design)))
 
 
 def _known(values: Real) -> tuple[float | None, ...]:
@@ -398,7 +408,8 @@ def _closed_form(body: Body, asked: Asked, model: str) -> CompressionResult:
         design=body.design.name, body=body.provenance, model=model, held=found.boundary, stress_kpa=asked.stress_kpa,
         displacement_um=tuple((found.displacement_m * _UM_PER_M).tolist()), displacement_error_um=_known(unknown),
         rise_f_per_m2=_known(rise), rise_error_f_per_m2=_known(off), lower_f_per_m2=_known(lower),
-        upper_f_per_m2=_known(upper), converged_kpa=asked.stress_kpa[-1], doubts=found.doubts,
+        upper_f_per_m2=_known(upper), converged_kpa=asked.stress_kpa[-1],
+        doubts=(*found.doubts, *_assumed(body.design)),
         bounds="of the capacitance, by the law between its bounds" if found.rises else "none",
     )  # fmt: skip
 

@@ -17,7 +17,7 @@ from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.effects import Effects
 from sensorgen.design.tip import WORDS
-from sensorgen.design.values import ASSUMED, ENDS, MaterialValue, lead_ranges, spread
+from sensorgen.design.values import ASSUMED, ENDS, MaterialValue, assumed, lead_ranges
 from sensorgen.models import line
 from sensorgen.models.compression import Compression
 from sensorgen.models.sensor import Sensor
@@ -426,11 +426,7 @@ def _moduli(model: SensorModel) -> list[Compression]:
 
 def _ranges_assumed(design: Design, values: Iterable[MaterialValue]) -> Iterator[str]:
     """Ranges in place of values that no source gives, and of leads."""
-    for value in values:
-        if value.source == ASSUMED:
-            low, high = spread(design, value)
-            about = f"{value.quantity} of {value.material} {value.value:.3g}"
-            yield f"{about} ({low:.3g} to {high:.4g}): no source gives it"
+    yield from assumed(design, values)
     farad, ohm = lead_ranges(design)
     yield (
         f"leads of {1e12 * farad[1]:.3g} to {1e12 * farad[2]:.3g} pF, with contacts {ohm[1]:.4g} to {ohm[2]:.4g} ohm: "
