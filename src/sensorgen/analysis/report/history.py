@@ -46,8 +46,7 @@ def rows(found: Comparison, ac: Sequence[AcRow]) -> list[HistoryRow]:
     made, before = [], dict[str, _Before]()
     for row in found.rows:
         name = row.reading.specimen
-        body = found.bodies.get(found.names.get(name, ""))
-        shrinkage = body.design.shrinkage if body else 0.0
+        shrinkage = _shrinkage(found, name)
         earlier, c = before.get(name), measured.get(row.reading.number, {})
         state = _state(row)
         known = (state != _UNTOLD or shrinkage) and not (earlier and state == _state(earlier[0]))
@@ -56,6 +55,12 @@ def rows(found: Comparison, ac: Sequence[AcRow]) -> list[HistoryRow]:
         kept = earlier[1] if earlier and not known else {}
         before[name] = row, {**kept, **{f: pf for f, (pf, _) in c.items()}}
     return made
+
+
+def _shrinkage(found: Comparison, specimen: str) -> float:
+    """By which the bake shrinks a specimen, as its design has it [-]; 0 without a design."""
+    body = found.bodies.get(found.names.get(specimen, ""))
+    return body.design.shrinkage if body else 0.0
 
 
 def _state(row: Compared) -> tuple[bool | None, str, str]:
