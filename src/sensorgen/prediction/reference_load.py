@@ -18,8 +18,7 @@ from sensorgen.prediction.results import Changes, Term
 
 SOURCES = "sources"
 _STEPS = 4  # of Gauss and Newton, to a press that is misread
-_PARALLEL = 1e-9  # of the larger direction, below which another one does not tell
-_ROUNDED = 1e-6  # share of the load and of the length, below which a press is read as it is
+_PARALLEL = 1e-9  # of the larger direction, below which another one does not tell; of a press, what is rounding
 _MOST = 20.0  # force that a press is misread as, over its own [-]
 
 Real = NDArray[np.float64]
@@ -119,8 +118,6 @@ class ReferenceLoad:
         Least squares of the logarithms, by Gauss-Newton steps that stay on the sensor and within its law.
         """
         force = self.force_n
-        if not force > 0:
-            return 0.0, 0.0
         own, sought, scale = self._own, read.shift(), np.array([force, self.sensor.length_m])
         at = np.array(self.at)
         for _ in range(_STEPS):
@@ -133,7 +130,7 @@ class ReferenceLoad:
                 break
             own, at = Reading(*pressed, own.rest), after
         off = np.abs(at - np.array(self.at))
-        off[off < _ROUNDED * scale] = 0.0
+        off[off < _PARALLEL * scale] = 0.0
         return float(off[0]), float(off[1])
 
     def _grades(self, sensor: Sensor) -> tuple[float, float]:
