@@ -37,5 +37,5 @@ def data_of(run, noise):
 
 
 def none_of(data):
-    """The same specimen at rest, without known presses."""
+    """Specimen at rest alone, without known presses."""
     return replace(data.rows(np.zeros(0, int)), single=data.noise[0])

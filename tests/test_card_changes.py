@@ -88,7 +88,7 @@ def test_half_the_width_is_half_the_capacitance_twice_the_stress():
 
 
 def test_the_cell_is_the_one_that_a_design_makes():
-    """Its capacitance is within the bounds of the columns, its curve the solved one; no tip makes it another cell."""
+    """Capacitance within the bounds of the columns, curve the solved one; no tip makes it another cell."""
     design = make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}})
     made, cell = sensor_of(design).sensor, cell_sensor()
     assert cell.compression == made.compression

@@ -1,4 +1,4 @@
-"""What a reading is exposed to: against closed forms, and presses that an own chain of pieces is misread as."""
+"""Exposures of a reading: against closed forms, and presses that an own chain of pieces is misread as."""
 
 import numpy as np
 import pytest
@@ -46,7 +46,7 @@ def chain(force, place, eps=1.0, rho=1.0, under=1.0, rise=1.0, n=1500):
 
 
 def misread(**changed):
-    """What the chain finds in a reading of a changed one, by the ratio to the reading at rest."""
+    """Errors of force and position [N], [m] of a chain that reads a changed one, by the ratio to rest."""
 
     def told(force, place, rest, **how):
         ln = np.log(chain(force, place, **how) / rest)

@@ -181,7 +181,7 @@ def test_a_plate_has_no_period():
 
 
 def test_infill_is_pressed_as_the_sensor_that_it_makes():
-    """Its cell and its sensor at rest and under 60 kPa, by one law."""
+    """Cell and sensor at rest and under 60 kPa, by one law."""
     design = small("reference", {"length_mm": 12.0, "width_mm": 6.0}, infill={"x60": {"percent": 80}})
     printed = estimated(design)
     law = build_sensor(printed, rest=rest_state(printed, ranges=False)).sensor.compression

@@ -318,7 +318,7 @@ class Design(Strict):
         return data | {"materials": first, "materials_values": stuff}
 
     def _differs(self, slot: str, then: str) -> bool:
-        """Whether a part has another number of any quantity than in version 0.1.0."""
+        """True if a part has another number of any quantity than in version 0.1.0."""
         (name, _, source), first_source = slot.partition("@"), then.partition("@")[2]
         now, first = self.material(name), material_files.first_form(self.material(name))
         return any(now.chosen(q, source) != first.chosen(q, first_source) for q in first.properties)

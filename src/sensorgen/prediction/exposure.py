@@ -12,6 +12,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.errors import MissingValue, OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.effects import Effects
+from sensorgen.design.tip import EVEN
 from sensorgen.models import pressure
 from sensorgen.models.compression import averaged
 from sensorgen.models.sensor import Sensor
@@ -21,7 +22,6 @@ from sensorgen.prediction.results import Changes, Term
 from sensorgen.prediction.sensor_model import SensorModel, piece
 
 _EDGE = 0.45  # of the width: farthest that a tip is pressed off the middle
-_TIP_M, _TIP_PA = 0.01, 12e6  # thesis: a block of NinjaFlex; its modulus by the maker's tensile data
 
 
 class Exposure(NamedTuple):
@@ -44,7 +44,7 @@ def exposed(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
     effects = model.body.design.effects
     if not reference.force_n > 0:
         return
-    for one in chain(_drift(effects, model, reference), _memory(effects, reference), _tip(effects, model, reference),
+    for one in chain(_drift(effects, model.sensor), _memory(effects, reference), _tip(effects, model, reference),
                      _first_layer(effects, model.sensor)):  # fmt: skip
         source = effects.source(*one.keys)
         if one.sensors is None:
@@ -64,33 +64,22 @@ def exposed(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
         yield Term("person", what, "person", press, source=source, turns=reference.turns(press))
 
 
-def _drift(e: Effects, model: SensorModel, reference: ReferenceLoad) -> Iterator[Exposure]:
-    """Drift of permittivity and resistivity, dispersion, and piezoresistance under the tip."""
-    sensor = model.sensor
-    warmer, moister = f"{e.temperature_k:g} K", f"{e.humidity_percent:g} % of humidity"
-    for name, cause, of, share, keys in (
-        ("permittivity, temperature", warmer, _permittivity, e.permittivity_per_k * e.temperature_k,
-         ("permittivity_per_k", "temperature_k")),
-        ("permittivity, humidity", moister, _permittivity, e.permittivity_per_percent * e.humidity_percent,
-         ("permittivity_per_percent", "humidity_percent")),
-        ("resistivity, temperature", warmer, _resistivity, e.resistivity_per_k * e.temperature_k,
-         ("resistivity_per_k", "temperature_k")),
-        ("resistivity, humidity", moister, _resistivity, e.resistivity_per_percent * e.humidity_percent,
-         ("resistivity_per_percent", "humidity_percent")),
-    ):  # fmt: skip
-        ends = [of(sensor, 1 + sign * share) for sign in (-1, 1) if share]
-        yield Exposure(keys, name, f"{share:.2g} by {cause} since the reading at rest", "drift", ends)
+def _drift(e: Effects, sensor: Sensor) -> Iterator[Exposure]:
+    """Drift of permittivity and resistivity since the reading at rest, and their dispersion."""
+    causes = ("temperature", "k", "K"), ("humidity", "percent", "% of humidity")
+    for quantity, of in (("permittivity", _permittivity), ("resistivity", _resistivity)):
+        for cause, unit, words in causes:
+            keys = f"{quantity}_per_{unit}", f"{cause}_{unit}"
+            per, change = (getattr(e, key) for key in keys)
+            ends = [of(sensor, 1 + sign * per * change) for sign in (-1, 1) if per * change]
+            what = f"{per * change:.2g} by {change:g} {words} since the reading at rest"
+            yield Exposure(keys, f"{quantity}, {cause}", what, "drift", ends)
     n, m = e.permittivity_dispersion, e.resistivity_dispersion
     dispersed = [Dispersed(**vars(sensor), permittivity_power=n, resistivity_power=m)] if n or m else []
     what = f"permittivity as f^-{n:g}, resistivity as f^-{m:g}"
     yield Exposure(
         ("permittivity_dispersion", "resistivity_dispersion"), "dispersion", what, "drift", dispersed, since_rest=False
     )
-    if not model.piezoresistance:
-        per_pa = e.piezoresistance / reference.stress_pa()
-        ends = [replace(sensor, piezoresistance_per_pa=(s * per_pa, s * per_pa)) for s in (-1, 1) if per_pa]
-        what = f"resistivity under the tip {e.piezoresistance:g} lower or higher"
-        yield Exposure(("piezoresistance",), "piezoresistance", what, "drift", ends)
 
 
 def _memory(e: Effects, reference: ReferenceLoad) -> Iterator[Exposure]:
@@ -103,13 +92,18 @@ def _memory(e: Effects, reference: ReferenceLoad) -> Iterator[Exposure]:
 
 
 def _tip(e: Effects, model: SensorModel, reference: ReferenceLoad) -> Iterator[Exposure]:
-    """Uneven pressure across the sensor: a tip off the middle, or tilted."""
+    """Piezoresistance under the tip; uneven pressure across the sensor: a tip off the middle, or tilted."""
     width_m = model.sensor.width_m
+    if not model.piezoresistance:
+        per_pa = e.piezoresistance / reference.stress_pa()
+        changed = [replace(model.sensor, piezoresistance_per_pa=(s * per_pa, s * per_pa)) for s in (-1, 1) if per_pa]
+        what = f"resistivity under the tip {e.piezoresistance:g} lower or higher"
+        yield Exposure(("piezoresistance",), "piezoresistance", what, "drift", changed)
     if e.off_middle_mm:
         across = pressure.off_middle(min(e.off_middle_mm * M_PER_MM / width_m, _EDGE))
         ends = _with_law(reference, lambda _: across)
         yield Exposure(("off_middle_mm",), "tip off the middle", f"by {e.off_middle_mm:g} mm across", "tip", ends)
-    if e.tilt_deg:
+    if e.tilt_deg and model.body.design.tip.block != EVEN:
         ends = _tilted(model, reference, tan(radians(e.tilt_deg)) * width_m)
         yield Exposure(("tilt_deg",), "tip tilted", f"by {e.tilt_deg:g} degrees across", "tip", ends)
 
@@ -149,9 +143,11 @@ def _with_law(
 
 def _tilted(model: SensorModel, reference: ReferenceLoad, difference_m: float) -> list[Sensor] | None:
     """Under a tip that is held so many metres lower at one side; None where it is not known how the film yields."""
+    design, tip = model.body.design, model.body.design.tip.tip()
+    block = tip.height_m / design.material(tip.block).value("youngs_modulus_pa").value if tip.soft else 0.0
     try:
         film_pa_per_m = model.sensor.compression.foundation_stiffness_pa_per_m(gap_m(piece(model.body).scene))
     except (MissingValue, OutOfRange):
         return None
-    rise_pa = difference_m / (1 / film_pa_per_m + _TIP_M / _TIP_PA)
+    rise_pa = difference_m / (1 / film_pa_per_m + block)
     return _with_law(reference, lambda mean_pa: pressure.tilted(rise_pa, mean_pa))

@@ -446,7 +446,11 @@ def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
         yield "contacts between extruded lines cost no resistance: no source gives their resistivity"
     gone = lost(body.design).taken
     said = " and ".join(f"{t.quantity} of {t.material}" for t in gone)
-    yield f"dielectric losses: {said} as given" if gone else "no dielectric loss and no leak: the sources give none"
+    yield (
+        f"dielectric losses: {said} as given"
+        if gone
+        else "no leak, and dielectric loss in the range of Z alone: no source gives them"
+    )
     rises = model.piezoresistance if model else {}
     if not rises:
         yield "resistivity under the tip as elsewhere: no source says how it changes with pressure"

@@ -108,7 +108,7 @@ def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = n
 
 
 def _overlap(time: Real, rig: RigLog) -> bool:
-    """Whether half of the shorter record lies in the other, as with clocks that agree."""
+    """True if half of the shorter record lies in the other, as with clocks that agree."""
     rows = rig.sound()[0]
     common = min(time[-1], rows[-1]) - max(time[0], rows[0])
     return bool(common >= 0.5 * min(np.ptp(time), np.ptp(rows)))
