@@ -55,11 +55,7 @@ _STRAIN = np.linspace(0.0, 0.3, 7)  # of infill: lines of its law, which is stra
 _SAME_RATIO = 1e-3  # difference of Poisson's ratios: 0.4999 and 0.5 are one cell, 0.45 deforms by 11 % more
 _ENOUGH = 0.5  # of the last of them: a curve that is known so far is extended [-]
 _ONSET = 0.25  # largest relative error of a curve's onset, on films of 0.02 to 0.2 mm from 0.5 kPa on
-_LIKE = {
-    "press2d": "tri",
-    "press3d": "rect",
-    "press_round": "tri",
-}  # prototypes that other cells are assumed to resemble
+_LIKE = {"press2d": "tri", "press3d": "rect", "press_round": "tri"}  # prototypes that other cells should resemble
 
 
 @dataclass(frozen=True)
@@ -391,11 +387,7 @@ def solved(
     known = shares[np.isfinite(shares)]
     if not known.size:
         raise OutOfRange("the error of the solved cell is unknown: the next coarser mesh did not converge")
-    curve = replace(
-        curve,
-        within=float(known.max()),
-        displacement_m=float(found.displacement_m[-1]) - found.fall_m,
-    )
+    curve = replace(curve, within=float(known.max()), displacement_m=float(found.displacement_m[-1]) - found.fall_m)
     short = curve.stress_pa[-1] < loads[-1]
     ended = [f"the solution of the cell ended at {curve.stress_pa[-1] / 1e3:.3g} kPa"] if short else []
     doubts = (*found.doubts, *([_LANDING] if found.fall_m else []), *ended)
