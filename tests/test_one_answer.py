@@ -412,9 +412,12 @@ def _questions():
 
 @pytest.mark.usefixtures("shared_cache")
 @pytest.mark.parametrize(("quantity", "entry", "names"), [*_questions()])
-def test_whoever_is_asked_says_the_same(quantity, entry, names, asked, monkeypatch, program):
+def test_whoever_is_asked_says_the_same(quantity, entry, names, asked, monkeypatch, program, request):
+    """By day of laws that are stored or in closed form; by night of solved ones, too."""
     if quantity == "errors":
         program("prusa-slicer", "prusa-slicer")
+    if entry is not compress and not set(SLOW) & set(names):
+        request.getfixturevalue("unpressed")
     differing, known = {}, slice_ if quantity == "errors" else predict
     for name in names:
         if name == "double" and entry in (fit, invert):

@@ -381,7 +381,7 @@ def test_designs_that_do_not_fit_their_bodies_are_refused(run, plates, change, l
         make(load(Path("a.yaml")).model_dump(mode="json") | change)
 
 
-@pytest.mark.usefixtures("shared_kernel")
+@pytest.mark.usefixtures("shared_kernel", "unpressed")
 def test_the_whole_walk_in_an_empty_folder(run, models, program):
     """From a STEP of another program to a sliced print, with commands alone."""
     program("prusa-slicer", "prusa-slicer")
