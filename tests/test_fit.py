@@ -315,8 +315,9 @@ def pillars_f(permittivity, end):
 
 
 @pytest.fixture
-def bounded(monkeypatch, unpressed):
+def bounded(monkeypatch, unpressed, tmp_path):
     """No model of the cell but the closed-form bounds."""
+    monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(prediction_of_c, "capacitance_models", lambda: {"columns": columns})
 
 

@@ -183,7 +183,8 @@ def _by_ratio(
             raise BadInput(f"{measured}: nothing at rest before readings under load; expected 1 in column 'rest' first")
     sigma = noise or float(np.nanmedian(rest.noise()))
     notes = (*([rest.change.words] if rest.change else []), *(made[3] if made else ()))
-    result = summary.result(of, made[2] if made else 0, made[1] if made else 0.0, sigma, notes)
+    by, limit, length_m = (made[2], made[1], float(made[0].position_m[-1])) if made else (0, 0.0, 0.0)
+    result = summary.result(of, by, limit, length_m, sigma, notes)
     _said(result, terminal, output)
     return 0
 
