@@ -434,15 +434,6 @@ class Prediction(Displayed):
         """Indented JSON of the published schema."""
         return json.dumps(json.loads(to_json(self)), indent=2, ensure_ascii=False) + "\n"
 
-    def with_short(self, found: Sequence[Finding]) -> tuple[Finding, ...]:
-        """Findings about a drawing, an error where its print is a short, a warning where it has no capacitance."""
-        if self.status == "not predicted":
-            return (unpredicted(self.reason), *found)
-        if self.status != "short" or any(f.rule == "1-short" for f in found):
-            return tuple(found)
-        advice = "widen narrow parts to a line, or draw the electrodes further apart"
-        return (Finding("1-short", "error", "sensor", f"as {self.body}: {self.reason}", advice, 0.0), *found)
-
     def problems(self, accuracy: float | None) -> Sequence[str]:
         """That abs(Z) is not within an accuracy that was asked for [-]."""
         if accuracy is None or self.capacitance is None:
