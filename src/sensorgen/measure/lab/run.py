@@ -381,12 +381,15 @@ class _Attempt:
                               counts=counts)  # fmt: skip
         except SensorgenError as error:
             failed.append(str(error))
-        failed += kept.close()
+        unkept = kept.close()
         rows: list[BenchRun] = []
         try:
             rows = recorder.log_attempts(self.log, self.folder, self.clock)
         except SensorgenError as error:
-            failed.append(f"not logged yet: {error}")
+            unkept.append(f"not logged yet: {error}")
+        if end == "done" and unkept:
+            end, reason = "fault", f"{reason}, but {unkept[0]}"
+        failed += unkept
         failed += [each["problem"] for each in Run.read(self.folder).of("logged") if each["problem"]]
         return RunResult(
             self.plan.experiment.specimen, str(self.folder), end, reason, len(self.done), len(self.plan.steps),
