@@ -177,7 +177,7 @@ def summarised(
         for one in map(lockin, marked):
             lockins[one.lockin] = _longer(lockins[one.lockin], one) if one.lockin in lockins else one
     if rig and beside is None and fault:  # as of a sensor with a hole, which does not respond to the force
-        beside = Rig(**rig.counts(), clocks=f"not joined with the rig: {fault}")
+        beside = Rig(len(rig.time_s), int(rig.error.sum()), clocks=f"not joined with the rig: {fault}")
     return Facts(tuple(lockins.values()), dict(columns), dict(rig_columns), beside)
 
 
