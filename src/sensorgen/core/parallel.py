@@ -22,7 +22,7 @@ CHUNK_S = 1.0  # sending work to a process takes a millisecond, to another compu
 # evaluation of a sensor takes 18.7 s of CPU with one thread of BLAS, and 22.1 s with two, in the same time.
 _ENVIRONMENT = {
     "PYTHONSAFEPATH": "1", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1",
-    "VECLIB_MAXIMUM_THREADS": "1",
+    "VECLIB_MAXIMUM_THREADS": "1", "PYTHONWARNINGS": "ignore",
 }  # fmt: skip
 _POLL_S, _CONNECT_S, _ALONE_S = 1.0, 10.0, 60.0
 _LIMIT_S = 1800.0  # of processor time for one work; the longest that we know takes a tenth
