@@ -35,6 +35,14 @@ from sensorgen.verification.chart.measured import Point, with_front
 REFERENCE = Path(__file__).parent / "reference"
 
 
+@pytest.fixture(autouse=True, scope="module")
+def _timed_once():
+    """What only the time is taken of is not done again; how often it would be has a test of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measured_in, "_REPEATS", 1)
+        yield
+
+
 def point(seconds, error, model="m", bounded=True, scene="s"):
     return Point(scene, model, error, seconds, "", bounded, None, 1.0, 1.1)
 
@@ -63,6 +71,7 @@ def test_the_front_is_what_nothing_beats(pairs):
     ],
 )
 def test_quick_work_is_timed_several_times(monkeypatch, runs, counts, expected):
+    monkeypatch.setattr(measured_in, "_REPEATS", 5)
     clock = iter(np.cumsum([0.0, *[x for run in runs for x in (run, 0.0)]]).tolist())
     monkeypatch.setattr(measured_in, "used_s", lambda: next(clock))
     called = []

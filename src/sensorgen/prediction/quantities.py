@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from itertools import product
 from math import inf, isnan, nan, pi, prod, tan
 from typing import Any
@@ -157,13 +157,17 @@ def _impedance(
     """
     omega, (lead_f, lead_ohm) = 2 * pi * frequency_hz, leads
 
+    @cache  # the same line at the end of other leads
+    def own(ohm: float, farad: float, n: float) -> complex:
+        lossy = 1j + gone.tan_delta + tan(n * pi / 2)
+        admittance = omega * farad * (frequency_hz / LOWEST_HZ) ** -n * lossy + gone.leak_s
+        return complex(line.cascade([ohm], [np.array([admittance])], [1.0])[0])
+
     def z(
         ohm: float, farad: float, parallel: float = lead_f.value, series: float = lead_ohm.value, n: float = 0.0
     ) -> complex:  # fmt: skip
-        lossy = 1j + gone.tan_delta + tan(n * pi / 2)
-        admittance = omega * farad * (frequency_hz / LOWEST_HZ) ** -n * lossy + gone.leak_s
-        own = complex(line.cascade([ohm], [np.array([admittance])], [1.0])[0])
-        return series + own / (1 + 1j * omega * parallel * own)
+        alone = own(ohm, farad, n)
+        return series + alone / (1 + 1j * omega * parallel * alone)
 
     by_leads = list(product(lead_f[1:], lead_ohm[1:]))
     rest = list(product((r.lower, r.upper), (c.lower, c.upper)))

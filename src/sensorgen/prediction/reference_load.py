@@ -123,6 +123,8 @@ class ReferenceLoad:
         for _ in range(_STEPS):
             by = np.column_stack([_parts(own.by_force / own.pressed), _parts(own.by_position / own.pressed)])
             step = np.linalg.lstsq(by * scale, sought - own.shift(), rcond=_PARALLEL)[0]
+            if np.abs(step).max() < _PARALLEL:
+                break
             after = np.clip(at + step * scale, 0.0, [_MOST * force, self.sensor.length_m])
             try:
                 pressed = self.sensor.response(self._frequency, *after.tolist())
