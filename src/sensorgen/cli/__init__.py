@@ -130,7 +130,8 @@ class _Terminated(BaseException):
 @click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(__version__, prog_name="sensorgen")
 @click.option("--trust-printer", is_flag=True, help="Let printer files widen limits of hardware and G-code.")
-def cli(*, trust_printer: bool) -> None:
+@click.option("--trust-cluster", is_flag=True, help="Let --cluster use a network without TLS; workers run code.")
+def cli(*, trust_printer: bool, trust_cluster: bool) -> None:
     """From one design to a printable elastomer sensor: geometry, checks, 3MF, profiles, prediction.
 
     \b
@@ -141,6 +142,10 @@ def cli(*, trust_printer: bool) -> None:
         from sensorgen.design.printer import TRUST
 
         os.environ[TRUST] = "1"
+    if trust_cluster:
+        from sensorgen.core.parallel import TRUST_CLUSTER
+
+        os.environ[TRUST_CLUSTER] = "1"
 
 
 def main() -> None:
