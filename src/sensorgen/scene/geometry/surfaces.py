@@ -6,7 +6,7 @@ around an edge are paired through the material between them, so that solids whic
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -307,8 +307,7 @@ def _outwards(shells: Sequence[Mesh]) -> tuple[list[Mesh], int, list[Fault]]:
     faults, turned = [], 0
     for shell in shells:
         low, high = shell.vertices_mm.min(0), shell.vertices_mm.max(0)
-        corners = shell.vertices_mm[shell.triangles]
-        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+        area = np.linalg.norm(shell.normals_mm2(), axis=1).sum() / 2
         volume = shell.volume_mm3()
         if abs(volume) <= _NOTHING * area * np.linalg.norm(high - low):
             faults.append(
@@ -325,7 +324,7 @@ def _outwards(shells: Sequence[Mesh]) -> tuple[list[Mesh], int, list[Fault]]:
         if inside and any((o.vertices_mm.min(0) < low).all() for o in outer):
             cavities.append(shell)
         else:
-            outer.append(replace(shell, triangles=shell.triangles[:, ::-1].copy()))
+            outer.append(shell.turned())
             turned += 1
     return [*outer, *cavities], turned, faults
 
@@ -337,7 +336,7 @@ def crossing(mesh: Mesh) -> Place | None:
     """
     import shapely
 
-    corners = mesh.vertices_mm[mesh.triangles]
+    corners = mesh.corners_mm()
     low, high = corners.min(1), corners.max(1)
     flat = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
     one, other = shapely.STRtree(flat).query(flat, predicate="intersects")
@@ -372,31 +371,15 @@ def _pierced(start: Real, end: Real, faces: Real) -> Real | None:
     return start[at[0]] + t[at[0]] * way[at[0]] if len(at) else None
 
 
-def joined(shells: Sequence[Mesh]) -> Mesh:
-    """Shells side by side in one mesh."""
-    first = np.cumsum([0, *(len(shell.vertices_mm) for shell in shells)])
-    triangles = [shell.triangles + start for shell, start in zip(shells, first, strict=False)]
-    return Mesh(np.concatenate([s.vertices_mm for s in shells]), np.concatenate(triangles).astype(np.int32))
-
-
-def solid(shells: Sequence[Mesh]) -> "manifold3d.Manifold":
-    """Shells as one solid of manifold3d."""
-    import manifold3d
-
-    whole = joined(shells)
-    data = manifold3d.Mesh64(vert_properties=whole.vertices_mm, tri_verts=whole.triangles.astype(np.uint64))
-    return manifold3d.Manifold(data)
-
-
 def united(shells: Sequence[Mesh]) -> tuple[Mesh, ...]:
     """Shells of one body that overlap as one; cavities stay cavities."""
     import manifold3d
 
-    outer = [solid([shell]) for shell in shells if shell.volume_mm3() > 0]
+    outer = [shell.solid() for shell in shells if shell.volume_mm3() > 0]
     hollow = [shell for shell in shells if shell.volume_mm3() < 0]
     whole = manifold3d.Manifold.batch_boolean(outer, manifold3d.OpType.Add)
     for shell in hollow:
-        whole = whole - solid([Mesh(shell.vertices_mm, shell.triangles[:, ::-1].copy())])
+        whole = whole - shell.turned().solid()
     return shells_of(whole)
 
 
