@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Real, Whole
+from sensorgen.scene.connections import groups
 from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.scene import Place
 
@@ -106,17 +107,11 @@ def _place(point: Real) -> Place:
 
 def _welded(points: Real, faces: Whole, near_mm: float) -> tuple[Real, Whole]:
     """Corners within a distance as one, faces of fewer than three corners left out."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     exact, back = np.unique(points, axis=0, return_inverse=True)
-    pairs = cKDTree(exact).query_pairs(near_mm, output_type="ndarray")
-    label = np.arange(len(exact))
-    if len(pairs):
-        links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(exact), len(exact)))
-        _, label = connected_components(links, directed=False)
-    _, first, label = np.unique(label, return_index=True, return_inverse=True)
+    label = groups(len(exact), *cKDTree(exact).query_pairs(near_mm, output_type="ndarray").T)
+    _, first = np.unique(label, return_index=True)
     faces = label[back.reshape(-1)[faces]]
     distinct = (faces != np.roll(faces, 1, axis=1)).all(1)
     return exact[first], faces[distinct]
@@ -157,23 +152,12 @@ def _oriented(faces: Whole) -> tuple[Whole, int]:
     against = (directed[one] == directed[other]).all(1)
     if not against.any():
         return faces, 0
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
-
-    a, b = one // 3, other // 3
-    n = len(faces)
-    links = coo_matrix((np.ones(len(a)), (a, b)), shape=(n, n)).tocsr()
-    flips = {**{(int(i), int(j)): bool(f) for i, j, f in zip(a, b, against, strict=True)},
-             **{(int(j), int(i)): bool(f) for i, j, f in zip(a, b, against, strict=True)}}  # fmt: skip
-    turned = np.zeros(n, bool)
-    _, label = connected_components(links, directed=False)
-    for start in np.unique(label, return_index=True)[1]:
-        order, before = breadth_first_order(links, start, directed=False)
-        for k in order[1:].tolist():
-            turned[k] = turned[before[k]] ^ flips[int(before[k]), k]
-        here = label == label[start]
-        if turned[here].sum() > here.sum() / 2:
-            turned[here] = ~turned[here]
+    # Every face as it is, and turned: numbers k and k + n
+    a, b, n = one // 3, other // 3, len(faces)
+    label = groups(2 * n, np.append(a, a + n), np.append(b + n * against, b + n * ~against))
+    turned, surface = label[:n] > label[n:], np.minimum(label[:n], label[n:])
+    most = np.bincount(surface, turned) > np.bincount(surface) / 2
+    turned ^= most[surface]
     return np.where(turned[:, None], faces[:, ::-1], faces), int(turned.sum())
 
 
@@ -280,19 +264,13 @@ def _through_material(
 
 def _shells(points: Real, faces: Whole, mates: Whole) -> list[Mesh]:
     """Connected surfaces, each with corners of its own: those of one fan of faces are one."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     number = np.arange(len(mates))
     following = number - number % 3 + (number + 1) % 3  # directed edge k starts at corner k, and ends at this one
-    corners = coo_matrix((np.ones(2 * len(mates)), (np.concatenate([number, following]),
-                          np.concatenate([following[mates], mates]))), shape=(len(mates),) * 2)  # fmt: skip
-    _, vertex = connected_components(corners, directed=False)
-    pieces = coo_matrix((np.ones(len(mates)), (number // 3, mates // 3)), shape=(len(faces),) * 2)
-    count, label = connected_components(pieces, directed=False)
+    vertex = groups(len(mates), np.append(number, following), np.append(following[mates], mates))
+    label = groups(len(faces), number // 3, mates // 3)
     places = points[faces.reshape(-1)]
     found = []
-    for k in range(count):
+    for k in range(int(label.max(initial=-1)) + 1):
         own = vertex.reshape(-1, 3)[label == k]
         _, first, back = np.unique(own, return_index=True, return_inverse=True)
         where = np.flatnonzero(np.repeat(label == k, 3))[first]
