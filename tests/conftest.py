@@ -21,6 +21,7 @@ def _own_folders(monkeypatch, tmp_path_factory, cache):
     monkeypatch.setenv("SENSORGEN_LOG", str(own / "log.db"))
     monkeypatch.setenv("BROWSER", "true")  # opens nothing
     monkeypatch.setenv("SENSORGEN_BUDGET", "0")  # changes of designs are tried by the tests of that alone
+    monkeypatch.setenv("SENSORGEN_SLICER", "none")  # verdicts by real slices are tested by those of that alone
     monkeypatch.setenv("SENSORGEN_MATERIALS", str(own / "materials"))
     monkeypatch.setenv("SENSORGEN_PACKS", str(own / "packs"))
 

@@ -11,6 +11,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding, grouped
 from sensorgen.design.design import load, make
 from sensorgen.prediction.results import resolved
+from sensorgen.prediction.slices import reviewed
 from sensorgen.workflows import moves
 from sensorgen.workflows.advice import _Search, advise
 from sensorgen.workflows.decision import advised, decision
@@ -66,7 +67,7 @@ def test_numbers_of_a_change_are_those_of_its_own_trial(plate):
 
 def test_no_change_of_a_design_without_findings():
     design = make({"shape": "reference", "parameters": {"length_mm": 30.0}})
-    held = review(design)
+    held = reviewed(design)
     decided = decision(design, held, 5.0)
     assert (decided.verdict, decided.advice) == ("PRINT", None)
 

@@ -265,22 +265,6 @@ def check(asked):
     )  # fmt: skip
 
 
-def draw(asked):
-    """``draw``: errors in the title block; drawing is no verdict, so the exit code counts for nothing."""
-    asked.say("draw", asked.file, "-o", "drawing.svg")
-    said = re.search(r"Findings: .*", (asked.folder / "drawing.svg").read_text("utf-8"))
-    count = re.search(r"(\d+) errors?", said[0]) if said else None
-    return Answer(errors=(int(count[1]) if count else 0, None))
-
-
-def slice_(asked):
-    """``slice``: errors of the drawing, of what is printed, and of the G-code, if it writes any."""
-    code, out = asked.say("slice", asked.file, "--out", "sliced", "--json")
-    said = json.loads(out)
-    found = [*said.get("design_findings", []), *said.get("printed", {}).get("findings", []), *said["findings"]]
-    return Answer(errors=(_errors(found), code))
-
-
 def python(asked):
     """``sensorgen.predict``."""
     from sensorgen.prediction.results import to_json
@@ -379,7 +363,6 @@ ASKED = {
     "gap drawn": (predict_drawn, *KEPT, check),
     "resolution printed": (*KEPT, report),
     "resolution drawn": (predict_drawn, *KEPT),
-    "errors": (build, check, batch, draw),
 }
 
 
@@ -403,7 +386,6 @@ def _questions():
     for quantity, entries in ASKED.items():
         for entry in entries:
             slow = (*SLOW, "rect") if entry is compress else SLOW
-            slow = tuple(name for name in DESIGNS if name not in SLICED_ONE_BY_ONE) if quantity == "errors" else slow
             fast = tuple(name for name in DESIGNS if name not in slow)
             yield pytest.param(quantity, entry, fast, id=f"{quantity}-{entry.__name__}")
             mark = pytest.mark.nightly
@@ -412,13 +394,11 @@ def _questions():
 
 @pytest.mark.usefixtures("shared_cache")
 @pytest.mark.parametrize(("quantity", "entry", "names"), [*_questions()])
-def test_whoever_is_asked_says_the_same(quantity, entry, names, asked, monkeypatch, program, request):
+def test_whoever_is_asked_says_the_same(quantity, entry, names, asked, monkeypatch, request):
     """By day of laws that are stored or in closed form; by night of solved ones, too."""
-    if quantity == "errors":
-        program("prusa-slicer", "prusa-slicer")
     if entry is not compress and not set(SLOW) & set(names):
         request.getfixturevalue("unpressed")
-    differing, known = {}, slice_ if quantity == "errors" else predict
+    differing, known = {}, predict
     for name in names:
         if name == "double" and entry in (fit, invert):
             continue  # a line needs a capacitance, which three electrodes do not have

@@ -134,3 +134,12 @@ def test_a_file_may_narrow_limits_but_not_widen_them_unasked(own, monkeypatch, o
 
 def test_a_file_that_narrows_limits_is_taken(own):
     assert printer.load_printer(own("max_nozzle_c: 250.0", "max_nozzle_c: 200")).max_nozzle_c == 200
+
+
+def test_a_macro_that_homes_nothing_is_no_homing(own):
+    """The maker's bed.g probes a mesh."""
+    with pytest.raises(BadInput, match="homes has G32, whose macro bed homes no axis"):
+        printer.load_printer(own("homes: [G28]", "homes: [G28, G32]"))
+    machine = printer.load_printer("diabase-h5")
+    assert machine.macro("tpost", "tfree") == "G90\nG1 R2 X0 Y0 F6000\nG1 R2 Z2\n"
+    assert printer.load_printer("prusa-xl5").macro("tpost") is None

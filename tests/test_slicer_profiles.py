@@ -146,7 +146,7 @@ def test_prusa_bed_lies_where_the_printer_has_its_origin(name, shape):
 
 def test_prusa_start_gcode_stays_on_one_line():
     found = ini(prusa.profile(DIABASE, FINE, usual(DIABASE)))
-    assert found["start_gcode"] == r"M501\nG90\nM83\nG54\nG32\nM106 P3 S0"
+    assert found["start_gcode"] == r"M501\nG90\nM83\nG54\nG28\nG32\nM106 P3 S0"
 
 
 def test_prusa_nothing_changes_the_drawing():

@@ -10,11 +10,11 @@ from sensorgen.checks.review import review
 from sensorgen.core import cache
 from sensorgen.core.document import text, to_json
 from sensorgen.core.errors import OutOfRange
-from sensorgen.core.findings import Finding
 from sensorgen.design.design import make
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import DEFAULT, Query, Tip
+from sensorgen.prediction.slices import reviewed
 from sensorgen.workflows.build import build
 from sensorgen.workflows.decision import decision
 from sensorgen.workflows.trial import Trial, trial
@@ -42,15 +42,6 @@ def test_verdict_and_numbers_are_those_of_the_build(data, tmp_path):
     assert next(iter(text(tried.document()))).startswith(tried.verdict)
 
 
-def test_a_short_print_changes_the_verdict():
-    found = evaluate(bodies.drawn(make({"shape": "reference"})))
-    short = replace(found, status="short", reason="electrodes touch")
-    assert [f.rule for f in short.with_short(())] == ["1-short"]
-    known = (Finding("1-short", "error", "a", "b", "c"),)
-    assert short.with_short(known) == known
-    assert found.with_short(()) == ()
-
-
 def test_without_electrical_numbers_no_design_is_plainly_printed(tmp_path):
     """A film of two permittivities of which none is the default: the verdict was PRINT."""
     (tmp_path / "materials").mkdir()
@@ -66,16 +57,16 @@ def test_without_electrical_numbers_no_design_is_plainly_printed(tmp_path):
     assert tried.printed.capacitance is None
     assert tried.verdict == "PRINT WITH WARNINGS"
     assert [f.rule for f in tried.findings if f.severity == "warning"] == ["12-numbers"]
-    said = " ".join(" ".join(text(decision(design, review(design), 0.0).document())).split())
+    said = " ".join(" ".join(text(decision(design, reviewed(design), 0.0).document())).split())
     assert said.startswith("PRINT WITH WARNINGS")
     assert "not predicted: film has no default relative_permittivity" in said
-    alone = " ".join(text(decision(design, review(design), 0.0, predict=False).document()))
+    alone = " ".join(text(decision(design, reviewed(design), 0.0, predict=False).document()))
     assert "not predicted: checks alone" in alone
 
 
 def test_the_first_screen_says_what_is_doubtful():
     design = make({"shape": "reference", "parameters": {"length_mm": 30.0}})
-    said = " ".join(" ".join(text(decision(design, review(design), 0.0).document())).split())
+    said = " ".join(" ".join(text(decision(design, reviewed(design), 0.0).document())).split())
     assert "doubtful: plate bonded to electrodes that it stretches: " in said
 
 

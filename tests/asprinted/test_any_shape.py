@@ -157,14 +157,15 @@ def test_lines_that_end_half_a_width_inside_a_strip_fill_it(across, convention):
 @pytest.mark.parametrize("turn", [0.0, 0.6, pi / 2])
 @pytest.mark.parametrize(("convention", "width"), [("vol", 0.4), ("stadium", 0.4 + estimate.ROUND * 0.1)])
 def test_ends_of_a_line_by_closed_form(turn, convention, width):
-    """A rectangle of width w, longer than the line by w; of any shape a half circle, of 16 corners, at both ends."""
+    """A rectangle of width w, longer than the line by w; of any shape a stadium of the deposit's area, then its rim."""
     length, start = 2.0, np.array([5.0, 5.0])
     line = straight([start], [start + length * np.array([cos(turn), sin(turn)])])
     (corners,) = line.corners_mm(convention)
     assert shapely.Polygon(corners).area == pytest.approx((length + 0.4) * width, rel=1e-12)
     assert corners.mean(0) == pytest.approx(start + length / 2 * np.array([cos(turn), sin(turn)]))
     region = layers(Sliced, line, convention)[6].region("pattern")
-    assert region.area == pytest.approx(length * width + 8 * sin(pi / 8) * (width / 2) ** 2, rel=1e-6)
+    rim, wide = width - 0.4, ((length**2 + pi * length * 0.4) ** 0.5 - length) * 2 / pi  # of a stadium of that area
+    assert region.area == pytest.approx(length * 0.4 + rim * (length + (pi / 2 - 1) * wide) + rim * rim, rel=0.01)
 
 
 @pytest.mark.parametrize(("pattern", "slicer"), [("posts", "cura"), ("slanted", "prusa")])

@@ -52,11 +52,19 @@ def test_copies_count_on_from_where_they_are_told(plan):
     assert [p.name for p in read(path)] == [f"26 triX .2mm {k} fine" for k in (1, 2, 3, 4)]
 
 
-def test_a_plan_overrides_quality_and_printer_of_its_designs(plan):
+def test_a_plan_fills_in_the_quality_and_printer_that_its_designs_leave_open(plan, tmp_path):
     path = plan("quality: extrafine\nprinter: prusa-xl5\n" + HEAD + "  - {shape: tri}\n")
     (piece,) = read(path)
     assert (piece.design.layers.name, piece.design.machine.name) == ("extrafine", "prusa-xl5")
     assert piece.name == "26 triX .2mm 1 x fine"
+    (tmp_path / "own.yaml").write_text("shape: tri\nquality: extrafine\n")
+    (own,) = read(plan("quality: fine\nprinter: prusa-xl5\n" + HEAD + "  - {design: own.yaml}\n"))
+    assert (own.design.layers.name, own.design.machine.name) == ("extrafine", "prusa-xl5")
+
+
+def test_a_shape_that_the_thesis_does_not_have_is_called_by_its_own_name(plan):
+    (piece,) = read(plan(HEAD + "  - {shape: pillar}\n"))
+    assert piece.name == "26 pillar .2mm 1 fine"
 
 
 def test_a_plan_assigns_tools(plan, tmp_path):
@@ -122,7 +130,7 @@ def test_the_nearest_design_is_offered(plan, tmp_path):
 @pytest.mark.parametrize(
     ("one", "other", "said"),
     [
-        ("quality: fine", "quality: extrafine", "quality fine for a and extrafine for b; set 'quality'"),
+        ("quality: fine", "quality: extrafine", "quality fine for a and extrafine for b; give both the same quality"),
         ("printer: diabase-h5", "printer: prusa-xl5", "printer diabase-h5 for a and prusa-xl5"),
         ("nozzle_mm: 0.4", "nozzle_mm: 0.25", "0.4 for a and 0.25 for b"),
         ("tools: {x60: 4}", "tools: {x60: 5}", "wants x60 on tool 5, but x60 is on tool 4"),

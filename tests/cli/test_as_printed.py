@@ -37,7 +37,13 @@ def test_a_sliced_file_of_this_very_design_is_the_body(tmp_path):
     design, other = (make({"shape": "tri", "parameters": {"dielectric_mm": film}}) for film in (0.1, 0.2))
     file = tmp_path / "a.prusa.gcode"
     file.write_text("G28\n")
-    note = {"slicer": {"name": "PrusaSlicer", "version": "2.5"}, "design": design.id()}
+    none = dict.fromkeys(("lines", "moves", "layers", "time_s", "tool_changes"), 0) | {"tools": [], "findings": []}
+    travel = {"tools": [], "layers": []}
+    note = none | {
+        "slicer": {"name": "PrusaSlicer", "version": "2.5"}, "design": design.id(), "box_mm": None, "name": "a",
+        "refused": False, "sensorgen": "1", "printer": "p", "quality": "q", "printed": {"layers": [], "findings": []},
+        "lifting": {"before": travel, "after": travel, "lifts": 0, "retractions": 0, "added_s": 0.0},
+    }  # fmt: skip
     note["sha256"] = sha256(file.read_bytes()).hexdigest()
     (tmp_path / "a.prusa.gcode.json").write_text(json.dumps(note))
     assert default_body(design, tmp_path).provenance == "printed, PrusaSlicer 2.5, a.prusa.gcode"

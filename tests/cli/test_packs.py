@@ -36,6 +36,8 @@ def put(folder, what, name, change=("", "")):
     path = folder / kind / f"{name}{suffix}"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text.replace(*change) if change[0] else text, "utf-8")
+    if what == "shape":
+        shape_files.trust(name, path.read_text("utf-8"))
     return path
 
 
@@ -57,6 +59,7 @@ def made(**changes):
 def test_from_an_empty_folder_to_files_for_a_print(run, unpressed):
     for words in (("material", "eel"), ("shape", "zig"), ("printer", "mine"), ("quality", "mid"), ("design", "my")):
         assert run("new", *words).code == 0
+    assert run("pack", "trust", ".").code == 0
     assert run("pack", "test", ".").out == ".: 4 files, no findings\n"
     assert run("check", "my.yaml").out.startswith("PRINT  my: no findings")
     Path("my.yaml").write_text(DESIGN, encoding="utf-8")
@@ -80,6 +83,7 @@ def test_a_new_design_is_the_shape_by_its_name(run):
 def test_by_options_alone(run):
     for words in (("material", "eel"), ("shape", "zig")):
         run("new", *words)
+    run("pack", "trust", ".")
     for shape in ("zig", "./shapes/zig.py"):
         said = run("check", shape, "--material", "electrode=eel", "--tool", "eel=1", "--film", "0.3", "--json")
         assert (said.code, said.err) == (0, "")
@@ -105,7 +109,7 @@ def test_by_options_alone(run):
         ("new material a --pack ../x", "--pack '../x'; expected small letters, digits and '-'"),
         ("pack test nothing", "unknown pack 'nothing'. Known: .*thesis"),
         ("pack test .", ".: no files of a pack; expected folders as materials, sources, shapes"),
-        ("pack trust thesis", "thesis: has no shapes; expected a pack with shapes, or a shape's file"),
+        ("pack trust thesis", "thesis: has no shapes; expected a pack with shapes, a shape's file"),
         (
             "check tri --layer-height 0.2",
             "unknown option '--layer-height': the print quality has it; take another with",
@@ -147,6 +151,7 @@ def test_a_parameter_with_the_name_of_an_option(run, recwarn, unpressed):
 def test_where_each_comes_from(run, here, monkeypatch, tmp_path_factory):
     run("new", "material", "eel")
     run("new", "shape", "zig", "--pack", "mine")
+    run("pack", "trust", "mine")
     install(tmp_path_factory.mktemp("site"), monkeypatch)
     entries = json.loads(run("list", "materials", "--json").out)
     found = {name: (entries[name]["pack"], entries[name]["where"], entries[name]["version"]) for name in entries}
@@ -256,6 +261,7 @@ def test_the_identity_of_a_design_holds_the_content_of_its_files(here):
         text = files[name].read_text()
         assert old in text
         files[name].write_text(text.replace(old, new))
+        shape_files.trust(name, files[name].read_text())
         assert (made().id() == before) is same, (name, new)
         files[name].write_text(text)
     for name in ("materials", "shapes", "printers"):
@@ -387,14 +393,43 @@ def test_hostile_yaml(run, here, text, expected):
 
 def test_trust_is_of_a_content(run, here):
     file = put(here, "shape", "zig")
-    assert not shape_files.is_trusted(file.read_text())
-    before = design.make({"shape": "zig"})
-    assert run("pack", "trust", "shapes/zig.py").out == f"trusted: {file.relative_to(here)}\n"
-    assert shape_files.is_trusted(file.read_text())
-    trusted = design.make({"shape": "zig"})
-    assert (trusted.id(), trusted.drawn) == (before.id(), before.drawn)
+    assert design.make({"shape": "zig"}).drawn
     file.write_text(file.read_text() + "\n")
-    assert not shape_files.is_trusted(file.read_text())
+    with pytest.raises(shape_files.NotTrusted, match="not trusted and did not run"):
+        design.make({"shape": "zig"})
+    assert run("pack", "trust", "shapes/zig.py").out.startswith(f"trusted: {file.relative_to(here)}\n")
+    assert design.make({"shape": "zig"}).drawn
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["check zig", "check zig --help", "list shapes", "pack test .", "pack test shapes/zig.py", "draw ./shapes/zig.py",
+     "check d.yaml", "predict brought.yaml"],
+)  # fmt: skip
+def test_nothing_of_a_strangers_folder_runs_unasked(run, words, monkeypatch):
+    """No process starts before the consent, and each command shows what is missing."""
+    text = (TEMPLATES / "shape.py").read_text("utf-8")
+    Path("shapes").mkdir()
+    Path("shapes/zig.py").write_text(text, "utf-8")
+    Path("d.yaml").write_text("shape: zig\n", "utf-8")
+    Path("brought.yaml").write_text(f"shape: zig\nown: {{shapes: {{zig: {json.dumps(text)}}}}}\n", "utf-8")
+    started = []
+    monkeypatch.setattr(shape_files.subprocess, "Popen", lambda *words, **_: started.append(words))
+    monkeypatch.setattr(shape_files.shape_process, "module_of", lambda *words: started.append(words))
+    said = run(*words.split())
+    assert started == []
+    assert said.code == (0 if words == "list shapes" else 1 if words.startswith("pack") else 2)
+    both = " ".join(f"{said.out} {said.err}".split())
+    assert "not trusted" in both
+    assert "sensorgen pack trust shapes/zig.py" in both
+
+
+def test_a_design_that_brings_its_shape_is_trusted_by_its_file(run):
+    text = (TEMPLATES / "shape.py").read_text("utf-8")
+    Path("brought.yaml").write_text(json.dumps({"shape": "zig", "own": {"shapes": {"zig": text}}}), "utf-8")
+    assert run("pack", "trust", "brought.yaml").out.startswith("trusted: brought.yaml: zig\n")
+    assert shape_files.is_trusted(text)
+    assert run("check", "brought.yaml").code in (0, 1)
 
 
 PLANTED = [

@@ -196,7 +196,7 @@ def test_relative_places_and_inches_are_refused(mode):
 
 
 def test_lifts_are_no_new_findings():
-    before = {f.rule for f in check(COMB + OVER, DIABASE).findings}
+    before = {f.rule for f in check(COMB + OVER, DIABASE).findings} - {"z"}  # a lift states Z
     made = lift(COMB + OVER, DIABASE).text
     assert {f.rule for f in check(made, DIABASE).findings} == before
 

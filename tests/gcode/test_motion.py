@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sensorgen.design.printer import load_printer
+from sensorgen.core.errors import BadInput
+from sensorgen.design.printer import Macro, load_printer
 from sensorgen.export.gcode import paths
+from sensorgen.export.gcode.macros import effect
 from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.words import parse
 
@@ -289,3 +291,18 @@ def test_columns_are_what_a_machine_does_line_by_line(lines):
                 held.update({"G90": {"G91": False}, "G91": {"G91": True}}.get(code, {}))
                 held.update({"M82": {"M82": True}, "M83": {"M82": False}}.get(code, {}))
     assert follow(lines).rows[:, :9] == pytest.approx(np.array(rows).reshape(-1, 9), abs=1e-9)
+
+
+def test_macros_of_a_change_are_executed():
+    """As Diabase's: 40 mm up, back to X and Y and to 2 mm above the place of the change; and two others."""
+    lines = [R, "G1 X1 Y2 Z3", "T3", "G1 X5", "G1 Z3", "T3", "G1 X6", "T4", "G1 Y7"]
+    motion = follow(lines, change=effect("G91\nG1 Z40\nG90\nG1 R2 X0 Y0\nG1 R2 Z2"))
+    assert motion.end_mm.tolist() == [[1, 2, 3], [5, 2, 5], [5, 2, 3], [6, 2, 3], [6, 7, 5]]
+    assert motion.z_stated.tolist() == [True, False, True, True, False]
+    assert follow(lines).end_mm[-1].tolist() == [6, 7, 3]
+    stays = Macro(lift_mm=40.0, return_mm=(0.0, 0.0, None), leaves="G91")
+    assert follow(lines, change=effect(stays.gcode())).end_mm[1].tolist() == [6, 2, 43]
+    parks = follow(lines, change=effect("G1 X-180 Y-45 Z3\nG91\nG1 Z1\nG90"))
+    assert parks.start_mm[1].tolist() == [-180, -45, 4]
+    with pytest.raises(BadInput, match="lift_mm"):
+        effect("if true\n  G1 Z2")

@@ -3,11 +3,12 @@
 import re
 import subprocess
 
+import line_ladder
 import numpy as np
 import pytest
 from line_cases import PLATE
 
-from sensorgen.models import line, line_ladder
+from sensorgen.models import line
 from sensorgen.solvers.line.inputs import read
 
 

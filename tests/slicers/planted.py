@@ -354,22 +354,24 @@ HEAT = (
     Fault("bed not waited for", lambda lines: sub(r"^M116.*\n", "")(sub(r"^M190 S75", "M140 S75")(lines)), "wait"),
     Fault("no M116 anywhere", sub(r"^M116.*\n", ""), "wait"),
     Fault("one M116 left out after a change", lambda lines: [line for k, line in enumerate(lines)
-        if k != _at(lines, "M116 P4", 1)], "warns: wait"),
+        if k != _at(lines, "M116 P4", 1)], "wait"),
     Fault("off and on before M116", after("T4", "G10 P4 S0", "G10 P4 S230 R180", nth=2), "argued: it is waited for"),
     Fault("off and on without waiting", amid("G10 P3 S0", "G10 P4 S0", "G10 P3 S210 R180", "G10 P4 S230 R180"), "wait"),
     Fault("temperature without a tool", amid("M104 S210"), "temperature"),
     Fault("temperature of another tool", amid("G10 P9 S210"), "tool"),
     Fault("hot tools at the end", sub(r"^(G10 P[34] S0|M0).*\n", ""), "heat-left"),
-    Fault("no end at all", lambda lines: lines[: _at(lines, "G28", 0)], "warns: end"),
+    Fault("no end at all", lambda lines: lines[: _at(lines, "G28", 1)], "warns: end"),
 )  # fmt: skip
 
 START = (
-    Fault("no homing", sub(r"^G32\n", ""), "home"),
+    Fault("no homing", sub(r"^G28\nG32\n", "G32\n"), "home"),
+    Fault("homed by the probe's macro alone", sub(r"^G28\nG32\n", "G32\n"), "home"),
+    Fault("Z not stated after a change", sub(r"^G1 Z\S+ F3000\n(?=G1\s+X\S+\s+E)", ""), "z"),
     Fault("no levelling", sub(r"^G32$", "G28"), "level"),
     Fault("homed without levelling, then probed late", lambda lines: amid("G32")(sub(r"^G32$", "G28")(lines)), "level"),
     Fault("no M83", sub(r"^M83.*\n", ""), "absolute-e"),
     Fault("no G90", sub(r"^G90.*\n", ""), "warns: start"),
-    Fault("moves before homing", before("G32", "G1 X5 Y0 F3000"), "warns: home"),
+    Fault("moves before homing", before("G28", "G1 X5 Y0 F3000"), "home"),
     Fault("an end command in the middle", amid("M0 H1"), "end"),
     Fault("a print line at 12001 mm/min", at_middle(lambda line: f"{line} F12001"), "speed melt"),
     Fault("a feed of 0", amid("G1 X1 Y1 E.1 F0"), "speed"),

@@ -7,7 +7,7 @@ from sensorgen.asprinted import agreement
 from sensorgen.core.errors import BadInput
 from sensorgen.design import design
 from sensorgen.export.gcode.check import check_motion
-from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.motion import executed, follow
 from sensorgen.export.gcode.paths import paths_of
 from sensorgen.export.slicing import alone, sliced
 
@@ -33,7 +33,7 @@ def base(tmp_path_factory):
 def found(lines):
     """Findings as ``slice`` has them."""
     machine = SENSOR.machine
-    motion = follow("\n".join(lines).encode(), machine.control.prime_macro)
+    motion = executed("\n".join(lines).encode(), machine)
     checked = check_motion(motion, machine, {SENSOR.tool(name): name for name in SENSOR.used()}, others_empty=True)
     paths, place = paths_of(motion, machine), machine.bed_centre_mm()
     return checked.with_more(agreement.check(SENSOR, paths, motion.changes, place, alone=True)).findings

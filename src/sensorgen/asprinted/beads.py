@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from sensorgen.checks.estimate import ROUND
 from sensorgen.core.arrays import Mask, Real, Whole
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 CONVENTIONS = ("vol", "deposit", "stadium")
 FULL = 0.95  # a plate of which this share is filled has no holes but between rounded lines
 _CUTS = (-0.37, -0.2, 0.0, 0.17, 0.41)  # places of the cuts, in shares of a tenth of the sensor, from its middle
+_OF_AREA, _STEPS = 1e-3, 8  # to which an area is met, and steps that it may take
 _LEVEL_MM = 0.01  # a line belongs to a layer whose top it is this near
 
 
@@ -51,11 +53,11 @@ class Beads:
     tool: Whole
     number: Whole
 
-    def corners_mm(self, convention: str) -> Real:
-        """Each line as a rectangle in plan, (n, 4, 2): half a width longer at both ends, wide by a convention [mm]."""
+    def corners_mm(self, convention: str, longer: float = 1.0) -> Real:
+        """Each line as a rectangle in plan, (n, 4, 2): ``longer`` widths longer, wide by a convention [mm]."""
         middle, way = (self.start_mm + self.end_mm) / 2, self.end_mm - self.start_mm
         length = np.hypot(*way.T)
-        along = way * ((length + self.width_mm) / (2 * length))[:, None]
+        along = way * ((length + longer * self.width_mm) / (2 * length))[:, None]
         aside = way[:, ::-1] * [-1, 1] * (self.widths_mm(convention) / (2 * length))[:, None]
         corners = (middle + along + aside, middle + along - aside, middle - along - aside, middle - along + aside)
         return np.stack(corners, axis=1)
@@ -140,7 +142,9 @@ def layers(
     Notes
     -----
     A layer that is drawn as strips is cut across near the middle of the sensor, and the median cut is taken along the
-    whole strip. Of any other layer the union of all lines is taken, with slits between touching lines closed.
+    whole strip. Of any other layer the union of all lines is taken, with slits between touching lines closed; the
+    outline of each separate part is moved until its area is what its lines deposit: round ends of short lines would
+    double a small tip. There "vol" and "deposit" are one.
     """
     if convention not in CONVENTIONS:
         raise UnknownName("convention for a line's width", convention, CONVENTIONS)
@@ -152,9 +156,11 @@ def layers(
         first = {k: here.number[here.tool == here.tool[here.body == k][0]].min() for k in bodies}
         for k in sorted(bodies, key=lambda k: (electrode_wins and not scene.bodies[k].terminal, first[k], k)):
             name = scene.bodies[k].name
-            filled = cover(here.of(here.body == k), layer, scene.size_mm, convention)
+            mine = here.of(here.body == k)
+            filled = cover(mine, layer, scene.size_mm, convention)
             if layer.along and len(plan := parts(layer.region(name))) == 1:
-                filled = plan[0] if filled.area > FULL * scene.size_mm[0] * scene.size_mm[1] else filled
+                most = max(filled.area, float((mine.volume_mm3 / mine.height_mm).sum()))
+                filled = plan[0] if most > FULL * scene.size_mm[0] * scene.size_mm[1] else filled
             regions[name] = cleaned(shapely.difference(filled, shapely.union_all(list(regions.values()))))
         found.append(layer.mapped(regions))
     return found
@@ -171,42 +177,55 @@ def _strips(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], convent
 
 def _cut(lines: Beads, axis: int, at_mm: float, convention: str) -> Real:
     """Runs along an axis, (n, 2), in which a line square to it meets the beads [mm]."""
-    here = lines.corners_mm(convention)
-    u, v = here[:, :, axis], here[:, :, 1 - axis] - at_mm
+    runs = _merged(_runs(lines.corners_mm(convention), axis, at_mm))
+    if convention == "deposit" and len(runs):
+        met = _runs(lines.corners_mm(convention, 0.0), axis, at_mm)  # ends that reach over the next line count once
+        owner = (np.searchsorted(runs[:, 0], met.mean(1)) - 1).clip(0)
+        taken = np.bincount(owner, np.diff(met)[:, 0], len(runs))
+        runs = _merged(runs + (taken - np.diff(runs)[:, 0]).clip(0.0)[:, None] / 2 * [-1, 1])
+    return runs
+
+
+def _runs(corners_mm: Real, axis: int, at_mm: float) -> Real:
+    """Runs along an axis, (n, 2), in which a line square to it meets rectangles, (m, 4, 2) [mm]."""
+    u, v = corners_mm[:, :, axis], corners_mm[:, :, 1 - axis] - at_mm
     u_next, v_next = np.roll(u, -1, axis=1), np.roll(v, -1, axis=1)
     crossed = (v < 0) != (v_next < 0)
     met = u + v / np.where(crossed, v - v_next, 1.0) * (u_next - u)
     hit = crossed.any(1)
-    runs = np.stack([np.where(crossed, met, np.inf).min(1), np.where(crossed, met, -np.inf).max(1)], axis=1)[hit]
-    runs, taken = _merged(runs)
-    if convention == "deposit":
-        more = (taken - (runs[:, 1] - runs[:, 0])).clip(0.0)[:, None] / 2
-        runs, _ = _merged(runs + more * [-1, 1])
-    return runs
+    runs = np.stack([np.where(crossed, met, np.inf).min(1), np.where(crossed, met, -np.inf).max(1)], axis=1)
+    return np.asarray(runs[hit])
 
 
-def _merged(runs: Real) -> tuple[Real, Real]:
-    """Union of runs, (n, 2), and the sum of the lengths of those in each [mm]."""
+def _merged(runs: Real) -> Real:
+    """Union of runs, (n, 2) [mm]."""
     runs = runs[runs[:, 0].argsort()]
     if not len(runs):
-        return runs, runs[:, 0]
+        return runs
     reach = np.maximum.accumulate(runs[:, 1])
     starts = np.flatnonzero(np.append(True, runs[1:, 0] > reach[:-1] + SLIVER_MM))
-    ends = reach[np.append(starts[1:], len(runs)) - 1]
-    return np.column_stack([runs[starts, 0], ends]), np.add.reduceat(runs[:, 1] - runs[:, 0], starts)
+    return np.column_stack([runs[starts, 0], reach[np.append(starts[1:], len(runs)) - 1]])
 
 
 def _union(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], convention: str) -> Region:
-    """All lines with round ends, slits between touching ones closed."""
+    """All lines with round ends, slits between touching ones closed, each part as large as its lines' deposit."""
     ways = shapely.linestrings(np.stack([lines.start_mm, lines.end_mm], axis=1))
-    region = shapely.union_all(shapely.buffer(ways, lines.widths_mm(convention) / 2, quad_segs=4))
-    if convention == "deposit":
-        wider = []
-        for part in parts(region):  # by what its lines overlap
-            inside = shapely.contains_xy(part, (lines.start_mm + lines.end_mm) / 2)
-            deposited = float((lines.volume_mm3[inside] / lines.height_mm[inside]).sum())
-            wider.append(part.buffer(max(deposited - part.area, 0.0) / part.length, join_style="mitre"))
-        region = shapely.union_all(wider)
+    region = shapely.union_all(shapely.buffer(ways, lines.width_mm / 2, quad_segs=4))
     slit = ROUND * layer.height_mm
     closed = region.buffer(slit, join_style="mitre").buffer(-slit, join_style="mitre")
-    return shapely.clip_by_rect(closed, 0.0, 0.0, size_mm[0], size_mm[1])
+    pieces = np.array(parts(closed), dtype=object)
+    owner = shapely.STRtree(pieces).nearest(shapely.points((lines.start_mm + lines.end_mm) / 2))
+    deposit: Real = np.bincount(owner, lines.volume_mm3 / lines.height_mm, len(pieces)).astype(float)
+    grown = shapely.union_all(_offset(pieces, deposit, slit / 2 if convention == "stadium" else 0.0))
+    return shapely.clip_by_rect(grown, 0.0, 0.0, size_mm[0], size_mm[1])
+
+
+def _offset(pieces: NDArray[np.object_], area_mm2: Real, more_mm: float) -> NDArray[np.object_]:
+    """Polygons with their outlines moved until they have some areas, then outwards by a length [mm]."""
+    offset, made = np.zeros(len(pieces)), pieces.copy()
+    for _ in range(_STEPS):  # of Newton's method: the length of the outline is the slope of the area
+        away = np.abs(shapely.area(made) - area_mm2) > _OF_AREA * area_mm2
+        step = (area_mm2 - shapely.area(made)) / np.maximum(shapely.length(made), SLIVER_MM)
+        offset[away] += step[away]
+        made[away] = shapely.buffer(pieces[away], offset[away], join_style="mitre")
+    return shapely.buffer(made, more_mm, join_style="mitre") if more_mm else made

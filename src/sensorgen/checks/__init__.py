@@ -16,7 +16,7 @@ from sensorgen.scene.scene import Scene
 RULES = (
     "0-body", "0-printer", "1-short", "2-film", "2-printed-gap", "3-grid", "4-unsampled", "5-width", "6-gap",
     "7-printed", "8-bed", "9-bridge", "10-film", "10-waiver", "11-crossing", "11-overlap", "11-profile", "11-repaired",
-    "11-size", "11-surface", "12-numbers",
+    "11-size", "11-surface", "12-numbers", "13-gcode",
 )  # fmt: skip
 
 

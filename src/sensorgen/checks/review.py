@@ -1,13 +1,14 @@
 """Design rule check: exact gap, valid bodies, and the findings of every rule about a design on its printer."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
+from typing import Self
 
 from sensorgen import checks
 from sensorgen.checks import estimate
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Part, comma_separated
-from sensorgen.core.findings import Finding, counted, counts, listed, table
+from sensorgen.core.findings import Finding, Verdict, counts, headline, listed, table, verdict
 from sensorgen.design.design import Design
 from sensorgen.design.tower import tower
 from sensorgen.design.walls import rule
@@ -22,39 +23,32 @@ LOST = "7-printed"
 _WIDENED = ("2-printed-gap", "5-width", LOST)  # rules that larger widths or a longer period satisfy
 
 
-def lost(found: Iterable[Finding]) -> list[Finding]:
-    """Errors of rule 7 that the design does not waive: bodies that are missing from a printed layer."""
-    return [f for f in found if f.rule == LOST and f.severity == "error" and not f.waiver]
-
-
 @dataclass(frozen=True, eq=False)
 class Review(Displayed):
-    """The printed bodies as meshes, by name, and all findings about them."""
+    """The printed bodies as meshes, by name, and all findings about them, with their source."""
 
     meshes: dict[str, Mesh]
     findings: list[Finding]
+    source: str = "rules of the drawing"
 
-    def with_meshes(self, design: Design) -> "Review":
+    def with_meshes(self, design: Design) -> Self:
         """The same review, with the meshes that a misfit on the bed had spared."""
-        return self if self.meshes else Review(_meshes(design), self.findings)
+        return self if self.meshes else replace(self, meshes=_meshes(design))
 
     def errors(self, strict: bool = False) -> list[Finding]:
         """Findings that stop a build: errors, and when ``strict`` warnings, that the design does not waive.
 
-        What is lost in slicing stops nothing unless ``strict``: the files are written, as G-code is; see :meth:`lost`.
+        What is lost in slicing stops nothing unless ``strict``: the files are written, as G-code is.
         """
         open_ones = [f for f in self.findings if not f.waiver]
         if strict:
             return [f for f in open_ones if f.severity in ("error", "warning")]
         return [f for f in open_ones if f.severity == "error" and f.rule != LOST]
 
-    def lost(self) -> list[Finding]:
-        """Errors of rule 7 that the design does not waive: bodies that are missing from a printed layer."""
-        return lost(self.findings)
-
-    def sliced(self) -> "Review":
-        """The review without the estimate of rule 7, which G-code replaces."""
-        return replace(self, findings=[f for f in self.findings if f.rule != LOST])
+    @property
+    def verdict(self) -> Verdict:
+        """CHANGE where a finding is an error, PRINT WITH WARNINGS, or PRINT."""
+        return verdict(self.findings)
 
     def counts(self) -> dict[str, int]:
         """How many findings there are of each severity, and how many are waived."""
@@ -92,7 +86,7 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "") -> Revi
     found = checks.findings(
         scene, design.machine, design.layers, gap_mm, walls or rule("prusa", design.walls), estimate.lines(design)
     ) + _crowding(design)
-    found = [_advised(f, [p.name for p in fields(design.params)]) for f in found]
+    found = [advised(f, [p.name for p in fields(design.params)]) for f in found]
     if not any(f.severity == "error" and f.rule != LOST for f in found):
         step("validity")
         advice = "change the parameters; if they make sense, this is a fault of sensorgen: report it"
@@ -100,7 +94,7 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "") -> Revi
     return Review(made, design.waived(found) + design.idle_waivers(found))
 
 
-def _advised(finding: Finding, parameters: list[str]) -> Finding:
+def advised(finding: Finding, parameters: list[str]) -> Finding:
     """A finding whose advice names parameters that the shape has."""
     wider = [name for name in parameters if name == "period_mm" or name.endswith("_width_mm")]
     if finding.rule in _WIDENED and finding.severity != "info" and wider:
@@ -134,7 +128,7 @@ def _crowding(design: Design) -> list[Finding]:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """The findings about a design, as in ``check.json``.
+    """The findings about a print, as in ``check.json``.
 
     Attributes
     ----------
@@ -142,6 +136,10 @@ class CheckReport:
         Name and identity of the design.
     printer, quality : str
         What it was checked for.
+    verdict : str
+        CHANGE where a finding is an error, PRINT WITH WARNINGS, or PRINT.
+    source : str
+        Slicer and version, or that the print is estimated, and why.
     counts : dict of str to int
         Findings of each severity, and waived ones.
     findings : tuple of Finding
@@ -152,13 +150,15 @@ class CheckReport:
     design: str
     printer: str
     quality: str
+    verdict: Verdict
+    source: str
     counts: dict[str, int]
     findings: tuple[Finding, ...]
 
     def document(self) -> Iterator[Part]:
-        """The findings, then their number."""
+        """Verdict, then the findings."""
+        yield headline(self.name, self.findings, self.source)
         yield from listed(self.findings)
-        yield f"{self.name}: {counted(self.counts)}"
 
     def csv(self) -> Iterator[str]:
         """The findings as a table."""
@@ -168,8 +168,9 @@ class CheckReport:
 def report(design: Design, held: Review) -> CheckReport:
     """The findings as data."""
     return CheckReport(
-        design.name, design.id(), design.machine.name, design.layers.name, held.counts(), tuple(held.findings)
-    )
+        design.name, design.id(), design.machine.name, design.layers.name, held.verdict, held.source, held.counts(),
+        tuple(held.findings),
+    )  # fmt: skip
 
 
 def draw(design: Design, held: Review, printed: Scene | None = None, source: str = "") -> str:
@@ -177,6 +178,7 @@ def draw(design: Design, held: Review, printed: Scene | None = None, source: str
     scene = design.printed
     names = {body.material for body in scene.bodies}
     notes = [
+        f"{held.verdict}; {held.source}",
         f"{design.machine.name}, {design.layers.name}, printed {design.orientation}",
         *([f"green outlines: {source}"] if source else []),
     ]

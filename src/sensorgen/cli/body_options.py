@@ -1,6 +1,5 @@
 """Options that say which body a command means: the print (by default), its G-code, slicer or walls, or the drawing."""
 
-import tempfile
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
     from sensorgen.design.body import Body, BodyOf
     from sensorgen.design.design import Design
+    from sensorgen.prediction.slices import PrintReview
     from sensorgen.workflows.compensation import Change
 
 _BODY = "sensorgen.body"  # in the context's meta: the option that was given, and its value
@@ -30,8 +30,8 @@ def body_options() -> list[click.Parameter]:
         ),
         click.Option(
             ["--gcode"], metavar="FILE", expose_value=False, callback=_choose,
-            help="The print by this file, whoever has sliced it; if not given, the G-code in out/NAME, else an "
-            "estimate from the layers.",
+            help="The print by this file, whoever has sliced it; if not given, the G-code in out/NAME, else by the "
+            "slicer that is installed (SENSORGEN_SLICER: prusa, cura or none), else an estimate.",
         ),
         click.Option(
             ["--slicer"], type=OneOf(SLICERS), expose_value=False, callback=_choose, help="Slice now for the print.",
@@ -103,33 +103,24 @@ def compensated(
     return found, changes
 
 
-def printed_of(design: "Design") -> "Printed | None":
-    """The print of a design, with its layers, by the options; an estimate without any; None for the drawing."""
-    from sensorgen.asprinted.printed import body
-    from sensorgen.prediction.bodies import registered
+def printed_of(design: "Design") -> "tuple[Printed | None, PrintReview]":
+    """The print of a design by the options, None for the drawing, and all findings about it."""
+    from sensorgen.checks.review import STEPS, review
+    from sensorgen.prediction import bodies, slices
 
-    option, value = click.get_current_context().meta.get(_BODY, ("--walls", design.walls))
-    if option == "--drawn":
-        return None
-    if option == "--gcode":
-        return registered(design, Path(value))
-    return _slice(value, design)[0] if option == "--slicer" else body(design, walls=value)
+    option, value = click.get_current_context().meta.get(_BODY, ("", ""))
+    with show.progress((*STEPS, "slicing")) as step:
+        if option == "--gcode":
+            printed = bodies.registered(design, Path(value))
+            return printed, slices.combined(design, review(design, step), printed.provenance, printed.findings())
+        slicer, walls = (value if option == name else "" for name in ("--slicer", "--walls"))
+        held = slices.reviewed(design, step, slicer, walls=walls)
+        return None if option == "--drawn" else held.printed(design, walls), held
 
 
 def _sliced(slicer: str, design: "Design", program: str = "") -> "Body":
-    from sensorgen.prediction import bodies
-
-    printed, source, content = _slice(slicer, design, program)
-    return bodies.sliced(design, lambda: printed, source, content)
-
-
-def _slice(slicer: str, design: "Design", program: str = "") -> "tuple[Printed, str, bytes]":
-    """What a real slicer prints, its name and version, and its G-code."""
-    from sensorgen.asprinted.printed import body
     from sensorgen.export import slicing
+    from sensorgen.prediction import bodies, slices
 
-    with tempfile.TemporaryDirectory() as folder, show.progress(slicing.STEPS) as step:
-        made = slicing.sliced([slicing.alone(design)], slicer, Path(folder), program=program, step=step)
-        content = made.ready.read_bytes()
-    source = f"{made.slicer} {made.version}"
-    return body(design, made.lines, slicer=source), source, content
+    with show.progress(slicing.STEPS) as step:
+        return bodies.of_file(design, slices.at_hand(design, None, slicer, step, program)[0])

@@ -38,7 +38,6 @@ def _work(
     budget: float,
     apply_change: int | None,
 ) -> int:
-    from sensorgen.checks.review import lost
     from sensorgen.workflows.build import STEPS, DetailedBuild, build
 
     if verify:
@@ -57,13 +56,13 @@ def _work(
         return FOUND_ERRORS  # of the design as it was: the file has another one now
     render.deliver(DetailedBuild(**vars(built)) if details else built)
     settings.applied(design, built.advice, apply_change)
-    return 1 if lost(built.findings) and not force else 0
+    return 1 if built.verdict == "CHANGE" and not force else 0
 
 
 def _refuse(design: "Design", error: Unprintable, budget: float, apply_change: int | None) -> None:
     """Deliver why a design is not built, and the changes that were tried."""
+    from sensorgen.prediction.slices import reviewed
     from sensorgen.workflows.decision import STEPS, RefusedBuild, decision
-    from sensorgen.workflows.reviewed import reviewed
 
     with show.progress(STEPS) as step:
         advice = decision(design, reviewed(design), budget, predict=budget > 0, step=step).advice

@@ -82,6 +82,8 @@ def _form(file: packs.File) -> shape_files.Shape:
 
 
 def _shape(file: packs.File) -> Entry:
+    if file.pack.where != "shipped" and not shape_files.is_trusted(file.text()):
+        return Entry(f"not trusted: did not run; read it, then: sensorgen pack trust {file.path}")
     module = _form(file)
     return Entry(_first_line(module.__doc__), tuple(f"{f.name}: {_said(f)}" for f in fields(module.Params)))
 

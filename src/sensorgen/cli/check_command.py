@@ -20,15 +20,15 @@ OWN: list[click.Parameter] = [
 
 def _work(design: "Design", *, strict: bool, budget: float, apply_change: int | None) -> int:
     from sensorgen.checks.review import STEPS
+    from sensorgen.prediction.slices import reviewed
     from sensorgen.workflows import decision
-    from sensorgen.workflows.reviewed import reviewed
 
     with show.progress((*STEPS, *decision.STEPS)) as step:
         held = reviewed(design, step)
         decided = decision.decision(design, held, budget, predict=budget > 0, step=step)
     render.deliver(decided)
     settings.applied(design, decided.advice, apply_change)
-    return 1 if held.errors(strict) or decided.verdict == "CHANGE" else 0
+    return 1 if held.errors(strict) or held.verdict == "CHANGE" else 0
 
 
 command = DesignGroup(

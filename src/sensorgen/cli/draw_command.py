@@ -1,12 +1,11 @@
 """``sensorgen draw``: the dimensioned cross-section."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import body_options, render, show
+from sensorgen.cli import body_options, render
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.core.errors import BadInput
 
@@ -25,7 +24,7 @@ OWN: list[click.Parameter] = [
 
 
 def _work(design: "Design", *, output: str | None) -> int:
-    from sensorgen.checks.review import STEPS, draw, review
+    from sensorgen.checks.review import draw
     from sensorgen.core import files as store
 
     if output and output != "-" and Path(output).suffix.lower() not in ("", ".svg", ".html"):
@@ -33,19 +32,15 @@ def _work(design: "Design", *, output: str | None) -> int:
             f"--output {output}: the drawing is SVG, or a page of layers; expected a name in .svg or .html, or - "
             "to print the SVG"
         )
-    made = body_options.printed_of(design)
+    made, held = body_options.printed_of(design)
     if output and output.lower().endswith(".html"):
         from sensorgen.analysis.plots import layers
 
         if made is None:
             raise BadInput(f"--output {output}: layers are those of a print; expected it without --drawn")
-        store.replace(Path(output), layers.of_print(made).encode())
+        store.replace(Path(output), layers.of_print(made, held.findings).encode())
         render.say(output)
         return 0
-    with show.progress(STEPS) as step:
-        held = review(design, step)
-    if made:
-        held = replace(held, findings=[*made.findings(), *held.sliced().findings])
     text = draw(design, held, made.scene, made.provenance) if made else draw(design, held)
     if output == "-":
         render.say(text, nl=False)

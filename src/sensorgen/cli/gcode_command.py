@@ -33,13 +33,13 @@ def _check(file: str, design: str | None, printer: str | None, materials: tuple[
     from sensorgen.core.errors import BadInput
     from sensorgen.design.design import own_texts
     from sensorgen.export.gcode.check import CheckedFile, check_motion
-    from sensorgen.export.gcode.motion import follow
+    from sensorgen.export.gcode.motion import executed
 
     drawn, machine = _subject(design, printer)
     loaded = {drawn.tool(name): name for name in drawn.used()} if drawn else {}
     named = _loaded(materials, machine.tool_numbers)
     loaded |= named
-    motion = follow(Path(file), machine.control.prime_macro)
+    motion = executed(Path(file), machine)
     own = drawn.own if drawn else {}
     texts = {**own, "materials": {**own_texts(named.values()).get("materials", {}), **own.get("materials", {})}}
     found = check_motion(motion, machine, loaded, others_empty=drawn is not None, texts=texts)

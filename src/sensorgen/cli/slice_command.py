@@ -50,7 +50,7 @@ def _work(
             compensated=changes, step=step,
         )  # fmt: skip
     render.deliver(made)
-    return 1 if made.refused or (made.lost and not force) else 0
+    return 1 if made.refused or (made.verdict == "CHANGE" and not force) else 0
 
 
 command = DesignGroup(

@@ -24,6 +24,7 @@ _SOURCES = (
     "asprinted",
     "checks",
     "design",
+    "export",
     "models",
     "prediction",
     "scene",

@@ -144,6 +144,11 @@ def verdict(found: Sequence[Finding]) -> Verdict:
     return "CHANGE" if number["error"] else "PRINT WITH WARNINGS" if number["warning"] else "PRINT"
 
 
+def headline(name: str, found: Sequence[Finding], source: str = "") -> str:
+    """Verdict, counts and source of all findings about a print."""
+    return f"{verdict(found)}  {name}: {counted(counts(found))}{source and f'; {source}'}"
+
+
 def counted(counts: Mapping[str, int]) -> str:
     """Numbers of findings by severity, in words.
 

@@ -424,17 +424,8 @@ def parameters(shape_name: str, given: Mapping[str, float | str], text: str | No
             raise UnknownName(f"parameter of {shape_name}", name, known)
         values[name] = _checked(known[name], value)
     kind: Any = _shape(shape_name, text).Params
-
-    def made() -> tuple[Envelope, float]:
-        params = kind(**values)
-        return params, params.cells()
-
-    if text is None:
-        params, cells = made()
-    else:
-        from sensorgen.design import shape_files
-
-        params, cells = shape_files.in_this_process(shape_name, made)
+    params: Envelope = kind(**values)
+    cells: Any = params.cells()
     if isinstance(cells, bool) or not isinstance(cells, (int, float)) or not cells > 0:
         raise BadInput(f"{shape_name}.py: cells() is {cells!r:.60}; expected a number above 0")
     if cells > MAX_CELLS:  # the mesh would fill the memory

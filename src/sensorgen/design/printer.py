@@ -16,6 +16,7 @@ from sensorgen.design import packs
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Pattern = Literal["rectilinear", "grid", "concentric", "honeycomb", "triangles", "gyroid"]  # of infill
+MacroName = Literal["tfree", "tpre", "tpost", "homeall", "bed"]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
@@ -33,6 +34,25 @@ class Reach(Strict):
     x: Annotated[tuple[Finite, Finite], Field(strict=False)]
     y: Annotated[tuple[Finite, Finite], Field(strict=False)]
     z: Annotated[tuple[Finite, Finite], Field(strict=False)]
+
+
+class Macro(Strict):
+    """Effect of a macro of the firmware, where its own lines are too many to state."""
+
+    lift_mm: Finite = 0.0  # from where the nozzle was
+    return_mm: Annotated[tuple[Finite | None, Finite | None, Finite | None] | None, Field(strict=False)] = None
+    leaves: Literal["G90", "G91", "G90 M83", "G91 M83"] | None = None  # modes after it
+    homes: Annotated[str, Field(pattern="^X?Y?Z?$", examples=["XYZ"])] = ""
+    waits: bool = False  # for the tool's temperature
+
+    def gcode(self) -> str:
+        """G-code of the same effect; R2 is where the tool was taken, an axis without a return stays."""
+        back = zip("XYZ", self.return_mm or (), strict=False)
+        returns = " ".join(f"{axis}{offset:g}" for axis, offset in back if offset is not None)
+        lines = [f"G91\nG1 Z{self.lift_mm:g}\nG90"] if self.lift_mm else []
+        lines += [f"G1 R2 {returns}"] if returns else []
+        lines += [f"G28 {' '.join(self.homes)}"] if self.homes else []
+        return "\n".join([*lines, *(["M116"] if self.waits else []), *(self.leaves or "").split()])
 
 
 class Control(Strict):
@@ -81,6 +101,19 @@ class Printer(Strict):
     start_gcode: str
     end_gcode: str
     control: Control = Control()
+    macros: dict[MacroName, str | Macro] = Field(default={})  # that the firmware runs, as G-code or as effect
+
+    def macro(self, *names: MacroName) -> str | None:
+        """G-code of some of the firmware's macros, one after the other; None where the printer states none of them."""
+        known = [self.macros[name] for name in names if name in self.macros]
+        return "\n".join(each if isinstance(each, str) else each.gcode() for each in known) if known else None
+
+    @model_validator(mode="after")
+    def _homes(self) -> Self:
+        text = self.macro("bed")
+        if "G32" in self.control.homes and text is not None and "G28" not in text:
+            raise ValueError("control.homes has G32, whose macro bed homes no axis: leave it out, and home with G28")
+        return self
 
     @model_validator(mode="after")
     def _prints_layers(self) -> Self:

@@ -1,7 +1,8 @@
-"""Shapes: those that ship are modules; the file of one from a pack runs in a process of its own, unless it is trusted.
+"""Shapes: those that ship are modules; the file of one from a pack runs once the user trusts its content, confined.
 
-The process has a time and a memory limit, and what comes back is plain data, which is checked. Answers are stored by
-content (:mod:`sensorgen.core.cache`): a shape runs once for each set of parameters.
+Its process computes and does nothing else (:mod:`sensorgen.design.shape_process`), has limits of time and memory, and
+what comes back is plain data, which is checked. Answers are stored by content (:mod:`sensorgen.core.cache`): a shape
+runs once for each set of parameters.
 """
 
 import dataclasses
@@ -12,10 +13,11 @@ import re
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache, lru_cache
 from hashlib import sha256
+from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any, Protocol, cast
 
@@ -23,14 +25,14 @@ from pydantic import ValidationError
 
 from sensorgen.core import cache as answers
 from sensorgen.core import files
-from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, Unwritable
+from sensorgen.core.errors import BadInput, OutOfRange, Unwritable
 from sensorgen.core.records import problem
 from sensorgen.design import packs, shape_process
 from sensorgen.scene.scene import FLOATING, Body, Envelope, Fill, Scene
 
 SECONDS = 5  # of processor time for one question; a scene takes milliseconds
 MEMORY_BYTES = 1 << 30
-MOST_BYTES = 1 << 26  # of an answer: 50 000 cells are a tenth of it
+MOST_BYTES = 1 << 24  # of an answer: 50 000 cells are less than half of it
 TRUSTED = "trusted-shapes.txt"  # in the folder of the user's packs: hash and name, a line each
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
 _TERMINALS = ("", "top", "middle", "bottom", FLOATING)
@@ -50,15 +52,29 @@ class Shape(Protocol):
         """Bodies for parameters and materials."""
 
 
+class NotTrusted(BadInput):
+    """A shape's file whose content the user has not trusted."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(
+            f"{name}.py is not trusted and did not run: a shape is a program; read it, then: sensorgen pack trust "
+            f"shapes/{name}.py (its file, or the design's that contains it), and again after each change"
+        )
+
+
 def load(name: str, text: str) -> Shape:
     """A shape by its name and the text of its file.
 
     Raises
     ------
+    NotTrusted
+        The user has not trusted this content; none of it ran.
     BadInput
         The file is no shape; the message names its line.
     """
-    return _trusted(name, text) if is_trusted(text) else _foreign(name, text)
+    if not is_trusted(text):
+        raise NotTrusted(name)
+    return _foreign(name, text)
 
 
 def digest(text: str) -> str:
@@ -97,8 +113,10 @@ def is_trusted(text: str) -> bool:
 
 
 def trust(name: str, text: str) -> Path:
-    """Let a shape's file with this content run in this process from now on; the list of such files."""
+    """Let a shape's file with this content run, confined; path of the list of such files."""
     path, kept = packs.place() / TRUSTED, ""
+    if is_trusted(text):
+        return path
     with suppress(OSError, UnicodeDecodeError):
         kept = path.read_text("utf-8")
     try:
@@ -107,27 +125,6 @@ def trust(name: str, text: str) -> Path:
     except OSError as error:
         raise Unwritable(f"cannot write {str(path)!r}: {error.strerror or error}") from None
     return path
-
-
-@lru_cache(maxsize=32)
-def _trusted(name: str, text: str) -> Shape:
-    module = in_this_process(name, lambda: shape_process.module_of(f"sensorgen_shape_{digest(text)[:16]}", text))
-    reply = in_this_process(name, lambda: shape_process.described(module))
-    in_this_process(name, lambda: _fields(name, reply))
-    module.SHORT = _short(name, reply)
-    made = module.scene
-    module.scene = lambda p, fill: _checked(name, in_this_process(name, lambda: made(p, fill)), fill)
-    return cast(Shape, module)
-
-
-def in_this_process(name: str, work: Callable[[], Any]) -> Any:
-    """Result of a shape file's code; raises BadInput with the file's line for whatever goes wrong in it."""
-    try:
-        return work()
-    except SensorgenError:
-        raise
-    except Exception as error:  # whatever the file does
-        raise BadInput(shape_process.fault(error, f"{name}.py")) from None
 
 
 def _short(name: str, reply: Mapping[str, Any]) -> str:
@@ -261,14 +258,21 @@ class _Process:
     """The process that runs one shape's file."""
 
     def __init__(self, name: str, text: str) -> None:
+        if not is_trusted(text):
+            raise NotTrusted(name)
         self.name = name
         self._process = subprocess.Popen(  # noqa: S603 - this very program
             [sys.executable, "-I", "-S", "-B", shape_process.__file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL, env={},
         )  # fmt: skip
         self._lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-        threading.Thread(target=_read, args=(self._process.stdout, self._lines), daemon=True).start()
-        self.about = self._exchange({"name": name, "text": text, "seconds": SECONDS, "memory_bytes": MEMORY_BYTES})
+        self._wanted = threading.Semaphore(
+            0
+        )  # lines: one for each question, or an endless answer would fill the memory
+        threading.Thread(target=_read, args=(self._process.stdout, self._wanted, self._lines), daemon=True).start()
+        self.about = self._exchange({
+            "name": name, "text": text, "seconds": SECONDS, "memory_bytes": MEMORY_BYTES, "libraries": _libraries(),
+        })  # fmt: skip
 
     def ask(self, question: Mapping[str, Any]) -> Any:
         """The answer to a question; to an empty one, what the file says of itself."""
@@ -280,6 +284,7 @@ class _Process:
             pipe.write(f"{json.dumps(question)}\n".encode())
             pipe.flush()
         wait_s = 5 + 3 * SECONDS  # as other programs may run
+        self._wanted.release()
         try:
             line = self._lines.get(timeout=wait_s)
         except queue.Empty:
@@ -289,7 +294,7 @@ class _Process:
             ) from None
         try:
             reply = json.loads(line, parse_constant=_refuse) if line else None
-        except ValueError:
+        except (ValueError, RecursionError):
             reply = None
         if not isinstance(reply, dict) or not reply.keys() & {"answer", "refused", "fault"}:
             code = self.close()
@@ -309,6 +314,7 @@ class _Process:
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(0.2)
         self._process.kill()
+        self._wanted.release()
         for pipe in (self._process.stdin, self._process.stdout):
             with suppress(OSError):
                 pipe and pipe.close()
@@ -339,11 +345,19 @@ def close() -> None:
         each.close()
 
 
-def _read(pipe: IO[bytes], lines: "queue.SimpleQueue[bytes]") -> None:
+def _read(pipe: IO[bytes], wanted: threading.Semaphore, lines: "queue.SimpleQueue[bytes]") -> None:
     with suppress(OSError, ValueError):
-        while line := pipe.readline(MOST_BYTES):
+        while wanted.acquire():
+            line = pipe.readline(MOST_BYTES)
             lines.put(line if line.endswith(b"\n") else b"")
-    lines.put(b"")
+            if not line:
+                return
+
+
+def _libraries() -> list[str]:
+    """Folders of the libraries that a shape may import: its process starts without any."""
+    specs = [find_spec(name) for name in shape_process.LIBRARIES]
+    return sorted({str(Path(spec.origin).parents[1]) for spec in specs if spec and spec.origin})
 
 
 def _refuse(word: str) -> Any:

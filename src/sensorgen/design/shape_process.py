@@ -1,25 +1,35 @@
-"""Run a shape's file: as a program, in a process with limits that asks for and answers plain data.
+"""Run a shape's file: as a program, in a confined process that asks for and answers plain data.
 
-Started as ``python -I -S shape_process.py``: the first line of its input is the file, each further one a question, and
-each line of its output an answer, all JSON. What the file prints goes nowhere; it cannot open files, start programs or
-reach a network. The limits keep mistakes from doing harm; they are no wall against somebody who knows Python well.
+Started as ``python -I -S shape_process.py`` with no environment: the first line of its input is the file, each further
+one a question, and each line of its output an answer, all JSON. What the file may import is imported before the process
+is confined (:mod:`sensorgen.core.confine`), and only then the file runs: it computes, and reads and writes these pipes.
 """
 
 import dataclasses
 import json
 import os
+import re
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from types import FrameType, ModuleType
 from typing import Any
 
-_DENIED = (
-    "os.", "subprocess.", "socket.", "shutil.", "ctypes.", "pty.", "urllib.", "http.", "ftplib.", "smtplib.",
-    "sqlite3.", "tempfile.", "webbrowser.", "signal.", "fcntl.", "mmap.", "syslog.", "glob.",
+resource: Any = None
+with suppress(ImportError):  # Windows
+    import resource
+
+LIBRARIES = ("numpy", "shapely")  # of others, that a shape may import
+_MODULES = (
+    *LIBRARIES, "array", "bisect", "cmath", "collections", "copy", "dataclasses", "decimal", "enum", "fractions",
+    "functools", "hashlib", "heapq", "itertools", "json", "math", "numbers", "numpy.linalg", "numpy.random", "operator",
+    "random", "re", "statistics", "string", "struct", "textwrap", "time", "typing", "sensorgen.scene.array",
+    "sensorgen.scene.layers", "sensorgen.scene.polyhedra", "sensorgen.scene.revolved", "sensorgen.scene.triangles",
+    "sensorgen.scene.sections",
 )  # fmt: skip
-_ALLOWED = ("os.listdir", "os.scandir")  # as imports of the standard library do
 
 
 class TooLong(BaseException):
@@ -31,7 +41,7 @@ def module_of(name: str, text: str) -> ModuleType:
     module = ModuleType(name)
     module.__file__ = f"{name}.py"
     sys.modules[name] = module  # where dataclasses look
-    exec(compile(text, f"{name}.py", "exec"), module.__dict__)  # noqa: S102 - trusted, or in a process of its own
+    exec(compile(text, f"{name}.py", "exec"), module.__dict__)  # noqa: S102 - in a confined process
     return module
 
 
@@ -61,6 +71,8 @@ def fault(error: BaseException, file: str) -> str:
         return f"{where}: needs more memory than a shape may have"
     if isinstance(error, TooLong):
         return f"{where}: still running when its time was over"
+    if isinstance(error, PermissionError):
+        return f"{where}: a shape computes and does nothing else ({' '.join(str(error).split())[:300]})"
     message = error.msg if isinstance(error, SyntaxError) else str(error)
     return f"{where}: {type(error).__name__}: {' '.join(message.split())[:300]}"
 
@@ -78,45 +90,39 @@ def _answer(module: ModuleType, question: Mapping[str, Any]) -> Any:
 
 
 def _limit(memory_bytes: int) -> None:
-    """Limit memory, forbid files to write and processes to start, where the system can."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return
-    for which, most in (("RLIMIT_AS", memory_bytes), ("RLIMIT_FSIZE", 0), ("RLIMIT_NPROC", 0), ("RLIMIT_CORE", 0)):
-        if hasattr(resource, which):
-            try:
-                resource.setrlimit(getattr(resource, which), (most, most))
-            except (OSError, ValueError):
-                continue
+    """Limit memory; forbid files, network and other processes, as far as the system can."""
+    from sensorgen.core import confine
+
+    limits = {"AS": memory_bytes, "FSIZE": 0, "NPROC": 0, "CORE": 0} | ({} if confine.available() else {"NOFILE": 0})
+    for name, most in limits.items():
+        with suppress(OSError, ValueError, AttributeError):
+            resource.setrlimit(getattr(resource, f"RLIMIT_{name}"), (most, most))
+    if confine.available():
+        confine.confine()
+
+
+def _import(text: str, libraries: list[str]) -> None:
+    """Import the modules that a file names, of those that a shape may import; after this, no other is found."""
+    import_module("sensorgen.core.confine")
+    sys.path += libraries
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # a thread that exists already would not be confined
+    for name in _MODULES:
+        if re.search(rf"\b{re.escape(name)}\b", text):
+            with suppress(ImportError):  # the file's own import says so
+                import_module(name)
+    os.environ.clear()
+    sys.path.clear()
 
 
 def _allow(seconds: int) -> None:
     """Give the next question its processor time."""
-    try:
-        import resource
-    except ImportError:
+    if resource is None:
         return
     _LATE[0] = 0
     used = resource.getrusage(resource.RUSAGE_SELF)
     hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
     soft = int(used.ru_utime + used.ru_stime) + seconds
     resource.setrlimit(resource.RLIMIT_CPU, (soft if hard < 0 else min(soft, hard), hard))
-
-
-def _refuse(event: str, given: tuple[Any, ...]) -> None:
-    """Audit hook: a shape computes and does nothing else."""
-    if event == "open":
-        path, mode = str(given[0]), given[1]
-        inside = path.startswith((_LIBRARY, _PACKAGE)) or path.endswith(".pyc")
-        if not inside or (isinstance(mode, str) and not set(mode) <= set("rb")):
-            raise PermissionError(f"a shape opens no files ({path[:80]})")
-    elif event.startswith(_DENIED) and event not in _ALLOWED:
-        raise PermissionError(f"a shape does nothing but compute ({event})")
-
-
-_LIBRARY = str(Path(os.__file__).parent)
-_PACKAGE = str(Path(__file__).resolve().parents[1])
 
 
 _LATE = [0]  # seconds since the time of a question was over
@@ -142,15 +148,13 @@ def main() -> None:
     from sensorgen.core.errors import SensorgenError
     from sensorgen.core.leash import end_with_parent
 
-    __import__("sensorgen.scene.scene")
-    sys.path.pop(0)  # the standard library is left
     end_with_parent()
     first = json.loads(source.readline())
+    _import(f"sensorgen.scene.polyhedra sensorgen.scene.revolved {first['text']}", first["libraries"])
     file = f"{first['name']}.py"
     if hasattr(signal, "SIGXCPU"):
         signal.signal(signal.SIGXCPU, _stop)
     _limit(first["memory_bytes"])
-    sys.addaudithook(_refuse)
 
     def reply(work: Callable[[], Any]) -> Any:
         try:

@@ -19,9 +19,8 @@ from sensorgen.scene.scene import Prism
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
+    from sensorgen.prediction.slices import PrintFile
     from sensorgen.scene.scene import Scene
-
-OUT = Path("out")  # folder of the designs' folders, where build and slice write, unless told otherwise
 
 
 def drawn(design: Design) -> Body:
@@ -206,7 +205,7 @@ def registered(design: Design, path: Path) -> "Printed":
 
 
 def default_body(design: Design, folder: Path | None = None) -> Body:
-    """The print of a design: by the tool path in its folder where there is one, else by the rules of slicers.
+    """The print of a design: by the G-code in its folder, else by a slicer that is installed, else by its rules.
 
     Parameters
     ----------
@@ -215,34 +214,16 @@ def default_body(design: Design, folder: Path | None = None) -> Body:
     folder : Path, optional
         With the design's files; ``out/NAME`` in the working folder if not given.
     """
-    path = toolpath(design, folder)
-    if path is None:
+    from sensorgen.prediction import slices
+
+    return of_file(design, slices.at_hand(design, folder)[0])
+
+
+def of_file(design: Design, file: "PrintFile | None") -> Body:
+    """The print by a G-code file of this very design; by the rules of slicers where there is none."""
+    if file is None:
         return estimated(design)
-    made = json.loads(path.with_name(f"{path.name}.json").read_text("utf-8"))
-    source = f"{made['slicer']['name']} {made['slicer']['version']}"
-    return sliced(design, partial(_read, design, path, source), f"{source}, {path.name}", path.read_bytes())
-
-
-def toolpath(design: Design, folder: Path | None = None) -> Path | None:
-    """The sliced file of this very design in a folder, or None; its record is beside it, ``.json`` at its end."""
-    folder = folder or OUT / design.name
-    for note in sorted(folder.glob("*.gcode.json")) if folder.is_dir() else ():
-        path = note.with_suffix("")
-        try:
-            made = json.loads(note.read_text("utf-8"))
-            named = all(isinstance(made["slicer"][key], str) for key in ("name", "version"))
-            if named and made["design"] == design.id() and made["sha256"] == sha256(path.read_bytes()).hexdigest():
-                return path
-        except (OSError, ValueError, KeyError, TypeError):  # no file of ours
-            continue
-    return None
-
-
-def _read(design: Design, path: Path, source: str) -> "Printed":
-    from sensorgen.asprinted import printed
-    from sensorgen.export.gcode import paths
-
-    return printed.body(design, paths.read(path, design.machine), slicer=source)
+    return sliced(design, partial(file.printed, design), file.source, file.content)
 
 
 def _printed_cells(prints: "Mapping[str, Printed]") -> Cells:

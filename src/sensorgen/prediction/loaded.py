@@ -7,8 +7,10 @@ from functools import cached_property
 
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table
+from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM, si
 from sensorgen.design.body import Body
+from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import grid
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.planning import rough_sensor, sensor_model
@@ -33,12 +35,15 @@ class Loaded(Displayed):
         Frequencies [Hz], forces [N] and positions [mm].
     noise : float
         Standard deviation of a reading, relative to abs(Z) [-].
+    left_out : str
+        Positions without an answer, and the reason; or "".
     """
 
     prediction: Prediction
     model: SensorModel
     axes: Axes
     noise: float
+    left_out: str = ""
 
     @cached_property
     def impedance(self) -> grid.ImpedanceGrid:
@@ -51,7 +56,7 @@ class Loaded(Displayed):
         _, force_n, position_mm = self.axes
         stress_pa = self.model.sensor.stress_pa(force_n[-1], [x * M_PER_MM for x in position_mm])
         beyond = self.model.sensor.compression.doubt(float(stress_pa.max()))
-        return (*self.model.doubts, *([beyond] if beyond else ()))
+        return (*self.model.doubts, *filter(None, (beyond, self.left_out)))
 
     def document(self) -> Iterator[Part]:
         """Ranges of R and X, how much they change, corners at the last frequency, and the judgement of a reading."""
@@ -129,7 +134,8 @@ def loaded(body: Body, query: Query, force_n: Sequence[float] = (), position_mm:
     query : Query
         Frequencies, tip, law, accuracy and noise.
     force_n, position_mm : sequence of float
-        Rising [N], [mm]; if not given, 0 to 6 N, and the whole sensor in 100 steps.
+        Rising [N], [mm]; if not given, 0 to 6 N, and the whole sensor in 100 steps: without those where the tip
+        overhangs an end, if there the pressure is beyond the law.
 
     Raises
     ------
@@ -140,8 +146,24 @@ def loaded(body: Body, query: Query, force_n: Sequence[float] = (), position_mm:
     reference = grid.hardest(*axes)
     query = replace(query, force_n=reference.force_n, position_m=reference.position_m)
     rough = rough_sensor(body, query.law, query.tip_of(body.design), query.force_n)
-    grid.check_presses(rough.sensor, axes[1], [x * M_PER_MM for x in axes[2]])
-    return Loaded(evaluate(body, query), sensor_model(body, query)[0], axes, query.noise)
+    if position_mm:
+        grid.check_presses(rough.sensor, axes[1], [x * M_PER_MM for x in axes[2]])
+    prediction, model = evaluate(body, query), sensor_model(body, query)[0]
+    at, left_out = (axes[2], "") if position_mm else _pressable(model.sensor, *axes[1:])
+    return Loaded(prediction, model, (*axes[:2], at), query.noise, left_out)
+
+
+def _pressable(
+    sensor: Sensor, force_n: Sequence[float], position_mm: Sequence[float]
+) -> tuple[Sequence[float], str]:  # fmt: skip
+    """Positions that can be pressed, and why others cannot; errors as of :func:`grid.check_presses`."""
+    try:
+        grid.check_presses(sensor, force_n, [x * M_PER_MM for x in position_mm])
+    except OutOfRange as error:
+        whole = tuple(x for x in position_mm if sensor.whole(x * M_PER_MM))
+        grid.check_presses(sensor, force_n, [x * M_PER_MM for x in whole])
+        return whole, f"only from {whole[0]:g} to {whole[-1]:g} mm, where the tip lies on the sensor whole ({error})"
+    return position_mm, ""
 
 
 def _axis(values: Sequence[float], name: str, unit: str) -> str:

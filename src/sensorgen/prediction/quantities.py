@@ -298,7 +298,11 @@ def _with_tops(found: Prediction, model: SensorModel, load: Load, query: Query) 
     others = (
         _under_top(name, law, own, model, load, query) for name, law in model.law.tops.items() if name != tip.block
     )
-    tops = [UnderTop(tip.material, **own), *filter(None, others)]
+    known = found.identifiability
+    tops = [
+        UnderTop(tip.material, **own, calibrated=known and known.calibrated, typical=known and known.map.typical()),
+        *filter(None, others),
+    ]
     wider: dict[str, Any] = {}
     apart = False
     for key, bounds in own.items():
@@ -317,13 +321,18 @@ def _under_top(
     """Numbers under another top; None where it cannot take the load."""
     sensor = replace(model.sensor, compression=law)
     try:
-        values = *_errors(sensor, load, query), _mean_slope(law, _range_pa(sensor, load, query))
+        known = identify(
+            sensor, load.frequency_hz, query.noise, force_n=load.force_n, position_m=load.position_m,
+            assumed=_unknown(model),
+        )  # fmt: skip
+        values = known.sigma_force_n, known.sigma_position_m, _mean_slope(law, _range_pa(sensor, load, query))
     except OutOfRange:
         return None
-    ratios = {key: value / own[key].value for key, value in zip(_UNITS, values, strict=True) if key in own}
-    if any(map(isnan, ratios.values())):
+    ratios = {key: value and value / own[key].value for key, value in zip(_UNITS, values, strict=True) if key in own}
+    if None in ratios.values():
         return None
-    return UnderTop(WORDS[name], **{key: own[key].times(ratio, _UNITS[key]) for key, ratio in ratios.items()})
+    under = {key: own[key].times(ratio, _UNITS[key]) for key, ratio in ratios.items() if ratio}
+    return UnderTop(WORDS[name], **under, calibrated=known.calibrated, typical=known.map.typical())
 
 
 def _sensitivity(model: SensorModel, load: Load, query: Query, others: Otherwise) -> Bounds:

@@ -14,7 +14,14 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
 from sensorgen.core.units import si
 from sensorgen.design.values import ASSUMED, MaterialValue
-from sensorgen.prediction.identifiability.results import GUESS, Identifiability, metres, newtons, of_schema_1
+from sensorgen.prediction.identifiability.results import (
+    GUESS,
+    Identifiability,
+    StandardErrors,
+    metres,
+    newtons,
+    of_schema_1,
+)
 from sensorgen.prediction.plan import Plan, without_times
 
 if TYPE_CHECKING:
@@ -237,16 +244,28 @@ class UnderTop:
         As "stiff plate".
     force_resolution, position_resolution, sensitivity : Bounds or None
         As of :class:`Prediction` [N], [m], [1/kPa].
+    calibrated, typical : StandardErrors or None
+        After 30 known presses at the reference load; medians over forces and positions.
     """
 
     name: str
     force_resolution: Bounds | None = None
     position_resolution: Bounds | None = None
     sensitivity: Bounds | None = None
+    calibrated: StandardErrors | None = None
+    typical: StandardErrors | None = None
+
+    def bench(self) -> tuple[Bounds | None, Bounds | None]:
+        """Standard errors of force and position after known presses [N], [m]."""
+        known = self.calibrated or StandardErrors(sigma_force_n=None, sigma_position_m=None)
+        return (
+            on_bench(self.force_resolution, known.sigma_force_n),
+            on_bench(self.position_resolution, known.sigma_position_m),
+        )
 
     def words(self) -> str:
-        """Name and resolutions."""
-        values = (b.value for b in (self.force_resolution, self.position_resolution) if b)
+        """Name, and standard errors after known presses."""
+        values = (b.value for b in self.bench() if b)
         return f"{self.name} {', '.join(si(v, u, 3) for v, u in zip(values, ('N', 'm'), strict=False))}"
 
 
@@ -333,10 +352,15 @@ class Prediction(Displayed):
     narrowing: tuple[Narrowing, ...] = ()
 
     def bench(self) -> tuple[Bounds | None, Bounds | None]:
-        """Standard errors of force and position on a bench, after known presses [N], [m]."""
-        known = self.identifiability.calibrated if self.identifiability else None
-        force, position = (known.sigma_force_n, known.sigma_position_m) if known else (None, None)
-        return on_bench(self.force_resolution, force), on_bench(self.position_resolution, position)
+        """Standard errors of force and position after known presses, under the worst top [N], [m]."""
+        force, position = zip(*(top.bench() for top in self.under()), strict=True)
+        return _worst(force), _worst(position)
+
+    def under(self) -> tuple[UnderTop, ...]:
+        """Numbers under each top, where they differ; else under the tip."""
+        known = self.identifiability
+        own = (self.force_resolution, self.position_resolution, self.sensitivity)
+        return self.tops or (UnderTop("", *own, *((known.calibrated, known.map.typical()) if known else ())),)
 
     @property
     def conditional(self) -> bool:
@@ -363,7 +387,7 @@ class Prediction(Displayed):
         yield Table("quantities", "", columns, tuple(rows))
         yield caption_of(self.force_n, self.position_m, self.body)
         if self.tops:
-            yield f"it depends on the tip: {'; '.join(top.words() for top in self.tops)}"
+            yield f"the worst of: {'; '.join(top.words() for top in self.tops)}"
         if self.narrowing:
             columns = (Column("range that spans"), Column("a factor"), Column("narrowed most by"), Column("to"))
             rows_ = ((n.quantity, _times(n.factor), n.measurement, _times(n.left)) for n in self.narrowing)
@@ -422,6 +446,9 @@ class Prediction(Displayed):
         """Identifiability and error budget; or why there are none."""
         if self.identifiability:
             yield from self.identifiability.document()
+            medians = [f"{top.name} {top.typical.words()}" for top in self.tops if top.typical]
+            if medians:
+                yield f"median over forces and positions: {'; '.join(medians)}"
         elif self.reason:
             yield f"no load: {self.reason}"
         if self.budget:
@@ -433,15 +460,6 @@ class Prediction(Displayed):
     def to_json(self) -> str:
         """Indented JSON of the published schema."""
         return json.dumps(json.loads(to_json(self)), indent=2, ensure_ascii=False) + "\n"
-
-    def with_short(self, found: Sequence[Finding]) -> tuple[Finding, ...]:
-        """Findings about a drawing, an error where its print is a short, a warning where it has no capacitance."""
-        if self.status == "not predicted":
-            return (unpredicted(self.reason), *found)
-        if self.status != "short" or any(f.rule == "1-short" for f in found):
-            return tuple(found)
-        advice = "widen narrow parts to a line, or draw the electrodes further apart"
-        return (Finding("1-short", "error", "sensor", f"as {self.body}: {self.reason}", advice, 0.0), *found)
 
     def problems(self, accuracy: float | None) -> Sequence[str]:
         """That abs(Z) is not within an accuracy that was asked for [-]."""
@@ -483,6 +501,15 @@ def on_bench(exact: Bounds | None, calibrated: float | None) -> Bounds | None:
     if exact is None or calibrated is None:
         return exact
     return exact.times(calibrated / exact.value, exact.unit)
+
+
+def _worst(errors: Sequence[Bounds | None]) -> Bounds | None:
+    """Largest standard error, its range that of all; None where none is known."""
+    known = [b for b in errors if b]
+    if not known:
+        return None
+    ends = min(b.lower for b in known), max(b.upper for b in known)
+    return replace(max(known, key=lambda b: b.value), lower=ends[0], upper=ends[1])
 
 
 def _times(factor: float) -> str:

@@ -47,11 +47,12 @@ def groups(count: int, one: Whole, other: Whole) -> Whole:
     label = np.arange(count)
     while True:
         low, found = np.minimum(label[one], label[other]), label.copy()
-        np.minimum.at(found, one, low)
-        np.minimum.at(found, other, low)
-        found = found[found]
+        for ends in (one, other):  # the first of each group takes the least first of its neighbours
+            np.minimum.at(found, label[ends], low)
+        while (found[found] != found).any():
+            found = found[found]
         if (found == label).all():
-            return np.unique(label, return_inverse=True)[1]
+            return (np.cumsum(label == np.arange(count)) - 1)[label]
         label = found
 
 

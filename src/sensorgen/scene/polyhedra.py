@@ -79,10 +79,7 @@ class Polyhedron:
         x0 = self.vertices[0][0]
         flux = []  # of the field (x, 0, 0), which level faces do not pass
         for triangle in self.triangles:
-            corners = [self.vertices[number] for number in triangle]
-            for level, side in ((low_mm, 1.0), (high_mm, -1.0)):
-                if corners and isfinite(level):
-                    corners = _above(corners, level, side)
+            corners = between([self.vertices[number] for number in triangle], low_mm, high_mm)
             for k in range(1, len(corners) - 1):
                 (xa, ya, za), (xb, yb, zb), (xc, yc, zc) = corners[0], corners[k], corners[k + 1]
                 normal = (yb - ya) * (zc - za) - (zb - za) * (yc - ya)
@@ -143,16 +140,18 @@ class Polyhedron:
         return replace(self, vertices=tuple((rounded(x * factor), rounded(y * factor), z) for x, y, z in self.vertices))
 
 
-def _above(corners: Sequence[Place], level_mm: float, side: float) -> list[Place]:
-    """Part of a flat polygon above a height, or below it for a ``side`` of -1 (Sutherland and Hodgman, 1974)."""
-    kept: list[Place] = []
-    for k, b in enumerate(corners):
-        a = corners[k - 1]
-        if (side * (a[2] - level_mm) >= 0) != (side * (b[2] - level_mm) >= 0):
-            share = (level_mm - a[2]) / (b[2] - a[2])
-            kept.append((a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), level_mm))
-        kept += [b] if side * (b[2] - level_mm) >= 0 else []
-    return kept
+def between(corners: Sequence[Place], low_mm: float, high_mm: float) -> Sequence[Place]:
+    """Part of a flat polygon between two heights (Sutherland and Hodgman, 1974)."""
+    for side, level in ((1.0, low_mm), (-1.0, high_mm)):
+        inside: list[Place] = []
+        for a, b in zip([*corners[-1:], *corners[:-1]], corners, strict=True):
+            if (side * (a[2] - level) >= 0) != (side * (b[2] - level) >= 0):
+                share = (level - a[2]) / (b[2] - a[2])
+                inside.append((a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), level))
+            if side * (b[2] - level) >= 0:
+                inside.append(b)
+        corners = inside
+    return corners
 
 
 def _without_holes(loops: list[Outline]) -> list[Outline]:

@@ -97,12 +97,9 @@ def is_open(scene: Scene) -> bool:
 
 def _faces(piece: Piece) -> "Real":
     """Triangles of its surface (n, 3, 3) [mm]."""
-    import numpy as np
-
     from sensorgen.scene.geometry.meshes import mesh
 
-    made = mesh(Body("", "", (piece,)))
-    return np.asarray(made.vertices_mm[made.triangles], float)
+    return mesh(Body("", "", (piece,))).corners_mm()
 
 
 def _between(piece: Piece, faces: "Real", low_mm: float, high_mm: float) -> "tuple[Region, Region]":
@@ -125,17 +122,10 @@ def _projected(faces: "Real", low_mm: float, high_mm: float) -> "Iterator[shapel
     """The parts of triangles between two heights, seen from above."""
     import shapely
 
+    from sensorgen.scene.polyhedra import between
+
     for triangle in faces.tolist():
-        corners = triangle
-        for sign, level in ((1.0, low_mm), (-1.0, high_mm)):
-            kept = []
-            for a, b in zip(corners, [*corners[1:], *corners[:1]], strict=True):
-                if sign * (a[2] - level) >= 0:
-                    kept.append(a)
-                if sign * (a[2] - level) * sign * (b[2] - level) < 0:
-                    share = (level - a[2]) / (b[2] - a[2])
-                    kept.append([u + share * (v - u) for u, v in zip(a, b, strict=True)])
-            corners = kept
+        corners = between(triangle, low_mm, high_mm)
         if len(corners) > 2:
             outline = shapely.Polygon([corner[:2] for corner in corners])
             if outline.area > SLIVER_MM**2:

@@ -25,12 +25,12 @@ from sensorgen.prediction.loaded import Loaded, loaded
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import FLAT, NOISE, TONES_HZ, Query, Tip
 from sensorgen.prediction.results import Prediction
+from sensorgen.prediction.slices import reviewed
 from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.workflows import build as builds
 from sensorgen.workflows import display as display
 from sensorgen.workflows import slice as slicing
 from sensorgen.workflows.build import Built
-from sensorgen.workflows.reviewed import reviewed
 from sensorgen.workflows.slice import Printed
 
 

@@ -10,13 +10,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, ClassVar
 
-from sensorgen.asprinted.printed import body as estimate
-from sensorgen.checks.review import Review, Step, draw, report
+from sensorgen.checks.review import Step, draw, report
 from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.document import Part
 from sensorgen.core.errors import Unprintable
-from sensorgen.core.findings import Finding, listed, most_severe
+from sensorgen.core.findings import Finding, headline, listed, most_severe
 from sensorgen.core.version import __version__
 from sensorgen.design import printer
 from sensorgen.design.design import Design
@@ -29,10 +28,10 @@ from sensorgen.export.threemf.part import parts_of
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless, to_json
+from sensorgen.prediction.slices import PrintReview, reviewed
 from sensorgen.workflows import compensation, decision, sealed
 from sensorgen.workflows.compensation import Change
 from sensorgen.workflows.decision import Advice, Decision
-from sensorgen.workflows.reviewed import reviewed
 from sensorgen.workflows.trial import Trial
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
@@ -53,9 +52,9 @@ class Built:
     files : tuple of str
         Their names there.
     verdict : str
-        CHANGE where a check reports an error, PRINT WITH WARNINGS, or PRINT.
+        CHANGE where a finding is an error, PRINT WITH WARNINGS, or PRINT.
     findings : tuple of Finding
-        Of the checks.
+        About the print.
     prediction : Prediction
         Of the print, with the drawing's beside it.
     compensated : tuple of Change
@@ -66,6 +65,8 @@ class Built:
         The numbers that decide; None where nothing is predicted.
     advice : Advice or None
         Changes that were tried; None where none was looked for.
+    source : str
+        Of the findings: slicer and version, or that the print is estimated, and why.
     """
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
@@ -80,6 +81,7 @@ class Built:
     replaced: tuple[str, ...] = ()
     trial: Trial | None = None
     advice: Advice | None = None
+    source: str = ""
 
     def document(self) -> Iterator[Part]:
         """Verdict, quantities drawn beside printed, and the three findings that matter most."""
@@ -97,8 +99,7 @@ class Built:
     def _head(self) -> Iterator[Part]:
         yield from self.replaced
         yield from compensation.document(self.compensated)
-        reason = self.prediction.reason if self.prediction.status == "not predicted" else ""
-        yield decision.headline(self.verdict, self.name, self.findings, reason)
+        yield headline(self.name, self.findings, self.source)
         yield ""
 
 
@@ -161,7 +162,7 @@ def build(
             from sensorgen.scene.geometry.cad import CadProcess
 
             kernel = stack.enter_context(CadProcess())  # its import runs beside everything below
-        held = reviewed(design, step)
+        held = reviewed(design, step, folder=folder)
         if held.errors(strict) and not force:
             raise Unprintable(held.findings, held.errors(strict))
         held = held.with_meshes(design)
@@ -169,8 +170,8 @@ def build(
         step_file = stage / f"{design.name}.step"
         job = kernel.submit(design.printed, _colours(design), design.name, step_file) if kernel else None
         step("prediction")
-        predicted = evaluate(bodies.default_body(design, folder))
-        decided = decision.decision(design, held, budget_s, folder=folder, step=step)
+        predicted = evaluate(bodies.of_file(design, held.file))
+        decided = decision.decision(design, held, budget_s, step=step)
         for name, content in _files(design, held, predicted, decided, step):
             store.write(stage, {name: content})
         if job:
@@ -183,6 +184,7 @@ def build(
     return Built(
         design.name, folder, tuple(sorted([*store.listed(folder), store.MANIFEST])), decided.verdict,
         decided.findings, timeless(predicted), tuple(compensated), replaced, decided.trial, decided.advice,
+        held.source,
     )  # fmt: skip
 
 
@@ -196,7 +198,7 @@ def _replaced(folder: Path, design: Design) -> tuple[str, ...]:
 
 
 def _files(
-    design: Design, held: Review, predicted: Prediction, decided: Decision, step: Step
+    design: Design, held: PrintReview, predicted: Prediction, decided: Decision, step: Step
 ) -> Iterator[tuple[str, bytes]]:
     name, primed = design.name, tower(design.machine, design.layers, len(design.used()))
     step("3MF")
@@ -208,7 +210,7 @@ def _files(
     for path, text in profiles(design).items():
         yield path, text.encode()
     step("drawing")
-    printed = estimate(design)
+    printed = held.printed(design)
     yield f"{name}.svg", draw(design, held, printed.scene, printed.provenance).encode()
     yield f"{name}.html", decided.page(printed, held, predicted).encode()
     yield "check.json", document.to_json(report(design, held)).encode()

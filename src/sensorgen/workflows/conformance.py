@@ -113,6 +113,34 @@ def _named(word: str) -> Pack:
     return known[word]
 
 
+def trust(word: str) -> list[str]:
+    """Trust the shapes of a pack, a folder, one file, or a design's file that contains theirs; where each is.
+
+    Raises
+    ------
+    BadInput
+        There are none.
+    """
+    texts = _shape_texts(word)
+    if not texts:
+        raise BadInput(f"{word}: has no shapes; expected a pack with shapes, a shape's file, or a design that has one")
+    for _, name, text in texts:
+        shape_files.trust(name, text)
+    return [where for where, _, _ in texts]
+
+
+def _shape_texts(word: str) -> list[tuple[str, str, str]]:
+    """Place, name and text of each shape."""
+    path = Path(word)
+    if path.suffix in (".yaml", ".yml") and path.absolute().parent.name not in packs.SINGULAR:
+        match yamlfile.read(path):
+            case {"own": {"shapes": {**shapes}}}:
+                return [(f"{word}: {name}", str(name), text) for name, text in shapes.items() if isinstance(text, str)]
+        return []
+    files = [file for file in chosen(word) if file.kind == "shapes" and file.pack.where != "shipped"]
+    return [(str(file.path), file.name, file.text()) for file in files]
+
+
 def conformance(word: str, step: Step = lambda _: None) -> PackReport:
     """Test the files of a pack; ``word`` as of :func:`chosen`, ``step`` gets the name of each file."""
     pack = None if Path(word).is_file() else _pack(word)
@@ -236,15 +264,26 @@ def _material(file: File) -> Faults:
         yield "values", "no values", "add at least one quantity"
 
 
-def _shape(file: File, step: Step) -> Faults:
-    """Faults of its scenes at the ends of its parameters, each once with how many sensors have it."""
-    text = file.text()
+def _program(file: File, text: str) -> Faults:
+    """Faults of a shape's file as a program: what keeps it from being tried comes last."""
     for name in _imported(text, file):
         if not name.startswith(_IMPORTS) and name.partition(".")[0] not in sys.stdlib_module_names:
             yield "imports", f"imports {name}", "a shape imports sensorgen.scene and the standard library only"
-    if file.pack.where != "shipped" and shape_files.varies(file.name, text, dataclasses.asdict(Fill())):
+    if file.pack.where == "shipped":
+        return
+    if not shape_files.is_trusted(text):
+        yield "trust", "not trusted: did not run", f"read it, then: sensorgen pack trust {file.path}"
+    elif shape_files.varies(file.name, text, dataclasses.asdict(Fill())):
         message = "the same parameters give different bodies from run to run"
         yield "random", message, "compute from the parameters alone: no random numbers, no time, no order of a set"
+
+
+def _shape(file: File, step: Step) -> Faults:
+    """Faults of its scenes at the ends of its parameters, each once with how many sensors have it."""
+    text, rule = file.text(), ""
+    for rule, message, advice in _program(file, text):
+        yield rule, message, advice
+    if rule in ("trust", "random"):
         return
     form = shape_files.load(file.name, text) if file.pack.where != "shipped" else designs.shape(file.name)
     if not (form.__doc__ or "").strip():

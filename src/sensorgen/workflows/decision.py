@@ -6,18 +6,18 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from sensorgen.checks.review import CheckReport, Review, review
+from sensorgen.checks.review import CheckReport, Review, report, review
 from sensorgen.core import cache as answers
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import SensorgenError
-from sensorgen.core.findings import Finding, Refused, Verdict, counted, counts, grouped, listed, verdict
+from sensorgen.core.findings import Finding, Refused, Verdict, grouped, headline, listed, verdict
 from sensorgen.design.design import Design
 from sensorgen.prediction.identifiability.results import FORCE_SHARE, GUESS
-from sensorgen.prediction.results import UNPREDICTED, caption_of, resolved, unpredicted
+from sensorgen.prediction.results import UNPREDICTED, caption_of, resolved
+from sensorgen.prediction.slices import PrintReview
 from sensorgen.workflows.moves import changed
 from sensorgen.workflows.trial import Numbers, Trial, trial
 
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from sensorgen.prediction.results import Prediction
 
 _VERSION = 5  # of the search for changes: stored advice of another one is not read
-_OF_PRINT = ("1-short", UNPREDICTED)  # rules whose findings are of the prediction
 STEPS = ("prediction", "changes", "done")
 Step = Callable[[str], None]
 
@@ -140,12 +139,10 @@ class Advice:
 
 @dataclass(frozen=True)
 class Decision(CheckReport):
-    """The findings about a design, and what follows from them.
+    """The findings about a print, and what follows from them.
 
     Attributes
     ----------
-    verdict : str
-        CHANGE where a finding is an error, PRINT WITH WARNINGS, or PRINT.
     trial : Trial or None
         Numbers of the drawing and the print; None for checks alone, or where nothing is predicted.
     reason : str
@@ -158,7 +155,6 @@ class Decision(CheckReport):
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
 
-    verdict: Verdict = "PRINT"
     trial: Trial | None = None
     reason: str = ""
     advice: Advice | None = None
@@ -166,12 +162,12 @@ class Decision(CheckReport):
 
     def document(self) -> Iterator[Part]:
         """Verdict, numbers, findings and changes."""
-        yield headline(self.verdict, self.name, self.findings, self.reason)
-        if self.trial:
+        yield headline(self.name, self.findings, self.source)
+        if self.trial or self.reason:
             yield from ("", *self.numbers())
         if self.findings:
             yield ""
-            yield from listed(grouped(self.findings))
+            yield from listed(self.findings)
         if self.advice:
             yield ""
             yield from self.advice.document()
@@ -181,7 +177,7 @@ class Decision(CheckReport):
         from sensorgen.analysis import preview
 
         advice = self.advice.document() if self.advice else ()
-        return preview.page(printed, held, predicted, self.verdict, self.numbers(), advice)
+        return preview.page(printed, held, predicted, self.numbers(), advice)
 
     def numbers(self) -> Iterator[Part]:
         """The numbers that decide; why there are none."""
@@ -209,54 +205,44 @@ class RefusedBuild(Refused):
             yield from self.advice.document()
 
 
-def headline(said: str, name: str, findings: Sequence[Finding], reason: str) -> str:
-    """Verdict and counts, and why there are no electrical numbers."""
-    return f"{said}  {name}: {counted(counts(grouped(findings)))}{reason and f'; not predicted: {reason}'}"
-
-
 def decision(
     design: Design,
-    held: Review,
+    held: PrintReview,
     budget_s: float,
     *,
     predict: bool = True,
-    folder: Path | None = None,
     step: Step = lambda _: None,
 ) -> Decision:
-    """What follows from the findings about a design.
+    """What follows from the findings about a print.
 
     Parameters
     ----------
     design : Design
         What was checked.
-    held : Review
-        Its findings.
+    held : PrintReview
+        All findings.
     budget_s : float
         Processor time for the prediction and for trying changes; at 0, advice that is stored is given [s].
     predict : bool
         Also predict drawing and print, without which no change is tried.
-    folder : Path, optional
-        With the design's files, as of :func:`sensorgen.workflows.trial.trial`.
     step : callable
         Called with the next step, for a progress display.
     """
-    findings, made, advice, start_s = tuple(held.findings), None, None, time.process_time()
+    made, advice, start_s = None, None, time.process_time()
     reason = "" if predict else "checks alone (--budget 0)"
     if predict and held.meshes:
         step("prediction")
         try:
-            made = trial(design, folder=folder)
+            made = trial(design, held=held)
         except SensorgenError as error:
-            reason, findings = str(error), (unpredicted(str(error)), *findings)
+            reason = str(error)
     if made:
         reason = made.reason if made.status == "not predicted" else ""
-        findings = (*(f for f in made.findings if f.rule in _OF_PRINT and f not in findings), *findings)
         step("changes")
         advice = advised(design, made, budget_s, step, time.process_time() - start_s)
-    said = verdict(findings)
     return Decision(
-        design.name, design.id(), design.machine.name, design.layers.name, counts(findings), findings, said, made,
-        reason, advice, _turned_by(design, said),
+        **vars(report(design, held)), trial=made, reason=reason, advice=advice,
+        turned_by=_turned_by(design, held.verdict),
     )  # fmt: skip
 
 
@@ -338,10 +324,12 @@ def table(tried: Trial) -> Iterator[Part]:
         rows.append(("print time", "", f"at least {tried.toolpath.time_s / 60:.0f} min"))
     yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
     yield caption_of(tried.force_n, tried.position_m, tried.body)
+    if tried.printed.by_top:
+        yield f"printed, the worst of: {tried.printed.by_top}"
     if tried.rests_on and any(grade(tried)):
         yield f"largest assumption: a press is read wrongly by {tried.rests_on}"
-    if tried.reason and tried.status != "not predicted":
-        yield tried.reason
+    if tried.reason:
+        yield f"{'not predicted: ' * (tried.status == 'not predicted')}{tried.reason}"
     yield from (f"doubtful: {doubt}" for doubt in tried.doubts)
 
 

@@ -18,9 +18,10 @@ def _(found: Review) -> str:
 
 @display.html.register(Design)
 def _(design: Design) -> str:
-    from sensorgen.checks.review import draw, review
+    from sensorgen.checks.review import draw
+    from sensorgen.prediction.slices import reviewed
 
-    return draw(design, review(design))
+    return draw(design, reviewed(design))
 
 
 @display.figure.register(Prediction)

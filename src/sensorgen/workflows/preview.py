@@ -2,14 +2,13 @@
 
 from pathlib import Path
 
-from sensorgen.asprinted.printed import body
 from sensorgen.checks.review import STEPS as CHECKS
 from sensorgen.checks.review import Step
 from sensorgen.design.design import Design
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.slices import reviewed
 from sensorgen.workflows.decision import decision
-from sensorgen.workflows.reviewed import reviewed
 
 STEPS = (*CHECKS, "prediction", "page", "done")
 
@@ -31,8 +30,8 @@ def page_of(design: Design, *, folder: Path | None = None, step: Step = lambda _
     SensorgenError
         A name or value of the design is missing.
     """
-    held = reviewed(design, step)
-    decided = decision(design, held, 0.0, folder=folder, step=step)
-    predicted = evaluate(bodies.default_body(design, folder))
+    held = reviewed(design, step, folder=folder)
+    decided = decision(design, held, 0.0, step=step)
+    predicted = evaluate(bodies.of_file(design, held.file))
     step("page")
-    return decided.page(body(design), held, predicted)
+    return decided.page(held.printed(design), held, predicted)

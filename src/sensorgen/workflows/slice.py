@@ -1,104 +1,57 @@
 """A design to its G-code file: checked as a design, sliced, and checked again as G-code."""
 
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from hashlib import sha256
 from pathlib import Path
 
 from sensorgen.analysis.plots import layers as pages
-from sensorgen.asprinted import agreement, pinholes
-from sensorgen.asprinted.printed import nominal
 from sensorgen.checks import volumes
-from sensorgen.checks.volumes import Row
+from sensorgen.checks.review import review
 from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.document import Part
 from sensorgen.core.errors import Unprintable
-from sensorgen.core.findings import Finding, counted, counts, listed
-from sensorgen.core.version import __version__
+from sensorgen.core.findings import Finding, Verdict, headline, listed
 from sensorgen.design.design import Design
 from sensorgen.design.walls import rule
-from sensorgen.export.gcode.check import Checked, check_motion
-from sensorgen.export.gcode.drags import Lifting
+from sensorgen.export.gcode.report import Report
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
-from sensorgen.export.slicing import Step, alone, sliced
+from sensorgen.export.slicing import Step
+from sensorgen.prediction.slices import SliceReport, combined, estimated, slice_now
 from sensorgen.workflows import compensation
 from sensorgen.workflows.compensation import Change
-from sensorgen.workflows.reviewed import reviewed
-
-
-@dataclass(frozen=True)
-class Slicer:
-    """Name and version of a slicer."""
-
-    name: str
-    version: str
-
-
-@dataclass(frozen=True)
-class Volumes:
-    """Printed over exact volume per body and layer, and findings of rule 7 and of the slicer's profile."""
-
-    layers: tuple[Row, ...]
-    findings: tuple[Finding, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Printed(Checked):
-    """G-code of a design, as in the JSON beside it; without run times, so that equal slicing gives equal bytes.
+class Printed(SliceReport):
+    """G-code of a design, as in the JSON beside it.
 
     Attributes
     ----------
-    name, design : str
-        Name and identity of the design.
-    gcode, sha256 : str
-        The file for the printer, and its SHA-256.
-    refused : bool
-        Whether the check of the G-code found errors.
-    slicer : Slicer
-        Who sliced it.
-    sensorgen, printer, quality : str
-        Version of sensorgen; the printer and the quality.
-    design_findings : tuple of Finding
-        What the checks of the design found.
-    printed : Volumes
-        Volumes as printed.
-    lifting : Lifting
-        Travel over other tools' material before and after lifts.
+    gcode : str
+        The file for the printer.
+    verdict : str
+        CHANGE where a finding is an error, PRINT WITH WARNINGS, or PRINT.
+    all_findings : tuple of Finding
+        About drawing, file and print, as every command lists them.
     compensated : tuple of Change
         How the design differs from the one that was asked for.
     """
 
-    name: str
-    design: str
     gcode: str
-    refused: bool
-    sha256: str
-    slicer: Slicer
-    sensorgen: str
-    printer: str
-    quality: str
-    design_findings: tuple[Finding, ...]
-    printed: Volumes
-    lifting: Lifting
+    verdict: Verdict
+    all_findings: tuple[Finding, ...]
     compensated: tuple[Change, ...] = ()
 
-    @property
-    def lost(self) -> bool:
-        """Whether a body is missing from a layer against the will of the design."""
-        return any(f.severity == "error" and not f.waiver for f in self.printed.findings)
-
     def document(self) -> Iterator[Part]:
-        """Findings about design, file and print, and what the file takes."""
+        """Verdict, findings about design, file and print, and what the file takes."""
         yield from compensation.document(self.compensated)
-        yield f"{self.name}, drawn: {counted(counts(self.design_findings))} (sensorgen check shows them)"
-        yield from super().document()
+        yield headline(self.name, self.all_findings, self.slicer.words)
+        yield from listed(self.all_findings)
+        yield from Report.document(self)
         yield volumes.table(self.printed.layers)
-        yield from listed(self.printed.findings)
         yield from self.lifting.document()
-        verdict = "refused; " if self.refused else ""
-        yield f"{self.gcode}: {verdict}{self.slicer.name} {self.slicer.version}; {counted(self.counts())}"
+        yield f"{self.gcode}: {'refused; ' * self.refused}{self.slicer.name} {self.slicer.version}"
 
 
 def slice_design(
@@ -150,38 +103,25 @@ def slice_design(
         The place cannot be written to, or the disk is full.
     """
     step("checks")
-    held = reviewed(design, walls=rule(slicer, design.walls) if slicer in SLICERS else "")
-    if held.errors(strict) and not force:
+    drawn = review(design, walls=rule(slicer, design.walls) if slicer in SLICERS else "")
+    if drawn.errors(strict) and not force:
+        held = estimated(design, drawn)
         raise Unprintable(held.findings, held.errors(strict))
-    with tempfile.TemporaryDirectory() as stage:
-        made = sliced([alone(design)], slicer, Path(stage), program=program, time_limit_s=time_limit_s, step=step)
-        content = made.ready.read_bytes()
-    machine, loaded = design.machine, {design.tool(name): name for name in design.used()}
-    printed = nominal(design, made.lines, f"{made.slicer} {made.version}")
-    checked = check_motion(made.lifted.motion, machine, loaded, others_empty=True, texts=design.own).with_more(
-        agreement.check(
-            design, made.lines, made.lifted.motion.changes, machine.bed_centre_mm(), alone=True, lines=printed.lines
-        )
-    )
-    layers, findings = printed.rows, printed.findings()
-    if printed.lines and len(printed.lines.number):
-        films = pinholes.of_lines(design, printed.lines, widths=(1.0,), most_layers=pinholes.MOST_LAYERS)
-        findings += design.waived([*pinholes.findings(films)])
+    made = slice_now(design, slicer, program=program, time_limit_s=time_limit_s, strict=strict, step=step)
+    report = made.file.report
+    held = combined(design, drawn, report.slicer.words, report.of_print(), made.file)
+    page = ""
+    if made.printed.lines and len(made.printed.lines.number):
         travel = {"as sliced": made.lifted.before, "as written": made.lifted.after}
-        page = pages.of_print(printed, findings, {when: found.stretches() for when, found in travel.items()})
-    else:
-        page = ""
-    stopped, stem = bool(checked.errors(strict)), f"{design.name}.{slicer}"
+        page = pages.of_print(made.printed, held.findings, {when: found.stretches() for when, found in travel.items()})
+    stem = f"{design.name}.{slicer}"
     passed, refused = (f"{stem}.gcode", f"{stem}.gcode.json"), (f"{stem}.refused.gcode", f"{stem}.refused.json")
-    names, others = (refused, passed) if stopped else (passed, refused)
+    names, others = (refused, passed) if report.refused else (passed, refused)
     result = Printed(
-        **vars(checked), name=design.name, design=design.id(), gcode=names[0], refused=stopped,
-        sha256=sha256(content).hexdigest(), slicer=Slicer(made.slicer, made.version), sensorgen=__version__,
-        printer=design.machine.name, quality=design.layers.name, design_findings=tuple(held.sliced().findings),
-        printed=Volumes(tuple(layers), (*made.findings, *findings)), lifting=made.lifted.lifting,
+        **vars(report), gcode=names[0], verdict=held.verdict, all_findings=tuple(held.findings),
         compensated=tuple(compensated),
     )  # fmt: skip
-    return _written(result, out / design.name, content, page, others)
+    return _written(result, out / design.name, made.file.content, page, others)
 
 
 def _written(result: Printed, folder: Path, content: bytes, page: str, others: tuple[str, ...]) -> Printed:

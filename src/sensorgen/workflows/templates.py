@@ -17,7 +17,7 @@ KINDS: dict[What, Kind | None] = {
 }  # fmt: skip
 _NEXT: dict[What, str] = {
     "material": "replace its numbers; then sensorgen pack test {file}, and --material electrode={name} in any command",
-    "shape": "change it; then sensorgen pack test {file}, and sensorgen check {name}",
+    "shape": "change it; then sensorgen pack trust {file}, sensorgen pack test {file}, and sensorgen check {name}",
     "printer": "replace its numbers; then sensorgen pack test {file}, and --printer {name} in any command",
     "quality": "replace its numbers; then sensorgen pack test {file}, and --quality {name} in any command",
     "instrument": "replace its numbers; then sensorgen pack test {file}",

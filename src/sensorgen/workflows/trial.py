@@ -1,29 +1,21 @@
 """One design tried: findings, verdict, and the numbers that decide, drawn beside printed."""
 
-import json
-import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
-from sensorgen.checks.review import review
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.findings import Finding, Verdict, counted, counts, listed, most_severe, verdict
 from sensorgen.core.units import M_PER_MM
-from sensorgen.design.body import Body
 from sensorgen.design.design import Design
-from sensorgen.design.walls import rule
-from sensorgen.export.slicers import SLICERS
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import DEFAULT, Query
 from sensorgen.prediction.results import Prediction, on_bench, resolved
-
-if TYPE_CHECKING:
-    from sensorgen.export.gcode.drags import OfTool
+from sensorgen.prediction.slices import PrintReview, SliceReport, reviewed
 
 
 @dataclass(frozen=True)
@@ -48,6 +40,8 @@ class Numbers:
         Median of the standard errors over all forces and positions [N], [m].
     conditional : bool
         Whether they rest on values that no source gives.
+    by_top : str
+        Standard errors after known presses under each top, in words; "" where the top makes no difference.
     """
 
     gap: Bounds | None = None
@@ -62,24 +56,29 @@ class Numbers:
     force_typical: float | None = None
     position_typical: float | None = None
     conditional: bool = False
+    by_top: str = ""
 
     @classmethod
     def of(cls, found: Prediction) -> "Numbers":
-        """The numbers of a prediction, under the worse top where they depend on it."""
-        known = found.identifiability
-        bench = known.calibrated if known else None
+        """The numbers of a prediction, under the worst top where they depend on it."""
+        tops = found.under()
 
         def worst(key: str) -> Bounds | None:
-            values: list[Bounds] = [b for top in found.tops or (found,) if (b := getattr(top, key))]
+            values: list[Bounds] = [b for top in tops if (b := getattr(top, key))]
             sign = 1 if key == "sensitivity" else -1
             return min(values, key=lambda b: sign * b.value, default=None)
 
+        def largest(key: str, part: str) -> float | None:
+            values = [getattr(errors, part) for top in tops if (errors := getattr(top, key))]
+            return max((v for v in values if v is not None), default=None)
+
+        force, place = "sigma_force_n", "sigma_position_m"
         return cls(
             found.gap, found.capacitance, found.resistance.get("top"), found.resistance.get("bottom"),
             worst("sensitivity"), worst("force_resolution"), worst("position_resolution"),
-            bench.sigma_force_n if bench else None, bench.sigma_position_m if bench else None,
-            known.map.of_force.median if known else None, known.map.of_position.median if known else None,
-            found.conditional,
+            largest("calibrated", force), largest("calibrated", place),
+            largest("typical", force), largest("typical", place),
+            found.conditional, "; ".join(top.words() for top in found.tops),
         )  # fmt: skip
 
     def bench(self) -> tuple[Bounds | None, Bounds | None]:
@@ -115,11 +114,12 @@ class Toolpath:
     crossings: int
 
     @classmethod
-    def of(cls, source: str, time_s: float, tools: "Iterable[OfTool]") -> "Toolpath":
+    def of(cls, made: SliceReport) -> "Toolpath":
         """By what each tool passes over."""
-        each = tuple(tools)
-        touching = sum(tool.contact_mm + tool.rubbing_mm for tool in each)
-        return cls(source, time_s, touching, sum(tool.crossings for tool in each))
+        tools = made.lifting.after.tools
+        touching = sum(tool.contact_mm + tool.rubbing_mm for tool in tools)
+        source = f"{made.slicer.name} {made.slicer.version}"
+        return cls(source, made.time_s, touching, sum(tool.crossings for tool in tools))
 
 
 @dataclass(frozen=True)
@@ -209,7 +209,7 @@ class Trial(Displayed):
 
 def trial(
     design: Design, query: Query = DEFAULT, *, folder: Path | None = None, slicer: str = "", keep: bool = True,
-    drawn: bool = True,
+    drawn: bool = True, held: PrintReview | None = None,
 ) -> Trial:  # fmt: skip
     """Check a design, and predict its drawing and its print.
 
@@ -219,14 +219,14 @@ def trial(
         What is tried.
     query : Query
         Reference load, tip, frequencies, range of the sensitivity.
-    folder : Path, optional
-        With the design's files: the print is that of its G-code there, else estimated; ``out/NAME`` if not given.
-    slicer : str
-        Slice now, by ``prusa`` or ``cura``; "" for what ``folder`` has.
+    folder, slicer : Path, str
+        As of :func:`sensorgen.prediction.slices.reviewed`.
     keep : bool
         Read stored predictions and store new ones.
     drawn : bool
         Predict the drawing, too.
+    held : PrintReview, optional
+        Findings about the print, if they are known.
 
     Raises
     ------
@@ -239,52 +239,14 @@ def trial(
     >>> tried.verdict, tried.printed.capacitance.unit
     ('PRINT', 'F')
     """
-    walls = rule(slicer, design.walls) if slicer in SLICERS else ""
-    held = review(design, walls=walls)
-    path: Toolpath | None
-    if slicer:
-        body, path, of_print = _sliced(design, slicer)
-        found = [*held.sliced().findings, *of_print]
-    else:
-        (body, path), found = _at_hand(design, folder), held.findings
+    held = held or reviewed(design, slicer=slicer, folder=folder)
+    body = bodies.of_file(design, held.file)
     predicted = evaluate(body, query, keep=keep, beside=drawn)
-    findings = tuple(f for f in predicted.with_short(found) if not f.waiver)
+    findings = tuple(f for f in held.findings if not f.waiver)
     assumed = predicted.budget.by_press()[:1] if predicted.budget else ()
     return Trial(
         design.name, design.id(), body.provenance, predicted.status, predicted.reason, verdict(findings), findings,
         predicted.force_n, predicted.position_m, design.params.length_mm * M_PER_MM,
-        Numbers.of(predicted.drawn) if predicted.drawn else Numbers(), Numbers.of(predicted), predicted.doubts, path,
-        "".join(term.words() for term in assumed),
+        Numbers.of(predicted.drawn) if predicted.drawn else Numbers(), Numbers.of(predicted), predicted.doubts,
+        Toolpath.of(held.file.report) if held.file else None, "".join(term.words() for term in assumed),
     )  # fmt: skip
-
-
-def _at_hand(design: Design, folder: Path | None) -> tuple[Body, Toolpath | None]:
-    """The print by the G-code in a folder, with its record; else the estimate."""
-    body, file = bodies.default_body(design, folder), bodies.toolpath(design, folder)
-    if file is None:
-        return body, None
-    from sensorgen.export.gcode.drags import OfTool  # a build reads no G-code
-
-    made = json.loads(file.with_name(f"{file.name}.json").read_text("utf-8"))
-    try:
-        tools = [OfTool(**tool) for tool in made["lifting"]["after"]["tools"]]
-        source = f"{made['slicer']['name']} {made['slicer']['version']}"
-        return body, Toolpath.of(source, float(made["time_s"]), tools)
-    except (KeyError, TypeError, ValueError):  # of an older version
-        return body, None
-
-
-def _sliced(design: Design, slicer: str) -> tuple[Body, Toolpath, list[Finding]]:
-    """The print by a real slicer, as ``sensorgen slice`` makes it, and the findings about it."""
-    from sensorgen.asprinted.printed import body
-    from sensorgen.export import slicing
-    from sensorgen.export.gcode.report import report
-
-    with tempfile.TemporaryDirectory() as stage:
-        made = slicing.sliced([slicing.alone(design)], slicer, Path(stage))
-        content = made.ready.read_bytes()
-    source = f"{made.slicer} {made.version}"
-    print_ = body(design, made.lines, slicer=source)
-    time_s = report(made.lifted.motion, design.machine).time_s
-    path = Toolpath.of(source, time_s, made.lifted.lifting.after.tools)
-    return bodies.sliced(design, lambda: print_, source, content), path, [*made.findings, *print_.findings()]

@@ -13,7 +13,7 @@ from sensorgen.asprinted.printed import Printed
 from sensorgen.checks.review import Review, draw
 from sensorgen.core import document
 from sensorgen.core.document import Part
-from sensorgen.core.findings import SEVERITIES, Finding, grouped
+from sensorgen.core.findings import SEVERITIES, Finding, headline
 from sensorgen.prediction.identifiability.results import metres, newtons
 from sensorgen.prediction.results import Changes, Prediction, Term
 from sensorgen.scene.scene import SLIVER_MM
@@ -41,7 +41,7 @@ class Listed:
 
 
 def page(
-    printed: Printed, held: Review, predicted: Prediction, verdict: str, numbers: Iterable[Part],
+    printed: Printed, held: Review, predicted: Prediction, numbers: Iterable[Part],
     advice: Iterable[Part] = (),
 ) -> str:  # fmt: skip
     """The page as HTML that needs nothing else.
@@ -54,8 +54,6 @@ def page(
         Findings about the design.
     predicted : Prediction
         Of the print.
-    verdict : str
-        PRINT, PRINT WITH WARNINGS or CHANGE.
     numbers : iterable of Part
         The numbers that decide, drawn beside printed.
     advice : iterable of Part
@@ -63,7 +61,7 @@ def page(
     """
     design, scene = printed.design, printed.design.printed
     shown = tuple(_bodies(printed))
-    listed = [_placed(f, printed) for f in grouped(held.findings)]
+    listed = [_placed(f, printed) for f in held.findings]
     names = [body.name for body in scene.bodies]
     data = geometry.packed(
         {
@@ -76,7 +74,8 @@ def page(
     )
     sheet = draw(design, held, printed.scene, printed.provenance)
     return render(
-        "sensorgen.analysis.preview", "preview.html", title=design.name, verdict=verdict, bodies=shown,
+        "sensorgen.analysis.preview", "preview.html", headline=headline(design.name, held.findings, held.source),
+        title=design.name, verdict=held.verdict, bodies=shown,
         provenance=printed.provenance, printer=f"{design.machine.name}, {design.layers.name}",
         size=" × ".join(f"{side:g}" for side in scene.size_mm), layers=len(printed.first),
         sections=geometry.figures(scene, printed.scene, names, design.layers.boundaries_mm(scene.size_mm[2])),

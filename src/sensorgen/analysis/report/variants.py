@@ -7,12 +7,13 @@ from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, Body, Curve, Figure, Panel
-from sensorgen.checks.review import draw, review
+from sensorgen.checks.review import draw
 from sensorgen.core.document import Column, Table
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.prediction.identifiability.results import Identifiability
 from sensorgen.prediction.query import FORCE_N
+from sensorgen.prediction.slices import reviewed
 from sensorgen.scene.geometry.meshes import mesh
 
 _STRETCH = (1.0, 1.0, 10.0)
@@ -61,7 +62,7 @@ def variants(found: Comparison) -> tuple[Variant, ...]:
             f"capacitance {c.lower / _F_PER_PF:.4g} to {c.upper / _F_PER_PF:.4g} pF" if c
             else f"no capacitance: {of.reason}", of.provenance,
         )  # fmt: skip
-        made.append(Variant(name, design.id(), draw(design, review(design)), "; ".join(words)))
+        made.append(Variant(name, design.id(), draw(design, reviewed(design)), "; ".join(words)))
     return tuple(made)
 
 

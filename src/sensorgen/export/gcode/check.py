@@ -11,7 +11,7 @@ from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import commands, limits
 from sensorgen.export.gcode.files import Source
 from sensorgen.export.gcode.found import Found, merged
-from sensorgen.export.gcode.motion import follow
+from sensorgen.export.gcode.motion import executed
 from sensorgen.export.gcode.moves import Motion
 from sensorgen.export.gcode.report import Report, report
 
@@ -98,7 +98,7 @@ def check(
     >>> found[0].rule, found[0].line, found[0].message
     ('tool', 4, 'tool 9 gets a temperature; diabase-h5 has 1, 2, 3, 4, 5')
     """
-    return check_motion(follow(source, machine.control.prime_macro), machine, loaded, others_empty=others_empty)
+    return check_motion(executed(source, machine), machine, loaded, others_empty=others_empty)
 
 
 def check_motion(

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sensorgen.design.materials import Material
 from sensorgen.design.printer import Printer
-from sensorgen.export.gcode import allowed
+from sensorgen.export.gcode import allowed, macros
 from sensorgen.export.gcode.found import Findings, Found
 from sensorgen.export.gcode.heat import Heaters
 from sensorgen.export.gcode.moves import NO_TOOL, Change, Event, Motion
@@ -52,7 +52,7 @@ class _Simulation:
         start = machine.tool_at_start()
         self.tool = NO_TOOL if start is None else start
         self.last: Change | None = None
-        self.heaters = Heaters(machine, loaded, self.found)
+        self.heaters, self.turning = Heaters(machine, loaded, self.found), macros.of_change(machine)
         self.homed: set[str] = set()
         self.levelled = not self.control.levels
         self.relative, self.absolute_e = False, True
@@ -71,7 +71,7 @@ class _Simulation:
         if line := self._first(self.lines, first, row):
             self.heaters.check_printing(self.tool, line)
         if moved and self.homed != set(AXES):
-            self.found.warning("home", moved, "a move comes before all axes are homed", "home first")
+            self._not_homed("a move comes", moved)
         if moved and self.ended:
             self.found.warning("end", moved, f"moves after {self.ended} are never reached", "remove them")
 
@@ -94,9 +94,6 @@ class _Simulation:
 
     def _printing(self, number: int) -> None:
         error = self.found.error
-        if self.homed != set(AXES):
-            advice = f"home first ({' or '.join(self.control.homes)})"
-            error("home", number, "the file prints before all axes are homed", advice)
         if not self.levelled:
             advice = f"level first ({' or '.join(self.control.levels)})"
             error("level", number, "the file prints before the bed is levelled", advice)
@@ -106,6 +103,10 @@ class _Simulation:
             message = f"lines after {self.ended} are never printed: it ends the print"
             error("end", number, message, "end the print after its last line")
 
+    def _not_homed(self, what: str, number: int) -> None:
+        homes = " or ".join(self.control.homes)
+        self.found.error("home", number, f"{what} before all axes are homed", f"home first ({homes})")
+
     def obey(self, event: Event) -> None:
         """Follow one command."""
         code = event.command.code
@@ -114,7 +115,7 @@ class _Simulation:
             self._take(change)
         if code in self.control.homes:
             self.homed |= {axis for axis in AXES if event.command.has(axis) or not event.command.has(AXES)}
-        self.levelled |= code in self.control.levels
+        self._level(event)
         if code in self.control.ends and not self.ended:
             self.ended, self.end_line = str(event.command), event.number
         if code in PAUSES:
@@ -124,11 +125,17 @@ class _Simulation:
         self._modes(event)
         self._machine(event)
 
+    def _level(self, event: Event) -> None:
+        code = event.command.code
+        if code in self.control.levels and self.homed != set(AXES):
+            self._not_homed(f"{code} probes the bed", event.number)
+        self.levelled |= code in self.control.levels
+
     def _take(self, change: Change) -> None:
         if change.tool != NO_TOOL:
             self.heaters.check_tool(change.number, change.tool, "is taken")
         last, self.last, self.tool = self.last, change, change.tool
-        self.heaters.take(change.tool, waits=change.macro)
+        self.heaters.take(change.tool, waits=change.macro or bool(self.turning and self.turning.waits))
         twice = last and (last.tool, last.macro) == (change.tool, not change.macro) and last.number != change.number
         if last and twice and not self._first(self.prints, last.row, change.row):
             message = f"tool {change.tool} is taken twice, by T and by its macro: the macro takes it itself"

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sensorgen.design.materials import Material
 from sensorgen.design.printer import Printer
+from sensorgen.export.gcode import macros
 from sensorgen.export.gcode.found import Found
 from sensorgen.export.gcode.moves import NO_TOOL, Motion
 
@@ -143,11 +144,13 @@ def _speed(motion: Motion, machine: Printer) -> Iterator[Found]:
     way = np.hypot(across, up)
     rate = feed / np.where(way > 0, way, np.maximum(filament, 1e-12))
     limits = machine.max_speed_mm_s
+    down = motion.z_stated & ~np.append(True, motion.z_stated[:-1])  # from where macros have left the nozzle
+    down |= motion.start_mm[:, 2] != np.append(0.0, motion.end_mm[:-1, 2])
     prints = (motion.extruded_mm > 0) & (across > 0)  # filament that is pushed with Z alone makes good for a retraction
     axes = (("X and Y", across, limits.xy), ("Z", up, limits.z), ("E", filament, limits.extruder))
     for name, length, limit in axes:
         fast = rate * length
-        over = fast > limit * (1 + 1e-6)
+        over = (fast > limit * (1 + 1e-6)) & ~((name == "Z") & down)
         for rows, severity, what, then in (
             (over & prints, "error", "a line is printed", "it was sliced for another speed"),
             (over & ~prints, "warning", "a move without printing goes", "the firmware slows it down"),
@@ -186,6 +189,19 @@ def _purge(motion: Motion, machine: Printer) -> Iterator[Found]:
         yield from _found(motion, wrong, "purge", "error", message, advice)
 
 
+def _z_stated(motion: Motion, machine: Printer) -> Iterator[Found]:
+    """Z is stated after a change of tool before a line is printed, where the printer's macros leave it elsewhere."""
+    change = macros.of_change(machine)
+    if change is None or (change.offset_mm[2] == 0 and math.isnan(change.place_mm[2])):
+        return
+    where = f"{change.offset_mm[2]:g} mm above" if math.isnan(change.place_mm[2]) else f"at {change.place_mm[2]:g} mm"
+    yield from _found(
+        motion, (motion.extruded_mm > 0) & (motion.across_mm > 0) & ~motion.z_stated, "z", "error",
+        f"lines are printed after a tool change before Z is stated; the macros of {machine.name} leave the nozzle "
+        f"{where}", "state Z (G1 Z) after each T",
+    )  # fmt: skip
+
+
 def _read(motion: Motion, _: Printer) -> Iterator[Found]:
     """Every line can be read."""
     for severe, advice in ((True, "correct the line"), (False, "keep to plain ASCII and plain commands")):
@@ -199,5 +215,5 @@ def _read(motion: Motion, _: Printer) -> Iterator[Found]:
 
 
 RULES: tuple[Callable[[Motion, Printer], Iterator[Found]], ...] = (
-    _reach, _bed, _below, _speed, _purge, _read,
+    _reach, _bed, _below, _speed, _purge, _z_stated, _read,
 )  # fmt: skip

@@ -4,17 +4,20 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from sensorgen.design.printer import Printer
+from sensorgen.export.gcode import macros
 from sensorgen.export.gcode.arcs import Arcs, centres_of_radius
 from sensorgen.export.gcode.columns import WORDS, Floats, Ints, Mask
 from sensorgen.export.gcode.files import Source, text_of
+from sensorgen.export.gcode.macros import Effect
 from sensorgen.export.gcode.moves import NO_TOOL, Change, Event, Fault, Motion, Track
-from sensorgen.export.gcode.reading import PLACE, SHIFT, Holding, Reading
+from sensorgen.export.gcode.reading import OFFSET, PLACE, SHIFT, Holding, Reading
 
 DEFAULT_FEED_MM_MIN = 3000.0  # RepRapFirmware's, until a line says another
 MOST_MM = 1e9  # beyond this a number is a slip, and differences of it are noise
 
 
-def follow(source: Source, prime_macro: str = "") -> Motion:
+def follow(source: Source, prime_macro: str = "", change: Effect | None = None) -> Motion:
     """Follow a file; places and filament count as absolute until it says otherwise, as firmwares start.
 
     Parameters
@@ -23,6 +26,8 @@ def follow(source: Source, prime_macro: str = "") -> Motion:
         The G-code; see :func:`sensorgen.export.gcode.files.text_of`.
     prime_macro : str
         Macro that changes tools, as ``tprime{tool}.g``; "" if the printer has none.
+    change : Effect, optional
+        Of the firmware's macros at a change of tool, which are executed.
 
     Raises
     ------
@@ -35,7 +40,12 @@ def follow(source: Source, prime_macro: str = "") -> Motion:
     >>> motion.extruded_mm.tolist(), motion.length_mm.tolist(), motion.kinds
     ([0.0, 0.0, 0.0, 0.5], [5.0, 0.0, 0.0, 4.0], ('', 'perimeter'))
     """
-    return _Steps(Reading(text_of(source), prime_macro)).motion()
+    return _Steps(Reading(text_of(source), prime_macro, change)).motion()
+
+
+def executed(source: Source, machine: Printer) -> Motion:
+    """Follow a file as a printer does, its own macros included."""
+    return follow(source, machine.control.prime_macro, macros.of_change(machine))
 
 
 class _Steps:
@@ -45,10 +55,11 @@ class _Steps:
         self.said = said
         self.place, table = said.table()
         self.code = table[:, 0]
-        self.moves = self.code != PLACE
+        self.moves = self.code < PLACE
         numbers = table[:, 1:]
         numbers *= self._held(said.scale, 1.0)[:, None]
         self.words = dict(zip(WORDS, np.clip(numbers, -MOST_MM, MOST_MM, out=numbers).T, strict=True))
+        self.sets = ((self._held(said.relative, 0.0) == 0) | ~self.moves) & (self.code != OFFSET)
 
     def motion(self) -> Motion:
         """The file as moves in columns."""
@@ -76,16 +87,15 @@ class _Steps:
             tuple(said.kinds), self._track(said.kind),
             self._track(said.width_mm), self._track(said.height_mm), self._track(said.layer),
             self._track(said.absolute_e), sorted([*said.faults, *faults, *wrong], key=lambda fault: fault.number),
-            said.lines, said.maker,
+            said.lines, said.maker, self._z_stated(),
         )  # fmt: skip
 
     def _columns(self) -> Iterator[Floats]:
         """Columns of ``Motion.rows``, for each step; one by one, since a million moves take room."""
-        sets = (self._held(self.said.relative, 0.0) == 0) | ~self.moves
         for axis in "XYZ":
-            yield _before(_state(self.words[axis], sets))
+            yield _before(_state(self.words[axis], self.sets))
         for axis in "XYZ":
-            yield _state(self.words[axis], sets)
+            yield _state(self.words[axis], self.sets)
         given, absolute = self.words["E"], self._held(self.said.absolute_e, 1.0) > 0
         at = _state(given, absolute | ~self.moves)
         filament = np.where(self.moves & ~np.isnan(given), np.where(absolute, at - _before(at), given), 0.0)
@@ -94,6 +104,13 @@ class _Steps:
         last = _last(~np.isnan(self.words["F"]))
         yield np.where(last < 0, DEFAULT_FEED_MM_MIN, self.words["F"][last])
         yield (self.place >> SHIFT).astype(np.float64)
+
+    def _z_stated(self) -> Mask:
+        """Z has been stated since the last change of tool, for each move."""
+        turned = np.zeros(len(self.place) + 1, bool)
+        turned[np.searchsorted(self.place, np.array(self.said.turns, np.int64))] = True
+        stated = _last(self.sets & ~np.isnan(self.words["Z"]))
+        return np.asarray(stated >= _last(turned[:-1]))[self.moves]
 
     def _held(self, holding: Holding, before: float) -> Floats:
         """What holds for each step."""
@@ -139,7 +156,7 @@ def _state(given: Floats, sets: Mask) -> Floats:
     """Where an axis is after each step, which sets it to what is given or moves it by that; 0 at the start."""
     by = np.where(np.isnan(given) | sets, 0.0, given).cumsum()
     last = _last(sets & ~np.isnan(given))
-    return np.asarray(np.where(last < 0, 0.0, given[last] - by[last]) + by)
+    return np.asarray(np.where(last < 0, by, given[last] + (by - by[last])))
 
 
 def _before(state: Floats) -> Floats:

@@ -89,6 +89,8 @@ class Motion:
         How many lines the file has.
     maker : str
         Slicer that names itself at the top, where that tells something; else "".
+    z_stated : (n,) bool array
+        Z has been stated since the last change of tool, by the move itself or before it.
     """
 
     rows: Floats
@@ -106,6 +108,7 @@ class Motion:
     faults: Sequence[Fault]
     lines: int
     maker: str
+    z_stated: NDArray[np.bool_]
 
     @property
     def start_mm(self) -> Floats:

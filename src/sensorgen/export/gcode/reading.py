@@ -6,18 +6,21 @@ places sort as the file runs.
 
 import re
 from array import array
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
 
 from sensorgen.export.gcode import columns, remarks, words
 from sensorgen.export.gcode.columns import Floats, Ints
+from sensorgen.export.gcode.macros import Effect
 from sensorgen.export.gcode.moves import NO_TOOL, Fault
 from sensorgen.export.gcode.words import Command
 
 INCH_MM = 25.4
 SHIFT = 12  # bits of a place below the line's number: no line has so many commands
 PLACE = 92.0  # code of a row that says where the nozzle is, as G92 does
+OFFSET = 93.0  # code of a row that says how far macros have taken it
 MOST_FAULTS = 10_000  # enough to know that a file is none
 _PIECE = 1 << 20  # bytes that are read at once
 _TOOL = re.compile("-?[0-9]{1,6}")
@@ -49,6 +52,8 @@ class Reading:
         Places of moves with other words than ``columns.WORDS``, as those of further axes, and the moves.
     changes : list of (int, int, bool)
         Place, tool and whether a macro takes it.
+    turns : list of int
+        Places at which the firmware runs its macros of a change.
     faults : list of Fault
         What could not be read.
     scale, relative, absolute_e, level : Holding
@@ -63,11 +68,12 @@ class Reading:
         How many lines there are.
     """
 
-    def __init__(self, text: bytes, prime_macro: str = "") -> None:
-        """Read a text, each line of which ends with a line feed; ``prime_macro`` as for ``follow``."""
+    def __init__(self, text: bytes, prime_macro: str = "", change: Effect | None = None) -> None:
+        """Read a text, each line of which ends with a line feed; the rest as for ``follow``."""
         self.events: list[tuple[int, Command]] = []
         self.odd: list[tuple[int, Command]] = []
         self.changes: list[tuple[int, int, bool]] = []
+        self.turns: list[int] = []
         self.faults: list[Fault] = []
         self.scale, self.relative, self.absolute_e, self.level = Holding(), Holding(), Holding(), Holding()
         self.tools, self.kind, self.width_mm, self.height_mm, self.layer = (Holding() for _ in range(5))
@@ -76,6 +82,7 @@ class Reading:
         self.lines = 0
         head, _, tail = prime_macro.partition("{tool}")
         self._macro = re.compile(f"{re.escape(head)}([0-9]+){re.escape(tail)}") if prime_macro else None
+        self._change = change
         self._places: list[Ints] = []
         self._rows: list[Floats] = []
         self._own_places, self._own_rows = array("q"), array("d")
@@ -173,9 +180,12 @@ class Reading:
             numbers = [0.0 if not command.has("XYZ") or command.has(letter) else np.nan for letter in "XYZ"]
         else:
             return
+        self._row(place, float(command.code[1:]) if command.code in _MOVES else PLACE, numbers)
+
+    def _row(self, place: int, code: float, numbers: Sequence[float]) -> None:
         self._own_places.append(place)
-        self._own_rows.append(float(command.code[1:]) if command.code in _MOVES else PLACE)
-        self._own_rows.extend(numbers + [np.nan] * (len(columns.WORDS) - len(numbers)))
+        self._own_rows.append(code)
+        self._own_rows.extend([*numbers, *[np.nan] * (len(columns.WORDS) - len(numbers))])
 
     def _number(self, command: Command, letter: str, place: int) -> float:
         """Number of a word; nan without the word, or where it has none."""
@@ -192,7 +202,14 @@ class Reading:
         if not _TOOL.fullmatch(digits):
             self._fault(place, f"T{digits[:20]} is no tool")
             return
-        tool = max(int(digits), NO_TOOL)
+        tool, before = max(int(digits), NO_TOOL), self.tools.values[-1] if self.tools.values else NO_TOOL
+        if macro or tool != before:  # the firmware ignores a tool that is in hand
+            self.turns.append(place)
+            if self._change:
+                self._row(place, OFFSET, self._change.offset_mm)
+                self._row(place, PLACE, self._change.place_mm)
+                if self._change.relative is not None:
+                    self.relative.put(place, float(self._change.relative))
         self.tools.put(place, tool)
         self.changes.append((place, tool, macro))
 

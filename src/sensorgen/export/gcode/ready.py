@@ -9,6 +9,7 @@ comments, moves and everything else stay as they are. What changes is the printe
 - the fan on the part gets its number;
 - after a tool is taken, the file waits for its temperature, and ``M290`` sets its height where tools differ;
 - the tool that comes next is heated some seconds before;
+- Z is stated after a tool is taken, before it pushes filament: macros may leave the nozzle at another height;
 - the first tool is taken once the axes are homed, and all are switched off after the last line;
 - commands after the printer's last one are never reached and go.
 """
@@ -71,10 +72,10 @@ def ready(text: bytes, motion: Motion, machine: Printer) -> Iterator[bytes]:
     writer, moves = _Writer(machine), np.unique(motion.number)
     starts = np.flatnonzero(np.frombuffer(b"\n" + text, np.uint8) == ord("\n")).tolist()  # of each line, and the end
     commands = {event.number for event in motion.events}
-    before, end = (
-        dict(_preheats(motion, machine)),
-        int(motion.number[moved].max(initial=0)),
-    )  # the last to move filament
+    before = dict(_preheats(motion, machine))
+    for number, lines in _heights(text, motion, machine):
+        before[number] = [*before.get(number, ()), *lines]
+    end = int(motion.number[moved].max(initial=0))  # the last to move filament
     done = 0  # lines
     for number in sorted({*commands, *before, end, len(starts)} - {0}):
         place = int(np.searchsorted(moves, done, side="right"))
@@ -109,6 +110,20 @@ def _preheats(motion: Motion, machine: Printer) -> Iterator[tuple[int, list[str]
         row = int(np.searchsorted(clock, clock[change.row] - machine.control.preheat_s))
         row = min(max(row, last.row), change.row - 1)
         yield int(numbers[row]), [f"M568 P{_own(machine, change.tool)} A2\n"]
+
+
+def _heights(text: bytes, motion: Motion, machine: Printer) -> Iterator[tuple[int, list[str]]]:
+    """Lines to write before a line: Z after a change of tool, where the file pushes filament without stating it."""
+    known = motion.start_mm[:, 2] > 0  # a height that was never stated stays as the printer has it
+    wrong = np.flatnonzero((motion.filament_mm > 0) & ~motion.z_stated & known)
+    taken = np.searchsorted([change.row for change in motion.changes], wrong, side="right")
+    lines = text.split(b"\n") if len(wrong) else []
+    for row in wrong[np.flatnonzero(np.diff(taken, prepend=-1))].tolist():
+        number, feed = int(motion.number[row]), f"{motion.feed_mm_min[row]:g}"
+        keeps = b"F" in lines[number - 1].partition(b";")[0].upper()
+        feeds = [] if keeps else [f"G1 F{feed}\n"]
+        height = f"G1 Z{motion.start_mm[row, 2]:.4f}".rstrip("0").rstrip(".")
+        yield number, [f"{height} F{60 * machine.max_speed_mm_s.z:g}\n", *feeds]
 
 
 def _own(machine: Printer, index: float) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 from sensorgen.core.arrays import Mask
 from sensorgen.core.document import Part
 from sensorgen.core.units import M_PER_MM
-from sensorgen.prediction.calibration.inversion import Found, Verdict
+from sensorgen.prediction.calibration.inversion import WIDE, Found, Verdict
 from sensorgen.prediction.calibration.rest import STALE_S
 from sensorgen.prediction.inverse.answers import csv_cell, csv_row, number
 
@@ -62,6 +62,8 @@ class CalibratedInversion:
         How many have which status.
     force_limit_n : float
         Largest force that was looked for [N].
+    length_mm : float
+        Of the sensor; 0 where nothing was read [mm].
     median_force_width_n, median_position_width_mm : float or None
         Of the 90 % intervals [N], [mm].
     noise : float
@@ -76,6 +78,7 @@ class CalibratedInversion:
     at_rest: int
     statuses: dict[str, int]
     force_limit_n: float
+    length_mm: float
     median_force_width_n: float | None
     median_position_width_mm: float | None
     noise: float | None
@@ -90,6 +93,11 @@ class CalibratedInversion:
                 f"median widths of the 90 % intervals: {self.median_force_width_n:.3g} N, "
                 f"{self.median_position_width_mm:.3g} mm (noise {self.noise:.2g} of |Z|)"
             )
+            if (self.median_position_width_mm or 0.0) > WIDE * self.length_mm:
+                yield f"this sensor of {self.length_mm:g} mm does not tell positions of such presses: force alone"
+        yield from self._advice()
+
+    def _advice(self) -> Iterator[str]:
         if not self.calibrated_by:
             yield (
                 "not calibrated: the intervals hold all that a specimen of this design may differ in; some 30 known "
@@ -137,11 +145,11 @@ class Summary:
             ))  # fmt: skip
 
     def result(
-        self, of: str, by: int, limit_n: float, noise: float | None, notes: Sequence[str]
-    ) -> CalibratedInversion:
+        self, of: str, by: int, limit_n: float, length_m: float, noise: float | None, notes: Sequence[str]
+    ) -> CalibratedInversion:  # fmt: skip
         """The summary so far."""
-        widths = np.median(self._widths, axis=0).tolist() if self._widths else [None, None]
+        newtons, mm = np.median(self._widths, axis=0).tolist() if self._widths else (None, None)
         statuses = {v.words: self._statuses[v] for v in Verdict if self._statuses[v]}
         return CalibratedInversion(
-            of, by, self.samples, self.at_rest, statuses, limit_n, widths[0], widths[1], noise, tuple(notes)
+            of, by, self.samples, self.at_rest, statuses, limit_n, length_m / M_PER_MM, newtons, mm, noise, tuple(notes)
         )

@@ -20,7 +20,8 @@ from sensorgen.prediction.calibration.rest import STALE_S
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, parts
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
 from sensorgen.prediction.inverse.prior import Prior
-from sensorgen.prediction.inverse.verdict import chi2_limit
+from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
+from sensorgen.prediction.inverse.verdict import covariance as inverted
 
 LEVEL = 0.9  # probability of the intervals
 _COARSE = 20, 16  # forces and positions at which covariances are worked out
@@ -35,6 +36,8 @@ _BELOW_REST = 4.0  # standard deviations that noise exceeds in three readings of
 _DOUBTED = 200  # readings beside one below its rest, whose rest was probably read the same way
 _UNLIKE = 0.2  # share of the squared distance that another capacitance, of unknown place and size, may leave
 _PLACES = 7  # of a second press, along the sensor
+WIDE = 0.8  # share of the sensor above which an interval does not tell the position
+_LOCATES = 0.4  # share of the sensor below which an interval is expected to tell it
 
 
 class Verdict(IntEnum):
@@ -42,7 +45,7 @@ class Verdict(IntEnum):
 
     OK = 0
     FORCE_ONLY = 1
-    """The position's interval is most of the sensor."""
+    """The position's interval is most of the sensor, which locates other presses of this force."""
     AT_THE_END = 2
     """The force's interval ends at the largest force that was looked for."""
     NOT_CALIBRATED = 3
@@ -154,6 +157,7 @@ class Inverter:
         self._posterior, self._length = posterior, model.sensor.length_m
         coarse = np.linspace(0, 1, _COARSE[0]) ** 2 * force_limit_n, np.linspace(0, self._length, _COARSE[1])
         mean, covariance = readings(model, posterior, *coarse)
+        self._position_error_m = coarse[0], np.minimum(_position_errors(coarse, mean, covariance), self._length)
         self.force_n, self.position_m = _grid(coarse, mean, covariance)
         self._means, self._covariances = (
             _refined(coarse, (self.force_n, self.position_m), v) for v in (mean, covariance)
@@ -296,9 +300,10 @@ class Inverter:
         return self._tables[key]
 
     def _judged(self, found: Found, stale: Mask, changed: Mask) -> Found:
-        wide = np.ptp(found.position_90_m, axis=1) > 0.8 * self._length
+        expected = 2 * NORMAL_90 * np.interp(found.force_n, *self._position_error_m)
+        wide = np.ptp(found.position_90_m, axis=1) > WIDE * self._length
         rules = (
-            (Verdict.FORCE_ONLY, wide),
+            (Verdict.FORCE_ONLY, wide & (expected < _LOCATES * self._length)),
             (Verdict.AT_THE_END, found.force_90_n[:, 1] > self.force_n[-2]),
             (Verdict.NOT_CALIBRATED, np.full(len(wide), self._posterior.presses == 0)),
             (Verdict.STALE_REST, stale),
@@ -403,6 +408,15 @@ def readings(model: SpecimenModel, posterior: Posterior, force_n: Real, position
     own = covariances(model, posterior.at, data, components, vectors)
     shared = slopes @ posterior.covariance @ slopes.transpose(0, 2, 1)
     return parts(model.ratio(posterior.at, presses)), own + shared
+
+
+def _position_errors(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> Real:
+    """Standard error of the position at each force of a grid, the median over positions [m]."""
+    shape = len(coarse[0]), len(coarse[1])
+    slopes = [np.asarray(np.gradient(mean.reshape(*shape, -1), at, axis=k)) for k, at in enumerate(coarse)]
+    slope = np.stack(slopes, 2).reshape(len(mean), 2, -1)
+    fisher = slope @ np.linalg.solve(covariance, slope.transpose(0, 2, 1))
+    return np.asarray(np.median(np.sqrt(inverted(fisher)[:, 1, 1]).reshape(shape), axis=1))
 
 
 def _grid(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> tuple[Real, Real]:

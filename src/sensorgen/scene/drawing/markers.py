@@ -2,10 +2,10 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import cos, hypot, pi, sin
 
-from sensorgen.core.findings import SEVERITIES, Finding
+from sensorgen.core.findings import Finding, counted, counts, grouped
 from sensorgen.scene.drawing.panels import GUTTER, Panel, Room
 from sensorgen.scene.drawing.paper import element, fitted, line, spread, text, wrapped
 from sensorgen.scene.scene import AXES, Point
@@ -18,11 +18,10 @@ _NUMBER = re.compile(r"[0-9.]+")
 
 @dataclass(frozen=True)
 class Marked:
-    """A finding with its number on the page, and how many findings are merged in it."""
+    """A finding with its number on the page."""
 
     number: int
     finding: Finding
-    merged: int = 1
 
     @property
     def kind(self) -> str:
@@ -41,23 +40,8 @@ class Entry:
 
 
 def ranked(findings: Sequence[Finding]) -> list[Marked]:
-    """Findings numbered from the most severe to the least, waived ones last.
-
-    Those that differ in their numbers only, as of one body layer by layer, are one, with the number of their places.
-    """
-    alike: dict[tuple[str, ...], list[Finding]] = {}
-    for f in sorted(findings, key=lambda f: (bool(f.waiver), SEVERITIES.index(f.severity))):
-        message, advice = (_NUMBER.sub("#", words) for words in (f.message, f.advice))
-        alike.setdefault((f.rule, f.severity, f.body, f.waiver, message, advice), []).append(f)
-    found = []
-    for k, same in enumerate(alike.values(), start=1):
-        layers = [n for f in same for n in (f.layer, f.last_layer) if n is not None]
-        first, last = min(layers, default=None), max(layers, default=None)
-        whole = replace(
-            same[0], count=sum(f.count for f in same), layer=first, last_layer=None if last == first else last
-        )
-        found.append(Marked(k, whole if len(same) > 1 else same[0], len(same)))
-    return found
+    """Findings numbered from the most severe to the least, waived ones last; each sentence once."""
+    return [Marked(k, f) for k, f in enumerate(grouped(findings), start=1)]
 
 
 def height_mm(finding: Finding, boundaries_mm: Sequence[float]) -> float | None:
@@ -185,10 +169,9 @@ def placed(marked: Sequence[Marked], letters: Mapping[str, str], room: Room) -> 
 
 def listed(entries: Sequence[Entry], marked: Sequence[Marked], left: float, top: float, room: float) -> Iterator[str]:
     """The list of findings under its heading [mm on the page]."""
-    counts = [(sum(mark.merged for mark in marked if mark.kind == kind), kind) for kind in (*SEVERITIES, "waived")]
-    words = ", ".join(f"{n} {kind}{'s' if n > 1 and kind in ('error', 'warning') else ''}" for n, kind in counts if n)
+    words = counted(counts([mark.finding for mark in marked]))
     rest = f"; {len(marked) - len(entries)} not shown, see check.json" if len(entries) < len(marked) else ""
-    yield text("heading", left, top, fitted(f"Findings: {words or 'no findings'}{rest}", room, 3.2))
+    yield text("heading", left, top, fitted(f"Findings: {words}{rest}", room, 3.2))
     for entry in entries:
         yield _balloon(entry.mark, entry.x + RADIUS, entry.y + 0.6)
         for k, (kind, words) in enumerate(entry.rows):

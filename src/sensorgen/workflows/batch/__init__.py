@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from sensorgen.checks.review import Review, Step, lost
+from sensorgen.checks.review import Review, Step
 from sensorgen.core import files as store
-from sensorgen.core.document import Facts, Part
+from sensorgen.core.document import Part
 from sensorgen.core.errors import BadInput, OutOfRange, Unprintable
-from sensorgen.core.findings import Finding, counted, counts
+from sensorgen.core.findings import Finding, headline, verdict
 from sensorgen.core.parallel import remembered
 from sensorgen.design.design import Design
 from sensorgen.export import threemf
@@ -18,13 +18,13 @@ from sensorgen.export.slicers import TIME_LIMIT_S
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless
+from sensorgen.prediction.slices import reviewed
 from sensorgen.workflows.batch import picture, printing, record, sheet, tab
 from sensorgen.workflows.batch.layout import Plate, Room, Size, column, packed, room
 from sensorgen.workflows.batch.pieces import Piece, pieces, shuffled, texts, tools
 from sensorgen.workflows.batch.plan import Plan, load
 from sensorgen.workflows.batch.record import Record, ResolvedDesign, SlicedPlate
 from sensorgen.workflows.build import json_bytes, versions
-from sensorgen.workflows.reviewed import reviewed
 
 STEPS = ("plan", "checks", "predictions", "3MF", "slicing", "as printed", "record", "done")
 
@@ -72,22 +72,22 @@ class Batch:
     record : Record
         As in ``batch.json``.
     findings : dict of str to list of Finding
-        Findings about each design, by its name.
+        Findings about each design printed alone, by its name.
+    sources : dict of str to str
+        Their sources: slicer and version, or that a print is estimated, and why.
     """
 
     folder: Path
     record: Record
     findings: dict[str, list[Finding]]
+    sources: dict[str, str]
 
     def errors(self, *, force: bool = False) -> bool:
-        """Whether a file for the printer has errors, or, unless ``force``, a layer of a body is not printed at all.
-
-        Without G-code, by the checks' estimate.
-        """
+        """True where a file for the printer has errors, or, unless ``force``, a design is to be changed."""
         plates = self.record.slicers.values()
-        estimated = [] if plates else [bool(lost(found)) for found in self.findings.values()]
-        missing = any([*estimated, *(made.lost for plate in plates for made in plate.printed.values())])
-        return any(plate.errors() for plate in plates) or (missing and not force)
+        change = any(verdict(found) == "CHANGE" for found in self.findings.values())
+        missing = any(made.lost for plate in plates for made in plate.printed.values())
+        return any(plate.errors() for plate in plates) or ((change or missing) and not force)
 
     def to_json(self) -> str:
         """The folder, then the record."""
@@ -97,8 +97,7 @@ class Batch:
         """The record, the numbers of findings, and the folder."""
         yield from self.record.document()
         yield ""
-        yield "findings, as sensorgen check shows them"
-        yield Facts(tuple((f"  {name}", counted(counts(found))) for name, found in self.findings.items()))
+        yield from (headline(name, found, self.sources[name]) for name, found in self.findings.items())
         yield f"{self.folder}: {len(self.record.files) + 1} files"
 
 
@@ -191,7 +190,7 @@ def make(
     held = {key: reviewed(design) for key, design in found.designs.items()}
     _refuse_unprintable(found, held, force=force, strict=strict)
     step("predictions")
-    prints = [(bodies.estimated(design),) for design in found.designs.values()]
+    prints = [(bodies.of_file(design, held[key].file),) for key, design in found.designs.items()]
     known = dict(remembered(evaluate, prints, jobs, cluster=cluster))
     predicted = {key: timeless(known[k]) for k, key in enumerate(found.designs)}
     folder = out / found.plan.name
@@ -212,7 +211,8 @@ def make(
         store.write(stage, {record.RECORD: made.to_json().encode()})
         store.publish(stage, folder, record.RECORD)
     step("done")
-    return Batch(folder, made, {found.designs[key].name: held[key].findings for key in held})
+    named = {found.designs[key].name: of for key, of in held.items()}
+    return Batch(folder, made, {k: of.findings for k, of in named.items()}, {k: of.source for k, of in named.items()})
 
 
 def _refuse_unprintable(found: Arranged, held: Mapping[str, Review], *, force: bool, strict: bool) -> None:

@@ -108,7 +108,7 @@ def _refuse_strangers(designs: Sequence[Design]) -> None:
                 key = word.partition(" ")[0]
                 raise BadInput(
                     f"one plate, two of a kind: {word} {one} for {first.name} and {other} for {design.name}; "
-                    f"set '{key}' in the plan, or make two plans"
+                    f"give both the same {key}, or make two plans"
                 )
     tools(designs)
     texts(designs)

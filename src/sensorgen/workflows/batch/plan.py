@@ -90,8 +90,8 @@ class Plan(Strict):
     iteration: Annotated[int, Field(ge=0, le=9999)]
     seed: Annotated[int, Field(ge=0, le=2**53)] = 0
     designs: Annotated[tuple[Item, ...], Field(min_length=1, strict=False)]
-    printer: str = Field(default="", description="Printer of all designs; each design's own when not given.")
-    quality: str = Field(default="", description="Quality of all designs; each design's own when not given.")
+    printer: str = Field(default="", description="Printer of the designs whose files name none.")
+    quality: str = Field(default="", description="Quality of the designs whose files name none.")
     tools: dict[str, Annotated[int, Field(ge=0, le=99)]] = Field(
         default={}, description="Material to tool, in the printer's own numbers; goes before each design's."
     )
@@ -117,7 +117,7 @@ class Plan(Strict):
             It is unknown, or wrong.
         """
         data = item.data(folder)
-        over = {key: value for key in ("printer", "quality") if (value := getattr(self, key))}
+        over = {key: value for key in ("printer", "quality") if (value := getattr(self, key)) and not data.get(key)}
         if self.tools:
             over["tools"] = _over(data.get("tools", {}), self.tools)
         if any(data.get(key) != value for key, value in over.items()):

@@ -3,7 +3,6 @@
 import json
 from dataclasses import asdict, dataclass, replace
 from functools import cache as once
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from sensorgen.prediction.identifiability.fisher import bounds, slopes
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.prediction.sensor_model import build_sensor, piece, pressure_pa
+from sensorgen.prediction.slices import NONE
 from sensorgen.workflows.optimise.target import NUMBERS
 from sensorgen.workflows.trial import Numbers, Trial, trial
 
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 AT_REST = frozenset({"gap_mm", "capacitance_pf", "top_electrode_ohm", "bottom_electrode_ohm"})
 COARSE = AT_REST | {"force_resolution_n", "position_resolution_mm", "sensitivity_per_kpa"}
-_NO_FOLDER = Path("/dev/null")  # holds no G-code: the print is estimated
 _PA_PER_KPA = 1e3
 _TRIAL = 3  # version of the stored trials
 
@@ -140,7 +139,7 @@ def everything(design: Design, query: Query, slicer: str) -> Trial:
     question["waivers"] = [w.model_dump() for w in design.waivers]
 
     def work() -> object:
-        found = trial(design, query, folder=_NO_FOLDER, slicer=slicer, drawn=False)
+        found = trial(design, query, slicer=slicer or NONE, drawn=False)
         return json.loads(_adapter().dump_json(found))
 
     return _adapter().validate_json(json.dumps(cache.answer(question, work)))

@@ -1,0 +1,378 @@
+"""The print of a design by a real slicer: its G-code, all findings about it, and the one list that every command has.
+
+A design is sliced once: its G-code is stored by design, profile, slicer and version.
+"""
+
+import os
+import shutil
+import tempfile
+import zlib
+from base64 import b64decode, b64encode
+from dataclasses import asdict, dataclass, fields, replace
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sensorgen.asprinted import agreement, pinholes
+from sensorgen.asprinted import printed as asprinted
+from sensorgen.checks import bed
+from sensorgen.checks.review import LOST, Review, Step, advised, review
+from sensorgen.checks.volumes import Row
+from sensorgen.core import cache as stored
+from sensorgen.core.errors import MissingValue, SensorgenError, UnknownName
+from sensorgen.core.findings import Finding, grouped
+from sensorgen.core.version import __version__
+from sensorgen.design.design import Design
+from sensorgen.design.values import permittivities, resistivities
+from sensorgen.design.walls import WALLS, rule
+from sensorgen.export import machine, slicing
+from sensorgen.export.gcode.check import Checked, check_motion
+from sensorgen.export.gcode.drags import Lifted, Lifting
+from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, curaengine, prusa, versions
+from sensorgen.export.slicers.loads import loads
+from sensorgen.export.slicers.run import find
+from sensorgen.prediction.results import unpredicted
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
+
+VARIABLE = "SENSORGEN_SLICER"  # environment: prusa, cura, or none for estimates; the first that is installed if not set
+NONE = "none"
+GCODE = "13-gcode"  # rule of what the check of a G-code file reports
+SHORT, IDLE = "1-short", "10-waiver"
+_LIMIT_S = 300.0  # for a decision
+OUT = Path("out")  # folder of the designs' folders, where build and slice write, unless told otherwise
+
+
+@dataclass(frozen=True)
+class Slicer:
+    """Name and version of a slicer."""
+
+    name: str
+    version: str
+
+    @property
+    def words(self) -> str:
+        """Source of findings about its print."""
+        return f"sliced by {TITLES.get(self.name, self.name)} {self.version}"
+
+
+@dataclass(frozen=True)
+class Volumes:
+    """Printed over exact volume per body and layer, and findings about what the lines print."""
+
+    layers: tuple[Row, ...]
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SliceReport(Checked):
+    """G-code of a design alone on the bed; without run times, so that equal slicing gives equal bytes.
+
+    Attributes
+    ----------
+    name, design : str
+        Name and identity of the design.
+    sha256 : str
+        Of the file.
+    refused : bool
+        True where the check of the G-code has errors.
+    slicer : Slicer
+        Slicer of the file.
+    sensorgen, printer, quality : str
+        Version of sensorgen; the printer and the quality.
+    printed : Volumes
+        Volumes as printed.
+    lifting : Lifting
+        Travel over other tools' material before and after lifts.
+    """
+
+    name: str
+    design: str
+    sha256: str
+    refused: bool
+    slicer: Slicer
+    sensorgen: str
+    printer: str
+    quality: str
+    printed: Volumes
+    lifting: Lifting
+
+    def of_print(self) -> list[Finding]:
+        """Findings about the file and what it prints, in the form of the checks' findings."""
+        of_file = (
+            Finding(GCODE, f.severity, f"{f.rule}, line {f.line}", f.message, f.advice, count=f.count)
+            for f in self.findings
+        )
+        return [*self.printed.findings, *of_file]
+
+
+@dataclass(frozen=True, eq=False)
+class PrintFile:
+    """A G-code file of a design: its report, its text, and the file's name, "" for one from the cache."""
+
+    report: SliceReport
+    content: bytes
+    name: str = ""
+
+    @property
+    def source(self) -> str:
+        """Slicer, version and file."""
+        made = self.report.slicer
+        return ", ".join(filter(None, (f"{made.name} {made.version}", self.name)))
+
+    def printed(self, design: Design) -> asprinted.Printed:
+        """What the lines print."""
+        from sensorgen.export.gcode import paths
+
+        return asprinted.body(design, paths.read(self.content, design.machine), slicer=self.source)
+
+
+@dataclass(frozen=True, eq=False)
+class NewSlice:
+    """A print sliced now.
+
+    Attributes
+    ----------
+    file : PrintFile
+        The result.
+    printed : asprinted.Printed
+        By the first convention for a line's width.
+    lifted : Lifted
+        The file, followed.
+    """
+
+    file: PrintFile
+    printed: asprinted.Printed
+    lifted: Lifted
+
+
+def slice_now(
+    design: Design, slicer: str, *, program: str = "", time_limit_s: float = TIME_LIMIT_S, strict: bool = False,
+    step: Step = lambda _: None,
+) -> NewSlice:  # fmt: skip
+    """Slice a design alone in the middle of the bed, and check the G-code, also against the design.
+
+    Parameters and errors as of :func:`sensorgen.export.slicing.sliced`; with ``strict`` warnings refuse the file, too.
+    """
+    with tempfile.TemporaryDirectory() as stage:
+        made = slicing.sliced(
+            [slicing.alone(design)], slicer, Path(stage), program=program, time_limit_s=time_limit_s, step=step
+        )
+        content = made.ready.read_bytes()
+    printer, loaded = design.machine, {design.tool(name): name for name in design.used()}
+    printed = asprinted.nominal(design, made.lines, f"{made.slicer} {made.version}")
+    checked = check_motion(made.lifted.motion, printer, loaded, others_empty=True, texts=design.own).with_more(
+        agreement.check(
+            design, made.lines, made.lifted.motion.changes, printer.bed_centre_mm(), alone=True, lines=printed.lines
+        )
+    )
+    findings = printed.findings()
+    if printed.lines and len(printed.lines.number):
+        films = pinholes.of_lines(design, printed.lines, widths=(1.0,), most_layers=pinholes.MOST_LAYERS)
+        findings += design.waived([*pinholes.findings(films)])
+    report = SliceReport(
+        **vars(checked), name=design.name, design=design.id(), sha256=sha256(content).hexdigest(),
+        refused=bool(checked.errors(strict)), slicer=Slicer(made.slicer, made.version), sensorgen=__version__,
+        printer=printer.name, quality=design.layers.name,
+        printed=Volumes(tuple(printed.rows), (*made.findings, *findings)), lifting=made.lifted.lifting,
+    )  # fmt: skip
+    return NewSlice(PrintFile(report, content), printed, made.lifted)
+
+
+def deciding() -> str:
+    """Name of the slicer that decides; ``none`` where none is installed.
+
+    Raises
+    ------
+    UnknownName
+        The environment names another one.
+    """
+    word = os.environ.get(VARIABLE, "")
+    if word and word not in (*SLICERS, NONE):
+        raise UnknownName(f"slicer in {VARIABLE}", word, (*SLICERS, NONE))
+    return word or next((name for name in SLICERS if shutil.which(PROGRAMS[name][0])), NONE)
+
+
+def at_hand(
+    design: Design, folder: Path | None = None, slicer: str = "", step: Step = lambda _: None, program: str = ""
+) -> tuple[PrintFile | None, str]:  # fmt: skip
+    """G-code of a design: that of its folder, else sliced, now or before; or None, and why the print is estimated.
+
+    Parameters
+    ----------
+    design : Design
+        What is printed.
+    folder : Path, optional
+        With the design's files; ``out/NAME`` in the working folder if not given.
+    slicer : str
+        One of ``SLICERS``, whatever the folder has, or ``none``; the deciding one if not given.
+    step : callable
+        Called with the next step, for a progress display.
+    program : str
+        Path of the slicer's program; that on PATH if not given.
+
+    Raises
+    ------
+    SensorgenError
+        A slicer that is given is missing, or fails.
+    """
+    if not slicer and (found := in_folder(design, folder)):
+        return found, ""
+    decides = slicer or deciding()
+    if decides == NONE:
+        return None, "no slicer installed" if not slicer and not os.environ.get(VARIABLE) else ""
+    if any(not f.waiver for f in design.waived(list(bed.check(design.printed, design.machine)))):
+        return None, "it does not fit the bed"
+    try:
+        return _sliced(design, decides, find(*PROGRAMS[decides], program), step), ""
+    except SensorgenError as error:
+        if slicer:
+            raise
+        return None, str(error)
+
+
+def _sliced(design: Design, slicer: str, program: str, step: Step) -> PrintFile:
+    """A design sliced now or before."""
+    question = _question(design, slicer, program)
+
+    def work() -> dict[str, Any]:
+        made = slice_now(design, slicer, program=program, time_limit_s=_LIMIT_S, step=step).file
+        return {
+            "report": _adapter().dump_python(made.report, mode="json"),
+            "gcode": b64encode(zlib.compress(made.content, 1)).decode(),
+        }
+
+    entry = stored.answer(question, work)
+    report = replace(_adapter().validate_python(entry["report"]), name=design.name)
+    return PrintFile(report, zlib.decompress(b64decode(entry["gcode"])))
+
+
+def _question(design: Design, slicer: str, program: str) -> dict[str, Any]:
+    """All that decides a slice and its findings."""
+    changed = Path(program).stat().st_mtime_ns
+    version = tuple(
+        stored.answer(
+            {"what": "version", "program": program, "changed": changed},
+            lambda: list(versions.of_program(slicer, program)),
+        )
+    )
+    printer, layers, all_loads = design.machine, design.layers, loads(design)
+    profile = (
+        prusa.profile(printer, layers, all_loads, version) if slicer == "prusa"
+        else repr(asdict(curaengine.engine_settings(printer, layers, all_loads, version)))
+    )  # fmt: skip
+    decides = f"{profile}{printer!r}{layers!r}{[w.model_dump() for w in design.waivers]}"
+    return {
+        "what": "slice", "design": design.id(), "slicer": slicer, "version": version, "program": program,
+        "changed": changed, "profile": sha256(decides.encode()).hexdigest(),
+    }  # fmt: skip
+
+
+@cache
+def _adapter() -> "TypeAdapter[SliceReport]":
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(SliceReport)
+
+
+def in_folder(design: Design, folder: Path | None = None) -> PrintFile | None:
+    """The sliced file of this very design in a folder, ``out/NAME`` if not given; its record is beside it."""
+    folder = folder or OUT / design.name
+    for note in sorted(folder.glob("*.gcode.json")) if folder.is_dir() else ():
+        try:
+            content = note.with_suffix("").read_bytes()
+            report = _adapter().validate_json(note.read_bytes())
+            if report.design == design.id() and report.sha256 == sha256(content).hexdigest():
+                return PrintFile(report, content, note.with_suffix("").name)
+        except (OSError, ValueError):  # no file of ours
+            continue
+    return None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PrintReview(Review):
+    """All findings about a print, each sentence once, and their source.
+
+    Attributes
+    ----------
+    drawn : Review
+        Findings about the drawing, with an estimate of rule 7.
+    file : PrintFile or None
+        The G-code; None for an estimate.
+    """
+
+    drawn: Review
+    file: PrintFile | None
+
+    def printed(self, design: Design, walls: str = "") -> asprinted.Printed:
+        """The print that the findings are about."""
+        walls = walls or rule("prusa", design.walls)
+        return self.file.printed(design) if self.file else asprinted.body(design, walls=walls)
+
+    def errors(self, strict: bool = False) -> list[Finding]:
+        """Findings that stop a build: errors of the drawing, and when ``strict`` all errors and warnings."""
+        of_print = (LOST, GCODE) if any(f.rule == SHORT for f in self.drawn.findings) else (LOST, GCODE, SHORT)
+        return [f for f in super().errors(strict) if strict or f.rule not in of_print]
+
+
+def reviewed(
+    design: Design, step: Step = lambda _: None, slicer: str = "", folder: Path | None = None, walls: str = ""
+) -> PrintReview:  # fmt: skip
+    """All findings about the print of a design, for every command: by G-code where a slicer is there.
+
+    Parameters
+    ----------
+    design : Design
+        What is printed.
+    step : callable
+        Called with the next step, for a progress display.
+    slicer, folder
+        As of :func:`at_hand`.
+    walls : str
+        For an estimate, one of ``WALLS``; the design's if not given.
+    """
+    drawn = review(design, step, walls or (rule(slicer, design.walls) if slicer in SLICERS else ""))
+    step("slicing")
+    file, why = at_hand(design, folder, NONE if walls else slicer, step)
+    if file:
+        return combined(design, drawn, file.report.slicer.words, file.report.of_print(), file)
+    return estimated(design, drawn, walls, why)
+
+
+def estimated(design: Design, drawn: Review, walls: str = "", why: str = "") -> PrintReview:
+    """Findings about a drawing and about its print by the rules of slicers."""
+    walls, shorts = walls or rule("prusa", design.walls), list[Finding]()
+    if drawn.meshes and all(f.rule != SHORT for f in drawn.findings):
+        shorts = [f for f in asprinted.body(design, walls=walls).findings() if f.rule == SHORT]
+    return combined(design, drawn, f"estimated ({WALLS[walls]}){why and f': {why}'}", shorts)
+
+
+def combined(
+    design: Design, drawn: Review, source: str, of_print: list[Finding], file: PrintFile | None = None
+) -> PrintReview:  # fmt: skip
+    """Findings about a drawing and about its print as one list.
+
+    Parameters
+    ----------
+    design, drawn : Design, Review
+        What is printed, and findings about the drawing.
+    source : str
+        Of the print.
+    of_print : list of Finding
+        About the print; where it is no estimate, with rule 7 in place of the drawing's.
+    file : PrintFile, optional
+        The print's G-code.
+    """
+    own = [] if not design.own.keys() & {"printers", "qualities"} else machine.of_design(design)  # shipped: tested
+    replaced = (IDLE,) if source.startswith("estimated") else (IDLE, LOST)
+    names = [parameter.name for parameter in fields(design.params)]
+    try:
+        permittivities(design), resistivities(design)
+    except MissingValue as error:
+        own.append(unpredicted(str(error)))
+    found = [*own, *(advised(f, names) for f in of_print), *(f for f in drawn.findings if f.rule not in replaced)]
+    waived = [f if f.rule == GCODE else w for f, w in zip(found, design.waived(found), strict=True)]
+    listed = grouped([*waived, *design.idle_waivers(found)])
+    return PrintReview(drawn.meshes, listed, source, drawn=drawn, file=file)
