@@ -248,9 +248,7 @@ def _incompressible(design: Design) -> bool:
 
 def _stored_print(design: Design, printed: Piece, youngs_modulus_pa: Mapping[str, float]) -> Curve | None:
     """The stored curve of a printed cell, as those of the thesis's designs are."""
-    keys = (
-        content(printed, digits) for digits in (6, 3)
-    )  # of an estimate, and of G-code, whose slicer's threads differ
+    keys = (content(printed, digits) for digits in (6, 3))  # estimates; G-code, of which equal slices differ by 4 nm
     found = next(filter(None, (compression.solved_print(key, youngs_modulus_pa) for key in keys)), None)
     return found if found and _incompressible(design) else None
 

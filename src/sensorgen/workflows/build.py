@@ -164,8 +164,8 @@ def build(
         See there; nothing was written.
     """
     folder = out / design.name
-    if (folder.exists() and not folder.is_dir()) or (out.exists() and not out.is_dir()):
-        raise Unwritable(f"{folder} is no folder; name another with --out, or remove the file")
+    if file := next((place for place in (out, folder) if place.is_file()), None):
+        raise Unwritable(f"{file} is a file; expected a folder: name another with --out, or remove the file")
     with ExitStack() as stack:
         held = reviewed(design, step, folder=folder)
         if held.errors(strict) and not force:
