@@ -1,4 +1,6 @@
-"""Compression of the thesis's triangular cells as slicers should print them: writes models/solved_prints.yaml.
+"""Compression of the thesis's triangular cells as slicers print them: writes models/solved_prints.yaml.
+
+Films of 0.1 and 0.2 mm are sliced by the PrusaSlicer that is installed too, by every convention for a line's width.
 
 A cell that the file has is not solved again: delete the file to solve all anew, which takes a quarter of an hour.
 """
@@ -13,16 +15,17 @@ import numpy as np
 
 from sensorgen.design.design import Design, make
 from sensorgen.design.tip import EVEN, STIFF, Tip
-from sensorgen.prediction.bodies import WALLS, estimated
+from sensorgen.prediction.bodies import WALLS, estimated, of_file
 from sensorgen.prediction.compression_law import case_of, content, solved
 from sensorgen.prediction.mesh_ladder import COARSEST, Piece, model_of, pressed
 from sensorgen.prediction.sensor_model import piece
+from sensorgen.prediction.slices import at_hand
 
 FILE = Path(__file__).parents[1] / "src" / "sensorgen" / "models" / "solved_prints.yaml"
 HEAD = """\
 # Rise of the capacitance of printed triangular cells with stress, as bench/solved_prints.py solved it: by press2d, its
-# usual mesh, held against the next coarser one ("within"); layers of 0.1 and 0.06 mm, walls as named, and of Arachne's
-# walls the film as thin and as thick as the printer's tools may make it. Keys are the content of the cross-section.
+# usual mesh, held against the next coarser one ("within"); layers of 0.1 and 0.06 mm, walls as named or sliced ("prusa"), the
+# film as thin and as thick as the printer's tools may make it, too. Keys are the content of the cross-section.
 # "stiff" is the change under a stiff plate, from the even pressure of the curve, at 60 kPa on the coarsest mesh.
 source: plane-strain finite elements with frictionless contact, neo-Hookean, nu 0.4999, of the printed cell
 youngs_modulus_pa: {etpu: 22.0e6, x60: 6.0e6}
@@ -37,11 +40,12 @@ def main() -> None:
     before = {entry[2:18]: entry for entry in re.findall(r"(?m)^  \w{16}:.*\n(?:    .*\n)+", text)}
     found: dict[str, str] = {}
     films = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
-    for walls, quality, along, film in product(WALLS, ("fine", "extrafine"), "xy", films):
+    estimates = product(WALLS, ("fine", "extrafine"), "xy", films)
+    for walls, quality, along, film in (*product(["prusa"], ["fine"], "xy", (0.2, 0.1)), *estimates):
         sizes = {"dielectric_mm": film, "along": along}
         design = make({"shape": "tri", "quality": quality, "parameters": sizes})
         for what, cell in cells(design, walls):
-            key = content(cell)
+            key = content(cell, 3 if walls == "prusa" else 6)
             if key in found:
                 continue
             if key in before:
@@ -84,11 +88,13 @@ def with_stiff(entry: str, design: Design, cell: Piece) -> str:
 
 
 def cells(design: Design, walls: str) -> Iterator[tuple[str, Piece]]:
-    """The printed cell; by Arachne's walls, which are the likeliest, with other films too."""
-    body = estimated(design, walls)
+    """The printed cell; by Arachne's walls, which are the likeliest, and by G-code with other films too."""
+    body = of_file(design, at_hand(design, None, walls)[0]) if walls == "prusa" else estimated(design, walls)
     yield "", piece(body)
+    for rule in list(body.cells.scenes)[1:] if walls == "prusa" else ():
+        yield f" ({rule})", piece(body.printed_otherwise(rule))
     film = body.cells.film
-    if walls == "arachne" and film:
+    if walls in ("arachne", "prusa") and film:
         for sign, scene in (("-", film.thinner), ("+", film.thicker)):
             if scene:
                 yield f" {sign} {film.error_mm:g}", Piece(scene, body.cells.period_mm)

@@ -49,6 +49,20 @@ def filleted():
     }
 
 
+def rounded():
+    """Three plates whose corners in plan are rounded, as drawn by hand."""
+
+    def layer(z, high):
+        part = plate(0, 0, z, 30, 10, high)
+        return cad.fillet(part.edges().filter_by(cad.Axis.Z), 1.0)
+
+    return {
+        "low": (layer(0, 0.4), "#303436"),
+        "pad": (layer(0.4, 0.6), "#f2c14e"),
+        "up": (layer(1.0, 0.4), "#303436"),
+    }
+
+
 def serpentine(z):
     turns = [plate(3, 1 + k * 2.4, z, 24, 1.2, 0.4) for k in range(5)]
     ends = [plate(25.8 if k % 2 == 0 else 3, 1 + k * 2.4, z, 1.2, 3.6, 0.4) for k in range(4)]
@@ -81,5 +95,6 @@ if __name__ == "__main__":
     write(out, "dome", dome())
     write(out, "filleted", filleted())
     write(out, "crossed", crossed())
+    write(out, "rounded", rounded())
     write(out, "colliding", colliding())
     write(out, "inches", filleted(), "inch")

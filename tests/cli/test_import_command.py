@@ -1,6 +1,8 @@
 """``sensorgen import``: sensors of other CAD programs, from the file to everything that a drawn shape gets."""
 
 import json
+import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -379,6 +381,20 @@ def test_designs_that_do_not_fit_their_bodies_are_refused(run, plates, change, l
 
     with pytest.raises(SensorgenError, match=line):
         make(load(Path("a.yaml")).model_dump(mode="json") | change)
+
+
+@pytest.mark.usefixtures("shared_kernel")
+def test_rounded_corners_cost_the_resistance_alone(run, models):
+    """Of the plate without its corners; the electrodes reach no end face, which is said, with its exit code."""
+    assert run("import", models / "rounded.step", "--map", "pad=x60@1", "--map", "*=etpu@2").code == 0
+    said = run("predict", "rounded.yaml", "--json")
+    found, plate_f = json.loads(said.out), 8.8541878128e-12 * 4.68 * (300 - (4 - math.pi)) * 1e-6 / 0.6e-3
+    assert plate_f < found["drawn"]["capacitance"]["value"] < 1.12 * plate_f
+    assert found["capacitance"]["value"] == pytest.approx(found["drawn"]["capacitance"]["value"], rel=0.05)
+    assert (said.code, found["status"], found["resistance"]) == (2, "predicted", {})
+    assert re.search("no resistance: the (top|bottom) electrode runs from", said.err)
+    text = run("predict", "rounded.yaml").words
+    assert "capacitance" in text and "no resistance: the" in text  # noqa: PT018
 
 
 @pytest.mark.usefixtures("shared_kernel", "unpressed")

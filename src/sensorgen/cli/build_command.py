@@ -13,15 +13,18 @@ if TYPE_CHECKING:
     from sensorgen.design.design import Design
 
 OWN: list[click.Parameter] = [
-    click.Option(["--out"], default="out", show_default=True, metavar="DIR", help="Folder for the designs' folders."),
+    click.Option(
+        ["--out", "-o"], default="out", show_default=True, metavar="DIR", help="Folder for the designs' folders."
+    ),
     click.Option(["--no-cad"], is_flag=True, help="Skip the STEP file (saves about 3 s)."),
     click.Option(["--force"], is_flag=True, help="Write the files even if checks report errors."),
     click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
     body_options.compensate_option(),
     click.Option(["--verify"], is_flag=True, help="Write nothing: compare the folder with its record and the log."),
     click.Option(["--details"], is_flag=True, help="Print all findings and the whole prediction."),
+    click.Option(["--advise"], is_flag=True, help="Also try changes that remove findings, as sensorgen check does."),
     *settings.advice_options(),
-    *render.options("json", "markdown"),
+    *render.options("json", "markdown", outputs=("--output",)),
 ]
 
 
@@ -35,37 +38,48 @@ def _work(
     compensate: str | None,
     verify: bool,
     details: bool,
+    advise: bool,
     budget: float,
     apply_change: int | None,
 ) -> int:
-    from sensorgen.workflows.build import STEPS, DetailedBuild, build
+    from sensorgen.core import document
+    from sensorgen.workflows.build import STEPS, Built, DetailedBuild, build
 
     if verify:
         return _verify(design, Path(out) / design.name)
     design, changes = body_options.compensated(design, compensate, design.walls)
+    kind, budget_s = DetailedBuild if details else Built, budget if advise or apply_change else None
+
+    def decided(built: Built) -> None:  # before the files, which take longer
+        show.clear()
+        render.deliver(kind(**vars(built)))
+
     try:
         with show.progress(STEPS) as step:
             built = build(
-                design, Path(out), cad=not no_cad, force=force, strict=strict, compensated=changes, budget_s=budget,
-                step=step,
+                design, Path(out), cad=not no_cad, force=force, strict=strict, compensated=changes, budget_s=budget_s,
+                step=step, decided=decided if render.early() else lambda _: None,
             )  # fmt: skip
     except Unprintable as error:
-        _refuse(design, error, budget, apply_change)
+        _refuse(design, error, budget_s, apply_change)
         if apply_change is None:
             raise
         return FOUND_ERRORS  # of the design as it was: the file has another one now
-    render.deliver(DetailedBuild(**vars(built)) if details else built)
+    if render.early():
+        render.say("\n".join(document.text(built.written())))
+    else:
+        render.deliver(kind(**vars(built)))
     settings.applied(design, built.advice, apply_change)
     return 1 if built.verdict == "CHANGE" and not force else 0
 
 
-def _refuse(design: "Design", error: Unprintable, budget: float, apply_change: int | None) -> None:
+def _refuse(design: "Design", error: Unprintable, budget_s: float | None, apply_change: int | None) -> None:
     """Deliver why a design is not built, and the changes that were tried."""
     from sensorgen.prediction.slices import reviewed
     from sensorgen.workflows.decision import STEPS, RefusedBuild, decision
 
     with show.progress(STEPS) as step:
-        advice = decision(design, reviewed(design), budget, predict=budget > 0, step=step).advice
+        advice = decision(design, reviewed(design), budget_s, predict=bool(budget_s), step=step).advice
     render.deliver(RefusedBuild(design.name, tuple(error.findings), len(error.stopping), advice=advice))
     settings.applied(design, advice, apply_change)
 

@@ -32,7 +32,7 @@ class DesignGroup(click.Group):
         super().__init__(
             options_metavar="",
             subcommand_metavar="{SHAPE|DESIGN.yaml} [OPTIONS]",
-            epilog="SHAPE --help lists the options.",
+            epilog="SHAPE --help lists the options of the shape and of its print, too.",
             context_settings={"ignore_unknown_options": True},
             **attributes,
         )
@@ -75,12 +75,12 @@ class DesignGroup(click.Group):
         """Files, and the shapes."""
         return [CompletionItem(incomplete, type="file"), *super().shell_complete(ctx, incomplete)]
 
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the shapes under their own name."""
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the command's options, then the shapes."""
+        with formatter.section("Options"):
+            formatter.write_dl([row for p in (*self.own, *self.get_params(ctx)) if (row := p.get_help_record(ctx))])
         with formatter.section("Shapes"):
-            formatter.write_dl(
-                [(name, _about(registry.load(shapes, name)).partition("\n")[0]) for name in self.list_commands(ctx)]
-            )
+            formatter.write_text(", ".join(self.list_commands(ctx)))
 
     def _command(self, name: str, module: "Shape | ModuleType | None", base: Data) -> click.Command:
         def run(**given: Any) -> int:

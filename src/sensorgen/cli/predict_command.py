@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import body_options, options, render, settings, show, sweeps
+from sensorgen.cli import WRONG_INPUT, body_options, options, render, settings, show, sweeps
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.options import option
 from sensorgen.cli.words import Length, OneOf, Values, proper
@@ -102,6 +102,9 @@ def _work(
         _plot(found, Path(plot))
     else:
         render.deliver(found, before=prediction.explained() if explain else ())
+    if missing := prediction.missing():
+        render.say(f"sensorgen: {missing}", err=True)
+        return WRONG_INPUT
     return render.verdict(*prediction.problems(accuracy))
 
 

@@ -19,14 +19,16 @@ _COLOURS = {"error": "red", "warning": "yellow", "info": "blue", "CHANGE": "red"
 _FORM, _FILE = "sensorgen.form", "sensorgen.output"  # in the context's meta
 
 
-def options(*forms: str, file: bool = True, csv: str = _ABOUT["csv"]) -> list[click.Parameter]:
+def options(
+    *forms: str, file: bool = True, csv: str = _ABOUT["csv"], outputs: tuple[str, ...] = ("--output", "-o")
+) -> list[click.Parameter]:  # fmt: skip
     """``--json``, ``--csv``, ``--markdown``, or those named, and ``--output``; :func:`deliver` obeys them."""
     flags = [
         click.Option([f"--{form}", f"as_{form}"], is_flag=True, expose_value=False, callback=_choose, help=about)
         for form, about in (_ABOUT | {"csv": csv}).items() if form in (forms or _ABOUT)
     ]  # fmt: skip
     output = click.Option(
-        ["--output", "-o"], metavar="FILE", expose_value=False, callback=_to, help="Write this file."
+        [*outputs], metavar="FILE", expose_value=False, callback=_to, help="Write this file."
     )  # fmt: skip
     return [*flags, output] if file else [*flags]
 
@@ -48,6 +50,11 @@ def form() -> str:
     meta = click.get_current_context().meta
     suffix = Path(meta.get(_FILE) or "").suffix
     return str(meta.get(_FORM, {".json": "json", ".csv": "csv", ".md": "markdown"}.get(suffix, "")))
+
+
+def early() -> bool:
+    """True where text goes to the terminal at once: no form and no file was asked for."""
+    return not form() and click.get_current_context().meta.get(_FILE) in (None, "-")
 
 
 def refuse_beside(option: str) -> None:

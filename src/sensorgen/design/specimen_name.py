@@ -101,13 +101,8 @@ class Specimen:
         '23 triY .2mm 3'
         """
         number = "" if self.iteration is None else str(self.iteration)
-        words = (
-            number,
-            _WORDS.get(self.shape, self.shape) + self.axes,
-            self._thickness(),
-            str(self.replicate or ""),
-            self.slicing,
-        )
+        shape, copy = _WORDS.get(self.shape, self.shape), str(self.replicate or "")
+        words = (number, shape + self.axes, self._thickness(), copy, self.slicing)
         return " ".join(filter(None, (*words, self.place)))
 
     def _thickness(self) -> str:

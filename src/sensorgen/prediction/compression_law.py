@@ -245,12 +245,13 @@ def _incompressible(design: Design) -> bool:
 
 def _stored_print(design: Design, printed: Piece, youngs_modulus_pa: Mapping[str, float]) -> Curve | None:
     """The stored curve of a printed cell, as those of the thesis's designs are."""
-    found = compression.solved_print(content(printed), youngs_modulus_pa)
+    keys = (content(printed, digits) for digits in (6, 3))  # estimates; G-code, of which equal slices differ by 4 nm
+    found = next(filter(None, (compression.solved_print(key, youngs_modulus_pa) for key in keys)), None)
     return found if found and _incompressible(design) else None
 
 
-def content(piece: Piece) -> str:
-    """Identity of a cell's cross-section, to a nanometre; "" where it has several."""
+def content(piece: Piece, digits: int = 6) -> str:
+    """Identity of a cell's cross-section, to a digit of a millimetre; "" where it has several."""
     try:
         section, *others = sections(piece.scene)
     except ValueError:
@@ -258,7 +259,7 @@ def content(piece: Piece) -> str:
     if others:
         return ""
     regions = sorted(
-        (body.material, body.terminal, [[round(v, 6) for v in corner] for corner in outline])
+        (body.material, body.terminal, [[round(v, digits) for v in corner] for corner in outline])
         for body, outline in section.regions
     )
     return sha256(dumps([regions, piece.period_mm]).encode()).hexdigest()[:16]

@@ -104,15 +104,13 @@ def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -
         material=_permittivity_range(body.design, scene, c.middle()) if ranges else Interval(c.middle(), c.middle()),
     )  # fmt: skip
     ends = (rho["top"].value, rho["bottom"].value)
-    resistance, unknown = _resistance(body, scene)
+    resistance, unknown = _resistance(body)
     doubts += unknown
     return RestState(answer, bounds, resistance, ends, (*values, *rho.values()), by_width, by_film, tuple(doubts))
 
 
-def _resistance(body: Body, scene: Scene) -> tuple[dict[str, Bounds], list[str]]:
-    """Of both electrodes; where one does not cover the sensor, of those from end to end, and what is left."""
-    if not is_open(scene):
-        return electrode_resistance(body), []
+def _resistance(body: Body) -> tuple[dict[str, Bounds], list[str]]:
+    """Of the electrodes that reach from end to end, and why another has none."""
     found, said = dict[str, Bounds](), list[str]()
     for end in ENDS:
         try:

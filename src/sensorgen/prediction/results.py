@@ -13,15 +13,17 @@ from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
 from sensorgen.core.units import si
-from sensorgen.design.values import ASSUMED, MaterialValue
+from sensorgen.design.values import ASSUMED, ENDS, MaterialValue
 from sensorgen.prediction.identifiability.results import (
+    CANNOT_LOCATE,
+    CANNOT_SENSE,
     GUESS,
     Identifiability,
     StandardErrors,
     metres,
     newtons,
     of_schema_1,
-)
+)  # fmt: skip
 from sensorgen.prediction.plan import Plan, without_times
 
 if TYPE_CHECKING:
@@ -367,21 +369,25 @@ class Prediction(Displayed):
         """True where it rests on values that no source gives."""
         return any(value.source == ASSUMED for value in self.values)
 
-    def resolved(self, which: int, most: float, cannot: str) -> str:
-        """Standard error of force (0) or position (1) on a bench, in words."""
-        return resolved(self.bench()[which], most, cannot, conditional=self.conditional)
+    def resolved(self) -> tuple[str, str]:
+        """Standard errors of force and position on a bench, in words; what the sensor cannot do."""
+        (force, position), known = self.bench(), self.identifiability
+        length_m = max(known.map.position_m, default=inf) if known else inf
+        return (
+            resolved(force, self.force_n, CANNOT_SENSE, conditional=self.conditional),
+            resolved(position, length_m, CANNOT_LOCATE, conditional=self.conditional),
+        )
 
     def summary(self) -> Iterator[Part]:
         """Quantities of the print beside the drawing's: the best value and the range with all errors."""
         shown = [self.drawn, self] if self.drawn else [self]
-        length_m = max(self.identifiability.map.position_m, default=inf) if self.identifiability else inf
         rows = [
             ("electrode gap", *(_words(p.gap) for p in shown)),
             ("capacitance", *(p.capacitance.words() if p.capacitance else p.status for p in shown)),
             *((f"{end} electrode", *(_words(p.resistance.get(end)) for p in shown)) for end in self.resistance),
             ("sensitivity [1/kPa]", *((_words(p.sensitivity) or "–").replace(" 1/kPa", "") for p in shown)),
-            ("force resolution", *(p.resolved(0, p.force_n, "cannot sense force") for p in shown)),
-            ("position resolution", *(p.resolved(1, length_m, "cannot locate") for p in shown)),
+            ("force resolution", *(p.resolved()[0] for p in shown)),
+            ("position resolution", *(p.resolved()[1] for p in shown)),
         ]
         columns = (Column(""), *(Column(p.body.partition(",")[0]) for p in shown))
         yield Table("quantities", "", columns, tuple(rows))
@@ -461,8 +467,16 @@ class Prediction(Displayed):
         """Indented JSON of the published schema."""
         return json.dumps(json.loads(to_json(self)), indent=2, ensure_ascii=False) + "\n"
 
+    def missing(self) -> str:
+        """Why capacitance or the resistance of an electrode is not predicted; "" where all are."""
+        if self.status == "short" or (self.capacitance and len(self.resistance) == len(ENDS)):
+            return ""
+        return next((doubt for doubt in self.doubts if doubt.startswith("no resistance")), self.reason)
+
     def problems(self, accuracy: float | None) -> Sequence[str]:
-        """That abs(Z) is not within an accuracy that was asked for [-]."""
+        """A short, and that abs(Z) is not within an accuracy that was asked for [-]."""
+        if self.status == "short":
+            return (f"a short: {self.reason}",)
         if accuracy is None or self.capacitance is None:
             return ()
         reached = self.plan.width if self.plan else self.capacitance.model.width()
@@ -476,19 +490,16 @@ class Overview(Prediction):
     """A prediction whose document is its first screen."""
 
     def document(self) -> Iterator[Part]:
-        """Numbers on a bench, what narrows them, what their ranges hold, and what is assumed."""
+        """Numbers on a bench, what narrows them, and what is doubtful."""
         if self.capacitance is None:
             yield from super().document()
             return
         yield self.design
         yield from self.summary()
-        yield ""
-        yield self._ranges()
         if self.reason and not self.identifiability:
             yield f"no load: {self.reason}"
-        yield ""
-        yield from self.remarks()
-        yield "(--details: impedance, a perfect model's resolution, what improves it, error budget)"
+        yield from (f"doubtful: {doubt}" for doubt in self.doubts)
+        yield f"(--details: causes of the ranges, impedance, error budget, {len(self.assumptions)} assumptions)"
 
 
 def caption_of(force_n: float, position_m: float, body: str) -> str:

@@ -130,10 +130,10 @@ def build_sensor(
 def _no_line(body: Body, rest: RestState) -> str:
     """Why electrodes that do not cover the sensor are no line of equal cells, or ""."""
     scene = body.cells.first()
-    if not is_open(scene):
-        return ""
     if set(rest.resistance) != set(ENDS):
         return "an electrode does not run from end to end: the sensor at rest is predicted, not its response"
+    if not is_open(scene):
+        return ""
     ends = [replace(scene, bodies=tuple(b for b in scene.bodies if b.terminal == end)) for end in ENDS]
     if all(len(square_to(electrode, "x")) == 1 for electrode in ends):
         return ""

@@ -14,6 +14,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from sensorgen.asprinted import agreement, pinholes
 from sensorgen.asprinted import printed as asprinted
 from sensorgen.checks import bed
@@ -72,6 +74,8 @@ class SliceReport(Checked):
 
     Attributes
     ----------
+    box_mm : tuple of two (float, float, float), or None
+        Around the lines of the sensor, from its corner: tower and skirt apart [mm].
     name, design : str
         Name and identity of the design.
     sha256 : str
@@ -168,12 +172,15 @@ def slice_now(
             design, made.lines, made.lifted.motion.changes, printer.bed_centre_mm(), alone=True, lines=printed.lines
         )
     )
-    findings = printed.findings()
+    findings, box = printed.findings(), None
     if printed.lines and len(printed.lines.number):
+        ends = np.concatenate([printed.lines.start_mm, printed.lines.end_mm])
+        low, high = (tuple(round(v, 3) for v in corner.tolist()) for corner in (ends.min(0), ends.max(0)))
+        box = ((*low, printed.first[0].bottom_mm), (*high, printed.first[-1].top_mm))
         films = pinholes.of_lines(design, printed.lines, widths=(1.0,), most_layers=pinholes.MOST_LAYERS)
         findings += design.waived([*pinholes.findings(films)])
     report = SliceReport(
-        **vars(checked), name=design.name, design=design.id(), sha256=sha256(content).hexdigest(),
+        **(vars(checked) | {"box_mm": box}), name=design.name, design=design.id(), sha256=sha256(content).hexdigest(),
         refused=bool(checked.errors(strict)), slicer=Slicer(made.slicer, made.version), sensorgen=__version__,
         printer=printer.name, quality=design.layers.name,
         printed=Volumes(tuple(printed.rows), (*made.findings, *findings)), lifting=made.lifted.lifting,

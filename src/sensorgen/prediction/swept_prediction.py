@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
 
-from sensorgen.core.bounds import Bounds
 from sensorgen.core.document import Cell, Column, Table
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.body import Body
 from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.results import Prediction, timeless
 from sensorgen.prediction.sweep import Sweep, Value
@@ -44,23 +44,39 @@ class PredictedPoint:
     prediction: Prediction | None = None
     accuracy: float | None = None
 
+    @property
+    def source(self) -> str:
+        """Slicer and version, "estimated", or "drawn"."""
+        body = self.prediction.body if self.prediction else ""
+        return body.removeprefix("printed, ").partition(" (")[0].partition(", ")[0]
+
     def table(self) -> Table:
         """One row: each number with its range."""
         columns = [
             Column(f"{name.replace('_', ' ')}{end}", unit, hidden=bool(end))
             for name, unit, _ in _SHOWN for end in ("", ", least", ", most")
         ]  # fmt: skip
-        return Table("predictions", "", (*columns, Column("status")), (tuple(self._cells()),))
+        return Table("predictions", "", (*columns, Column("status"), Column("source")), (tuple(self._cells()),))
 
     def _cells(self) -> Iterator[Cell]:
-        for name, _, size in _SHOWN:
-            found: Bounds | None = getattr(self.prediction, name, None)
-            yield from (v / size for v in (found.value, found.lower, found.upper)) if found else (None, None, None)
-        yield self.prediction.status if self.prediction else "not predicted"
+        found = self.prediction
+        if found is None:
+            yield from (*[None] * 3 * len(_SHOWN), "not predicted", "")
+            return
+        values = (found.capacitance, found.sensitivity, *found.bench())
+        for (_, _, size), bounds, words in zip(_SHOWN, values, ("", "", *found.resolved()), strict=True):
+            if bounds is None:
+                yield from (None, None, None)
+                continue
+            yield words if words in (CANNOT_SENSE, CANNOT_LOCATE) else bounds.value / size
+            yield from (bounds.lower / size, bounds.upper / size)
+        yield from (found.status, self.source)
 
     def remarks(self) -> Sequence[str]:
-        """What is doubtful."""
-        return [f"doubtful: {doubt}" for doubt in self.prediction.doubts] if self.prediction else []
+        """Source, and what is doubtful."""
+        return (
+            [f"source: {self.source}", *(f"doubtful: {d}" for d in self.prediction.doubts)] if self.prediction else []
+        )
 
     def problems(self) -> Sequence[str]:
         """Why it is not predicted, or not within the accuracy."""

@@ -2,10 +2,10 @@
 
 import json
 import platform
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, ClassVar
@@ -14,7 +14,7 @@ from sensorgen.checks.review import Step, draw, report
 from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.document import Part
-from sensorgen.core.errors import Unprintable
+from sensorgen.core.errors import Unprintable, Unwritable
 from sensorgen.core.findings import Finding, headline, listed, most_severe
 from sensorgen.core.version import __version__
 from sensorgen.design import printer
@@ -94,10 +94,15 @@ class Built:
             yield ""
             yield from self.advice.document()
         yield ""
-        yield f"{self.folder}: {len(self.files)} files; --details prints all"
+        yield from self.written()
+
+    def written(self) -> Iterator[Part]:
+        """Where the files are; nothing before they are there."""
+        if self.files:
+            yield from self.replaced
+            yield f"{self.folder}: {len(self.files)} files; --details prints all, --advise tries changes"
 
     def _head(self) -> Iterator[Part]:
-        yield from self.replaced
         yield from compensation.document(self.compensated)
         yield headline(self.name, self.findings, self.source)
         yield ""
@@ -113,7 +118,7 @@ class DetailedBuild(Built):
         yield from listed(self.findings)
         yield ""
         yield from self.prediction.document()
-        yield f"{self.folder}: {len(self.files)} files"
+        yield from self.written()
 
 
 def build(
@@ -124,8 +129,9 @@ def build(
     force: bool = False,
     strict: bool = False,
     compensated: Sequence[Change] = (),
-    budget_s: float = 0.0,
+    budget_s: float | None = None,
     step: Step = lambda _: None,
+    decided: Callable[[Built], None] = lambda _: None,
 ) -> Built:
     """Write all files of a design into ``out/<name>``.
 
@@ -144,9 +150,11 @@ def build(
     compensated : sequence of Change
         How the design differs from the one that was asked for, for the record.
     budget_s : float
-        Processor time for trying changes that remove findings [s].
+        Processor time for trying changes that remove findings [s]; none are tried if not given.
     step : callable
         Called with the next step, for a progress display.
+    decided : callable
+        Called with verdict and numbers before any file is written.
 
     Raises
     ------
@@ -156,23 +164,28 @@ def build(
         See there; nothing was written.
     """
     folder = out / design.name
+    if file := next((place for place in (out, folder) if place.is_file()), None):
+        raise Unwritable(f"{file} is a file; expected a folder: name another with --out, or remove the file")
     with ExitStack() as stack:
-        kernel = None
-        if cad:
-            from sensorgen.scene.geometry.cad import CadProcess
-
-            kernel = stack.enter_context(CadProcess())  # its import runs beside everything below
         held = reviewed(design, step, folder=folder)
         if held.errors(strict) and not force:
             raise Unprintable(held.findings, held.errors(strict))
         held = held.with_meshes(design)
-        stage = stack.enter_context(store.staging(folder))
-        step_file = stage / f"{design.name}.step"
-        job = kernel.submit(design.printed, _colours(design), design.name, step_file) if kernel else None
         step("prediction")
         predicted = evaluate(bodies.of_file(design, held.file))
-        decided = decision.decision(design, held, budget_s, step=step)
-        for name, content in _files(design, held, predicted, decided, step):
+        made = decision.decision(design, held, budget_s, step=step)
+        built = Built(
+            design.name, folder, (), made.verdict, made.findings, timeless(predicted), tuple(compensated), (),
+            made.trial, made.advice, held.source,
+        )  # fmt: skip
+        decided(built)
+        stage, job = stack.enter_context(store.staging(folder)), None
+        if cad:
+            from sensorgen.scene.geometry.cad import CadProcess
+
+            kernel = stack.enter_context(CadProcess())  # its import runs beside everything below
+            job = kernel.submit(design.printed, _colours(design), design.name, stage / f"{design.name}.step")
+        for name, content in _files(design, held, predicted, made, step):
             store.write(stage, {name: content})
         if job:
             _await(job, step)
@@ -181,11 +194,7 @@ def build(
         store.publish(stage, folder)
         replaced += sealed.set_aside(folder, design)
         step("done")
-    return Built(
-        design.name, folder, tuple(sorted([*store.listed(folder), store.MANIFEST])), decided.verdict,
-        decided.findings, timeless(predicted), tuple(compensated), replaced, decided.trial, decided.advice,
-        held.source,
-    )  # fmt: skip
+    return replace(built, files=tuple(sorted([*store.listed(folder), store.MANIFEST])), replaced=replaced)
 
 
 def _replaced(folder: Path, design: Design) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Finding, Refused, Verdict, grouped, headline, listed, verdict
 from sensorgen.design.design import Design
-from sensorgen.prediction.identifiability.results import FORCE_SHARE, GUESS
+from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE, FORCE_SHARE, GUESS
 from sensorgen.prediction.results import UNPREDICTED, caption_of, resolved
 from sensorgen.prediction.slices import PrintReview
 from sensorgen.workflows.moves import changed
@@ -208,7 +208,7 @@ class RefusedBuild(Refused):
 def decision(
     design: Design,
     held: PrintReview,
-    budget_s: float,
+    budget_s: float | None,
     *,
     predict: bool = True,
     step: Step = lambda _: None,
@@ -222,7 +222,7 @@ def decision(
     held : PrintReview
         All findings.
     budget_s : float
-        Processor time for the prediction and for trying changes; at 0, advice that is stored is given [s].
+        Processor time for the prediction and for trying changes; at 0, advice that is stored is given [s]. None: none.
     predict : bool
         Also predict drawing and print, without which no change is tried.
     step : callable
@@ -238,8 +238,9 @@ def decision(
             reason = str(error)
     if made:
         reason = made.reason if made.status == "not predicted" else ""
-        step("changes")
-        advice = advised(design, made, budget_s, step, time.process_time() - start_s)
+        if budget_s is not None:
+            step("changes")
+            advice = advised(design, made, budget_s, step, time.process_time() - start_s)
     return Decision(
         **vars(report(design, held)), trial=made, reason=reason, advice=advice,
         turned_by=_turned_by(design, held.verdict),
@@ -346,11 +347,11 @@ def words_of(tried: Trial) -> str:
 
 
 def _force(numbers: Numbers, force_n: float) -> str:
-    return resolved(numbers.bench()[0], force_n, "cannot sense force", conditional=numbers.conditional)
+    return resolved(numbers.bench()[0], force_n, CANNOT_SENSE, conditional=numbers.conditional)
 
 
 def _place(numbers: Numbers, length_m: float) -> str:
-    return resolved(numbers.bench()[1], length_m, "cannot locate", conditional=numbers.conditional)
+    return resolved(numbers.bench()[1], length_m, CANNOT_LOCATE, conditional=numbers.conditional)
 
 
 def _words(bounds: Bounds | None) -> str:

@@ -13,6 +13,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
 from sensorgen.prediction.query import DEFAULT, Query
 from sensorgen.prediction.results import Prediction, on_bench, resolved
 from sensorgen.prediction.slices import PrintReview, SliceReport, reviewed
@@ -201,9 +202,9 @@ class Trial(Displayed):
         if isinstance(value, float):
             value = Bounds.of(value, UNITS[name])
         if name.startswith("position"):
-            return resolved(value, self.length_m, "cannot locate")
+            return resolved(value, self.length_m, CANNOT_LOCATE)
         if name in ("force_resolution", "force_calibrated"):
-            return resolved(value, self.force_n, "cannot sense force")
+            return resolved(value, self.force_n, CANNOT_SENSE)
         return value.words() if value else "–"
 
 

@@ -13,6 +13,7 @@ from sensorgen.core.units import si
 Rows = tuple[tuple[float | None, ...], ...]
 Real = float | NDArray[np.float64]
 FORCE_SHARE = 0.1  # force is sensed where its standard error is a tenth of it
+CANNOT_SENSE, CANNOT_LOCATE = "cannot sense force", "cannot locate"
 GUESS = 12**-0.5  # standard deviation of a uniform distribution, relative to its range [-]
 SHOWN = 7  # frequencies; of more, those with most information on position
 
@@ -309,13 +310,13 @@ class Identifiability(StandardErrors):
 
 
 def _sensed(error_n: float | None, most_n: float) -> str:
-    """A standard error of force; what the sensor cannot do where it exceeds the force [N]."""
-    return newtons(error_n) if error_n is None or error_n <= abs(most_n) else "cannot sense force"
+    """A standard error of force; what the sensor cannot do where it is that of no reading [N]."""
+    return newtons(error_n) if error_n is None or error_n < GUESS * abs(most_n) else CANNOT_SENSE
 
 
 def _located(error_m: float | None, length_m: float) -> str:
-    """A standard error of position; what the sensor cannot do where it exceeds the sensor's length [m]."""
-    return metres(error_m) if error_m is None or error_m <= length_m else "cannot locate"
+    """A standard error of position; what the sensor cannot do where it is that of no reading [m]."""
+    return metres(error_m) if error_m is None or error_m < GUESS * length_m else CANNOT_LOCATE
 
 
 def _percent(share: float | None) -> float | None:

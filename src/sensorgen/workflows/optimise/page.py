@@ -18,18 +18,21 @@ def page(found: Optimised) -> str:
         ("evaluated", GREY, [c for c in found.designs if c.numbers and c.number not in front and not c.violated]),
         ("violates a constraint", "#cc79a7", [c for c in found.designs if c.numbers and c.violated]),
     )
+    blind = sum(not all(c.senses(k) for k in (across, up)) for c in found.designs)
     curves = tuple(_points(name, colour, some, across, up) for name, colour, some in groups if _known(some, across, up))
     panel = Panel(curves, Axis(across, log=True), Axis(up, log=True))
     alt = f"Evaluated designs by {across} and {up}, with what the models leave open of {across}."
     figures = [Figure("front", f"{across} and {up} as printed", alt, {"": (panel,)})] if curves else []
     return pages.render(
-        "sensorgen.workflows.optimise", "optimised.html", figures, title=f"Best designs: {found.name}", words=(),
+        "sensorgen.workflows.optimise", "optimised.html", figures, title=f"Best designs: {found.name}",
+        words=(f"{blind} designs that cannot sense force or cannot locate are in the table alone",) * (blind > 0),
         content=html(found.document()),
     )  # fmt: skip
 
 
 def _known(some: list[Chosen], *keys: str) -> list[Chosen]:
-    return [c for c in some if all(k in c.numbers and c.numbers[k].value > 0 for k in keys)]
+    """Designs with a number for both axes: one that cannot locate has none."""
+    return [c for c in some if all(k in c.numbers and c.numbers[k].value > 0 and c.senses(k) for k in keys)]
 
 
 def _points(name: str, colour: str, some: list[Chosen], across: str, up: str) -> Curve:

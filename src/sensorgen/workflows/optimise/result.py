@@ -9,6 +9,7 @@ from sensorgen.core.bounds import Bounds
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Cell, Column, Part, Table, comma_separated, shown
 from sensorgen.core.findings import Verdict
+from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
 from sensorgen.workflows.optimise.search import Row, Searched
 from sensorgen.workflows.optimise.target import NUMBERS, Target
 from sensorgen.workflows.optimise.ties import RULE, tied
@@ -75,13 +76,17 @@ class Chosen:
     tied: tuple[int, ...] = ()
     uninformed: dict[str, float] = field(default_factory=dict)
 
+    def senses(self, name: str) -> bool:
+        """False for an error that is that of no reading."""
+        return name not in self.numbers or not isinstance(self.cell(name), str)
+
     def cell(self, name: str, value: float | None = None) -> Cell:
         """A number, or another value of it, for people: what is not sensed where an error holds no information."""
         if value is None:
             value = self.numbers[name].value if name in self.numbers else None
         if value is None or value < self.uninformed.get(name, inf):
             return value
-        return "cannot locate" if name.startswith("position") else "cannot sense force"
+        return CANNOT_LOCATE if name.startswith("position") else CANNOT_SENSE
 
 
 @dataclass(frozen=True)
