@@ -104,16 +104,18 @@ def compensated(
 
 
 def printed_of(design: "Design") -> "Printed | None":
-    """The print of a design, with its layers, by the options; an estimate without any; None for the drawing."""
+    """The print of a design, with its layers, by the options; as of ``default_body`` without; None for the drawing."""
     from sensorgen.asprinted.printed import body
-    from sensorgen.prediction.bodies import registered
+    from sensorgen.prediction.bodies import registered, toolpath
 
-    option, value = click.get_current_context().meta.get(_BODY, ("--walls", design.walls))
+    option, value = click.get_current_context().meta.get(_BODY, ("", ""))
+    if not option and (path := toolpath(design)):
+        option, value = "--gcode", str(path)
     if option == "--drawn":
         return None
     if option == "--gcode":
         return registered(design, Path(value))
-    return _slice(value, design)[0] if option == "--slicer" else body(design, walls=value)
+    return _slice(value, design)[0] if option == "--slicer" else body(design, walls=value or design.walls)
 
 
 def _sliced(slicer: str, design: "Design", program: str = "") -> "Body":
