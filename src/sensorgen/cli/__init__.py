@@ -25,6 +25,7 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
         "optimise": "Find the best printable designs for a target.",
         "slice": "Write printer-ready G-code, by a real slicer.",
         "gcode": "Check G-code before the printer does.",
+        "export": "Write the printed body as 3MF, STEP, STL or voxels.",
         "show": "Show a design as one page: 3D, section, layers, numbers.",
         "draw": "Draw the cross-section, its layers and findings, as SVG.",
     },
