@@ -8,10 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from functools import partial
-from ipaddress import ip_address
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
-from urllib.parse import urlsplit
 
 from sensorgen.core.errors import BadInput, NotInstalled, SensorgenError
 from sensorgen.core.leash import end_with_parent
@@ -358,6 +356,9 @@ def gone(address: str) -> SensorgenError:
 
 def _check_private(address: str) -> None:
     """Refuse a scheduler on a network without TLS: whoever reaches the line runs code here and on the workers."""
+    from ipaddress import ip_address
+    from urllib.parse import urlsplit
+
     url = urlsplit(address if "://" in address else f"tcp://{address}")
     here = url.scheme == "inproc" or url.hostname == "localhost"
     with suppress(ValueError):

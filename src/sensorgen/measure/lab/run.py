@@ -212,11 +212,8 @@ def run(
     plan = planned(experiment, log)
     if next_press is None and any(part.kind == "next" for part in experiment.plan):
         raise BadInput("plan: a part 'next' needs a model of the specimen; expected other parts here")
-    if watchdog and not isinstance(rig.actuator, SelfLifting) and experiment.limits.force_n > UNWATCHED_N:
-        raise BadInput(
-            f"limits.force_n: {experiment.limits.force_n:g} N, and this actuator has no watchdog: if run and guardian "
-            f"end together, the tip stays down; expected up to {UNWATCHED_N:g} N, or --no-watchdog"
-        )
+    if watchdog:
+        _check_watchdog(experiment, rig)
     recorder.recover(log, clock)
     folder = resume or recorder.new_folder(log.path)
     with ExitStack() as stack:
@@ -227,6 +224,15 @@ def run(
         if view:
             controls.add(view.commands)
         return attempt.result(view, controls, guardian, predicted)
+
+
+def _check_watchdog(experiment: Experiment, rig: Rig) -> None:
+    """Refuse forces that would stay on the specimen if run and guardian ended together."""
+    if not isinstance(rig.actuator, SelfLifting) and experiment.limits.force_n > UNWATCHED_N:
+        raise BadInput(
+            f"limits.force_n: {experiment.limits.force_n:g} N, and this actuator has no watchdog: if run and guardian "
+            f"end together, the tip stays down; expected up to {UNWATCHED_N:g} N, or --no-watchdog"
+        )
 
 
 class _Attempt:

@@ -217,7 +217,7 @@ class Actuator:
         self._set((_MODE, _HOME), (_CONTROL, _READY), (_CONTROL, _ON), (_CONTROL, _BEGIN))
         self._state.on = True
         if self._watch_s:
-            self._set((_WATCHES, 0), (_TIMER, self._timer))
+            self._set((_WATCHES, 0), (_TIMER, round(1000 * self._watch_s)))
             self._configure([(_VECTOR, _MACRO_NUMBER), (_WATCHES, 1)])
             self._fed_s = self._clock.now()
 
@@ -287,16 +287,11 @@ class Actuator:
             self._home(status, time_s)
         return Extension(time_s, self._force(units, count), self._position(count))
 
-    @property
-    def _timer(self) -> int:
-        """Time of the watchdog, as its timer counts [ms]."""
-        return round(1000 * self._watch_s)
-
     def _feed(self, now: float) -> None:
         """Set the watchdog's timer again; DeviceFault where it has lifted the piston."""
         if not self._watch_s or not self._state.on or now - self._fed_s < self._watch_s / _FEEDS:
             return
-        self._set((_TIMER, self._timer))
+        self._set((_TIMER, round(1000 * self._watch_s)))
         if not self._ask(_WATCHES)[0]:
             seconds, self._watch_s = self._watch_s, 0.0
             raise DeviceFault(f"actuator at {self._port.address}: its watchdog lifted it, unread for {seconds:g} s")

@@ -72,18 +72,23 @@ def connect(path: Path, *, create: bool) -> sqlite3.Connection:
                 raise BadInput(f"no log at {str(path)!r}: log something first, or name another with --log")
             _create(path)
         _check_header(path)
-        own = {"effective_ids": True} if os.access in os.supports_effective_ids else {}
-        # without write permission and without a write-ahead log beside it, the file cannot change while it is read
-        writable = os.access(path.parent, os.W_OK, **own) or Path(f"{path}-wal").exists()
-        try:
-            return _opened(path, "mode=rw" if writable else "immutable=1")
-        except sqlite3.Error as error:
-            if not writable or _code(error) not in _UNWRITABLE:
-                raise
-        wal = Path(f"{path}-wal")  # a full disk has no room for the index of the write-ahead log, which memory has
-        if wal.exists() and wal.stat().st_size:
-            return _opened(path, "mode=rw", "locking_mode = EXCLUSIVE")
-        return _opened(path, "immutable=1")
+        return _opened_as_possible(path)
+
+
+def _opened_as_possible(path: Path) -> sqlite3.Connection:
+    """Connection to read and write, or only to read where the folder is not writable or the disk is full."""
+    own = {"effective_ids": True} if os.access in os.supports_effective_ids else {}
+    wal = Path(f"{path}-wal")
+    # without write permission and without a write-ahead log beside it, the file cannot change while it is read
+    writable = os.access(path.parent, os.W_OK, **own) or wal.exists()
+    try:
+        return _opened(path, "mode=rw" if writable else "immutable=1")
+    except sqlite3.Error as error:
+        if not writable or _code(error) not in _UNWRITABLE:
+            raise
+    if wal.exists() and wal.stat().st_size:  # its index, for which a full disk has no room, is kept in memory
+        return _opened(path, "mode=rw", "locking_mode = EXCLUSIVE")
+    return _opened(path, "immutable=1")
 
 
 def _opened(path: Path, mode: str, *pragmas: str) -> sqlite3.Connection:
