@@ -1,4 +1,4 @@
-"""Which conductors belong to an electrode: those that touch it, whatever they are called; others float.
+"""Conductors of an electrode: those that touch it, whatever they are called; others float.
 
 An electrode is the largest connected piece of the bodies that are drawn with its terminal. Pieces that share a face, an
 edge or a corner touch.
@@ -33,7 +33,7 @@ class Short:
     place_mm: tuple[float, float, float]
 
     def words(self) -> str:
-        """What touches, and where."""
+        """Names of what touches, and the place."""
         x, y, z = self.place_mm
         return f"{' and '.join(dict.fromkeys(self.bodies))} touch at x {x:.3g}, y {y:.3g}, z {z:.3g} mm"
 
@@ -111,7 +111,7 @@ class Connected:
     floating: int = 0
 
     def remarks(self) -> tuple[str, ...]:
-        """What differs from two electrodes apart, in words."""
+        """Differences from two electrodes apart, in words."""
         one = "a piece of conductor touches no electrode"
         many = f"{self.floating} pieces of conductor touch no electrode"
         said = [] if not self.floating else [f"{one if self.floating == 1 else many}: solved as floating"]

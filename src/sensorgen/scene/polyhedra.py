@@ -87,17 +87,17 @@ class Polyhedron:
         return sum(flux) / 6
 
     def is_box(self) -> bool:
-        """Whether its six faces are square to the axes."""
+        """True for a box with six faces square to the axes."""
         sides = [high - low for low, high in map(self.span, AXES)]
         whole = sides[0] * sides[1] * sides[2]
         return whole > 0 and abs(self.volume_mm3() - whole) < 1e-12 * whole
 
     def is_round(self) -> bool:
-        """Whether it has curved faces, of which cuts and meshes have the chords."""
+        """True for curved faces, of which cuts and meshes have the chords."""
         return False
 
     def is_constant(self, axis: str) -> bool:  # noqa: ARG002
-        """Whether all its cuts square to an axis are the same."""
+        """True where all cuts square to an axis are the same."""
         return self.is_box()
 
     def levels_mm(self) -> set[float]:
@@ -239,15 +239,15 @@ class Loft:
         return (high - low) * (first + 4 * middle + last) / 6
 
     def is_box(self) -> bool:
-        """Whether its six faces are square to the axes."""
+        """True for a box with six faces square to the axes."""
         return self.lower == self.upper and is_rectangle(self.lower)
 
     def is_round(self) -> bool:
-        """Whether it has curved faces, of which cuts and meshes have the chords."""
+        """True for curved faces, of which cuts and meshes have the chords."""
         return False
 
     def is_constant(self, axis: str) -> bool:
-        """Whether all its cuts square to an axis are the same."""
+        """True where all cuts square to an axis are the same."""
         return self.is_box() or (axis == "z" and self.lower == self.upper)
 
     def levels_mm(self) -> set[float]:

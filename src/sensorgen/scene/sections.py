@@ -85,7 +85,7 @@ def _sections(scene: Scene, normal: str) -> list[Section]:
 
 
 def _seen(piece: Piece, normal: str) -> tuple[Point, ...]:
-    """What of a piece a section square to ``normal`` shows: the same for every place inside it."""
+    """Part of a piece that a section square to ``normal`` shows: the same for every place inside it."""
     if isinstance(piece, Prism) and piece.axis == normal:
         return piece.outline
     return tuple(piece.span(axis) for axis in PLANE[normal])

@@ -1,4 +1,4 @@
-"""What to draw of a scene: the cross-sections that show most, their period, and sizes worth a dimension line.
+"""Contents of a drawing: the cross-sections that show most, their period, and sizes worth a dimension line.
 
 Numbers only; nothing here knows of paper.
 """
@@ -42,7 +42,7 @@ class View:
 
     @cached_property
     def regions(self) -> list[Region]:
-        """What is cut, as far as it is looked at."""
+        """Cut bodies, as far as the view reaches."""
         found = []
         for body, outline in self.section.regions:
             along = [u for u, _ in outline]
@@ -114,7 +114,7 @@ def period(row: Sequence[Column]) -> tuple[float, ...]:
 
 
 def _alike(a: Column, b: Column) -> bool:
-    """Whether two columns have the same bodies, width and heights."""
+    """True where two columns have the same bodies, width and heights."""
     (bodies, sizes), (others, beside) = (
         (
             [layer.body.name for layer in column.layers],
@@ -139,7 +139,7 @@ class Measure:
         return self.high_mm - self.low_mm
 
     def same(self, other: "Measure") -> bool:
-        """Whether both have the same ends."""
+        """True where both have the same ends."""
         return abs(self.low_mm - other.low_mm) + abs(self.high_mm - other.high_mm) < SAME_MM
 
 

@@ -164,7 +164,7 @@ class _Object:
 
 @dataclass
 class _Model:
-    """What the model files of a 3MF hold; keys are file and number."""
+    """Contents of the model files of a 3MF; keys are file and number."""
 
     unit: str = ""
     objects: dict[tuple[str, str], _Object] = field(default_factory=dict)

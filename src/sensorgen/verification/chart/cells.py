@@ -146,7 +146,7 @@ def point(
     scene: str, model: str, found: Interval, standard: Standard, seconds: float, *,
     wanted: float | None = None, bounded: bool = True,
 ) -> Point:  # fmt: skip
-    """What a model gave per area, compared with the reference."""
+    """Answer of a model per area, compared with the reference."""
     off = [abs(bound / standard.capacitance_f_per_m2 - 1) for bound in (found.lower, found.upper)]
     error = max(*off, standard.known_to)
     said = f"{found.lower:.9g} to {found.upper:.9g} F/m²" if bounded else f"{found.lower:.9g} F/m²"

@@ -71,7 +71,7 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], panels: int) ->
 
 
 def _depths(found: cells.Plane | Grid, size_mm: Real) -> float:
-    """How many of the cell, as deep as it was taken, make the sensor's depth [-]."""
+    """Number of cells, as deep as taken, in the sensor's depth [-]."""
     return found.depth_mm / float(size_mm[1]) if isinstance(found, cells.Plane) else 1.0
 
 

@@ -1,4 +1,4 @@
-"""What came of holding a number of the thesis against ours."""
+"""Verdicts on numbers of the thesis, by our own."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -62,7 +62,7 @@ class Part:
     limit: bool = False
 
     def off(self) -> float:
-        """How far the thesis is from ours, as a share of ours; by its sign more or less, where both are real [-]."""
+        """Difference of the thesis from ours, as a share of ours; by its sign more or less, where both are real [-]."""
         if self.printed is None:
             return 0.0
         if self.limit and self.ours <= self.printed:  # type: ignore[operator]
@@ -73,7 +73,7 @@ class Part:
         return self._distance(printed)
 
     def mended(self) -> float:
-        """How far the corrected value is from ours, as a share of it [-]."""
+        """Distance of the corrected value from ours, as a share of it [-]."""
         return np.inf if self.corrected is None else self._distance(np.asarray(self.corrected))
 
     def _distance(self, other: Numbers) -> float:
@@ -144,7 +144,7 @@ def compared(parts: Sequence[Part]) -> list[Part]:
 
 
 def digits(off: float) -> str:
-    """How many leading digits two numbers have in common, in words.
+    """Number of leading digits that two numbers have in common, in words.
 
     >>> digits(0.04), digits(2e-7), digits(1e-14)
     ('1 digit', '6 digits', '9 digits or more')
