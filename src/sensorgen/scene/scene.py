@@ -246,11 +246,17 @@ def seen_from_above(piece: Piece) -> Outline:
     ValueError
         It is neither: its outline changes with height.
     """
-    if isinstance(piece, Prism) and piece.axis == "z":
-        return piece.outline
-    if not piece.is_box():
+    if not piece.is_box() and not (isinstance(piece, Prism) and piece.axis == "z"):
         raise ValueError("its outline changes with height")
-    return rectangle(*piece.span("x"), *piece.span("y"))
+    return shadow(piece, "z")
+
+
+def shadow(piece: Piece, axis: str) -> Outline:
+    """Outline of a piece along an axis, in ``PLANE[axis]``: of a prism across the axis its rectangle [mm]."""
+    if isinstance(piece, Prism) and piece.axis == axis:
+        return piece.outline
+    first, second = PLANE[axis]
+    return rectangle(*piece.span(first), *piece.span(second))
 
 
 def content(piece: Piece) -> list[object]:

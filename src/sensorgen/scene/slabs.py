@@ -7,7 +7,7 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from sensorgen.scene.scene import SLIVER_MM, Body, Outline, Piece, Prism, Scene, area_mm2, rectangle, seen_from_above
+from sensorgen.scene.scene import SLIVER_MM, Body, Piece, Prism, Scene, area_mm2, seen_from_above, shadow
 
 if TYPE_CHECKING:  # a stored answer loads no numbers
     import shapely
@@ -76,17 +76,12 @@ def covered(scene: Scene, terminal: str) -> bool:
     """True where an electrode covers the whole plan of a scene, seen from above."""
     whole = _COVERS * scene.size_mm[0] * scene.size_mm[1]
     prisms = [p for b in scene.bodies if b.terminal == terminal for p in b.pieces if isinstance(p, Prism)]
-    if any(abs(area_mm2(_from_above(prism))) >= whole for prism in prisms):
+    if any(abs(area_mm2(shadow(prism, "z"))) >= whole for prism in prisms):
         return True
     import shapely
 
     own = [region for slab in slabs(scene) for body, region in slab.outer.items() if body.terminal == terminal]
     return bool(shapely.union_all(own).area >= whole)
-
-
-def _from_above(prism: Prism) -> Outline:
-    """Shadow of a prism in plan: a rectangle where it lies."""
-    return prism.outline if prism.axis == "z" else rectangle(*prism.span("x"), *prism.span("y"))
 
 
 def is_open(scene: Scene) -> bool:

@@ -10,11 +10,11 @@ from itertools import pairwise, permutations
 from math import hypot
 
 from sensorgen.scene.scene import AXES, SLIVER_MM, Body, Outline, Point, Scene, area_mm2, clipped
-from sensorgen.scene.sections import Column, Section, columns
+from sensorgen.scene.sections import Column, Section, alike, columns
 
 PLACES = 8  # places tried for a section: two periods of crossed strips change eight times
 PROBE = 64  # corners looked at for a period: enough for two repetitions of any pattern one would draw
-SAME_MM = 1e-6
+SAME_MM, SAME_DIGITS = 1e-6, 6
 MOST_LEVELS, MOST_COLUMNS, MOST_EXTENTS, MOST_PIECES = 9, 8, 3, 2  # measures of a view
 Region = tuple[Body, Outline]
 
@@ -53,9 +53,14 @@ class View:
         return found
 
     @cached_property
+    def cut(self) -> Section:
+        """The section as far as the view reaches."""
+        return replace(self.section, regions=tuple(self.regions))
+
+    @property
     def columns(self) -> list[Column]:
         """The columns that are looked at."""
-        return columns(replace(self.section, regions=tuple(self.regions)))
+        return columns(self.cut)
 
     @property
     def normal(self) -> str:
@@ -92,7 +97,7 @@ def _view(scene: Scene, across: str) -> View:
     extent = scene.size_mm[AXES.index(across)]
     corners = sorted({u for _, outline in section.regions for u, _ in outline})
     probe = View(section, extent, (), corners[min(PROBE, len(corners) - 1)])
-    return View(section, extent, period(probe.columns), probe.end_mm)
+    return View(section, extent, period(probe.cut), probe.end_mm)
 
 
 def _shown_mm2(section: Section) -> tuple[float, float]:
@@ -101,28 +106,17 @@ def _shown_mm2(section: Section) -> tuple[float, float]:
     return round(sum(area for area, terminal in areas if terminal), 6), round(sum(area for area, _ in areas), 6)
 
 
-def period(row: Sequence[Column]) -> tuple[float, ...]:
+def period(section: Section) -> tuple[float, ...]:
     """Edges of the columns of the first full period [mm]; empty where nothing repeats.
 
     The first and the last column may be the rest of one, where the outline cuts through the pattern.
     """
+    row = list(zip(columns(section), alike(section, SAME_DIGITS), strict=True))
     for inner in (row, row[:-1], row[1:-1]):
         for n in range(1, min(2 * len(inner) // 3, len(inner) - 2) + 1):  # two columns at least must come again
-            if all(_alike(a, b) for a, b in zip(inner, inner[n:], strict=False)):
-                return tuple(c.left_mm for c in inner[: n + 1])
+            if all(a == b for (_, a), (_, b) in zip(inner, inner[n:], strict=False)):
+                return tuple(column.left_mm for column, _ in inner[: n + 1])
     return ()
-
-
-def _alike(a: Column, b: Column) -> bool:
-    """True where two columns have the same bodies, width and heights."""
-    (bodies, sizes), (others, beside) = (
-        (
-            [layer.body.name for layer in column.layers],
-            [column.right_mm - column.left_mm, *(z for layer in column.layers for z in layer.bottom_mm + layer.top_mm)],
-        )
-        for column in (a, b)
-    )
-    return bodies == others and all(abs(p - q) < SAME_MM for p, q in zip(sizes, beside, strict=True))
 
 
 @dataclass(frozen=True)
