@@ -175,7 +175,7 @@ def heights(views: Sequence[View], height_mm: float) -> list[list[Measure]]:
 
 def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
     """Horizontal measures in rows from the sensor outwards: those above the view, and those below it."""
-    middle = max(z for _, outline in view.regions for _, z in outline) / 2
+    middle = _reach(view, None, max) / 2
     columns = [*(column.left_mm for column in view.columns), view.columns[-1].right_mm]  # where nothing repeats
     edges = [u for u in view.period_mm or columns if u <= view.end_mm + SAME_MM]
     lowest = [_reach(view, u, min) for u in edges]
@@ -185,17 +185,21 @@ def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
     chain = chain if 1 < len(chain) <= MOST_COLUMNS else []
     repeats = view.period_mm and len(edges) == len(view.period_mm)  # the view shows all of a period
     whole = [Measure(edges[0], edges[-1], (reach[0], reach[-1]))] if repeats else []
-    sides = (side for _, outline in view.regions for side in _sides(outline))
-    flats = sorted((min(a[0], b[0]), max(a[0], b[0]), a[1]) for a, b in sides if a[1] == b[1])
-    flats = [flat for flat in flats if flat[0] > SAME_MM and flat[1] < view.end_mm - SAME_MM]
     known = [*chain, *whole, Measure(0.0, view.end_mm)]
-    pieces = _new((Measure(low, high, (z, z)) for low, high, z in flats), known, by_value=True)[:MOST_PIECES]
+    pieces = _new(_flats(view), known, by_value=True)[:MOST_PIECES]
     rows: tuple[list[list[Measure]], list[list[Measure]]] = ([], [])
     rows[not above].append(chain)
     for measure in pieces:
         rows[measure.ends_mm[0] <= middle].append([measure])
     rows[not above].append(whole)
     return [row for row in rows[0] if row], [row for row in rows[1] if row]
+
+
+def _flats(view: View) -> list[Measure]:
+    """Level edges that the view's ends do not cut, from left to right."""
+    sides = (side for _, outline in view.regions for side in _sides(outline))
+    flats = sorted((min(a[0], b[0]), max(a[0], b[0]), a[1]) for a, b in sides if a[1] == b[1])
+    return [Measure(low, high, (z, z)) for low, high, z in flats if low > SAME_MM and high < view.end_mm - SAME_MM]
 
 
 def nearest(view: View) -> Gap | None:
@@ -238,9 +242,10 @@ def _extents(view: View) -> Iterator[Point]:
     return ((min(zs), max(zs)) for zs in by_body.values())
 
 
-def _reach(view: View, at_mm: float, end: Callable[..., float]) -> float:
-    """Height of the lowest or the highest corner at one place of the section [mm]."""
-    return end((z for _, outline in view.regions for u, z in outline if abs(u - at_mm) < SAME_MM), default=0.0)
+def _reach(view: View, at_mm: float | None, end: Callable[..., float]) -> float:
+    """Height of the lowest or the highest corner at one place of the section, or at all [mm]."""
+    corners = (corner for _, outline in view.regions for corner in outline)
+    return end((z for u, z in corners if at_mm is None or abs(u - at_mm) < SAME_MM), default=0.0)
 
 
 def _new(measures: Iterable[Measure], known: Sequence[Measure], by_value: bool = False) -> list[Measure]:
