@@ -134,7 +134,7 @@ def test_textbook_scenes_are_met():
 
     def off(case):
         found = fem2d.capacitance(case.scene, exact.PERMITTIVITY, 1e-5).middle()
-        return abs(found / (case.capacitance_f_per_m * 1e-3) - 1)
+        return abs(found / (case.capacitance_f_per_m2 * case.scene.size_mm[0] * 1e-6) - 1)
 
     for case in (exact.stripline(), exact.interdigital()):
         assert off(case) < 1e-6

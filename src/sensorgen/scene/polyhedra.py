@@ -1,6 +1,6 @@
 """Bodies with flat faces: closed triangle meshes, and lofts between outlines at two heights."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import hypot, inf, isfinite
@@ -87,17 +87,17 @@ class Polyhedron:
         return sum(flux) / 6
 
     def is_box(self) -> bool:
-        """Whether its six faces are square to the axes."""
+        """True for a box with six faces square to the axes."""
         sides = [high - low for low, high in map(self.span, AXES)]
         whole = sides[0] * sides[1] * sides[2]
         return whole > 0 and abs(self.volume_mm3() - whole) < 1e-12 * whole
 
     def is_round(self) -> bool:
-        """Whether it has curved faces, of which cuts and meshes have the chords."""
+        """True for curved faces, of which cuts and meshes have the chords."""
         return False
 
     def is_constant(self, axis: str) -> bool:  # noqa: ARG002
-        """Whether all its cuts square to an axis are the same."""
+        """True where all cuts square to an axis are the same."""
         return self.is_box()
 
     def levels_mm(self) -> set[float]:
@@ -117,17 +117,15 @@ class Polyhedron:
                 down = next((b, a) for a, b in sides if below[b] and not below[a])
                 # (x, z) is left-handed: seen against y, triangles run the other way round
                 after[up if axis == "y" else down] = down if axis == "y" else up
-        loops = []
-        while after:
-            start, place = next(iter(after)), None
-            loop, place = [], start
-            while place in after:
-                a, b = (self.vertices[number] for number in place)
-                share = (at_mm - a[across]) / (b[across] - a[across])
-                u, v = (rounded(a[k] + share * (b[k] - a[k])) for k in (first, second))
-                loop.append((u, v))
-                place = after.pop(place)
-            loops.append(without_straight(loop))
+
+        def crossing(edge: tuple[int, int]) -> Point:
+            a, b = (self.vertices[number] for number in edge)
+            share = (at_mm - a[across]) / (b[across] - a[across])
+            return rounded(a[first] + share * (b[first] - a[first])), rounded(
+                a[second] + share * (b[second] - a[second])
+            )
+
+        loops = [without_straight([crossing(edge) for edge in ring]) for ring in _rings(after)]
         return _without_holes([loop for loop in loops if len(loop) > 2 and abs(area_mm2(loop)) > SLIVER_MM**2])
 
     def turned_over(self, size_mm: Place) -> "Polyhedron":
@@ -138,6 +136,16 @@ class Polyhedron:
     def stretched(self, factor: float) -> "Polyhedron":
         """It scaled in x and y."""
         return replace(self, vertices=tuple((rounded(x * factor), rounded(y * factor), z) for x, y, z in self.vertices))
+
+
+def _rings(after: dict[tuple[int, int], tuple[int, int]]) -> Iterator[list[tuple[int, int]]]:
+    """Rings of edges, each with its follower; ``after`` is emptied."""
+    while after:
+        ring, place = [], next(iter(after))
+        while place in after:
+            ring.append(place)
+            place = after.pop(place)
+        yield ring
 
 
 def between(corners: Sequence[Place], low_mm: float, high_mm: float) -> Sequence[Place]:
@@ -239,15 +247,15 @@ class Loft:
         return (high - low) * (first + 4 * middle + last) / 6
 
     def is_box(self) -> bool:
-        """Whether its six faces are square to the axes."""
+        """True for a box with six faces square to the axes."""
         return self.lower == self.upper and is_rectangle(self.lower)
 
     def is_round(self) -> bool:
-        """Whether it has curved faces, of which cuts and meshes have the chords."""
+        """True for curved faces, of which cuts and meshes have the chords."""
         return False
 
     def is_constant(self, axis: str) -> bool:
-        """Whether all its cuts square to an axis are the same."""
+        """True where all cuts square to an axis are the same."""
         return self.is_box() or (axis == "z" and self.lower == self.upper)
 
     def levels_mm(self) -> set[float]:

@@ -90,7 +90,7 @@ def _prisms(mesh: Mesh, axis: str, near_mm: float) -> tuple[Prism, ...]:
 
 
 def _region(mesh: Mesh, faces: Sequence[int], plane: Sequence[int], near_mm: float) -> shapely.Geometry:
-    """What level faces cover, by the edges that only one of them has."""
+    """Region that level faces cover, by the edges that only one of them has."""
     edges = mesh.edges().reshape(-1, 3, 2)[faces].reshape(-1, 2)
     _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
     border = edges[first[count == 1]]

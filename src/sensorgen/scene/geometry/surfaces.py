@@ -28,7 +28,7 @@ _NOTHING = 1e-9  # volume over surface and size below which a surface encloses n
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong with a surface, and cannot be put right.
+    """Fault of a surface that cannot be put right.
 
     Attributes
     ----------

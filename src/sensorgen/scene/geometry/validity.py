@@ -61,17 +61,17 @@ def _box_mm(body: Body) -> list[float]:
 
 
 def _rounding_mm3(body: Body, solid: "manifold3d.Manifold") -> float:
-    """How far the volume of a mesh may be from the exact one: rounding, and chords in place of arcs [mm3]."""
+    """Largest difference of a mesh's volume from the exact one: rounding, and chords in place of arcs [mm3]."""
     return 1e-9 * body.volume_mm3() + _off_mm(body) * float(solid.surface_area())
 
 
 def _off_mm(body: Body) -> float:
-    """How far a mesh may be from the surface [mm]."""
+    """Largest distance of a mesh from the surface [mm]."""
     return CHORD_MM if any(p.is_round() for p in body.pieces) else 0.0
 
 
 def _are_apart(scene: Scene) -> bool:
-    """Whether the cross-sections show that no bodies overlap; solids take ten times longer to intersect."""
+    """True where cross-sections show that no bodies overlap; solids take ten times longer to intersect."""
     try:
         sections(scene)
     except ValueError:
@@ -80,7 +80,7 @@ def _are_apart(scene: Scene) -> bool:
 
 
 def _two_manifold(mesh: Mesh) -> bool:
-    """Whether every edge has one triangle on each side; manifold3d takes a seam with four and parts it."""
+    """True where every edge has one triangle on each side; manifold3d takes a seam with four and parts it."""
     ends = mesh.edges()
     there, back = (np.sort(ends @ way) for way in ([1, len(mesh.vertices_mm)], [len(mesh.vertices_mm), 1]))
     return bool(np.all(np.diff(there) > 0) and np.array_equal(there, back))
@@ -98,7 +98,7 @@ def _self_overlap_mm3(mesh: Mesh, solid: "manifold3d.Manifold") -> float:
 
 
 def _shells_are_apart(mesh: Mesh) -> bool:
-    """Whether the boxes around its shells share faces at most: a thousandth of the time to take it apart."""
+    """True where the boxes around its shells share faces at most: a thousandth of the time to take it apart."""
     from sensorgen.scene.connections import groups
 
     label = groups(len(mesh.vertices_mm), *mesh.edges().T)

@@ -1,4 +1,4 @@
-"""What is asked of a design: models, other programs, and their references."""
+"""Quantities of a design: models and other programs that give them, and their references."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -52,7 +52,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Reference:
-    """What answers are compared with.
+    """Value that answers are compared with.
 
     Attributes
     ----------
@@ -188,7 +188,7 @@ def _compression(body: Body, stress_pa: float) -> Question:
 
 
 def _published(body: Body, case: mesh_ladder.Case, stress_pa: float) -> tuple[Reference, ...]:
-    """What two other programs found for this very cell under this pressure, if they were asked."""
+    """Published answers of two other programs for this very cell under this pressure, if there are any."""
     from sensorgen.verification.chart import presses
 
     for known in presses.CELLS.values():

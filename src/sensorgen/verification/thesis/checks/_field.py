@@ -58,7 +58,7 @@ class Smooth:
         self._terms: NDArray[Any] = np.linalg.solve(chebyshev.chebvander(places, _DEGREE), values)
 
     def at(self, x_m: ArrayLike, order: int = 0) -> Complex:
-        """Its value, or a derivative of it, per metre to the power of the order."""
+        """Value of the field, or a derivative of it, per metre to the power of the order."""
         terms = chebyshev.chebder(self._terms, order) * (2 / LENGTH_M) ** order
         return np.asarray(chebyshev.chebval(2 * np.asarray(x_m) / LENGTH_M - 1, terms))
 

@@ -41,7 +41,7 @@ def _rise(field: Callable[[NDArray[np.float64]], NDArray[np.complex128]]) -> NDA
 
 
 def _in_time(phasor: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """What a phasor is an eighth of a period later."""
+    """Value of a phasor an eighth of a period later."""
     return np.real(phasor * np.exp(1j * np.pi / 4))
 
 
