@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sensorgen.core.bounds import Interval
 from sensorgen.design.design import make
 
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
@@ -140,3 +141,20 @@ def test_an_error_is_unknown_where_the_coarser_mesh_ends(monkeypatch):
     assert np.isfinite(found.rise_error_f_per_m2[:2]).all()
     assert np.isinf(found.rise_error_f_per_m2[2])
     assert np.isinf(found.relative()).all()
+
+
+def test_an_error_of_second_order_is_stated_a_quarter_larger(monkeypatch):
+    """Roache's index, of values that a mesh of size h has 0.2 h^2 too large."""
+
+    def solved(case, stress_pa, level=0, **more):
+        load, nothing = np.array(stress_pa) / 1e4, np.zeros(len(stress_pa))
+        too_large = 1 + 0.2 * {-1: 1.5, 0: 1.0}[level] ** 2
+        bounds = tuple(Interval(c, c) for c in (2e-7 + 1e-9 * too_large * load).tolist())
+        return pressed.Pressed(
+            np.array(stress_pa), 1e-6 * too_large * load, bounds, (), 1 + nothing, nothing, nothing, 0.0, ()
+        )
+
+    monkeypatch.setattr(mesh_ladder, "pressed", solved)
+    found = estimated(0, [0.0, 1e4, 2e4])
+    assert found.displacement_error_m == pytest.approx([0.0, 0.25e-6, 0.5e-6])
+    assert found.rise_error_f_per_m2 == pytest.approx([0.0, 0.25e-9, 0.5e-9], rel=1e-6, abs=0)
