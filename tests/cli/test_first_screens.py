@@ -3,8 +3,6 @@
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
-
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.document import text
 from sensorgen.design.design import make
@@ -12,8 +10,6 @@ from sensorgen.prediction.results import SCHEMA, Prediction
 from sensorgen.prediction.sweep import Sweep
 from sensorgen.prediction.swept_prediction import PredictedPoint
 from sensorgen.workflows.build import build
-
-SMALL = ("tri", "--dielectric", "0.2", "--length", "10")
 
 
 def fits(out):
@@ -43,14 +39,16 @@ def test_verdict_and_numbers_come_before_any_file(tmp_path):
 
 
 def test_no_change_is_tried_unless_that_is_asked_for(run, monkeypatch):
-    monkeypatch.setattr("sensorgen.workflows.decision.advised", lambda *_: pytest.fail("changes were tried"))
-    assert run("build", "reference", "--dielectric", "0.1", "--length", "10", "--no-cad").code == 0
-    assert "changes were tried" in str(run("build", "reference", "--dielectric", "0.1", "--no-cad", "--advise").err)
+    tried = []
+    monkeypatch.setattr("sensorgen.workflows.decision.advised", lambda *_: tried.append("changes"))
+    words = ("build", "reference", "--dielectric", "0.1", "--length", "10", "--no-cad")
+    assert (run(*words).code, tried) == (0, [])
+    assert (run(*words, "--advise").code, tried) == (0, ["changes"])
 
 
 def test_an_output_of_build_is_a_folder_or_an_error(run):
     assert run("build", "reference", "--length", "10", "--no-cad", "-o", "made").code == 0
-    assert (Path("made") / "reference" / "check.json").is_file() or any(Path("made").glob("*/check.json"))
+    assert len(list(Path("made").glob("*/check.json"))) == 1
     Path("file").write_text("")
     said = run("build", "reference", "--length", "10", "--no-cad", "-o", "file")
     assert (said.code, Path("file").read_text()) == (2, "")
