@@ -6,7 +6,7 @@ READY = $(VENV)/.ready
 READY_DEV = $(VENV)/.ready-dev
 unexport PYTHONDONTWRITEBYTECODE  # without bytecode, each of the thousand processes of the tests compiles what it imports
 
-.PHONY: help demo test nightly lint docs site words size bench clean attack mutants lowest pythons wheel hashes sbom
+.PHONY: help demo test nightly lint docs site words size bench clean attack mutants lowest pythons wheel hashes sbom audit
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 8
@@ -26,7 +26,7 @@ nightly: $(READY_DEV) ## the tests that guard more of the same, kills and attack
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "nightly and not kernel" $(ARGS)
 	$(BIN)/python -m pytest -m "nightly and kernel" tests/geometry $(ARGS)
 	$(BIN)/python bench/coverage.py
-	$(MAKE) attack
+	$(MAKE) attack sbom audit
 
 lint: $(READY_DEV) ## style, types, which module may import which, and the lines of budget.tsv
 	$(BIN)/ruff format --check src tests bench docs scripts
@@ -56,6 +56,7 @@ bench: $(READY_DEV) ## measure speed, memory and accuracy; write bench/results
 attack: $(READY_DEV) ## feed 10 000 damaged files of each kind to every reader, in 2 GB; takes hours
 	$(BIN)/python tests/attacks/fuzz.py $(ARGS)
 	SENSORGEN_ATTACK=1 $(BIN)/python -m pytest -q tests/attacks/test_log.py
+	$(BIN)/python bench/attacks.py
 
 mutants: $(READY_DEV) ## plant 60 faults one at a time, run the tests that guard against each; write bench/results/mutants.md
 	$(BIN)/python scripts/mutants.py $(ARGS)
@@ -78,6 +79,10 @@ sbom: $(READY) ## write out/sbom.json, what is installed beside sensorgen and it
 	scripts/clean-environment --tools "$(PYTHON)"
 	mkdir -p out
 	out/tools/bin/cyclonedx-py environment --output-reproducible --of JSON -o out/sbom.json $(BIN)/python
+
+audit: ## look for advisories on every version in constraints.txt (pip-audit, answers cached in out/audit); what it cannot look up fails
+	scripts/clean-environment --tools "$(PYTHON)"
+	out/tools/bin/pip-audit --strict --disable-pip --no-deps -r constraints.txt --cache-dir out/audit --progress-spinner off
 
 clean: ## remove everything that is derived
 	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

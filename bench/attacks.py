@@ -16,6 +16,15 @@ KINDS = {
     "a stranger's shape before it is trusted": "tests/cli/test_packs.py -k strangers_folder",
     "a trusted shape leaves its process": "tests/attacks/test_shapes.py -k no_attack",
     "a trusted shape does what it must not": "tests/test_shape_files.py -k wrong_is_one_line",
+    "a log on a full or read-only file system": "tests/attacks/test_full_disk.py",
+    "a log whose bits flip, edited by SQL": "tests/log/test_chain.py -k edit_by_sql or bits_that_flip or rewrites",
+    "log or folder removed during a run": "tests/lab/test_removed.py",
+    "run and guardian ended together, computer asleep": "tests/lab/test_watchdog.py",
+    "a device of the rig fails": "tests/lab/test_faults.py",
+    "two machines correct one reading": "tests/log/test_sync.py -k correction",
+    "escapes, closed pipes, bytes that are no photo": "tests/cli/test_noise.py",
+    "text of strangers on the terminal": "tests/attacks/test_inputs_words.py",
+    "a cluster on a network without TLS": "tests/test_processes_dying.py -k network_needs_tls",
 }
 
 

@@ -31,10 +31,13 @@ HERE = Path(__file__).parent
 RESULTS, PICTURES = HERE / "results", HERE.parent / "docs" / "pictures"
 sys.path.insert(0, str(HERE.parent / "tests" / "models"))
 
+import line_abcd  # noqa: E402
+import line_closed  # noqa: E402
+import line_ladder  # noqa: E402
 from line_cases import PLATE, TONES, cases, exact, off  # noqa: E402
 
 from sensorgen.core.errors import OutOfRange  # noqa: E402
-from sensorgen.models import line, line_abcd, line_closed, line_ladder  # noqa: E402
+from sensorgen.models import line  # noqa: E402
 from sensorgen.solvers.line.inputs import PressedLine, read  # noqa: E402
 
 ROUNDS = 7

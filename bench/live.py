@@ -37,9 +37,9 @@ def lines(truth, folder, count=2000):
     return header, rows
 
 
-def timed(rate_hz, header, rows, environment):
-    """Answers per second, and seconds from row to answer: median and 95 %."""
-    command = [sys.executable, "-m", "sensorgen", "invert", "S1", "-"]
+def timed(rate_hz, header, rows, environment, *words):
+    """Answers per second, seconds from row to answer, median and 95 %, and share of rows that were answered."""
+    command = [sys.executable, "-m", "sensorgen", "invert", "S1", "-", *words]
     count = FIRST + int(min(rate_hz * SECONDS, 60_000))
     sent, answered = np.zeros(count), []
     pipe = subprocess.PIPE
@@ -47,27 +47,34 @@ def timed(rate_hz, header, rows, environment):
 
         def read():
             program.stdout.readline()
-            answered.extend(time.perf_counter() for _ in program.stdout)
+            answered.extend((time.perf_counter(), int(float(line.partition(b",")[0]))) for line in program.stdout)
 
         reader = threading.Thread(target=read)
         reader.start()
-        program.stdin.write(header + b"".join(rows[:FIRST]))
+        program.stdin.write(header + b"".join(numbered(rows, range(FIRST))))
         program.stdin.flush()
-        while len(answered) < FIRST:
+        while not answered or answered[-1][1] < FIRST - 1:
             time.sleep(0.01)
         start, at = time.perf_counter(), FIRST
         while at < count:
             due = min(count, FIRST + int((time.perf_counter() - start) * rate_hz) + 1)
             if due > at:
                 sent[at:due] = time.perf_counter()
-                program.stdin.write(b"".join(rows[k % len(rows)] for k in range(at, due)))
+                program.stdin.write(b"".join(numbered(rows, range(at, due))))
                 program.stdin.flush()
                 at = due
             time.sleep(0.0005)
         program.stdin.close()
         reader.join()
-    waits = np.array(answered)[FIRST:] - sent[FIRST:]
-    return (count - FIRST) / (answered[-1] - start), statistics.median(waits), float(np.quantile(waits, 0.95))
+    late = [(at, k) for at, k in answered if k >= FIRST]
+    waits = [at - sent[k] for at, k in late]
+    per_s = len(late) / (late[-1][0] - start)
+    return per_s, statistics.median(waits), float(np.quantile(waits, 0.95)), len(late) / (count - FIRST)
+
+
+def numbered(rows, numbers):
+    """Rows again and again, each with its number in place of its time."""
+    return (b"%d,%s" % (k, rows[k % len(rows)].partition(b",")[2]) for k in numbers)
 
 
 def main():
@@ -86,14 +93,20 @@ def main():
         header, rows = lines(truth, folder)
         table = []
         for rate in RATES_HZ:
-            per_s, median, late = timed(rate, header, rows, environment)
             said = f"{rate:,}" if rate < RATES_HZ[-1] else "as fast as they are taken"
-            table.append(f"| {said} | {per_s:,.0f} | {1e3 * median:.1f} | {1e3 * late:.1f} |")
-            print(table[-1], flush=True)
+            for word in ("", "--newest"):
+                per_s, median, late, share = timed(rate, header, rows, environment, *filter(None, [word]))
+                table.append(
+                    f"| {said} | {word} | {per_s:,.0f} | {share:.0%} | {1e3 * median:.1f} | {1e3 * late:.1f} |"
+                )
+                print(table[-1], flush=True)
     text = (
         "Live inversion of a calibrated specimen through a pipe: `sensorgen invert S1 -`, seven tones, noise 0.1 %, "
-        "one row in ten at rest.\n\n| rows/s sent | rows/s answered | wait, median [ms] | 95 % [ms] |\n"
-        "|---|---|---|---|\n" + "\n".join(table) + "\n"
+        "one row in ten at rest; the wait of those that were answered. "
+        f"Load of this computer: {os.getloadavg()[0]:.0f} on {os.cpu_count()} cores.\n\n"
+        "| rows/s sent | | rows/s answered | of all | wait, median [ms] | 95 % [ms] |\n|---|---|---|---|---|---|\n"
+        + "\n".join(table)
+        + "\n"
     )
     (Path(__file__).parent / "results" / "live.md").write_text(text)
 

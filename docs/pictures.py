@@ -6,11 +6,14 @@ from pathlib import Path
 import numpy as np
 from generate import DOCS, sensorgen
 from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from sensorgen.analysis.plots import sheet, static
 from sensorgen.analysis.plots.identifiability import figure
+from sensorgen.asprinted import printed as prints
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.design import make
+from sensorgen.export import slicing
 from sensorgen.models.sheet import Patch, Sheet, contact_sets, localise
 from sensorgen.models.stack import Body
 from sensorgen.prediction.bodies import drawn
@@ -18,6 +21,8 @@ from sensorgen.prediction.double_layer.designs import press_at, stacked
 from sensorgen.prediction.double_layer.touching import WIRINGS, Touching
 from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor
+from sensorgen.scene.geometry.layered import closed
+from sensorgen.scene.geometry.meshes import mesh
 
 PICTURES = DOCS / "pictures"
 SENSORS = {
@@ -94,6 +99,34 @@ def shapes() -> None:
     figure.savefig(PICTURES / "shapes.png", dpi=110)
 
 
+def printed_body() -> None:
+    """Cones of the top electrode, seen from the film: as drawn, and as PrusaSlicer's G-code prints them."""
+    design = make({"shape": "cone", "parameters": {"length_mm": 2.5, "width_mm": 2.5}})
+    with tempfile.TemporaryDirectory() as folder:
+        made = slicing.sliced([slicing.alone(design)], "prusa", Path(folder))
+        printed = prints.body(design, made.lines, slicer=f"PrusaSlicer {made.version}")
+    top = next(each for each in design.printed.bodies if each.terminal == "top")
+    shown = {"drawn": mesh(top), printed.provenance: closed(printed.first, [top.name])}
+    drawing = Figure(figsize=(9, 3.6), layout="constrained")
+    axes = drawing.subplots(1, 2, subplot_kw={"projection": "3d", "proj_type": "ortho"})
+    for each, (title, surface) in zip(axes, shown.items(), strict=True):
+        corners = (surface.vertices_mm * [1, -1, -1])[surface.triangles]  # turned over
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        plate = corners[..., 2].max(1) < corners[..., 2].min() + 0.31  # whose large triangles go behind
+        for rows, layer in ((plate, 1), (~plate, 2)):
+            seen = corners[rows & (normal @ (0.42, -0.73, 0.53) > 0)]
+            each.add_collection3d(
+                Poly3DCollection(seen, facecolors="#8a9bb0", shade=True, zorder=layer, antialiased=False)
+            )
+        each.computed_zorder = False
+        low, high = corners.min((0, 1)), corners.max((0, 1))
+        each.set(title=title, xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+        each.set_box_aspect((2.5, 2.5, 1.05), zoom=1.1)
+        each.view_init(32, -60)
+        each.set_axis_off()
+    drawing.savefig(PICTURES / "printed-body.png", dpi=110)
+
+
 if __name__ == "__main__":
     shapes()
     for each in SENSORS:
@@ -101,3 +134,4 @@ if __name__ == "__main__":
     predictions()
     bounds_on_a_sheet()
     touch()
+    printed_body()

@@ -152,7 +152,7 @@ def loaded(command: str) -> int:
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         kept = {f"SENSORGEN_{name.upper()}": str(place / name) for name in ("cache", "log", "materials", "packs")}
-        environment = {**os.environ, **kept, "SENSORGEN_BUDGET": "0", "BROWSER": "true"}
+        environment = {**os.environ, **kept, "SENSORGEN_BUDGET": "0", "SENSORGEN_SLICER": "none", "BROWSER": "true"}
         (place / "measured.csv").write_text(LINE, "utf-8")
         run = [sys.executable, "-m", "sensorgen"]
         for before in COMMANDS[command]:

@@ -35,6 +35,14 @@ from sensorgen.verification.chart.measured import Point, with_front
 REFERENCE = Path(__file__).parent / "reference"
 
 
+@pytest.fixture(autouse=True, scope="module")
+def _timed_once():
+    """What only the time is taken of is not done again; how often it would be has a test of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measured_in, "_REPEATS", 1)
+        yield
+
+
 def point(seconds, error, model="m", bounded=True, scene="s"):
     return Point(scene, model, error, seconds, "", bounded, None, 1.0, 1.1)
 
@@ -63,6 +71,7 @@ def test_the_front_is_what_nothing_beats(pairs):
     ],
 )
 def test_quick_work_is_timed_several_times(monkeypatch, runs, counts, expected):
+    monkeypatch.setattr(measured_in, "_REPEATS", 5)
     clock = iter(np.cumsum([0.0, *[x for run in runs for x in (run, 0.0)]]).tolist())
     monkeypatch.setattr(measured_in, "used_s", lambda: next(clock))
     called = []
@@ -125,7 +134,7 @@ def test_textbook_scenes_are_met():
 
     def off(case):
         found = fem2d.capacitance(case.scene, exact.PERMITTIVITY, 1e-5).middle()
-        return abs(found / (case.capacitance_f_per_m * 1e-3) - 1)
+        return abs(found / (case.capacitance_f_per_m2 * case.scene.size_mm[0] * 1e-6) - 1)
 
     for case in (exact.stripline(), exact.interdigital()):
         assert off(case) < 1e-6
@@ -248,7 +257,6 @@ def test_the_line_under_a_round_tip_is_known():
 @pytest.fixture(scope="module")
 def of_lines():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(lines, "_LADDERS", (1, 10, 100))
         patch.setattr(lines, "_PIECES", (1, 4, 16))
         return chart.points(list(lines.STANDARD), 1e9, lambda _: None)
 
@@ -260,18 +268,15 @@ def rungs(found, scene, model):
 
 
 def test_what_is_known_of_lines(of_lines):
-    """Ladders are of second order; matrices lose Re Z at low tones; the misprint of B.48 is no small one."""
+    """Grids of the sheet are of second order, and so are the cells of another program's circuit."""
     low, wide = ({p.model: p.error for p in of_lines if p.scene == name} for name in FLAT)
     assert max(found[model] for found in (low, wide) for model in ("line", "line_tip")) < 1e-15
-    assert wide["line_abcd"] > 1e6 * wide["line"]
-    assert low["line_closed: B.48 as printed"] > 0.5
     assert max(found["stack: one film"] for found in (low, wide)) < 1e-12
     grid = rungs(of_lines, "line, seven tones", "sheet")
     assert [a / b for a, b in pairwise(grid)] == pytest.approx([4, 4], rel=0.3)  # of second order, too
-    ladder = rungs(of_lines, "line, seven tones", "line_ladder")
-    assert len(ladder) == 3
-    assert ladder[0] / ladder[1] == pytest.approx(100, rel=0.01)
-    assert ladder[1] / ladder[2] == pytest.approx(100, rel=0.01)
+    if shutil.which("ngspice"):
+        circuit = rungs(of_lines, "line, seven tones", "ngspice")
+        assert [a / b for a, b in pairwise(circuit)] == pytest.approx([100, 100], rel=0.01)
     assert all(p.seconds > 0 and not p.bounded and "Re Z by" in p.said for p in of_lines)
 
 
@@ -364,11 +369,9 @@ def test_a_cylinder_touches_as_hertz_says():
 
 
 def test_ways_back():
-    """The fit as printed is off by centimetres, its root by metres; all tones together find the press."""
+    """All tones together give the press."""
     found, _ = by_model("inversion of a load")
     assert found["invert: seven tones"].error < 1e-9
-    assert found["line_fit: corrected"].error < 3e-3 < found["line_fit: printed"].error < 0.05
-    assert found["line_fit: C.5 as printed"].error > 1
 
 
 def test_two_films_are_known():
@@ -505,7 +508,7 @@ def test_meshes_of_presses_come_nearer_until_it_costs_too_much(monkeypatch):
 
 def test_a_budget_ends_the_ladders(monkeypatch):
     monkeypatch.setattr(measured_in, "timed", lambda work: (work(), 1.0))
-    found = [p for p in lines.points("line, seven tones", 5.0) if p.model == "line_ladder"]
+    found = [p for p in lines.points("line, seven tones", 5.0) if p.model == "sheet"]
     assert len(found) == 1
 
 

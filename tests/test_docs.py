@@ -114,8 +114,10 @@ def specimen_on_a_bench(command, folder, sensorgen):
 
 @pytest.mark.usefixtures("shared_cache")
 @pytest.mark.parametrize("line", commands(NIGHTLY))
-def test_every_command_of_the_pages_works(line, here, sensorgen, program, monkeypatch):
+def test_every_command_of_the_pages_works(line, here, sensorgen, program, monkeypatch, request):
     words = shlex.split(line)
+    if words[0] != "compress":
+        request.getfixturevalue("unpressed")
     if words[0] == "slice":
         program("prusa-slicer", "prusa-slicer")
     for name in ("measured.csv", "flat-tri.csv"):

@@ -20,7 +20,7 @@ from sensorgen.scene.drawing.dimensions import beside
 from sensorgen.scene.drawing.paper import Frame, fitted, spread, width, wrapped
 from sensorgen.scene.drawing.view import Measure, nearest, period, views
 from sensorgen.scene.scene import Body, Fill, Point, Prism, Scene, area_mm2, box
-from sensorgen.scene.sections import Column, columns
+from sensorgen.scene.sections import Column, Section, columns
 
 SHAPES = registry.names(shapes)
 COLOURS = {"etpu": ("PI-eTPU 85-700+", "#303436"), "x60": ("Flexion X60", "#f2c14e"), "bvoh": ("BVOH", "#7fc8f8")}
@@ -393,7 +393,7 @@ def test_dimensions_are_the_parameters() -> None:
 def test_the_period_survives_a_pattern_that_begins_within_one() -> None:
     strips = {view.section.across: view for view in views(scene_of("rect", width_mm=9.5).turned_over())}
     assert strips["y"].repeat_mm() == pytest.approx(2.0)
-    assert period([]) == ()
+    assert period(Section("x", 1.0, 0.5, ())) == ()
     assert views(scene_of("reference"))[0].period_mm == ()
 
 

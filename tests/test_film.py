@@ -120,6 +120,22 @@ def test_a_pressed_plates_range_is_that_of_plates_drawn_thinner_and_thicker():
     assert (ends.lower, ends.upper) == (near(min(resolutions), 2e-3), near(max(resolutions), 2e-3))
 
 
+def test_a_prints_range_has_law_and_capacitance_of_the_same_film():
+    """Cells with the teeth moved by 0.02 mm, as bodies of their own with stored curves, and by capacitance alone."""
+    body, query = bodies.estimated(make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}})), Query(force_n=6.0)
+    scene, tip = body.cells.first(), query.tip_of(body.design)
+    models = [build_sensor(of_scene(body, moved(scene, by)), tip=tip) for by in (0.0, -0.02, 0.02)]
+    assert all(model.law.bounded for model in models)
+    usual, *others = (model.sensor for model in models)
+    others += [replace(usual, capacitance_f_per_m=other.capacitance_f_per_m) for other in others]
+    own, *moved_by = (np.array(sensor.response(TONES_HZ, 6.0, 0.05)[:2]) for sensor in (usual, *others))
+    expected = np.max([abs(of / own - 1).max(axis=1) for of in moved_by], axis=0)
+    found = evaluate(of_scene(body, scene, body.cells.film), query)
+    term = next(t for t in found.budget.terms if t.name == "film thickness")
+    assert (term.changes.magnitude, term.changes.by_force) == (near(expected[0], 1e-3), near(expected[1], 1e-3))
+    assert not term.at_least
+
+
 @pytest.mark.nightly
 def test_a_pressed_prints_range_is_that_of_cells_drawn_thinner_and_thicker():
     """Cells with the teeth moved by 0.02 mm, solved on another mesh as bodies of their own."""

@@ -51,7 +51,7 @@ def of_thesis(tmp_path_factory):
 
     with Log(tmp_path_factory.mktemp("fit") / "log.db", create=True) as log:
         importing.thesis(log)
-        return fit(log, 23, body_of=drawn)
+        return fit(log, 23)
 
 
 def test_a_known_resistivity_and_leak_come_back(tmp_path):

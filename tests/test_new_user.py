@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+UNPRESSED = "import runpy, sys; sys.modules['netgen'] = None; runpy.run_module('sensorgen', run_name='__main__')"
 ROOT = Path(__file__).parents[1]
 HERE = Path(__file__).parent
 DESIGN = """\
@@ -32,12 +33,13 @@ def site(tmp_path_factory):
 
 @pytest.fixture
 def sensorgen(site, tmp_path):
-    """Runs a command in an empty folder, by the wheel's package; its output."""
-    home = {"HOME": str(tmp_path / "home"), "PYTHONPATH": str(site), "XDG_CONFIG_HOME": str(tmp_path / "home/config")}
+    """Runs a command in an empty folder, by the wheel's package, which presses no cross-section; its output."""
+    home = {"HOME": str(tmp_path / "home"), "PYTHONPATH": str(site), "XDG_CONFIG_HOME": str(tmp_path / "home/config"),
+            "SENSORGEN_CACHE": str(tmp_path / "cache")}  # fmt: skip
     (tmp_path / "work").mkdir()
 
     def run(*words, code=0):
-        command = [sys.executable, "-m", "sensorgen", *map(str, words)]
+        command = [sys.executable, "-c", UNPRESSED, *map(str, words)]
         done = subprocess.run(
             command, cwd=tmp_path / "work", env=os.environ | home, capture_output=True, encoding="utf-8", check=False
         )

@@ -1,5 +1,7 @@
 """Works in chunks: a process that dies costs its chunk, a work that kills is named, a cluster does the same."""
 
+import importlib.util
+import json
 import os
 import time
 from itertools import repeat
@@ -8,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from sensorgen.core import cache, parallel
-from sensorgen.core.errors import SensorgenError
+from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.core.parallel import in_parallel, open_lanes, remembered
 
 
@@ -175,3 +177,27 @@ def test_what_dask_makes_of_cancelled_futures_is_one_line(monkeypatch, leaves):
     with pytest.raises(expected, match=words):
         work()
     cluster.close()
+
+
+@pytest.mark.parametrize(
+    ("address", "refused"),
+    [
+        ("tcp://10.0.0.5:8786", True), ("10.0.0.5:8786", True), ("ws://cluster.example:80", True),
+        ("tcp://[2001:db8::1]:8786", True), ("tls://10.0.0.5:8786", False), ("tcp://127.0.0.1:9", False),
+        ("localhost:9", False), ("tcp://[::1]:9", False),
+    ],
+)  # fmt: skip
+def test_a_cluster_on_a_network_needs_tls(address, refused, monkeypatch, tmp_path):
+    file = tmp_path / "scheduler.json"
+    file.write_text(json.dumps({"address": address}))
+    for trusted in (False, True):
+        monkeypatch.setenv(parallel.TRUST_CLUSTER, "1" if trusted else "")
+        if refused and not trusted:
+            with pytest.raises(BadInput, match=r"expected tls:// or this computer, or sensorgen --trust-cluster"):
+                parallel._check_private(address)
+        else:
+            parallel._check_private(address)
+    if refused and importlib.util.find_spec("distributed"):
+        monkeypatch.delenv(parallel.TRUST_CLUSTER)
+        with pytest.raises(BadInput, match="without TLS"):
+            list(in_parallel(divmod, [(7, 2)], 1, cluster=str(file)))

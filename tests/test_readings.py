@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.csv_table import Waiting
-from sensorgen.measure.readings import readings
+from sensorgen.measure.csv_table import Table, Waiting
+from sensorgen.measure.readings import Readings, readings
 
 HEAD = "time_s,re_ohm_1.1kHz,im_ohm_1.1kHz,re_ohm_99.7kHz,im_ohm_99.7kHz\n"
 ROW = "0.5,100,-2e6,90.5,-2e4\n"
@@ -251,3 +251,18 @@ def test_sweeps_of_an_lcr_meter_are_samples(tmp_path):
     path.write_text("Frequency [kHz];Cp [pF]\n100;60\n")
     with pytest.raises(BadInput, match=r"lcr.csv: no two quantities .* as Cp and D"), readings(str(path)):
         pass
+
+
+def test_of_readings_that_wait_the_newest_is_left_and_those_at_rest():
+    """A pipe that brought seven rows while the first were worked off."""
+    head = "time_s,re_ohm_1kHz,im_ohm_1kHz,rest\n"
+    rest = [1, 0, 0, 1, 0, 0, 0]
+    text = head + "".join(f"{k},{100 + k},-5,{at_rest}\n" for k, at_rest in enumerate(rest))
+    source = Readings(Table("pipe", Waiting(io.BytesIO(text.encode()))), ("rest",), newest=True)
+    (block,) = source.blocks()
+    assert block.rows == [2, 5, 8]
+    assert block.impedance_ohm[:, 0].real.tolist() == [100, 103, 106]
+    assert block.kept == [["0"], ["3"], ["6"]]
+    assert source.dropped == 4
+    (whole,) = Readings(Table("pipe", Waiting(io.BytesIO(text.encode()))), ("rest",)).blocks()
+    assert len(whole.rows) == 7

@@ -242,7 +242,7 @@ def test_walls_beside_their_lines(planned, study, truth, tmp_path, run, walls_mm
     assert f"line width 0.450 mm (set 0.44); a wall is {words} its lines" in run("characterise", "read", form).words
 
 
-def test_from_plate_to_prediction(planned, study, truth, tmp_path, run):
+def test_from_plate_to_prediction(planned, study, truth, tmp_path, run, unpressed):
     """The budget of a prediction shrinks to what the coupons leave open, and the truth lies within."""
     form = tmp_path / "form.yaml"
     text = (

@@ -397,7 +397,7 @@ def test_rounded_corners_cost_the_resistance_alone(run, models):
     assert "capacitance" in text and "no resistance: the" in text  # noqa: PT018
 
 
-@pytest.mark.usefixtures("shared_kernel")
+@pytest.mark.usefixtures("shared_kernel", "unpressed")
 def test_the_whole_walk_in_an_empty_folder(run, models, program):
     """From a STEP of another program to a sliced print, with commands alone."""
     program("prusa-slicer", "prusa-slicer")

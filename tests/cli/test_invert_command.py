@@ -180,6 +180,22 @@ def test_help(run, words):
     assert "MEASURED.csv" in said.out
 
 
+def test_in_real_time_readings_that_wait_are_dropped_and_counted(run, monkeypatch):
+    """Four rows have come before the first is worked off: the newest is answered, as it would be anyway."""
+    text = table()
+
+    def said(*words):
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
+        return run("invert", *DESIGN, "-", *QUIET, *words)
+
+    every, newest = said(), said("--newest")
+    assert (len(answers(every.out)), len(answers(newest.out))) == (4, 1)
+    (only,), last = answers(newest.out), answers(every.out)[-1]
+    assert all(only[name] == last[name] for name in ("time_s", "force_n", "position_mm", "status"))
+    assert "3 readings were dropped for newer ones" in newest.err
+    assert "dropped" not in every.err
+
+
 LIVE = (
     "import sys; sys.argv[0] = 'sensorgen'; import sensorgen.cli as c; c.COMMANDS = {*c.COMMANDS, 'invert'}; c.main()"
 )

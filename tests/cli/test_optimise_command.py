@@ -53,7 +53,7 @@ def test_the_front_is_that_of_a_plain_loop():
     for film in (0.1, 0.2, 0.3, 0.4):
         for electrode in (0.2, 0.3, 0.4):
             plate = make({"shape": "reference", "parameters": {"dielectric_mm": film, "electrode_mm": electrode}})
-            p = evaluate(bodies.estimated(plate), keep=False)
+            p = evaluate(bodies.estimated(plate), keep=False, beside=False)
             values[film, electrode] = p.capacitance.value, p.resistance["bottom"].value
     best = {
         k for k, (c, r) in values.items()

@@ -9,7 +9,6 @@ import trimesh
 
 from sensorgen.design.shapes import rect, reference, tri
 from sensorgen.scene.geometry.meshes import Mesh, mesh
-from sensorgen.scene.geometry.validity import solid
 from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
 
 
@@ -23,7 +22,7 @@ def assert_solid(made: Mesh, volume_mm3: float, shells: int | None = None) -> No
     assert other.is_watertight
     assert other.is_winding_consistent
     assert other.volume == pytest.approx(volume_mm3, rel=1e-9)
-    third = solid(made)
+    third = made.solid()
     assert third.status() == manifold3d.Error.NoError
     assert third.volume() == pytest.approx(volume_mm3, rel=1e-9)
     assert made.volume_mm3() == pytest.approx(volume_mm3, rel=1e-9)
@@ -100,7 +99,7 @@ def test_all_ways_of_eight_cubes_around_a_point_are_solids():
     for pattern in range(1, 256):
         body = cubes(*(c for k, c in enumerate(corners) if pattern >> k & 1))
         made = mesh(body)
-        assert solid(made).status() == manifold3d.Error.NoError, pattern
+        assert made.solid().status() == manifold3d.Error.NoError, pattern
         assert made.volume_mm3() == pytest.approx(len(body.pieces), rel=1e-12), pattern
         edges = np.sort(made.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         assert set(np.unique(edges, axis=0, return_counts=True)[1]) == {2}, pattern

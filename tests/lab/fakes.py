@@ -113,6 +113,9 @@ class FakeActuator(_Device):
     nan = False
     deaf = False  # answers, but obeys nothing
 
+    def watch(self, seconds: float) -> None:
+        self._message("watch")
+
     def start(self, limit_n: float) -> None:
         self._message("start")
         self.plant.on, self.plant.device_limit_n = True, limit_n

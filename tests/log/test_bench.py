@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import scipy.io
 
-from sensorgen.core.errors import SensorgenError
+from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.measure.log import Log, RawFile, files, verify
-from sensorgen.measure.log.bench import log_recording
-from sensorgen.measure.recording import read
+from sensorgen.measure.log.bench import log_recording, read_again
+from sensorgen.measure.recording import joined_all, read
 
 MADE = made.presses(8)
 OFFSET_S = 3.217
@@ -97,6 +97,25 @@ def test_columns_of_csv_by_other_names_are_kept_to_read_it_again(run, path, run_
     again = read(raw, facts["columns"])
     assert again.impedance_ohm[:, 0] == pytest.approx(lived.impedance_ohm[:, 0])
     assert facts["rig_columns"] == {"when": "time_s"}
+
+
+def test_a_sensor_with_a_hole_is_logged_although_nothing_shows_the_clocks(run, path, run_files, tmp_path):
+    """5 Mohm in series hide the force: CSV without stamps, and clocks that do not overlap."""
+    lived = made.run(MADE, tones_hz=made.TONES_HZ[:1])
+    noise = np.random.default_rng(1).standard_normal(len(lived.time_s))
+    ohm = 5e6 * (1 + 1e-4 * noise) + lived.impedance_ohm[:, 0].mean()
+    rows = zip(lived.time_s + 1e5, ohm, strict=True)
+    lines = "".join(f"{t},{z.real},{z.imag}\n" for t, z in rows)
+    (tmp_path / "run.csv").write_text(f"time_s,re_ohm_1.1kHz,im_ohm_1.1kHz\n{lines}")
+    said = run("bench", "26 triX", "run.csv", run_files[1])
+    assert said.code == 0
+    assert "not joined with the rig: the force explains" in " ".join(said.out.split())
+    with Log(path) as log:
+        (row,) = log.recordings()
+        parts, rig = read_again(log, row)
+        with pytest.raises(BadInput, match="too little to find the offset"):
+            joined_all(next(parts), rig)
+    assert row.rig_file
 
 
 def test_without_a_rig_and_twice(log, run_files):

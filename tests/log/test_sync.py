@@ -9,11 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from sensorgen.core import document
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.log import BenchRun, Log, Prediction, Reading, chain, file_system, files, sync, verify
+from sensorgen.measure.log import BenchRun, Log, Prediction, Reading, chain, file_system, files, listing, sync, verify
 from sensorgen.measure.log.batches import prediction
 from sensorgen.measure.log.notes import reading
 from sensorgen.measure.log.tables import thesis
+from sensorgen.measure.log.withdrawing import withdraw
 
 PREDICTED = {"capacitance_f": {"lower": 1e-11, "upper": 2e-11}}
 
@@ -103,18 +105,56 @@ def test_the_same_table_imported_twice_is_one_table(machines, tmp_path):
     assert sound(a, b)
 
 
-def test_two_corrections_of_one_row_are_both_shown(machines, tmp_path):
+def test_of_two_corrections_of_one_row_the_same_one_counts_everywhere_until_a_person_settles_it(machines, tmp_path):
     a, b, _ = machines
     (old,) = a.add([reading("23 triX", "0.65")])
     sync.sync(a, tmp_path / "share")
     sync.sync(b, tmp_path / "share")
-    for log, ohm in ((a, "650"), (b, "0.66k")):
+    lines = {}  # what each machine corrected, and what it corrects that by
+    for log, ohms in ((a, ("650", "651")), (b, ("660", "661"))):
+        (first,) = log.add([reading("23 triX", ohms[0], supersedes=old.uid)])
+        (last,) = log.add([reading("23 triX", ohms[1], supersedes=first.uid)])
+        lines[last.uid] = first.uid
+    for log in (a, b, a):
+        sync.sync(log, tmp_path / "share")
+    (counts,), (also,) = a.readings(), b.readings()
+    assert counts.uid == also.uid
+    other = next(uid for uid in lines if uid != counts.uid)
+    for log in (a, b):
+        rows = {row.uid: row for row in log.readings(superseded=True)}
+        assert log.count(Reading) == 1
+        assert len(log.superseding(old)) == 2
+        assert {other, lines[other]} <= {row.uid for row in log.entries(Reading, replaced=True)}
+        assert log.rival(rows[lines[other]]) == rows[lines[counts.uid]]
+        assert log.rival(rows[counts.uid]) is None
+        said = " ".join(document.text(listing.details(log, [rows[lines[other]]]).document()))
+        expected = f"row {rows[lines[counts.uid]].number}, from another machine, corrects the same row and counts"
+        assert expected in " ".join(said.split())
+        with pytest.raises(BadInput, match="was corrected before"):
+            log.add([reading("23 triX", "652", supersedes=lines[other])])
+    withdraw(b, "reading", next(r.number for r in b.readings(superseded=True) if r.uid == counts.uid), "typing error")
+    withdraw(b, "reading", next(r.number for r in b.readings(superseded=True) if r.uid == other), "typing error")
+    assert b.readings() == ()
+    assert sound(a, b)
+
+
+def test_withdrawing_the_correction_that_counts_lets_the_other_one_count(machines, tmp_path):
+    a, b, _ = machines
+    (old,) = a.add([reading("23 triX", "0.65")])
+    for log in (a, b):
+        sync.sync(log, tmp_path / "share")
+    for log, ohm in ((a, "650"), (b, "660")):
         log.add([reading("23 triX", ohm, supersedes=old.uid)])
     for log in (a, b, a):
         sync.sync(log, tmp_path / "share")
-    for log in (a, b):
-        assert sorted(r.y_ohm[0] for r in log.readings()) == [650.0, 660.0]
-        assert len(log.superseding(old)) == 2
+    (counts,) = b.readings()
+    lost = next(r for r in b.entries(Reading, replaced=True) if r.uid not in (old.uid, counts.uid))
+    with pytest.raises(BadInput, match=f"row {lost.number} is out of use: row {counts.number}, from another machine"):
+        b.add([reading("23 triX", "670", supersedes=lost.uid)])
+    withdraw(b, "reading", counts.number, "typing error")
+    for log in (b, a):
+        sync.sync(log, tmp_path / "share")
+        assert [row.uid for row in log.readings()] == [lost.uid]
     assert sound(a, b)
 
 

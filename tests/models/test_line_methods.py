@@ -2,12 +2,15 @@
 
 from pathlib import Path
 
+import line_abcd
+import line_closed
+import line_ladder
 import numpy as np
 import pytest
 from line_cases import PLATE, TONES, cases, exact, off
 
 from sensorgen.core.errors import OutOfRange, UnknownName
-from sensorgen.models import line, line_abcd, line_closed, line_ladder
+from sensorgen.models import line
 
 MODELS = {"abcd": line_abcd.impedance, "exponentials": line_closed.impedance}
 LONG = PLATE | {"length_m": 1e3, "frequency_hz": 1e6}

@@ -303,7 +303,7 @@ def test_what_explains_recordings_is_what_is_wrong(of_recorded):
 def test_tones_beside_their_prediction(of_recorded):
     found = table(of_recorded, "impedance")
     assert len(found.rows) == 2 * 7
-    c = [v for v, f in zip(column(found, "C measured"), column(found, "frequency"), strict=True) if f < 3e3]
+    c = [v for v, f in zip(column(found, "Cs measured"), column(found, "frequency"), strict=True) if f < 3e3]
     assert c == pytest.approx([1.3 * column(found, "C predicted")[0]] * len(c), rel=3e-3)
     for measured, predicted, residual in zip(
         *(column(found, n) for n in ("X measured", "X predicted", "residual of X")), strict=True

@@ -12,7 +12,6 @@ from sensorgen.core.findings import Finding, Verdict, counts, headline, listed, 
 from sensorgen.design.design import Design
 from sensorgen.design.tower import tower
 from sensorgen.design.walls import rule
-from sensorgen.scene import drawing
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.scene import Scene
@@ -175,6 +174,8 @@ def report(design: Design, held: Review) -> CheckReport:
 
 def draw(design: Design, held: Review, printed: Scene | None = None, source: str = "") -> str:
     """The drawing of the cross-section, as SVG, with what is printed outlined over it if that is given."""
+    from sensorgen.scene import drawing
+
     scene = design.printed
     names = {body.material for body in scene.bodies}
     notes = [

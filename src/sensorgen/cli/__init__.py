@@ -5,8 +5,9 @@ import os
 import re
 import signal
 import sys
+import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -24,6 +25,7 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
         "optimise": "Find the best printable designs for a target.",
         "slice": "Write printer-ready G-code, by a real slicer.",
         "gcode": "Check G-code before the printer does.",
+        "export": "Write the printed body as 3MF, STEP, STL or voxels.",
         "show": "Show a design as one page: 3D, section, layers, numbers.",
         "draw": "Draw the cross-section, its layers and findings, as SVG.",
     },
@@ -129,7 +131,8 @@ class _Terminated(BaseException):
 @click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(__version__, prog_name="sensorgen")
 @click.option("--trust-printer", is_flag=True, help="Let printer files widen limits of hardware and G-code.")
-def cli(*, trust_printer: bool) -> None:
+@click.option("--trust-cluster", is_flag=True, help="Let --cluster use a network without TLS; workers run code.")
+def cli(*, trust_printer: bool, trust_cluster: bool) -> None:
     """From one design to a printable elastomer sensor: geometry, checks, 3MF, profiles, prediction.
 
     \b
@@ -140,16 +143,23 @@ def cli(*, trust_printer: bool) -> None:
         from sensorgen.design.printer import TRUST
 
         os.environ[TRUST] = "1"
+    if trust_cluster:
+        from sensorgen.core.parallel import TRUST_CLUSTER
+
+        os.environ[TRUST_CLUSTER] = "1"
 
 
 def main() -> None:
     """Run the command line and leave with 0 (clean), 1 (findings of severity error) or 2 (wrong input)."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy loads: on small matrices threads only wait
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # to look for them takes 17 ms
+    warnings.showwarning = _unseen
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by whoever started this
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
     try:
         code = _run()
-        if sys.stdout is not None:
-            sys.stdout.flush()
+        sys.stdout.flush()
     except MemoryError:
         code = _complain("not enough memory for this design: use a longer period or a smaller sensor", WRONG_INPUT)
     except (KeyboardInterrupt, click.Abort):
@@ -159,7 +169,15 @@ def main() -> None:
     except (OSError, UnicodeEncodeError) as error:
         _silence()
         code = _complain(f"cannot write the output: {getattr(error, 'strerror', None) or error}", WRONG_INPUT)
+    try:  # what a stopped command has left
+        sys.stdout.flush()
+    except OSError:
+        _silence()
     sys.exit(code)
+
+
+def _unseen(*_: object, **__: object) -> None:
+    """Show no warning of a library, as NumPy's of a division by zero: what matters to a user is in the result."""
 
 
 def _run() -> int:
@@ -211,5 +229,6 @@ def _silence() -> int:
 
 def _complain(what: object, code: int) -> int:
     text = harmless(str(what))
-    click.echo(text if text.startswith("Usage:") else f"sensorgen: {' '.join(text.split())}", err=True)
+    with suppress(OSError):  # nobody reads it
+        click.echo(text if text.startswith("Usage:") else f"sensorgen: {' '.join(text.split())}", err=True)
     return code

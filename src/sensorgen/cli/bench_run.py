@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def _run(
     experiment: str | None, again: str | None, file: str | None, *, simulate: bool, real_time: bool, page: bool | None,
-    yes: bool,
+    yes: bool, watchdog: bool,
 ) -> int:  # fmt: skip
     """Run an experiment: check, zero and find the contact gently, press, and record into the log.
 
@@ -47,7 +47,7 @@ def _run(
         session = stack.enter_context(sessions.Session(asked, log, real_time=real_time, page=shown, model=_model))
         if session.url:
             render.say(f"live page: {session.url}", err=True)
-        found = session.run(lambda plan, who: _confirmed(plan, who, yes=yes or asked.simulated))
+        found = session.run(lambda plan, who: _confirmed(plan, who, yes=yes or asked.simulated), watchdog=watchdog)
     render.deliver(found)
     return 0 if found.end == "done" else FOUND_ERRORS
 
@@ -86,6 +86,8 @@ command = made(
     click.Option(["--real-time"], is_flag=True, help="With --simulate: by the real clock, to watch."),
     click.Option(["--resume", "again"], metavar="RUN", help="Go on with a run that ended early."),
     click.Option(["--page/--no-page"], default=None, help="Show the run in the browser; with real devices by default."),
+    click.Option(["--watchdog/--no-watchdog"], default=True,
+                 help="Load a program that lifts the tip into the actuator's controller; required above 1 N."),
     click.Option(["--yes"], is_flag=True, help="Do not ask before the rig moves."),
     log_words.where(),
     *render.options("json", file=False),

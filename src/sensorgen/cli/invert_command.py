@@ -53,6 +53,10 @@ _COMMON: list[click.Parameter] = [
         ["--output", "-o"], metavar="FILE.csv",
         help="Write a row per sample, '-' to the terminal; readings from the standard input go there by themselves.",
     ),
+    click.Option(
+        ["--newest"], is_flag=True,
+        help="In real time: of readings that wait, only those at rest and the newest are used; the others are counted.",
+    ),
 ]  # fmt: skip
 OWN: list[click.Parameter] = [
     *_COMMON,
@@ -99,12 +103,15 @@ def _work(
         known = fitting.by_rest(model, np.log(mean), noise / count**0.5, noise)
         return Inverter(model, known, _prior(how["prior"]), limit), limit, 0, found.doubts
 
-    return _by_ratio(design.name, inverter, measured, output, rest_file, None, how["noise"], how["force_limit_n"], None)
+    return _by_ratio(
+        design.name, inverter, measured, output, rest_file, None, how["noise"], how["force_limit_n"], None,
+        newest=how["newest"],
+    )  # fmt: skip
 
 
 def _specimen(
     name: str, measured: str, output: str | None, rest_file: str | None, noise: float | None, prior: str | None,
-    force_limit_n: tuple[float, ...] | None, file: str | None,
+    force_limit_n: tuple[float, ...] | None, file: str | None, *, newest: bool,
 ) -> int:  # fmt: skip
     """Force and position of a specimen that 'sensorgen calibrate' has calibrated."""
     from sensorgen.analysis.calibration import design_of, stored
@@ -133,14 +140,15 @@ def _specimen(
         return made, limit, known.posterior.presses, (*beyond, *known.allowance)
 
     return _by_ratio(
-        of, inverter, measured, output, rest_file, known.model.frequency_hz, noise, force_limit_n, known.baseline
-    )
+        of, inverter, measured, output, rest_file, known.model.frequency_hz, noise, force_limit_n, known.baseline,
+        newest=newest,
+    )  # fmt: skip
 
 
 def _by_ratio(
     of: str, inverter: "Callable[[Rest, Any, Any, float | None], tuple[Inverter, float, int, Any]]", measured: str,
     output: str | None, rest_file: str | None, tones_hz: Any, noise: float | None,
-    force_limit_n: tuple[float, ...] | None, baseline: "Baseline | None",
+    force_limit_n: tuple[float, ...] | None, baseline: "Baseline | None", *, newest: bool,
 ) -> int:  # fmt: skip
     """Ratios to the latest reading at rest, row by row; the inverter is made when the first of them is there."""
     from sensorgen.measure.readings import readings
@@ -151,7 +159,7 @@ def _by_ratio(
     limit_n = one("--force-limit", force_limit_n) if force_limit_n else None
     if noise is not None and not 0 < noise <= 1:
         raise BadInput(f"a noise of {noise:g}; expected a share above 0, up to 100 %")
-    with readings(measured, beside=(_REST, _TIME)) as source, ExitStack() as stack:
+    with readings(measured, beside=(_REST, _TIME), newest=newest) as source, ExitStack() as stack:
         tones_hz = source.frequency_hz if tones_hz is None else tones_hz
         with within(measured):
             order = checked(source.frequency_hz, tones_hz)
@@ -185,7 +193,7 @@ def _by_ratio(
     notes = (*([rest.change.words] if rest.change else []), *(made[3] if made else ()))
     by, limit, length_m = (made[2], made[1], float(made[0].position_m[-1])) if made else (0, 0.0, 0.0)
     result = summary.result(of, by, limit, length_m, sigma, notes)
-    _said(result, terminal, output)
+    _said(result, terminal, output, source.dropped)
     return 0
 
 
@@ -225,7 +233,9 @@ def _writer(stack: ExitStack, measured: str, output: str | None) -> tuple[Callab
     return write, terminal
 
 
-def _said(result: "Documented", terminal: bool, output: str | None) -> None:
+def _said(result: "Documented", terminal: bool, output: str | None, dropped: int) -> None:
+    if dropped:
+        render.say(f"{dropped} readings were dropped for newer ones", err=True)
     for piece in render.pieces(result, render.form()):
         render.say(piece, nl=False, err=terminal)
     if not render.form() and not terminal:
@@ -234,14 +244,14 @@ def _said(result: "Documented", terminal: bool, output: str | None) -> None:
 
 def _perfect(
     body: Any, query: Any, measured: str, output: str | None, *, noise: float | None, prior: str | None,
-    force_limit_n: tuple[float, ...] | None,
+    force_limit_n: tuple[float, ...] | None, newest: bool,
 ) -> int:  # fmt: skip
     from sensorgen.measure.readings import readings
     from sensorgen.prediction.inverse import FORCE_LIMIT_N, Estimator, answers
     from sensorgen.prediction.planning import sensor_model
     from sensorgen.prediction.query import NOISE
 
-    with readings(measured, beside=(_REST,)) as source, ExitStack() as stack:
+    with readings(measured, beside=(_REST,), newest=newest) as source, ExitStack() as stack:
         model = sensor_model(body, query)[0]
         limit = one("--force-limit", force_limit_n) if force_limit_n else FORCE_LIMIT_N
         estimator = Estimator(
@@ -257,7 +267,7 @@ def _perfect(
             summary.add(found)
             step(f"{summary.samples} samples")
             write(answers.rows([block.kept[k] for k in under_load], found, prior=estimator.prior is not None))
-    _said(summary.result(), terminal, output)
+    _said(summary.result(), terminal, output, source.dropped)
     return 0
 
 

@@ -64,7 +64,7 @@ def _add(
             specimen, y_words, z_words, mega=mega, supersedes=_uid(log, Reading, corrects), baked=baked, remark=remark,
             measured_at=measured_at, instrument=instrument, source=visa or "typed", log=log,
         )  # fmt: skip
-        kept = [files.keep(log.files, Path(photo))] if photo else []
+        kept = [files.keep_photo(log.files, Path(photo))] if photo else []
         row = replace(
             notes.with_ac(row, typed), wires=int(wires) if wires else None, temperature_c=temperature,
             humidity_percent=humidity, photo=kept[0].uid if kept else "", defects=tuple(dict.fromkeys(defects)),

@@ -141,9 +141,10 @@ def verdict(*problems: str) -> int:
 def write(text: Iterable[str]) -> None:
     """Print pieces of text as they come, or write them to the file, which is there when all of them are."""
     output = click.get_current_context().meta.get(_FILE)
+    text = map(escaped if form() == "json" else harmless, text)
     if output in (None, "-"):
-        terminal = sys.stdout is not None and sys.stdout.isatty() and not form()
-        for piece in map(escaped if form() == "json" else harmless, text):
+        terminal = sys.stdout.isatty() and not form()
+        for piece in text:
             sys.stdout.write(_coloured(piece) if terminal else piece)
         return
     from sensorgen.core import files

@@ -28,7 +28,7 @@ def workers(usual: str = "one for each core") -> list[click.Parameter]:
         ),
         click.Option(
             ["--cluster"], metavar="ADDRESS", default="",
-            help="Work on a Dask cluster: its scheduler's address, as tcp://10.0.0.5:8786, or its scheduler file.",
+            help="Work on a Dask cluster: its scheduler's address, as tls://10.0.0.5:8786, or its scheduler file.",
         ),
     ]  # fmt: skip
 

@@ -1,28 +1,30 @@
 """The same work for many, in processes of this computer or on a Dask cluster; a process that dies costs one chunk."""
 
+import json
 import os
 import signal
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from sensorgen.core.errors import NotInstalled, SensorgenError
+from sensorgen.core.errors import BadInput, NotInstalled, SensorgenError
 from sensorgen.core.leash import end_with_parent
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
     from contextlib import AbstractContextManager
 
+TRUST_CLUSTER = "SENSORGEN_TRUST_CLUSTER"  # environment variable: 1 for clusters without TLS
 CHUNK_S = 1.0  # sending work to a process takes a millisecond, to another computer ten
 # A process that is spawned looks for no modules in the working folder, and leaves the other cores to the others: one
 # evaluation of a sensor takes 18.7 s of CPU with one thread of BLAS, and 22.1 s with two, in the same time.
 _ENVIRONMENT = {
     "PYTHONSAFEPATH": "1", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1",
-    "VECLIB_MAXIMUM_THREADS": "1",
+    "VECLIB_MAXIMUM_THREADS": "1", "PYTHONWARNINGS": "ignore",
 }  # fmt: skip
 _POLL_S, _CONNECT_S, _ALONE_S = 1.0, 10.0, 60.0
 _LIMIT_S = 1800.0  # of processor time for one work; the longest that we know takes a tenth
@@ -352,6 +354,22 @@ def gone(address: str) -> SensorgenError:
     return SensorgenError(f"the Dask cluster {address!r} no longer answers; results so far are kept: run it again")
 
 
+def _check_private(address: str) -> None:
+    """Refuse a scheduler on a network without TLS: whoever reaches the line runs code here and on the workers."""
+    from ipaddress import ip_address
+    from urllib.parse import urlsplit
+
+    url = urlsplit(address if "://" in address else f"tcp://{address}")
+    here = url.scheme == "inproc" or url.hostname == "localhost"
+    with suppress(ValueError):
+        here = here or ip_address(url.hostname or "").is_loopback
+    if url.scheme not in ("tls", "wss") and not here and os.environ.get(TRUST_CLUSTER) != "1":
+        raise BadInput(
+            f"--cluster {address}: on a network without TLS whoever reaches it runs code here and on the workers; "
+            "expected tls:// or this computer, or sensorgen --trust-cluster"
+        )
+
+
 @contextmanager
 def _on_cluster(address: str) -> Iterator[Sequence[Lane]]:
     """Places of a Dask cluster: two chunks for each of its threads."""
@@ -368,12 +386,13 @@ def _on_cluster(address: str) -> Iterator[Sequence[Lane]]:
     for name in loggers:  # each has a level of its own
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what goes wrong is said once, by us
     where = {"scheduler_file": address} if Path(address).is_file() else {"address": address}
+    _check_private(json.loads(Path(address).read_text("utf-8"))["address"] if "scheduler_file" in where else address)
     try:
         client = Client(**where, timeout=_CONNECT_S)
     except (OSError, ValueError, TimeoutError) as error:
         raise SensorgenError(
             f"no Dask scheduler at {address!r} ({str(error).splitlines()[0]:.80}); expected its address, as "
-            "tcp://10.0.0.5:8786, or its scheduler file"
+            "tls://10.0.0.5:8786, or its scheduler file"
         ) from None
     try:
         threads = sum(client.nthreads().values())

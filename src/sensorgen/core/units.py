@@ -137,7 +137,7 @@ def si(value: float, unit: str, digits: int = 4) -> str:
 
 
 def frequency_text(frequency_hz: float) -> str:
-    """A frequency as a number with Hz, kHz or MHz that :func:`frequency_hz` reads back as the very same.
+    """A frequency as a number with Hz, kHz or MHz that :func:`frequency_hz` reads back, but for its last two bits.
 
     Parameters
     ----------
@@ -146,10 +146,11 @@ def frequency_text(frequency_hz: float) -> str:
 
     Examples
     --------
-    >>> frequency_text(99700.0), frequency_text(0.5)
-    ('99.7kHz', '0.5Hz')
+    >>> frequency_text(99700.0), frequency_text(0.5), frequency_text(3000000.000000001)
+    ('99.7kHz', '0.5Hz', '3MHz')
     """
-    number = Decimal(repr(float(frequency_hz)))
+    short = float(f"{frequency_hz:.12g}")
+    number = Decimal(repr(short if math.isclose(short, frequency_hz, rel_tol=1e-15) else float(frequency_hz)))
     power = next((p for p in _PREFIXES if abs(number) >= 10**p), 0)
     shown = format(number.scaleb(-power).normalize(), "f")
     return f"{shown}{_PREFIXES[power]}Hz"

@@ -227,8 +227,6 @@ def _checked(name: str, scene: Scene, fill: Fill) -> Scene:
     BadInput
         No scene; a body without a sound name, terminal or material, or one that leaves the box.
     """
-    if not isinstance(scene, Scene):
-        raise BadInput(f"{name}.py: scene() gives {type(scene).__name__}; expected a Scene")
     if not all(math.isfinite(size) and size > 0 for size in scene.size_mm) or len(scene.size_mm) != 3:
         raise BadInput(f"{name}.py: size_mm is {scene.size_mm}; expected three lengths above 0")
     if not scene.bodies:

@@ -187,10 +187,9 @@ def _header(lines: Sequence[str]) -> _Header | None:
 
 
 def _columns(heads: Sequence[str], before: Sequence[str]) -> Iterator[_Column]:
-    function = _function(before)
     for at, head in enumerate(heads):
         name, unit = _name(head)
-        if name in ("primary", "secondary", "a", "b", "dataa", "datab") and function:
+        if name in ("primary", "secondary", "a", "b", "dataa", "datab") and (function := _function(before)):
             quantity = function[name in ("secondary", "b", "datab")]
             unit, quantity = (quantity, "phase") if quantity in ("deg", "rad") else (unit, quantity)
         else:

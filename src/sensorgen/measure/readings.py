@@ -20,6 +20,7 @@ from sensorgen.measure.csv_table import BLOCK_ROWS, SAME_NAMES, Table, listed
 from sensorgen.measure.immittance import impedance, pair
 
 _IMPEDANCE = re.compile(r"(re|im)_ohm_(.*)", re.IGNORECASE)
+REST = "rest"  # column with 1 where nothing is on the sensor
 _EXPECTED = "expected two columns per frequency, as re_ohm_1.1kHz and im_ohm_1.1kHz"
 
 
@@ -54,6 +55,9 @@ class Readings:
         The open file.
     beside : sequence of str
         Columns to give as numbers, where the file has them.
+    newest : bool
+        Drop readings that wait behind a newer one, as of a pipe that brings more than is worked off; those with 1 in a
+        column ``rest`` stay.
 
     Attributes
     ----------
@@ -63,10 +67,14 @@ class Readings:
         Columns of no impedance that are not in ``beside``.
     numbers : list of str
         Columns of ``beside`` that the file has.
+    dropped : int
+        Rows that were dropped for newer ones.
     """
 
-    def __init__(self, table: Table, beside: Sequence[str] = ()) -> None:
-        self._table, names = table, table.names
+    dropped = 0
+
+    def __init__(self, table: Table, beside: Sequence[str] = (), *, newest: bool = False) -> None:
+        self._table, self._newest, names = table, newest, table.names
         for name in beside:
             if names.count(name) > 1:
                 raise table.error(1, f"{names.count(name)} columns are {name}; expected one")
@@ -86,7 +94,17 @@ class Readings:
         for block in self._table.blocks(columns, self._others, size):
             impedance = np.empty((len(block.rows), m), np.complex128)
             impedance.real, impedance.imag = block.numbers[:, :m], block.numbers[:, m : 2 * m]
-            yield Block(block.rows, impedance, block.text, block.numbers[:, 2 * m :])
+            found = Block(block.rows, impedance, block.text, block.numbers[:, 2 * m :])
+            yield self._only_newest(found) if self._newest else found
+
+    def _only_newest(self, block: Block) -> Block:
+        at_rest = [np.nan_to_num(block.numbers[:, k]) != 0 for k, name in enumerate(self.numbers) if name == REST]
+        stays = at_rest[0] if at_rest else np.zeros(len(block.rows), bool)
+        stays[np.flatnonzero(~stays)[-1:]] = True
+        self.dropped += int(np.count_nonzero(~stays))
+        rows = np.flatnonzero(stays).tolist()
+        text = [block.kept[k] for k in rows]
+        return Block([block.rows[k] for k in rows], block.impedance_ohm[rows], text, block.numbers[rows])
 
 
 class LcrReadings(Readings):
@@ -134,7 +152,9 @@ class LcrReadings(Readings):
 
 
 @contextmanager
-def readings(path: str, columns: Mapping[str, str] = SAME_NAMES, beside: Sequence[str] = ()) -> Iterator[Readings]:
+def readings(
+    path: str, columns: Mapping[str, str] = SAME_NAMES, beside: Sequence[str] = (), *, newest: bool = False
+) -> Iterator[Readings]:
     """Open a file of impedance readings; "-" is the standard input.
 
     Parameters
@@ -145,6 +165,8 @@ def readings(path: str, columns: Mapping[str, str] = SAME_NAMES, beside: Sequenc
         From the file's column names to sensorgen's.
     beside : sequence of str
         Other columns to give as numbers, where the file has them.
+    newest : bool
+        As of :class:`Readings`.
 
     Raises
     ------
@@ -157,7 +179,7 @@ def readings(path: str, columns: Mapping[str, str] = SAME_NAMES, beside: Sequenc
         yield sweeps
         return
     with csv_table.opened(path, columns) as table:
-        yield Readings(table, beside)
+        yield Readings(table, beside, newest=newest)
 
 
 def _impedance_columns(names: Sequence[str]) -> tuple[dict[float, int], dict[float, int]]:

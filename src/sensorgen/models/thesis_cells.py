@@ -173,7 +173,7 @@ def bulging_f_per_m2(p: rect.Params, eps_r: float, press_mm: float = 0.0, printe
 
 
 def _swept(p: Any, eps_r: float, press_mm: float, formula: Callable[..., float]) -> float:
-    """What a formula gives for the sizes that 3.1.2 makes of a pressed cell, per area of the sensor at rest [F/m2]."""
+    """Formula on the sizes that 3.1.2 gives a pressed cell, per area of the sensor at rest [F/m2]."""
     q = thesis_swept.swept(p, press_mm)
     return formula(q, eps_r) * thesis_swept.stretch(p, q)
 

@@ -45,7 +45,7 @@ def swept(p: _P, press_mm: float) -> _P:
 
 
 def stretch(rest: tri.Params | rect.Params, now: tri.Params | rect.Params) -> float:
-    """How many times the area of a cell has grown [-]: the triangular cell's period does, as the flanks turn."""
+    """Area of a cell over that at rest [-]: the triangular cell's period grows, as the flanks turn."""
     grown = now.period_mm / rest.period_mm
     return grown if isinstance(rest, tri.Params) else grown**2
 

@@ -1,6 +1,6 @@
 """Displacement and capacitance of a design's cell under pressure: results of ``sensorgen compress``."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
@@ -12,17 +12,18 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table
-from sensorgen.core.errors import BadInput, MissingValue, NotInstalled, OutOfRange
+from sensorgen.core.errors import BadInput, MissingValue, NotInstalled, OutOfRange, SensorgenError
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
-from sensorgen.design.tip import Tip
+from sensorgen.design.tip import TOPS, WORDS, Tip
 from sensorgen.design.values import assumed, of_all_materials, permittivities
 from sensorgen.models import press2d
+from sensorgen.models.compression import curve_of
 from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.prediction import capacitance_answer as at_rest
 from sensorgen.prediction import closed_form_compression as closed_form
 from sensorgen.prediction.capacitance import Unpredictable
-from sensorgen.prediction.compression_law import case_of
+from sensorgen.prediction.compression_law import case_of, under_tops
 from sensorgen.prediction.mesh_ladder import (
     MODELS,
     USUAL,
@@ -52,8 +53,10 @@ COLUMNS = (
     Column("+/-", "F/m2", key="rise_error_f_per_m2", digits=2, si=True),
     Column("C, lower", "F/m2", key="lower_f_per_m2", digits=7, si=True),
     Column("C, upper", "F/m2", key="upper_f_per_m2", digits=7, si=True),
-    *(Column(k, key=k, hidden=True) for k in ("converged_kpa", "largest_rise_error", "model", "reached", "reason")),
 )  # fmt: skip
+HIDDEN = tuple(
+    Column(k, key=k, hidden=True) for k in ("converged_kpa", "largest_rise_error", "model", "reached", "reason")
+)
 
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
 _OF_BOTH = "of the capacitance at rest plus its rise, whose error is an estimate from two meshes"
@@ -126,6 +129,8 @@ class CompressionResult(Displayed):
         Why the answer is not to be trusted; why its numbers are uncertain.
     bounds : str
         What the bounds hold.
+    tops : mapping of str to tuple of float or None
+        Rise under an even pressure and a stiff plate, of those that differ by more than the error [F/m2].
     accuracy : float or None
         Relative error of the rise that was asked for [-].
     largest_rise_error, largest_displacement_error : float or None
@@ -153,6 +158,7 @@ class CompressionResult(Displayed):
     faults: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     bounds: str = ""
+    tops: Mapping[str, tuple[float | None, ...]] = field(default_factory=dict)
     accuracy: float | None = None
     largest_rise_error: float | None = None
     largest_displacement_error: float | None = None
@@ -162,14 +168,19 @@ class CompressionResult(Displayed):
 
     def table(self) -> Table:
         """A row for each stress; one with the reason where there is no answer."""
+        under = {name: self.tops.get(name, (None,) * len(self.stress_kpa)) for name in TOPS}
+        columns = [
+            Column(f"rise, {WORDS[name]}", "F/m2", key=f"rise_{name}_f_per_m2", si=True, hidden=name not in self.tops)
+            for name in TOPS
+        ]
         curve = zip(
             self.stress_kpa, self.displacement_um, self.displacement_error_um, self.rise_f_per_m2,
-            self.rise_error_f_per_m2, self.lower_f_per_m2, self.upper_f_per_m2, strict=True,
+            self.rise_error_f_per_m2, self.lower_f_per_m2, self.upper_f_per_m2, *under.values(), strict=True,
         )  # fmt: skip
         said = self.reason or "; ".join(self.faults)
         more = self.converged_kpa, self.largest_rise_error, self.model, self.reached, said
-        rows = curve if self.model else [(None,) * 7]
-        return Table("compression", "", COLUMNS, tuple((*row, *more) for row in rows))
+        rows = curve if self.model else [(None,) * 9]
+        return Table("compression", "", (*COLUMNS, *columns, *HIDDEN), tuple((*row, *more) for row in rows))
 
     def document(self) -> Iterator[Part]:
         """The curve, how the cell was held, and what is uncertain."""
@@ -379,7 +390,26 @@ def _result(body: Body, case: Case, estimate: Estimate, asked: Asked) -> Compres
         converged_kpa=found.converged_pa / _PA_PER_KPA, faults=found.faults, bounds=_OF_BOTH,
         doubts=(*found.doubts, *_assumed(body.design)),
         largest_rise_error=up if up < inf else None, largest_displacement_error=down if down < inf else None,
+        tops=dict(_under_tops(body, case, estimate, tip)),
     )  # fmt: skip
+
+
+def _under_tops(
+    body: Body, case: Case, estimate: Estimate, tip: Tip
+) -> Iterator[tuple[str, tuple[float | None, ...]]]:  # fmt: skip
+    """Rise of C under an even pressure and a stiff plate, where it differs by more than the error."""
+    try:
+        own = curve_of(estimate.found)
+        found = under_tops(body.design, piece_of(body), case.model, tip, own, case.boundary)
+    except SensorgenError:
+        return
+    stress, at_rest = estimate.found.stress_pa, estimate.found.capacitance_f_per_m2[0]
+    at_rest_f_per_m2 = at_rest.middle() if at_rest else nan
+    for name, law in found.items():
+        strain = law.capacitive_strain(stress)[0]
+        rise = np.where(stress <= law.stress_pa[-1], at_rest_f_per_m2 * strain / (1 - strain), nan)
+        if name != tip.block and (abs(rise - estimate.rise_f_per_m2) > estimate.rise_error_f_per_m2).any():
+            yield name, _known(rise)
 
 
 def _assumed(design: Design) -> Iterator[str]:

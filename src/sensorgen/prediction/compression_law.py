@@ -29,6 +29,7 @@ from sensorgen.prediction.mesh_ladder import (
     Case,
     MeshLevel,
     Piece,
+    coarsest,
     drawn,
     estimated,
     mesh_levels,
@@ -55,11 +56,7 @@ _STRAIN = np.linspace(0.0, 0.3, 7)  # of infill: lines of its law, which is stra
 _SAME_RATIO = 1e-3  # difference of Poisson's ratios: 0.4999 and 0.5 are one cell, 0.45 deforms by 11 % more
 _ENOUGH = 0.5  # of the last of them: a curve that is known so far is extended [-]
 _ONSET = 0.25  # largest relative error of a curve's onset, on films of 0.02 to 0.2 mm from 0.5 kPa on
-_LIKE = {
-    "press2d": "tri",
-    "press3d": "rect",
-    "press_round": "tri",
-}  # prototypes that other cells are assumed to resemble
+_LIKE = {"press2d": "tri", "press3d": "rect", "press_round": "tri"}  # prototypes that other cells should resemble
 
 
 @dataclass(frozen=True)
@@ -392,25 +389,31 @@ def solved(
     known = shares[np.isfinite(shares)]
     if not known.size:
         raise OutOfRange("the error of the solved cell is unknown: the next coarser mesh did not converge")
-    curve = replace(
-        curve,
-        within=float(known.max()),
-        displacement_m=float(found.displacement_m[-1]) - found.fall_m,
-    )
+    curve = replace(curve, within=float(known.max()), displacement_m=float(found.displacement_m[-1]) - found.fall_m)
     short = curve.stress_pa[-1] < loads[-1]
     ended = [f"the solution of the cell ended at {curve.stress_pa[-1] / 1e3:.3g} kPa"] if short else []
     doubts = (*found.doubts, *([_LANDING] if found.fall_m else []), *ended)
-    tops = {} if boundary else _tops(design, piece, model, tip, curve)
+    tops = {} if boundary else under_tops(design, piece, model, tip, curve)
     return _cell(replace(curve, doubts=doubts), {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, tops)
 
 
-def _tops(design: Design, piece: Piece, model: str, tip: Tip, own: Curve) -> dict[str, Curve]:
-    """Curves under an even pressure and a stiff plate, by the ratio of rises on the coarsest mesh."""
-    loads, level = [own.stress_pa[-1] * share for share in _COARSE], USUAL - 1 if model == "press3d" else COARSEST
+def under_tops(
+    design: Design, piece: Piece, model: str, tip: Tip, own: Curve, boundary: "BoundaryConditions | None" = None
+) -> dict[str, Curve]:  # fmt: skip
+    """Curves under an even pressure and a stiff plate, by the ratio of rises on the coarsest mesh.
+
+    Parameters
+    ----------
+    design, piece, model, tip, boundary
+        As of :func:`case_of`.
+    own : Curve
+        Under the tip.
+    """
+    loads, level = [own.stress_pa[-1] * share for share in _COARSE], coarsest(model)
 
     def rise(block: str) -> Real:
         try:
-            found = pressed(case_of(design, piece, model, replace(tip, block=block)), loads, level).sound()
+            found = pressed(case_of(design, piece, model, replace(tip, block=block), boundary), loads, level).sound()
         except SensorgenError:
             return np.zeros(0)
         values = np.array([c.middle() if c else np.nan for c in found.capacitance_f_per_m2])
@@ -419,14 +422,15 @@ def _tops(design: Design, piece: Piece, model: str, tip: Tip, own: Curve) -> dic
 
     reference, curves = rise(tip.block), {tip.block: own} if not tip.soft else {}
     for block in {EVEN, STIFF} - {tip.block}:
-        other = rise(block)
-        n = min(len(reference), len(other))
-        if n and np.isfinite(ratio := other[:n] / reference[:n]).all():
+        under = rise(block)
+        n = min(len(reference), len(under))
+        if n and np.isfinite(ratio := under[:n] / reference[:n]).all():
             known = [p for p in own.stress_pa if p <= loads[n]]
             rises = (np.array(own.ratio[: len(known)]) - 1) * np.interp(known, loads[1 : n + 1], ratio)
-            curves[block] = replace(
-                compression.curve(own.name, own.source, known, (1 + rises).tolist()), within=own.within
-            )
+            end = 1 + int(np.argmin(np.append(np.diff(rises) > 0, False)))  # a coarse mesh may fall after a contact
+            if end > 1:
+                other = compression.curve(own.name, own.source, known[:end], (1 + rises[:end]).tolist())
+                curves[block] = replace(other, within=own.within)
     return curves
 
 

@@ -176,6 +176,11 @@ def _size(model: str, level: int) -> float:
     return usual / (usual + level) if usual + level > 0 else inf
 
 
+def coarsest(model: str) -> int:
+    """Level of the coarsest mesh that there is."""
+    return COARSEST if model != "press3d" else USUAL if _size(model, USUAL - 1) == inf else USUAL - 1
+
+
 def pressed(
     case: Case, stress_pa: Sequence[float], level: int = USUAL, *, keep: bool = True,
     step: Callable[[float], None] | None = None,

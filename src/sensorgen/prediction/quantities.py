@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from itertools import product
 from math import inf, isnan, nan, pi, prod, tan
 from typing import Any
@@ -157,13 +157,17 @@ def _impedance(
     """
     omega, (lead_f, lead_ohm) = 2 * pi * frequency_hz, leads
 
+    @cache  # the same line at the end of other leads
+    def own(ohm: float, farad: float, n: float) -> complex:
+        lossy = 1j + gone.tan_delta + tan(n * pi / 2)
+        admittance = omega * farad * (frequency_hz / LOWEST_HZ) ** -n * lossy + gone.leak_s
+        return complex(line.cascade([ohm], [np.array([admittance])], [1.0])[0])
+
     def z(
         ohm: float, farad: float, parallel: float = lead_f.value, series: float = lead_ohm.value, n: float = 0.0
     ) -> complex:  # fmt: skip
-        lossy = 1j + gone.tan_delta + tan(n * pi / 2)
-        admittance = omega * farad * (frequency_hz / LOWEST_HZ) ** -n * lossy + gone.leak_s
-        own = complex(line.cascade([ohm], [np.array([admittance])], [1.0])[0])
-        return series + own / (1 + 1j * omega * parallel * own)
+        alone = own(ohm, farad, n)
+        return series + alone / (1 + 1j * omega * parallel * alone)
 
     by_leads = list(product(lead_f[1:], lead_ohm[1:]))
     rest = list(product((r.lower, r.upper), (c.lower, c.upper)))
@@ -294,7 +298,11 @@ def _with_tops(found: Prediction, model: SensorModel, load: Load, query: Query) 
     others = (
         _under_top(name, law, own, model, load, query) for name, law in model.law.tops.items() if name != tip.block
     )
-    tops = [UnderTop(tip.material, **own), *filter(None, others)]
+    known = found.identifiability
+    tops = [
+        UnderTop(tip.material, **own, calibrated=known and known.calibrated, typical=known and known.map.typical()),
+        *filter(None, others),
+    ]
     wider: dict[str, Any] = {}
     apart = False
     for key, bounds in own.items():
@@ -313,13 +321,18 @@ def _under_top(
     """Numbers under another top; None where it cannot take the load."""
     sensor = replace(model.sensor, compression=law)
     try:
-        values = *_errors(sensor, load, query), _mean_slope(law, _range_pa(sensor, load, query))
+        known = identify(
+            sensor, load.frequency_hz, query.noise, force_n=load.force_n, position_m=load.position_m,
+            assumed=_unknown(model),
+        )  # fmt: skip
+        values = known.sigma_force_n, known.sigma_position_m, _mean_slope(law, _range_pa(sensor, load, query))
     except OutOfRange:
         return None
-    ratios = {key: value / own[key].value for key, value in zip(_UNITS, values, strict=True) if key in own}
-    if any(map(isnan, ratios.values())):
+    ratios = {key: value and value / own[key].value for key, value in zip(_UNITS, values, strict=True) if key in own}
+    if None in ratios.values():
         return None
-    return UnderTop(WORDS[name], **{key: own[key].times(ratio, _UNITS[key]) for key, ratio in ratios.items()})
+    under = {key: own[key].times(ratio, _UNITS[key]) for key, ratio in ratios.items() if ratio}
+    return UnderTop(WORDS[name], **under, calibrated=known.calibrated, typical=known.map.typical())
 
 
 def _sensitivity(model: SensorModel, load: Load, query: Query, others: Otherwise) -> Bounds:

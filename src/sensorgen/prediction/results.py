@@ -19,6 +19,7 @@ from sensorgen.prediction.identifiability.results import (
     CANNOT_SENSE,
     GUESS,
     Identifiability,
+    StandardErrors,
     metres,
     newtons,
     of_schema_1,
@@ -245,16 +246,28 @@ class UnderTop:
         As "stiff plate".
     force_resolution, position_resolution, sensitivity : Bounds or None
         As of :class:`Prediction` [N], [m], [1/kPa].
+    calibrated, typical : StandardErrors or None
+        After 30 known presses at the reference load; medians over forces and positions.
     """
 
     name: str
     force_resolution: Bounds | None = None
     position_resolution: Bounds | None = None
     sensitivity: Bounds | None = None
+    calibrated: StandardErrors | None = None
+    typical: StandardErrors | None = None
+
+    def bench(self) -> tuple[Bounds | None, Bounds | None]:
+        """Standard errors of force and position after known presses [N], [m]."""
+        known = self.calibrated or StandardErrors(sigma_force_n=None, sigma_position_m=None)
+        return (
+            on_bench(self.force_resolution, known.sigma_force_n),
+            on_bench(self.position_resolution, known.sigma_position_m),
+        )
 
     def words(self) -> str:
-        """Name and resolutions."""
-        values = (b.value for b in (self.force_resolution, self.position_resolution) if b)
+        """Name, and standard errors after known presses."""
+        values = (b.value for b in self.bench() if b)
         return f"{self.name} {', '.join(si(v, u, 3) for v, u in zip(values, ('N', 'm'), strict=False))}"
 
 
@@ -341,10 +354,15 @@ class Prediction(Displayed):
     narrowing: tuple[Narrowing, ...] = ()
 
     def bench(self) -> tuple[Bounds | None, Bounds | None]:
-        """Standard errors of force and position on a bench, after known presses [N], [m]."""
-        known = self.identifiability.calibrated if self.identifiability else None
-        force, position = (known.sigma_force_n, known.sigma_position_m) if known else (None, None)
-        return on_bench(self.force_resolution, force), on_bench(self.position_resolution, position)
+        """Standard errors of force and position after known presses, under the worst top [N], [m]."""
+        force, position = zip(*(top.bench() for top in self.under()), strict=True)
+        return _worst(force), _worst(position)
+
+    def under(self) -> tuple[UnderTop, ...]:
+        """Numbers under each top, where they differ; else under the tip."""
+        known = self.identifiability
+        own = (self.force_resolution, self.position_resolution, self.sensitivity)
+        return self.tops or (UnderTop("", *own, *((known.calibrated, known.map.typical()) if known else ())),)
 
     @property
     def conditional(self) -> bool:
@@ -375,7 +393,7 @@ class Prediction(Displayed):
         yield Table("quantities", "", columns, tuple(rows))
         yield caption_of(self.force_n, self.position_m, self.body)
         if self.tops:
-            yield f"it depends on the tip: {'; '.join(top.words() for top in self.tops)}"
+            yield f"the worst of: {'; '.join(top.words() for top in self.tops)}"
         if self.narrowing:
             columns = (Column("range that spans"), Column("a factor"), Column("narrowed most by"), Column("to"))
             rows_ = ((n.quantity, _times(n.factor), n.measurement, _times(n.left)) for n in self.narrowing)
@@ -434,6 +452,9 @@ class Prediction(Displayed):
         """Identifiability and error budget; or why there are none."""
         if self.identifiability:
             yield from self.identifiability.document()
+            medians = [f"{top.name} {top.typical.words()}" for top in self.tops if top.typical]
+            if medians:
+                yield f"median over forces and positions: {'; '.join(medians)}"
         elif self.reason:
             yield f"no load: {self.reason}"
         if self.budget:
@@ -491,6 +512,15 @@ def on_bench(exact: Bounds | None, calibrated: float | None) -> Bounds | None:
     if exact is None or calibrated is None:
         return exact
     return exact.times(calibrated / exact.value, exact.unit)
+
+
+def _worst(errors: Sequence[Bounds | None]) -> Bounds | None:
+    """Largest standard error, its range that of all; None where none is known."""
+    known = [b for b in errors if b]
+    if not known:
+        return None
+    ends = min(b.lower for b in known), max(b.upper for b in known)
+    return replace(max(known, key=lambda b: b.value), lower=ends[0], upper=ends[1])
 
 
 def _times(factor: float) -> str:

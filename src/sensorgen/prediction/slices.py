@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sensorgen.asprinted import agreement, pinholes
 from sensorgen.asprinted import printed as asprinted
 from sensorgen.checks import bed
 from sensorgen.checks.review import LOST, Review, Step, advised, review
@@ -28,9 +27,9 @@ from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
 from sensorgen.design.values import permittivities, resistivities
 from sensorgen.design.walls import WALLS, rule
-from sensorgen.export import machine, slicing
-from sensorgen.export.gcode.check import Checked, check_motion
-from sensorgen.export.gcode.drags import Lifted, Lifting
+from sensorgen.export import machine
+from sensorgen.export.gcode.check import Checked
+from sensorgen.export.gcode.drags import Lifting
 from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, curaengine, prusa, versions
 from sensorgen.export.slicers.loads import loads
 from sensorgen.export.slicers.run import find
@@ -38,6 +37,8 @@ from sensorgen.prediction.results import unpredicted
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
+
+    from sensorgen.export.gcode.drags import Lifted
 
 VARIABLE = "SENSORGEN_SLICER"  # environment: prusa, cura, or none for estimates; the first that is installed if not set
 NONE = "none"
@@ -149,7 +150,7 @@ class NewSlice:
 
     file: PrintFile
     printed: asprinted.Printed
-    lifted: Lifted
+    lifted: "Lifted"
 
 
 def slice_now(
@@ -160,6 +161,10 @@ def slice_now(
 
     Parameters and errors as of :func:`sensorgen.export.slicing.sliced`; with ``strict`` warnings refuse the file, too.
     """
+    from sensorgen.asprinted import agreement, pinholes
+    from sensorgen.export import slicing
+    from sensorgen.export.gcode.check import check_motion
+
     with tempfile.TemporaryDirectory() as stage:
         made = slicing.sliced(
             [slicing.alone(design)], slicer, Path(stage), program=program, time_limit_s=time_limit_s, step=step

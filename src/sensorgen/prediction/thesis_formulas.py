@@ -73,7 +73,7 @@ class FormulaResult:
         yield self.reason
 
     def remarks(self) -> Sequence[str]:
-        """Its source, or why there is no value."""
+        """Source of the formula, or why there is no value."""
         return (self.reason,)
 
     def problems(self) -> Sequence[str]:
@@ -117,7 +117,7 @@ def answer(design: Design, asked: Asked, press_mm: float | None = None) -> Formu
 def sweep(
     key: str, points: Sequence[tuple[float | str, Design]], asked: Asked, press_mm: Sequence[float]
 ) -> Sweep[FormulaResult]:
-    """The same along a sweep, or along presses of one design; a reason stands in place of what has no number.
+    """Answers along a sweep, or along presses of one design; with a reason where there is no number.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Which material fills which region: prisms, sections, unit cell, meshes, solids, drawing."""
+"""Bodies and regions of a sensor: prisms, sections, unit cell, meshes, solids, drawing."""

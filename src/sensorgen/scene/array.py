@@ -26,11 +26,11 @@ class ArrayParams(Envelope):
     )  # fmt: skip
 
     def cells(self) -> float:
-        """How many cells of the pattern the sensor holds [-]."""
+        """Number of cells of the pattern in the sensor [-]."""
         return self.length_mm * self.width_mm / self.period_mm**2
 
     def fitting(self) -> tuple[int, int]:
-        """How many whole cells it has along its length and width."""
+        """Number of whole cells along its length and width."""
         along, across = (floor(size / self.period_mm + 1e-9) for size in (self.length_mm, self.width_mm))
         return along, across
 
@@ -122,7 +122,7 @@ def array_scene(
 
 
 def beside_round(x_mm: float, y_mm: float, period_mm: float, z0: float, z1: float) -> list[Piece]:
-    """What of a square cell lies beyond the circle in it, as upright prisms with chords for arcs."""
+    """Parts of a square cell beyond the circle in it, as upright prisms with chords for arcs."""
     from math import cos, pi, sin
 
     half, quarter = period_mm / 2, 24

@@ -55,17 +55,17 @@ def _inside(piece: Piece, region: shapely.Polygon) -> Iterator[Piece]:
         for outline in outlines(left):
             yield Prism("z", outline, low, high)
         return
-    from sensorgen.scene.geometry import meshes, surfaces
+    from sensorgen.scene.geometry.meshes import mesh
     from sensorgen.scene.geometry.recognition import pieces
+    from sensorgen.scene.geometry.surfaces import shells_of
 
     low, high = piece.span("z")
     tool = [Prism("z", outline, low - 1, high + 1) for outline in outlines(region)]
-    made = meshes.mesh(Body("piece", "", (piece,)))
-    solid = surfaces.solid([made])
+    solid = mesh(Body("piece", "", (piece,))).solid()
     for prism in tool:
-        left = solid ^ surfaces.solid([meshes.mesh(Body("border", "", (prism,)))])
+        left = solid ^ mesh(Body("border", "", (prism,))).solid()
         if left.volume() > SLIVER_MM**2 * (high - low):
-            yield from pieces(surfaces.shells_of(left))
+            yield from pieces(shells_of(left))
 
 
 def share(scene: Scene, region: shapely.Polygon, cell_mm: Point) -> Share:

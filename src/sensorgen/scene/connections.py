@@ -1,4 +1,4 @@
-"""Which conductors belong to an electrode: those that touch it, whatever they are called; others float.
+"""Conductors of an electrode: those that touch it, whatever they are called; others float.
 
 An electrode is the largest connected piece of the bodies that are drawn with its terminal. Pieces that share a face, an
 edge or a corner touch.
@@ -12,7 +12,7 @@ import shapely
 
 from sensorgen.core.arrays import Real, Whole
 from sensorgen.scene.layers import LayerRegions, parts
-from sensorgen.scene.scene import FLOATING, PLANE, SLIVER_MM, Body, Outline, Piece, Prism, Scene, rectangle
+from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Piece, Scene, shadow
 
 Conducts = Callable[[str], bool]  # whether a material, by its name, does
 
@@ -33,7 +33,7 @@ class Short:
     place_mm: tuple[float, float, float]
 
     def words(self) -> str:
-        """What touches, and where."""
+        """Names of what touches, and the place."""
         x, y, z = self.place_mm
         return f"{' and '.join(dict.fromkeys(self.bodies))} touch at x {x:.3g}, y {y:.3g}, z {z:.3g} mm"
 
@@ -47,11 +47,12 @@ def groups(count: int, one: Whole, other: Whole) -> Whole:
     label = np.arange(count)
     while True:
         low, found = np.minimum(label[one], label[other]), label.copy()
-        np.minimum.at(found, one, low)
-        np.minimum.at(found, other, low)
-        found = found[found]
+        for ends in (one, other):  # the first of each group takes the least first of its neighbours
+            np.minimum.at(found, label[ends], low)
+        while (found[found] != found).any():
+            found = found[found]
         if (found == label).all():
-            return np.unique(label, return_inverse=True)[1]
+            return (np.cumsum(label == np.arange(count)) - 1)[label]
         label = found
 
 
@@ -110,7 +111,7 @@ class Connected:
     floating: int = 0
 
     def remarks(self) -> tuple[str, ...]:
-        """What differs from two electrodes apart, in words."""
+        """Differences from two electrodes apart, in words."""
         one = "a piece of conductor touches no electrode"
         many = f"{self.floating} pieces of conductor touch no electrode"
         said = [] if not self.floating else [f"{one if self.floating == 1 else many}: solved as floating"]
@@ -185,7 +186,7 @@ def connected_scene(scene: Scene, conducts: Conducts) -> Scene:
     axis = next((n for n in "zyx" if all(p.is_constant(n) for _, p in pieces)), None)
     if axis is None or not pieces:
         return scene
-    outlines = np.array([shapely.Polygon(_outline(p, axis)) for _, p in pieces])
+    outlines = np.array([shapely.Polygon(shadow(p, axis)) for _, p in pieces])
     spans = np.array([p.span(axis) for _, p in pieces])
     terminals, *_ = _Pieces([b for b, _ in pieces], outlines, spans).terminals()
     if all(body.terminal == terminal for (body, _), terminal in zip(pieces, terminals, strict=True)):
@@ -197,11 +198,3 @@ def connected_scene(scene: Scene, conducts: Conducts) -> Scene:
             own = _as(body, next(given)) if body.terminal or conducts(body.material) else body
             made.setdefault(own.name, (own, []))[1].append(piece)
     return replace(scene, bodies=tuple(replace(body, pieces=tuple(own)) for body, own in made.values()))
-
-
-def _outline(piece: Piece, axis: str) -> Outline:
-    """A prism seen along an axis."""
-    if isinstance(piece, Prism) and piece.axis == axis:
-        return piece.outline
-    first, second = PLANE[axis]
-    return rectangle(*piece.span(first), *piece.span(second))

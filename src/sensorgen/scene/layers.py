@@ -44,7 +44,7 @@ class LayerRegions:
         return self.top_mm - self.bottom_mm
 
     def region(self, body: str) -> Region:
-        """What a body covers; empty where it is absent."""
+        """Region that a body covers; empty where it is absent."""
         return self.regions.get(body, EMPTY)
 
     def mapped(self, regions: Mapping[str, Region]) -> "LayerRegions":
@@ -83,13 +83,13 @@ def cleaned(region: Region) -> Region:
 
 
 def are_boxes(polygons: Sequence[Polygon] | NDArray[np.object_]) -> NDArray[np.bool_]:
-    """Which polygons are rectangles along the axes (n,)."""
+    """Mask of the polygons that are rectangles along the axes (n,)."""
     x0, y0, x1, y1 = shapely.bounds(polygons).T
     return np.asarray(abs((x1 - x0) * (y1 - y0) - shapely.area(polygons)) < SLIVER_MM**2)
 
 
 def is_rectilinear(region: Region) -> bool:
-    """Whether all edges run along x or y."""
+    """True where all edges run along x or y."""
     rings = shapely.get_rings(shapely.get_parts(region))
     corners, ring = shapely.get_coordinates(rings, return_index=True)
     steps = np.abs(np.diff(corners, axis=0)).min(1)

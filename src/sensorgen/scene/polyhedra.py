@@ -1,6 +1,6 @@
 """Bodies with flat faces: closed triangle meshes, and lofts between outlines at two heights."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import hypot, inf, isfinite
@@ -79,10 +79,7 @@ class Polyhedron:
         x0 = self.vertices[0][0]
         flux = []  # of the field (x, 0, 0), which level faces do not pass
         for triangle in self.triangles:
-            corners = [self.vertices[number] for number in triangle]
-            for level, side in ((low_mm, 1.0), (high_mm, -1.0)):
-                if corners and isfinite(level):
-                    corners = _above(corners, level, side)
+            corners = between([self.vertices[number] for number in triangle], low_mm, high_mm)
             for k in range(1, len(corners) - 1):
                 (xa, ya, za), (xb, yb, zb), (xc, yc, zc) = corners[0], corners[k], corners[k + 1]
                 normal = (yb - ya) * (zc - za) - (zb - za) * (yc - ya)
@@ -90,17 +87,17 @@ class Polyhedron:
         return sum(flux) / 6
 
     def is_box(self) -> bool:
-        """Whether its six faces are square to the axes."""
+        """True for a box with six faces square to the axes."""
         sides = [high - low for low, high in map(self.span, AXES)]
         whole = sides[0] * sides[1] * sides[2]
         return whole > 0 and abs(self.volume_mm3() - whole) < 1e-12 * whole
 
     def is_round(self) -> bool:
-        """Whether it has curved faces, of which cuts and meshes have the chords."""
+        """True for curved faces, of which cuts and meshes have the chords."""
         return False
 
     def is_constant(self, axis: str) -> bool:  # noqa: ARG002
-        """Whether all its cuts square to an axis are the same."""
+        """True where all cuts square to an axis are the same."""
         return self.is_box()
 
     def levels_mm(self) -> set[float]:
@@ -120,17 +117,15 @@ class Polyhedron:
                 down = next((b, a) for a, b in sides if below[b] and not below[a])
                 # (x, z) is left-handed: seen against y, triangles run the other way round
                 after[up if axis == "y" else down] = down if axis == "y" else up
-        loops = []
-        while after:
-            start, place = next(iter(after)), None
-            loop, place = [], start
-            while place in after:
-                a, b = (self.vertices[number] for number in place)
-                share = (at_mm - a[across]) / (b[across] - a[across])
-                u, v = (rounded(a[k] + share * (b[k] - a[k])) for k in (first, second))
-                loop.append((u, v))
-                place = after.pop(place)
-            loops.append(without_straight(loop))
+
+        def crossing(edge: tuple[int, int]) -> Point:
+            a, b = (self.vertices[number] for number in edge)
+            share = (at_mm - a[across]) / (b[across] - a[across])
+            return rounded(a[first] + share * (b[first] - a[first])), rounded(
+                a[second] + share * (b[second] - a[second])
+            )
+
+        loops = [without_straight([crossing(edge) for edge in ring]) for ring in _rings(after)]
         return _without_holes([loop for loop in loops if len(loop) > 2 and abs(area_mm2(loop)) > SLIVER_MM**2])
 
     def turned_over(self, size_mm: Place) -> "Polyhedron":
@@ -143,16 +138,28 @@ class Polyhedron:
         return replace(self, vertices=tuple((rounded(x * factor), rounded(y * factor), z) for x, y, z in self.vertices))
 
 
-def _above(corners: Sequence[Place], level_mm: float, side: float) -> list[Place]:
-    """Part of a flat polygon above a height, or below it for a ``side`` of -1 (Sutherland and Hodgman, 1974)."""
-    kept: list[Place] = []
-    for k, b in enumerate(corners):
-        a = corners[k - 1]
-        if (side * (a[2] - level_mm) >= 0) != (side * (b[2] - level_mm) >= 0):
-            share = (level_mm - a[2]) / (b[2] - a[2])
-            kept.append((a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), level_mm))
-        kept += [b] if side * (b[2] - level_mm) >= 0 else []
-    return kept
+def _rings(after: dict[tuple[int, int], tuple[int, int]]) -> Iterator[list[tuple[int, int]]]:
+    """Rings of edges, each with its follower; ``after`` is emptied."""
+    while after:
+        ring, place = [], next(iter(after))
+        while place in after:
+            ring.append(place)
+            place = after.pop(place)
+        yield ring
+
+
+def between(corners: Sequence[Place], low_mm: float, high_mm: float) -> Sequence[Place]:
+    """Part of a flat polygon between two heights (Sutherland and Hodgman, 1974)."""
+    for side, level in ((1.0, low_mm), (-1.0, high_mm)):
+        inside: list[Place] = []
+        for a, b in zip([*corners[-1:], *corners[:-1]], corners, strict=True):
+            if (side * (a[2] - level) >= 0) != (side * (b[2] - level) >= 0):
+                share = (level - a[2]) / (b[2] - a[2])
+                inside.append((a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), level))
+            if side * (b[2] - level) >= 0:
+                inside.append(b)
+        corners = inside
+    return corners
 
 
 def _without_holes(loops: list[Outline]) -> list[Outline]:
@@ -240,15 +247,15 @@ class Loft:
         return (high - low) * (first + 4 * middle + last) / 6
 
     def is_box(self) -> bool:
-        """Whether its six faces are square to the axes."""
+        """True for a box with six faces square to the axes."""
         return self.lower == self.upper and is_rectangle(self.lower)
 
     def is_round(self) -> bool:
-        """Whether it has curved faces, of which cuts and meshes have the chords."""
+        """True for curved faces, of which cuts and meshes have the chords."""
         return False
 
     def is_constant(self, axis: str) -> bool:
-        """Whether all its cuts square to an axis are the same."""
+        """True where all cuts square to an axis are the same."""
         return self.is_box() or (axis == "z" and self.lower == self.upper)
 
     def levels_mm(self) -> set[float]:

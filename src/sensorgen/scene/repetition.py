@@ -21,7 +21,7 @@ _SAME = 1e-6  # share of the area by which a repeated pattern may differ: what r
 
 @dataclass(frozen=True)
 class Repeat:
-    """What of a plan repeats along one axis.
+    """Part of a plan that repeats along one axis.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ def widened(regions: Sequence[Region], size_mm: Sequence[float], axis: int, by_m
 
 
 def _is_plain(region: Region, size_mm: Sequence[float], axis: int) -> bool:
-    """Whether a region does not change along an axis."""
+    """True where a region does not change along an axis."""
     slab = shapely.bounds(shapely.get_parts(region))
     through = (slab[:, axis] < _SAME_MM) & (slab[:, axis + 2] > size_mm[axis] - _SAME_MM)
     boxes = (slab[:, 2] - slab[:, 0]) * (slab[:, 3] - slab[:, 1])
@@ -127,7 +127,7 @@ def _crossings(looks: Sequence[Region], axis: int, whole: float, wide: float) ->
 
 
 def _shifts(at: Real, kind: Real, period: float, whole: float) -> bool:
-    """Whether every crossing is one again a period further."""
+    """True where every crossing is one again a period further."""
     for one in np.unique(kind):
         own = at[kind == one]
         here = own[own < whole - period - _SAME_MM] + period
@@ -164,13 +164,13 @@ def halved(sides: tuple[Repeat, Repeat], regions: Sequence[Region]) -> tuple[Rep
 
 
 def are_mirrored(regions: Sequence[Region], axis: int, at_mm: float) -> bool:
-    """Whether each of some regions is its own mirror image at a place along an axis."""
+    """True where each of some regions is its own mirror image at a place along an axis."""
     ways = (-1.0, 1.0) if axis == 0 else (1.0, -1.0)
     return all(_are_same(scale(r, *ways, origin=(at_mm, at_mm)), r) for r in regions)
 
 
 def _around(at_mm: float, axis: int, size_mm: Sequence[float]) -> tuple[float, ...]:
-    """What of a plan lies as far to one side of a place as to the other: x and y, low and high [mm]."""
+    """Part of a plan that lies as far to one side of a place as to the other: x and y, low and high [mm]."""
     reach = min(at_mm, size_mm[axis] - at_mm)
     low, high = [0.0, 0.0], list(size_mm[:2])
     low[axis], high[axis] = at_mm - reach, at_mm + reach

@@ -174,15 +174,15 @@ class Revolved:
         return sum(found)
 
     def is_box(self) -> bool:
-        """Whether its six faces are square to the axes: never."""
+        """False: no box has curved faces."""
         return False
 
     def is_round(self) -> bool:
-        """Whether it has curved faces, of which cuts and meshes have the chords."""
+        """True for curved faces, of which cuts and meshes have the chords."""
         return True
 
     def is_constant(self, axis: str) -> bool:  # noqa: ARG002
-        """Whether all its cuts square to an axis are the same: never, as cuts are polygons and it is round."""
+        """False: cuts are polygons, and it is round."""
         return False
 
     def levels_mm(self) -> set[float]:

@@ -81,15 +81,15 @@ class Prism:
         return area * (self.end_mm - self.start_mm)
 
     def is_box(self) -> bool:
-        """Whether its six faces are square to the axes."""
+        """True for a box with six faces square to the axes."""
         return is_rectangle(self.outline)
 
     def is_round(self) -> bool:
-        """Whether it has curved faces, of which cuts and meshes have the chords."""
+        """True for curved faces, of which cuts and meshes have the chords."""
         return False
 
     def is_constant(self, axis: str) -> bool:
-        """Whether all its cuts square to an axis are the same."""
+        """True where all cuts square to an axis are the same."""
         return self.axis == axis or self.is_box()
 
     def levels_mm(self) -> set[float]:
@@ -140,7 +140,7 @@ class Prism:
 
 @dataclass(frozen=True)
 class Body:
-    """What one tool prints as one piece of the sensor.
+    """Part of the sensor that one tool prints as one piece.
 
     Attributes
     ----------
@@ -161,7 +161,7 @@ class Body:
     terminal: str = ""
 
     def is_support(self) -> bool:
-        """Whether it is dissolved after printing, and no part of the sensor in use."""
+        """True where it is dissolved after printing, and no part of the sensor in use."""
         return self.name == "support"
 
     def volume_mm3(self) -> float:
@@ -209,7 +209,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Fill:
-    """Which material fills which part of a shape; "" leaves it empty."""
+    """Materials by the part of a shape that they fill; "" leaves it empty."""
 
     bottom_electrode: str = "etpu"
     top_electrode: str = "etpu"
@@ -234,7 +234,7 @@ class Envelope:
     )
 
     def cells(self) -> float:
-        """How many cells of a repeating pattern the sensor holds; 1 without a pattern [-]."""
+        """Number of cells of a repeating pattern in the sensor; 1 without a pattern [-]."""
         return 1.0
 
 
@@ -246,11 +246,17 @@ def seen_from_above(piece: Piece) -> Outline:
     ValueError
         It is neither: its outline changes with height.
     """
-    if isinstance(piece, Prism) and piece.axis == "z":
-        return piece.outline
-    if not piece.is_box():
+    if not piece.is_box() and not (isinstance(piece, Prism) and piece.axis == "z"):
         raise ValueError("its outline changes with height")
-    return rectangle(*piece.span("x"), *piece.span("y"))
+    return shadow(piece, "z")
+
+
+def shadow(piece: Piece, axis: str) -> Outline:
+    """Outline of a piece along an axis, in ``PLANE[axis]``: of a prism across the axis its rectangle [mm]."""
+    if isinstance(piece, Prism) and piece.axis == axis:
+        return piece.outline
+    first, second = PLANE[axis]
+    return rectangle(*piece.span(first), *piece.span(second))
 
 
 def content(piece: Piece) -> list[object]:
@@ -270,7 +276,7 @@ def rectangle(a0: float, a1: float, b0: float, b1: float) -> Outline:
 
 
 def is_rectangle(outline: Outline) -> bool:
-    """Whether it is a rectangle along the axes."""
+    """True for a rectangle along the axes."""
     low, high = (tuple(map(end, zip(*outline, strict=True))) for end in (min, max))
     corners = {low, high, (low[0], high[1]), (high[0], low[1])}
     return len(outline) == 4 == len(corners) and set(outline) == corners and area_mm2(outline) != 0

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
-from sensorgen.scene.scene import PLANE, Body, Outline, Piece, Point, Prism, Scene, rounded
+from sensorgen.scene.scene import Body, Outline, Point, Scene, shadow
 
 ROUNDING_MM = 1e-9  # edges nearer than this are one edge, reached by different sums
 
@@ -72,7 +72,7 @@ def _sections(scene: Scene, normal: str) -> list[Section]:
         for k in range(bisect_left(cuts, low), bisect_left(cuts, high)):
             slabs[k].append(index)
     looks: dict[object, int] = {}
-    look = [looks.setdefault((body.name, _seen(p, normal)), len(looks)) for _, body, p in spans]
+    look = [looks.setdefault((body.name, shadow(p, normal)), len(looks)) for _, body, p in spans]
     found: dict[tuple[int, ...], tuple[float, float, list[int]]] = {}
     for (low, high), here in zip(pairwise(cuts), slabs, strict=True):
         key = tuple(look[i] for i in here)
@@ -82,13 +82,6 @@ def _sections(scene: Scene, normal: str) -> list[Section]:
         Section(across, depth, at, tuple((spans[i][1], o) for i in members for o in spans[i][2].cut(normal, at)))
         for depth, at, members in found.values()
     ]
-
-
-def _seen(piece: Piece, normal: str) -> tuple[Point, ...]:
-    """What of a piece a section square to ``normal`` shows: the same for every place inside it."""
-    if isinstance(piece, Prism) and piece.axis == normal:
-        return piece.outline
-    return tuple(piece.span(axis) for axis in PLANE[normal])
 
 
 @dataclass(frozen=True)
@@ -118,13 +111,16 @@ def columns(section: Section) -> list[Column]:
 
 
 @lru_cache(maxsize=8)
-def alike(section: Section) -> list[int]:
-    """Of each column, the number of the first that looks like it: as wide, of the same bodies at the same heights."""
+def alike(section: Section, digits: int = 12) -> list[int]:
+    """Of each column, the number of the first that looks like it: as wide, of the same bodies at the same heights.
+
+    Sizes are equal where they are to so many digits after the point [mm].
+    """
     firsts: dict[object, int] = {}
     found = []
     for k, column in enumerate(_columns(section)):
-        lines = ((layer.body.name, *map(rounded, (*layer.bottom_mm, *layer.top_mm))) for layer in column.layers)
-        found.append(firsts.setdefault((rounded(column.right_mm - column.left_mm), *lines), k))
+        lines = ((own.body.name, *(round(z, digits) for z in own.bottom_mm + own.top_mm)) for own in column.layers)
+        found.append(firsts.setdefault((round(column.right_mm - column.left_mm, digits), *lines), k))
     return found
 
 

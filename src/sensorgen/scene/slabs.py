@@ -7,7 +7,7 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from sensorgen.scene.scene import SLIVER_MM, Body, Outline, Piece, Prism, Scene, area_mm2, rectangle, seen_from_above
+from sensorgen.scene.scene import SLIVER_MM, Body, Piece, Prism, Scene, area_mm2, seen_from_above, shadow
 
 if TYPE_CHECKING:  # a stored answer loads no numbers
     import shapely
@@ -21,7 +21,7 @@ _COVERS = 0.99  # of the plan: between round beads there may be holes
 
 @dataclass(frozen=True)
 class Slab:
-    """What lies between two heights.
+    """Slab of a scene between two heights.
 
     Attributes
     ----------
@@ -73,10 +73,10 @@ def slabs(scene: Scene, cuts: int = CUTS) -> tuple[Slab, ...]:
 
 
 def covered(scene: Scene, terminal: str) -> bool:
-    """Whether an electrode covers the whole plan of a scene, seen from above."""
+    """True where an electrode covers the whole plan of a scene, seen from above."""
     whole = _COVERS * scene.size_mm[0] * scene.size_mm[1]
     prisms = [p for b in scene.bodies if b.terminal == terminal for p in b.pieces if isinstance(p, Prism)]
-    if any(abs(area_mm2(_from_above(prism))) >= whole for prism in prisms):
+    if any(abs(area_mm2(shadow(prism, "z"))) >= whole for prism in prisms):
         return True
     import shapely
 
@@ -84,29 +84,21 @@ def covered(scene: Scene, terminal: str) -> bool:
     return bool(shapely.union_all(own).area >= whole)
 
 
-def _from_above(prism: Prism) -> Outline:
-    """Its shadow in plan: a rectangle where it lies."""
-    return prism.outline if prism.axis == "z" else rectangle(*prism.span("x"), *prism.span("y"))
-
-
 def is_open(scene: Scene) -> bool:
-    """Whether one of the two electrodes does not cover the whole plan, so that the field leaves the sensor."""
+    """True where one of the two electrodes does not cover the whole plan, so that the field leaves the sensor."""
     ends = {body.terminal for body in scene.bodies} & {"top", "bottom"}
     return not all(covered(scene, end) for end in sorted(ends))
 
 
 def _faces(piece: Piece) -> "Real":
     """Triangles of its surface (n, 3, 3) [mm]."""
-    import numpy as np
-
     from sensorgen.scene.geometry.meshes import mesh
 
-    made = mesh(Body("", "", (piece,)))
-    return np.asarray(made.vertices_mm[made.triangles], float)
+    return mesh(Body("", "", (piece,))).corners_mm()
 
 
 def _between(piece: Piece, faces: "Real", low_mm: float, high_mm: float) -> "tuple[Region, Region]":
-    """What a piece covers at all heights between two, and at any: its surface in between decides where they differ."""
+    """Regions that a piece covers at all heights between two, and at any: its surface decides where they differ."""
     import shapely
 
     from sensorgen.scene.layers import EMPTY
@@ -125,17 +117,10 @@ def _projected(faces: "Real", low_mm: float, high_mm: float) -> "Iterator[shapel
     """The parts of triangles between two heights, seen from above."""
     import shapely
 
+    from sensorgen.scene.polyhedra import between
+
     for triangle in faces.tolist():
-        corners = triangle
-        for sign, level in ((1.0, low_mm), (-1.0, high_mm)):
-            kept = []
-            for a, b in zip(corners, [*corners[1:], *corners[:1]], strict=True):
-                if sign * (a[2] - level) >= 0:
-                    kept.append(a)
-                if sign * (a[2] - level) * sign * (b[2] - level) < 0:
-                    share = (level - a[2]) / (b[2] - a[2])
-                    kept.append([u + share * (v - u) for u, v in zip(a, b, strict=True)])
-            corners = kept
+        corners = between(triangle, low_mm, high_mm)
         if len(corners) > 2:
             outline = shapely.Polygon([corner[:2] for corner in corners])
             if outline.area > SLIVER_MM**2:

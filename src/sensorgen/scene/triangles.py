@@ -45,7 +45,7 @@ class TriangleParams(Envelope):
             )
 
     def cells(self) -> float:
-        """How many cells of the pattern the sensor holds [-]."""
+        """Number of cells of the pattern in the sensor [-]."""
         return (self.length_mm if self.along == "x" else self.width_mm) / self.period_mm
 
 
@@ -123,7 +123,7 @@ class Frame:
         return [(0.0, self.low), (teeth[0][0], self.low), *teeth, (self.apexes[0] - self.quarter, self.peak)]
 
     def air(self) -> list[list[Point]]:
-        """What is left open above each foot."""
+        """Air above each foot."""
         q, t = self.quarter, self.blunt
         return [[(a - 2 * q + t, self.film), (a - q, self.peak), (a - t, self.film), (a - q, self.roof)]
                 for a in self.apexes]  # fmt: skip

@@ -40,7 +40,7 @@ class Band:
     top_mm: Point
 
     def is_same(self, other: "Band") -> bool:
-        """Whether both are of one material, or of one conductor."""
+        """True where both are of one material, or of one conductor."""
         return (self.material, self.terminal) == (other.material, other.terminal)
 
 
@@ -70,13 +70,13 @@ class Slice:
         return Slice(left_mm, right_mm, tuple(bands))
 
     def is_flat(self) -> bool:
-        """Whether all its interfaces are level."""
+        """True where all interfaces are level."""
         return all(abs(b.top_mm[0] - b.top_mm[1]) < ROUNDING_MM for b in self.bands)
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What has to be solved of a section, with zero flux through both sides.
+    """Part of a section that has to be solved, with zero flux through both sides.
 
     Attributes
     ----------
@@ -178,7 +178,7 @@ def _bridged(last: Slice, here: Slice) -> tuple[Band, ...]:
 
 
 def _runs_on(joined: Slice, last: Slice, here: Slice) -> bool:
-    """Whether two neighbours are one slice: the same materials, lines that neither jump nor bend."""
+    """True where two neighbours are one slice: the same materials, lines that neither jump nor bend."""
     if len(last.bands) != len(here.bands) or not all(map(Band.is_same, last.bands, here.bands)):
         return False
     middle = joined.lines_mm(here.left_mm)
@@ -187,18 +187,18 @@ def _runs_on(joined: Slice, last: Slice, here: Slice) -> bool:
 
 
 def _is_even(start_mm: float, piece_mm: float, whole_mm: float) -> bool:
-    """Whether a piece occurs a whole number of times, each of its parts as often as another."""
+    """True where a piece occurs a whole number of times, each of its parts as often as another."""
     times = round(whole_mm / piece_mm)
     return abs(times * piece_mm - whole_mm) < ROUNDING_MM and (times % 2 == 0 or start_mm < ROUNDING_MM)
 
 
 def _has_room(start_mm: float, piece_mm: float, whole_mm: float) -> bool:
-    """Whether two whole pieces follow each other: one alone would not show that it repeats."""
+    """True where two whole pieces follow each other: one alone would not show that it repeats."""
     return start_mm + 2 * piece_mm <= whole_mm + ROUNDING_MM
 
 
 def _shows_periods(start_mm: float, piece_mm: float, whole_mm: float) -> bool:
-    """Whether there are two whole periods: in one alone, any place within its level ends may be the mirror."""
+    """True for two whole periods: in one alone, any place within its level ends may be the mirror."""
     return start_mm + 4 * piece_mm <= whole_mm + ROUNDING_MM
 
 
@@ -222,13 +222,13 @@ def _pairs(places: list[float], end_mm: float) -> Iterator[Point]:
 
 
 def _is_mirror(slices: list[Slice], at: float) -> bool:
-    """Whether a place mirrors what lies to both its sides, as far as the nearer end reaches."""
+    """True where a place mirrors both its sides, as far as the nearer end reaches."""
     reach = min(at - slices[0].left_mm, slices[-1].right_mm - at)
     return reach <= ROUNDING_MM or _repeats(_cut(slices, at - reach, at + reach), at, at + reach)
 
 
 def _repeats(slices: list[Slice], low: float, high: float) -> bool:
-    """Whether mirrors at two places make the whole section from what lies between them."""
+    """True where mirrors at two places make the whole section from the part between them."""
     inside = _cut(slices, low, high)
     lefts = [s.left_mm for s in inside]
     for piece in _folded(slices, low, high):

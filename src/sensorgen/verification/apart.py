@@ -23,7 +23,7 @@ _MB = 1024  # kB
 
 @dataclass(frozen=True)
 class Answer:
-    """What a model gives.
+    """Answer of a model.
 
     Attributes
     ----------

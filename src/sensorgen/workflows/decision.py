@@ -325,6 +325,8 @@ def table(tried: Trial) -> Iterator[Part]:
         rows.append(("print time", "", f"at least {tried.toolpath.time_s / 60:.0f} min"))
     yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
     yield caption_of(tried.force_n, tried.position_m, tried.body)
+    if tried.printed.by_top:
+        yield f"printed, the worst of: {tried.printed.by_top}"
     if tried.rests_on and any(grade(tried)):
         yield f"largest assumption: a press is read wrongly by {tried.rests_on}"
     if tried.reason:

@@ -41,6 +41,8 @@ class Numbers:
         Median of the standard errors over all forces and positions [N], [m].
     conditional : bool
         Whether they rest on values that no source gives.
+    by_top : str
+        Standard errors after known presses under each top, in words; "" where the top makes no difference.
     """
 
     gap: Bounds | None = None
@@ -55,24 +57,29 @@ class Numbers:
     force_typical: float | None = None
     position_typical: float | None = None
     conditional: bool = False
+    by_top: str = ""
 
     @classmethod
     def of(cls, found: Prediction) -> "Numbers":
-        """The numbers of a prediction, under the worse top where they depend on it."""
-        known = found.identifiability
-        bench = known.calibrated if known else None
+        """The numbers of a prediction, under the worst top where they depend on it."""
+        tops = found.under()
 
         def worst(key: str) -> Bounds | None:
-            values: list[Bounds] = [b for top in found.tops or (found,) if (b := getattr(top, key))]
+            values: list[Bounds] = [b for top in tops if (b := getattr(top, key))]
             sign = 1 if key == "sensitivity" else -1
             return min(values, key=lambda b: sign * b.value, default=None)
 
+        def largest(key: str, part: str) -> float | None:
+            values = [getattr(errors, part) for top in tops if (errors := getattr(top, key))]
+            return max((v for v in values if v is not None), default=None)
+
+        force, place = "sigma_force_n", "sigma_position_m"
         return cls(
             found.gap, found.capacitance, found.resistance.get("top"), found.resistance.get("bottom"),
             worst("sensitivity"), worst("force_resolution"), worst("position_resolution"),
-            bench.sigma_force_n if bench else None, bench.sigma_position_m if bench else None,
-            known.map.of_force.median if known else None, known.map.of_position.median if known else None,
-            found.conditional,
+            largest("calibrated", force), largest("calibrated", place),
+            largest("typical", force), largest("typical", place),
+            found.conditional, "; ".join(top.words() for top in found.tops),
         )  # fmt: skip
 
     def bench(self) -> tuple[Bounds | None, Bounds | None]:

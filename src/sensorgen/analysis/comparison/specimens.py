@@ -18,6 +18,7 @@ from sensorgen.design.specimen_name import Specimen, design_of, parse
 from sensorgen.measure import accuracy
 from sensorgen.measure.log import BenchRun, Entry, Log, Prediction, Print, Reading, Withdrawal
 from sensorgen.measure.log.batches import designs as on_beds
+from sensorgen.measure.log.logbook import conflict
 from sensorgen.measure.signal.verdicts import (
     INTACT_OHM,
     Evidence,
@@ -213,10 +214,9 @@ def _begun(
 def _superseded(log: Log, iteration: int | None, specimens: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Readings out of use, and why."""
     for old in log.about(Reading, iteration, specimens, replaced=True):
-        later = log.superseding(old)
-        reason = next((row.reason for row in later if isinstance(row, Withdrawal)), "")
-        both = f"; {len(later)} corrections of it, made on different machines, all count" if len(later) > 1 else ""
-        why = f"withdrawn: {reason}" if reason else f"a later reading corrects it{both}"
+        reason = next((row.reason for row in log.superseding(old) if isinstance(row, Withdrawal)), "")
+        rival = log.rival(old)
+        why = f"withdrawn: {reason}" if reason else conflict(rival) if rival else "a later reading corrects it"
         yield f"reading {old.number}, {old.specimen}", why
 
 

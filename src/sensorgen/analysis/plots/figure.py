@@ -128,7 +128,7 @@ class Map:
 
     @property
     def signed(self) -> bool:
-        """Whether the colour scale has a neutral middle."""
+        """True where the colour scale has a neutral middle."""
         return self.span[0] < 0 < self.span[1]
 
 
@@ -167,7 +167,7 @@ class Panel:
 
     @property
     def solid(self) -> bool:
-        """Whether it has three dimensions."""
+        """True for a panel of bodies, in three dimensions."""
         return isinstance(self.content[0], Body) if self.content else False
 
 

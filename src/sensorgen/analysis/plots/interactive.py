@@ -49,7 +49,7 @@ def _all_traces(panels: Sequence[Panel]) -> Iterator[Data]:
 
 
 def height_px(figure: Figure) -> int:
-    """How high it is drawn [px]."""
+    """Height at which it is drawn [px]."""
     panels = next(iter(figure.choices.values()))
     if panels[0].solid:
         return _SOLID_PX
@@ -86,7 +86,7 @@ def _layout(panels: Sequence[Panel], figure: Figure) -> Data:
 
 
 def _alike(panels: Sequence[Panel]) -> bool:
-    """Whether all panels stand over one axis."""
+    """True where all panels have one axis across."""
     return all(panel.x == panels[0].x for panel in panels)
 
 

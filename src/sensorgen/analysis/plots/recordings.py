@@ -40,7 +40,7 @@ _TIME, _FORCE, _POSITION = Axis("time [s]"), Axis("force [N]"), Axis("position [
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What is drawn of a recording.
+    """Recording, as it is drawn.
 
     Attributes
     ----------

@@ -43,7 +43,7 @@ class ImpedanceRow:
     x_residual: Annotated[float | None, Column("residual of X", "", "(measured - predicted) / abs(Z predicted)")]
     noise_percent: Annotated[float, Column("noise", "%", "standard deviation of R and of X of a sample, of |Z|")]
     verdict: Annotated[str, Column("verdict")]
-    c_pf: Annotated[float, Column("C measured", "pF", "-1 / (omega X)")]
+    c_pf: Annotated[float, Column("Cs measured", "pF", "in series, -1 / (omega X)")]
     c_predicted_pf: Annotated[Cell, Column("C predicted", "pF")]
     c_from_pf: Annotated[Cell, Column("C from", "pF")]
     c_to_pf: Annotated[Cell, Column("C to", "pF")]

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 PATTERNS = get_args(Pattern)
+MELTED = 0.95  # of the melt rate, that lines may take: slicers write five decimals, and lay some a little wider
+TOWER_LINE = 1.25  # nozzles; PrusaSlicer 2.5 lays the first line of its tower at the speed of the prime before it
 RETRACTION_SPEED_MM_S = 40.0  # PrusaSlicer's default; slower where the printer's extruder is
 
 
@@ -112,26 +114,29 @@ def recipe(printer: Printer, quality: Quality, tool: int, load: Load) -> Recipe:
     walls = value("wall_lines", "walls [lines]", 1, 100, load.profile.wall_lines.get(load.material.name))
     if walls != round(walls):
         raise OutOfRange(f"{where}: walls [lines] is {walls:g}; expected a whole number")
+    line_mm = load.profile.line_mm.get(load.material.name, printer.line_mm())
+    flow_percent = value("flow_percent", "flow [%]", 10, 200)
+    most_mm2_s = (
+        MELTED
+        * load.material.print_range("max_flow_mm3_s", 0.0)[1]
+        / (max(quality.layer_mm, quality.first_layer_mm) * flow_percent / 100)
+    )
     return Recipe(
         material=load.material,
         source=load.source,
         nozzle_c=value("nozzle_temperature_c", "nozzle temperature [C]", 0, printer.max_nozzle_c),
         bed_c=value("bed_temperature_c", "bed temperature [C]", 0, printer.max_bed_c),
-        speed_mm_s=value("speed_mm_s", "speed [mm/s]", 0.1, limits.xy),
+        speed_mm_s=min(value("speed_mm_s", "speed [mm/s]", 0.1, limits.xy), most_mm2_s / line_mm),
         fan_percent=value("fan_percent", "fan [%]", 0, 100),
         infill_percent=value("infill_percent", "infill [%]", 1, 100, load.infill_percent),
         infill_pattern=pattern,
         wall_lines=int(walls),
-        flow_percent=value("flow_percent", "flow [%]", 10, 200),
+        flow_percent=flow_percent,
         retraction_mm=value("retraction_mm", "retraction [mm]", 0, 20),
-        retraction_speed_mm_s=min(RETRACTION_SPEED_MM_S, limits.extruder),
-        line_mm=_between(
-            where,
-            "line width [mm]",
-            load.profile.line_mm.get(load.material.name, printer.line_mm()),
-            0.5 * printer.nozzle_mm,
-            2 * printer.nozzle_mm,
+        retraction_speed_mm_s=min(
+            RETRACTION_SPEED_MM_S, limits.extruder, most_mm2_s / (TOWER_LINE * printer.nozzle_mm)
         ),
+        line_mm=_between(where, "line width [mm]", line_mm, 0.5 * printer.nozzle_mm, 2 * printer.nozzle_mm),
         infill_angle_deg=load.profile.infill_angle_deg.get(load.material.name),
     )
 

@@ -6,7 +6,7 @@ sends it nothing but that question. Any failure is a :class:`DeviceFault`.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import InstrumentFailed
@@ -82,6 +82,14 @@ class Actuator(Protocol):
 
     def close(self) -> None:
         """Give the connection back; never raises."""
+
+
+@runtime_checkable
+class SelfLifting(Protocol):
+    """An actuator whose controller lifts the tip by itself, as when both computer and guardian have stopped."""
+
+    def watch(self, seconds: float) -> None:
+        """Load that into the controller: from the next start on the tip goes up if nothing is read for a time [s]."""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ import numpy as np
 from sensorgen.core import units
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, Unwritable
+from sensorgen.core.files import replacing
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import Readings
 
@@ -44,7 +45,7 @@ class Appended:
     def __init__(self, path: Path) -> None:
         self._path = path
         try:
-            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
         except OSError as error:
             raise self._failed(error) from None
 
@@ -58,18 +59,33 @@ class Appended:
             raise self._failed(error) from None
 
     def sync(self) -> None:
-        """Return when all is on the disk."""
+        """Return when all is on the disk, at its path."""
         try:
             os.fsync(self._file)
         except OSError as error:
             raise self._failed(error) from None
+        if not self._there():
+            raise Unwritable(f"{str(self._path)!r} was removed during the run")
 
     def close(self) -> None:
-        """Sync and close."""
+        """Sync and close; a file that was removed is written again, and named as an error."""
         try:
+            if not self._there():
+                with replacing(self._path) as copy:
+                    for at in range(0, os.fstat(self._file).st_size, 1 << 20):
+                        copy.write(os.pread(self._file, 1 << 20, at))
+                raise Unwritable(f"{str(self._path)!r} was removed during the run, and is written again")
             self.sync()
+        except OSError as error:
+            raise self._failed(error) from None
         finally:
             os.close(self._file)
+
+    def _there(self) -> bool:
+        """True where the path is this file still."""
+        with suppress(OSError):
+            return os.path.samestat(os.fstat(self._file), self._path.stat())
+        return False
 
     def _failed(self, error: OSError) -> Unwritable:
         return Unwritable(f"cannot write to {str(self._path)!r}: {error.strerror or error}; make room on the disk")

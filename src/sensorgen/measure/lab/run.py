@@ -20,7 +20,7 @@ from sensorgen.measure.lab import experiment as experiments
 from sensorgen.measure.lab import plans, preflight, press, recorder, safety
 from sensorgen.measure.lab.clock import Clock, SimulatedClock
 from sensorgen.measure.lab.controls import Controls
-from sensorgen.measure.lab.devices import Identity
+from sensorgen.measure.lab.devices import Identity, SelfLifting
 from sensorgen.measure.lab.experiment import Experiment, Next
 from sensorgen.measure.lab.loop import Alive, Loop, Paused, Predicted, View
 from sensorgen.measure.lab.plans import Choice, NextPress, Pressed, Step
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 Confirm = Callable[["Planned", dict[str, Identity]], bool]
 """Whether the rig may move, by what is planned and what each device said that it is."""
+WATCHDOG_S = 1.5  # without a reading, until the actuator's controller lifts
+UNWATCHED_N = 1.0  # highest limits.force_n without that: the weight of the piston alone is 0.9 N
 USUAL_MM = 100.0  # length of a specimen whose design is unknown
 
 
@@ -174,6 +176,7 @@ def run(
     experiment: Experiment, *, clock: Clock, log: "Log", rig: Rig, simulated: bool, view: View | None = None,
     controls: Controls | None = None, guardian: Alive | None = None, next_press: NextPress | None = None,
     predicted: Predicted | None = None, resume: Path | None = None, confirm: Confirm = lambda *_: True,
+    watchdog: bool = True,
 ) -> RunResult:  # fmt: skip
     """Run an experiment.
 
@@ -197,6 +200,8 @@ def run(
         Folder of a run of this experiment that ended early: the steps not done are done.
     confirm : callable
         Asked when all devices are identified, and before any moves, whether they may.
+    watchdog : bool
+        Whether the actuator's own controller has to watch the run, where forces are above ``UNWATCHED_N``.
 
     Raises
     ------
@@ -207,16 +212,27 @@ def run(
     plan = planned(experiment, log)
     if next_press is None and any(part.kind == "next" for part in experiment.plan):
         raise BadInput("plan: a part 'next' needs a model of the specimen; expected other parts here")
+    if watchdog:
+        _check_watchdog(experiment, rig)
     recorder.recover(log, clock)
     folder = resume or recorder.new_folder(log.path)
     with ExitStack() as stack:
         if not stack.enter_context(recorder.alone(folder)):
             raise BadInput(f"{str(folder)!r} is a run that goes on in another process; expected one that has ended")
-        attempt = _Attempt(plan, clock, log, rig, folder, simulated, next_press, confirm)
+        attempt = _Attempt(plan, clock, log, rig, folder, simulated, next_press, confirm, watchdog)
         controls = controls or Controls()
         if view:
             controls.add(view.commands)
         return attempt.result(view, controls, guardian, predicted)
+
+
+def _check_watchdog(experiment: Experiment, rig: Rig) -> None:
+    """Refuse forces that would stay on the specimen if run and guardian ended together."""
+    if not isinstance(rig.actuator, SelfLifting) and experiment.limits.force_n > UNWATCHED_N:
+        raise BadInput(
+            f"limits.force_n: {experiment.limits.force_n:g} N, and this actuator has no watchdog: if run and guardian "
+            f"end together, the tip stays down; expected up to {UNWATCHED_N:g} N, or --no-watchdog"
+        )
 
 
 class _Attempt:
@@ -224,10 +240,10 @@ class _Attempt:
 
     def __init__(
         self, plan: Planned, clock: Clock, log: "Log", rig: Rig, folder: Path, simulated: bool,
-        next_press: NextPress | None, confirm: Confirm,
+        next_press: NextPress | None, confirm: Confirm, watchdog: bool,
     ) -> None:  # fmt: skip
         self.plan, self.clock, self.log, self.rig, self.folder = plan, clock, log, rig, folder
-        self.simulated, self.next_press, self.confirm = simulated, next_press, confirm
+        self.simulated, self.next_press, self.confirm, self.watchdog = simulated, next_press, confirm, watchdog
         before = Run.read(folder) if (folder / recorder.JOURNAL).exists() else Run(folder, ())
         self.number, self.done = before.attempts + 1, before.done
         self.pressed = _pressed(before, plan.steps)
@@ -286,6 +302,9 @@ class _Attempt:
         if not self.confirm(self.plan, self.identities):
             raise Ended("abort", "not confirmed; nothing has moved")
         listening.enter_context(loop.controls.listening())
+        if self.watchdog and isinstance(self.rig.actuator, SelfLifting):
+            with within("watchdog (without: --no-watchdog)"):
+                self.rig.actuator.watch(min(WATCHDOG_S, self.plan.experiment.limits.dead_man_s))
         if loop.guardian:
             loop.guardian.arm()
         loop.begin()
@@ -368,12 +387,15 @@ class _Attempt:
                               counts=counts)  # fmt: skip
         except SensorgenError as error:
             failed.append(str(error))
-        failed += kept.close()
+        unkept = kept.close()
         rows: list[BenchRun] = []
         try:
             rows = recorder.log_attempts(self.log, self.folder, self.clock)
         except SensorgenError as error:
-            failed.append(f"not logged yet: {error}")
+            unkept.append(f"not logged yet: {error}")
+        if end == "done" and unkept:
+            end, reason = "fault", f"{reason}, but {unkept[0]}"
+        failed += unkept
         failed += [each["problem"] for each in Run.read(self.folder).of("logged") if each["problem"]]
         return RunResult(
             self.plan.experiment.specimen, str(self.folder), end, reason, len(self.done), len(self.plan.steps),

@@ -171,7 +171,7 @@ class Session:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def run(self, confirm: Confirm = lambda *_: True) -> RunResult:
+    def run(self, confirm: Confirm = lambda *_: True, *, watchdog: bool = True) -> RunResult:
         """Do it; see :func:`sensorgen.measure.lab.run.run`."""
         experiment, asked = self._asked.experiment, self._asked
         folder = asked.folder or recorder.new_folder(self._log.path)
@@ -182,7 +182,7 @@ class Session:
         return run(
             experiment, clock=self._clock, log=self._log, rig=self._rig, simulated=asked.simulated, view=self._views,
             guardian=guardian, next_press=self._model, resume=folder, confirm=confirm,
-            predicted=self._model.predicted if self._model else None,
+            watchdog=watchdog, predicted=self._model.predicted if self._model else None,
         )  # fmt: skip
 
 

@@ -6,6 +6,10 @@ Source: SMAC's programming guide of the "embedded motion control library" and te
 Softland and Reset Error, in the public repository ``martijnschouten/lab-equipment-matlab-drivers``, whose program
 MatlabForceControl also gives the homing (method -1: to the upper end, then to the index) and its speeds.
 
+Watchdog: macro 59, a program in the controller, lifts by force when its timer 3 reaches 0 (interrupt 7); every reading
+sets the timer again. Sources: programming guide 5.3 to 5.5 (objects 0x2C04 to 0x2C08), and MatlabForceControl.mlm for
+the coding of commands; macros 60 to 63 are the maker's.
+
 Force on the object = per mille of the rated current x ``newton_per_unit`` + ``weight_n`` -+ ``friction_n``; friction
 acts against the last movement. Thesis 5.1.2: 0.0167 N per unit, 0.9 N. SMAC's notes give 0.1 to 1 N of friction; it has
 to be measured (constant speed down and up: half the difference), so that the default is 0.
@@ -51,6 +55,11 @@ _STATUS_S = 0.05  # until the status word is valid after the start of homing
 _LIFT, _RAMP = 30_000, 200_000  # counts/s, counts/s2
 _BURST = 3  # messages before an answer is waited for, where there is time: the controller's memory for them is unknown
 _MARGIN_N = 1.0  # of lifting and homing, above weight and friction
+_RESET_MACRO, _MACRO, _COMMAND, _CODE, _TIMER = 0x42C04, 0x12C05, 0x22C05, 0x32C05, 0x32C06
+_VECTOR, _WATCHES, _MARK = 0x72C07, 0x72C08, 0x642C00  # of interrupt 7; register W100
+_OURS, _MACRO_NUMBER, _EMPTY, _RETURN = 0x53454E53, 59, 0xFFFFFFF1FFFFFFFF, 0x022C044000000000
+_BYTES = {_MODE: 1, _CONTROL: 2, _FORCE: 2, _MARK: 4}
+_ERASE_S, _FEEDS = 0.6, 5  # after a reset of a macro, 0.5 s by the guide; settings of the timer in its time
 _ENCODER = (0x7305, 0x7306)
 _ERRORS = {
     0x2200: "peak current", 0x2201: "I2T current", 0x6320: "parameter", 0x7305: "encoder", 0x7306: "encoder wire",
@@ -134,6 +143,7 @@ class Actuator:
         self._port, self._clock = port, clock
         self._state = _State()
         self._confirm: list[tuple[int, int]] = []
+        self._watch_s, self._fed_s = 0.0, -math.inf
 
     def identify(self) -> Identity:
         """Ask for device type and maker, then for its numbers; nothing else is sent before.
@@ -152,6 +162,35 @@ class Actuator:
         self._state.known = True
         product, revision, serial = self._ask(_PRODUCT, _REVISION, _SERIAL)
         return Identity(f"SMAC LCC-10 (product 0x{product:X})", str(serial), str(revision))
+
+    def watch(self, seconds: float) -> None:
+        """Load the program that lifts the piston when nothing was read for a time; :meth:`start` begins it [s].
+
+        Raises
+        ------
+        DeviceFault
+            The controller does not take it, or macro 59 has a program of somebody else.
+        """
+        program = [_command(what, value) for what, value in ((_MARK, _OURS), *_raising(self.settings))] + [_RETURN]
+        if (there := self._program(len(program))) != program:
+            if there[0] not in (_EMPTY, program[0]):
+                raise DeviceFault(f"actuator at {self._port.address}: macro {_MACRO_NUMBER} has another program")
+            if there[0] != _EMPTY:
+                self._set((_RESET_MACRO, _MACRO_NUMBER))
+                self._clock.wait_until(self._clock.now() + _ERASE_S)
+            for number, code in enumerate(program):
+                self._set((_MACRO, _MACRO_NUMBER), (_COMMAND, number), (_CODE, code))
+            if self._program(len(program)) != program:
+                raise DeviceFault(f"actuator at {self._port.address} did not take the watchdog's program")
+        self._watch_s = seconds
+
+    def _program(self, length: int) -> list[int]:
+        """First commands of the watchdog's macro."""
+        codes = []
+        for number in range(length):
+            self._set((_MACRO, _MACRO_NUMBER), (_COMMAND, number))
+            codes.append(self._ask(_CODE)[0] % (1 << 64))
+        return codes
 
     def start(self, limit_n: float) -> None:
         """Limit the current to a force on the specimen, switch the motor on, and begin to go to the upper end [N].
@@ -177,6 +216,10 @@ class Actuator:
         self._configure([*_HOMING.items(), (_HOMING_FORCE, -up)])
         self._set((_MODE, _HOME), (_CONTROL, _READY), (_CONTROL, _ON), (_CONTROL, _BEGIN))
         self._state.on = True
+        if self._watch_s:
+            self._set((_WATCHES, 0), (_TIMER, round(1000 * self._watch_s)))
+            self._configure([(_VECTOR, _MACRO_NUMBER), (_WATCHES, 1)])
+            self._fed_s = self._clock.now()
 
     def move(self, position_mm: float, speed_mm_s: float, force_n: float) -> None:
         """Begin to go to a position with at most a force: the soft landing [mm], [mm/s], [N].
@@ -233,6 +276,7 @@ class Actuator:
             follow.
         """
         begin = self._clock.now()
+        self._feed(begin)
         confirm, self._confirm = self._confirm, []
         *back, units, count, status = self._ask(*(each for each, _ in confirm), _FORCE_NOW, _POSITION, _STATUS)
         time_s = (begin + self._clock.now()) / 2
@@ -242,6 +286,16 @@ class Actuator:
         if self._state.homing_s is not None:
             self._home(status, time_s)
         return Extension(time_s, self._force(units, count), self._position(count))
+
+    def _feed(self, now: float) -> None:
+        """Set the watchdog's timer again; DeviceFault where it has lifted the piston."""
+        if not self._watch_s or not self._state.on or now - self._fed_s < self._watch_s / _FEEDS:
+            return
+        self._set((_TIMER, round(1000 * self._watch_s)))
+        if not self._ask(_WATCHES)[0]:
+            seconds, self._watch_s = self._watch_s, 0.0
+            raise DeviceFault(f"actuator at {self._port.address}: its watchdog lifted it, unread for {seconds:g} s")
+        self._fed_s = now
 
     def lift(self) -> None:
         """Begin to go to the upper end, whatever was before, also on a line opened anew; nothing is asked.
@@ -263,6 +317,8 @@ class Actuator:
 
     def off(self) -> None:
         """Switch the motor off."""
+        if self._watch_s:
+            self._set((_WATCHES, 0))
         self._set((_CONTROL, _OFF), node=0)
         self._state.on = self._state.lifting = False
         self._state.homing_s = None
@@ -417,6 +473,11 @@ def _raising(settings: Settings) -> list[tuple[int, int]]:
     """Error reset, motor on, and force upwards; switching on clears the set-points, so that the force comes last."""
     words = [(_CONTROL, word) for word in (_OFF, _RESET, _OFF, _READY, _ON)]
     return [(_MODE, _BY_FORCE), *words, (_FORCE, settings.lifting())]
+
+
+def _command(what: int, value: int) -> int:
+    """Command of a macro that sets an object: sub-index, index, bytes of the value, value."""
+    return (what >> 16) << 56 | (what & 0xFFFF) << 40 | _BYTES[what] << 36 | value % (1 << 8 * _BYTES[what])
 
 
 def _writes(pairs: Iterable[tuple[int, int]], node: int) -> bytes:

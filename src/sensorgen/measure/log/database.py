@@ -31,6 +31,18 @@ _UNWRITABLE = (
 )  # fmt: skip
 
 
+class _Connection(sqlite3.Connection):
+    """Connection with its file, whose path may become another's."""
+
+    file: os.stat_result
+
+
+def _is(path: Path, file: os.stat_result) -> bool:
+    with suppress(OSError):
+        return os.path.samestat(path.stat(), file)
+    return False
+
+
 def connect(path: Path, *, create: bool) -> sqlite3.Connection:
     """Open a log and bring it up to date.
 
@@ -60,20 +72,39 @@ def connect(path: Path, *, create: bool) -> sqlite3.Connection:
                 raise BadInput(f"no log at {str(path)!r}: log something first, or name another with --log")
             _create(path)
         _check_header(path)
-        own = {"effective_ids": True} if os.access in os.supports_effective_ids else {}
-        # without write permission and without a write-ahead log beside it, the file cannot change while it is read
-        writable = os.access(path.parent, os.W_OK, **own) or Path(f"{path}-wal").exists()
-        uri = f"{path.absolute().as_uri()}?{'mode=rw' if writable else 'immutable=1'}"
-        connection = sqlite3.connect(uri, uri=True, timeout=WAIT_S, isolation_level=None)
-        try:
-            for pragma in _PRAGMAS:
-                connection.execute(f"PRAGMA {pragma}")
-            _migrate(connection, path)
-            _check_tables(connection, path)
-        except BaseException:
-            connection.close()
+        return _opened_as_possible(path)
+
+
+def _opened_as_possible(path: Path) -> sqlite3.Connection:
+    """Connection to read and write, or only to read where the folder is not writable or the disk is full."""
+    own = {"effective_ids": True} if os.access in os.supports_effective_ids else {}
+    wal = Path(f"{path}-wal")
+    # without write permission and without a write-ahead log beside it, the file cannot change while it is read
+    writable = os.access(path.parent, os.W_OK, **own) or wal.exists()
+    try:
+        return _opened(path, "mode=rw" if writable else "immutable=1")
+    except sqlite3.Error as error:
+        if not writable or _code(error) not in _UNWRITABLE:
             raise
-        return connection
+    if wal.exists() and wal.stat().st_size:  # its index, for which a full disk has no room, is kept in memory
+        return _opened(path, "mode=rw", "locking_mode = EXCLUSIVE")
+    return _opened(path, "immutable=1")
+
+
+def _opened(path: Path, mode: str, *pragmas: str) -> sqlite3.Connection:
+    """Connection to a log of this version, migrated if need be."""
+    uri = f"{path.absolute().as_uri()}?{mode}"
+    connection = sqlite3.connect(uri, uri=True, timeout=WAIT_S, isolation_level=None, factory=_Connection)
+    try:
+        connection.file = path.stat()
+        for pragma in (*pragmas, *_PRAGMAS):
+            connection.execute(f"PRAGMA {pragma}")
+        _migrate(connection, path)
+        _check_tables(connection, path)
+    except BaseException:
+        connection.close()
+        raise
+    return connection
 
 
 @contextmanager
@@ -89,6 +120,8 @@ def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[None]:
         connection.execute("BEGIN IMMEDIATE")
         try:
             yield
+            if isinstance(connection, _Connection) and not _is(path, connection.file):
+                raise Unwritable(f"the log {str(path)!r} was removed or replaced meanwhile; nothing was logged")
             connection.execute("COMMIT")
             with suppress(sqlite3.Error):  # so that a copy of the file alone has everything; the rows are safe without
                 connection.execute("PRAGMA wal_checkpoint(PASSIVE)")
@@ -115,8 +148,12 @@ def translate_errors(path: Path) -> Iterator[None]:
         raise Unwritable(f"cannot use the log {str(path)!r}: {error.strerror or error}") from None
 
 
+def _code(error: sqlite3.Error) -> int:
+    return int(getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)) & 0xFF
+
+
 def _translated(error: sqlite3.Error, path: str) -> SensorgenError:
-    code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
+    code = _code(error)
     if code in _BUSY:
         return Unwritable(f"another program has locked the log {path!r}; nothing was logged, try again")
     if code in _UNWRITABLE:

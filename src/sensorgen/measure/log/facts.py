@@ -159,13 +159,7 @@ def _adapter() -> Any:
 def summarised(
     parts: "Iterable[tuple[Recording, ...]]", columns: dict[str, str], rig: "RigLog | None", rig_columns: dict[str, str]
 ) -> Facts:
-    """Facts of recordings, part after part, joined with the rig's log if there is one.
-
-    Raises
-    ------
-    BadInput
-        No part can be joined with the rig's log.
-    """
+    """Facts of recordings, part after part, joined with the rig's log if there is one and the recording shows how."""
     from sensorgen.measure.recording import joined_all
 
     lockins: dict[int, LockIn] = {}
@@ -182,8 +176,8 @@ def summarised(
                 beside = _with_rig(beside, joined[0], rig)
         for one in map(lockin, marked):
             lockins[one.lockin] = _longer(lockins[one.lockin], one) if one.lockin in lockins else one
-    if rig and beside is None and fault:
-        raise fault
+    if rig and beside is None and fault:  # as of a sensor with a hole, which does not respond to the force
+        beside = Rig(len(rig.time_s), int(rig.error.sum()), clocks=f"not joined with the rig: {fault}")
     return Facts(tuple(lockins.values()), dict(columns), dict(rig_columns), beside)
 
 

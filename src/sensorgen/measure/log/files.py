@@ -18,6 +18,7 @@ from sensorgen.measure.log.entries import RawFile
 
 CHANGED = "changed while it was read: log it when it is complete"
 _BLOCK = 1 << 20
+_PHOTOS = (b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n", b"II*\0", b"MM\0*", b"GIF8", b"BM")
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _SUFFIX = re.compile(r"\.[A-Za-z0-9]{1,8}")
 
@@ -33,6 +34,15 @@ def place(folder: Path, file: RawFile) -> Path:
         raise BadInput(f"{file.uid!r:.80} is no SHA-256 of a raw file; expected 64 digits, 0 to f")
     suffix = Path(file.name).suffix
     return folder / file.uid[:2] / (file.uid + (suffix.lower() if _SUFFIX.fullmatch(suffix) else ""))
+
+
+def keep_photo(folder: Path, path: Path) -> RawFile:
+    """Copy a photo, by its first bytes JPEG, PNG, HEIC, WebP, TIFF, GIF or BMP; as :func:`keep`."""
+    with reading(path), path.open("rb") as file:
+        head = file.read(12)
+    if not head.startswith(_PHOTOS) and head[4:8] != b"ftyp" and head[8:] != b"WEBP":
+        raise BadInput(f"{str(path)!r} is no photo; expected JPEG, PNG, HEIC, WebP, TIFF, GIF or BMP")
+    return keep(folder, path)
 
 
 def keep(folder: Path, path: Path, known: RawFile | None = None) -> RawFile:

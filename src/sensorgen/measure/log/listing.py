@@ -12,7 +12,7 @@ from sensorgen.core.units import frequency_text, si
 from sensorgen.measure.immittance import shown_value
 from sensorgen.measure.log import facts
 from sensorgen.measure.log.entries import BenchRun, Entry, Prediction, Print, Reading, Withdrawal
-from sensorgen.measure.log.logbook import Log
+from sensorgen.measure.log.logbook import Log, conflict
 
 _REMARK = 20  # letters of a remark in a list
 _READING = (
@@ -200,6 +200,8 @@ def _corrections(entry: Entry, log: Log) -> Iterator[tuple[str, str]]:
             yield "corrects", f"row {old.number}"
     for new in log.superseding(entry):
         yield ("withdrawn", new.reason) if isinstance(new, Withdrawal) else ("corrected", f"by row {new.number}")
+    if rival := log.rival(entry):
+        yield "conflict", conflict(rival)
     sequence, key = log.record_of(entry)
     yield "record", f"{sequence}, {key[:16]}"
 

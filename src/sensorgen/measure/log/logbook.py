@@ -40,9 +40,20 @@ _FROM_PRINT = ("batch", "design_id", "design")
 # what may differ between copies of one row that several machines have imported
 _LOCAL = ("number", "logged_at", "claimed_at", *_FROM_PRINT)
 _FIELDS = "id, parents, kind, version, logged_at, content"
-_SUPERSEDED = (  # of the kind that is the first value
-    "SELECT supersedes FROM record WHERE supersedes IS NOT NULL AND (+kind = ?1 "
-    "OR +kind = 'withdrawal' AND json_extract(content, '$.of') = ?1)"
+# of the kind that is the first value: withdrawn rows; a correction that counts in place of another one of the same row,
+# as two machines may make them, by an order that all machines share; and all that is corrected, withdrawn or lost so
+_WITHDRAWN = "SELECT supersedes FROM record WHERE kind = 'withdrawal' AND json_extract(content, '$.of') = ?1"
+_PREFERRED = (
+    "other.supersedes = row.supersedes AND +other.kind = ?1 AND other.number IS NOT NULL AND "
+    f"(other.logged_at, other.id) > (row.logged_at, row.id) AND other.uid NOT IN ({_WITHDRAWN})"
+)
+_SUPERSEDED = (
+    "SELECT supersedes FROM record WHERE supersedes IS NOT NULL AND (+kind = ?1 "  # noqa: S608
+    "OR +kind = 'withdrawal' AND json_extract(content, '$.of') = ?1) "
+    "UNION SELECT uid FROM (WITH RECURSIVE lost(uid) AS (SELECT row.uid FROM record row WHERE +row.kind = ?1 AND "
+    f"row.supersedes IS NOT NULL AND row.number IS NOT NULL AND EXISTS (SELECT 1 FROM record other WHERE {_PREFERRED}) "
+    "UNION SELECT record.uid FROM record JOIN lost ON record.supersedes = lost.uid AND +record.kind = ?1) "
+    "SELECT uid FROM lost)"
 )
 _Kind = TypeVar("_Kind", bound=Entry)
 
@@ -426,6 +437,9 @@ class Log:
         if later:
             how = "withdrawn" if isinstance(later, Withdrawal) else "corrected"
             raise BadInput(f"row {old.number} was {how} before, by row {later.number}; correct that one")
+        rival = self.rival(old)
+        if rival and not isinstance(entry, Withdrawal):
+            raise BadInput(f"row {old.number} is out of use: {conflict(rival)}")
 
     def superseding(self, entry: Entry) -> tuple[Entry, ...]:
         """Corrections and withdrawals of a row: more than one where two machines have made them."""
@@ -433,6 +447,15 @@ class Log:
             entry, "supersedes") else ()  # fmt: skip
         withdrawals = self.entries(Withdrawal, superseded=True, supersedes=entry.uid)
         return (*corrections, *(row for row in withdrawals if row.of == NAMES[type(entry)]))
+
+    def rival(self, entry: Entry) -> Entry | None:
+        """Correction by another machine of the row that this row corrects, which counts in its place."""
+        sql = (
+            "SELECT other.kind, other.content, other.number, other.logged_at FROM record row, record other "  # noqa: S608
+            f"WHERE row.kind = ?1 AND row.number = ?2 AND {_PREFERRED} ORDER BY other.logged_at DESC, other.id DESC"
+        )
+        found = next(self._rows(sql, [NAMES[type(entry)], entry.number]), None)
+        return self._row(*found) if found else None
 
     def _with_print(self, entry: Reading | BenchRun) -> Reading | BenchRun:
         """Entry with batch and design of the specimen's latest print."""
@@ -540,6 +563,11 @@ class _Writer:
 
 def _current(*, superseded: bool) -> str:
     return "TRUE" if superseded else f"uid NOT IN ({_SUPERSEDED})"
+
+
+def conflict(rival: Entry) -> str:
+    """Reason why a correction does not count, and how a person settles it."""
+    return f"row {rival.number}, from another machine, corrects the same row and counts; withdraw one of the two"
 
 
 def _two_designs(one: Print, other: Print) -> str:

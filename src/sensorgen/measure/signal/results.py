@@ -140,7 +140,7 @@ class RecordingResult:
         if self.rest:
             heads_at_rest = (
                 Column("at rest", "Hz", si=True), Column("R", "ohm", right=True), Column("X", "ohm", right=True),
-                Column("noise", "%", digits=2), Column("C", "F", si=True),
+                Column("noise", "%", digits=2), Column("Cs", "F", si=True),
             )  # fmt: skip
             rest = tuple(
                 (one.frequency_hz, f"{one.re_ohm:.6g}", f"{one.im_ohm:.6g}",

@@ -3,21 +3,15 @@
 Written from the public notes that the driver names, but without the driver.
 """
 
+from math import inf
+
 from sensorgen.measure.virtual.plant import Plant, lines
 
 FAULTS = ("silent", "hung", "garbage", "identity", "truncated", "echo", "cut", "error", "stuck", "runaway")
 _SIGNED = {
-    0x6071: 16,
-    0x6077: 16,
-    0x60E0: 16,
-    0x60E1: 16,
-    0x607A: 32,
-    0x6064: 32,
-    0x60F4: 32,
-    0x6061: 8,
-    0x6098: 8,
+    0x6071: 16, 0x6077: 16, 0x60E0: 16, 0x60E1: 16, 0x607A: 32, 0x6064: 32, 0x60F4: 32, 0x6061: 8, 0x6098: 8,
     0x607C: 32,
-}
+}  # fmt: skip
 _SWITCHED = {6: 0x21, 7: 0x23, 15: 0x27}  # status by control word
 _FROM = {7: (0x21, 0x23, 0x27), 15: (0x23, 0x27)}  # states from which a control word is obeyed
 _HOMED_MM, _REACHED_MM = 0.02, 0.02
@@ -54,7 +48,10 @@ class SmacController:
         self._homing_s: float | None = None
         self._now_s = 0.0
         self._told = 0
+        self._macros: dict[tuple[int, int], int] = {}  # by number and command
+        self._timer_s = inf  # when timer 3 reaches 0
         self._objects = {
+            0x12C05: 0, 0x22C05: 0, 0x72C07: 0, 0x72C08: 0,
             0x1000: 0x00020192, 0x11018: 0x29C, 0x21018: 0x116, 0x31018: 0x20001, 0x41018: 4711, 0x1001: 0, 0x603F: 0,
             0x42000: 1, 0x52000: 1, 0x6040: 0, 0x6041: 0x40, 0x6060: 1, 0x6061: 1, 0x6071: 0, 0x6072: 1000,
             0x60E0: 1000, 0x60E1: -1000, 0x607A: 0, 0x6081: 30_000, 0x6083: 30_000, 0x6084: 30_000, 0x6087: 10_000,
@@ -82,6 +79,7 @@ class SmacController:
             return
         if self.fault == "error" and not self._failed:
             self._fail(0x2201)
+        self._count_down()
         self._failed = self.fault == "error"
         if self._state() == 0x27 and self.fault == "runaway":
             self._plant.drive(self._bounded(1000) * self._newton)
@@ -91,6 +89,19 @@ class SmacController:
         if self._objects[0x52000] and status != self._told:
             self._say(0x6041, status)
         self._told = status
+
+    def _count_down(self) -> None:
+        """Timer 3 and its interrupt, which calls a macro whose commands write objects."""
+        if self._now_s < self._timer_s:
+            return
+        self._timer_s, macro = inf, self._objects[0x72C07] * self._objects[0x72C08]
+        self._objects[0x72C08] = 0
+        for number in range(64):
+            code = self._macros.get((macro, number), 0)
+            what, bits, value = code >> 40, 8 * (code >> 36 & 0xF), code & 0xFFFFFFFF
+            if what in (0, 0x022C04):  # the end, return
+                return
+            self._write(what, value - (1 << bits) if what in _SIGNED and value >> (bits - 1) & 1 else value)
 
     def _home(self, begin_s: float) -> None:
         if self._plant.extension_mm <= _HOMED_MM and self.fault != "stuck":
@@ -143,6 +154,8 @@ class SmacController:
     def _read(self, what: int) -> int:
         if what == 0x11018 and self.fault == "identity":
             return 0x2E
+        if what == 0x32C05:
+            return self._macros.get((self._objects[0x12C05], self._objects[0x22C05]), 0xFFFFFFF1FFFFFFFF)
         live = {
             0x6041: self._status(),
             0x6064: round((self._plant.extension_mm - self._zero_mm) / self._mm),
@@ -166,6 +179,7 @@ class SmacController:
             self._control(value)
             return
         if what not in self._objects:
+            self._program(what, value)
             return
         self._objects[what] = value
         if what == 0x6060:
@@ -175,6 +189,15 @@ class SmacController:
             self._drive()
         if what in (0x60E0, 0x60E1) and self._objects[0x6061] == 1:
             self._seek_again()
+
+    def _program(self, what: int, value: int) -> None:
+        """Macro memory and timer."""
+        if what == 0x32C05:
+            self._macros[self._objects[0x12C05], self._objects[0x22C05]] = value
+        elif what == 0x32C06:
+            self._timer_s = self._now_s + value / 1e3
+        elif what == 0x42C04:
+            self._macros = {key: code for key, code in self._macros.items() if key[0] != value}
 
     def _control(self, value: int) -> None:
         """Control word: state machine, and the bit that begins a move or homing."""

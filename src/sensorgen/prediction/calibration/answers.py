@@ -95,6 +95,9 @@ class CalibratedInversion:
             )
             if (self.median_position_width_mm or 0.0) > WIDE * self.length_mm:
                 yield f"this sensor of {self.length_mm:g} mm does not tell positions of such presses: force alone"
+        yield from self._advice()
+
+    def _advice(self) -> Iterator[str]:
         if not self.calibrated_by:
             yield (
                 "not calibrated: the intervals hold all that a specimen of this design may differ in; some 30 known "
@@ -145,8 +148,8 @@ class Summary:
         self, of: str, by: int, limit_n: float, length_m: float, noise: float | None, notes: Sequence[str]
     ) -> CalibratedInversion:  # fmt: skip
         """The summary so far."""
-        widths = np.median(self._widths, axis=0).tolist() if self._widths else [None, None]
+        newtons, mm = np.median(self._widths, axis=0).tolist() if self._widths else (None, None)
         statuses = {v.words: self._statuses[v] for v in Verdict if self._statuses[v]}
         return CalibratedInversion(
-            of, by, self.samples, self.at_rest, statuses, limit_n, length_m / M_PER_MM, *widths, noise, tuple(notes)
+            of, by, self.samples, self.at_rest, statuses, limit_n, length_m / M_PER_MM, newtons, mm, noise, tuple(notes)
         )

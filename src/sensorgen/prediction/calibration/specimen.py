@@ -3,7 +3,7 @@
 Each parameter is a standard normal number before calibration; its unit is the standard deviation of the prior.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import pairwise
@@ -203,7 +203,7 @@ class SpecimenModel:
         if frequency_hz is not None:
             at = np.array(at)
             at[..., [self._at["lead"], self._at["stray"]]] = -np.inf
-        return self._read(at, nothing, loaded=False, frequency_hz=frequency_hz)[..., 0, :]
+        return next(self._read(at, nothing, (False,), frequency_hz=frequency_hz))[..., 0, :]
 
     def ratio(self, at: Real, presses: Presses, changes: Real | None = None) -> Complex:
         """Ln of pressed over rest.
@@ -222,24 +222,19 @@ class SpecimenModel:
         (..., n, m) array
         """
         # at rest, too, cut where the tip would be: what the cuts leave of a profile cancels
-        return self._read(at, presses, changes) - self._read(at, presses, loaded=False)
+        if changes is None:
+            pressed, free = self._read(at, presses, (True, False))
+        else:  # since the rest reading
+            (pressed,), (free,) = self._read(at, presses, (True,), changes), self._read(at, presses, (False,))
+        return pressed - free
 
-    def _read(
-        self, at: Real, presses: Presses, changes: Real | None = None, *, loaded: bool = True,
-        frequency_hz: Real | None = None,
-    ) -> Complex:  # fmt: skip
+    def _pressed(
+        self, at: Real, value: Mapping[str, Real], presses: Presses, length_m: Real, rise: Real
+    ) -> tuple[Real, Real]:  # fmt: skip
+        """Capacitance under the tip over that at rest [-], and the pressure [Pa]."""
         sensor, spread = self.sensor, self.spread
-        value = {name: at[..., k, None] for name, k in self._at.items()}
-        rise, c, r = np.moveaxis(np.zeros(3) if changes is None else changes, -1, 0)[..., None]
-        position = np.clip(presses.position_m + spread.position_m * value["position offset"], 0, sensor.length_m)
-        force = np.zeros(position.shape)
-        if loaded:
-            force = np.maximum(
-                presses.force_n + spread.force_offset_n + spread.force_n * value["force offset"], _NOTHING_N
-            )
-        patch = sensor.patch(position)
-        length = np.broadcast_to(patch.length_m, position.shape)
-        stress = force / (sensor.width_m * length)
+        force = np.maximum(presses.force_n + spread.force_offset_n + spread.force_n * value["force offset"], _NOTHING_N)
+        stress = force / (sensor.width_m * length_m)
         share, _ = sensor.compression.capacitive_strain(np.minimum(stress, self.most_pa))
         first = self._at[f"rise at {FORCES_N[0]:g} N"]
         knots = spread.law_shape * (at[..., first : first + len(FORCES_N)] @ self._shapes.T)
@@ -251,24 +246,37 @@ class SpecimenModel:
         )
         for name, course in (("hysteresis", presses.unloading), ("creep", presses.decades)):
             ln_rise = ln_rise + getattr(spread, name) * np.exp(value[name] - 0.5) * np.nan_to_num(course)
-        lifted = 1 + share / (1 - share) * np.maximum(stress / self.most_pa, 1.0) * np.exp(ln_rise)
+        return 1 + share / (1 - share) * np.maximum(stress / self.most_pa, 1.0) * np.exp(ln_rise), stress
 
+    def _read(
+        self, at: Real, presses: Presses, loads: Sequence[bool], changes: Real | None = None,
+        frequency_hz: Real | None = None,
+    ) -> Iterator[Complex]:  # fmt: skip
+        """Ln of the impedance that the bench reads, with the tip down or not."""
+        sensor, spread = self.sensor, self.spread
+        value = {name: at[..., k, None] for name, k in self._at.items()}
+        rise, c, r = np.moveaxis(np.zeros(3) if changes is None else changes, -1, 0)[..., None]
+        position = np.clip(presses.position_m + spread.position_m * value["position offset"], 0, sensor.length_m)
+        patch = sensor.patch(position)
+        length = np.broadcast_to(patch.length_m, position.shape)
         omega = 2 * np.pi * (self.frequency_hz if frequency_hz is None else frequency_hz)
         leak, stored = self._film(value, c, omega)
-        loose, pressed = leak + stored, leak + stored * lifted[..., None]
         track, by_pressure = sensor.track_ohm_per_m()
         whole = track * np.exp(spread.resistance * value["resistance"] + r)
         left, right = patch.left_m, np.maximum(sensor.length_m - patch.left_m - length, 0.0)
         shares = np.arange(_PIECES + 1) / _PIECES
         ends = np.stack([*(left * k for k in shares), *(left + length + right * k for k in shares)])
-        tracks = [whole * np.exp(self._bent(at, start, end)) for start, end in pairwise(ends)]
-        tracks[_PIECES] = tracks[_PIECES] + stress * by_pressure
-        films = [loose] * _PIECES + [pressed] + [loose] * _PIECES
-        z = line.cascade(
-            [one[..., None] for one in tracks], films, [one[..., None] for one in np.diff(ends, axis=0)], sensor.far_end
-        )
+        tracks = [(whole * np.exp(self._bent(at, start, end)))[..., None] for start, end in pairwise(ends)]
+        films, lengths = [leak + stored] * len(tracks), [one[..., None] for one in np.diff(ends, axis=0)]
         stray, lead = (np.exp(value[name] - 0.5)[..., None] for name in ("stray", "lead"))
-        return np.asarray(np.log(spread.lead_ohm * lead + 1 / (1 / z + 1j * omega * spread.stray_f * stray)))
+        for loaded in loads:
+            own, film = list(tracks), list(films)
+            if loaded:
+                lifted, stress = self._pressed(at, value, presses, length, rise)
+                film[_PIECES] = leak + stored * lifted[..., None]
+                own[_PIECES] = own[_PIECES] + (stress * by_pressure)[..., None]
+            z = line.cascade(own, film, lengths, sensor.far_end)
+            yield np.asarray(np.log(spread.lead_ohm * lead + 1 / (1 / z + 1j * omega * spread.stray_f * stray)))
 
     def _film(self, value: Mapping[str, Real], c: Real, omega: Real) -> tuple[Complex, Complex]:
         """Admittance of the film with nothing on it [S/m]: of its leak, and of what rises with C."""

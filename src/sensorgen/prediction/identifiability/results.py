@@ -147,6 +147,10 @@ class ErrorMap:
     of_force: ErrorSummary
     of_position: ErrorSummary
 
+    def typical(self) -> StandardErrors:
+        """Medians."""
+        return StandardErrors(sigma_force_n=self.of_force.median, sigma_position_m=self.of_position.median)
+
 
 @dataclass(frozen=True, kw_only=True)
 class FrequencyChoice(StandardErrors):

@@ -67,7 +67,7 @@ def rows(frame: Frame, found: Sequence[Sequence[Measure]], start: float, step: f
 
 
 def _fits(frame: Frame, row: Sequence[Measure]) -> bool:
-    """Whether a row can be read: its values are no longer than itself."""
+    """True where a row can be read: its values are no longer than itself."""
     length = sum(m.value_mm for m in row) * frame.per_mm
     return length >= NARROW if len(row) == 1 else sum(width(number(m.value_mm)) for m in row) < length
 

@@ -81,7 +81,7 @@ def scale_words(scale: float) -> str:
 
 
 def materials(panel: Panel, colours: Colours, kind: str = "body") -> Iterator[str]:
-    """What is cut, one path for each body."""
+    """Cut bodies, one path for each."""
     paths: dict[str, list[str]] = {}
     bodies: dict[str, Body] = {}
     for body, outline in panel.view.regions:
@@ -132,7 +132,7 @@ def lettered(panel: Panel, names: Mapping[str, str], colours: Colours) -> Iterat
 
 
 def caption(panel: Panel, name: str, y: float) -> str:
-    """What the view shows, in one line at ``y`` on the page [mm]."""
+    """Caption of the view, in one line at ``y`` on the page [mm]."""
     view, scale = panel.view, panel.frame.per_mm
     words = (
         f"Section {name}: {view.normal} = {number(view.section.at_mm)} mm, "

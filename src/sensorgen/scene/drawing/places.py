@@ -63,10 +63,9 @@ def svg(meshes: Mapping[str, Mesh], places: Sequence[tuple[tuple[float, float, f
 
 def _sharp(mesh: Mesh) -> Real:
     """Edges of a mesh between faces of different directions, or of one face alone (n, 2, 3)."""
-    a, b, c = (mesh.vertices_mm[mesh.triangles[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
+    normal = mesh.normals_mm2()
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    sides = np.sort(mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    sides = np.sort(mesh.edges(), axis=1)
     order = np.lexsort(sides.T)
     first = np.flatnonzero(np.append(True, (sides[order][1:] != sides[order][:-1]).any(1)))
     count = np.diff(np.append(first, len(order)))

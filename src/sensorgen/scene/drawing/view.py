@@ -1,4 +1,4 @@
-"""What to draw of a scene: the cross-sections that show most, their period, and sizes worth a dimension line.
+"""Contents of a drawing: the cross-sections that show most, their period, and sizes worth a dimension line.
 
 Numbers only; nothing here knows of paper.
 """
@@ -10,11 +10,11 @@ from itertools import pairwise, permutations
 from math import hypot
 
 from sensorgen.scene.scene import AXES, SLIVER_MM, Body, Outline, Point, Scene, area_mm2, clipped
-from sensorgen.scene.sections import Column, Section, columns
+from sensorgen.scene.sections import Column, Section, alike, columns
 
 PLACES = 8  # places tried for a section: two periods of crossed strips change eight times
 PROBE = 64  # corners looked at for a period: enough for two repetitions of any pattern one would draw
-SAME_MM = 1e-6
+SAME_MM, SAME_DIGITS = 1e-6, 6
 MOST_LEVELS, MOST_COLUMNS, MOST_EXTENTS, MOST_PIECES = 9, 8, 3, 2  # measures of a view
 Region = tuple[Body, Outline]
 
@@ -42,7 +42,7 @@ class View:
 
     @cached_property
     def regions(self) -> list[Region]:
-        """What is cut, as far as it is looked at."""
+        """Cut bodies, as far as the view reaches."""
         found = []
         for body, outline in self.section.regions:
             along = [u for u, _ in outline]
@@ -53,9 +53,14 @@ class View:
         return found
 
     @cached_property
+    def cut(self) -> Section:
+        """The section as far as the view reaches."""
+        return replace(self.section, regions=tuple(self.regions))
+
+    @property
     def columns(self) -> list[Column]:
         """The columns that are looked at."""
-        return columns(replace(self.section, regions=tuple(self.regions)))
+        return columns(self.cut)
 
     @property
     def normal(self) -> str:
@@ -92,7 +97,7 @@ def _view(scene: Scene, across: str) -> View:
     extent = scene.size_mm[AXES.index(across)]
     corners = sorted({u for _, outline in section.regions for u, _ in outline})
     probe = View(section, extent, (), corners[min(PROBE, len(corners) - 1)])
-    return View(section, extent, period(probe.columns), probe.end_mm)
+    return View(section, extent, period(probe.cut), probe.end_mm)
 
 
 def _shown_mm2(section: Section) -> tuple[float, float]:
@@ -101,28 +106,17 @@ def _shown_mm2(section: Section) -> tuple[float, float]:
     return round(sum(area for area, terminal in areas if terminal), 6), round(sum(area for area, _ in areas), 6)
 
 
-def period(row: Sequence[Column]) -> tuple[float, ...]:
+def period(section: Section) -> tuple[float, ...]:
     """Edges of the columns of the first full period [mm]; empty where nothing repeats.
 
     The first and the last column may be the rest of one, where the outline cuts through the pattern.
     """
+    row = list(zip(columns(section), alike(section, SAME_DIGITS), strict=True))
     for inner in (row, row[:-1], row[1:-1]):
         for n in range(1, min(2 * len(inner) // 3, len(inner) - 2) + 1):  # two columns at least must come again
-            if all(_alike(a, b) for a, b in zip(inner, inner[n:], strict=False)):
-                return tuple(c.left_mm for c in inner[: n + 1])
+            if all(a == b for (_, a), (_, b) in zip(inner, inner[n:], strict=False)):
+                return tuple(column.left_mm for column, _ in inner[: n + 1])
     return ()
-
-
-def _alike(a: Column, b: Column) -> bool:
-    """Whether two columns have the same bodies, width and heights."""
-    (bodies, sizes), (others, beside) = (
-        (
-            [layer.body.name for layer in column.layers],
-            [column.right_mm - column.left_mm, *(z for layer in column.layers for z in layer.bottom_mm + layer.top_mm)],
-        )
-        for column in (a, b)
-    )
-    return bodies == others and all(abs(p - q) < SAME_MM for p, q in zip(sizes, beside, strict=True))
 
 
 @dataclass(frozen=True)
@@ -139,7 +133,7 @@ class Measure:
         return self.high_mm - self.low_mm
 
     def same(self, other: "Measure") -> bool:
-        """Whether both have the same ends."""
+        """True where both have the same ends."""
         return abs(self.low_mm - other.low_mm) + abs(self.high_mm - other.high_mm) < SAME_MM
 
 
@@ -181,7 +175,7 @@ def heights(views: Sequence[View], height_mm: float) -> list[list[Measure]]:
 
 def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
     """Horizontal measures in rows from the sensor outwards: those above the view, and those below it."""
-    middle = max(z for _, outline in view.regions for _, z in outline) / 2
+    middle = _reach(view, None, max) / 2
     columns = [*(column.left_mm for column in view.columns), view.columns[-1].right_mm]  # where nothing repeats
     edges = [u for u in view.period_mm or columns if u <= view.end_mm + SAME_MM]
     lowest = [_reach(view, u, min) for u in edges]
@@ -191,17 +185,21 @@ def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
     chain = chain if 1 < len(chain) <= MOST_COLUMNS else []
     repeats = view.period_mm and len(edges) == len(view.period_mm)  # the view shows all of a period
     whole = [Measure(edges[0], edges[-1], (reach[0], reach[-1]))] if repeats else []
-    sides = (side for _, outline in view.regions for side in _sides(outline))
-    flats = sorted((min(a[0], b[0]), max(a[0], b[0]), a[1]) for a, b in sides if a[1] == b[1])
-    flats = [flat for flat in flats if flat[0] > SAME_MM and flat[1] < view.end_mm - SAME_MM]
     known = [*chain, *whole, Measure(0.0, view.end_mm)]
-    pieces = _new((Measure(low, high, (z, z)) for low, high, z in flats), known, by_value=True)[:MOST_PIECES]
+    pieces = _new(_flats(view), known, by_value=True)[:MOST_PIECES]
     rows: tuple[list[list[Measure]], list[list[Measure]]] = ([], [])
     rows[not above].append(chain)
     for measure in pieces:
         rows[measure.ends_mm[0] <= middle].append([measure])
     rows[not above].append(whole)
     return [row for row in rows[0] if row], [row for row in rows[1] if row]
+
+
+def _flats(view: View) -> list[Measure]:
+    """Level edges that the view's ends do not cut, from left to right."""
+    sides = (side for _, outline in view.regions for side in _sides(outline))
+    flats = sorted((min(a[0], b[0]), max(a[0], b[0]), a[1]) for a, b in sides if a[1] == b[1])
+    return [Measure(low, high, (z, z)) for low, high, z in flats if low > SAME_MM and high < view.end_mm - SAME_MM]
 
 
 def nearest(view: View) -> Gap | None:
@@ -244,9 +242,10 @@ def _extents(view: View) -> Iterator[Point]:
     return ((min(zs), max(zs)) for zs in by_body.values())
 
 
-def _reach(view: View, at_mm: float, end: Callable[..., float]) -> float:
-    """Height of the lowest or the highest corner at one place of the section [mm]."""
-    return end((z for _, outline in view.regions for u, z in outline if abs(u - at_mm) < SAME_MM), default=0.0)
+def _reach(view: View, at_mm: float | None, end: Callable[..., float]) -> float:
+    """Height of the lowest or the highest corner at one place of the section, or at all [mm]."""
+    corners = (corner for _, outline in view.regions for corner in outline)
+    return end((z for u, z in corners if at_mm is None or abs(u - at_mm) < SAME_MM), default=0.0)
 
 
 def _new(measures: Iterable[Measure], known: Sequence[Measure], by_value: bool = False) -> list[Measure]:

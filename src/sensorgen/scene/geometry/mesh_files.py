@@ -8,7 +8,7 @@ import math
 import re
 import struct
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,6 +29,7 @@ MOST_UNPACKED = 400_000_000  # of the model files in a 3MF
 MOST_TRIANGLES = 500_000
 _3MF_UNITS = {"millimeter": "mm", "centimeter": "cm", "meter": "m"}  # others as in UNITS_MM
 _DEPTH = 20  # of components within components
+_Range = tuple[int, int, str]  # first and last triangle of a part, and its name
 _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _VERTEX = re.compile(rb"vertex\s+(%b)\s+(%b)\s+(%b)" % (_NUMBER, _NUMBER, _NUMBER))
 
@@ -164,7 +165,7 @@ class _Object:
 
 @dataclass
 class _Model:
-    """What the model files of a 3MF hold; keys are file and number."""
+    """Contents of the model files of a 3MF; keys are file and number."""
 
     unit: str = ""
     objects: dict[tuple[str, str], _Object] = field(default_factory=dict)
@@ -197,12 +198,11 @@ def read_3mf(path: Path, unit: str = "") -> list[FileBody]:
             model = _Model()
             for name in names:
                 _parse(archive, name, _model_handler(model, "/" + name))
-            volumes = _volumes(archive)
-            part_names = _part_names(archive)
+            parts = _parts(archive)
         if not model.built:
             raise BadInput("it builds nothing; expected objects in its <build>")
         scale = _scale(unit or _3MF_UNITS.get(model.unit, model.unit or "mm"))
-        bodies = [body for key, where in model.built for body in _bodies(model, key, where, volumes, part_names)]
+        bodies = [body for key, where in model.built for body in _bodies(model, key, where, parts)]
         _refuse_many(path, sum(len(body.triangles) for body in bodies))
         return [
             FileBody(b.name, b.vertices_mm * scale, b.triangles, b.colour, 1e-6 * scale)
@@ -280,12 +280,7 @@ def _matrix(text: str) -> Real:
 
 
 def _bodies(
-    model: _Model,
-    key: tuple[str, str],
-    where: Real,
-    volumes: Mapping[str, list[tuple[int, int, str]]],
-    part_names: Mapping[str, str],
-    depth: int = 0,
+    model: _Model, key: tuple[str, str], where: Real, parts: Mapping[str, Sequence[_Range]], depth: int = 0
 ) -> Iterator[FileBody]:
     """The bodies of an object and of its components, in their places."""
     if depth > _DEPTH:
@@ -297,9 +292,8 @@ def _bodies(
         return
     for part, place in one.components:
         linear = place[:3] @ where[:3]
-        yield from _bodies(
-            model, part, np.vstack([linear, place[3] @ where[:3] + where[3]]), volumes, part_names, depth + 1
-        )
+        shift = place[3] @ where[:3] + where[3]
+        yield from _bodies(model, part, np.vstack([linear, shift]), parts, depth + 1)
     if not one.triangles:
         return
     points = np.array(one.vertices, float).reshape(-1, 3) @ where[:3] + where[3]
@@ -309,46 +303,32 @@ def _bodies(
     if np.linalg.det(where[:3]) < 0:
         faces = faces[:, ::-1]
     known = model.colours.get((key[0], one.colour[0]), [])
-    for first, last, name in volumes.get(key[1]) or [(0, len(faces) - 1, part_names.get(key[1]) or one.name)]:
+    for first, last, name in parts.get(key[1]) or [(0, len(faces), one.name)]:
         paint = one.materials[first]
         colour = known[paint][1] if 0 <= paint < len(known) else ""
         yield FileBody(name, points, faces[first : last + 1], colour)
 
 
-def _volumes(archive: zipfile.ZipFile) -> dict[str, list[tuple[int, int, str]]]:
-    """PrusaSlicer's volumes: ranges of an object's triangles, and their names."""
-    found: dict[str, list[tuple[int, int, str]]] = {}
+def _parts(archive: zipfile.ZipFile) -> dict[str, list[_Range]]:
+    """Named parts by number of the object: volumes of PrusaSlicer; parts of OrcaSlicer and Bambu Studio, each whole."""
+    found: dict[str, list[_Range]] = {}
     last = ""
 
     def start(tag: str, has: Mapping[str, str]) -> None:
         nonlocal last
-        if tag == "object":
-            last = has["id"]
-        elif tag == "volume":
-            found.setdefault(last, []).append((int(has["firstid"]), int(has["lastid"]), ""))
-        elif tag == "metadata" and has.get("type") == "volume":
-            if has.get("key") == "name":
-                found[last][-1] = (*found[last][-1][:2], has.get("value", ""))
-            elif has.get("key") == "volume_type" and has.get("value") != "ModelPart":
-                raise BadInput("it has modifiers or negative volumes of a slicer; expected solid parts only")
-
-    if "Metadata/Slic3r_PE_model.config" in archive.namelist():
-        _parse(archive, "Metadata/Slic3r_PE_model.config", start)
-    return found
-
-
-def _part_names(archive: zipfile.ZipFile) -> dict[str, str]:
-    """Names of parts as OrcaSlicer and Bambu Studio keep them, by number of the object."""
-    found: dict[str, str] = {}
-    last = ""
-
-    def start(tag: str, has: Mapping[str, str]) -> None:
-        nonlocal last
+        name = has.get("value", "") if has.get("key") == "name" else ""
         if tag in ("object", "part"):
             last = has.get("id", "")
-        elif tag == "metadata" and has.get("key") == "name" and last:
-            found.setdefault(last, has.get("value", ""))
+        elif tag == "volume":
+            found.setdefault(last, []).append((int(has["firstid"]), int(has["lastid"]), ""))
+        elif name and has.get("type") == "volume":
+            found[last][-1] = (*found[last][-1][:2], name)
+        elif has.get("key") == "volume_type" and has.get("value") != "ModelPart":
+            raise BadInput("it has modifiers or negative volumes of a slicer; expected solid parts only")
+        elif name and last and "type" not in has:
+            found.setdefault(last, [(0, MOST_TRIANGLES, name)])
 
-    if "Metadata/model_settings.config" in archive.namelist():
-        _parse(archive, "Metadata/model_settings.config", start)
+    for file in ("Metadata/Slic3r_PE_model.config", "Metadata/model_settings.config"):
+        if file in archive.namelist():
+            _parse(archive, file, start)
     return found

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 from math import acos, ceil, pi, sin, sqrt
 from typing import TYPE_CHECKING
@@ -13,6 +14,8 @@ from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.scene.scene import PLANE, Body, Outline, Piece, Prism
 
 if TYPE_CHECKING:
+    import manifold3d
+
     from sensorgen.scene.revolved import Revolved
 
 CHORD_MM = 0.01  # of a round body, from the middle of its triangles: less than slicers resolve
@@ -33,6 +36,27 @@ class Mesh:
     vertices_mm: NDArray[np.float64]
     triangles: NDArray[np.int32]
 
+    def corners_mm(self) -> Real:
+        """Corners of every triangle (m, 3, 3) [mm]."""
+        return np.asarray(self.vertices_mm[self.triangles], float)
+
+    def normals_mm2(self) -> Real:
+        """Normals of the triangles, as long as twice their areas (m, 3) [mm2]."""
+        a, b, c = self.corners_mm().swapaxes(0, 1)
+        return np.asarray(np.cross(b - a, c - a))
+
+    def edges(self) -> Whole:
+        """Directed edges of the triangles (3 m, 2), those of the first triangle first."""
+        return self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+
+    def turned(self) -> "Mesh":
+        """Mesh with inside and outside exchanged."""
+        return Mesh(self.vertices_mm, self.triangles[:, ::-1].copy())
+
+    def solid(self) -> "manifold3d.Manifold":
+        """Solid of manifold3d, in double precision; look at its ``status()``."""
+        return _solid(self)
+
     def volume_mm3(self) -> float:
         """Enclosed volume, by the divergence theorem [mm3]."""
         if len(self.triangles) == 0:
@@ -40,6 +64,21 @@ class Mesh:
         origin = self.vertices_mm[0]  # near the body, so that little cancels
         a, b, c = ((self.vertices_mm - origin)[self.triangles[:, k]] for k in range(3))
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+
+
+@lru_cache(maxsize=16)
+def _solid(mesh: Mesh) -> "manifold3d.Manifold":
+    import manifold3d
+
+    data = manifold3d.Mesh64(vert_properties=mesh.vertices_mm, tri_verts=mesh.triangles.astype(np.uint64))
+    return manifold3d.Manifold(data)
+
+
+def joined(parts: Sequence[Mesh]) -> Mesh:
+    """Meshes side by side in one."""
+    first = np.cumsum([0, *(len(p.vertices_mm) for p in parts)])
+    triangles = [p.triangles + start for p, start in zip(parts, first, strict=False)]
+    return Mesh(np.concatenate([p.vertices_mm for p in parts]), np.concatenate(triangles).astype(np.int32))
 
 
 def mesh(body: Body) -> Mesh:
@@ -50,7 +89,7 @@ def mesh(body: Body) -> Mesh:
     """
     if all(p.is_box() for p in body.pieces):
         return _grid(body.pieces)
-    return _joined([_of_piece(p) for p in body.pieces])
+    return joined([_of_piece(p) for p in body.pieces])
 
 
 def _of_piece(piece: Piece) -> Mesh:
@@ -83,12 +122,6 @@ def _revolved(piece: "Revolved") -> Mesh:
     triangles = np.concatenate([np.stack([quads[k] for k in way], 1) for way in ((0, 1, 2), (0, 2, 3))])
     a, b, c = triangles.T
     return Mesh(np.concatenate(rings), triangles[(a != b) & (b != c) & (c != a)].astype(np.int32))
-
-
-def _joined(parts: list[Mesh]) -> Mesh:
-    offsets = np.cumsum([0] + [len(p.vertices_mm) for p in parts[:-1]])
-    triangles = [p.triangles + offset for p, offset in zip(parts, offsets, strict=True)]
-    return Mesh(np.concatenate([p.vertices_mm for p in parts]), np.concatenate(triangles).astype(np.int32))
 
 
 def _prism(prism: Prism) -> Mesh:

@@ -15,6 +15,7 @@ import shapely
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput
 from sensorgen.core.files import reading
+from sensorgen.scene.connections import groups
 
 if TYPE_CHECKING:
     from svgelements import PathSegment
@@ -61,16 +62,12 @@ def read(path: Path) -> shapely.Polygon:
 
 def _region(lines: list[Real]) -> shapely.Polygon:
     """The region in closed lines, from pieces of curves."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     if not lines:
         raise BadInput("no outline in it; expected one closed curve")
     ends = np.array([line[k] for line in lines for k in (0, -1)])
-    pairs = cKDTree(ends).query_pairs(JOINED_MM, output_type="ndarray")
-    links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(ends),) * 2)
-    _, label = connected_components(links, directed=False)
+    label = groups(len(ends), *cKDTree(ends).query_pairs(JOINED_MM, output_type="ndarray").T)
     _, first = np.unique(label, return_index=True)
     joined = ends[first][label].reshape(-1, 2, 2)
     whole = [np.concatenate([[a], line[1:-1], [b]]) for line, (a, b) in zip(lines, joined, strict=True)]

@@ -9,9 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from sensorgen.core.arrays import Real
-from sensorgen.scene.geometry.meshes import Mesh
-from sensorgen.scene.geometry.surfaces import joined
+from sensorgen.scene.geometry.meshes import Mesh, joined
 from sensorgen.scene.layers import outlines
 from sensorgen.scene.polyhedra import Polyhedron
 from sensorgen.scene.scene import AXES, PLANE, Outline, Piece, Prism, box
@@ -44,7 +42,7 @@ def pieces(shells: Sequence[Mesh], rounding_mm: float = _GRID_MM) -> tuple[Piece
 def _pieces(mesh: Mesh, near_mm: float) -> tuple[Piece, ...]:
     """One connected body as the fewest prisms, or as it is."""
     exact = mesh.volume_mm3()
-    area = np.linalg.norm(_normals(mesh), axis=1).sum() / 2
+    area = np.linalg.norm(mesh.normals_mm2(), axis=1).sum() / 2
     best: tuple[Piece, ...] = ()
     for axis in "zyx":
         made = _prisms(mesh, axis, near_mm)
@@ -57,17 +55,11 @@ def _pieces(mesh: Mesh, near_mm: float) -> tuple[Piece, ...]:
     return (Polyhedron(tuple(places), tuple((a, b, c) for a, b, c in mesh.triangles.tolist())),)
 
 
-def _normals(mesh: Mesh) -> Real:
-    """Normals of the triangles, as long as twice their areas [mm2]."""
-    a, b, c = (mesh.vertices_mm[mesh.triangles[:, k]] for k in range(3))
-    return np.asarray(np.cross(b - a, c - a))
-
-
 def _prisms(mesh: Mesh, axis: str, near_mm: float) -> tuple[Prism, ...]:
     """Prisms along an axis; none where a face is neither level nor upright along it, or there are too many."""
     k, plane = AXES.index(axis), [AXES.index(other) for other in PLANE[axis]]
-    corners = mesh.vertices_mm[mesh.triangles]
-    normal = _normals(mesh)[:, k]
+    corners = mesh.corners_mm()
+    normal = mesh.normals_mm2()[:, k]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(1)
     level = np.ptp(corners[:, :, k], axis=1) <= near_mm
     upright = abs(normal) <= 2 * near_mm * longest
@@ -98,14 +90,14 @@ def _prisms(mesh: Mesh, axis: str, near_mm: float) -> tuple[Prism, ...]:
 
 
 def _region(mesh: Mesh, faces: Sequence[int], plane: Sequence[int], near_mm: float) -> shapely.Geometry:
-    """What level faces cover, by the edges that only one of them has."""
-    edges = mesh.triangles[faces][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    """Region that level faces cover, by the edges that only one of them has."""
+    edges = mesh.edges().reshape(-1, 3, 2)[faces].reshape(-1, 2)
     _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
     border = edges[first[count == 1]]
     lines = shapely.linestrings(mesh.vertices_mm[border][:, :, plane])
     rings = shapely.get_parts(shapely.polygonize([shapely.union_all(lines, grid_size=_GRID_MM)]))
     middles = shapely.point_on_surface(rings)
-    tree = shapely.STRtree(shapely.polygons(mesh.vertices_mm[mesh.triangles[faces]][:, :, plane]))
+    tree = shapely.STRtree(shapely.polygons(mesh.corners_mm()[faces][:, :, plane]))
     covered = np.unique(tree.query(middles, predicate="intersects")[0])
     return shapely.simplify(shapely.union_all(rings[covered], grid_size=_GRID_MM), near_mm)
 

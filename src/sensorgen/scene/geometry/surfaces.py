@@ -6,13 +6,14 @@ around an edge are paired through the material between them, so that solids whic
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Real, Whole
+from sensorgen.scene.connections import groups
 from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.scene import Place
 
@@ -27,7 +28,7 @@ _NOTHING = 1e-9  # volume over surface and size below which a surface encloses n
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong with a surface, and cannot be put right.
+    """Fault of a surface that cannot be put right.
 
     Attributes
     ----------
@@ -106,17 +107,11 @@ def _place(point: Real) -> Place:
 
 def _welded(points: Real, faces: Whole, near_mm: float) -> tuple[Real, Whole]:
     """Corners within a distance as one, faces of fewer than three corners left out."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     exact, back = np.unique(points, axis=0, return_inverse=True)
-    pairs = cKDTree(exact).query_pairs(near_mm, output_type="ndarray")
-    label = np.arange(len(exact))
-    if len(pairs):
-        links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(exact), len(exact)))
-        _, label = connected_components(links, directed=False)
-    _, first, label = np.unique(label, return_index=True, return_inverse=True)
+    label = groups(len(exact), *cKDTree(exact).query_pairs(near_mm, output_type="ndarray").T)
+    _, first = np.unique(label, return_index=True)
     faces = label[back.reshape(-1)[faces]]
     distinct = (faces != np.roll(faces, 1, axis=1)).all(1)
     return exact[first], faces[distinct]
@@ -157,23 +152,12 @@ def _oriented(faces: Whole) -> tuple[Whole, int]:
     against = (directed[one] == directed[other]).all(1)
     if not against.any():
         return faces, 0
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
-
-    a, b = one // 3, other // 3
-    n = len(faces)
-    links = coo_matrix((np.ones(len(a)), (a, b)), shape=(n, n)).tocsr()
-    flips = {**{(int(i), int(j)): bool(f) for i, j, f in zip(a, b, against, strict=True)},
-             **{(int(j), int(i)): bool(f) for i, j, f in zip(a, b, against, strict=True)}}  # fmt: skip
-    turned = np.zeros(n, bool)
-    _, label = connected_components(links, directed=False)
-    for start in np.unique(label, return_index=True)[1]:
-        order, before = breadth_first_order(links, start, directed=False)
-        for k in order[1:].tolist():
-            turned[k] = turned[before[k]] ^ flips[int(before[k]), k]
-        here = label == label[start]
-        if turned[here].sum() > here.sum() / 2:
-            turned[here] = ~turned[here]
+    # Every face as it is, and turned: numbers k and k + n
+    a, b, n = one // 3, other // 3, len(faces)
+    label = groups(2 * n, np.append(a, a + n), np.append(b + n * against, b + n * ~against))
+    turned, surface = label[:n] > label[n:], np.minimum(label[:n], label[n:])
+    most = np.bincount(surface, turned) > np.bincount(surface) / 2
+    turned ^= most[surface]
     return np.where(turned[:, None], faces[:, ::-1], faces), int(turned.sum())
 
 
@@ -280,19 +264,13 @@ def _through_material(
 
 def _shells(points: Real, faces: Whole, mates: Whole) -> list[Mesh]:
     """Connected surfaces, each with corners of its own: those of one fan of faces are one."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     number = np.arange(len(mates))
     following = number - number % 3 + (number + 1) % 3  # directed edge k starts at corner k, and ends at this one
-    corners = coo_matrix((np.ones(2 * len(mates)), (np.concatenate([number, following]),
-                          np.concatenate([following[mates], mates]))), shape=(len(mates),) * 2)  # fmt: skip
-    _, vertex = connected_components(corners, directed=False)
-    pieces = coo_matrix((np.ones(len(mates)), (number // 3, mates // 3)), shape=(len(faces),) * 2)
-    count, label = connected_components(pieces, directed=False)
+    vertex = groups(len(mates), np.append(number, following), np.append(following[mates], mates))
+    label = groups(len(faces), number // 3, mates // 3)
     places = points[faces.reshape(-1)]
     found = []
-    for k in range(count):
+    for k in range(int(label.max(initial=-1)) + 1):
         own = vertex.reshape(-1, 3)[label == k]
         _, first, back = np.unique(own, return_index=True, return_inverse=True)
         where = np.flatnonzero(np.repeat(label == k, 3))[first]
@@ -307,8 +285,7 @@ def _outwards(shells: Sequence[Mesh]) -> tuple[list[Mesh], int, list[Fault]]:
     faults, turned = [], 0
     for shell in shells:
         low, high = shell.vertices_mm.min(0), shell.vertices_mm.max(0)
-        corners = shell.vertices_mm[shell.triangles]
-        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+        area = np.linalg.norm(shell.normals_mm2(), axis=1).sum() / 2
         volume = shell.volume_mm3()
         if abs(volume) <= _NOTHING * area * np.linalg.norm(high - low):
             faults.append(
@@ -325,7 +302,7 @@ def _outwards(shells: Sequence[Mesh]) -> tuple[list[Mesh], int, list[Fault]]:
         if inside and any((o.vertices_mm.min(0) < low).all() for o in outer):
             cavities.append(shell)
         else:
-            outer.append(replace(shell, triangles=shell.triangles[:, ::-1].copy()))
+            outer.append(shell.turned())
             turned += 1
     return [*outer, *cavities], turned, faults
 
@@ -337,7 +314,7 @@ def crossing(mesh: Mesh) -> Place | None:
     """
     import shapely
 
-    corners = mesh.vertices_mm[mesh.triangles]
+    corners = mesh.corners_mm()
     low, high = corners.min(1), corners.max(1)
     flat = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
     one, other = shapely.STRtree(flat).query(flat, predicate="intersects")
@@ -372,31 +349,15 @@ def _pierced(start: Real, end: Real, faces: Real) -> Real | None:
     return start[at[0]] + t[at[0]] * way[at[0]] if len(at) else None
 
 
-def joined(shells: Sequence[Mesh]) -> Mesh:
-    """Shells side by side in one mesh."""
-    first = np.cumsum([0, *(len(shell.vertices_mm) for shell in shells)])
-    triangles = [shell.triangles + start for shell, start in zip(shells, first, strict=False)]
-    return Mesh(np.concatenate([s.vertices_mm for s in shells]), np.concatenate(triangles).astype(np.int32))
-
-
-def solid(shells: Sequence[Mesh]) -> "manifold3d.Manifold":
-    """Shells as one solid of manifold3d."""
-    import manifold3d
-
-    whole = joined(shells)
-    data = manifold3d.Mesh64(vert_properties=whole.vertices_mm, tri_verts=whole.triangles.astype(np.uint64))
-    return manifold3d.Manifold(data)
-
-
 def united(shells: Sequence[Mesh]) -> tuple[Mesh, ...]:
     """Shells of one body that overlap as one; cavities stay cavities."""
     import manifold3d
 
-    outer = [solid([shell]) for shell in shells if shell.volume_mm3() > 0]
+    outer = [shell.solid() for shell in shells if shell.volume_mm3() > 0]
     hollow = [shell for shell in shells if shell.volume_mm3() < 0]
     whole = manifold3d.Manifold.batch_boolean(outer, manifold3d.OpType.Add)
     for shell in hollow:
-        whole = whole - solid([Mesh(shell.vertices_mm, shell.triangles[:, ::-1].copy())])
+        whole = whole - shell.turned().solid()
     return shells_of(whole)
 
 

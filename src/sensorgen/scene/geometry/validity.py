@@ -1,7 +1,6 @@
 """Are the meshes closed, oriented, apart from one another, and the electrodes apart?"""
 
 from collections.abc import Mapping
-from functools import lru_cache
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -20,15 +19,6 @@ OVERLAP_MM = 1e-9
 _MANY = 10_000  # triangles, from which on taking a mesh apart takes seconds
 
 
-@lru_cache(maxsize=16)
-def solid(mesh: Mesh) -> "manifold3d.Manifold":
-    """The mesh as a solid of manifold3d, in double precision; look at its ``status()``."""
-    import manifold3d
-
-    data = manifold3d.Mesh64(vert_properties=mesh.vertices_mm, tri_verts=mesh.triangles.astype(np.uint64))
-    return manifold3d.Manifold(data)
-
-
 def faults(scene: Scene, meshes: Mapping[str, Mesh]) -> list[tuple[str, str]]:
     """Bodies, and what is wrong with them; empty when all are valid.
 
@@ -41,7 +31,7 @@ def faults(scene: Scene, meshes: Mapping[str, Mesh]) -> list[tuple[str, str]]:
     """
     import manifold3d
 
-    solids = {name: solid(mesh) for name, mesh in meshes.items()}
+    solids = {name: mesh.solid() for name, mesh in meshes.items()}
     found = []
     for body in scene.bodies:
         exact, got = body.volume_mm3(), meshes[body.name].volume_mm3()
@@ -71,17 +61,17 @@ def _box_mm(body: Body) -> list[float]:
 
 
 def _rounding_mm3(body: Body, solid: "manifold3d.Manifold") -> float:
-    """How far the volume of a mesh may be from the exact one: rounding, and chords in place of arcs [mm3]."""
+    """Largest difference of a mesh's volume from the exact one: rounding, and chords in place of arcs [mm3]."""
     return 1e-9 * body.volume_mm3() + _off_mm(body) * float(solid.surface_area())
 
 
 def _off_mm(body: Body) -> float:
-    """How far a mesh may be from the surface [mm]."""
+    """Largest distance of a mesh from the surface [mm]."""
     return CHORD_MM if any(p.is_round() for p in body.pieces) else 0.0
 
 
 def _are_apart(scene: Scene) -> bool:
-    """Whether the cross-sections show that no bodies overlap; solids take ten times longer to intersect."""
+    """True where cross-sections show that no bodies overlap; solids take ten times longer to intersect."""
     try:
         sections(scene)
     except ValueError:
@@ -90,8 +80,8 @@ def _are_apart(scene: Scene) -> bool:
 
 
 def _two_manifold(mesh: Mesh) -> bool:
-    """Whether every edge has one triangle on each side; manifold3d takes a seam with four and parts it."""
-    ends = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    """True where every edge has one triangle on each side; manifold3d takes a seam with four and parts it."""
+    ends = mesh.edges()
     there, back = (np.sort(ends @ way) for way in ([1, len(mesh.vertices_mm)], [len(mesh.vertices_mm), 1]))
     return bool(np.all(np.diff(there) > 0) and np.array_equal(there, back))
 
@@ -108,11 +98,10 @@ def _self_overlap_mm3(mesh: Mesh, solid: "manifold3d.Manifold") -> float:
 
 
 def _shells_are_apart(mesh: Mesh) -> bool:
-    """Whether the boxes around its shells share faces at most: a thousandth of the time to take it apart."""
+    """True where the boxes around its shells share faces at most: a thousandth of the time to take it apart."""
     from sensorgen.scene.connections import groups
 
-    ends = mesh.triangles[:, [0, 1, 1, 2]].astype(np.int64)
-    label = groups(len(mesh.vertices_mm), *ends.reshape(-1, 2).T)
+    label = groups(len(mesh.vertices_mm), *mesh.edges().T)
     order = np.argsort(label, kind="stable")
     starts = np.flatnonzero(np.diff(label[order], prepend=-1))
     places = mesh.vertices_mm[order]
@@ -138,6 +127,6 @@ def _overlaps(solids: Mapping[str, "manifold3d.Manifold"], off_mm: Mapping[str, 
 
 def electrode_gap_mm(scene: Scene, meshes: Mapping[str, Mesh]) -> float:
     """Smallest distance between bodies at different terminals, exact; infinite where there are no two [mm]."""
-    ends = [(b.terminal, solid(meshes[b.name])) for b in scene.bodies if b.terminal]
+    ends = [(b.terminal, meshes[b.name].solid()) for b in scene.bodies if b.terminal]
     reach = sum(scene.size_mm)
     return min((float(a.min_gap(b, reach)) for (s, a), (t, b) in combinations(ends, 2) if s != t), default=np.inf)

@@ -87,7 +87,7 @@ def block() -> Standard:
 
 
 def free_block() -> Standard:
-    r"""The same that widens along x and y: :math:`\sigma = \mu (b^{-2} - b)`."""
+    r"""Block that widens along x and y: :math:`\sigma = \mu (b^{-2} - b)`."""
     return _block(lambda b: b**-2 - b, plane=False)
 
 

@@ -1,9 +1,9 @@
 """Models of a cell's capacitance on scenes whose capacitance is known."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -12,9 +12,9 @@ from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.models import capacitance_models, thesis_cells
-from sensorgen.scene.scene import Scene
 from sensorgen.verification import peers
 from sensorgen.verification.chart import exact
+from sensorgen.verification.chart.exact import Standard
 from sensorgen.verification.chart.measured import Point, timed
 
 ASKED = "the capacitance of a cell at rest"
@@ -23,40 +23,9 @@ _NO_PEERS = ("plate, 0.6 mm",)  # exact by all of them
 _DEARER = 10.0  # by how much the next accuracy may cost more than the last
 
 
-@dataclass(frozen=True)
-class Standard:
-    """A scene whose capacitance is known.
-
-    Attributes
-    ----------
-    scene : Scene
-        As models see it.
-    permittivity : mapping of str to float
-        Of its dielectrics and of "air" [-].
-    capacitance_f_per_m2 : float
-        Per area of the sensor [F/m2].
-    known_to : float
-        Relative half-width of its reference [-].
-    shape, params : str, Params or None
-        What it was made from, for formulas of one shape.
-    """
-
-    scene: Scene
-    permittivity: Mapping[str, float]
-    capacitance_f_per_m2: float
-    known_to: float
-    shape: str = ""
-    params: Any = None
-
-
 def _designed(shape: str, dielectric_mm: float, capacitance_f_per_m2: float, known_to: float) -> Standard:
     design = designs.make({"shape": shape, "parameters": {"dielectric_mm": dielectric_mm}})
     return Standard(design.in_use, _EPS, capacitance_f_per_m2, known_to, shape, design.params)
-
-
-def _exact(case: exact.Exact) -> Standard:
-    per_area = case.capacitance_f_per_m / (case.scene.size_mm[0] * M_PER_MM)
-    return Standard(case.scene, exact.PERMITTIVITY, per_area, case.known_to)
 
 
 # tri: hp finite elements, agreeing with two other programs; rect: H1 and H(div) elements, agreeing with finite volumes;
@@ -68,10 +37,10 @@ STANDARD: dict[str, Callable[[], Standard]] = {
     "rect, 0.1 mm": lambda: _designed("rect", 0.1, 8.123429165e-13 / 4e-6, 2.7e-5),
     "rect, 0.2 mm": lambda: _designed("rect", 0.2, 4.852340605e-13 / 4e-6, 2.5e-5),
     "plate, 0.6 mm": lambda: _designed("reference", 0.6, EPS0_F_PER_M * _EPS["x60"] / 0.6e-3, 1e-15),
-    "coaxial line": lambda: _exact(exact.coaxial()),
-    "eccentric cylinders": lambda: _exact(exact.eccentric()),
-    "stripline": lambda: _exact(exact.stripline()),
-    "interdigital, half space": lambda: _exact(exact.interdigital()),
+    "coaxial line": exact.coaxial,
+    "eccentric cylinders": exact.eccentric,
+    "stripline": exact.stripline,
+    "interdigital, half space": exact.interdigital,
 }
 
 
@@ -146,7 +115,7 @@ def point(
     scene: str, model: str, found: Interval, standard: Standard, seconds: float, *,
     wanted: float | None = None, bounded: bool = True,
 ) -> Point:  # fmt: skip
-    """What a model gave per area, compared with the reference."""
+    """Answer of a model per area, compared with the reference."""
     off = [abs(bound / standard.capacitance_f_per_m2 - 1) for bound in (found.lower, found.upper)]
     error = max(*off, standard.known_to)
     said = f"{found.lower:.9g} to {found.upper:.9g} F/m²" if bounded else f"{found.lower:.9g} F/m²"

@@ -4,11 +4,12 @@ Their symmetry planes without an electrode are walls of next to no permittivity 
 upper one. Circles are drawn with straight lines that keep their mean radius.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import acosh, asinh, cos, log, pi, sin, tan, tanh
+from typing import Any
 
-from sensorgen.core.units import EPS0_F_PER_M
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.scene import Body, Outline, Prism, Scene, box
 
 PERMITTIVITY = {"air": 1.0, "wall": 1e-10}
@@ -19,45 +20,58 @@ _FLOOR_MM = 2 * _PLATE_MM
 
 
 @dataclass(frozen=True)
-class Exact:
-    """A scene 1 mm deep.
+class Standard:
+    """A scene whose capacitance is known.
 
     Attributes
     ----------
     scene : Scene
         As models see it.
-    capacitance_f_per_m : float
-        Per depth [F/m].
+    permittivity : mapping of str to float
+        Of its dielectrics and of "air" [-].
+    capacitance_f_per_m2 : float
+        Per area of the sensor [F/m2].
     known_to : float
-        What straight lines in place of arcs, a lid in place of infinity, and walls that are no mirrors cost [-].
+        Relative half-width of its reference: of textbook scenes what straight lines in place of arcs, a lid in place
+        of infinity, and walls that are no mirrors cost [-].
+    shape, params : str, Params or None
+        What it was made from, for formulas of one shape.
     """
 
     scene: Scene
-    capacitance_f_per_m: float
+    permittivity: Mapping[str, float]
+    capacitance_f_per_m2: float
     known_to: float
+    shape: str = ""
+    params: Any = None
 
 
-def coaxial(corners: int = CORNERS) -> Exact:
+def _exact(scene: Scene, capacitance_f_per_m: float, known_to: float) -> Standard:
+    """A scene by its capacitance per depth [F/m]."""
+    return Standard(scene, PERMITTIVITY, capacitance_f_per_m / (scene.size_mm[0] * M_PER_MM), known_to)
+
+
+def coaxial(corners: int = CORNERS) -> Standard:
     r"""A quarter of a coaxial line of radii 1 and 2 mm.
 
     .. math:: C = \frac{2 \pi \varepsilon_0}{\ln(b / a)}
     """
     low = _above([(0.0, 0.0), *_arc(0.0, 1.0, 0.0, 0.5, corners)])
     high = _above([*_arc(0.0, 2.0, 0.0, 0.5, corners), (0.0, 2.2), (2.2, 2.2), (2.2, 0.0)])
-    return Exact(_scene(low, high, 2.2, 2.2), 0.5 * pi * EPS0_F_PER_M / log(2), 2e-5)
+    return _exact(_scene(low, high, 2.2, 2.2), 0.5 * pi * EPS0_F_PER_M / log(2), 2e-5)
 
 
-def eccentric(corners: int = CORNERS) -> Exact:
+def eccentric(corners: int = CORNERS) -> Standard:
     r"""Half of a line of radii 1 and 2 mm whose axes are 0.5 mm apart.
 
     .. math:: C = \frac{2 \pi \varepsilon_0}{\operatorname{arcosh}((a^2 + b^2 - e^2) / (2 a b))}
     """
     low = _above(_arc(2.7, 1.0, 0.0, 1.0, 2 * corners))
     high = _above([(4.4, 0.0), *_arc(2.2, 2.0, 0.0, 1.0, 2 * corners), (0.0, 0.0), (0.0, 2.2), (4.4, 2.2)])
-    return Exact(_scene(low, high, 4.4, 2.2), pi * EPS0_F_PER_M / acosh((5 - 0.25) / 4), 2e-5)
+    return _exact(_scene(low, high, 4.4, 2.2), pi * EPS0_F_PER_M / acosh((5 - 0.25) / 4), 2e-5)
 
 
-def stripline() -> Exact:
+def stripline() -> Standard:
     r"""The upper half of a strip w = 1 mm wide, without thickness, midway between plates b = 1 mm apart.
 
     .. math:: C = 4 \varepsilon_0 \frac{K(k)}{K(k')}, \quad k = \tanh\frac{\pi w}{2 b}
@@ -67,10 +81,10 @@ def stripline() -> Exact:
     high = Body("high", "etpu", (box(0, 8, 0, 1, roof, roof + _PLATE_MM),), "top")
     wall = Body("wall", "wall", tuple(box(a, b, 0, 1, _PLATE_MM, _FLOOR_MM) for a, b in ((0, 3.5), (4.5, 8))))
     exact = 2 * EPS0_F_PER_M * _ratio(tanh(pi / 2))
-    return Exact(Scene((low, wall, high), (8.0, 1.0, roof + _PLATE_MM)), exact, 1e-7)
+    return _exact(Scene((low, wall, high), (8.0, 1.0, roof + _PLATE_MM)), exact, 1e-7)
 
 
-def interdigital() -> Exact:
+def interdigital() -> Standard:
     r"""Fingers of no thickness that fill half of their plane, on a half space: from one's middle to the next one's.
 
     .. math:: C = \tfrac{1}{2} \varepsilon_0 \frac{K(k)}{K(k')}, \quad k = \sin\frac{\pi s}{2}
@@ -85,7 +99,7 @@ def interdigital() -> Exact:
     walls = box(0.5, 1.5, 0, 1, _PLATE_MM, _FLOOR_MM), box(1.5, 2, 0, 1, _PLATE_MM, _PLATE_MM + 0.05)
     under_lid = box(0, 2, 0, 1, roof - _PLATE_MM, roof)
     scene = Scene((low, Body("wall", "wall", (*walls, under_lid)), high), (2.0, 1.0, roof + _PLATE_MM))
-    return Exact(scene, 0.5 * EPS0_F_PER_M * _ratio(sin(pi / 4)), 1e-7)
+    return _exact(scene, 0.5 * EPS0_F_PER_M * _ratio(sin(pi / 4)), 1e-7)
 
 
 def _arc(middle: float, radius: float, start: float, stop: float, corners: int) -> Iterator[tuple[float, float]]:

@@ -5,7 +5,7 @@ The error is the larger one of abs(Z) and of Re Z by itself, at the worst freque
 a thousandth of abs(Z) at low tones, and is lost first.
 """
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,6 @@ import numpy as np
 from sensorgen.solvers.line.inputs import PressedLine
 from sensorgen.verification import line_models, peers
 from sensorgen.verification.chart.measured import DIGITS, Level, Point, climbed
-from sensorgen.verification.peers import line as circuits
 
 ASKED = "the impedance of a pressed line"
 
@@ -84,9 +83,6 @@ STANDARD = {
     }, 60.0, "hertz"),
 }  # fmt: skip
 
-_LADDERS = (1, 10, 100, 1000, 10_000)  # cells per section
-_GRIDS = (20, 40, 80)  # cells along the sheet
-_CIRCUITS = (1, 10, 100)  # cells per section in ngspice
 _PIECES = (1, 4, 16, 64, 256)  # of a tip
 
 
@@ -108,29 +104,18 @@ def points(name: str, budget_s: float) -> list[Point]:
         real = float(np.max(abs(found.real - known.real) / abs(known.real)))
         return max(whole, real, DIGITS), f"abs(Z) off by {whole:.2g}, Re Z by {real:.2g}"
 
-    def of(work: Callable[..., Any], *words: str, **more: Any) -> Callable[[], Any]:
-        return lambda: work(*words, standard.line(), **more)
-
-    theirs: dict[str, list[Level]] = {}
-    if standard.profile == "uniform":
-        theirs["scikit-rf"] = [("", of(circuits.scikit_rf))]
-        theirs["ngspice"] = [(f"{n} cells, ", of(circuits.ngspice, cells=n)) for n in _CIRCUITS]
-
-    pieces = _PIECES if standard.profile != "uniform" else _PIECES[:1]
-    ladders = [
-        *((name, [("", of(line_models.impedance, name))]) for name in line_models.AT_ONCE),
-        ("line_ladder", [(f"{n} cells, ", of(line_models.impedance, "line_ladder", cells=n)) for n in _LADDERS]),
-        ("sheet", [(f"{n} cells, ", of(line_models.impedance, "sheet", cells=n)) for n in _GRIDS]),
-        (
-            "line_tip",
-            [
-                (f"{n} pieces, ", of(line_models.impedance, "line_tip", pieces=n, profile=standard.profile))
-                for n in pieces
-            ],
-        ),
-        *((peer, levels) for peer, levels in theirs.items() if not peers.missing(peer)),
-    ]
+    levels: dict[str, list[dict[str, Any]]] = dict(line_models.LEVELS)
+    absent = [program for program in line_models.PROGRAMS if standard.profile != "uniform" or peers.missing(program)]
+    if standard.profile != "uniform":
+        levels["line_tip"] = [{"pieces": n, "profile": standard.profile} for n in _PIECES]
+    ladders = [(model, [_level(model, standard, how) for how in hows])
+               for model, hows in levels.items() if model not in absent]  # fmt: skip
     return list(climbed(name, ladders, judge, budget_s))
+
+
+def _level(model: str, standard: Standard, fineness: Mapping[str, Any]) -> Level:
+    said = line_models.words(fineness)
+    return f"{said}, " * bool(said), lambda: line_models.impedance(model, standard.line(), **fineness)
 
 
 def why_not_applicable(name: str) -> dict[str, str]:

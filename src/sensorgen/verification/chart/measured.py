@@ -1,4 +1,4 @@
-"""What a model gave, and how long it took; which of them nothing beats; and which had nothing to say."""
+"""Answers of models with their times; those that no other beats; models without an answer."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -26,7 +26,7 @@ Judge = Callable[[Any], tuple[float, str]]  # from a value to its error and word
 
 @dataclass(frozen=True)
 class Point:
-    """What one model gave on one scene.
+    """Answer of one model on one scene.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Silent:
 
 
 def timed(work: Callable[[], Any]) -> tuple[Any, float]:
-    """What some work gives, and the processor's time for it: the median of several runs of quick work [s]."""
+    """Result of some work, and the processor's time for it: the median of several runs of quick work [s]."""
     taken: list[float] = []
     while len(taken) < _REPEATS and sum(taken) < (_AGAIN_S if len(taken) == 1 else _QUICK_S):
         start = used_s()

@@ -1,6 +1,6 @@
 """Processor time against error, a panel per scene, with the Pareto front (PNG, HTML)."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import floor, log10
 from textwrap import wrap
@@ -25,17 +25,14 @@ OVERVIEW = (  # a cell in the plane and in 3D, a press, a line, a network, and t
 
 def png(points: Sequence[Point]) -> bytes:
     """All scenes in one picture."""
-    panels = {figure.title: figure.choices[""] for figure in figures(points)}
-    title = "\n".join([TITLE, *wrap(ALT, 120)])
-    return static.png(Figure("chart", title, ALT, panels, "scene", columns=2, beside=True))
+    return picture("chart", TITLE, ALT, {figure.title: figure.choices[""] for figure in figures(points)})
 
 
 def overview(points: Sequence[Point]) -> bytes | None:
     """The scenes that decide, in one picture; None where none of them was measured."""
     here = [p for name in OVERVIEW for p in points if p.scene == name]
     panels = {figure.title: figure.choices[""] for figure in figures(here)}
-    title = "\n".join([TITLE, *wrap(ALT, 110)])
-    return static.png(Figure("overview", title, ALT, panels, "scene", columns=2, beside=True)) if here else None
+    return picture("overview", TITLE, ALT, panels) if here else None
 
 
 def html(points: Sequence[Point]) -> str:
@@ -49,31 +46,42 @@ def figures(points: Sequence[Point]) -> Iterator[Figure]:
         here = [p for p in points if p.scene == scene]
         curves = [
             curve for model, k in looks(scene, points).items() if (mine := [p for p in here if p.model == model])
-            for curve in _curves(mine, k)
+            for curve in marks(
+                model, [p.seconds for p in mine], [p.error for p in mine], [f"{p.model}: {p.said}" for p in mine],
+                k, hollow=not mine[0].bounded,
+            )
         ]  # fmt: skip
         front = list(steps([p for p in here if p.front]))
         curves.append(
             Curve("line", "Pareto front", [x for x, _ in front], [y for _, y in front], colour=GREY, dash="dash")
         )
-        low = 10.0 ** (floor(log10(min(p.error for p in here))) - 0.3)
-        high = 10.0 ** (floor(log10(max(p.error for p in here))) + 1.3)
-        asked = "\n".join(wrap(f"relative error of {kind_of(scene).ASKED} [-]", 34))
-        panel = Panel(
-            tuple(curves), Axis("processor time [s]", log=True), Axis(asked, log=True, low=low, high=high), title=scene
-        )
-        words = f"Relative error of {kind_of(scene).ASKED}; each point names its model and result."
-        yield Figure(f"scene-{number}", scene, words, {"": (panel,)})
+        errors, asked = [p.error for p in here], f"relative error of {kind_of(scene).ASKED}"
+        drawn = panel(curves, "processor time [s]", asked, (min(errors), max(errors)), scene)
+        yield Figure(f"scene-{number}", scene, f"R{asked[1:]}; each point names its model and result.", {"": (drawn,)})
 
 
-def _curves(points: Sequence[Point], k: int) -> Iterator[Curve]:
-    """Marks of one model, hollow if it has no bounds, joined by a line."""
+def marks(
+    name: str, costs: Sequence[float], errors: Sequence[float], text: Sequence[str], k: int, *, hollow: bool
+) -> Iterator[Curve]:
+    """Marks of one model, its levels joined by a line; ``k`` is the number of its colour and mark."""
     style = look(k)
-    x, y = [p.seconds for p in points], [p.error for p in points]
-    if len(points) > 1:
-        yield Curve("line", "", x, y, colour=style["colour"])
-    text = [f"{p.model}: {p.said}" for p in points]
-    marks = Curve("points", points[0].model, x, y, text=text, **style)
-    yield marks if points[0].bounded else replace(marks, symbol=f"{marks.symbol}-open")
+    if len(costs) > 1:
+        yield Curve("line", "", costs, errors, colour=style["colour"])
+    curve = Curve("points", name, costs, errors, text=text, **style)
+    yield replace(curve, symbol=f"{curve.symbol}-open") if hollow else curve
+
+
+def panel(curves: Sequence[Curve], cost: str, asked: str, ends: tuple[float, float], title: str) -> Panel:
+    """Cost against error, both logarithmic, whole decades around the least and the largest error."""
+    low, high = (10.0 ** (floor(log10(end)) + beyond) for end, beyond in zip(ends, (-0.3, 1.3), strict=True))
+    y = Axis("\n".join(wrap(f"{asked} [-]", 34)), log=True, low=low, high=high)
+    return Panel(tuple(curves), Axis(cost, log=True), y, title=title)
+
+
+def picture(key: str, title: str, alt: str, panels: Mapping[str, tuple[Panel, ...]]) -> bytes:
+    """All panels in one picture, two beside each other, each with its legend."""
+    words = "\n".join([title, *wrap(alt, 110)])
+    return static.png(Figure(key, words, alt, panels, "panel", columns=2, beside=True))
 
 
 def looks(scene: str, points: Sequence[Point]) -> dict[str, int]:

@@ -143,7 +143,7 @@ def _scene(known: Known) -> Scene:
 
 
 def has_mesher() -> bool:
-    """Whether the mesher of cells that are pressed is installed; it is loaded then."""
+    """True where the mesher of pressed cells is installed; it is loaded then."""
     try:
         mesher.check()
     except MissingValue:

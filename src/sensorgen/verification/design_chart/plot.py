@@ -1,15 +1,13 @@
 """Time and memory against error of one design's models, a panel per quantity (PNG, HTML)."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from math import floor, log10
-from textwrap import wrap
 
 from markupsafe import Markup
 
-from sensorgen.analysis.plots import pages, static
-from sensorgen.analysis.plots.figure import GREY, Axis, Curve, Figure, Panel, look
+from sensorgen.analysis.plots import pages
+from sensorgen.analysis.plots.figure import GREY, Curve, Figure, Panel
 from sensorgen.core import document
+from sensorgen.verification.chart.plot import marks, panel, picture
 from sensorgen.verification.design_chart.results import DesignChart, Point
 
 ALT = (
@@ -30,8 +28,7 @@ def png(found: DesignChart) -> bytes:
         f"{figure.key}, {cost}": figure.choices[cost] for figure in figures(found) for cost in _IN_PICTURE
         if cost in figure.choices
     }  # fmt: skip
-    title = "\n".join([_title(found), *wrap(ALT, 120)])
-    return static.png(Figure("chart", title, ALT, panels, "quantity", columns=2, beside=True))
+    return picture("chart", _title(found), ALT, panels)
 
 
 def html(found: DesignChart) -> str:
@@ -70,20 +67,15 @@ def _panel(points: Sequence[Point], title: str, axis: str, cold: str, warm: str)
     """Marks of every model, joined from coarse to fine, and what the references are known to."""
     curves: list[Curve] = []
     for k, model in enumerate(dict.fromkeys(p.model for p in points)):
-        mine, style = [p for p in points if p.model == model and getattr(p, cold) is not None], look(k)
-        y = [p.error for p in mine]
+        mine = [p for p in points if p.model == model and getattr(p, cold) is not None]
         text = [f"{p.model} {p.level}: {p.error:.2g} off, against {p.against}" for p in mine]
         for cost, hollow in ((cold, bool(warm)), (warm, False)):
             if cost:
-                x = [getattr(p, cost) for p in mine]
-                curves += [Curve("line", "", x, y, colour=style["colour"])] * (len(mine) > 1)
-                marks = Curve("points", "" if hollow else model, x, y, text=text, **style)
-                curves.append(replace(marks, symbol=f"{marks.symbol}-open") if hollow else marks)
+                costs, errors = [getattr(p, cost) for p in mine], [p.error for p in mine]
+                curves += marks("" if hollow else model, costs, errors, text, k, hollow=hollow)
     ends = [getattr(p, cost) for p in points for cost in (cold, warm) if cost and getattr(p, cost) is not None]
     for doubt in sorted({p.doubt for p in points}):
         words = "known to" if doubt == min(p.doubt for p in points) else ""
         curves.append(Curve("line", words, [min(ends), max(ends)], [doubt, doubt], colour=GREY, dash="dot"))
-    low = 10.0 ** (floor(log10(min(p.doubt for p in points))) - 0.3)
-    high = 10.0 ** (floor(log10(max(p.error for p in points))) + 1.3)
-    about = "\n".join(wrap(f"relative error: {title} [-]", 34))
-    return Panel(tuple(curves), Axis(axis, log=True), Axis(about, log=True, low=low, high=high), title=title)
+    least, most = min(p.doubt for p in points), max(p.error for p in points)
+    return panel(curves, axis, f"relative error: {title}", (least, most), title)

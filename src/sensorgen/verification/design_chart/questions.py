@@ -1,4 +1,4 @@
-"""What is asked of a design: models, other programs, and their references."""
+"""Quantities of a design: models and other programs that give them, and their references."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -29,9 +29,6 @@ from sensorgen.verification.design_chart import works
 OWN = "sensorgen"
 WIDTHS, WIDTHS_IN_3D = (1e-3, 1e-5, 1e-7), (1e-1, 1e-2, 1e-3, 1e-4)  # of the bounds of C, wanted
 ACCURACIES = (1e-1, 1e-2, 1e-3)
-LADDERS = (1, 10, 100, 1000)
-CIRCUITS = (1, 10, 100)  # cells of a ladder in ngspice
-GRIDS = (20, 40)
 DIGITS = 2.0**-52
 _SPATIAL = 3  # cost of a field solve in space
 
@@ -55,7 +52,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Reference:
-    """What answers are compared with.
+    """Value that answers are compared with.
 
     Attributes
     ----------
@@ -191,7 +188,7 @@ def _compression(body: Body, stress_pa: float) -> Question:
 
 
 def _published(body: Body, case: mesh_ladder.Case, stress_pa: float) -> tuple[Reference, ...]:
-    """What two other programs found for this very cell under this pressure, if they were asked."""
+    """Published answers of two other programs for this very cell under this pressure, if there are any."""
     from sensorgen.verification.chart import presses
 
     for known in presses.CELLS.values():
@@ -241,27 +238,19 @@ def exact(line: PressedLine) -> tuple[complex, ...]:
 def _line(sensor: Sensor, query: Query, body: Body) -> Question:
     line = pressed_line(sensor, query, query.load(body.design).position_m)
     lossy = sensor.tan_delta or sensor.leak_s_per_m
-    series, silent = [], [("pressure", "a flat tip presses evenly")]
-
-    def own(name: str, *levels: tuple[str, int]) -> Series:
-        parts = [({kind: n}, f"{n} {kind}") for kind, n in levels] or [({}, "")]
-        return Series(name, OWN, tuple((said, partial(works.line, name, line, how), 0.0) for how, said in parts))
-
-    series += [own(name) for name in line_models.AT_ONCE]
-    series += [own("line_ladder", *(("cells", n) for n in LADDERS)), own("line_tip", ("pieces", 1))]
+    silent = [("pressure", "a flat tip presses evenly")]
+    unable = {name: why for name in line_models.PROGRAMS if (why := peers.missing(name))}
     if lossy or any(sensor.piezoresistance_per_pa):
-        silent.append(("sheet", "the film loses, or the tracks are piezoresistive"))
-    else:
-        series.append(own("sheet", *(("cells", n) for n in GRIDS)))
-    for name, cells in (("scikit-rf", ()), ("ngspice", CIRCUITS)):
-        why = peers.missing(name) or ("the film loses: its ladder has capacitors alone" * bool(lossy and cells))
-        if why:
-            silent.append((name, why))
+        unable["sheet"] = "the film loses, or the tracks are piezoresistive"
+    if lossy:
+        unable.setdefault("ngspice", "the film loses: its ladder has capacitors alone")
+    series = []
+    for name, levels in line_models.LEVELS.items():
+        if name in unable:
+            silent.append((name, unable[name]))
             continue
-        levels = [({"cells": n}, f"{n} cells") for n in cells] or [({}, "")]
-        series.append(
-            Series(name, name, tuple((said, partial(works.circuit, name, line, how), 0.0) for how, said in levels))
-        )
+        runs = tuple((line_models.words(how), partial(works.line, name, line, how), 0.0) for how in levels)
+        series.append(Series(name, name if name in line_models.PROGRAMS else OWN, runs))
     known = (Reference("chain matrices in 220 digits", "decimal numbers", exact(line), DIGITS),)
     return Question("line", "pressed line", "Z of the line, |Z| and Re Z", tuple(series), tuple(silent), known, of_line)
 

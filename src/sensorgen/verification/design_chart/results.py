@@ -33,7 +33,7 @@ _DEARER = 5.0  # how many times longer the next level should take than the last 
 
 @dataclass(frozen=True)
 class Point:
-    """What one model gave, and what it cost.
+    """Answer of one model, and its cost.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Silent:
-    """Who gave nothing to a question, and why."""
+    """Model or program without an answer to a question, and the reason."""
 
     question: str
     model: str

@@ -62,18 +62,10 @@ def rise_by_mesh(case: "Case", level: int, stress_pa: float, stated: float) -> A
 
 
 def line(model: str, line: "PressedLine", fineness: Mapping[str, int]) -> Answer:
-    """Impedance at every frequency [ohm] by one of our models of lines."""
+    """Impedance at every frequency [ohm] by a model of lines, or by another program."""
     from sensorgen.verification.line_models import impedance
 
     return Answer(tuple(impedance(model, line, **fineness).ravel().tolist()))
-
-
-def circuit(name: str, line: "PressedLine", fineness: Mapping[str, int]) -> Answer:
-    """Impedance at every frequency [ohm] by another program."""
-    from sensorgen.verification.peers import line as programs
-
-    found = programs.ngspice(line, **fineness) if name == "ngspice" else programs.scikit_rf(line)
-    return Answer(tuple(found.ravel().tolist()))
 
 
 def predicted(body: "Body", query: "Query", *, rough: bool = False) -> Answer:

@@ -15,7 +15,7 @@ Levels = list[tuple[str, Callable[[], float]]]  # words, and work that gives a c
 
 FIELD = {"scikit-fem": "skfem", "NGSolve": "ngsolve", "FastCap": "fastcap2"}
 _FILES = {"scikit-fem": "scikit_fem", "NGSolve": "ngsolve_fem", "FastCap": "fastcap"}
-_UNKNOWNS = {"scikit-fem": (200, 1000, 5000, 20_000), "NGSolve": (200, 1000, 5000, 20_000)}
+_UNKNOWNS = (200, 1000, 5000, 20_000)
 _BRICKS: dict[str, tuple[tuple[int, ...], ...]] = {  # layers; and order, where it can be chosen
     "scikit-fem": ((0,), (1,), (2,)), "NGSolve": ((0, 2), (0, 4), (1, 3), (1, 5), (2, 6)),
 }  # fmt: skip
@@ -28,8 +28,8 @@ def missing(peer: str) -> str:
     if peer == "ngspice":
         return "" if shutil.which("ngspice") else "ngspice is not installed (Debian: apt install ngspice)"
     name = {**FIELD, "scikit-rf": "skrf"}[peer]
-    packages = {"fastcap2": "fastcap2", "ngsolve": "ngsolve", "skfem": "scikit-fem", "skrf": "scikit-rf"}
-    return "" if find_spec(name) else f"not installed: pip install {packages[name]}"
+    packages = {"skfem": "scikit-fem", "skrf": "scikit-rf"}
+    return "" if find_spec(name) else f"not installed: pip install {packages.get(name, name)}"
 
 
 def levels(peer: str, scene: Scene, permittivity: Mapping[str, float]) -> Levels:
@@ -53,18 +53,14 @@ def levels(peer: str, scene: Scene, permittivity: Mapping[str, float]) -> Levels
     from sensorgen.verification.peers import cells
 
     geometry = cells.geometry(scene)
+    words: list[tuple[str, tuple[int, ...]]]
     module = import_module(f"sensorgen.verification.peers.{_FILES[peer]}")
     if peer == "FastCap":
         cells.share(geometry)  # refuses a cell that is cut
-        return [
-            (f"{n} panels along the height, ", partial(module.capacitance, scene, permittivity, n)) for n in _PANELS
-        ]
-    if isinstance(geometry, cells.Plane):
-        return [(f"{n} unknowns, ", partial(module.plane, scene, permittivity, n)) for n in _UNKNOWNS[peer]]
-    return [
-        (
-            f"{how[0]} layers{''.join(f' of order {p}' for p in how[1:])}, ",
-            partial(module.boxes, scene, permittivity, *how),
-        )
-        for how in _BRICKS[peer]
-    ]
+        work, words = module.capacitance, [(f"{n} panels along the height, ", (n,)) for n in _PANELS]
+    elif isinstance(geometry, cells.Plane):
+        work, words = module.plane, [(f"{n} unknowns, ", (n,)) for n in _UNKNOWNS]
+    else:
+        of_order = ((how, "".join(f" of order {p}" for p in how[1:])) for how in _BRICKS[peer])
+        work, words = module.boxes, [(f"{how[0]} layers{order}, ", how) for how, order in of_order]
+    return [(said, partial(work, geometry, permittivity, *how)) for said, how in words]

@@ -112,7 +112,7 @@ def _polygons(part: Slice, heights: dict[float, set[float]]) -> Iterator[tuple[s
 
 
 def share(found: Plane | Grid) -> float:
-    """How often the cell occurs in the sensor [-]; raises ValueError where the sensor's end cuts it."""
+    """Number of cells in the sensor [-]; raises ValueError where the sensor's end cuts the cell."""
     if np.ptp(found.shares) > ROUNDING_MM:
         raise ValueError("the sensor's end cuts its repeating cell")
     return float(np.ravel(found.shares)[0])

@@ -13,7 +13,6 @@ import numpy as np
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
-from sensorgen.scene.scene import Scene
 from sensorgen.solvers.electrostatics.bricks import Grid
 from sensorgen.verification.peers import cells
 
@@ -36,12 +35,10 @@ class _Face:
     within_mm: Real
 
 
-def capacitance(scene: Scene, permittivity: Mapping[str, float], panels: int) -> float:
+def capacitance(found: cells.Plane | Grid, permittivity: Mapping[str, float], panels: int) -> float:
     """Of the whole sensor [F], by so many panels along the height of the cell."""
     import fastcap2
 
-    found = cells.geometry(scene)
-    count = cells.share(found)
     faces = list(_of_plane(found) if isinstance(found, cells.Plane) else _of_boxes(found))
     corners = np.array([f.corner_mm + k * f.along_mm + n * f.across_mm for f in faces for k in (0, 1) for n in (0, 1)])
     low, high = corners.min(0), corners.max(0)
@@ -67,11 +64,11 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], panels: int) ->
                         surfaces[key].add_quad(*moved)
                     else:
                         surfaces[key].add_quad(*moved, rp=tuple(within))
-    return _charge(surfaces, permittivity) * count * _depths(found, size)
+    return _charge(surfaces, permittivity) * cells.share(found) * _depths(found, size)
 
 
 def _depths(found: cells.Plane | Grid, size_mm: Real) -> float:
-    """How many of the cell, as deep as it was taken, make the sensor's depth [-]."""
+    """Number of cells, as deep as taken, in the sensor's depth [-]."""
     return found.depth_mm / float(size_mm[1]) if isinstance(found, cells.Plane) else 1.0
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
-from sensorgen.scene.scene import Scene
+from sensorgen.solvers.electrostatics.bricks import Grid
 from sensorgen.verification.peers import cells
 
 _ORDER = 3  # on triangles
@@ -18,14 +18,11 @@ _BRICK = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 
 _SIDES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (2, 3, 7, 6), (1, 2, 6, 5), (3, 0, 4, 7))  # of a brick
 
 
-def plane(scene: Scene, permittivity: Mapping[str, float], unknowns: int) -> float:
+def plane(found: cells.Plane, permittivity: Mapping[str, float], unknowns: int) -> float:
     """From above [F]: triangles are refined until there are that many unknowns."""
     import netgen.meshing as netgen
     import ngsolve as ng
 
-    found = cells.geometry(scene)
-    if not isinstance(found, cells.Plane):
-        raise ValueError("its cross-section changes along its depth")
     values = cells.permittivities(found, dict(permittivity))
     kinds, which = np.unique(values, return_inverse=True)
     made = netgen.Mesh(2)
@@ -67,14 +64,11 @@ def _solved(ng: Any, mesh: Any, eps: Any, order: int) -> tuple[float, Any, int]:
     return float(energy), field, fes.ndof
 
 
-def boxes(scene: Scene, permittivity: Mapping[str, float], layers: int, order: int) -> float:
+def boxes(found: Grid, permittivity: Mapping[str, float], layers: int, order: int) -> float:
     """From above [F], each box of the cell with so many layers that shrink towards its edges."""
     import netgen.meshing as netgen
     import ngsolve as ng
 
-    found = cells.geometry(scene)
-    if isinstance(found, cells.Plane):
-        raise ValueError("it is a cross-section")
     planes = [cells.nodes(p, layers) for p in found.planes_mm]
     pieces = 2 * layers + 1
     fill = found.fill.repeat(pieces, 0).repeat(pieces, 1).repeat(pieces, 2)

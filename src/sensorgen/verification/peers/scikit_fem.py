@@ -7,21 +7,18 @@ import numpy as np
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
-from sensorgen.scene.scene import Scene
+from sensorgen.solvers.electrostatics.bricks import Grid
 from sensorgen.verification.peers import cells
 
 _NEAR_MM = 1e-9
 _HALF = 0.5  # share of the error that refined triangles hold
 
 
-def plane(scene: Scene, permittivity: Mapping[str, float], unknowns: int) -> float:
+def plane(found: cells.Plane, permittivity: Mapping[str, float], unknowns: int) -> float:
     """From above [F]: triangles are refined until there are that many unknowns."""
     import skfem
     from skfem.helpers import dot, grad
 
-    found = cells.geometry(scene)
-    if not isinstance(found, cells.Plane):
-        raise ValueError("its cross-section changes along its depth")
     values = cells.permittivities(found, dict(permittivity))
     mesh = skfem.MeshTri(found.points_mm.T.copy(), found.triangles.T.copy())
     finder, held = mesh.element_finder(), found.held()
@@ -63,14 +60,11 @@ def _jumps(skfem: Any, mesh: Any, x: Real, eps: Real) -> Real:
     return np.asarray(found)
 
 
-def boxes(scene: Scene, permittivity: Mapping[str, float], layers: int) -> float:
+def boxes(found: Grid, permittivity: Mapping[str, float], layers: int) -> float:
     """From above [F], each box of the cell with so many layers that shrink towards its edges."""
     import skfem
     from skfem.helpers import dot, grad
 
-    found = cells.geometry(scene)
-    if isinstance(found, cells.Plane):
-        raise ValueError("it is a cross-section")
     mesh = skfem.MeshHex.init_tensor(*(cells.nodes(p, layers) for p in found.planes_mm))
     at = [
         np.searchsorted(planes, middle) - 1

@@ -1,4 +1,4 @@
-"""What is numbered in the thesis, and claims of its text, by chapter: the files in ``chapters/``, in our own words."""
+"""Numbered items of the thesis, and claims of its text, by chapter: the files in ``chapters/``, in our own words."""
 
 from collections.abc import Iterator
 from functools import cache

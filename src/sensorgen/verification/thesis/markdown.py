@@ -31,7 +31,7 @@ def markdown(rows: Sequence[Row]) -> str:
 
 
 def lead(rows: Sequence[Row]) -> str:
-    """What the counts come to."""
+    """Sum of the counts, in words."""
     found = Counter(row.verdict.word for row in rows)
     copies = [sum(part.copied for part in row.parts) for row in rows if row.verdict.word in JUDGED]
     counts = [f"{found[word]} {text}" for word, text in zip(JUDGED, ("agree", "are misprints", "differ"), strict=True)]

@@ -1,7 +1,7 @@
-"""What came of holding a number of the thesis against ours."""
+"""Verdicts on numbers of the thesis, by our own."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import floor, log10
 from typing import TYPE_CHECKING, Any
 
@@ -62,7 +62,7 @@ class Part:
     limit: bool = False
 
     def off(self) -> float:
-        """How far the thesis is from ours, as a share of ours; by its sign more or less, where both are real [-]."""
+        """Difference of the thesis from ours, as a share of ours; by its sign more or less, where both are real [-]."""
         if self.printed is None:
             return 0.0
         if self.limit and self.ours <= self.printed:  # type: ignore[operator]
@@ -73,7 +73,7 @@ class Part:
         return self._distance(printed)
 
     def mended(self) -> float:
-        """How far the corrected value is from ours, as a share of it [-]."""
+        """Distance of the corrected value from ours, as a share of it [-]."""
         return np.inf if self.corrected is None else self._distance(np.asarray(self.corrected))
 
     def _distance(self, other: Numbers) -> float:
@@ -107,22 +107,27 @@ def judged(item: "Item", parts: Sequence[Part]) -> Verdict:
         What was computed.
     """
     wrong = [part for part in parts if not abs(part.off()) <= item.tolerance]
-    copies = [part for part in parts if part.copied]
-    also = f"; transcribed: {len(copies)}" if copies else ""
-    if not wrong and (item.off or any(part.corrected is not None for part in parts)):
+    copies = sum(part.copied for part in parts)
+    found = _explained(item, wrong) if wrong else _agreeing(item, parts, copies)
+    return replace(found, why=f"{found.why}; transcribed: {copies}") if copies and found.word in JUDGED else found
+
+
+def _agreeing(item: "Item", parts: Sequence[Part], copies: int) -> Verdict:
+    if item.off or any(part.corrected is not None for part in parts):
         return Verdict(UNEXPLAINED, "(what is announced as wrong agrees with ours)")
-    if not wrong and copies and not compared(parts):
-        return Verdict(TRANSCRIBED, f"({len(copies)} value{'s' * (len(copies) > 1)}, which nothing else gives)")
-    if not wrong:
-        held = [abs(part.off()) for part in compared(parts) if not part.limit]
-        return Verdict(AGREES, (f"to {digits(max(held))}" if held else "with the limit") + also)
-    wrongly_copied = any(part.copied for part in wrong)
-    if all(part.mended() <= item.tolerance for part in wrong) and item.erratum and not wrongly_copied:
-        return Verdict(MISPRINT, f"(corrected: to {digits(max(part.mended() for part in wrong))}){also}")
-    announced = all(_as_announced(part, item) for part in wrong)
-    if item.because and announced and not wrongly_copied:
+    if copies and not compared(parts):
+        return Verdict(TRANSCRIBED, f"({copies} value{'s' * (copies > 1)}, which nothing else gives)")
+    off = [abs(part.off()) for part in compared(parts) if not part.limit]
+    return Verdict(AGREES, f"to {digits(max(off))}" if off else "with the limit")
+
+
+def _explained(item: "Item", wrong: Sequence[Part]) -> Verdict:
+    mended, copied = [part.mended() for part in wrong], any(part.copied for part in wrong)
+    if all(off <= item.tolerance for off in mended) and item.erratum and not copied:
+        return Verdict(MISPRINT, f"(corrected: to {digits(max(mended))})")
+    if item.because and not copied and all(_as_announced(part, item) for part in wrong):
         worst = max(wrong, key=lambda part: abs(part.off()))
-        return Verdict(DIFFERS, f"({_how_far(worst)}), because {item.because}{also}")
+        return Verdict(DIFFERS, f"({_how_far(worst)}), because {item.because}")
     named = ", ".join(f"{part.name} {share(part.off())}" for part in wrong)
     return Verdict(UNEXPLAINED, f"(off: {named})")
 
@@ -144,7 +149,7 @@ def compared(parts: Sequence[Part]) -> list[Part]:
 
 
 def digits(off: float) -> str:
-    """How many leading digits two numbers have in common, in words.
+    """Number of leading digits that two numbers have in common, in words.
 
     >>> digits(0.04), digits(2e-7), digits(1e-14)
     ('1 digit', '6 digits', '9 digits or more')

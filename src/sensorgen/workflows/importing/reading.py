@@ -16,7 +16,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
 from sensorgen.scene.geometry import cad, mesh_files, surfaces
 from sensorgen.scene.geometry.mesh_files import FileBody
-from sensorgen.scene.geometry.meshes import Mesh
+from sensorgen.scene.geometry.meshes import Mesh, joined
 
 if TYPE_CHECKING:
     import manifold3d
@@ -61,7 +61,7 @@ class ReadBody:
 
     def solid(self) -> "manifold3d.Manifold":
         """All its shells as a solid."""
-        return surfaces.solid(self.shells)
+        return joined(self.shells).solid()
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,1 @@
-"""What is computed for the numbered items of the thesis, by topic: functions that give parts to be judged."""
+"""Checks of the numbered items of the thesis, by topic: functions that give parts to be judged."""

@@ -38,6 +38,16 @@ K = np.sqrt(2 * GAMMA)
 _DEGREE = 16  # of the polynomials: the fields' own are below rounding from 12 on
 
 
+def unpressed_ohm(rho_ohm_m: float = RHO_OHM_M, frequency_hz: ArrayLike = FREQUENCY_HZ) -> Complex:
+    r"""Impedance of the unpressed line in one equation, 2.18 and B.53.
+
+    .. math:: Z = \frac{\sqrt{2} \rho\, (1 + e^{2 \sqrt{2 \Gamma} L})}{H \sqrt{\Gamma} W (-1 + e^{2 \sqrt{2 \Gamma} L})}
+    """
+    gamma = GAMMA * rho_ohm_m / RHO_OHM_M * np.asarray(frequency_hz) / FREQUENCY_HZ
+    e = np.exp(2 * np.sqrt(2 * gamma) * LENGTH_M)
+    return np.asarray(np.sqrt(2) * rho_ohm_m * (1 + e) / (AREA_M2 * np.sqrt(gamma) * (-1 + e)))
+
+
 class Smooth:
     """A field along the line, and its derivatives."""
 
@@ -48,7 +58,7 @@ class Smooth:
         self._terms: NDArray[Any] = np.linalg.solve(chebyshev.chebvander(places, _DEGREE), values)
 
     def at(self, x_m: ArrayLike, order: int = 0) -> Complex:
-        """Its value, or a derivative of it, per metre to the power of the order."""
+        """Value of the field, or a derivative of it, per metre to the power of the order."""
         terms = chebyshev.chebder(self._terms, order) * (2 / LENGTH_M) ** order
         return np.asarray(chebyshev.chebval(2 * np.asarray(x_m) / LENGTH_M - 1, terms))
 

@@ -6,5 +6,5 @@ from sensorgen.verification.thesis.items import chapter
 
 
 def table(number: str) -> dict[str, Any]:
-    """What a table of the thesis prints, as the chapters keep it."""
+    """Values of a table of the thesis, as the chapters keep it."""
     return next(item.given for item in chapter(number.partition(".")[0]).tables if item.number == number)

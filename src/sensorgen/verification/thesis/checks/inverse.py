@@ -3,15 +3,13 @@
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
-from sensorgen.models import compression, line_fit
+from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
 from sensorgen.verification.thesis.checks._text import table
 from sensorgen.verification.thesis.verdicts import Part
-
-Real = NDArray[np.float64]
 
 _LOW_HZ, _TONE_HZ = 1.1e3, 99.7e3
 _MISSED_OHM = 2.0
@@ -34,7 +32,13 @@ _C0_F, _CF_F_PER_N = 140e-12, 0.5e-12
 def _readings() -> tuple[Real, Real, Real, Real]:
     """Force, position, C and R of every press [N], [m], [F], [ohm]."""
     force, x = (a.ravel() for a in np.meshgrid(_FORCES_N, _PLACES_M))
-    return force, x, *line_fit.series(_TONE_HZ, _SENSOR.impedance(_TONE_HZ, force, x))
+    z = _SENSOR.impedance(_TONE_HZ, force, x)
+    return force, x, _capacitance_f(_TONE_HZ, z), z.real
+
+
+def _capacitance_f(tone_hz: float, z: Complex) -> Real:
+    """Of a reading, taken as a resistor in series with a capacitor [F]."""
+    return np.asarray(-1 / (2 * np.pi * tone_hz * z.imag))
 
 
 def _least_squares(columns: list[Real], wanted: Real) -> Real:
@@ -46,8 +50,8 @@ def _least_squares(columns: list[Real], wanted: Real) -> Real:
 def _straight(tone_hz: float) -> tuple[Real, Real, float]:
     """Rise of C over rest of all presses, that by C.1, and the slope C_F of C.1 [F], [F], [F/N]."""
     force, x, _, _ = _readings()
-    c, _ = line_fit.series(tone_hz, _SENSOR.impedance(tone_hz, force, x))
-    rest, _ = line_fit.series(tone_hz, _SENSOR.impedance(tone_hz, 0.0, _LENGTH_M / 2))
+    c = _capacitance_f(tone_hz, _SENSOR.impedance(tone_hz, force, x))
+    rest = _capacitance_f(tone_hz, _SENSOR.impedance(tone_hz, 0.0, _LENGTH_M / 2))
     straight = _least_squares([np.ones_like(force), force], c)
     return c - rest, straight - rest, float(np.ptp(straight) / np.ptp(force))
 
@@ -79,13 +83,14 @@ def resistance() -> list[Part]:
 
 def cost() -> list[Part]:
     """C.3: readings that miss C.2 by a known amount, which bends with the force and so no fit can follow."""
-    force, x, c, r = _polynomial()
+    force, x, _, r = _polynomial()
     bent = 3 * (force - force.mean()) ** 2
     bent -= bent.mean()
     missed = _MISSED_OHM * bent / np.sqrt(np.mean(bent**2))
-    fit = line_fit.fit(force, x, c, r + missed, form="printed")
+    fitted = _least_squares([np.ones_like(force), force, x * x, x, force * x], r + missed)
+    left = np.sqrt(np.mean((fitted - r - missed) ** 2))
     outside = np.sqrt(np.sum(missed) ** 2 / len(missed))
-    return [Part("what is left of R", "ohm", fit.residual_ohm, float(outside), _MISSED_OHM)]
+    return [Part("what is left of R", "ohm", float(left), float(outside), _MISSED_OHM)]
 
 
 def _polynomial() -> tuple[Real, Real, Real, Real]:
@@ -95,16 +100,15 @@ def _polynomial() -> tuple[Real, Real, Real, Real]:
 
 
 def position() -> list[Part]:
-    """C.5, on presses whose resistance is that polynomial."""
-    f, x, c, r = _polynomial()
-    fit = line_fit.fit(f, x, c, r, form="printed")
-    roots = fit.presses(c, r).position_m
-    ours = np.take_along_axis(roots, abs(roots - x[:, None]).argmin(1)[:, None], 1)[:, 0]
+    """C.5, on presses whose resistance is that polynomial; printed without the measured one, and with -(D + EF)^2."""
+    _, x, c, r = _polynomial()
+    f = (c - _C0_F) / _CF_F_PER_N
     linear = _D + _E * f
+    printed = (-linear - np.sqrt(-(linear**2) - 4 * _B * (_R0 + _A * f))) / (2 * _B)
     under = linear**2 - 4 * _B * (_R0 + _A * f - r)
     both = np.stack([(-linear + sign * np.sqrt(under)) / (2 * _B) for sign in (1, -1)], -1)
     corrected = np.take_along_axis(both, abs(both - x[:, None]).argmin(1)[:, None], 1)[:, 0]
-    return [Part("x", "m", ours, fit.printed_position_m(c), corrected)]
+    return [Part("x", "m", x, printed, corrected)]
 
 
 def weights(w_fit: list[float]) -> list[Part]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.units import EPS0_F_PER_M
-from sensorgen.models import line, line_closed
+from sensorgen.models import line
 from sensorgen.verification.thesis.checks import _field
 from sensorgen.verification.thesis.checks._field import EPS_R, FILM_M, GAMMA, INPUT_V, LENGTH_M, LINE, OMEGA, TRACKS
 from sensorgen.verification.thesis.verdicts import Part
@@ -41,7 +41,7 @@ def _rise(field: Callable[[NDArray[np.float64]], NDArray[np.complex128]]) -> NDA
 
 
 def _in_time(phasor: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """What a phasor is an eighth of a period later."""
+    """Value of a phasor an eighth of a period later."""
     return np.real(phasor * np.exp(1j * np.pi / 4))
 
 
@@ -133,5 +133,5 @@ def return_current() -> list[Part]:
     rho = _field.RHO_OHM_M
     apart = {"top_resistivity_ohm_m": 0.5 * rho, "bottom_resistivity_ohm_m": 1.5 * rho}
     ours = line.impedance(line.PressedLine(length_m=LENGTH_M, **TRACKS | apart))
-    printed = line_closed.uniform(line.PressedLine(length_m=LENGTH_M, **TRACKS))
+    printed = _field.unpressed_ohm()
     return [Part("Re Z", "ohm", np.real(ours), np.real(printed)), Part("Im Z", "ohm", np.imag(ours), np.imag(printed))]

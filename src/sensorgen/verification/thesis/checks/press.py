@@ -48,7 +48,7 @@ def _pressed(
 
 
 def _top(name: str, moved: compressed.CompressionResult, thesis_mm: float) -> Part:
-    """How far the top of a cell moves, against what the thesis has."""
+    """Displacement of the top of a cell, against that of the thesis."""
     ours = float(moved.displacement_um[-1]) * _M_PER_UM
     return Part(name, "m", ours, thesis_mm * M_PER_MM, shown=_SHOWN)
 

@@ -1,12 +1,15 @@
 """The line and its lumped readings, at rest and pressed: 2.24, 2.25, B.49 to B.51, B.54, 5.1, circuits of chapter 2."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sensorgen.core.units import EPS0_F_PER_M
-from sensorgen.models import compression, line, line_abcd, line_closed, line_fit, line_ladder
+from sensorgen.models import compression, line
 from sensorgen.models.sensor import Sensor
+from sensorgen.solvers.line.inputs import read
 from sensorgen.verification.thesis.checks import _field
 from sensorgen.verification.thesis.checks._field import (
     CAPACITANCE_F_PER_M,
@@ -22,8 +25,11 @@ _FORCE_N, _PATCH_M, _LEFT_M, _MODULUS_PA = 3.0, 0.01, 0.045, 6e6  # Table 3.1; t
 _S_PER_N = 0.02  # a piezoresistance that shows; no source gives one
 _TONES_HZ = np.array([1.1e3, 99.7e3])
 _CELLS = 2000  # of a ladder: its error is below 1e-6 then
+_BEFORE = 0.5  # share of a cell's capacitance before its resistor
 _LEAST_HZ, _MOST_HZ = 1e5, 2e6
 _GAUSS = 24  # points of a quadrature
+
+Matrix = NDArray[np.complex128]
 
 _TRACKS: dict[str, Any] = {**_field.TRACKS, "length_m": LENGTH_M}
 _PRESS = {"force_n": _FORCE_N, "modulus_pa": _MODULUS_PA, "tip_m": _PATCH_M, "left_m": _LEFT_M}
@@ -65,11 +71,12 @@ def corner() -> list[Part]:
         LENGTH_M, WIDTH_M, (HEIGHT_M,) * 2, (RHO_OHM_M,) * 2, CAPACITANCE_F_PER_M, compression.unconfined(_MODULUS_PA)
     )
     alike = float(np.exp(brentq(apart, np.log(_LEAST_HZ), np.log(_MOST_HZ), xtol=1e-14)))
-    capacitance, resistance = line_fit.series(_TONES_HZ[0], _z(frequency_hz=_TONES_HZ[0]))
+    lowest = _z(frequency_hz=_TONES_HZ[0])
+    by_lowest = -_TONES_HZ[0] * lowest.imag / lowest.real  # 1/(2 pi R C) of its R and C
     return [
         Part("1/(2 pi R C), R of both tracks", "Hz", sensor.corner_frequency_hz(),
              1 / (2 * np.pi * _RESISTANCE_OHM * _CAPACITANCE_F)),
-        Part("where R and |X| of the line are alike", "Hz", alike, float(1 / (2 * np.pi * resistance * capacitance))),
+        Part("where R and |X| of the line are alike", "Hz", alike, float(by_lowest)),
     ]  # fmt: skip
 
 
@@ -95,24 +102,48 @@ def piezoresistive() -> list[Part]:
     """B.50: a line that is pressed all along, of a rigid film, is one of more resistivity."""
     stiff = {"modulus_pa": 1e30, "tip_m": LENGTH_M, "force_n": _FORCE_N, "frequency_hz": _TONES_HZ}
     ours = _z(**stiff, top_piezoresistance_per_n=_S_PER_N, bottom_piezoresistance_per_n=_S_PER_N)
-    more = dict.fromkeys(("top_resistivity_ohm_m", "bottom_resistivity_ohm_m"), RHO_OHM_M * (1 + _S_PER_N * _FORCE_N))
-    return _both("Z", ours, line_closed.uniform(line.PressedLine(**_TRACKS | more | {"frequency_hz": _TONES_HZ})))
+    return _both("Z", ours, _field.unpressed_ohm(RHO_OHM_M * (1 + _S_PER_N * _FORCE_N), _TONES_HZ))
 
 
 def three_sections() -> list[Part]:
     """B.51: product of the three sections' matrices as in B.44 to B.47; and as textbooks have it."""
-    given = line.PressedLine(**_TRACKS | _PRESS | {"frequency_hz": _TONES_HZ})
-    ours = line.impedance(given)
-    return [
-        *_both("Z", ours, line_closed.impedance(given)),
-        *_both("Z by cosh and sinh", ours, line_abcd.impedance(given)),
-    ]
+    ours = [complex(line.impedance(_under_tip(tone))) for tone in _TONES_HZ]
+    printed, textbook = ([_product(tone, of) for tone in _TONES_HZ] for of in (_by_exponentials, _by_functions))
+    return [*_both("Z", ours, printed), *_both("Z by cosh and sinh", ours, textbook)]
+
+
+def _under_tip(tone_hz: float) -> line.PressedLine:
+    return line.PressedLine(**_TRACKS | _PRESS | {"frequency_hz": tone_hz})
+
+
+def _product(tone_hz: float, matrix: Callable[[complex, complex], Matrix]) -> complex:
+    """-A22/A21 of the product of the sections' matrices, each by its gamma l and characteristic impedance."""
+    whole = np.eye(2, dtype=complex)
+    for r, y, length in zip(*read(_under_tip(tone_hz)).sections(), strict=True):
+        whole = matrix(complex(np.sqrt(r * y) * length), complex(np.sqrt(r / y))) @ whole
+    return complex(-whole[1, 1] / whole[1, 0])
+
+
+def _by_exponentials(z: complex, zc: complex) -> Matrix:
+    """B.44 to B.47."""
+    e = np.exp(z)
+    same, other = (1 + e**2) / (2 * e), -(e**2 - 1) / (2 * e)
+    return np.array([[same, other * zc], [other / zc, same]])
+
+
+def _by_functions(z: complex, zc: complex) -> Matrix:
+    return np.array([[np.cosh(z), -np.sinh(z) * zc], [-np.sinh(z) / zc, np.cosh(z)]])
 
 
 def ladder() -> list[Part]:
     """2.3, 2.4, B.4, B.5: a chain of resistors and capacitors, each cell's capacitance halved between its ends."""
-    given = line.PressedLine(**_TRACKS | _PRESS | {"frequency_hz": _TONES_HZ[1]})
-    return _both("Z", line.impedance(given), line_ladder.impedance(given, _CELLS))
+    given, admittance = _under_tip(_TONES_HZ[1]), 0j
+    for r, y, length in reversed(list(zip(*read(given).sections(), strict=True))):
+        ohm, half = complex(r * length / _CELLS), complex(y * length / _CELLS) * _BEFORE
+        for _ in range(_CELLS):
+            admittance += complex(y * length / _CELLS) - half
+            admittance = admittance / (1 + ohm * admittance) + half
+    return _both("Z", line.impedance(given), 1 / admittance)
 
 
 def cog_resistance() -> list[Part]:

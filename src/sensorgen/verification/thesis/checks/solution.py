@@ -180,6 +180,4 @@ def no_output() -> list[Part]:
 
 def whole() -> list[Part]:
     """2.18, B.53."""
-    e = np.exp(2 * K * LENGTH_M)
-    printed = np.sqrt(2) * RHO_OHM_M * (1 + e) / (HW * _ROOT * (-1 + e))
-    return _parts("Z", "ohm", LINE.impedance_ohm, printed)
+    return _parts("Z", "ohm", LINE.impedance_ohm, _field.unpressed_ohm())

@@ -110,7 +110,7 @@ def _gain() -> float:
 
 
 def _kept(dh_mm: float) -> float:
-    """How many times the dielectric's term grows, as thesis_cells keeps it [-]."""
+    """Growth of the dielectric's term, as thesis_cells keeps it [-]."""
     rest = thesis_cells.strips_f_per_m2(_CELL, EPS_R)
     pressed, free = (thesis_cells.bulging_f_per_m2(_CELL, EPS_R, dh) - rest for dh in (dh_mm, 0.0))
     return pressed / free - 1

@@ -40,7 +40,7 @@ def _prints() -> list[Reading]:
 
 
 def _named(material: str, quantity: str) -> tuple[str, str]:
-    """What a quantity of a material is called, and its unit."""
+    """Name of a quantity of a material, and its unit."""
     ending = next((end for end in _UNITS if quantity.endswith(end)), "")
     return f"{material}: {quantity.removesuffix(ending).replace('_', ' ')}", _UNITS.get(ending, "")
 

@@ -45,7 +45,7 @@ _GAUSS = 24  # points of a quadrature
 
 @dataclass(frozen=True)
 class _Region:
-    """What lies under one flank of a hanging triangle: alpha and beta [m] as printed, and whether X60 hangs there."""
+    """Region under one flank of a hanging triangle: alpha and beta [m] as printed, and whether X60 hangs there."""
 
     alpha: float
     beta_m: float

@@ -1,0 +1,104 @@
+"""Stated errors of the rise of the capacitance under pressure, against finer meshes: writes results/rise_errors.md.
+
+``python bench/rise_errors.py reference [PART]`` solves the scenes of ``SCENES`` on two fine meshes, half an hour, and
+writes tests/reference/rise.json with the scenes themselves; without an argument the default mesh is compared with it.
+"""
+
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from sensorgen.design.design import make
+from sensorgen.design.tip import Tip
+from sensorgen.models import press2d
+from sensorgen.prediction.bodies import estimated
+from sensorgen.prediction.compression_law import case_of
+from sensorgen.prediction.mesh_ladder import drawn
+from sensorgen.prediction.sensor_model import piece
+
+FILE = Path(__file__).parents[1] / "tests" / "reference" / "rise.json"
+PRESSURE_KPA = (10.0, 30.0, 60.0, 100.0)
+FINE = {False: (0.5, 0.35), True: (0.35, 0.25)}  # sizes over the default mesh's, of drawn and printed cells
+_THIN = {"period_mm": 5.0, "hang_height_mm": 0.42, "lower_height_mm": 0.12, "dielectric_mm": 0.12, "electrode_mm": 0.12}
+_WIDE = _THIN | {"period_mm": 6.25, "lower_height_mm": 0.06}
+_MEDIUM = {"period_mm": 3.2, "hang_height_mm": 0.4, "lower_height_mm": 0.18, "dielectric_mm": 0.15, "electrode_mm": 0.2}
+_SMALL = {"period_mm": 1.2, "hang_height_mm": 0.4, "lower_height_mm": 0.2, "dielectric_mm": 0.05}
+SCENES = (  # parameters, quality, walls ("": as drawn), top
+    ({"dielectric_mm": 0.1}, "fine", "", "even"),
+    ({"dielectric_mm": 0.1}, "fine", "", "ninjaflex"),
+    ({"dielectric_mm": 0.2}, "fine", "", "even"),
+    ({"dielectric_mm": 0.2}, "fine", "", "stiff"),
+    ({"dielectric_mm": 0.4}, "fine", "", "ninjaflex"),
+    ({"dielectric_mm": 0.1, "period_mm": 4.0}, "fine", "", "stiff"),
+    (_SMALL, "fine", "", "even"),
+    (_THIN, "extrafine", "", "even"),
+    (_THIN, "extrafine", "", "stiff"),
+    (_THIN, "extrafine", "", "ninjaflex"),
+    (_MEDIUM, "fine", "", "ninjaflex"),
+    (_WIDE, "extrafine", "", "stiff"),
+    ({"dielectric_mm": 0.1}, "fine", "arachne", "even"),
+    ({"dielectric_mm": 0.1}, "fine", "arachne", "stiff"),
+    ({"dielectric_mm": 0.1}, "fine", "arachne", "ninjaflex"),
+    ({"dielectric_mm": 0.2}, "fine", "arachne", "even"),
+    ({"dielectric_mm": 0.2}, "fine", "arachne", "ninjaflex"),
+    ({"dielectric_mm": 0.1}, "fine", "classic", "even"),
+    ({"dielectric_mm": 0.3}, "fine", "classic", "stiff"),
+    ({"dielectric_mm": 0.2}, "extrafine", "arachne", "even"),
+    ({"dielectric_mm": 0.1, "period_mm": 4.0}, "fine", "arachne", "ninjaflex"),
+    (_THIN, "extrafine", "arachne", "even"),
+    (_THIN, "extrafine", "arachne", "stiff"),
+    (_THIN, "extrafine", "arachne", "ninjaflex"),
+    (_WIDE, "extrafine", "arachne", "stiff"),
+    (_MEDIUM | {"lower_height_mm": 0.2, "dielectric_mm": 0.2}, "fine", "arachne", "ninjaflex"),
+)  # fmt: skip
+
+
+def case(parameters, quality, walls, top):
+    """A scene under a top."""
+    design = make({"shape": "tri", "quality": quality, "parameters": parameters})
+    pressed = piece(estimated(design, walls)) if walls else drawn(design)
+    return case_of(design, pressed, "press2d", Tip(block=top))
+
+
+def rises(found):
+    """Of the capacitance per area [nF/m2]; None where unknown."""
+    known = [c.middle() if c else np.nan for c in found.capacitance_f_per_m2]
+    values = [round(1e9 * (c - known[0]), 6) for c in known[1:]]
+    return [None if np.isnan(v) else v for v in values] + [None] * (len(PRESSURE_KPA) - len(values))
+
+
+def reference(scene):
+    """A scene with what two fine meshes say."""
+    one = case(*scene)
+    cell = press2d.cell(one.piece.scene, one.piece.period_mm)
+    loads = [0.0, *(1e3 * p for p in PRESSURE_KPA)]
+    known = {}
+    for size in FINE[bool(scene[2])]:
+        try:
+            mesh = press2d.Fineness().scaled(size)
+            known[size] = rises(press2d.press(cell, one.solids, loads, one.permittivity, one.boundary, mesh))
+        except Exception as error:  # a fine mesh that fails leaves the coarser of the two
+            known[size] = str(error)
+    print(scene, known, flush=True)
+    parameters, quality, walls, top = scene
+    return {
+        "parameters": parameters, "quality": quality, "walls": walls, "top": top,
+        "scene": asdict(one.piece.scene) | {"period_mm": one.piece.period_mm},
+        "rise_nf_per_m2": {str(size): values for size, values in known.items()},
+    }  # fmt: skip
+
+
+def main():
+    part = int(sys.argv[2]) if len(sys.argv) > 2 else None
+    chosen = SCENES[part::2] if part is not None else SCENES
+    for k, scene in enumerate(chosen):
+        Path(f"/tmp/b/rise{part}-{k}.json").write_text(json.dumps(reference(scene)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,123 @@
+"""A log on a full or read-only file system is read like any other; what cannot be logged is said."""
+
+import os
+import resource
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from sensorgen.measure.log import Log, Reading
+
+NOBODY = 65534
+COMMANDS = ("list", "verify")
+
+
+def reading(number):
+    return Reading(uid=str(number), specimen=f"S{number}", written=f"S{number}", y_ohm=(680.0,))
+
+
+@pytest.fixture
+def path(tmp_path):
+    path = tmp_path / "log.db"
+    with Log(path, create=True) as log:
+        log.add([reading(number) for number in range(3)])
+    return path
+
+
+def full():
+    """No file may grow, as on a full disk."""
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+
+
+def sensorgen(*words, **how):
+    # a pipe: the limit of files does not concern it
+    return subprocess.run(
+        [sys.executable, "-m", "sensorgen", *words], capture_output=True, encoding="utf-8", check=False, **how
+    )
+
+
+@pytest.mark.parametrize("unmerged", [False, True], ids=["checkpointed", "rows in the write-ahead log"])
+def test_a_full_disk_lets_read_and_says_what_is_not_logged(path, unmerged):
+    if unmerged:  # as a killed program leaves it: the last row is in the write-ahead log alone
+        copy = path.parent / "copy"
+        copy.mkdir()
+        with Log(path) as log:
+            log._connection.execute("PRAGMA wal_autocheckpoint = 0")
+            reader = sqlite3.connect(path)
+            reader.execute("BEGIN")
+            reader.execute("SELECT count(*) FROM record").fetchone()
+            log.add([reading(7)])
+            for end in ("", "-wal"):
+                shutil.copy(f"{path}{end}", copy)
+            reader.close()
+        path = copy / "log.db"
+        with closing(sqlite3.connect(f"{path.as_uri()}?immutable=1", uri=True)) as without:
+            assert without.execute("SELECT count(*) FROM record WHERE specimen = 'S7'").fetchone() == (0,)
+    expected = ["S0", "S1", "S2", *(["S7"] if unmerged else [])]
+    for command in COMMANDS:
+        done = sensorgen("log", command, "--log", str(path), preexec_fn=full)
+        assert (done.returncode, done.stderr) == (0, ""), done
+        if command == "list":
+            assert [name for name in (*expected, "S8") if name in done.stdout] == expected
+    done = sensorgen("log", "add", "23 triX", "--y", "680", "--log", str(path), preexec_fn=full)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "nothing was logged" in done.stderr, done.stderr
+
+
+@pytest.mark.skipif(os.name == "nt" or os.getuid() != 0, reason="only root can mount, and become another user")
+def test_a_small_file_system_that_is_full(path):
+    """A real one of 300 kB."""
+    script = (
+        'mount -t tmpfs -o size=300k none "$1" && cp "$2" "$1/log.db" && { cat /dev/zero > "$1/fill" 2>/dev/null; '
+        '"$3" -m sensorgen log list --log "$1/log.db" && "$3" -m sensorgen log verify --log "$1/log.db"; }'
+    )
+    place = path.parent / "small"
+    place.mkdir()
+    words = ["unshare", "-m", "sh", "-c", script, "sh", str(place), str(path), sys.executable]
+    done = subprocess.run(words, capture_output=True, encoding="utf-8", check=False)
+    if "unshare" in done.stderr or "mount:" in done.stderr:
+        pytest.skip(done.stderr)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "S2" in done.stdout
+
+
+@pytest.mark.skipif(os.name == "nt" or os.getuid() != 0, reason="only root can become another user")
+def test_a_folder_that_another_user_may_only_read(path):
+    """In a process that has given up being root, since permissions do not bind root."""
+    for folder in (path.parent, *path.parent.parents[:3]):
+        if folder != Path("/tmp"):
+            folder.chmod(0o755)
+    path.chmod(0o644)
+    child = os.fork()
+    if not child:
+        code = 1
+        try:
+            os.setresgid(NOBODY, NOBODY, NOBODY)
+            os.setresuid(NOBODY, NOBODY, NOBODY)
+            with Log(path) as log:
+                rows = [row.specimen for row in log.readings()]
+                try:
+                    log.add([reading(9)])
+                except Exception as error:
+                    code = 0 if rows == ["S0", "S1", "S2"] and "nothing was logged" in str(error) else 2
+        finally:
+            os._exit(code)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    assert sorted(each.name for each in path.parent.glob("log*")) == ["log.db"]
+    with closing(sqlite3.connect(path)) as connection:
+        assert connection.execute("SELECT count(*) FROM record").fetchone()[0] >= 3
+
+
+def test_a_log_that_was_removed_takes_no_row_in_silence(path):
+    with Log(path) as log:
+        path.unlink()
+        with pytest.raises(Exception, match=r"was removed or replaced meanwhile; nothing was logged"):
+            log.add([reading(9)])
