@@ -36,7 +36,7 @@ def sensorgen(*words: str, folder: str = ".") -> str:
         "COLUMNS": "100",
         "TERMINAL_WIDTH": "100",
         "PYTHONIOENCODING": "utf-8",
-        "PATH": "",
+        "PATH": os.environ.get("PATH", ""),  # the first screen is of a real slice
         "SENSORGEN_BUDGET": "0",
         "SENSORGEN_CACHE": str(Path(tempfile.gettempdir()) / "sensorgen-docs"),  # without advice of other builds
     }

@@ -292,7 +292,7 @@ def _adapter() -> "TypeAdapter[SliceReport]":
 def in_folder(design: Design, folder: Path | None = None) -> PrintFile | None:
     """The sliced file of this very design in a folder, ``out/NAME`` if not given; its record is beside it."""
     folder = folder or OUT / design.name
-    for note in sorted(folder.glob("*.gcode.json")) if folder.is_dir() else ():
+    for note in sorted(folder.glob("*.gcode.json")) if os.path.isdir(folder) else ():  # noqa: PTH112 - a name too long
         try:
             content = note.with_suffix("").read_bytes()
             report = _adapter().validate_json(note.read_bytes())

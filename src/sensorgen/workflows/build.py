@@ -14,7 +14,7 @@ from sensorgen.checks.review import Step, draw, report
 from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.document import Part
-from sensorgen.core.errors import Unprintable, Unwritable
+from sensorgen.core.errors import Unprintable
 from sensorgen.core.findings import Finding, headline, listed, most_severe
 from sensorgen.core.version import __version__
 from sensorgen.design import printer
@@ -164,13 +164,12 @@ def build(
         See there; nothing was written.
     """
     folder = out / design.name
-    if file := next((place for place in (out, folder) if place.is_file()), None):
-        raise Unwritable(f"{file} is a file; expected a folder: name another with --out, or remove the file")
     with ExitStack() as stack:
         held = reviewed(design, step, folder=folder)
         if held.errors(strict) and not force:
             raise Unprintable(held.findings, held.errors(strict))
         held = held.with_meshes(design)
+        stage = stack.enter_context(store.staging(folder))
         step("prediction")
         predicted = evaluate(bodies.of_file(design, held.file))
         made = decision.decision(design, held, budget_s, step=step)
@@ -179,7 +178,7 @@ def build(
             made.trial, made.advice, held.source,
         )  # fmt: skip
         decided(built)
-        stage, job = stack.enter_context(store.staging(folder)), None
+        job = None
         if cad:
             from sensorgen.scene.geometry.cad import CadProcess
 
