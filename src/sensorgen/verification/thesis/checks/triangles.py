@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design.shapes import tri
-from sensorgen.models import columns, fem2d, thesis_cells, thesis_swept
+from sensorgen.models import columns, fem2d, thesis_cells
 from sensorgen.scene.sections import sections
 from sensorgen.scene.unit_cell import cell
 from sensorgen.solvers.electrostatics.mesh import Cones
@@ -219,7 +219,7 @@ def swept(rise_f: float, deepest_mm: float, depth_mm: float) -> list[Part]:
     """Figure 6.7: displacement for a rise of C, by the field on the geometry that 3.1.2 makes."""
 
     def c_f(press_mm: float) -> float:
-        now = thesis_swept.swept(_CELL, press_mm)
+        now = thesis_cells.swept(_CELL, press_mm)
         made = designs.make({"shape": "tri", "parameters": asdict(replace(now, length_mm=now.period_mm, width_mm=1.0))})
         return fem2d.capacitance(made.in_use, PERMITTIVITY).upper * depth_mm
 
