@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import MissingValue
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
@@ -19,8 +19,6 @@ from sensorgen.models.press2d import Elastic, Fineness
 from sensorgen.scene.scene import Fill, Scene
 from sensorgen.solvers.contact import mesher
 from sensorgen.verification.chart.measured import Ladder, Level, Point, climbed, relative
-
-Real = NDArray[np.float64]
 
 _EPS = {"x60": 4.68, "air": 1.00059}
 SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design.shapes import tri
@@ -26,8 +26,6 @@ from sensorgen.verification.thesis.checks._columns import (
 )
 from sensorgen.verification.thesis.checks._field import OMEGA
 from sensorgen.verification.thesis.verdicts import Part
-
-Real = NDArray[np.float64]
 
 _CELL = tri.Params(dielectric_mm=FILM_MM)
 _DESIGN = designs.make({"shape": "tri", "parameters": {"dielectric_mm": FILM_MM}})
