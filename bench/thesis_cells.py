@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sensorgen.design.shapes import rect, tri
-from sensorgen.models import fem2d, fem3d, thesis_cells, thesis_swept
+from sensorgen.models import fem2d, fem3d, thesis_cells
 from sensorgen.scene.scene import Fill
 
 HERE = Path(__file__).parent
@@ -80,7 +80,7 @@ def pressed_strips(film_mm: float) -> dict[str, list[float]]:
     p, eps = rect.Params(dielectric_mm=film_mm), EPS["x60"]
     laws = {name: law for name, law in thesis_cells.NAMED.items() if law.pressed and "rect" in law.shapes}
     return {
-        "field, 3.1.2": [strips_field(thesis_swept.swept(p, press)) for press in PRESSES_MM],
+        "field, 3.1.2": [strips_field(thesis_cells.swept(p, press)) for press in PRESSES_MM],
         "field, 3.50": [strips_field(thinner(p, press)) for press in PRESSES_MM],
         **{name: [law.value_f_per_m2(p, eps, press) for press in PRESSES_MM] for name, law in laws.items()},
     }
@@ -106,11 +106,11 @@ def pressed_triangles(film_mm: float) -> dict[str, list[float]]:
     p, known = tri.Params(dielectric_mm=film_mm), CONTACT[f"tri_d{film_mm}"]
     down = [um * 1e-3 for um in known["uy_um"]]
     law = thesis_cells.NAMED["thesis-3.35-swept"]
-    swept = [thesis_swept.swept(p, press) for press in down]
+    swept = [thesis_cells.swept(p, press) for press in down]
     return {
         "press [mm]": down,
         "solved": [c * 1e-12 / 2e-3 for c in known["C_pF_per_m"]],
-        "thesis-3.1.2": [triangles_field(q) * thesis_swept.stretch(p, q) for q in swept],
+        "thesis-3.1.2": [triangles_field(q) * thesis_cells.stretch(p, q) for q in swept],
         "thesis-3.35-swept": [law.value_f_per_m2(p, EPS["x60"], press) for press in down],
     }
 

@@ -462,9 +462,9 @@ def test_what_is_known_of_presses(monkeypatch):
     assert down["compression: unconfined"].error == pytest.approx(1 - 0.6e-3 * 1e4 / 6e6 / 6.1323e-6, abs=1e-4)
     assert down["compression: bonded"].error > 0.99
     assert down["springs"].error > 1
-    assert rise["thesis_swept: field"].error == pytest.approx(0.818, abs=0.002)
-    assert rise["thesis_swept: formula 3.35"].error == pytest.approx(0.780, abs=0.002)
-    assert "off by -" in rise["thesis_swept: field"].said
+    assert rise["thesis_cells: 3.1.2, field"].error == pytest.approx(0.818, abs=0.002)
+    assert rise["thesis_cells: 3.1.2, formula 3.35"].error == pytest.approx(0.780, abs=0.002)
+    assert "off by -" in rise["thesis_cells: 3.1.2, field"].said
 
 
 def test_the_worst_load_of_a_press_counts():
@@ -482,7 +482,7 @@ def test_without_the_mesher_cheap_laws_are_left(monkeypatch):
     plates = {"compression: unconfined", "compression: bonded"}
     assert found == {
         "top down": plates | {"springs"},
-        "rise of C": plates | {"thesis_swept: formula 3.35", "thesis_swept: field"},
+        "rise of C": plates | {"thesis_cells: 3.1.2, formula 3.35", "thesis_cells: 3.1.2, field"},
     }
 
 

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.shapes import rect, tri
-from sensorgen.models import columns, fem2d, fem3d, thesis_cells, thesis_swept
+from sensorgen.models import columns, fem2d, fem3d, thesis_cells
 from sensorgen.scene.scene import Fill
 
 CONTACT = json.loads((Path(__file__).parents[1] / "reference" / "contact.json").read_text("utf-8"))
@@ -96,29 +96,29 @@ def test_bulging_vanishes_at_rest_when_corrected():
 
 def test_a_turned_cell_keeps_the_flank_the_film_and_the_lower_triangle():
     p = tri.Params(dielectric_mm=0.1)
-    q = thesis_swept.turned(p, 0.05)
+    q = thesis_cells.turned(p, 0.05)
     flank = [(v.period_mm / 4) ** 2 + v.hang_height_mm**2 for v in (p, q)]
     assert flank[0] == close(flank[1], 1e-12)
     assert p.period_mm * p.dielectric_mm == close(q.period_mm * q.dielectric_mm, 1e-12)
     assert p.period_mm * p.lower_height_mm == close(q.period_mm * q.lower_height_mm, 1e-12)
     assert q.hang_height_mm - q.lower_height_mm < p.hang_height_mm - p.lower_height_mm
-    assert thesis_swept.turned(p, 0.0).period_mm == close(p.period_mm, 1e-12)
+    assert thesis_cells.turned(p, 0.0).period_mm == close(p.period_mm, 1e-12)
 
 
 @pytest.mark.parametrize("press_mm", [1e-6, 0.03, 0.2])
 @pytest.mark.parametrize("sizes", [{}, {"hang_height_mm": 1.5, "period_mm": 1.3}, {"lower_height_mm": 0.02}])
 def test_triangles_are_turned_until_the_top_has_come_down(press_mm, sizes):
     p = tri.Params(**sizes)
-    q = thesis_swept.swept(p, press_mm)
+    q = thesis_cells.swept(p, press_mm)
     assert p.hang_height_mm + p.dielectric_mm - q.hang_height_mm - q.dielectric_mm == close(press_mm, 1e-7)
     assert (p.period_mm / 4) ** 2 + p.hang_height_mm**2 == close((q.period_mm / 4) ** 2 + q.hang_height_mm**2, 1e-12)
-    assert thesis_swept.stretch(p, q) == close(q.period_mm / p.period_mm, 1e-12)
+    assert thesis_cells.stretch(p, q) == close(q.period_mm / p.period_mm, 1e-12)
 
 
 @pytest.mark.parametrize("sizes", [{}, {"etpu_width_mm": 0.4, "air_width_mm": 0.5, "upper_height_mm": 0.1}])
 def test_strips_keep_their_volume_and_air_alone_leaves(sizes):
     p = rect.Params(**sizes)
-    q = thesis_swept.swept(p, 0.05)
+    q = thesis_cells.swept(p, 0.05)
 
     def height(v):
         return v.upper_height_mm + v.lower_height_mm
@@ -129,7 +129,7 @@ def test_strips_keep_their_volume_and_air_alone_leaves(sizes):
             assert getattr(p, width) * getattr(p, layer) == close(getattr(q, width) * getattr(q, layer), 1e-12)
     assert (q.period_mm, q.dielectric_mm) == close((p.period_mm, p.dielectric_mm), 1e-12)
     assert 0 < q.air_width_mm < p.air_width_mm
-    assert thesis_swept.stretch(p, q) == close(1.0, 1e-12)
+    assert thesis_cells.stretch(p, q) == close(1.0, 1e-12)
 
 
 @pytest.mark.parametrize(("film", "of_field", "of_formula"), [(0.1, -77.8, -73.5), (0.2, -70.8, -66.5)])
@@ -138,7 +138,7 @@ def test_the_thesis_misses_how_a_solved_triangular_cell_rises(film, of_field, of
     pytest.importorskip("ngsolve", reason="the extra fem is not installed")
     known, p = CONTACT[f"tri_d{film}"], tri.Params(dielectric_mm=film)
     press = known["uy_um"][-1] * 1e-3
-    field = fem2d.capacitance(_period(thesis_swept.swept(p, press)), EPS, 1e-4).middle() / MM
+    field = fem2d.capacitance(_period(thesis_cells.swept(p, press)), EPS, 1e-4).middle() / MM
     rise = known["dC_pF_per_m"][-1] * 1e-12
     assert 100 * ((field - EXACT["tri", film] * 2 * MM) / rise - 1) == pytest.approx(of_field, abs=0.5)
     law = thesis_cells.NAMED["thesis-3.35-swept"].value_f_per_m2
@@ -156,7 +156,7 @@ def _period(p):
 def test_the_bulge_of_3_55_is_a_fortieth_of_the_rise():
     """Field of strips that keep their volume, 0.05 mm down: rise of 3.55 -97.6 %, of columns on it +4.2 %."""
     p = rect.Params(dielectric_mm=0.1)
-    q = thesis_swept.swept(p, 0.05)
+    q = thesis_cells.swept(p, 0.05)
     field = [fem3d.capacitance(_period(v), EPS, 5e-3).middle() / (2 * MM) ** 2 for v in (p, q)]
     for name, off in (("thesis-3.55", -97.6), ("thesis-3.55-corrected", -97.6), ("thesis-3.49-swept", 4.2)):
         rest, pressed = (thesis_cells.NAMED[name].value_f_per_m2(p, 4.68, press) for press in (0.0, 0.05))
@@ -174,10 +174,10 @@ def test_what_has_no_value_is_refused():
     with pytest.raises(OutOfRange, match="film"):
         thesis_cells.NAMED["thesis-film-only"].value_f_per_m2(p, 4.68)
     with pytest.raises(OutOfRange, match="air"):
-        thesis_swept.turned(tri.Params(), 0.6)
+        thesis_cells.turned(tri.Params(), 0.6)
     for cell, at in ((tri.Params(), "0.379"), (rect.Params(), "0.18")):
         with pytest.raises(OutOfRange, match=f"pressed by 0.5 mm: all air is gone at {at} mm"):
-            thesis_swept.swept(cell, 0.5)
+            thesis_cells.swept(cell, 0.5)
         for press in (-1e-9, float("nan")):
             with pytest.raises(OutOfRange, match="expected 0 or more"):
-                thesis_swept.swept(cell, press)
+                thesis_cells.swept(cell, press)

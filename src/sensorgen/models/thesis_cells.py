@@ -2,21 +2,28 @@
 
 They are kept to be compared with: the planner never takes them. Film and dielectric are taken to be of one material,
 air of permittivity 1, as in the thesis. How far each is off stands in docs/cells.md.
+
+Its geometry of a pressed cell (3.1.2) has no elasticity: air is purged from the gaps, every solid's volume kept. It is
+a model of compression by sizes alone, for use with any capacitance model.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from math import log
-from typing import Any
+from math import asin, atan2, cos, hypot, log, sin
+from typing import Any, TypeVar
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design.shapes import rect, tri
-from sensorgen.models import thesis_swept
 
+GEOMETRY, GEOMETRY_SOURCE = "thesis-3.1.2", "Thesis 3.1.2 and figures 6.7 and 6.10"
 SOURCE = "Thesis 3.2.1 and 3.2.2, Eqs. 3.24, 3.34, 3.35, 3.49 and 3.55"
 COST = 0
+
+_HALVINGS = 60  # of an angle: as far as doubles go
+
+_P = TypeVar("_P", tri.Params, rect.Params)
 
 
 def under_dielectric_f_per_m(p: tri.Params, eps_r: float) -> float:
@@ -172,10 +179,109 @@ def bulging_f_per_m2(p: rect.Params, eps_r: float, press_mm: float = 0.0, printe
     return strips_f_per_m2(p, eps_r) + 8 / 16 * (term(press_mm) - (0.0 if printed else term(0.0)))
 
 
+def swept(p: _P, press_mm: float) -> _P:
+    """Sizes of a compressed cell.
+
+    Parameters
+    ----------
+    p : tri.Params or rect.Params
+        Sizes at rest.
+    press_mm : float
+        Displacement of the top [mm].
+
+    Raises
+    ------
+    OutOfRange
+        No air is left before that.
+    """
+    if not press_mm >= 0:
+        raise OutOfRange(f"pressed by {press_mm:g} mm; expected 0 or more")
+    work: Callable[[Any, float], Any] = _flattened if isinstance(p, tri.Params) else _widened
+    pressed: _P = work(p, press_mm)
+    return pressed
+
+
+def stretch(rest: tri.Params | rect.Params, now: tri.Params | rect.Params) -> float:
+    """Area of a cell over that at rest [-]: the triangular cell's period grows, as the flanks turn."""
+    grown = now.period_mm / rest.period_mm
+    return grown if isinstance(rest, tri.Params) else grown**2
+
+
+def turned(p: tri.Params, turned_rad: float) -> tri.Params:
+    """The triangular design with its flanks turned flatter at constant length, air purged, solids kept.
+
+    Hanging flanks of length r keep it: base r cos, height r sin of their angle. The lower triangles and the film keep
+    their areas per period. Hanging triangles keep theirs at 45 degrees to first order, as r^2 sin(2 phi) / 4 is
+    greatest there. Per period, the sensor has become longer.
+
+    Parameters
+    ----------
+    p : tri.Params
+        Sizes at rest.
+    turned_rad : float
+        By how much the flanks are turned [rad].
+
+    Raises
+    ------
+    OutOfRange
+        The flanks would meet the lower triangles: all air is gone before.
+    """
+    quarter = p.period_mm / 4
+    flank, angle = hypot(quarter, p.hang_height_mm), atan2(p.hang_height_mm, quarter) - turned_rad
+    base = flank * cos(angle)
+    lower, hang = p.lower_height_mm * quarter / base, flank * sin(angle)
+    if not 0 < lower < hang:
+        raise OutOfRange(f"turned by {turned_rad:g} rad: no air is left; expected less")
+    return replace(
+        p,
+        period_mm=4 * base,
+        hang_height_mm=hang,
+        lower_height_mm=lower,
+        dielectric_mm=p.dielectric_mm * quarter / base,
+    )
+
+
+def _flattened(p: tri.Params, press_mm: float) -> tri.Params:
+    """Flanks turned until the top has its displacement."""
+    quarter = p.period_mm / 4
+    flank, angle = hypot(quarter, p.hang_height_mm), atan2(p.hang_height_mm, quarter)
+    rest = p.hang_height_mm + p.dielectric_mm
+
+    def down_mm(now: float) -> float:
+        return rest - flank * sin(now) - p.dielectric_mm * quarter / (flank * cos(now))
+
+    closed = 0.5 * asin(2 * p.lower_height_mm * quarter / flank**2)  # lower triangles as high as hanging ones
+    if press_mm >= down_mm(closed):
+        raise OutOfRange(f"pressed by {press_mm:g} mm: all air is gone at {down_mm(closed):.3g} mm; expected less")
+    low, high = closed, angle
+    for _ in range(_HALVINGS):  # the displacement is monotonic in the angle
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if down_mm(middle) > press_mm else (low, middle)
+    return turned(p, angle - high)
+
+
+def _widened(p: rect.Params, press_mm: float) -> rect.Params:
+    """Both layers of strips compressed by the same ratio at constant volume; the film is confined."""
+    strips = p.upper_height_mm + p.lower_height_mm
+    solid = p.etpu_width_mm + p.x60_width_mm
+    most = strips * (1 - solid / p.period_mm)
+    if press_mm >= most:
+        raise OutOfRange(f"pressed by {press_mm:g} mm: all air is gone at {most:.3g} mm; expected less")
+    share = 1 - press_mm / strips
+    return replace(
+        p,
+        etpu_width_mm=p.etpu_width_mm / share,
+        x60_width_mm=p.x60_width_mm / share,
+        air_width_mm=p.air_width_mm - 0.5 * solid * (1 / share - 1),
+        upper_height_mm=p.upper_height_mm * share,
+        lower_height_mm=p.lower_height_mm * share,
+    )
+
+
 def _swept(p: Any, eps_r: float, press_mm: float, formula: Callable[..., float]) -> float:
     """Formula on the sizes that 3.1.2 gives a pressed cell, per area of the sensor at rest [F/m2]."""
-    q = thesis_swept.swept(p, press_mm)
-    return formula(q, eps_r) * thesis_swept.stretch(p, q)
+    q = swept(p, press_mm)
+    return formula(q, eps_r) * stretch(p, q)
 
 
 @dataclass(frozen=True)

@@ -15,16 +15,16 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design.design import Design
 from sensorgen.design.values import MaterialValue, permittivities
-from sensorgen.models import thesis_cells, thesis_swept
+from sensorgen.models import thesis_cells
 from sensorgen.prediction import capacitance as planner
 from sensorgen.prediction import losses
 from sensorgen.prediction.capacitance import PLANE, Unpredictable
 from sensorgen.prediction.capacitance_answer import Asked
 from sensorgen.prediction.sweep import Sweep
 
-NAMES = (*thesis_cells.NAMED, thesis_swept.NAME)
-SHAPES = {name: law.shapes for name, law in thesis_cells.NAMED.items()} | {thesis_swept.NAME: thesis_swept.SHAPES}
-PRESSED = (*(name for name, law in thesis_cells.NAMED.items() if law.pressed), thesis_swept.NAME)
+NAMES = (*thesis_cells.NAMED, thesis_cells.GEOMETRY)
+SHAPES = {name: law.shapes for name, law in thesis_cells.NAMED.items()} | {thesis_cells.GEOMETRY: ("tri", "rect")}
+PRESSED = (*(name for name, law in thesis_cells.NAMED.items() if law.pressed), thesis_cells.GEOMETRY)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +106,7 @@ def answer(design: Design, asked: Asked, press_mm: float | None = None) -> Formu
     """
     _refuse(design, asked.model, press_mm)
     start = time.perf_counter()
-    work = _field if asked.model == thesis_swept.NAME else _formula
+    work = _field if asked.model == thesis_cells.GEOMETRY else _formula
     value, source, values = work(design, asked, press_mm or 0.0)
     return FormulaResult(
         design=design.name, value_f_per_m2=value, model=asked.model, reason=source, press_mm=press_mm,
@@ -176,7 +176,7 @@ def _formula(design: Design, asked: Asked, press_mm: float) -> Found:
 def _field(design: Design, asked: Asked, press_mm: float) -> Found:
     """The field on the sizes that 3.1.2 makes of some whole periods, by the least expensive model within tolerance."""
     rest: Any = design.params
-    now = thesis_swept.swept(rest, press_mm)
+    now = thesis_cells.swept(rest, press_mm)
     side_mm = ceil(1 / now.period_mm) * now.period_mm
     sizes = asdict(replace(now, length_mm=side_mm, width_mm=side_mm))
     pressed = designs.make(design.model_dump(exclude={"parameters"}) | {"parameters": sizes})
@@ -184,6 +184,6 @@ def _field(design: Design, asked: Asked, press_mm: float) -> Found:
     found = planner.capacitance(
         pressed.in_use, {t.material: t.value for t in taken}, asked.width or PLANE, keep=asked.keep
     )
-    value = found.capacitance_f.middle() / (side_mm * M_PER_MM) ** 2 * thesis_swept.stretch(rest, now)
-    said = f"{thesis_swept.SOURCE}: sizes changed by hand, their field by {found.model} within {found.width():.2g}"
-    return value, f"{said}; solved compression: compress", taken
+    value = found.capacitance_f.middle() / (side_mm * M_PER_MM) ** 2 * thesis_cells.stretch(rest, now)
+    by = f"their field by {found.model} within {found.width():.2g}; solved compression: compress"
+    return value, f"{thesis_cells.GEOMETRY_SOURCE}: sizes changed by hand, {by}", taken

@@ -8,25 +8,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Complex, Mask, Real
+
 BLUE, ORANGE, GREEN, PINK, YELLOW, SKY, GREY = (
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a8f98",
 )  # fmt: skip
 COLOURS = (BLUE, ORANGE, GREEN, PINK, YELLOW, SKY, "#7a5195", "#8c564b", "#555555")
 SYMBOLS = (
-    "circle",
-    "square",
-    "diamond",
-    "triangle-up",
-    "triangle-down",
-    "cross",
-    "x",
-    "triangle-left",
-    "triangle-right",
-)
+    "circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x", "triangle-left", "triangle-right",
+)  # fmt: skip
 MOST_POINTS = 3000  # of a drawn curve: more than a screen is wide
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
-Real = NDArray[np.float64]
 Values = Sequence[float] | Sequence[str] | Real
 
 
@@ -266,7 +259,7 @@ def thinned(values: Real, most: int = MOST_POINTS) -> NDArray[np.intp]:
     return np.asarray(found[found < len(values)])
 
 
-def thinned_together(z: NDArray[np.complex128], which: NDArray[np.bool_] | None = None) -> NDArray[np.intp]:
+def thinned_together(z: Complex, which: Mask | None = None) -> NDArray[np.intp]:
     """Samples of which the curves of both parts of each column are :func:`thinned`, among those of ``which``."""
     columns = (column if which is None else column[which] for column in z.T)
     found = [thinned(part) for column in columns for part in (column.real, column.imag)]

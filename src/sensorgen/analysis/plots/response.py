@@ -5,14 +5,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sensorgen.analysis.plots.figure import Axis, Curve, Figure, Map, Panel, Real, frequency, scale
+from sensorgen.analysis.plots.figure import Axis, Curve, Figure, Map, Panel, frequency, scale
+from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.models.sensor import Sensor
-
-Complex = NDArray[np.complex128]
 
 LARGEST = 500_000  # points that a page in a browser still draws at once
 MOST_FREQUENCIES = 24  # panels that a picture still shows
@@ -71,13 +69,13 @@ class Response:
         source = slopes.get(by, self.impedance_ohm)
         return np.asarray(source.real if part == "resistance" else source.imag)
 
-    def on_sensor(self) -> NDArray[np.bool_]:
+    def on_sensor(self) -> Mask:
         """Positions where the whole tip rests on the sensor; all, where it does at none."""
         half = self.tip_mm / 2 * (1 + 1e-9)  # where the tip just reaches an end, the slopes jump
         inside = (self.position_mm > half) & (self.position_mm < self.length_mm - half)
         return inside if inside.any() else ~inside
 
-    def folds(self) -> NDArray[np.bool_]:
+    def folds(self) -> Mask:
         """Loads beyond which (F, x) -> (R, X) turns over: the sign of its determinant changes towards the next."""
         turning = (np.conj(self.by_force_ohm_per_n) * self.by_position_ohm_per_mm).imag
         turning = np.sign(np.where(np.abs(turning) > 1e-12 * np.abs(turning).max(initial=0), turning, 0))

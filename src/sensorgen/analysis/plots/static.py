@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sensorgen.analysis.plots.figure import GREY, Axis, Body, Curve, Figure, Map, Panel
+from sensorgen.analysis.plots.figure import GREY, SYMBOLS, Axis, Body, Curve, Figure, Map, Panel
 from sensorgen.analysis.plots.libraries import needed
 
 if TYPE_CHECKING:
@@ -16,10 +16,7 @@ if TYPE_CHECKING:
 
 _PANEL_IN = ((8.4, 3.0), (5.2, 3.0), (4.4, 3.0), (2.85, 2.7))  # by the number of columns
 _ROW_IN, _FRAME_IN, _MARGIN_IN = 0.17, 1.3, 0.6
-_MARKERS = dict(zip(
-    ("circle", "square", "diamond", "cross", "x", "triangle-up", "triangle-down", "triangle-left", "triangle-right"),
-    "osDPx^v<>", strict=True,
-))  # fmt: skip
+_MARKERS = dict(zip(SYMBOLS, "osD^vPx<>", strict=True))
 _STYLES = {"solid": "-", "dash": "--", "dot": ":"}
 _EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
 _ROUNDING = 1e-6  # of the span: less is no other colour

@@ -10,8 +10,8 @@ from functools import partial
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.models import compression, press2d, press3d, springs
@@ -21,8 +21,6 @@ from sensorgen.models.press3d import BoundaryConditions, Pieces, Pressed
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.verification.chart.measured import DIGITS, Ladder, Point, climbed, relative
 from sensorgen.verification.chart.presses import has_mesher
-
-Real = NDArray[np.float64]
 
 ASKED = "displacement of the top of a body"
 _RUBBER = Elastic(6e6, 0.5)

@@ -7,8 +7,8 @@ small strain. Compared with the mean displacement of the sheared edge, by mixed 
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real, Whole
 from sensorgen.verification.chart.measured import Point, climbed, relative
 
 ASKED = "how far the sheared edge of a membrane moves"
@@ -16,8 +16,6 @@ STANDARD: dict[str, float] = {"Cook's membrane": 0.077181}
 _KNOWN_TO = 4e-5
 _CELLS = (4, 8, 16, 32)
 _MODULUS, _RATIO = 240.565, 0.4999
-
-Real = NDArray[np.float64]
 
 
 def points(name: str, budget_s: float) -> list[Point]:
@@ -64,7 +62,7 @@ def edge(cells: int) -> float:
     return float(force[free] @ spsolve(matrix[free][:, free].tocsc(), force[free]))
 
 
-def _grid(cells: int) -> tuple[Real, NDArray[np.int64], NDArray[np.int64]]:
+def _grid(cells: int) -> tuple[Real, Whole, Whole]:
     """Corners, triangles and their region, narrow towards the clamped edge and its ends."""
     s = np.linspace(0, 1, cells + 1)
     x, y = (v.ravel() for v in np.meshgrid(s**2, (1 - np.cos(np.pi * s)) / 2))

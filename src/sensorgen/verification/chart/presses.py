@@ -8,19 +8,17 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import MissingValue
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design.shapes import tri
-from sensorgen.models import compression, fem2d, press2d, press3d, springs, thesis_cells, thesis_swept
+from sensorgen.models import compression, fem2d, press2d, press3d, springs, thesis_cells
 from sensorgen.models.press2d import Elastic, Fineness
 from sensorgen.scene.scene import Fill, Scene
 from sensorgen.solvers.contact import mesher
 from sensorgen.verification.chart.measured import Ladder, Level, Point, climbed, relative
-
-Real = NDArray[np.float64]
 
 _EPS = {"x60": 4.68, "air": 1.00059}
 SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
@@ -104,7 +102,7 @@ def why_not_applicable(name: str) -> dict[str, str]:
     film, what = STANDARD[name]
     said = {"press3d": press3d.why_not_applicable(_scene(CELLS[film])) or "", "press2d": _MISSING}
     if what == _DOWN:
-        return said | {"thesis_swept": "the displacement is what it is given"}
+        return said | {"thesis_cells": "the displacement is what 3.1.2 is given"}
     return said | {"springs": "it has a displacement and no capacitance"}
 
 
@@ -123,7 +121,7 @@ def _rise(known: Known) -> Iterator[Ladder]:
         yield f"compression: {law.name}", [("", partial(_by_law, known, law, rise=True))]
     by_hand = {"formula 3.35": lambda q: thesis_cells.triangles_f_per_m2(q, _EPS["x60"]), "field": _field_f_per_m2}
     for name, work in by_hand.items():
-        yield f"thesis_swept: {name}", [("displacement given, ", partial(_swept, known, work))]
+        yield f"thesis_cells: 3.1.2, {name}", [("displacement given, ", partial(_swept, known, work))]
     yield "press2d", _levels(known, _EPS)
 
 
@@ -175,7 +173,7 @@ def _pressed(known: Known, permittivity: dict[str, float] | None, mesh: Fineness
 
 def _swept(known: Known, work: Callable[[tri.Params], float]) -> Real:
     """Rise per depth of a period of sizes that are changed by hand to each displacement, in pF/m."""
-    sizes = [thesis_swept.swept(known.params(), um * 1e-3) for um in (0.0, *known.down_um)]
+    sizes = [thesis_cells.swept(known.params(), um * 1e-3) for um in (0.0, *known.down_um)]
     value = np.array([work(q) * q.period_mm * M_PER_MM for q in sizes])
     return np.asarray(1e12 * (value[1:] - value[0]))
 

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import line
-
-Complex = NDArray[np.complex128]
 
 LENGTH_M, WIDTH_M, HEIGHT_M, FILM_M = 0.1, 0.01, 3e-4, 6e-4  # Table 3.1
 EPS_R = 4.68
@@ -51,7 +50,7 @@ def unpressed_ohm(rho_ohm_m: float = RHO_OHM_M, frequency_hz: ArrayLike = FREQUE
 class Smooth:
     """A field along the line, and its derivatives."""
 
-    def __init__(self, field: Callable[[NDArray[np.float64]], Complex]) -> None:
+    def __init__(self, field: Callable[[Real], Complex]) -> None:
         """Interpolate between the ends."""
         places = chebyshev.chebpts1(_DEGREE + 1)
         values = field((places + 1) / 2 * LENGTH_M)

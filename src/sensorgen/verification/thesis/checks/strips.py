@@ -6,7 +6,7 @@ from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design.shapes import rect, tri
 from sensorgen.models import columns as every_column
-from sensorgen.models import thesis_cells, thesis_swept
+from sensorgen.models import thesis_cells
 from sensorgen.verification.thesis.checks._columns import (
     EPS_R,
     FILM_MM,
@@ -150,7 +150,7 @@ def bulging() -> list[Part]:
 
 def turned_out(rise_f: float, press_mm: float) -> list[Part]:
     """Figure 6.10: what the strips gain that 3.1.2 makes lower and wider, by columns of these."""
-    now = thesis_swept.swept(_CELL, press_mm)
+    now = thesis_cells.swept(_CELL, press_mm)
     rise = _columns_f(now) - _columns_f()
     return [
         Part("gain by 5 µm, a cell of 2 mm by 2 mm", "F", rise, rise_f, shown=SHOWN),

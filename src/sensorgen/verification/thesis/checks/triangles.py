@@ -4,12 +4,12 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design.shapes import tri
-from sensorgen.models import columns, fem2d, thesis_cells, thesis_swept
+from sensorgen.models import columns, fem2d, thesis_cells
 from sensorgen.scene.sections import sections
 from sensorgen.scene.unit_cell import cell
 from sensorgen.solvers.electrostatics.mesh import Cones
@@ -26,8 +26,6 @@ from sensorgen.verification.thesis.checks._columns import (
 )
 from sensorgen.verification.thesis.checks._field import OMEGA
 from sensorgen.verification.thesis.verdicts import Part
-
-Real = NDArray[np.float64]
 
 _CELL = tri.Params(dielectric_mm=FILM_MM)
 _DESIGN = designs.make({"shape": "tri", "parameters": {"dielectric_mm": FILM_MM}})
@@ -219,7 +217,7 @@ def swept(rise_f: float, deepest_mm: float, depth_mm: float) -> list[Part]:
     """Figure 6.7: displacement for a rise of C, by the field on the geometry that 3.1.2 makes."""
 
     def c_f(press_mm: float) -> float:
-        now = thesis_swept.swept(_CELL, press_mm)
+        now = thesis_cells.swept(_CELL, press_mm)
         made = designs.make({"shape": "tri", "parameters": asdict(replace(now, length_mm=now.period_mm, width_mm=1.0))})
         return fem2d.capacitance(made.in_use, PERMITTIVITY).upper * depth_mm
 
