@@ -26,7 +26,7 @@ class Params(ArrayParams):
         default=1.0, metadata={"help": "Diameter of a cone at the top electrode.", "range": (0.02, 100.0)}
     )
     tip_mm: float = field(
-        default=0.5, metadata={"help": "Diameter of its blunt tip; 0 for a sharp one.", "range": (0.0, 100.0)}
+        default=0.66, metadata={"help": "Diameter of its blunt tip; 0 for a sharp one.", "range": (0.0, 100.0)}
     )
 
     def __post_init__(self) -> None:

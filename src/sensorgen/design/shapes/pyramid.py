@@ -26,7 +26,7 @@ class Params(ArrayParams):
         default=1.0, metadata={"help": "Side of a pyramid at the top electrode.", "range": (0.02, 100.0)}
     )
     tip_mm: float = field(
-        default=0.5, metadata={"help": "Side of its blunt tip; 0 for a sharp one.", "range": (0.0, 100.0)}
+        default=0.66, metadata={"help": "Side of its blunt tip; 0 for a sharp one.", "range": (0.0, 100.0)}
     )
 
     def __post_init__(self) -> None:
