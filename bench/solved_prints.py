@@ -21,7 +21,8 @@ from sensorgen.prediction.sensor_model import piece
 FILE = Path(__file__).parents[1] / "src" / "sensorgen" / "models" / "solved_prints.yaml"
 HEAD = """\
 # Rise of the capacitance of printed triangular cells with stress, as bench/solved_prints.py solved it: by press2d, its
-# usual mesh, held against the next coarser one ("within"); layers of 0.1 and 0.06 mm, walls as named, and of Arachne's
+# usual mesh; "within" by bench/rise_errors.py, of cells without an apex;
+# layers of 0.1 and 0.06 mm, walls as named, and of Arachne's
 # walls the film as thin and as thick as the printer's tools may make it. Keys are the content of the cross-section.
 # "stiff" is the change under a stiff plate, from the even pressure of the curve, at 60 kPa on the coarsest mesh.
 source: plane-strain finite elements with frictionless contact, neo-Hookean, nu 0.4999, of the printed cell
