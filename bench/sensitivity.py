@@ -10,12 +10,12 @@ from itertools import product
 from math import floor, log10
 from pathlib import Path
 
+from plate_sensitivity import BOUNDARIES, Sensitivity, sensitivity
 from sensorgen.design.design import Design, make
 from sensorgen.models import compression
 from sensorgen.models.compression import Compression
 from sensorgen.prediction.compression_law import solved
 from sensorgen.prediction.query import TONES_HZ
-from sensorgen.prediction.sensitivity import BOUNDARIES, Sensitivity, sensitivity
 
 FORCE_N, RHO_OHM_M = 6.0, 0.042
 RECT_MESH = 1.022  # rise in the limit of fine meshes over that of the default mesh: docs/compression.md

@@ -2,10 +2,10 @@
 
 import pytest
 
+from plate_sensitivity import BOUNDARIES, sensitivity
 from sensorgen.design.design import make
 from sensorgen.models import compression
 from sensorgen.prediction.query import TONES_HZ
-from sensorgen.prediction.sensitivity import BOUNDARIES, sensitivity
 
 PLATE = make({"shape": "reference"})
 

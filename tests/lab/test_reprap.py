@@ -12,10 +12,27 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.measure.lab import reprap
 from sensorgen.measure.lab.clock import RealClock, SimulatedClock
 from sensorgen.measure.lab.devices import DeviceFault, WrongDevice
-from sensorgen.measure.lab.port import HttpPort, SerialPort, SimulatedPort, SimulatedWeb
+from sensorgen.measure.lab.port import HttpPort, SerialPort, SimulatedPort, _faults
 from sensorgen.measure.virtual.reprap import FAULTS, RepRapFirmware
 
 WAYS = ("serial", "http")
+
+
+class SimulatedWeb:
+    """HTTP to a simulator in this process."""
+
+    def __init__(self, simulator, clock):
+        self.address = f"simulated {type(simulator).__name__}"
+        self._simulator, self._clock = simulator, clock
+
+    def get(self, path, timeout_s):
+        """Status and content of one GET request; a simulator that does not answer takes the whole time [s]."""
+        with _faults(self.address):
+            try:
+                return self._simulator.get(path, self._clock.now())
+            except TimeoutError:
+                self._clock.wait_until(self._clock.now() + timeout_s)
+                raise
 
 
 class Lab:

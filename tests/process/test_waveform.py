@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sensorgen.core.errors import BadInput, OutOfRange
-from sensorgen.measure.signal.waveform import coincidences, impedance, phasors, window_samples
+from sensorgen.measure.signal.waveform import impedance, phasors, window_samples
 
 TONES = np.array([1100.0, 2300, 5300, 10100, 19900, 49900, 99700])
 WEIGHTS = np.array([10, 7, 4.5, 3, 2, 1.5, 1])
@@ -105,6 +105,18 @@ def test_what_cannot_be_demodulated_is_refused():
         impedance(u, i[:-1], RATE, TONES)
     with pytest.raises(BadInput, match="carries no current"):
         impedance(u, i * 0, RATE, TONES)
+
+
+def coincidences(tones_hz):
+    """Tones that coincide with distortion products of others."""
+    tones = [float(f) for f in np.atleast_1d(np.asarray(tones_hz, float))]
+    hits = [(hit, f"{n} x {f:g} Hz") for f in tones for n in range(2, 12) for hit in tones if hit == n * f]
+    pairs = [(a, b) for a in tones for b in tones if a != b]
+    hits += [(hit, f"2 x {a:g} + {b:g} Hz") for a, b in pairs for hit in tones if hit == 2 * a + b]
+    for a, b in pairs:
+        product = f"2 x {a:g} - {b:g} Hz" if 2 * a > b else f"{b:g} - 2 x {a:g} Hz"
+        hits += [(hit, product) for hit in tones if hit == abs(2 * a - b) != b]
+    return hits
 
 
 def test_no_tone_of_the_thesis_is_a_harmonic_one_is_a_difference_and_all_fit_into_ten_milliseconds():

@@ -12,9 +12,8 @@ import shapely
 
 from sensorgen.checks import estimate, volumes
 from sensorgen.checks.volumes import Row
-from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
-from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.walls import WALLS
 from sensorgen.scene.geometry import meshes, validity
@@ -26,9 +25,6 @@ if TYPE_CHECKING:
     from sensorgen.asprinted.window import Window
     from sensorgen.export.gcode.paths import Paths
     from sensorgen.scene.connections import Connected
-    from sensorgen.solvers.network.nodes import Lines
-
-_JOINED_MM = 1e-4
 
 
 @dataclass(frozen=True)
@@ -254,33 +250,3 @@ def drawn_gap_mm(design: Design) -> float:
     """Smallest distance of the electrodes as drawn, exact [mm]."""
     scene = design.in_use
     return round(validity.electrode_gap_mm(scene, {b.name: meshes.mesh(b) for b in scene.bodies}), 9)
-
-
-def electrode_lines(design: Design, lines: "Beads", end: str) -> "Lines":
-    """The extruded lines of one electrode as a network, its middle at the origin: for studies of contact resistance.
-
-    Parameters
-    ----------
-    design : Design
-        As drawn.
-    lines : Beads
-        Of the whole sensor.
-    end : str
-        "top" or "bottom".
-
-    Raises
-    ------
-    OutOfRange
-        None of it is printed.
-    """
-    from sensorgen.solvers.network.nodes import Lines
-
-    mine = [k for k, body in enumerate(design.printed.bodies) if body.terminal == end]
-    found = lines.of(np.isin(lines.body, mine))
-    if not len(found.number):
-        raise OutOfRange(f"no line prints the {end} electrode")
-    middle = np.array(design.printed.size_mm[:2]) / 2
-    start, stop = ((p - middle) * M_PER_MM for p in (found.start_mm, found.end_mm))
-    meets = np.append(False, (np.abs(start[1:] - stop[:-1]) < _JOINED_MM * M_PER_MM).all(1))
-    meets[1:] &= found.layer[1:] == found.layer[:-1]
-    return Lines(start, stop, found.width_mm * M_PER_MM, found.height_mm * M_PER_MM, found.layer, meets)

@@ -97,15 +97,6 @@ def modulus(solid_pa: float, poisson_ratio: float, share: float, pattern: str) -
     return Interval(0.0, upper)
 
 
-def foam_modulus_pa(solid_pa: float, share: float) -> float:
-    r"""Young's modulus of an open foam whose struts bend, :math:`E \phi^2`: an estimate (Gibson & Ashby) [Pa].
-
-    >>> foam_modulus_pa(6e6, 0.5)
-    1500000.0
-    """
-    return solid_pa * _checked(share) ** 2
-
-
 def _checked(share: float) -> float:
     if not 0 < share <= 1:
         raise OutOfRange(f"share of the solid is {share:g}; expected a number above 0 and at most 1")

@@ -13,8 +13,8 @@ from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import OutOfRange, SensorgenError
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design, make, name_of
-from sensorgen.scene.layers import faces_mm
 from sensorgen.scene.scene import SLIVER_MM, Envelope
+from sensorgen.workflows.moves import levels
 
 BAKE = 0.2  # what the bake takes off in the plane (thesis 6.2)
 MOST_SLICES = 10  # with that of the design as it was, and the last one, which is written
@@ -456,11 +456,6 @@ def _steps(design: Design) -> Iterator[tuple[str, float, str]]:
             least = design.machine.line_mm() if is_material else GAP_CLOSES * design.machine.nozzle_mm
             if value * larger < least - SLIVER_MM:
                 yield name, round(least / larger, 9), "one line" if is_material else "a gap that stays open"
-
-
-def levels(design: Design) -> set[float]:
-    """Heights of all faces and corners [mm]."""
-    return {round(z, 6) for body in design.drawn.bodies for z in faces_mm(body)}
 
 
 def _share(design: Design) -> float:

@@ -165,18 +165,18 @@ def _beside(name: str, value: float, step: float) -> list[tuple[Key, float]]:
 
 def _lengths(design: Design) -> Iterator[tuple[str, float, bool]]:
     """The shape's own lengths that are not 0, and whether a face moves up or down with them."""
-    levels = _levels(design)
+    drawn = levels(design)
     for name, value in asdict(design.params).items():
         if not isinstance(value, float) or not value or name in ("length_mm", "width_mm"):
             continue
         try:
-            moved = _levels(changed(design, {("parameters", name): 1.01 * value}))
+            moved = levels(changed(design, {("parameters", name): 1.01 * value}))
         except SensorgenError:
             continue
-        yield name, value, name in asdict(Envelope()) or not levels <= moved
+        yield name, value, name in asdict(Envelope()) or not drawn <= moved
 
 
-def _levels(design: Design) -> set[float]:
+def levels(design: Design) -> set[float]:
     """Heights of all faces and corners [mm]."""
     from sensorgen.scene.layers import faces_mm
 

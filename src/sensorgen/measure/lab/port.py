@@ -72,16 +72,6 @@ class Simulator(Protocol):
         """Bytes sent by a time, after having received some; OSError where the cable is out."""
 
 
-class WebSimulator(Protocol):
-    """What stands in for a device with HTTP."""
-
-    fault: str
-    heard: list[bytes]
-
-    def get(self, path: str, time_s: float) -> tuple[int, bytes]:
-        """Answer of one GET request; OSError where there is none."""
-
-
 @contextmanager
 def _faults(address: str) -> Iterator[None]:
     """Translate errors of a connection to DeviceFault."""
@@ -289,20 +279,3 @@ class HttpPort:
                 return answer.status, answer.read(1_000_000)
             finally:
                 line.close()
-
-
-class SimulatedWeb:
-    """HTTP to a simulator in this process."""
-
-    def __init__(self, simulator: WebSimulator, clock: Clock) -> None:
-        self.address = f"simulated {type(simulator).__name__}"
-        self._simulator, self._clock = simulator, clock
-
-    def get(self, path: str, timeout_s: float) -> tuple[int, bytes]:
-        """Status and content of one GET request; a simulator that does not answer takes the whole time [s]."""
-        with _faults(self.address):
-            try:
-                return self._simulator.get(path, self._clock.now())
-            except TimeoutError:
-                self._clock.wait_until(self._clock.now() + timeout_s)
-                raise

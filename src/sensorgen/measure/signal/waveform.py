@@ -21,7 +21,6 @@ from numpy.typing import ArrayLike, NDArray
 from sensorgen.core.errors import BadInput, OutOfRange
 
 Complex = NDArray[np.complex128]
-_HARMONICS = range(2, 12)
 _BATCH = 1 << 16  # samples that fit into the cache
 _SEGMENT = 256  # least samples of a segment: large enough for the matrix product, small enough for the sum
 
@@ -193,36 +192,3 @@ def clipped(signal: NDArray[Any], limit: float, size: int, count: int) -> NDArra
             at = (np.abs(some[: (count - i) * size]) >= limit).reshape(-1, size)
             beyond[i : i + step] = (at[:, 1:] & at[:, :-1]).any(axis=1)
     return beyond
-
-
-def coincidences(tones_hz: ArrayLike) -> list[tuple[float, str]]:
-    """Tones that coincide with distortion products of others.
-
-    Parameters
-    ----------
-    tones_hz : (m,) array
-        Tones [Hz].
-
-    Returns
-    -------
-    list of (float, str)
-        The tone [Hz], and the product: a harmonic up to the 11th, or 2a + b or 2a - b of two others.
-
-    Examples
-    --------
-    >>> coincidences([1000, 2000])
-    [(2000.0, '2 x 1000 Hz')]
-
-    Of the thesis's tones, two coincide by one relation:
-
-    >>> coincidences([1100, 2300, 5300, 10100, 19900, 49900, 99700])
-    [(49900.0, '2 x 19900 + 10100 Hz'), (10100.0, '49900 - 2 x 19900 Hz')]
-    """
-    tones = [float(f) for f in np.atleast_1d(np.asarray(tones_hz, float))]
-    hits = [(hit, f"{n} x {f:g} Hz") for f in tones for n in _HARMONICS for hit in tones if hit == n * f]
-    pairs = [(a, b) for a in tones for b in tones if a != b]
-    hits += [(hit, f"2 x {a:g} + {b:g} Hz") for a, b in pairs for hit in tones if hit == 2 * a + b]
-    for a, b in pairs:
-        product = f"2 x {a:g} - {b:g} Hz" if 2 * a > b else f"{b:g} - 2 x {a:g} Hz"
-        hits += [(hit, product) for hit in tones if hit == abs(2 * a - b) != b]
-    return hits
