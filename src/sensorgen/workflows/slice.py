@@ -160,7 +160,7 @@ def slice_design(
     printed = nominal(design, made.lines, f"{made.slicer} {made.version}")
     checked = check_motion(made.lifted.motion, machine, loaded, others_empty=True, texts=design.own).with_more(
         agreement.check(
-            design, made.lines, made.lifted.motion.changes, machine.bed_centre_mm(), alone=True, lines=printed.lines
+            design, made.lines, made.lifted.motion, machine.bed_centre_mm(), alone=True, lines=printed.lines
         )
     )
     layers, findings = printed.rows, printed.findings()
