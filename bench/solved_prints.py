@@ -25,8 +25,8 @@ FILE = Path(__file__).parents[1] / "src" / "sensorgen" / "models" / "solved_prin
 HEAD = """\
 # Rise of the capacitance of printed triangular cells with stress, as bench/solved_prints.py solved it: by press2d, its
 # usual mesh; "within" by bench/rise_errors.py, of slices ("prusa") against the next coarser mesh; layers of 0.1 and
-# 0.06 mm, walls as named, the film as thin and as thick as the printer's tools may make it, too. Keys are the content of
-# the cross-section. "stiff" is the change under a stiff plate, from the even pressure, at 60 kPa on the coarsest mesh.
+# 0.06 mm, walls as named, the film as thin and as thick as the printer's tools may make it, too. Keys are the content
+# of the section. "stiff" is the change under a stiff plate, from the even pressure, at 60 kPa on the coarsest mesh.
 source: plane-strain finite elements with frictionless contact, neo-Hookean, nu 0.4999, of the printed cell
 youngs_modulus_pa: {etpu: 22.0e6, x60: 6.0e6}
 cells:

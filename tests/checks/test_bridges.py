@@ -134,7 +134,7 @@ def test_an_arm_round_a_corner_is_an_overhang_of_its_own_length(sensor, findings
 @pytest.mark.parametrize(("width", "starts"), [(0.12, False), (0.12 + HAIR, True), (3.0, True)])
 def test_an_island_is_an_error(sensor, findings, width, starts):
     island = Body("island", "x60", (box(5, 5 + width, 5, 10, 1.4, 1.6),))
-    found = findings(sensor(island), "9-", "island")
+    found = findings(sensor(island), "9-bridge", "island")
     assert [(f.severity, f.layer) for f in found] == [("error", 15)] * starts
     if starts:
         assert found[0].value_mm == pytest.approx(width)

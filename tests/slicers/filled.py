@@ -6,7 +6,10 @@ import shapely
 
 from sensorgen.scene.layers import drawn, parts
 
-PURGE = "G1 X150 Y50 F7200\n;TYPE:Wipe tower\nG1 X170 Y50 E1.5 F1200\nG1 X170 Y50.5\nG1 X150 Y50.5 E1.5\n"
+DRAWN, PUSHED = "G1 E-4.7 F2400\n", "G1 E4.7 F2400\n"  # around every travel
+PURGE = (
+    f"{DRAWN}G1 X150 Y50 F7200\n{PUSHED};TYPE:Wipe tower\nG1 X170 Y50 E1.5 F1200\nG1 X170 Y50.5\nG1 X150 Y50.5 E1.5\n"
+)
 
 
 def filled(design, layers=None):
@@ -42,6 +45,6 @@ def _hatched(part, height_mm, machine, corner):
     text = ""
     for way in ways:
         (ax, ay), (bx, by) = way.coords[0], way.coords[-1]
-        text += f"G1 X{ax + corner[0]:.4f} Y{ay + corner[1]:.4f} F7200\n"
+        text += f"{DRAWN}G1 X{ax + corner[0]:.4f} Y{ay + corner[1]:.4f} F7200\n{PUSHED}"
         text += f"G1 X{bx + corner[0]:.4f} Y{by + corner[1]:.4f} E{each * way.length:.6f} F1200\n"
     return text

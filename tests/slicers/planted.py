@@ -379,10 +379,10 @@ START = (
     Fault("travel at 500 mm/s", sub(r"F7200", "F30000"), "warns: speed"),
     Fault("un-retract with Z at 4800 mm/min", after("T4", "G1 Z40 F6000", "G1 Z.4 E5 F4800"), "warns: speed"),
     Fault("M73 with a wrong share", amid("M73 P900"), "argued: only the display shows it"),
-    Fault("a pause", amid("M226"), "argued: somebody goes on"),
+    Fault("a pause", amid("M226"), "pause"),
     Fault("a message", amid('M291 P"stop; M112" S1'), "argued: only the display shows it"),
     Fault("baby steps of 0.05 mm", amid("M290 S0.05 R0"), "warns: height"),
-    Fault("fan of the part off", amid("M106 P3 S0"), "argued: the material's makers print without it too"),
+    Fault("fan of the part off", amid("M106 P3 S0"), "fan"),
 )
 
 FORM = (

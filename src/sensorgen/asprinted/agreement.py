@@ -1,4 +1,4 @@
-"""G-code against the design that it prints: heights, tools, volumes, widths of lines, purging, and what is beside."""
+"""G-code against the design that it prints: heights, deposit, nozzle, widths of lines, purging, and lines beside it."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -9,27 +9,24 @@ from itertools import groupby, zip_longest
 import numpy as np
 import shapely
 
+from sensorgen.asprinted import ledger, nozzle
 from sensorgen.asprinted.beads import Beads, beads
-from sensorgen.asprinted.registration import pieces
+from sensorgen.asprinted.registration import connected, pieces
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.design.design import Design
 from sensorgen.design.tower import PRIME_MM3
 from sensorgen.export.gcode.found import Found
 from sensorgen.export.gcode.moves import NO_TOOL, Change, Motion
 from sensorgen.export.gcode.paths import NOT_MODEL, Paths
-from sensorgen.scene.layers import LayerRegions, Region, drawn, narrow_mm, parts
+from sensorgen.scene.layers import LayerRegions, Region
 from sensorgen.scene.scene import Point
 
 LEVEL_MM = 0.005  # a line this far from the top of a layer lies in none; G-code has three decimals
-NEAR_MIDDLE = 0.1  # of a layer: slicers may sample a face this near to mid-height on either side
-LINES_WIDE = 4.0  # parts as wide as this are filled evenly; of narrower ones slicers print whole lines
-EVEN, UNEVEN = (0.85, 1.15), (0.6, 2.0)  # printed over drawn volume of wide parts, and of others at least a line wide
 WIDEST = 2.0  # lines, of one printed line
 THINNEST, LONG_MM = 0.25, 2.0  # a line is thin that is thinner, in lines, and longer
-SOME_OF_A_PART = 0.4  # of its volume; less is no print of it
 SHIFTED = 0.35  # lines, by which a tool's middle may be off; walls and seams make 0.1
 SOME_THIN = 0.6  # share of a tool's length that may be thin
-FOREIGN = 0.05  # share of a tool's volume in a layer that may lie where its material is not drawn
+MOST_LAYERS = 2.5  # that a line may lie above what stands there
 PURGED_MM3 = PRIME_MM3 / 3  # that fill the nozzle after a change of tools; towers take PRIME_MM3
 _SUPPORT = "support"
 
@@ -37,7 +34,7 @@ _SUPPORT = "support"
 def check(
     design: Design,
     paths: Paths,
-    changes: Sequence[Change],
+    motion: Motion,
     centre_mm: Point,
     *,
     alone: bool = False,
@@ -52,8 +49,8 @@ def check(
         That is to be printed.
     paths : Paths
         Lines of the file, with the printer's own tool numbers, in the design's own directions.
-    changes : sequence of Change
-        Tools in the order in which they are taken.
+    motion : Motion
+        The file.
     centre_mm : (float, float)
         Middle of the piece on the bed [mm].
     alone : bool
@@ -63,7 +60,7 @@ def check(
     lines : Beads, optional
         Lines of the piece; found in ``paths`` if not given.
     """
-    found = _of_piece(design, paths, changes, centre_mm, alone, lines)
+    found = _of_piece(design, paths, motion, centre_mm, alone, lines)
     return [replace(f, message=f"{piece}: {f.message}") for f in found] if piece else found
 
 
@@ -79,12 +76,12 @@ def check_motion(design: Design, motion: Motion) -> list[Found]:
     for number, place in enumerate(places, 1):
         x, y = place.bed_mm
         name = f"piece {number} of {len(places)}, at x {x:.4g}, y {y:.4g} mm" if len(places) > 1 else ""
-        found += check(design, place.paths, motion.changes, place.centre_mm, piece=name)
+        found += check(design, place.paths, motion, place.centre_mm, piece=name)
     return found
 
 
 def _of_piece(
-    design: Design, paths: Paths, changes: Sequence[Change], centre_mm: Point, alone: bool, lines: Beads | None
+    design: Design, paths: Paths, motion: Motion, centre_mm: Point, alone: bool, lines: Beads | None
 ) -> list[Found]:  # fmt: skip
     corner = np.array(centre_mm) - np.array(design.printed.size_mm[:2]) / 2
     ends = [p[:, :2] - corner for p in (paths.start_mm, paths.end_mm)]
@@ -99,24 +96,17 @@ def _of_piece(
         message = f"nothing is printed at the place of {design.name}; the nearest line is "
         message += f"{float(np.hypot(*off.T).min()):.3g} mm away" if model.any() else "not there at all"
         return [Found("place", "error", 1, message, "slice this design")]
-    lines, layers = lines or beads(design, paths, centre_mm), _sampled(design, 0.0)
+    lines, layers = lines or beads(design, paths, centre_mm), ledger.sampled(design, 0.0)
     return [
         *_heights(design, paths, piece),
-        *_tools(design, lines, layers),
-        *_volumes(design, lines, layers),
-        *_parts(design, lines, layers),
+        *ledger.check(design, lines),
+        *nozzle.check(design, motion, lines),
         *_shifts(design, lines, layers),
         *_widths(design, lines),
-        *_purged(design, paths, changes, piece),
+        *_purged(design, paths, motion.changes, piece),
+        *_floating(design, paths, np.logical_not(inside)),
         *_beside(paths, ends, _plan(design, layers), model & ~inside & alone, waste),
     ]
-
-
-def _sampled(design: Design, off: float) -> tuple[LayerRegions, ...]:
-    """The layers, sampled ``off`` layers above mid-height."""
-    scene = design.printed
-    shift = off * design.layers.layer_mm
-    return drawn(scene, [z + shift for z in design.layers.boundaries_mm(scene.size_mm[2])])
 
 
 def _line(number: Whole, rows: Mask) -> tuple[int, int]:
@@ -157,7 +147,7 @@ def _missing(design: Design, paths: Paths, rows: Mask, near: Whole, tops: Real) 
     """No layer is without a line; ``near`` is the layer of each line, and ``rows`` are those that lie in one."""
     there = np.zeros(len(tops), bool)
     there[near[rows]] = True
-    drawn_there = [list(layer.regions.values()) for layer in _sampled(design, 0.0)]
+    drawn_there = [list(layer.regions.values()) for layer in ledger.sampled(design, 0.0)]
     wide = np.array([any(_wide(r, design.machine.line_mm()).area > 0 for r in regions) for regions in drawn_there])
     narrow = ~wide & np.array([bool(regions) for regions in drawn_there])
     for absent, severity, advice in (
@@ -182,96 +172,6 @@ def _wide(region: Region, width_mm: float) -> Region:
     """The parts of a region that are at least so wide."""
     half = 0.49 * width_mm
     return region.buffer(-half, join_style="mitre").buffer(half, join_style="mitre")
-
-
-def _tools(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Iterator[Found]:
-    """Each tool prints where its material is drawn."""
-    found: dict[int, list[tuple[int, float, int]]] = {}
-    middle = shapely.points((lines.start_mm + lines.end_mm) / 2)
-    around = [layers, _sampled(design, NEAR_MIDDLE), _sampled(design, -NEAR_MIDDLE)]
-    names = {design.tool(body.material): body.material for body in design.printed.bodies}
-    for tool in names:
-        mine = [body.name for body in design.printed.bodies if design.tool(body.material) == tool]
-        for k in np.unique(lines.layer[lines.tool == tool]).tolist():
-            rows = np.flatnonzero((lines.tool == tool) & (lines.layer == k))
-            away = rows
-            for region in {each[k].region(name) for each in around for name in mine}:
-                shapely.prepare(region)
-                away = away[~shapely.dwithin(middle[away], region, design.machine.line_mm())]
-            share = float(lines.volume_mm3[away].sum() / lines.volume_mm3[rows].sum())
-            if share > FOREIGN:
-                found.setdefault(tool, []).append((k, share, int(lines.number[away][0])))
-    for tool, wrong in found.items():
-        layer, share, number = max(wrong, key=lambda each: each[1])
-        message = (
-            f"tool {tool} prints {share:.0%} of its lines of layer {layer + 1} where no {names[tool]} is drawn; "
-            f"{design.name} has {names[tool]} on tool {tool}"
-        )
-        yield Found("material", "error", number, message, "put each material on its tool (--tool)", len(wrong))
-
-
-def _volumes(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Iterator[Found]:
-    """Each body takes about its volume in each layer; slicers are free with parts under a few lines wide."""
-    line, bodies = design.machine.line_mm(), design.printed.bodies
-    around = [layers, _sampled(design, NEAR_MIDDLE), _sampled(design, -NEAR_MIDDLE)]
-    printed = np.zeros((len(layers), len(bodies)))
-    np.add.at(printed, (lines.layer, lines.body), lines.volume_mm3)
-    for n, body in enumerate(bodies):
-        infill = design.infill.get(body.material)
-        dense = (100.0 if infill is None or infill.percent is None else infill.percent) / 100
-        wrong: list[tuple[int, float, float, float]] = []
-        areas: dict[Region, tuple[float, float, float]] = {}
-        for k, layer in enumerate(layers):
-            samples = []
-            for region in {each[k].region(body.name) for each in around}:
-                if region not in areas:
-                    areas[region] = region.area, _wide(region, line).area, _wide(region, LINES_WIDE * line).area
-                samples.append(areas[region])
-            low = min(EVEN[0] * wide * dense + UNEVEN[0] * (lined - wide) * dense for _, lined, wide in samples)
-            high = max(EVEN[1] * wide + UNEVEN[1] * (all_ - wide) for all_, _, wide in samples)
-            spare = 2 * line * line * layer.height_mm  # ends of a line or two, and what a neighbour laps over
-            spare += UNEVEN[1] * line * layer.height_mm * max(all_ > 0 and all_ - lined for all_, lined, _ in samples)
-            given = printed[k, n]
-            if not low * layer.height_mm - spare <= given <= high * layer.height_mm + spare:
-                wrong.append((k, given, low * layer.height_mm, high * layer.height_mm))
-        for (_, above), group in groupby(enumerate(wrong), key=lambda p: (p[1][0] - p[0], p[1][1] > p[1][3])):
-            rows = [row for _, row in group]
-            first, last = rows[0][0], rows[-1][0]
-            mine = (lines.body == n) & (lines.layer >= first) & (lines.layer <= last)
-            number = _line(lines.number, mine)[0] if mine.any() else 1
-            where = f"layer {first + 1}" + (f" to {last + 1}" if last > first else "")
-            given, low, high = (sum(row[column] for row in rows) for column in (1, 2, 3))
-            message = f"{body.name} takes {given:.3g} mm3 in {where}; drawn are {low:.3g} to {high:.3g} mm3"
-            advice = "lower the flow" if above else "slice again: lines are missing, too thin, or of another tool"
-            yield Found("volume", "error", number, message, advice, len(rows))
-
-
-def _parts(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Iterator[Found]:
-    """Every part of a body that is at least a line wide is printed."""
-    for n, body in enumerate(design.printed.bodies):
-        infill = design.infill.get(body.material)
-        dense = (100.0 if infill is None or infill.percent is None else infill.percent) / 100
-        missing = []
-        for k, layer in enumerate(layers):
-            region, rows = layer.region(body.name), np.flatnonzero((lines.layer == k) & (lines.body == n))
-            plan = parts(region)
-            others = (parts(_sampled(design, off)[k].region(body.name)) for off in (NEAR_MIDDLE, -NEAR_MIDDLE))
-            if len(plan) < 2 or not len(rows) or any(len(other) != len(plan) for other in others):
-                continue  # or a slicer may see another plan
-            owner = shapely.STRtree(plan).nearest(shapely.points((lines.start_mm + lines.end_mm)[rows] / 2))
-            volume = np.bincount(owner, lines.volume_mm3[rows], len(plan))
-            least = SOME_OF_A_PART * dense * layer.height_mm * shapely.area(plan)
-            lost = np.flatnonzero((narrow_mm(plan) >= design.machine.line_mm()) & (volume < least))
-            missing += (
-                [(k, len(lost), len(plan), plan[lost[0]].centroid, int(lines.number[rows[0]]))] if len(lost) else []
-            )
-        if missing:
-            k, count, of, at, number = missing[0]
-            message = (
-                f"{count} of {of} parts of {body.name} in layer {k + 1} are not printed, the first at x {at.x:.3g}, "
-            )
-            message += f"y {at.y:.3g} mm from the corner"
-            yield Found("volume", "error", number, message, "slice again: lines are missing", len(missing))
 
 
 def _shifts(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Iterator[Found]:
@@ -340,6 +240,26 @@ def _plan(design: Design, layers: Sequence[LayerRegions]) -> shapely.Geometry:
     if design.border or design.geometry:
         return shapely.union_all([region for layer in layers for region in layer.regions.values()])
     return shapely.box(0.0, 0.0, *design.printed.size_mm[:2])
+
+
+def _floating(design: Design, paths: Paths, outside: Mask) -> Iterator[Found]:
+    """Lines beside the piece, as those of a tower, stand on the bed."""
+    rows = np.flatnonzero(outside & (paths.length_mm() > 0))
+    if not len(rows):
+        return
+    group = connected(paths.start_mm[rows, :2], paths.end_mm[rows, :2])
+    order = np.lexsort((paths.end_mm[rows, 2], group))
+    rows, z = rows[order], paths.end_mm[rows, 2][order]
+    starts = np.diff(group[order], prepend=-1) != 0
+    rise = np.where(starts, z, np.diff(z, prepend=0.0))
+    layer_mm = max(design.layers.layer_mm, design.layers.first_layer_mm)
+    jumps = np.cumsum(rise > MOST_LAYERS * layer_mm)
+    air = jumps > np.maximum.accumulate(np.where(starts, jumps - (rise > MOST_LAYERS * layer_mm), 0))
+    if paths.length_mm()[rows[air]].sum() > design.machine.line_mm():
+        row = int(rows[air][0])
+        x, y = paths.end_mm[row, :2]
+        message = f"lines are printed in air at x {x:.4g}, y {y:.4g} mm, beside the sensor"
+        yield Found("clear", "error", int(paths.number[row]), message, "leave them out", int(air.sum()))
 
 
 def _beside(

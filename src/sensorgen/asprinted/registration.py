@@ -1,6 +1,6 @@
 """Where a file of G-code prints a design: by its tools and its size, wherever it stands on the bed."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from sensorgen.export.gcode.paths import Paths, paths_of
 from sensorgen.scene.scene import Point
 
 APART_MM = 1.5  # pieces on a plate are further apart; lines of one piece are nearer
+_CELL_MM, _FAR_MM = APART_MM / 2, 1000.0
 WITHIN_MM = 0.8  # by which a piece may be larger or smaller than the design: walls and seams
 
 
@@ -77,9 +78,8 @@ def pieces(design: Design, motion: Motion) -> list[Placed]:
     model = paths.model()
     mine = np.isin(model.tool, _tools(design))
     low, high = (of(model.start_mm[mine, :2], model.end_mm[mine, :2]) for of in (np.minimum, np.maximum))
-    boxes = [
-        np.array([low[rows].min(0), high[rows].max(0)]) for rows in _pieces(low, high, np.arange(len(low)))
-    ]  # fmt: skip
+    group = connected(model.start_mm[mine, :2], model.end_mm[mine, :2])
+    boxes = [np.array([low[group == k].min(0), high[group == k].max(0)]) for k in np.unique(group).tolist()]
     size = np.array(design.printed.size_mm[:2]) - design.machine.line_mm()  # lines run half a line inside
     off = np.array([[abs(box[1] - box[0] - wanted).max() for wanted in (size, size[::-1])] for box in boxes])
     fits = [bool((each < WITHIN_MM).any()) for each in off]
@@ -122,17 +122,22 @@ def _of_tools(design: Design, motion: Motion) -> Paths:
     )
 
 
-def _pieces(low: Real, high: Real, rows: Whole) -> Iterator[Whole]:
-    """Lines that are no further apart than ``APART_MM``, along x and along y in turn."""
-    for axis in (0, 1):
-        order = rows[np.argsort(low[rows, axis], kind="stable")]
-        reach = np.maximum.accumulate(high[order, axis])
-        cuts = np.flatnonzero(low[order[1:], axis] > reach[:-1] + APART_MM) + 1
-        if len(cuts):
-            for part in np.split(order, cuts):
-                yield from _pieces(low, high, part)
-            return
-    yield rows
+def connected(start_mm: Real, end_mm: Real) -> Whole:
+    """Number of the connected group of each line in plan: lines of a group have no gap of ``APART_MM`` between them."""
+    from scipy import ndimage
+
+    start_mm, end_mm = (np.clip(place, -_FAR_MM, _FAR_MM) for place in (start_mm, end_mm))
+    way = end_mm - start_mm
+    count = np.maximum(np.ceil(np.abs(way).max(1) / _CELL_MM), 1).astype(np.int64) + 1
+    which = np.repeat(np.arange(len(count)), count)
+    share = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)) / (count[which] - 1)
+    cell = np.floor((start_mm[which] + share[:, None] * way[which]) / _CELL_MM).astype(np.int64)
+    cell -= cell.min(0, initial=0)
+    filled = np.zeros(cell.max(0, initial=0) + 1, bool)
+    filled[cell[:, 0], cell[:, 1]] = True
+    label, _ = ndimage.label(filled, np.ones((3, 3)))
+    first = cell[np.cumsum(count) - count]
+    return np.asarray(label[first[:, 0], first[:, 1]])
 
 
 def _turned(paths: Paths) -> Paths:

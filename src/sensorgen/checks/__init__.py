@@ -6,7 +6,7 @@ Rule 7, printed against drawn volume, is estimated here; after slicing it is tak
 from collections.abc import Mapping
 from dataclasses import replace
 
-from sensorgen.checks import bed, bridges, estimate, gap, grid, volumes, widths
+from sensorgen.checks import bed, bridges, estimate, gap, grid, support, volumes, widths
 from sensorgen.checks.slices import Slices
 from sensorgen.core.findings import SEVERITIES, Finding
 from sensorgen.design.printer import Printer, Quality
@@ -15,8 +15,8 @@ from sensorgen.scene.scene import Scene
 # Names of all rules; those from 10 on are about the design's file and about the G-code.
 RULES = (
     "0-body", "0-printer", "1-short", "2-film", "2-printed-gap", "3-grid", "4-unsampled", "5-width", "6-gap",
-    "7-printed", "8-bed", "9-bridge", "10-film", "10-waiver", "11-crossing", "11-overlap", "11-profile", "11-repaired",
-    "11-size", "11-surface", "12-numbers", "13-gcode",
+    "7-printed", "8-bed", "9-bridge", "9-support", "10-film", "10-waiver", "11-crossing", "11-overlap", "11-profile",
+    "11-repaired", "11-size", "11-surface", "12-numbers", "13-gcode",
 )  # fmt: skip
 
 
@@ -44,13 +44,15 @@ def findings(
         Material to its lines; solid ones of the printer's width if not given.
     """
     slices = Slices(scene, quality)
-    printed = volumes.findings(volumes.rows(scene, estimate.layers(scene, printer, quality, walls, laid)), scene)
+    layers = estimate.layers(scene, printer, quality, walls, laid)
+    printed = volumes.findings(volumes.rows(scene, layers), scene)
     found = [
         *gap.check(slices, printer, quality, gap_mm),
         *grid.check(scene, slices.layers),
         *widths.check(slices, printer),
         *bed.check(scene, printer),
         *bridges.check(slices, printer, quality),
+        *support.findings(layers, printer.line_mm()),
         *(f for f in printed if f.severity == "error"),  # rules 4 and 5 have its warnings
     ]
     # The same finding in layer after layer becomes one, from the first layer to the last

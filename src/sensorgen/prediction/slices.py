@@ -174,7 +174,7 @@ def slice_now(
     printed = asprinted.nominal(design, made.lines, f"{made.slicer} {made.version}")
     checked = check_motion(made.lifted.motion, printer, loaded, others_empty=True, texts=design.own).with_more(
         agreement.check(
-            design, made.lines, made.lifted.motion.changes, printer.bed_centre_mm(), alone=True, lines=printed.lines
+            design, made.lines, made.lifted.motion, printer.bed_centre_mm(), alone=True, lines=printed.lines
         )
     )
     findings, box = printed.findings(), None

@@ -119,8 +119,10 @@ class _Simulation:
         if code in self.control.ends and not self.ended:
             self.ended, self.end_line = str(event.command), event.number
         if code in PAUSES:
-            message = f"{code} waits until somebody goes on"
-            self.found.append(Found("pause", "info", event.number, message, "be there, or leave it out"))
+            amid = len(self.lines) and self.lines[0] < event.row <= self.lines[-1]
+            message = f"{code} waits until somebody goes on" + (", with the nozzle at the part" if amid else "")
+            severity = "error" if amid else "info"
+            self.found.append(Found("pause", severity, event.number, message, "be there, or leave it out"))
         self.heaters.obey(event, self.tool)
         self._modes(event)
         self._machine(event)
@@ -134,8 +136,11 @@ class _Simulation:
     def _take(self, change: Change) -> None:
         if change.tool != NO_TOOL:
             self.heaters.check_tool(change.number, change.tool, "is taken")
-        last, self.last, self.tool = self.last, change, change.tool
-        self.heaters.take(change.tool, waits=change.macro or bool(self.turning and self.turning.waits))
+        last, self.last = self.last, change
+        if change.tool != self.tool:
+            self.heaters.put_down(self.tool)
+        self.tool = change.tool
+        self.heaters.take(change.tool, change.number, waits=change.macro or bool(self.turning and self.turning.waits))
         twice = last and (last.tool, last.macro) == (change.tool, not change.macro) and last.number != change.number
         if last and twice and not self._first(self.prints, last.row, change.row):
             message = f"tool {change.tool} is taken twice, by T and by its macro: the macro takes it itself"

@@ -197,7 +197,7 @@ def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> 
     """
     text = text_of(source)
     motion = follow(text, machine.control.prime_macro)
-    found, retracted = crossings(motion, machine, numbering), _retracted(motion, machine)
+    found, drawn = crossings(motion, machine, numbering), retracted(motion, machine)
     before = summed(motion, found, machine)
     if not len(found.travel.row):
         return Lifted(text, motion, found, found, Lifting(before, before, 0, 0, 0.0))
@@ -207,7 +207,7 @@ def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> 
             f"line {odd.number}: {odd.command.code}; travel is lifted in files with absolute places in mm alone: slice "
             "with G90 and G21"
         )
-    writer = _Lifts(text, motion, machine, found, retracted)
+    writer = _Lifts(text, motion, machine, found, drawn)
     lifted = writer.text()
     again = follow(lifted, machine.control.prime_macro)
     rubbing_mm = found.rubbing_mm[motion.extruded_mm > 0]  # its lines are the same, and in the same order
@@ -220,7 +220,7 @@ def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> 
 
 def summed(motion: Motion, found: Crossings, machine: Printer) -> Drags:
     """Sums by tool, and by tool and layer."""
-    points, count, retracted = found.travel, len(motion.rows), _retracted(motion, machine)
+    points, count, drawn = found.travel, len(motion.rows), retracted(motion, machine)
     touches = points.gap_mm <= CONTACT_MM
     contact, near = (
         np.bincount(points.row[rows], points.length_mm[rows], minlength=count) for rows in (touches, ~touches)
@@ -231,7 +231,7 @@ def summed(motion: Motion, found: Crossings, machine: Printer) -> Drags:
     for tool in np.unique(found.tool[(contact + near + found.rubbing_mm) > 0]).tolist():
         mine = found.tool == tool
         whole = np.bincount(stretch[mine], (contact + near)[mine]) > COUNTED_MM
-        bare = np.bincount(stretch[mine], ((contact + near) * ~retracted)[mine]) > COUNTED_MM
+        bare = np.bincount(stretch[mine], ((contact + near) * ~drawn)[mine]) > COUNTED_MM
         sums = [float(v[mine].sum()) for v in (contact, near, found.rubbing_mm)]
         tools.append(OfTool(tool, sums[0], sums[1], int(whole.sum()), int(bare.sum()), sums[2]))
     keys = np.column_stack([np.round(points.place_mm[:, 2], 2), found.tool[points.row]])
@@ -244,8 +244,8 @@ def summed(motion: Motion, found: Crossings, machine: Printer) -> Drags:
     return Drags(tuple(tools), tuple(layers))
 
 
-def _habits(motion: Motion) -> dict[float, tuple[float, float]]:
-    """Of each tool of the file: the length of its usual retraction [mm], and its feed [mm/min]."""
+def habits(motion: Motion) -> dict[float, tuple[float, float]]:
+    """Length of the usual retraction of each tool of the file [mm], and its feed [mm/min]."""
     tools, found = motion.tools.column(len(motion.rows), -1.0), {}
     drawn = (motion.filament_mm < 0) & (motion.across_mm == 0)
     for tool in np.unique(tools[drawn]).tolist():
@@ -258,15 +258,15 @@ def _habits(motion: Motion) -> dict[float, tuple[float, float]]:
     return found
 
 
-def _retracted(motion: Motion, machine: Printer) -> Mask:
-    """Whether the filament is drawn back while each move is made."""
+def retracted(motion: Motion, machine: Printer) -> Mask:
+    """Moves during which the filament is drawn back."""
     count = len(motion.rows)
     tools, found = motion.tools.column(count, -1.0), np.zeros(count, bool)
     owed = motion.extruded_mm - motion.filament_mm
-    habits = _habits(motion)
+    usual = habits(motion)
     for tool in np.unique(tools).tolist():
         mine = tools == tool
-        found[mine] = np.cumsum(owed[mine]) > _RETRACTED * habits.get(tool, (np.inf, 0.0))[0]
+        found[mine] = np.cumsum(owed[mine]) > _RETRACTED * usual.get(tool, (np.inf, 0.0))[0]
     if machine.control.firmware_retraction:  # G10 without temperatures or places, until G11
         for event in motion.events:
             if event.command.code == "G11" or (event.command.code == "G10" and not event.command.has("PSRLXYZ")):
@@ -277,10 +277,10 @@ def _retracted(motion: Motion, machine: Printer) -> Mask:
 class _Lifts:
     """A file in lines, and what is written between them."""
 
-    def __init__(self, text: bytes, motion: Motion, machine: Printer, found: Crossings, retracted: Mask) -> None:
+    def __init__(self, text: bytes, motion: Motion, machine: Printer, found: Crossings, drawn: Mask) -> None:
         self.lines, self.motion, self.machine, self.found = text.split(b"\n"), motion, machine, found
-        self.retracted, self.number = retracted, motion.number
-        self.habits, self.tools = _habits(motion), motion.tools.column(len(motion.rows), -1.0)
+        self.retracted, self.number = drawn, motion.number
+        self.habits, self.tools = habits(motion), motion.tools.column(len(motion.rows), -1.0)
         self.relative_e = motion.absolute_e.column(len(motion.rows), 1.0) == 0
         self.lifts = self.retractions = 0
 

@@ -11,6 +11,7 @@ from sensorgen.export.gcode.moves import Event
 
 WITHIN_C = 15.0  # slicers raise a temperature by less after the first layer without waiting
 BED_WITHIN_C = 15.0  # sources that give the bed one temperature differ by as much: 60 to 75 C for the same TPU
+STANDBY_BELOW_C = 10.0  # of a tool that waits, below the temperature at which it prints
 _NAMED = {"G10": "is set", "M116": "is waited for", "M568": "gets a state"}  # what happens to a tool that P names
 
 
@@ -21,6 +22,8 @@ class Heat:
     active_c: float = 0.0
     standby_c: float = 0.0
     on: bool = True
+    stated: bool = False  # a standby temperature was given
+    rests_c: float | None = None  # standby temperature with which it was put down
     awaited_c: float = 0.0  # no hotter than this it is known to be
     rested: bool = False  # in the turret at its standby temperature, and not waited for since
 
@@ -35,9 +38,24 @@ class Heaters:
         self.tools = {tool: Heat() for tool in machine.tool_numbers}
         self.bed = Heat()
 
-    def take(self, tool: int, *, waits: bool) -> None:
+    def put_down(self, tool: int) -> None:
+        """A tool goes to the turret."""
+        if tool in self.tools:
+            self.tools[tool].rests_c = self.tools[tool].standby_c if self.tools[tool].stated else None
+
+    def _check_rest(self, tool: int, number: int) -> None:
+        """A tool that prints again has waited neither cold nor oozing."""
+        heat, control = self.tools[tool], self.machine.control
+        low_c, high_c = control.coldest_c, heat.active_c - STANDBY_BELOW_C
+        if control.standby_c is not None and heat.rests_c is not None and not low_c <= heat.rests_c <= high_c:
+            message = f"tool {tool} has waited at {heat.rests_c:g} C between its lines"
+            advice = f"keep it at {low_c:g} to {high_c:g} C (G10 P{tool} R..)"
+            self.found.error("standby", number, message, advice)
+
+    def take(self, tool: int, number: int, *, waits: bool) -> None:
         """A tool is taken, by a macro that ``waits`` for its heat or not; it goes on, also where it was off before."""
         if tool in self.tools:
+            self._check_rest(tool, number)
             heat = self.tools[tool]
             heat.on, heat.rested = True, self.machine.control.names_tools and heat.standby_c < heat.active_c
             if waits:
@@ -123,6 +141,7 @@ class Heaters:
             heat, active_c, standby_c = self.tools[int(tool)], command.number("S"), command.number("R")
             heat.active_c = heat.active_c if active_c is None or isnan(active_c) else active_c
             heat.standby_c = heat.standby_c if standby_c is None or isnan(standby_c) else standby_c
+            heat.stated |= standby_c is not None
             heat.awaited_c = min(heat.awaited_c, heat.active_c)
             if command.code == "M109":
                 _wait(heat)

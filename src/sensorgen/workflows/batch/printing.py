@@ -83,7 +83,7 @@ def gcode(
     checked = check_motion(made.lifted.motion, machine, loaded, others_empty=True, texts=texts(p.design for p in found))
     for piece in found:
         checked = checked.with_more(
-            agreement.check(piece.design, made.lines, made.lifted.motion.changes, piece.sensor_mm(), piece=piece.name)
+            agreement.check(piece.design, made.lines, made.lifted.motion, piece.sensor_mm(), piece=piece.name)
         )
     if checked.errors():
         ready = ready.replace(ready.with_suffix(".refused.gcode"))
