@@ -275,10 +275,15 @@ def test_a_printers_file_changes_the_list(line):
     assert "command" in errors(OWN.splitlines(), none)
 
 
+def test_a_pause_between_printed_lines_is_refused_and_one_before_them_is_told():
+    assert "pause" in errors(changed(OWN, "T4", "T4\nM226"))
+    assert ("pause", "info") in found(changed(OWN, "M116", "M25"))
+
+
 @pytest.mark.parametrize(
     ("line", "rule", "severity"),
     [
-        ("M290 S0.05 R0", "height", "warning"), ("M290 S0", "height", "warning"), ("M226", "pause", "info"),
+        ("M290 S0.05 R0", "height", "warning"), ("M290 S0", "height", "warning"),
     ],
 )  # fmt: skip
 def test_what_may_be_meant_is_told(line, rule, severity):

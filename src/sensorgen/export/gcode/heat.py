@@ -47,6 +47,8 @@ class Heaters:
         """A tool that prints again has waited neither cold nor oozing."""
         heat, control = self.tools[tool], self.machine.control
         low_c, high_c = control.coldest_c, heat.active_c - STANDBY_BELOW_C
+        if tool not in self.materials:
+            return  # the maker's own files have waited as hot as they print
         if control.standby_c is not None and heat.rests_c is not None and not low_c <= heat.rests_c <= high_c:
             message = f"tool {tool} has waited at {heat.rests_c:g} C between its lines"
             advice = f"keep it at {low_c:g} to {high_c:g} C (G10 P{tool} R..)"
