@@ -9,7 +9,7 @@ from typing import Any
 
 from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
 from sensorgen.design.design import Design, make, with_own_files
-from sensorgen.workflows.compensation import levels
+from sensorgen.workflows.moves import levels
 from sensorgen.workflows.optimise.target import Range, Target
 
 MOST = 20_000  # designs: their checks alone take half an hour on two cores
