@@ -336,7 +336,8 @@ def _errors(case: Case, fine: "Pressed", coarse: "Pressed", level: int) -> Estim
     small = _AT_APEX * (apex / np.where(down > 0, down, np.inf)) ** _AT_APEX_POWER
     area = _area_error(case.model)
     safety = SAFETY
-    if case.model == "press2d" and not (fine.apex_m and level != USUAL):
+    plans = {(p.span("x"), p.span("y")) for body in case.piece.scene.bodies for p in body.pieces}
+    if case.model == "press2d" and len(plans) > 1 and not (fine.apex_m and level != USUAL):
         safety = _SHARP if fine.apex_m else _BLUNT
     least = max(safety / SAFETY * (_expected(case, level) - area), VERIFIED) * (1 + small)
     moved = np.maximum(index[0], _OF_DISPLACEMENT * least * down) + area * down
