@@ -40,7 +40,7 @@ _STEP_MM = 0.2  # along lines, to look below them
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class LayerRaster:
     """One layer as rasters.
 
     Attributes
@@ -101,16 +101,16 @@ def check(design: Design, lines: Beads) -> Iterator[Found]:
     if not len(lines.number):
         return  # the heights say why
     faults, below = [*_volumes(design, lines)], None
-    for sheet in sheets(design, lines):
+    for raster in rasters(design, lines):
         for rule in (_holes, _piles, _foreign, _local):
-            faults += rule(design, sheet)
+            faults += rule(design, raster)
         if below is not None:
-            faults += _unsupported(design, sheet, below)
-        below = sheet.total
+            faults += _unsupported(design, raster, below)
+        below = raster.total
     yield from _merged(faults)
 
 
-def sheets(design: Design, lines: Beads) -> Iterator[Sheet]:
+def rasters(design: Design, lines: Beads) -> Iterator[LayerRaster]:
     """Layers of a piece as rasters, from the bed up."""
     scene = design.printed
     shape = tuple(int(np.ceil(size / PITCH_MM)) + 2 * _MARGIN for size in scene.size_mm[:2])
@@ -128,7 +128,7 @@ def sheets(design: Design, lines: Beads) -> Iterator[Sheet]:
         printed = {tool: deposit(here.of(here.tool == tool), shape) for tool in names}
         shown = {tool: tuple(known[way] for way in some) for tool, some in ways.items()}
         several = any(len(parts(region)) > 1 for region in layer.regions.values())
-        yield Sheet(k, here, printed, shown, bool(layer.along) and several)
+        yield LayerRaster(k, here, printed, shown, bool(layer.along) and several)
 
 
 def _ways(around: Sequence[LayerRegions], names: Sequence[str], line_mm: float) -> Iterator[tuple[Region, ...]]:
@@ -231,53 +231,53 @@ def _sparse(design: Design) -> float:
     return min(each.infill for each in estimate.lines(design).values())
 
 
-def _holes(design: Design, sheet: Sheet) -> Iterator[Disagreement]:
+def _holes(design: Design, raster: LayerRaster) -> Iterator[Disagreement]:
     """Places inside the drawing that stay open; sparse infill is open by itself."""
     line = design.machine.line_mm()
     if _sparse(design) < 1:
         return
-    plan = sum(np.min(each, axis=0) for each in sheet.drawn.values())
-    open_ = _inside(np.asarray(plan) > 1 - _OPEN / 4, 0.8 * line) & (_mean(sheet.total, 1.1 * line) < _OPEN)
+    plan = sum(np.min(each, axis=0) for each in raster.drawn.values())
+    open_ = _inside(np.asarray(plan) > 1 - _OPEN / 4, 0.8 * line) & (_mean(raster.total, 1.1 * line) < _OPEN)
     area, at = _largest(open_)
     if area > _HOLE_LINES * line**2:
         size = area + line * np.sqrt(area)  # the window leaves half a line at each side out
         message = f"a hole of about {size:.2g} mm2"
-        yield Disagreement("hole", "", sheet.number, size, message, at, _line_at(sheet.lines, at))
+        yield Disagreement("hole", "", raster.number, size, message, at, _line_at(raster.lines, at))
 
 
-def _piles(design: Design, sheet: Sheet) -> Iterator[Disagreement]:
+def _piles(design: Design, raster: LayerRaster) -> Iterator[Disagreement]:
     """Lines upon each other in one layer."""
     line = design.machine.line_mm()
-    area, at = _largest(_mean(sheet.total, 1.1 * line) > _PILED)
+    area, at = _largest(_mean(raster.total, 1.1 * line) > _PILED)
     if area > _PILE_LINES * line**2:
         message = f"lines lie upon each other on {area:.2g} mm2"
-        yield Disagreement("pile", "", sheet.number, area, message, at, _line_at(sheet.lines, at))
+        yield Disagreement("pile", "", raster.number, area, message, at, _line_at(raster.lines, at))
 
 
-def _foreign(design: Design, sheet: Sheet) -> Iterator[Disagreement]:
+def _foreign(design: Design, raster: LayerRaster) -> Iterator[Disagreement]:
     """Material further than a line from where its tool's material is drawn."""
     from scipy import ndimage
 
     line = design.machine.line_mm()
-    for tool, printed in sheet.printed.items():
-        near = ndimage.maximum_filter(np.max(sheet.drawn[tool], axis=0), 2 * round(line / PITCH_MM) + 1)
+    for tool, printed in raster.printed.items():
+        near = ndimage.maximum_filter(np.max(raster.drawn[tool], axis=0), 2 * round(line / PITCH_MM) + 1)
         stray = np.where(near < _OPEN / 4, printed, 0.0)
         area = float(stray.sum()) * PITCH_MM**2
         if area > _FOREIGN_LINES * line**2:
             _, at = _largest(stray > 0)
             share = float(stray.sum() / printed.sum())
             message = f"tool {tool} prints {area:.2g} mm2 ({share:.0%} of its lines) where its material is not drawn"
-            own = sheet.lines.of(sheet.lines.tool == tool)
-            yield Disagreement("material", f"{tool}", sheet.number, area, message, at, _line_at(own, at))
+            own = raster.lines.of(raster.lines.tool == tool)
+            yield Disagreement("material", f"{tool}", raster.number, area, message, at, _line_at(own, at))
 
 
-def _local(design: Design, sheet: Sheet) -> Iterator[Disagreement]:
+def _local(design: Design, raster: LayerRaster) -> Iterator[Disagreement]:
     """A tool's deposit is spread as the drawing is; how much it is in all is another rule's."""
     sparse, line = _sparse(design), design.machine.line_mm()
-    for tool, printed in sheet.printed.items():
-        for lines, least, most in _STRIPS if sheet.strips else _LOCAL:
+    for tool, printed in raster.printed.items():
+        for lines, least, most in _STRIPS if raster.strips else _LOCAL:
             window, off = lines * line / sparse, []
-            for plan in sheet.drawn[tool]:
+            for plan in raster.drawn[tool]:
                 ratio = float(printed.sum() / max(float(plan.sum()), 1.0))
                 off.append(_mean(printed - ratio * plan, window))
             worst = min(off, key=lambda each: float(np.ptp(each)))
@@ -285,21 +285,21 @@ def _local(design: Design, sheet: Sheet) -> Iterator[Disagreement]:
                 if wrong.any():
                     area, at = _largest(wrong)
                     material = f"tool {tool}: material {what} over {max(area, window**2):.2g} mm2"
-                    own = sheet.lines.of(sheet.lines.tool == tool)
-                    yield Disagreement("spread", f"{tool}{what}", sheet.number, area, material, at, _line_at(own, at))
+                    own = raster.lines.of(raster.lines.tool == tool)
+                    yield Disagreement("spread", f"{tool}{what}", raster.number, area, material, at, _line_at(own, at))
 
 
-def _unsupported(design: Design, sheet: Sheet, below: Real) -> Iterator[Disagreement]:
+def _unsupported(design: Design, raster: LayerRaster, below: Real) -> Iterator[Disagreement]:
     """A tool prints most of its lines of a layer over nothing: length and share."""
-    for tool in sheet.printed:
-        own = sheet.lines.of(sheet.lines.tool == tool)
+    for tool in raster.printed:
+        own = raster.lines.of(raster.lines.tool == tool)
         open_mm, length_mm = _over_nothing(own, below)
         if length_mm > 0 and open_mm > _ALONE * length_mm:
             middle = (own.start_mm + own.end_mm).mean(0) / 2
             names = sorted({design.printed.bodies[body].name for body in own.body.tolist()})
             message = f"{open_mm:.0f} mm of {', '.join(names)} ({open_mm / length_mm:.0%}) lie over an empty layer"
             at = (round(float(middle[0]), 2), round(float(middle[1]), 2))
-            yield Disagreement("support", f"{tool}", sheet.number, open_mm, message, at, int(own.number.min()))
+            yield Disagreement("support", f"{tool}", raster.number, open_mm, message, at, int(own.number.min()))
 
 
 def _over_nothing(lines: Beads, below: Real) -> tuple[float, float]:

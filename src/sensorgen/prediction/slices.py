@@ -235,7 +235,7 @@ def at_hand(
     decides = slicer or deciding()
     if decides == NONE:
         return None, "no slicer installed" if not slicer and not os.environ.get(VARIABLE) else ""
-    if any(not f.waiver for f in design.waived(list(bed.check(design.printed, design.machine)))):
+    if not _fits(design):
         return None, "it does not fit the bed"
     try:
         return _sliced(design, decides, find(*PROGRAMS[decides], program), step), ""
@@ -243,6 +243,11 @@ def at_hand(
         if slicer:
             raise
         return None, str(error)
+
+
+def _fits(design: Design) -> bool:
+    """Truth of that a design fits the bed, or is said to."""
+    return all(f.waiver for f in design.waived(list(bed.check(design.printed, design.machine))))
 
 
 def _sliced(design: Design, slicer: str, program: str, step: Step) -> PrintFile:
