@@ -1,22 +1,29 @@
 """Through-holes of films: planted ones, percolation, closed forms, and the probability of a short."""
 
+import csv
+from collections import Counter
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
+from scipy import ndimage
+from scipy.special import gammaln
 from scipy.stats import beta
 
-from sensorgen.analysis.shorts import chance, risk, verdicts
+from sensorgen.analysis.shorts import chance, elsewhere, risk, series, verdicts
 from sensorgen.asprinted.beads import Beads
 from sensorgen.asprinted.pinholes import Film, draws, findings, opened, pinholes, through
 from sensorgen.design.design import make
 from sensorgen.export.gcode import paths
-from sensorgen.measure.log import Log
+from sensorgen.measure.log import Log, importing
 from sensorgen.measure.log.entries import Reading
 
 PLAN = shapely.box(0, 0, 10, 10)
+JEFFREYS = beta(0.5, 0.5).ppf((np.arange(200) + 0.5) / 200)
 
 
 def lines(spacing, width, height=0.1, along_x=True, left_out=()):
@@ -141,18 +148,60 @@ def test_draws_repeat_and_differ():
     assert draws(two, 3).tolist() == draws(two, 3).tolist()
 
 
+def joined(sign, inset_mm=0.3):
+    """A layer of a wall and of infill at 45 degrees that ends on it: lines 0.4 mm wide."""
+    wall, inner = shapely.box(0.2, 0.2, 9.8, 9.8), shapely.box(inset_mm, inset_mm, 10 - inset_mm, 10 - inset_mm)
+    corners = np.array(wall.exterior.coords)
+    ways = [(5 + at - 20, 5 - 20 * sign, 5 + at + 20, 5 + 20 * sign) for at in np.arange(-10, 10, 0.4 * np.sqrt(2))]
+    infill = [shapely.intersection(shapely.LineString([way[:2], way[2:]]), inner) for way in ways]
+    ends = np.array([*pairwise(corners), *(way.coords for way in infill if way.length > 0.1)])
+    none, ones = np.zeros(len(ends), np.int64), np.ones(len(ends))
+    width = ones * (0.4 - (1 - np.pi / 4) * 0.1)
+    return Beads(ends[:, 0], ends[:, 1], width, ones * 0.1, ones, none, none, none, none)
+
+
+def rastered(two, count, cell_mm=0.01):
+    """Holes of random prints, counted on a raster by the distance to lines: shares no code with ``draws``."""
+    rng, counts, x = np.random.default_rng(1), [], np.arange(cell_mm / 2, 10, cell_mm)
+    for _ in range(count):
+        unfilled = np.ones((len(x), len(x)), bool)
+        for layer in two.lines:
+            shift, half = rng.uniform(-0.05, 0.05, 2), 0.2 * rng.uniform(0.95, 1.05)
+            filled = np.zeros_like(unfilled)
+            for start, end in zip(layer.start_mm + shift, layer.end_mm + shift, strict=True):
+                i, j = np.searchsorted(x, np.minimum(start, end) - half)
+                m, n = np.searchsorted(x, np.maximum(start, end) + half)
+                px, py, (ux, uy) = x[i:m, None] - start[0], x[None, j:n] - start[1], end - start
+                t = ((px * ux + py * uy) / (ux**2 + uy**2)).clip(0, 1)
+                filled[i:m, j:n] |= (px - t * ux) ** 2 + (py - t * uy) ** 2 < half**2
+            unfilled &= ~filled
+        label, _ = ndimage.label(unfilled)
+        counts.append(int((np.bincount(label.ravel())[1:] * cell_mm**2 > 4.5e-4).sum()))
+    return np.array(counts)
+
+
+def test_holes_of_random_prints_are_as_many_as_on_a_raster():
+    """Four corners of a wall are open; 530 crossings of slits at most 0.02 mm wide are no holes."""
+    two = film(joined(1), joined(-1))
+    drawn, counted = draws(two, 16), rastered(two, 8)
+    assert (np.median(drawn), np.median(counted)) == pytest.approx((3, 3), abs=0.5)
+    assert np.quantile(drawn, 0.9) == np.quantile(counted, 0.9) == 4
+
+
 def test_without_holes_the_posterior_is_a_beta_distribution():
     for shorted, prints in ((0, 0), (0, 5), (3, 4), (29, 32)):
         exact = beta(0.5 + shorted, 0.5 + prints - shorted)
-        found = chance([0.0], shorted, prints)
+        found = chance([0.0], JEFFREYS, shorted, prints)
         assert found.mean == pytest.approx(exact.mean(), abs=0.005)
         assert (found.low, found.high) == pytest.approx((exact.ppf(0.05), exact.ppf(0.95)), abs=0.015)
 
 
 def test_holes_raise_the_probability_and_intact_prints_lower_it():
-    assert chance([20.0], 0, 0).mean > chance([1.0], 0, 0).mean > chance([0.0], 0, 0).mean
-    assert chance([20.0], 0, 10).high < 0.27
-    assert chance([0.0], 10, 10).low > 0.75
+    assert [chance([holes], JEFFREYS, 0, 0).mean for holes in (20.0, 1.0, 0.0)] == pytest.approx(
+        [1 - 0.5 * np.mean((1 - JEFFREYS) ** holes) for holes in (20.0, 1.0, 0.0)]
+    )
+    assert chance([20.0], JEFFREYS, 0, 10).high < 0.27
+    assert chance([0.0], JEFFREYS, 10, 10).low > 0.75
 
 
 def test_the_interval_covers_the_truth_as_often_as_it_says():
@@ -160,9 +209,82 @@ def test_the_interval_covers_the_truth_as_often_as_it_says():
     truths = rng.beta(0.5, 0.5, 200)
     hits = 0
     for truth in truths:
-        found = chance([0.0], int(rng.binomial(12, truth)), 12)
+        found = chance([0.0], JEFFREYS, int(rng.binomial(12, truth)), 12)
         hits += found.low <= truth <= found.high
     assert 0.84 < hits / 200 < 0.96
+
+
+def moment(shorted, failed, power, mean, alike):
+    """E[p^(shorted + power) (1 - p^power)^failed] of one shape's counts by layers, p by Beta(mean alike, ...)."""
+    a = mean * alike
+    terms = [(sum(k * power(n) for n, k in shorted.items()), 1)]
+    for n, count in failed.items():
+        for _ in range(count):
+            terms += [(t + power(n), -sign) for t, sign in terms]
+    return lambda more: sum(
+        sign * np.exp(gammaln(a + t + more) - gammaln(a) + gammaln(alike) - gammaln(alike + t + more))
+        for t, sign in terms
+    )
+
+
+def integrated(table, shape, layers):
+    """Mean and standard deviation of r by midpoints over m, k and g; p is integrated in closed form."""
+    middle = (np.arange(60) + 0.5) / 60
+    mean, pooled, together = np.meshgrid(middle, middle, middle, indexing="ij")
+    alike = pooled / (1 - pooled)
+    weight, wanted = 1.0, None
+    for each in sorted({shape, *(s for s, _, _ in table)}):
+        shorted, failed = ({n: k for (s, n, low), k in table.items() if s == each and low == yes} for yes in (1, 0))
+        of = moment(shorted, failed, lambda n: n**together, mean, alike)
+        weight, wanted = (weight, of) if each == shape else (weight * of(0.0), wanted)
+    base, first, second = ((weight * wanted(k * layers**together)).sum() for k in (0, 1, 2))
+    return first / base, np.sqrt(second / base - (first / base) ** 2)
+
+
+@cache
+def table_d1():
+    """Series 23 by shape, layers and whether R_Z is below ten times R_Y, from the table that was parsed by hand."""
+    found = Counter()
+    with (Path(__file__).parents[1] / "reference" / "table_d1.csv").open() as text:
+        for row in csv.DictReader(text):
+            if row["iteration"] == "23" and row["ry_ohm"] and row["rz_ohm"]:
+                least = [min(map(float, row[name].split(";"))) for name in ("ry_ohm", "rz_ohm")]
+                layers = round(float(row["film_mm"]) / (0.06 if row["slicing"] == "extrafine" else 0.1))
+                found[row["shape"], layers, int(least[1] <= 10 * least[0])] += 1
+    return found
+
+
+def test_series_23_is_that_of_the_table_parsed_by_hand():
+    signed = Counter()
+    for (shape, layers), (shorted, prints) in series().items():
+        signed += Counter({(shape, layers, 1): shorted, (shape, layers, 0): prints - shorted})
+    assert signed == table_d1()
+    assert sum(series()[key][0] for key in series()) == 48
+
+
+@pytest.mark.parametrize(
+    ("shape", "layers"), [("tri", 2), ("rect", 1), ("rect", 6), ("reference", 1), ("reference", 6)]
+)
+def test_the_rate_of_other_shorts_is_that_of_an_integration(shape, layers):
+    values = elsewhere(shape, [layers])
+    assert (values.mean(), values.std()) == pytest.approx(integrated(table_d1(), shape, layers), abs=0.012)
+
+
+def test_six_layers_are_below_a_fifth_if_prints_show_that_layers_help():
+    """A hundred prints each: 4 in 5 shorted with one layer, 16 in 25 with two, 8 in 20 with four."""
+    assert elsewhere("reference", [6]).mean() > 0.2  # series 23: two layers shorted as often as one
+    helped = {("rect", 1): (80, 100), ("rect", 2): (64, 100), ("rect", 4): (40, 100)}
+    assert 0.2 < elsewhere("rect", [6], helped).mean() < 0.32
+    assert elsewhere("rect", [6], {("rect", 1): (20, 100), ("rect", 2): (4, 100)}).mean() < 0.05
+    two = elsewhere("rect", [2, 2], helped).mean()
+    assert elsewhere("rect", [2], helped).mean() < two < 2 * elsewhere("rect", [2], helped).mean()
+
+
+def test_a_log_of_the_same_table_does_not_count_twice(tmp_path):
+    with Log(tmp_path / "log.db", create=True) as log:
+        importing.thesis(log)
+        assert verdicts(log, make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}})) == (0, 0)
+        assert verdicts(log, make({"shape": "rect", "parameters": {"dielectric_mm": 0.0}}))[1] > 0  # of other series
 
 
 def test_the_logs_verdicts_are_those_of_the_same_shape_and_film(tmp_path):
@@ -182,8 +304,9 @@ def test_the_logs_verdicts_are_those_of_the_same_shape_and_film(tmp_path):
         assert verdicts(log, design) == (2, 3)
         found, figure = risk(design, text, log)
     assert (found.shorted, found.prints) == (2, 3)
-    assert found.posterior.high - found.posterior.low < found.prior.high - found.prior.low
+    assert found.posterior.mean < found.prior.mean  # fewer than in series 23
     said = "\n".join(str(part) for part in found.document())
     assert "yield" not in said
     assert "2 of 3 prints" in said
+    assert "11 of 13 with 1, 17 of 18 with 2" in said
     assert len(figure.choices[""]) == 1

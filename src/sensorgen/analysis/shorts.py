@@ -3,13 +3,16 @@ r"""Probability that a print of a design is shorted or leaking, from the holes o
 .. math:: P = 1 - (1 - r) \\, \\langle (1 - q)^N \\rangle
 
 N is the number of through-holes in the model of round lines, averaged over prints whose layers differ in width by up to
-5 % and are shifted by up to 0.05 mm; q, that a hole conducts; r, that a print is shorted by anything else. Nothing is
-known of q and r but what the log says: both have Jeffreys' prior, Beta(1/2, 1/2), and are updated by the prints of the
-same shape and film. Holes are taken to conduct independently of each other. Without prints the result is the prior.
+5 % and are shifted by up to 0.05 mm; q, that a hole conducts, with Jeffreys' prior, Beta(1/2, 1/2); r, that a print is
+shorted by anything else, with the prior of :func:`elsewhere`, from the prints of series 23. Their G-code is unknown, so
+that r counts their holes, too. Both are updated by the log's prints of the same shape and film, without those of Table
+D.1. Holes are taken to conduct independently of each other. Without prints the result is the prior.
 """
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import shapely
@@ -22,15 +25,25 @@ from sensorgen.asprinted.registration import placed
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import Design
+from sensorgen.design.printer import load_quality
+from sensorgen.design.specimen_name import QUALITIES
 from sensorgen.export.gcode.files import Source
 from sensorgen.measure.log import Log
+from sensorgen.measure.log.entries import Reading
+from sensorgen.measure.log.tables import thesis
 from sensorgen.measure.signal.verdicts import ORDER
 
 CREDIBLE = 0.9  # share of the posterior inside the interval
 DRAWS = 16
+SERIES = 23  # of Table D.1, whose prints give the prior of r
+_RATES, _SEED = 200_000, 23  # draws of rates from their prior
 _GRID = 200  # values of q and of r, of equal prior probability
 _CELL_MM = 0.5  # of the picture
 _PICTURED = 0.95  # width of lines in the picture, of what the file says
+
+
+Counts = Mapping[tuple[str, int], tuple[int, int]]
+"""Prints that are shorted or leaking, and all with both resistances, by shape and layers of the film."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +64,8 @@ class FilmRisk(Pinholes):
     holes_low, holes_high : float
         Least and most through-holes of the drawn prints [-].
     shorted, prints : int
-        Specimens of this shape and film in the log that are shorted or leaking, and all with both resistances [-].
+        Specimens of this shape and film in the log that are shorted or leaking, and all with both resistances, without
+        those of Table D.1 [-].
     prior, posterior : Chance
         Before and after the log.
     """
@@ -68,14 +82,26 @@ class FilmRisk(Pinholes):
         yield from super().document()
         said = (
             f"{self.shorted} of {self.prints} prints of this shape and film in the log are shorted or leaking"
-            if self.prints else "no print of this shape and film: from the assumptions alone, not from prints"
+            if self.prints else f"no print of this shape and film: from holes and series {SERIES}"
         )  # fmt: skip
         assumed = (
             f"{self.holes_low:g} to {self.holes_high:g} holes at widths within 5 % and layers within 0.05 mm; "
-            "each conducts with one unknown probability, independently; so does anything else"
+            "each conducts with one unknown probability, independently; anything else as in series 23, by shape and "
+            "layers, which fail together or one by one"
         )
-        before = _words(self.prior)
-        yield Facts((("P(short)", f"{_words(self.posterior)}; {said}"), ("before", before), ("assumed", assumed)))
+        by_layers, every = Counter[int](), Counter[int]()
+        for (_, layers), (yes, total) in series().items():
+            by_layers[layers] += yes
+            every[layers] += total
+        shares = ", ".join(f"{by_layers[n]} of {every[n]} with {n}" for n in sorted(every))
+        known = (
+            f"shorted or leaking, by layers of the film: {shares}. More layers are not shown to help; no print had "
+            f"more than {max(every)}"
+        )
+        yield Facts((
+            ("P(short)", f"{_words(self.posterior)}; {said}"), ("before", _words(self.prior)),
+            (f"series {SERIES}", known), ("assumed", assumed),
+        ))  # fmt: skip
 
 
 def _words(chance: Chance) -> str:
@@ -106,54 +132,120 @@ def risk(design: Design, source: Source, log: Log | None = None) -> tuple[FilmRi
         raise BadInput(f"{design.name} has no film between electrodes; expected a dielectric from edge to edge")
     counts = np.sum([draws(film, DRAWS) for film in thin], axis=0)
     shorted, prints = verdicts(log, design) if log else (0, 0)
+    other = elsewhere(design.shape, [len(film.lines) for film in thin])
     whole = FilmRisk(
         **vars(found), holes_low=float(np.min(counts)), holes_high=float(np.max(counts)), shorted=shorted,
-        prints=prints, prior=chance(counts, 0, 0), posterior=chance(counts, shorted, prints),
+        prints=prints, prior=chance(counts, other, 0, 0), posterior=chance(counts, other, shorted, prints),
     )  # fmt: skip
     return whole, picture(design.name, thin)
 
 
 def verdicts(log: Log, design: Design) -> tuple[int, int]:
-    """Specimens of a design's shape and film in a log that are shorted or leaking, and all with both resistances."""
+    """Specimens of a design's shape and film in a log that are shorted or leaking, and all with both resistances.
+
+    Rows of Table D.1's series 23 are left out: the prior has them.
+    """
     film = design.parameters.get("dielectric_mm", getattr(design.params, "dielectric_mm", None))
+    counted = {r.uid for r in thesis() if r.iteration == SERIES}
     last = {
-        r.specimen: (min(r.y_ohm), min(r.z_ohm))
-        for r in log.readings() if r.shape == design.shape and r.film_mm == film and r.y_ohm and r.z_ohm
+        r.specimen: _low(r) for r in log.readings()
+        if r.shape == design.shape and r.film_mm == film and r.y_ohm and r.z_ohm and r.uid not in counted
     }  # fmt: skip
-    return sum(z <= ORDER * y for y, z in last.values()), len(last)
+    return sum(last.values()), len(last)
 
 
-def chance(holes: Sequence[float] | NDArray[np.float64], shorted: int, prints: int) -> Chance:
+def _low(of: Reading) -> bool:
+    return min(of.z_ohm) <= ORDER * min(of.y_ohm)
+
+
+@cache
+def series() -> Counts:
+    """Counts of series 23 of Table D.1.
+
+    Layers are those of its qualities, or of "fine" where none is noted.
+
+    >>> sum(total for _, total in series().values())
+    51
+    """
+    shorted, every = Counter[tuple[str, int]](), Counter[tuple[str, int]]()
+    for r in thesis():
+        if r.iteration == SERIES and r.film_mm is not None and r.y_ohm and r.z_ohm:
+            key = r.shape, round(r.film_mm / load_quality(QUALITIES[r.slicing] or "fine").layer_mm)
+            shorted[key] += _low(r)
+            every[key] += 1
+    return {key: (shorted[key], total) for key, total in every.items()}
+
+
+def elsewhere(shape: str, layers: Sequence[int], counts: Counts | None = None) -> NDArray[np.float64]:
+    r"""Probability that a print is shorted by anything but holes: values of equal probability after earlier prints.
+
+    .. math:: r = p^{n^g}, \quad p \sim \mathrm{Beta}(m k, (1 - m) k)
+
+    p is the rate of a shape with one layer and n the number of layers. They fail together with g = 0, and independently
+    of each other with g = 1. m, g and k / (1 + k) are uniform from 0 to 1; a shape without prints has the others' m, k.
+
+    Parameters
+    ----------
+    shape : str
+        Shape of the design.
+    layers : sequence of int
+        Layers of each of its films [-].
+    counts : mapping, optional
+        Earlier prints; those of :func:`series` if not given.
+    """
+    from scipy.special import xlog1py, xlogy
+
+    counts, rng = series() if counts is None else counts, np.random.default_rng(_SEED)
+    mean, pooled, together = rng.random((3, _RATES))
+    alike = pooled / (1 - pooled)
+    rates = {s: rng.beta(mean * alike, (1 - mean) * alike) for s in sorted({shape, *(s for s, _ in counts)})}
+    weight = np.zeros(_RATES)
+    for (s, n), (shorted, prints) in counts.items():
+        rate = rates[s] ** (n**together)
+        weight += xlogy(shorted, rate) + xlog1py(prints - shorted, -rate)
+    sound = np.prod([1 - rates[shape] ** (n**together) for n in layers], axis=0)
+    return _quantiles(1 - sound, np.exp(weight - weight.max()), (np.arange(_GRID) + 0.5) / _GRID)
+
+
+def _quantiles(
+    values: NDArray[np.float64], weight: NDArray[np.float64], shares: Sequence[float] | NDArray[np.float64]
+) -> NDArray[np.float64]:
+    order = np.argsort(values)
+    below = np.cumsum(weight[order])
+    return np.asarray(values[order][np.searchsorted(below / below[-1], shares)])
+
+
+def chance(
+    holes: Sequence[float] | NDArray[np.float64], other: NDArray[np.float64], shorted: int, prints: int
+) -> Chance:
     """Posterior of the probability that a print is shorted.
 
     Parameters
     ----------
     holes : sequence of float
         Through-holes of possible prints [-].
+    other : (n,) array
+        Equally probable values of the probability that anything else shorts it [-].
     shorted, prints : int
         What was seen [-].
 
     Examples
     --------
-    Nothing is known before the first print:
+    A print without holes is shorted by something else, or not:
 
-    >>> before = chance([0.0], 0, 0)
+    >>> before = chance([0.0], np.array([0.1, 0.5, 0.9]), 0, 0)
     >>> round(before.mean, 2), round(before.low, 2), round(before.high, 2)
-    (0.5, 0.01, 0.99)
+    (0.5, 0.1, 0.9)
     """
     from scipy.special import betaincinv, xlog1py, xlogy
 
     value = betaincinv(0.5, 0.5, (np.arange(_GRID) + 0.5) / _GRID)
     none = np.mean([(1 - value) ** count for count in holes], axis=0)  # no hole conducts
-    probability = (1 - none[:, None] * (1 - value)[None, :]).ravel()
+    probability = (1 - none[:, None] * (1 - other)[None, :]).ravel()
     weight = xlogy(shorted, probability) + xlog1py(prints - shorted, -probability)
     weight = np.exp(weight - weight.max())
-    order = np.argsort(probability)
-    below = np.cumsum(weight[order]) / weight.sum()
-    ends = (
-        float(probability[order][np.searchsorted(below, tail)]) for tail in ((1 - CREDIBLE) / 2, (1 + CREDIBLE) / 2)
-    )
-    return Chance(float((weight * probability).sum() / weight.sum()), *ends)
+    low, high = _quantiles(probability, weight, ((1 - CREDIBLE) / 2, (1 + CREDIBLE) / 2))
+    return Chance(float((weight * probability).sum() / weight.sum()), float(low), float(high))
 
 
 def picture(name: str, thin: Sequence[Film]) -> Figure:

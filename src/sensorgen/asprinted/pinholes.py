@@ -28,7 +28,7 @@ SHIFT_MM = 0.05  # of a layer to both sides along x and y
 _WHOLE = 0.99  # share of the plan that a film covers
 _EDGE_MM = 1.0
 _LEAST_MM2 = 1e-6  # smaller is rounding
-HOLE_MM2 = 1e-4  # a hole smaller than 0.01 mm square is none
+HOLE_MM2 = 4e-4  # 0.02 mm square: smaller is less than 5 % of a line 0.4 mm wide, which no width is known to
 MOST_LAYERS = 2  # of a film that a slice is searched for
 
 

@@ -80,8 +80,8 @@ def _pinholes(file: str, design: str, log: str | None, pictures: str | None) -> 
     """Search the film of a print for through-holes, and estimate the probability that a print is shorted.
 
     Lines are taken as round at their sides, at the width of the file and 5 and 10 % less. The probability has an
-    interval, stated assumptions, and the verdicts of the log on prints of the same shape and film; without any it is a
-    prior, no yield.
+    interval, stated assumptions, and the verdicts of the log on prints of the same shape and film; without any it
+    follows from series 23 of the thesis.
     """
     from pathlib import Path
 
