@@ -11,8 +11,9 @@ unexport PYTHONDONTWRITEBYTECODE  # without bytecode, each of the thousand proce
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 8
 
-demo: $(READY) ## set up (with the solver NGSolve), and build the triangular sensor with a film of 0.2 mm
+demo: $(READY) ## set up (with the solver NGSolve), and build two triangular sensors: one to change, one to print
 	$(BIN)/sensorgen build tri --dielectric 0.2 || test $$? = 1  # 1: the checks have findings of severity error
+	$(BIN)/sensorgen build docs/locates-tri.yaml --no-cad
 
 test: $(READY_DEV) ## set up, with slicers, ngspice and Chromium where apt may, and run all tests
 	scripts/system-packages --programs

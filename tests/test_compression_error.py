@@ -129,18 +129,20 @@ def test_every_load_to_1100_kpa_converges(parameters):
     assert found.apex_m[1:] == pytest.approx((1e-6, 3e-6, 9e-6, 20e-6))
 
 
-def test_an_error_is_unknown_where_the_coarser_mesh_ends(monkeypatch):
+def test_the_displacements_error_doubles_beyond_the_coarser_meshs_end(monkeypatch):
     solved = mesh_ladder.pressed
 
     def ends(case, stress_pa, level=0, **more):
         found = solved(case, stress_pa, level, **more)
         return found if level == 0 else found.first(2)
 
+    known = estimated(0, [0.0, 5e3, 1e4])
     monkeypatch.setattr(mesh_ladder, "pressed", ends)
-    found = estimated(0, [0.0, 5e3, 1e4])
-    assert np.isfinite(found.rise_error_f_per_m2[:2]).all()
-    assert np.isinf(found.rise_error_f_per_m2[2])
-    assert np.isinf(found.relative()).all()
+    beyond = estimated(0, [0.0, 5e3, 1e4])
+    assert beyond.displacement_error_m[:2] == pytest.approx(known.displacement_error_m[:2])
+    share = known.displacement_error_m[1] / known.found.displacement_m[1]
+    assert beyond.displacement_error_m[2] / beyond.found.displacement_m[2] == pytest.approx(2 * share, rel=1e-6)
+    assert beyond.rise_error_f_per_m2[2] > 1.5 * known.rise_error_f_per_m2[2]
 
 
 def test_an_error_of_second_order_is_stated_a_quarter_larger(monkeypatch):

@@ -55,6 +55,7 @@ def test_own_material_printer_and_shape_to_gcode_and_page(sensorgen, tmp_path, p
     work = tmp_path / "work"
     for what, name in (("material", "eel"), ("printer", "mine"), ("shape", "zig")):
         sensorgen("new", what, name)
+    sensorgen("pack", "trust", ".")
     assert "no findings" in sensorgen("pack", "test", ".")
     (work / "own.yaml").write_text(DESIGN)
     assert re.match(r"PRINT( WITH WARNINGS)?  own", sensorgen("check", "own.yaml", "--budget", "0"))

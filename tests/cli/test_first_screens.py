@@ -75,6 +75,10 @@ def _of_100_mm():
     class Map:
         position_m = (0.0, 0.1)
 
+        @staticmethod
+        def typical():
+            return None
+
     class Known:
         map, calibrated = Map, None
 

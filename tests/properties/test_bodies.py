@@ -71,7 +71,7 @@ def by_material(scene: Scene, made) -> dict[str, float]:
         other = trimesh.Trimesh(mesh.vertices_mm, mesh.triangles, process=False)
         assert other.is_watertight
         assert other.is_winding_consistent
-        assert validity.solid(mesh).status() == manifold3d.Error.NoError
+        assert mesh.solid().status() == manifold3d.Error.NoError
         found[body.material] = found.get(body.material, 0.0) + float(other.volume)
     return found
 

@@ -7,9 +7,11 @@ import pytest
 from sensorgen.asprinted import printed
 from sensorgen.checks.review import review
 from sensorgen.design.design import load
+from sensorgen.export.gcode.check import check
 from sensorgen.export.slicing import alone, sliced
 from sensorgen.prediction import bodies
 from sensorgen.prediction.rest_state import rest_state
+from sensorgen.prediction.slices import reviewed
 
 BEST = Path(__file__).parents[2] / "docs" / "best-tri.yaml"
 
@@ -28,3 +30,27 @@ def test_the_best_tri_prints_as_estimated(tmp_path, program):
     body = bodies.sliced(design, lambda: real, source, made.ready.read_bytes())
     first = [rest_state(each).capacitance.value for each in (body, bodies.estimated(design, "arachne"))]
     assert first[0] == pytest.approx(first[1], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "tools", "lines"),
+    [
+        ("locates-tri.yaml", {3, 4}, ["G28", "G32"]),
+        # As PrusaSlicer's bundle for the XL: model, homing, and a mesh of the bed before anything is printed.
+        ("buyable-tri.yaml", {0, 1}, ["M190 S45", 'M862.3 P "XL"', "G28", "G29 P1", "G29 A", "M109 S225 T0"]),
+    ],
+)
+def test_what_the_pages_print_has_no_warning(name, tools, lines, tmp_path, program, monkeypatch):
+    """Verdict PRINT on a real slice, and a file that the printer's check accepts, homed and heated in this order."""
+    program("prusa-slicer", "prusa-slicer")
+    monkeypatch.setenv("SENSORGEN_SLICER", "prusa")
+    monkeypatch.chdir(tmp_path)
+    design = load(BEST.with_name(name))
+    assert reviewed(design).verdict == "PRINT"
+    made = sliced([alone(design)], "prusa", tmp_path)
+    found = check(made.ready, design.machine)
+    assert found.errors(strict=True) == []
+    assert {tool.tool for tool in found.tools} == tools
+    written = [line.partition(";")[0].strip() for line in made.ready.read_text("utf-8").splitlines()]
+    places = [written.index(line) for line in lines]
+    assert places == sorted(places)

@@ -32,6 +32,6 @@ def progress(steps: Sequence[str]) -> Iterator[Callable[[str], None]]:
 
 
 def clear() -> None:
-    """Take the bar away, for what is printed in its place."""
+    """Clear the bar, for what is printed in its place."""
     if sys.stderr is not None and sys.stderr.isatty():
         click.echo("\r" + " " * 60 + "\r", nl=False, err=True)

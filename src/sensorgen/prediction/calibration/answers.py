@@ -94,7 +94,7 @@ class CalibratedInversion:
                 f"{self.median_position_width_mm:.3g} mm (noise {self.noise:.2g} of |Z|)"
             )
             if (self.median_position_width_mm or 0.0) > WIDE * self.length_mm:
-                yield f"this sensor of {self.length_mm:g} mm does not tell positions of such presses: force alone"
+                yield f"this sensor of {self.length_mm:g} mm does not locate such presses: force alone"
         yield from self._advice()
 
     def _advice(self) -> Iterator[str]:
