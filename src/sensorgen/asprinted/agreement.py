@@ -96,7 +96,7 @@ def _of_piece(
         message = f"nothing is printed at the place of {design.name}; the nearest line is "
         message += f"{float(np.hypot(*off.T).min()):.3g} mm away" if model.any() else "not there at all"
         return [Found("place", "error", 1, message, "slice this design")]
-    lines, layers = lines or beads(design, paths, centre_mm), ledger.sampled(design, 0.0)
+    lines, layers = lines or beads(design, paths, centre_mm, cut=not alone), ledger.sampled(design, 0.0)
     return [
         *_heights(design, paths, piece),
         *ledger.check(design, lines),

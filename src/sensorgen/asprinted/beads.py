@@ -71,7 +71,7 @@ class Beads:
         return Beads(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
-def beads(design: Design, paths: "Paths", centre_mm: Point | None = None) -> Beads:
+def beads(design: Design, paths: "Paths", centre_mm: Point | None = None, *, cut: bool = False) -> Beads:
     """The lines that print a design, each given to the body that it belongs to.
 
     Parameters
@@ -82,11 +82,17 @@ def beads(design: Design, paths: "Paths", centre_mm: Point | None = None) -> Bea
         Lines of the file, with the printer's own tool numbers.
     centre_mm : (float, float), optional
         Middle of the piece on the printer's bed [mm]; the middle of the bed if not given.
+    cut : bool
+        Cut lines at the piece's outline, as those that run on into a tab; else each is of the piece or not, by its
+        middle.
     """
     scene, machine = design.printed, design.machine
     corner = np.array(centre_mm or machine.bed_centre_mm()) - np.array(scene.size_mm[:2]) / 2
     found = paths.model()
     ends = [p[:, :2] - corner for p in (found.start_mm, found.end_mm)]
+    share = np.ones(len(found.tool))
+    if cut:
+        ends, share = _inside(*ends, np.array(scene.size_mm[:2]))
     tools = {design.tool(body.material) for body in scene.bodies}
     heights = np.array(design.layers.boundaries_mm(scene.size_mm[2]))
     layer = np.abs(found.end_mm[:, 2, None] - heights[1:]).argmin(1)
@@ -96,8 +102,9 @@ def beads(design: Design, paths: "Paths", centre_mm: Point | None = None) -> Bea
     here &= ((middle > -margin) & (middle < np.array(scene.size_mm[:2]) + margin)).all(1)
     here &= np.isin(found.tool, sorted(tools))
     height = np.diff(heights)[layer]
-    volume = found.volume_mm3(machine.filament_mm)
-    width = volume / (found.length_mm() * height)
+    volume = found.volume_mm3(machine.filament_mm) * share
+    here &= share > 0
+    width = found.volume_mm3(machine.filament_mm) / (found.length_mm() * height)
     # The body that each line belongs to: of its tool's, the one that is drawn nearest in its layer, or near it
     layers = drawn(scene, design.layers.boundaries_mm(scene.size_mm[2]))
     body = np.zeros(len(found.tool), np.int64)
@@ -115,6 +122,17 @@ def beads(design: Design, paths: "Paths", centre_mm: Point | None = None) -> Bea
             body[rows] = owners[tree.nearest(shapely.points(middle[rows]))] if len(shown) > 1 else numbers[0]
     columns = (*ends, width, height, volume, layer, body, found.tool, found.number)
     return Beads(*(c[here] for c in columns))
+
+
+def _inside(start_mm: Real, end_mm: Real, size_mm: Real) -> tuple[list[Real], Real]:
+    """Ends of lines cut at a rectangle from the origin, and the share of each that is left (Liang and Barsky, 1984)."""
+    way = end_mm - start_mm
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = np.stack([-start_mm / way, (size_mm - start_mm) / way])
+    first = np.nan_to_num(at.min(0), nan=0.0, neginf=0.0, posinf=1.0).max(1).clip(0.0, 1.0)
+    last = np.nan_to_num(at.max(0), nan=1.0, neginf=0.0, posinf=1.0).min(1).clip(0.0, 1.0)
+    share = (last - first).clip(0.0)
+    return [start_mm + first[:, None] * way, start_mm + (first + share)[:, None] * way], share
 
 
 def layers(
