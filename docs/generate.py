@@ -14,8 +14,8 @@ LINES = 30  # of the first screen
 PICTURES = {"trix-d0.2": ["tri", "--drawn"]}
 PAGES = (
     [], ["build"], ["build", "tri"], ["build", "rect"], ["build", "reference"], ["check"], ["show"], ["draw"],
-    ["optimise"], ["slice"], ["slice", "tri"], ["import"], ["gcode"], ["gcode", "check"], ["gcode", "drags"],
-    ["gcode", "pinholes"], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
+    ["optimise"], ["slice"], ["slice", "tri"], ["export"], ["import"], ["gcode"], ["gcode", "check"],
+    ["gcode", "drags"], ["gcode", "pinholes"], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
     ["predict"], ["predict", "tri"], ["cell"], ["cell", "tri"], ["chart"], ["chart", "tri"],
     ["compress"], ["compress", "tri"],
     ["invert"], ["sheet"], ["stack"],

@@ -276,7 +276,7 @@ WRONG = [
     (["--frequencies", "1mhz"], "'mhz' may be mHz or MHz"),
     (["--frequencies", "1kHz,1kHz"], "1000 stands twice"),
     (["--force", "0:700:100", "--position", "50"], "force 600 N at position 50 mm: the stress thins the film by 1: "),
-    (["--plot", "p", "--force", "0:700:100"], "force 300 N at position 0 mm: the stress thins the film by 1: "),
+    (["--plot", "p", "--force", "0:700:100"], "force 600 N at position 5 mm: the stress thins the film by 1: "),
     (["--force", "1", "--tip", "120"], "a tip of 120 mm; expected up to the sensor's 100 mm"),
     (["--force", "1", "--tip", "0"], "tip.width_mm is 0.0; expected a number above 0"),
     (["--tip", "5,stiff,even"], "--tip '5,stiff,even': expected as 10mm, 5mm,stiff, even or 10mm,ninjaflex,10mm"),

@@ -146,8 +146,9 @@ def loaded(body: Body, query: Query, force_n: Sequence[float] = (), position_mm:
     reference = grid.hardest(*axes)
     query = replace(query, force_n=reference.force_n, position_m=reference.position_m)
     rough = rough_sensor(body, query.law, query.tip_of(body.design), query.force_n)
-    if position_mm:
-        grid.check_presses(rough.sensor, axes[1], [x * M_PER_MM for x in axes[2]])
+    at_m = [x * M_PER_MM for x in axes[2]]
+    whole = at_m if position_mm else [x for x in at_m if rough.sensor.whole(x)]
+    grid.check_presses(rough.sensor, axes[1], whole or at_m)
     prediction, model = evaluate(body, query), sensor_model(body, query)[0]
     at, left_out = (axes[2], "") if position_mm else _pressable(model.sensor, *axes[1:])
     return Loaded(prediction, model, (*axes[:2], at), query.noise, left_out)

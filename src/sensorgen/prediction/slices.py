@@ -366,6 +366,11 @@ def estimated(design: Design, drawn: Review, walls: str = "", why: str = "") -> 
     return combined(design, drawn, f"estimated ({WALLS[walls]}){why and f': {why}'}", shorts)
 
 
+def of_own_machine(design: Design) -> list[Finding]:
+    """Faults of a printer or quality of the user's own; what ships is tested."""
+    return machine.of_design(design) if design.own.keys() & {"printers", "qualities"} else []
+
+
 def combined(
     design: Design, drawn: Review, source: str, of_print: list[Finding], file: PrintFile | None = None
 ) -> PrintReview:  # fmt: skip
@@ -382,7 +387,7 @@ def combined(
     file : PrintFile, optional
         The print's G-code.
     """
-    own = [] if not design.own.keys() & {"printers", "qualities"} else machine.of_design(design)  # shipped: tested
+    own = of_own_machine(design)
     replaced = (IDLE,) if source.startswith("estimated") else (IDLE, LOST)
     names = [parameter.name for parameter in fields(design.params)]
     try:

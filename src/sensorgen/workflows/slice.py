@@ -17,7 +17,7 @@ from sensorgen.design.walls import rule
 from sensorgen.export.gcode.report import Report
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 from sensorgen.export.slicing import Step
-from sensorgen.prediction.slices import SliceReport, combined, estimated, slice_now
+from sensorgen.prediction.slices import SliceReport, combined, estimated, of_own_machine, slice_now
 from sensorgen.workflows import compensation
 from sensorgen.workflows.compensation import Change
 
@@ -104,7 +104,7 @@ def slice_design(
     """
     step("checks")
     drawn = review(design, walls=rule(slicer, design.walls) if slicer in SLICERS else "")
-    if drawn.errors(strict) and not force:
+    if (drawn.errors(strict) or of_own_machine(design)) and not force:
         held = estimated(design, drawn)
         raise Unprintable(held.findings, held.errors(strict))
     made = slice_now(design, slicer, program=program, time_limit_s=time_limit_s, strict=strict, step=step)
