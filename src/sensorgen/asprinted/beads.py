@@ -92,7 +92,7 @@ def beads(design: Design, paths: "Paths", centre_mm: Point | None = None, *, cut
     ends = [p[:, :2] - corner for p in (found.start_mm, found.end_mm)]
     share = np.ones(len(found.tool))
     if cut:
-        ends, share = _inside(*ends, np.array(scene.size_mm[:2]))
+        ends, share = _inside(ends[0], ends[1], np.array(scene.size_mm[:2]))
     tools = {design.tool(body.material) for body in scene.bodies}
     heights = np.array(design.layers.boundaries_mm(scene.size_mm[2]))
     layer = np.abs(found.end_mm[:, 2, None] - heights[1:]).argmin(1)
@@ -105,13 +105,20 @@ def beads(design: Design, paths: "Paths", centre_mm: Point | None = None, *, cut
     volume = found.volume_mm3(machine.filament_mm) * share
     here &= share > 0
     width = found.volume_mm3(machine.filament_mm) / (found.length_mm() * height)
-    # The body that each line belongs to: of its tool's, the one that is drawn nearest in its layer, or near it
+    body = _owners(design, found.tool, layer, middle)
+    columns = (*ends, width, height, volume, layer, body, found.tool, found.number)
+    return Beads(*(c[here] for c in columns))
+
+
+def _owners(design: Design, tool: Whole, layer: Whole, middle_mm: Real) -> Whole:
+    """Body of each line: of its tool's, the one that is drawn nearest to its middle in its layer, or near it."""
+    scene = design.printed
     layers = drawn(scene, design.layers.boundaries_mm(scene.size_mm[2]))
-    body = np.zeros(len(found.tool), np.int64)
+    body = np.zeros(len(tool), np.int64)
     for one in {design.tool(body.material) for body in scene.bodies}:
         mine = {body.name: k for k, body in enumerate(scene.bodies) if design.tool(body.material) == one}
-        for number in np.unique(layer[found.tool == one]):
-            rows = np.flatnonzero((found.tool == one) & (layer == number))
+        for number in np.unique(layer[tool == one]):
+            rows = np.flatnonzero((tool == one) & (layer == number))
             near = sorted(layers, key=lambda each: abs(each.bottom_mm - layers[number].bottom_mm))
             each = next(each for each in near if mine.keys() & each.regions.keys())
             shown = {name: region for name, region in each.regions.items() if name in mine}
@@ -119,9 +126,8 @@ def beads(design: Design, paths: "Paths", centre_mm: Point | None = None, *, cut
             pieces = [parts(region) for region in shown.values()]
             tree = shapely.STRtree([piece for each in pieces for piece in each])
             owners = np.repeat(numbers, [len(each) for each in pieces])
-            body[rows] = owners[tree.nearest(shapely.points(middle[rows]))] if len(shown) > 1 else numbers[0]
-    columns = (*ends, width, height, volume, layer, body, found.tool, found.number)
-    return Beads(*(c[here] for c in columns))
+            body[rows] = owners[tree.nearest(shapely.points(middle_mm[rows]))] if len(shown) > 1 else numbers[0]
+    return body
 
 
 def _inside(start_mm: Real, end_mm: Real, size_mm: Real) -> tuple[list[Real], Real]:

@@ -335,15 +335,21 @@ def _errors(case: Case, fine: "Pressed", coarse: "Pressed", level: int) -> Estim
     apex = np.array(fine.apex_m) if fine.apex_m else np.zeros(n)
     small = _AT_APEX * (apex / np.where(down > 0, down, np.inf)) ** _AT_APEX_POWER
     area = _area_error(case.model)
-    safety = SAFETY
-    plans = {(p.span("x"), p.span("y")) for body in case.piece.scene.bodies for p in body.pieces}
-    if case.model == "press2d" and len(plans) > 1 and not (fine.apex_m and level != USUAL):
-        safety = _SHARP if fine.apex_m else _BLUNT
-    least = max(safety / SAFETY * (_expected(case, level) - area), VERIFIED) * (1 + small)
+    least = max(_safety(case, bool(fine.apex_m), level) / SAFETY * (_expected(case, level) - area), VERIFIED) * (
+        1 + small
+    )
     moved = np.maximum(index[0], _OF_DISPLACEMENT * least * down) + area * down
     rises = np.maximum(index[1], least * np.abs(rise)) + spread + area * np.abs(rise)
     moved[0] = rises[0] = 0.0
     return Estimate(fine, moved, rise, rises)
+
+
+def _safety(case: Case, apex: bool, level: int) -> float:
+    """Stated error over the expected one; solids in layers of one plan have no corner [-]."""
+    plans = {(p.span("x"), p.span("y")) for body in case.piece.scene.bodies for p in body.pieces}
+    if case.model != "press2d" or len(plans) < 2 or (apex and level != USUAL):
+        return SAFETY
+    return _SHARP if apex else _BLUNT
 
 
 def _rise(found: "Pressed") -> tuple[Real, Real]:
