@@ -57,7 +57,9 @@ def test_the_reference_is_what_the_help_texts_say():
 
 def test_the_first_screen_of_the_readme_is_what_the_command_prints():
     generate = runpy.run_path(str(ROOT / "docs" / "generate.py"))
-    assert (ROOT / "README.md").read_text("utf-8") == generate["first_screen"](), "run `make docs`"
+    texts = (ROOT / "README.md").read_text("utf-8"), generate["first_screen"]()
+    readme, printed = (re.sub(r"line [0-9]+", "line", text) for text in texts)  # of a file that slicers vary a little
+    assert readme == printed, "run `make docs`"
 
 
 @pytest.mark.parametrize("name", COMMANDS)
