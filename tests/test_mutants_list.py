@@ -23,9 +23,9 @@ def test_a_fault_fits_its_file(fault):
     assert all((ROOT / word.partition("::")[0]).is_file() for word in files)
 
 
-def test_each_package_has_five():
-    assert set(Counter(fault["file"].partition("/")[0] for fault in FAULTS).values()) == {5}
-    assert len(FAULTS) == 60
+def test_each_package_has_five_or_more():
+    assert min(Counter(fault["file"].partition("/")[0] for fault in FAULTS).values()) >= 5
+    assert len(FAULTS) >= 60
 
 
 def test_a_name_without_faults_is_refused(capsys):
