@@ -37,7 +37,7 @@ REFERENCE = Path(__file__).parent / "reference"
 
 @pytest.fixture(autouse=True, scope="module")
 def _timed_once():
-    """What only the time is taken of is not done again; how often it would be has a test of its own."""
+    """Time each point once; repeated timing has a test of its own."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(measured_in, "_REPEATS", 1)
         yield

@@ -9,11 +9,9 @@ At commit 0645a80 these differed, for tri with a film of 0.2 mm: capacitance by 
 """
 
 import contextlib
-import io
 import json
 import math
 import re
-import sys
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -21,7 +19,7 @@ from pathlib import Path
 import pytest
 
 import sensorgen
-from sensorgen.cli import main
+from in_process import run
 
 VALUES = """\
 shape: reference
@@ -99,7 +97,7 @@ class Asked:
         """Exit code and standard output of a command, run in this process."""
         words = tuple(map(str, words))
         if words not in self._said:
-            self._said[words] = _run(words, self.folder)
+            self._said[words] = run(self.folder, *words)
         return self._said[words]
 
     def json(self, *words):
@@ -138,20 +136,6 @@ class Asked:
         self.say("log", "import", self.record)
         self.say("log", "multimeter", name, "--y", "3k", "--z", "OL")
         return name
-
-
-def _run(words, folder):
-    argv = sys.argv
-    out, err = io.StringIO(), io.StringIO()
-    sys.argv = ["sensorgen", *words]
-    try:
-        with contextlib.chdir(folder), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            main()
-    except SystemExit as left:
-        assert "Traceback" not in err.getvalue()
-        return left.code, out.getvalue()
-    finally:
-        sys.argv = argv
 
 
 # ---- adapters: one for each entry point --------------------------------------

@@ -5,15 +5,13 @@ At commit bc3b8e35 ``tri`` with a film of 0.2 mm had 8 findings by ``check``, 13
 """
 
 import contextlib
-import io
 import json
 import re
-import sys
 
 import pytest
 
 import sensorgen
-from sensorgen.cli import main
+from in_process import run
 from sensorgen.core.findings import counts, verdict
 from sensorgen.prediction import quantities
 from sensorgen.prediction.results import SCHEMA, Prediction
@@ -32,19 +30,6 @@ DESIGNS = {
     "upside-down": "shape: reference\norientation: upside-down\nparameters: {length_mm: 10, width_mm: 6}",
 }
 FAST = ("tri-lost", "reference", "cone", "waived")
-
-
-def _run(folder, *words):
-    argv, out, err = sys.argv, io.StringIO(), io.StringIO()
-    sys.argv = ["sensorgen", *words]
-    try:
-        with contextlib.chdir(folder), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            main()
-    except SystemExit as left:
-        assert "Traceback" not in err.getvalue()
-        return left.code, out.getvalue()
-    finally:
-        sys.argv = argv
 
 
 @pytest.fixture(scope="module")
@@ -99,34 +84,34 @@ def test_every_command_has_one_verdict(name, folder):
     assert held.source.startswith("sliced by PrusaSlicer 2")
     code = 1 if wanted == "CHANGE" else 0
 
-    said = _run(folder, "check", "d.yaml", "--budget", "0")
+    said = run(folder, "check", "d.yaml", "--budget", "0")
     first = _said(said[1])
     assert (said[0], first[0], first[2]) == (code, wanted, held.source)
     assert sum(map(int, re.findall(r"\d+", first[1]))) == len(held.findings)
     assert len(re.findall(r"(?m)^(?:error|warning|info|waived) ", said[1])) == len(held.findings)
 
-    built = _run(folder, "build", "d.yaml", "--no-cad", "--budget", "0", "--out", "built")
+    built = run(folder, "build", "d.yaml", "--no-cad", "--budget", "0", "--out", "built")
     assert (built[0], _said(built[1])) == (code, first)
-    detailed = _run(folder, "build", "d.yaml", "--no-cad", "--budget", "0", "--out", "built", "--details")
+    detailed = run(folder, "build", "d.yaml", "--no-cad", "--budget", "0", "--out", "built", "--details")
     assert (detailed[0], _said(detailed[1])) == (code, first)
     kept = json.loads((folder / "built" / name / "check.json").read_text("utf-8"))
     assert (kept["verdict"], kept["counts"], kept["source"]) == (wanted, number, held.source)
     assert _counted(kept["findings"]) == number
 
-    _run(folder, "draw", "d.yaml", "-o", "d.svg")
+    run(folder, "draw", "d.yaml", "-o", "d.svg")
     drawing = _words((folder / "d.svg").read_text("utf-8"))
     assert f"Findings: {first[1]}" in drawing
     assert f"{wanted}; {held.source}" in drawing
-    _run(folder, "show", "d.yaml", "--no-open", "-o", "d.html")
+    run(folder, "show", "d.yaml", "--no-open", "-o", "d.html")
     page = (folder / "d.html").read_text("utf-8")
     assert _said(page) == first
     assert len(re.findall(r'<li class="(?:error|warning|info|waived)">', page)) == len(held.findings)
 
     (folder / "plan.yaml").write_text("iteration: 60\ndesigns: [{design: d.yaml}]\n", "utf-8")
-    batch = _run(folder, "batch", "plan.yaml", "--no-gcode")
+    batch = run(folder, "batch", "plan.yaml", "--no-gcode")
     assert (batch[0], _said(batch[1])) == (code, first)
 
-    sliced = _run(folder, "slice", "d.yaml", "--out", "sliced")
+    sliced = run(folder, "slice", "d.yaml", "--out", "sliced")
     assert (sliced[0], _said(sliced[1])) == (code, first)
     data = json.loads(next((folder / "sliced" / name).glob("*.json")).read_text("utf-8"))
     assert (data["verdict"], _counted(data["all_findings"])) == (wanted, number)
@@ -136,17 +121,17 @@ def test_every_command_has_one_verdict(name, folder):
 def test_without_a_slicer_the_estimate_says_so(folder, monkeypatch):
     (folder / "d.yaml").write_text(f"name: tri\n{DESIGNS['tri-lost']}\n", "utf-8")
     monkeypatch.setenv("SENSORGEN_SLICER", "none")
-    by_hand = _said(_run(folder, "check", "d.yaml", "--budget", "0")[1])
+    by_hand = _said(run(folder, "check", "d.yaml", "--budget", "0")[1])
     monkeypatch.delenv("SENSORGEN_SLICER")
     monkeypatch.setenv("PATH", str(folder))
-    code, out = _run(folder, "check", "d.yaml", "--budget", "0")
+    code, out = run(folder, "check", "d.yaml", "--budget", "0")
     assert (code, _said(out)) == (1, by_hand)
     assert "estimated (PrusaSlicer, Arachne walls): no slicer installed" in _words(out)
-    code, out = _run(folder, "build", "d.yaml", "--no-cad", "--budget", "0")
+    code, out = run(folder, "build", "d.yaml", "--no-cad", "--budget", "0")
     assert (code, _said(out)) == (1, by_hand)
 
 
 def test_another_name_of_a_slicer_is_a_message(folder, monkeypatch):
     (folder / "d.yaml").write_text(f"name: tri\n{DESIGNS['reference']}\n", "utf-8")
     monkeypatch.setenv("SENSORGEN_SLICER", "prusaa")
-    assert _run(folder, "check", "d.yaml", "--budget", "0")[0] == 2
+    assert run(folder, "check", "d.yaml", "--budget", "0")[0] == 2

@@ -37,7 +37,7 @@ def kernel(x86_64, aarch64, *given):
 
 
 def reached(*words):
-    """Whether a system call was looked at: any answer but 'not permitted'."""
+    """True if a system call was carried out: any answer but 'not permitted'."""
     return kernel(*words) != -1
 
 
@@ -72,7 +72,7 @@ def limits_of_the_module_called_again():
 
 @attack("interpreter")
 def frames():
-    """What builtins the first frame had, before anything was replaced."""
+    """Builtins of the first frame, before anything was replaced."""
     frame = sys._getframe()
     while frame.f_back:
         frame = frame.f_back

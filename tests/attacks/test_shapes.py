@@ -26,7 +26,7 @@ linux = pytest.mark.skipif(not confine.available(), reason="this system confines
 
 @pytest.fixture
 def victims(tmp_path, monkeypatch):
-    """What an attack would change, read or reach; a function that gives the attacks' text, and a check of the rest."""
+    """Targets of the attacks; a function that gives the attacks' text, and a check that no target has changed."""
     folder = tmp_path / "victims"
     folder.mkdir(mode=0o777)
     folder.chmod(0o777)

@@ -1,4 +1,4 @@
-"""What a user never sees: tracebacks of pipes, warnings of libraries, escapes of strangers, and digits of rounding."""
+"""Noise that no user sees: tracebacks of pipes, warnings of libraries, escapes of strangers, and digits of rounding."""
 
 import subprocess
 import sys
@@ -23,7 +23,7 @@ DIVIDES = (
 @pytest.mark.parametrize("words", [("list", "materials"), ("list", "nothing"), ("--help",)], ids=" ".join)
 @pytest.mark.parametrize("way", ["| true", "2>&1 | true", ">&-", ">&- 2>&-", "2>&-"])
 def test_closed_pipes_and_outputs_are_no_news(words, way, tmp_path):
-    """The exit code is that of the command, and nobody is told of pipes."""
+    """The exit code is that of the command, without a message about pipes."""
     script = f"set -o pipefail; {sys.executable} -m sensorgen {' '.join(words)} {way}"
     done = subprocess.run(["bash", "-c", script], cwd=tmp_path, capture_output=True, encoding="utf-8", check=False)
     silent = (0, 1) if "--help" in words else (0,)  # click's own code for a help that nobody reads

@@ -21,11 +21,11 @@ class Unwatched(FakeActuator):
 
 
 class Killed(BaseException):
-    """Run and guardian end at once: nobody says anything any more."""
+    """Run and guardian end at once: no sign of life is sent any more."""
 
 
 def left_alone(lab, seconds):
-    """What the mechanism does when nobody asks; when the tip was last down, from now on [s]."""
+    """Leave the mechanism without commands; time until its tip was last down [s]."""
     begin = lab.clock.now()
     last = begin
     while lab.clock.now() < begin + seconds:

@@ -100,8 +100,9 @@ def check(design: Design, lines: Beads) -> Iterator[Found]:
     """
     if not len(lines.number):
         return  # the heights say why
-    faults, below = [*_volumes(design, lines)], None
-    for raster in rasters(design, lines):
+    around = [sampled(design, off) for off in (0.0, NEAR_MIDDLE, -NEAR_MIDDLE)]
+    faults, below = [*_volumes(design, lines, around)], None
+    for raster in rasters(design, lines, around):
         for rule in (_holes, _piles, _foreign, _local):
             faults += rule(design, raster)
         if below is not None:
@@ -110,11 +111,10 @@ def check(design: Design, lines: Beads) -> Iterator[Found]:
     yield from _merged(faults)
 
 
-def rasters(design: Design, lines: Beads) -> Iterator[LayerRaster]:
-    """Layers of a piece as rasters, from the bed up."""
+def rasters(design: Design, lines: Beads, around: Sequence[Sequence[LayerRegions]]) -> Iterator[LayerRaster]:
+    """Layers of a piece as rasters, from the bed up; ``around`` is the drawing at and near mid-height."""
     scene = design.printed
     shape = tuple(int(np.ceil(size / PITCH_MM)) + 2 * _MARGIN for size in scene.size_mm[:2])
-    around = [sampled(design, off) for off in (0.0, NEAR_MIDDLE, -NEAR_MIDDLE)]
     names: dict[int, list[str]] = {}
     for body in scene.bodies:
         names.setdefault(design.tool(body.material), []).append(body.name)
@@ -314,10 +314,11 @@ def _over_nothing(lines: Beads, below: Real) -> tuple[float, float]:
     return float((length / count)[which][below[x, y] < _UNSUPPORTED].sum()), float(length.sum())
 
 
-def _volumes(design: Design, lines: Beads) -> Iterator[Disagreement]:
+def _volumes(
+    design: Design, lines: Beads, around: Sequence[Sequence[LayerRegions]]
+) -> Iterator[Disagreement]:  # fmt: skip
     """Each body takes in each layer about the volume that some walls make of it."""
     bodies, line = design.printed.bodies, design.machine.line_mm()
-    around = [sampled(design, off) for off in (0.0, NEAR_MIDDLE, -NEAR_MIDDLE)]
     laid = estimate.lines(design)
     made = [estimate.layers(design.printed, design.machine, design.layers, walls, laid) for walls in estimate.RULES]
     printed = np.zeros((len(around[0]), len(bodies)))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sensorgen.core.findings import Finding
 from sensorgen.scene.layers import LayerRegions, narrow_mm, parts
 
+RULE = "9-support"
 _OPEN, _ALONE = 0.8, 0.8  # share of a part over nothing, and share of a body's parts in a layer
 
 
@@ -38,7 +39,7 @@ def findings(layers: Sequence[LayerRegions], line_mm: float) -> Iterator[Finding
             if length > _ALONE * whole:
                 at = plan[int(alone.argmax())].centroid
                 yield Finding(
-                    "9-support", "warning", body,
+                    RULE, "warning", body,
                     f"{length:.0f} mm of its lines ({length / whole:.0%}) lie over an empty layer",
                     "print what lies below: increase period_mm, or use other walls or thinner layers",
                     place_mm=(round(at.x, 3), round(at.y, 3), layer.bottom_mm), layer=number, count=int(alone.sum()),

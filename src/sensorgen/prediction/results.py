@@ -536,17 +536,21 @@ def unpredicted(reason: str) -> Finding:
 def resolved(error: Bounds | None, most: float, cannot: str, *, conditional: bool = False) -> str:
     """A standard error in words; where it is that of a reading without information, what the sensor cannot do.
 
-    Where the error is conditional, as on values that no source gives, that is said of all of its range alone.
+    Where the error is conditional, as on values that no source gives, the best of its range is stated beside that.
 
     >>> resolved(Bounds.of(8580.0, "m"), 0.1, "cannot locate"), resolved(Bounds.of(0.2, "N"), 6.0, "cannot sense")
     ('cannot locate', '200 mN')
+    >>> resolved(Bounds.of(0.12, "m", model=Interval(0.0065, 1.0)), 0.1, "cannot locate", conditional=True)
+    'cannot locate, at best 6.5 mm'
     """
     if error is None:
         return "–"
     if not (error.lower if conditional else error.value) < GUESS * most:
         return cannot
+    if error.value >= most:
+        return f"{cannot}, at best {si(error.lower, error.unit)}"
     if error.upper > most:
-        error = replace(error, value=min(error.value, most), upper=most, open="upper")
+        error = replace(error, upper=most, open="upper")
     return error.words()
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sensorgen.asprinted import printed as asprinted
-from sensorgen.checks import bed
+from sensorgen.checks import bed, support
 from sensorgen.checks.review import LOST, Review, Step, advised, review
 from sensorgen.checks.volumes import Row
 from sensorgen.core import cache as stored
@@ -128,7 +128,7 @@ class PrintFile:
         return ", ".join(filter(None, (f"{made.name} {made.version}", self.name)))
 
     def printed(self, design: Design) -> asprinted.Printed:
-        """What the lines print."""
+        """Body that the lines print."""
         from sensorgen.export.gcode import paths
 
         return asprinted.body(design, paths.read(self.content, design.machine), slicer=self.source)
@@ -383,12 +383,12 @@ def combined(
     source : str
         Of the print.
     of_print : list of Finding
-        About the print; where it is no estimate, with rule 7 in place of the drawing's.
+        About the print; where it is no estimate, in place of rule 7 and of unsupported lines by the drawing.
     file : PrintFile, optional
         The print's G-code.
     """
     own = of_own_machine(design)
-    replaced = (IDLE,) if source.startswith("estimated") else (IDLE, LOST)
+    replaced = (IDLE,) if source.startswith("estimated") else (IDLE, LOST, support.RULE)
     names = [parameter.name for parameter in fields(design.params)]
     try:
         permittivities(design), resistivities(design)

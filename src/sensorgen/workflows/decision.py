@@ -213,7 +213,7 @@ def decision(
     predict: bool = True,
     step: Step = lambda _: None,
 ) -> Decision:
-    """What follows from the findings about a print.
+    """Decide on a print by its findings: prediction, and changes that remove them.
 
     Parameters
     ----------

@@ -120,7 +120,7 @@ class _Simulation:
             self.ended, self.end_line = str(event.command), event.number
         if code in PAUSES:
             amid = len(self.lines) and self.lines[0] < event.row <= self.lines[-1]
-            message = f"{code} waits until somebody goes on" + (", with the nozzle at the part" if amid else "")
+            message = f"{code} waits for a person to continue" + (", with the nozzle at the part" if amid else "")
             severity = "error" if amid else "info"
             self.found.append(Found("pause", severity, event.number, message, "be there, or leave it out"))
         self.heaters.obey(event, self.tool)

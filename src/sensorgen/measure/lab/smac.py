@@ -169,7 +169,7 @@ class Actuator:
         Raises
         ------
         DeviceFault
-            The controller does not take it, or macro 59 has a program of somebody else.
+            The controller does not take it, or macro 59 has another program.
         """
         program = [_command(what, value) for what, value in ((_MARK, _OURS), *_raising(self.settings))] + [_RETURN]
         if (there := self._program(len(program))) != program:
