@@ -31,7 +31,7 @@ class Review(Displayed):
     source: str = "rules of the drawing"
 
     def with_meshes(self, design: Design) -> Self:
-        """The same review, with the meshes that a misfit on the bed had spared."""
+        """Review with the meshes that a misfit on the bed had spared."""
         return self if self.meshes else replace(self, meshes=_meshes(design))
 
     def errors(self, strict: bool = False) -> list[Finding]:
@@ -50,7 +50,7 @@ class Review(Displayed):
         return verdict(self.findings)
 
     def counts(self) -> dict[str, int]:
-        """How many findings there are of each severity, and how many are waived."""
+        """Number of findings of each severity, and of those that are waived."""
         return counts(self.findings)
 
 

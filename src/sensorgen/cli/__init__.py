@@ -81,7 +81,7 @@ def harmless(text: str) -> str:
 
 
 def escaped(text: str) -> str:
-    r"""The same for JSON, where nothing of the text may be lost.
+    r"""Escape a text for JSON, where nothing of it may be lost.
 
     >>> escaped('"a\u202eb"' + "\n")
     '"a\\u202eb"\n'

@@ -126,7 +126,7 @@ def _shape_of(base: Data) -> "Shape | ModuleType | None":
 
 
 def _about(module: "Shape | ModuleType | None") -> str:
-    """What a shape's file says of it; click leaves a picture alone that follows a backspace."""
+    """Description by a shape's file; click leaves a picture alone that follows a backspace."""
     about = (module.__doc__ or "").strip() if module else ""
     return about.replace("\n\n::\n\n", "\n\n\b\n").replace("::\n\n", ":\n\n\b\n")
 

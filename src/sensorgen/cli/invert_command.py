@@ -198,7 +198,7 @@ def _by_ratio(
 
 
 def _beside(source: "Readings", block: "Block") -> tuple[Any, Any]:
-    """Which rows are at rest, and the time of each [s]."""
+    """Mask of the rows at rest, and the time of each [s]."""
     columns = dict(zip(source.numbers, block.numbers.T, strict=True))
     nothing = np.full(len(block.rows), np.nan)
     return np.nan_to_num(columns.get(_REST, nothing)) != 0, columns.get(_TIME, nothing)
@@ -220,7 +220,7 @@ def _taken_apart(path: str, tones_hz: Any) -> tuple[Any, float]:
 
 
 def _writer(stack: ExitStack, measured: str, output: str | None) -> tuple[Callable[[str], None], bool]:
-    """What takes rows: the terminal, at once, or a file that is there when it is whole; and whether it is the first."""
+    """Writer of rows: the terminal, at once, or a file that is there when it is whole; and whether it is the first."""
     terminal = output == "-" or (measured == "-" and output is None)
     file = stack.enter_context(store.replacing(Path(output))) if output and not terminal else None
 

@@ -1,4 +1,4 @@
-"""How results show themselves in a notebook: by their document, or as the packages above register."""
+"""Display of results in a notebook: by their document, or as the packages above register."""
 
 from functools import singledispatch
 from html import escape

@@ -1,4 +1,4 @@
-"""What a result shows: paragraphs, facts and tables; as text, Markdown, HTML, CSV or JSON.
+"""Content of a result: paragraphs, facts and tables; as text, Markdown, HTML, CSV or JSON.
 
 A result that a command prints or a notebook displays has a method ``document()`` that yields these parts.
 """
@@ -233,7 +233,7 @@ def _aligned(table: Table) -> Iterator[str]:
 
 
 def _worded(table: Table) -> list[bool]:
-    """Which columns hold words that stand to the left."""
+    """Mask of the columns of words, which stand to the left."""
     return [
         not column.right and any(isinstance(row[k], str) for row in table.cells)
         for k, column in enumerate(table.columns)

@@ -46,7 +46,7 @@ class SVG(str):
 
 
 class Slots(Strict):
-    """Which material fills which part, each with the source of its values: ``x60`` or ``x60@thesis-4.1``."""
+    """Materials of the parts, each with the source of its values: ``x60`` or ``x60@thesis-4.1``."""
 
     top_electrode: Slot = "etpu"
     bottom_electrode: Slot = "etpu"
@@ -69,7 +69,7 @@ class Leads(Strict):
 
 
 class Infill(Strict):
-    """How densely one material is printed."""
+    """Density that one material is printed with."""
 
     percent: Annotated[float, Field(gt=0, le=100)] | None = None
     pattern: Pattern | None = None
@@ -191,7 +191,7 @@ class Design(Strict):
         return [body.material for body in self.bodies.values()] or [slot for _, slot in self.materials if slot]
 
     def conducts(self, name: str) -> bool:
-        """Whether a material does."""
+        """Test whether a material does."""
         return self.material(name).conductor
 
     def slot(self, part: str) -> tuple[material_files.Material, str]:

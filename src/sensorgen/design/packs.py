@@ -44,7 +44,7 @@ _PackName = Annotated[str, Field(pattern=f"^{NAME.pattern}$", examples=["lab-fil
 
 
 class Manifest(Strict):
-    """What ``pack.yaml`` says; all of it may be left out."""
+    """Content of ``pack.yaml``; all of it may be left out."""
 
     version: str = ""
     about: str = ""
@@ -131,17 +131,17 @@ class File:
 
 
 def suffix(kind: Kind) -> str:
-    """How names of files of a kind end."""
+    """Ending of the names of files of a kind."""
     return ".py" if kind == "shapes" else ".yaml"
 
 
 def is_name(kind: Kind, name: str) -> bool:
-    """Whether something of that kind can have the name."""
+    """Test whether something of that kind can have the name."""
     return bool(_NAMES.get(kind, NAME).fullmatch(name))
 
 
 def is_path(kind: Kind, word: str) -> bool:
-    """Whether a word is meant as a file, not as a name."""
+    """Test whether a word is meant as a file, not as a name."""
     return word.endswith((suffix(kind), ".yml")) or "/" in word or "\\" in word
 
 

@@ -40,7 +40,7 @@ _OUTSIDE_MM = 1e-6
 
 
 class Shape(Protocol):
-    """What a shape is."""
+    """Shape by the answers of its file."""
 
     __doc__: str | None
 
@@ -83,7 +83,7 @@ def digest(text: str) -> str:
 
 
 def varies(name: str, text: str, fill: Mapping[str, str]) -> bool:
-    """Whether a file's scene differs between two questions with its default parameters, in one process or in two.
+    """Test whether a file's scene differs between two questions with its default parameters, in one process or in two.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def varies(name: str, text: str, fill: Mapping[str, str]) -> bool:
 
 
 def is_trusted(text: str) -> bool:
-    """Whether the user has trusted a file with this very content."""
+    """Test whether the user has trusted a file with this very content."""
     with suppress(OSError, UnicodeDecodeError):
         lines = (packs.place() / TRUSTED).read_text("utf-8").splitlines()
         return digest(text) in {line.partition(" ")[0] for line in lines}
@@ -128,7 +128,7 @@ def trust(name: str, text: str) -> Path:
 
 
 def _short(name: str, reply: Mapping[str, Any]) -> str:
-    """How a shape's designs begin their names, which are those of files."""
+    """Beginning of the names of a shape's designs, which are those of files."""
     return str(reply["short"]) if _NAME.fullmatch(str(reply["short"])) else name
 
 
@@ -164,7 +164,7 @@ class _Foreign:
             raise BadInput(f"{self._name}.py: scene() gives no scene: {problem(error, data)}") from None
 
     def _ask(self, question: Mapping[str, Any]) -> Any:
-        """What the file answers, or answered before."""
+        """Answer of the file, or its stored answer."""
         key = {"shape": digest(self._text), "question": question}
         known = answers.known(key)
         if known is None:

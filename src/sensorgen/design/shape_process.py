@@ -46,7 +46,7 @@ def module_of(name: str, text: str) -> ModuleType:
 
 
 def described(module: ModuleType) -> dict[str, Any]:
-    """What a module says of its shape."""
+    """Description of a shape by its module."""
     params = module.Params
     return {
         "about": module.__doc__ or "",

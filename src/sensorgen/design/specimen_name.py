@@ -204,7 +204,7 @@ def _case(text: str, word: str) -> list[str]:
 
 
 def _rest(text: str, rest: str) -> dict[str, re.Match[str]]:
-    """What follows the shape, each kind of word at most once, in any order, with or without blanks between."""
+    """Words after the shape, each kind at most once, in any order, with or without blanks between."""
     found: dict[str, re.Match[str]] = {}
     at = 0
     while at < len(rest):

@@ -163,7 +163,7 @@ def _first(width: float) -> int:
 
 
 def _more(now: float, width: float) -> int:
-    """How many orders to add for a width, when the last had another; 4 at most."""
+    """Number of orders to add for a width, when the last had another; 4 at most."""
     return int(np.clip(np.ceil(np.log(now / width) / _GAIN), 1, 4))
 
 
@@ -283,7 +283,7 @@ def _best_multiple(plane: Plane, eps: NDArray[Any], u: Field, psi: Field) -> flo
 
 
 def _rounding(plane: Plane, eps: Numbers, rho: Numbers, u: Field, psi: Field) -> float:
-    r"""How far :math:`\int |\varepsilon \nabla u - D|^2 / \rho` may be off, and each of its three parts with it.
+    r"""Rounding error of :math:`\int |\varepsilon \nabla u - D|^2 / \rho`, and each of its three parts with it.
 
     However badly a system was solved, its potential and its flux bound the capacitance: all that doubles can spoil is
     what these two are worth, by the roundings of each term, and of the triangles' corners.

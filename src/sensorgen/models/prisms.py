@@ -251,7 +251,7 @@ class _Cell:
         )
 
     def shares(self, mesh: Mesh) -> np.ndarray:
-        """How often each triangle of a mesh occurs in the sensor, beyond the least (t,)."""
+        """Number of times that each triangle of a mesh occurs in the sensor, beyond the least (t,)."""
         middle = mesh.plan.points_mm[mesh.plan.triangles].mean(1)
         found = np.ones(len(middle))
         for at, side in zip(middle.T, (self.x, self.y), strict=True):

@@ -53,7 +53,7 @@ def _connected(design: Design, scene: "Scene") -> "Scene":
 
 
 def _parts(design: Design) -> "list[tuple[Scene, float]]":
-    """What stands for the sensor as drawn, and how many of each: of an array that is no prisms one cell, and its rims.
+    """Parts of the sensor as drawn, with their numbers: of an array that is no prisms one cell, and its rims.
 
     Other patterns are whole: models of prisms find the cell, and what the sensor's ends cut off.
     """
@@ -194,7 +194,7 @@ def from_gcode(design: Design, file: str | Path) -> Body:
 
 
 def registered(design: Design, path: Path) -> "Printed":
-    """What a file of G-code prints of a design; parameters and errors as of :func:`from_gcode`."""
+    """Print of a design by a file of G-code; parameters and errors as of :func:`from_gcode`."""
     from sensorgen.asprinted import printed, registration
 
     try:

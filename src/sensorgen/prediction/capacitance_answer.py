@@ -25,7 +25,7 @@ QUANTITIES = {
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked about every design.
+    """Question about every design.
 
     Attributes
     ----------
@@ -197,7 +197,7 @@ def sweep(
     key: str, points: Sequence[tuple[float | str, Body]], asked: Asked, jobs: int, done: Callable[[], None],
     cluster: str = "",
 ) -> Sweep[CellCapacitance]:  # fmt: skip
-    """The same along a sweep; a reason stands in place of what no model applies to, or at which one fails.
+    """Answers along a sweep; a reason stands in place of what no model applies to, or at which one fails.
 
     Parameters and errors as of :func:`answer` and :func:`sensorgen.prediction.sweep.sweep`.
     """

@@ -1,4 +1,4 @@
-"""What dielectrics lose: the complex permittivities of a design at a frequency, and what the line makes of them."""
+"""Losses of dielectrics: the complex permittivities of a design at a frequency, and what the line makes of them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -76,13 +76,13 @@ def _with(
 
 
 def _conduction(resistivity_ohm_m: float, frequency_hz: float) -> float:
-    """What a leak adds to the permittivity, minus its imaginary part [-]."""
+    """Addition of a leak to the permittivity, minus its imaginary part [-]."""
     return 1 / (2 * pi * frequency_hz * EPS0_F_PER_M * resistivity_ohm_m)
 
 
 @dataclass(frozen=True)
 class Lost:
-    """What the dielectrics of a whole sensor lose.
+    """Losses of the dielectrics of a whole sensor.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ NOTHING_LOST = Lost()
 
 
 def lost(design: Design) -> Lost:
-    r"""What the dielectrics of a design lose, as far as the design or a source that it names says.
+    r"""Losses of the dielectrics of a design, as far as the design or a source that it names says.
 
     A weak leak is a conductance :math:`G = \omega C''`: to first order in :math:`1 / (\omega \varepsilon \varrho)` it
     does not depend on the frequency, whatever lies in series with what leaks. It is taken at the lowest tone. What a

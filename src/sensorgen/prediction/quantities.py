@@ -48,7 +48,7 @@ _SAME = 0.05  # capacitances that differ by less are not told apart: solving tak
 
 
 def prediction(body: Body, query: Query) -> Prediction:
-    """What a body should measure, computed now; parameters and errors as of :mod:`sensorgen.prediction.evaluate`."""
+    """Prediction of a body, computed now; parameters and errors as of :mod:`sensorgen.prediction.evaluate`."""
     design, load = body.design, query.load(body.design)
     found = Prediction(
         SCHEMA, design.name, design.id(), body.provenance, "not predicted", load.force_n, load.position_m
@@ -360,7 +360,7 @@ def _mean_slope(law: Compression, range_pa: tuple[float, float]) -> float:
 
 
 def _is_beyond(of: Callable[[Compression], float], law: Compression) -> bool:
-    """Whether the pressure is more than a law, of softer material, is known for."""
+    """Test whether the pressure is more than a law, of softer material, is known for."""
     try:
         of(law)
     except OutOfRange:
@@ -448,7 +448,7 @@ def _ranges_assumed(design: Design, values: Iterable[MaterialValue]) -> Iterator
 
 
 def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
-    """What is taken for granted."""
+    """Assumptions of the model."""
     if is_open(body.cells.first()):
         yield "electrodes are equipotential for the capacitance, and the fringe at their edges is in free air"
     else:

@@ -24,11 +24,11 @@ class Point(Protocol):
         ...
 
     def table(self) -> Table:
-        """Its rows; of all results of a sweep with the same columns."""
+        """Rows of the result; of all results of a sweep with one set of columns."""
         ...
 
     def remarks(self) -> Sequence[str]:
-        """What is to be said of it besides its rows."""
+        """Remarks besides the rows."""
         ...
 
     def problems(self) -> Sequence[str]:
@@ -68,7 +68,7 @@ class Sweep(Generic[Result]):
             yield f"{remark} ({self.key} {', '.join(of)})" if len(of) < len(self.values) else remark
 
     def problems(self) -> Sequence[str]:
-        """What is wrong with the first that has a problem, and how many have one."""
+        """Problem of the first that has one, and the number of those that have."""
         found = [(result.design, problem) for result in self.results for problem in result.problems()[:1]]
         more = f" ({len(found)} of {len(self.results)} like this)" if len(found) > 1 else ""
         return [f"{design}: {problem}{more}" for design, problem in found[:1]]
@@ -85,7 +85,7 @@ def sweep(
     failed: Callable[[Body, str], Result], *, refused: tuple[type[SensorgenError], ...], keep: bool = True,
     jobs: int = 1, cluster: str = "", done: Callable[[], None] = lambda: None,
 ) -> Sweep[Result]:  # fmt: skip
-    """The same work for each body, those whose answer is not cached in several processes.
+    """Work on each body, those whose answer is not cached in several processes.
 
     Parameters
     ----------

@@ -85,7 +85,7 @@ def predict(
     frequency_hz: Sequence[float] = TONES_HZ, accuracy: float | None = None, law: str = "", tip: Tip = FLAT,
     noise: float = NOISE,
 ) -> Prediction | Loaded:  # fmt: skip
-    """What a sensor should measure: of the print, with the drawing beside it.
+    """Prediction of a sensor: of the print, with the drawing beside it.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ STEPS = ("meshes", "checks", "validity", "prediction", "3MF", "profiles", "drawi
 
 @dataclass(frozen=True)
 class Built:
-    """What a build has left behind.
+    """Results of a build.
 
     Attributes
     ----------

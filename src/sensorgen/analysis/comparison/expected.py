@@ -1,4 +1,4 @@
-"""What a design should measure: the earliest prediction in the log, else one that is made now and named so."""
+"""Expected readings of a design: the earliest prediction in the log, else one that is made now and named so."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -96,12 +96,12 @@ class Predicted:
 
     @cached_property
     def touches(self) -> bool:
-        """Whether the electrodes touch as printed, so that the film is a short by design."""
+        """True if the electrodes touch as printed, so that the film is a short by design."""
         return self.prediction.status == "short"
 
     @property
     def parted(self) -> bool:
-        """Whether the electrodes touch as drawn, but have a gap as printed."""
+        """True if the electrodes touch as drawn, but have a gap as printed."""
         return self.prediction.drawn is not None and self.prediction.drawn.status == "short" and not self.touches
 
     def impedance_at(self, frequency_hz: float) -> tuple[complex, complex, complex] | None:

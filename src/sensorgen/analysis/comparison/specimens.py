@@ -73,7 +73,7 @@ class Compared:
 
     @property
     def inside(self) -> bool | None:
-        """Whether a reading of R_Y lies within the prediction's interval; None where one is missing."""
+        """True if a reading of R_Y lies within the prediction's interval; None where one is missing."""
         expected = self.expected_ohm
         if expected is None or not self.evidence.ry_ohm:
             return None
@@ -221,7 +221,7 @@ def _superseded(log: Log, iteration: int | None, specimens: Sequence[str]) -> It
 
 
 def _first(left_out: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
-    """What was left out, and the number of readings beyond those that anybody reads."""
+    """Omitted readings, and the number of those beyond what a person reads."""
     more = Counter[str]()
     for what, why in left_out:
         more[why] += 1
@@ -279,7 +279,7 @@ def _by_specimen(
 
 
 def _other_designs(logged: Iterable[tuple[str, str]], known: Container[str]) -> list[tuple[str, str]]:
-    """What the log says of designs that the names do not stand for."""
+    """Entries of the log on designs that the names do not stand for."""
     others = {(name, uid) for name, uid in logged if uid and uid not in known}
     return [
         (f"design {name} ({uid})", "the log names it for a specimen whose name stands for another design, or for this "

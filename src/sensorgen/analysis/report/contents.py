@@ -175,7 +175,7 @@ def report(
 
 
 def _basis(found: Comparison, recorded: Sequence[Run]) -> Iterator[str]:
-    """What was measured, in one sentence; none of a single reading."""
+    """Summary of the measurements, in one sentence; none of a single reading."""
     specimens = {row.reading.specimen for row in found.rows} | {run.entry.specimen for run in recorded}
     if len(found.rows) + len(recorded) > 1:
         yield (

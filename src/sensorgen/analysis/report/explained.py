@@ -1,4 +1,4 @@
-r"""Which parameter explains the residuals best: one at a time, by least squares.
+r"""Parameter that explains the residuals best: one at a time, by least squares.
 
 For every kind of measurement, the residual is :math:`r = \ln(\text{measured} / \text{predicted})`, of every reading or
 frequency, complex where Z is. One parameter is moved for all of them until :math:`\sum |r|^2` is least; its share is

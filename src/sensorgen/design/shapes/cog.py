@@ -38,7 +38,7 @@ class Params(Envelope):
             )
 
     def cells(self) -> float:
-        """How many cells of the pattern the sensor holds [-]."""
+        """Number of cells of the pattern in the sensor [-]."""
         return (self.length_mm if self.along == "x" else self.width_mm) / self.period_mm
 
 

@@ -47,7 +47,7 @@ class Params(Envelope):
         return self.line_mm + self.space_mm
 
     def cells(self) -> float:
-        """How many cells of the pattern the sensor holds, in all layers [-]."""
+        """Number of cells of the pattern in the sensor, in all layers [-]."""
         return self.length_mm * self.width_mm / self.period_mm**2
 
 

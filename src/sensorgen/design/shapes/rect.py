@@ -64,7 +64,7 @@ class Params(Envelope):
         return self.etpu_width_mm + self.x60_width_mm + 2 * self.air_width_mm
 
     def cells(self) -> float:
-        """How many cells of the pattern the sensor holds [-]."""
+        """Number of cells of the pattern in the sensor [-]."""
         return self.length_mm * self.width_mm / self.period_mm**2
 
 

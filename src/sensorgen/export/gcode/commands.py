@@ -1,4 +1,4 @@
-"""What the commands of a file ask of the machine, one after the other: tools, heat, homing, modes, fans, macros."""
+"""Commands of a file, executed one after the other: tools, heat, homing, modes, fans, macros."""
 
 from collections.abc import Mapping
 
@@ -147,7 +147,7 @@ class _Simulation:
             self.found.error("tool-change", change.number, message, "leave one of them out")
 
     def _modes(self, event: Event) -> None:
-        """What later lines mean, and what the axes still know."""
+        """Modes of later lines, and what the axes still know."""
         code, command = event.command.code, event.command
         if code in ("M82", "M83"):
             self.absolute_e = code == "M82"

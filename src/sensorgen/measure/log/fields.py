@@ -26,7 +26,7 @@ _Kinds = tuple[bool, Any, frozenset[type]]
 
 @cache
 def _kinds(annotation: Any) -> _Kinds:
-    """Whether a field may be None, its type in JSON, and the types of its items if that is a list."""
+    """Kinds of a field: True if it may be None, its type in JSON, and the types of its items if that is a list."""
     if annotation == tuple[float, ...]:
         return False, list, frozenset((int, float))
     if annotation == tuple[str, ...]:
@@ -91,7 +91,7 @@ def decode(kind: type[_Kind], content: str, number: int, logged_at: str) -> _Kin
 
 
 def indexed(content: str) -> tuple[str | int | None, ...]:
-    """What the log's index has of a record's content: the fields of ``INDEXED``, None for those that it has not."""
+    """Entries of the log's index for a record's content: the fields of ``INDEXED``, None for those that it has not."""
     held = _object(content) or {}
     return tuple([held[name] if type(held.get(name)) is kind else None for name, kind in INDEXED.items()])
 

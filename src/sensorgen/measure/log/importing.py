@@ -147,7 +147,7 @@ def _table(path: Path, columns: Mapping[str, str]) -> tuple[Sequence[Entry], Seq
 
 
 def _is_log_table(path: Path) -> bool:
-    """Whether a file is an exported table of a log, or has a column of specimens."""
+    """Test whether a file is an exported table of a log, or has a column of specimens."""
     with suppress(BadInput), tables.opened(path) as table:
         return exchange.kind_of(table.names) is not None or bool(
             {name.casefold() for name in table.names} & {*tables.NAMES["specimen"]}

@@ -248,17 +248,17 @@ class Log:
         return ((_record(row[:6]), row[6], row[7], row[8:]) for row in self._rows(sql))
 
     def known(self, key: str, before: int = 2**62) -> bool:
-        """Whether the log has a record with that identity, before a number."""
+        """Test whether the log has a record with that identity, before a number."""
         sql = "SELECT 1 FROM record WHERE id = ? AND sequence < ?"
         return next(self._rows(sql, [key, before]), None) is not None
 
     def merged_after(self, sequence: int) -> bool:
-        """Whether a merge follows a record, as it does where another machine's log begins."""
+        """Test whether a merge follows a record, as it does where another machine's log begins."""
         sql = "SELECT 1 FROM record WHERE sequence > ? AND instr(parents, ',') > 0 LIMIT 1"
         return next(self._rows(sql, [sequence]), None) is not None
 
     def is_copy(self, sequence: int) -> bool:
-        """Whether a row of the same kind and ``uid`` stands before a record."""
+        """Test whether a row of the same kind and ``uid`` stands before a record."""
         sql = ("SELECT 1 FROM record copy JOIN record row ON row.kind = copy.kind AND row.uid = copy.uid "
                "WHERE copy.sequence = ? AND row.sequence < copy.sequence")  # fmt: skip
         return next(self._rows(sql, [sequence]), None) is not None
@@ -270,7 +270,7 @@ class Log:
         return int(sequence), str(key)
 
     def before(self, first: Entry, others: Sequence[Entry]) -> bool | None:
-        """Whether a row was logged before all of some others by the order of the records, which no clock decides.
+        """Test whether a row was logged before all of some others by the order of the records, which no clock decides.
 
         Returns
         -------
@@ -302,7 +302,7 @@ class Log:
 
     @property
     def merged(self) -> bool:
-        """Whether several machines have written the log."""
+        """True if several machines have written the log."""
         return self._ancestry is not None
 
     @cached_property
@@ -313,7 +313,7 @@ class Log:
 
     @cached_property
     def _ancestry(self) -> chain.Ancestry | None:
-        """Who knew of which records; None in a log of one machine, where the sequence tells."""
+        """Ancestry of the records; None in a log of one machine, where the sequence tells."""
         merged = self._rows("SELECT 1 FROM record WHERE instr(parents, ',') > 0 OR parents = '' LIMIT 2")
         if len(list(merged)) < 2:
             return None
@@ -384,7 +384,7 @@ class Log:
         return decode(KINDS[record.kind], record.content, 0, record.logged_at)
 
     def has(self, entry: Entry) -> bool:
-        """Whether the log has a row already, apart from what each machine adds to it."""
+        """Test whether the log has a row already, apart from what each machine adds to it."""
         sql = "SELECT 1 FROM record WHERE kind = ? AND uid = ? AND number IS NOT NULL"
         if not self._connection.execute(sql, [NAMES[type(entry)], entry.uid]).fetchone():
             return False
@@ -579,7 +579,7 @@ def _two_designs(one: Print, other: Print) -> str:
 
 
 def _same(one: Entry, other: Entry, but: tuple[str, ...]) -> bool:
-    """Whether two rows of a kind have the same content, apart from some fields."""
+    """Test whether two rows of a kind have the same content, apart from some fields."""
     return type(one) is type(other) and all(
         getattr(one, name) == getattr(other, name) for name in columns(type(one)) if name not in but
     )

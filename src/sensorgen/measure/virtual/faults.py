@@ -219,5 +219,5 @@ class Schedule:
         return time_s >= one.at_s if one.at_s is not None else force_n >= (one.at_force_n or 0.0)
 
     def __bool__(self) -> bool:
-        """Whether anything is to come."""
+        """Test whether anything is to come."""
         return bool(self._waiting or self._lasting)

@@ -29,7 +29,7 @@ _SECONDS_OF_DRIFT = 1.0  # between steps of the drift
 
 @dataclass(frozen=True)
 class Mechanics:
-    """What the rig is made of.
+    """Parts of the rig.
 
     Attributes
     ----------
@@ -224,7 +224,7 @@ class Rig:
         return self.mechanics.clearance_mm + self._axes["z"].at_mm - self.extension_mm
 
     def impedance(self, frequency_hz: Real) -> Complex:
-        """What an ideal instrument at the end of the leads would read now, of (m,) frequencies [ohm]."""
+        """Reading of an ideal instrument at the end of the leads now, of (m,) frequencies [ohm]."""
         frequency = np.atleast_1d(np.asarray(frequency_hz, float))
         if self.fault == "cable out":
             return np.full(len(frequency), OPEN_OHM, complex)
@@ -247,7 +247,7 @@ class Rig:
         return found
 
     def resistance(self, *, wires: int) -> float:
-        """What an ideal multimeter would read across the bottom electrode [ohm]."""
+        """Reading of an ideal multimeter across the bottom electrode [ohm]."""
         truth = self.specimen.truth
         if self.fault == "cable out":
             return OPEN_OHM

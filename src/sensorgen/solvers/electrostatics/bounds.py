@@ -29,7 +29,7 @@ ROUNDING = 1e-9  # relative: what edges nearer than a nanometre's thousandth los
 
 @dataclass(frozen=True)
 class Energies:
-    """What one mesh and order give, each over eps0: [mm], or per depth in two dimensions [-].
+    """Energies by one mesh and order, each over eps0: [mm], or per depth in two dimensions [-].
 
     Attributes
     ----------

@@ -56,7 +56,7 @@ class Cell:
         return [((i[0], j[0], z[0]), (i[1], j[1], z[1])) for i, j in product(x, y)]
 
     def weights(self) -> Real:
-        """How often each part occurs beyond the least."""
+        """Number of times that each part occurs beyond the least."""
         return np.zeros(1) if self.shares is None else np.asarray(self.shares - self.shares.min()).ravel()
 
     def boxes(self) -> list[tuple[Real, Piece, int]]:
@@ -66,12 +66,12 @@ class Cell:
         return [own for own in spans if ((own[0][:, 0] < high) & (own[0][:, 1] > low)).all()]
 
     def holds(self, places_mm: Real) -> Mask:
-        """Which places (n, 3) lie in the cell [mm]."""
+        """Mask of the places (n, 3) in the cell [mm]."""
         low, high = np.array(self.low_mm) - SAME_MM, np.array(self.high_mm) + SAME_MM
         return np.asarray(((places_mm > low) & (places_mm < high)).all(1))
 
     def conducts(self, places_mm: Real) -> Mask:
-        """Whether a conductor is at each of some places (n, 3), those beyond a side being mirrored [mm]."""
+        """Mask: true where a conductor is at each of some places (n, 3), those beyond a side being mirrored [mm]."""
         p = places_mm.copy()
         for axis in (0, 1):
             low, high = self.low_mm[axis], self.high_mm[axis]
@@ -149,7 +149,7 @@ class ProfileEdge(NamedTuple):
         return (r - self.start[0]) * way[1] - (z - self.start[1]) * way[0]
 
     def is_tip(self) -> bool:
-        """Whether it leaves the axis straight and neither level nor along it."""
+        """Test whether it leaves the axis straight and neither level nor along it."""
         (ra, za), (rb, zb) = self.start, self.end
         return not self.bulge and min(ra, rb) < SAME_MM < max(ra, rb) and abs(za - zb) > SAME_MM
 
@@ -231,7 +231,7 @@ def touches(cell: Cell) -> list[Touch]:
 
 
 def inside(piece: Piece, places_mm: Real) -> Mask:
-    """Whether places (n, 3) lie in a piece [mm]."""
+    """Mask: true where places (n, 3) lie in a piece [mm]."""
     x, y, z = places_mm.T
     if isinstance(piece, Prism):
         first, second = {"x": (y, z), "y": (x, z), "z": (x, y)}[piece.axis]

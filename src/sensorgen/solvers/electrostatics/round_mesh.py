@@ -123,7 +123,7 @@ def mesh_of(cell: Cell, order: int, layers: int, closed: float) -> RoundMesh:
 
 
 def unsound(mesh: Any, order: int) -> Mask:
-    """Which elements are turned inside out somewhere."""
+    """Mask of the elements that are turned inside out somewhere."""
     import ngsolve as ng
 
     kinds = [element.type for element in mesh.Elements()]
@@ -311,7 +311,7 @@ class _Grading:
         return bool(1 - self.cell.conducts(place + radius * ball).mean() > _REENTRANT)
 
     def _is_corner(self, place: tuple[float, ...], ways: Sequence[Real]) -> bool:
-        """Whether marked edges, mirrored at the sides of the cell, end or turn at a place."""
+        """Test whether marked edges, mirrored at the sides of the cell, end or turn at a place."""
         found = list(ways)
         for axis in (0, 1):
             if (

@@ -103,7 +103,7 @@ def _triangulated(points: NDArray[np.float64], found: "_Found") -> tuple[Triangl
 
 
 def apart(mesh: Triangles) -> Triangles:
-    """The same, with a point for each of the pieces that only touch there: no field runs through a point."""
+    """Triangles with a point for each of the pieces that only touch there: no field runs through a point."""
     for corner, found in fans(mesh.triangles).items():
         if len(found) > 1:
             # One of a corner's fans with a new point at the same place
@@ -213,7 +213,7 @@ _STRAIGHT = 1e-9  # sine of the angle of three corners on a line
 
 
 def flipped(points: NDArray[np.float64], triangles: Sequence[Triangle], regions: Sequence[Hashable]) -> list[Triangle]:
-    """The same regions in triangles of the same number and corners, no two of which would be blunter if turned.
+    """Regions in triangles of equal number and corners, no two of which would be blunter if turned.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ _Point = tuple[float, float]
 
 
 def _is_better(a: _Point, b: _Point, c: _Point, d: _Point) -> bool:
-    """Whether d-c is the better diagonal of a, d, b, c than a-b: the angles at c and d are more than half a turn."""
+    """True if d-c is a better diagonal of a, d, b, c than a-b: the angles at c and d are more than half a turn."""
     if min(_sine(a, d, c), _sine(d, b, c)) < _STRAIGHT:
         return False
     return _angle(a, c, b) + _angle(a, d, b) > np.pi + _GAIN
@@ -292,7 +292,7 @@ class Fan:
 
     @property
     def closed(self) -> bool:
-        """Whether it goes all around the corner."""
+        """True if it goes all around the corner."""
         return len(self.members) == len(self.spokes)
 
 

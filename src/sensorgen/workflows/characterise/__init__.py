@@ -71,7 +71,7 @@ class Row:
     title: Annotated[str, Column("meaning", hidden=True)]
 
     def determined(self) -> bool:
-        """Whether the readings say more than what was known before."""
+        """Test whether the readings say more than what was known before."""
         return self.high - self.low < _DETERMINED * (self.before_high - self.before_low)
 
 
@@ -136,7 +136,7 @@ class Study:
 
     @cached_property
     def targets(self) -> tuple[Target, ...]:
-        """What is wanted."""
+        """Quantities that are wanted."""
         return targets(self.conductor, self.dielectric, self.design.machine.line_mm())
 
     @cached_property
@@ -160,7 +160,7 @@ class Study:
                 "tools": json.dumps({m: self.design.tool(m) for m in (self.conductor, self.dielectric)})}  # fmt: skip
 
     def fits(self, chosen: Sequence[int], hours: float) -> bool:
-        """Whether bed and print time have room for coupons, by their numbers."""
+        """Test whether bed and print time have room for coupons, by their numbers."""
         coupons = [self.coupons[k] for k in chosen]
         if self.hours(coupons) > hours:
             return False

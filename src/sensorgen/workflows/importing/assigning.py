@@ -26,7 +26,7 @@ _ROLES = (("support", "bvoh"), ("electrode", "etpu"), ("conduct", "etpu"), ("die
 
 @dataclass(frozen=True)
 class Assigned:
-    """What the bodies of files are printed of, and which are electrodes.
+    """Materials of the bodies of files, and their electrodes.
 
     Attributes
     ----------
