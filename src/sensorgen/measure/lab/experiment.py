@@ -9,7 +9,7 @@ from pydantic import Field, ValidationError, model_validator
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, OutOfRange, within
 from sensorgen.core.records import Line, Strict, checked, problem
-from sensorgen.measure.virtual.faults import VirtualSpecimen
+from sensorgen.measure.virtual.rig import VirtualSpecimen
 from sensorgen.prediction.query import TONES_HZ
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

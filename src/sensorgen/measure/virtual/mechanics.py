@@ -3,16 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import copysign, exp, inf, sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
+from sensorgen.measure.virtual.faults import Schedule
 from sensorgen.measure.virtual.specimen import Line, Specimen
-
-if TYPE_CHECKING:
-    from sensorgen.measure.virtual.faults import Schedule
 
 STEP_S = 2e-3  # of the mechanism
 _OWN_MM_S = 2.0  # of a stage that moves by itself
@@ -154,7 +151,7 @@ class Rig:
     peak_n: float = 0.0
     fault: str = ""
     violations: list[Violation] = field(default_factory=list)
-    planted: "Schedule | None" = None
+    planted: Schedule | None = None
 
     def __post_init__(self) -> None:
         """At rest, raised."""

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from sensorgen.core.arrays import Mask, Real
-from sensorgen.scene.polyhedra import Loft
+from sensorgen.scene.polyhedra import surface
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import AXES, Piece, Point, Prism
 
@@ -239,7 +239,7 @@ def inside(piece: Piece, places_mm: Real) -> Mask:
     if isinstance(piece, Revolved):
         outline = np.concatenate([edge.places(_ARC if edge.bulge else 1)[:-1] for edge in profile(piece)])
         return np.asarray(shapely.contains_xy(shapely.Polygon(outline), np.hypot(x - piece.x_mm, y - piece.y_mm), z))
-    whole = piece.polyhedron() if isinstance(piece, Loft) else piece
+    whole = surface(piece)
     a, b, c = (np.array(whole.vertices)[np.array(whole.triangles)[:, k]] for k in range(3))
     # How often a ray leaves (Moeller and Trumbore, 1997)
     way = np.array([0.5377, 0.3819, 0.7517])

@@ -13,7 +13,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.errors import NotInstalled
-from sensorgen.scene.polyhedra import Loft
+from sensorgen.scene.polyhedra import surface
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Piece, Prism
 from sensorgen.solvers.electrostatics.bounds import Unsolved
@@ -226,7 +226,7 @@ def solid(piece: Piece) -> Any:
         at, way = piece.start_mm, [(piece.end_mm - piece.start_mm) * (piece.axis == axis) for axis in "xyz"]
         corners = [{"x": (at, u, v), "y": (u, at, v), "z": (u, v, at)}[piece.axis] for u, v in piece.outline]
         return occ.Prism(_flat(corners), occ.Vec(*way))
-    whole = piece.polyhedron() if isinstance(piece, Loft) else piece
+    whole = surface(piece)
     faces = [_flat([whole.vertices[k] for k in triangle]) for triangle in whole.triangles]
     return occ.Solid(occ.Sew(faces)).UnifySameDomain()
 

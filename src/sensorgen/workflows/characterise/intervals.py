@@ -1,24 +1,73 @@
-"""Intervals before and after as a picture: one bar each, relative to the value, on a logarithmic axis."""
+"""Intervals of targets before and after, and their picture: one bar each, relative to the value."""
 
 import html
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import log10
-from typing import TYPE_CHECKING
+from typing import Annotated
 
-if TYPE_CHECKING:
-    from sensorgen.workflows.characterise import Row
+import numpy as np
 
+from sensorgen.analysis.characterise.catalogue import Target
+from sensorgen.analysis.characterise.posterior import Interval95, Posterior
+from sensorgen.core.document import Column
+
+_DETERMINED = 0.5  # of an interval before, below which one after counts as measured
 _LEFT, _WIDE, _ROW, _DECADES = 250, 420, 26, 2.0  # pixels, and decades to each side
 
 
-def svg(title: str, rows: "Sequence[Row]") -> str:
+@dataclass(frozen=True)
+class IntervalRow:
+    """A target before and after.
+
+    Attributes
+    ----------
+    quantity, material : str
+        As a material's file has them.
+    value, low, high : float
+        Afterwards: median and 95 % interval.
+    half_width, goal : float
+        Half of the interval, relative to the value, and what is wanted [%].
+    before_low, before_high : float
+        The 95 % interval before.
+    """
+
+    quantity: Annotated[str, Column("quantity")]
+    material: Annotated[str, Column("material")]
+    before_low: Annotated[float, Column("before", digits=2)]
+    before_high: Annotated[float, Column("to", digits=2)]
+    value: Annotated[float, Column("after", digits=3)]
+    low: Annotated[float, Column("low", digits=3)]
+    high: Annotated[float, Column("high", digits=3)]
+    half_width: Annotated[float, Column("+-", "%", digits=2)]
+    goal: Annotated[float, Column("goal", "%", digits=2)]
+    title: Annotated[str, Column("meaning", hidden=True)]
+
+    def determined(self) -> bool:
+        """Test whether the readings say more than what was known before."""
+        return self.high - self.low < _DETERMINED * (self.before_high - self.before_low)
+
+
+def compared(before: Posterior, after: Posterior, wanted: Sequence[Target]) -> tuple[IntervalRow, ...]:
+    """All targets, with their intervals before and after."""
+
+    def row(target: Target, was: Interval95, now: Interval95) -> IntervalRow:
+        goal = 100 * target.goal if target.goal else np.nan
+        half = 100 * now.half_width() if target.goal else np.nan
+        return IntervalRow(target.quantity, target.material, was.low, was.high, now.value, now.low, now.high, half,
+                           goal, target.title)  # fmt: skip
+
+    return tuple(row(target, before.interval(target), after.interval(target)) for target in wanted)
+
+
+def svg(title: str, rows: Sequence[IntervalRow]) -> str:
     """The picture; quantities that may be 0 or below are left out.
 
     Parameters
     ----------
     title : str
         Above the bars.
-    rows : sequence of Row
+    rows : sequence of IntervalRow
         In the order of reading.
     """
     shown = [row for row in rows if row.low > 0 and row.before_low > 0]
