@@ -8,7 +8,7 @@ import shutil
 import tempfile
 import zlib
 from base64 import b64decode, b64encode
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -25,12 +25,13 @@ from sensorgen.core.errors import MissingValue, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding, grouped
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
+from sensorgen.design.printer import folder as profiles
 from sensorgen.design.values import permittivities, resistivities
 from sensorgen.design.walls import WALLS, rule
 from sensorgen.export import machine
 from sensorgen.export.gcode.check import Checked
 from sensorgen.export.gcode.drags import Lifting
-from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, curaengine, prusa, versions
+from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, versions
 from sensorgen.export.slicers.loads import loads
 from sensorgen.export.slicers.run import find
 from sensorgen.prediction.results import unpredicted
@@ -267,7 +268,7 @@ def _sliced(design: Design, slicer: str, program: str, step: Step) -> PrintFile:
 
 
 def _question(design: Design, slicer: str, program: str) -> dict[str, Any]:
-    """All that decides a slice and its findings."""
+    """All that decides a slice and its findings: files and values that a profile is written by, not its text."""
     changed = Path(program).stat().st_mtime_ns
     version = tuple(
         stored.answer(
@@ -275,12 +276,9 @@ def _question(design: Design, slicer: str, program: str) -> dict[str, Any]:
             lambda: list(versions.of_program(slicer, program)),
         )
     )
-    printer, layers, all_loads = design.machine, design.layers, loads(design)
-    profile = (
-        prusa.profile(printer, layers, all_loads, version) if slicer == "prusa"
-        else repr(asdict(curaengine.engine_settings(printer, layers, all_loads, version)))
-    )  # fmt: skip
-    decides = f"{profile}{printer!r}{layers!r}{[w.model_dump() for w in design.waivers]}"
+    files = sorted(path for path in profiles().rglob("*") if path.is_file())
+    waivers = [waiver.model_dump() for waiver in design.waivers]
+    decides = repr((design.machine, design.layers, loads(design), waivers, [path.read_bytes() for path in files]))
     return {
         "what": "slice", "design": design.id(), "slicer": slicer, "version": version, "program": program,
         "changed": changed, "profile": sha256(decides.encode()).hexdigest(),
