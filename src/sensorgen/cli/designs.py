@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from sensorgen.cli.settings import merged, pairs, setting
+from sensorgen.cli.settings import pairs
 from sensorgen.cli.words import Length, OneOf, Share, completed
 from sensorgen.core import plugins as registry
 from sensorgen.core import units
@@ -221,12 +221,12 @@ def _qualities() -> list[str]:
 
 
 def _design(base: Data, given: Data, word: str) -> "Design":
-    from sensorgen.design import design, packs
+    from sensorgen.design import design, packs, settings
 
     unnamed = {k: v for k, v in base.items() if k != "name"}
     if isinstance(unnamed.get("materials"), dict):
         unnamed["materials"] = packs.slots(unnamed["materials"])
-    data = merged(unnamed, _changes(base, given))
+    data = settings.merged(unnamed, _changes(base, given))
     if given["name"] is not None:
         data["name"] = given["name"]
     elif data == unnamed and "name" in base:
@@ -236,6 +236,8 @@ def _design(base: Data, given: Data, word: str) -> "Design":
 
 def _changes(base: Data, given: Data) -> Data:
     """The options that were given, as the part of a design file that they stand for."""
+    from sensorgen.design.settings import merged, setting
+
     known = {f.name for f in dataclasses.fields(shape.Params)} if (shape := _shape_of(base)) else set()
     parameters = {k: given[_OF_SHAPE + k] for k in known if given.get(_OF_SHAPE + k) is not None}
     parameters |= _size(given["size"]) if given["size"] is not None else {}

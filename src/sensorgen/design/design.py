@@ -8,15 +8,15 @@ import re
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, cast
 
-from pydantic import Field, field_validator
+from pydantic import Field, ModelWrapValidatorHandler, ValidationError, field_validator, model_validator
 
 from sensorgen.core import display, yamlfile
 from sensorgen.core import plugins as registry
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding
-from sensorgen.core.records import Strict, checked, shown
+from sensorgen.core.records import Strict, checked, problem, shown
 from sensorgen.design import borders, imported, packs, shapes
 from sensorgen.design import materials as material_files
 from sensorgen.design.effects import Effects
@@ -85,6 +85,22 @@ class Waiver(Strict):
 
 class Design(Strict):
     """A named variant of a sensor."""
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _constructed(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """Errors of a design that is constructed in Python, in the words of a file's."""
+        try:
+            return handler(data)
+        except ValidationError as error:
+            own = (
+                fields(data["shape"])
+                if isinstance(data, Mapping) and str(data.get("shape")) in packs.names("shapes")
+                else {}
+            )
+            for key in own.keys() & data:
+                raise BadInput(f"{key} is a parameter; expected parameters: {{{key}: {data[key]}}}") from None
+            raise BadInput(problem(error, data, cls)) from None
 
     def _repr_html_(self) -> str:
         return display.html(self)

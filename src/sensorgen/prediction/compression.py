@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
 from math import inf, isfinite, nan
+from typing import Any
 
 import numpy as np
 
@@ -259,8 +260,8 @@ def answer(body: Body, asked: Asked, *, step: Step | None = None) -> Compression
 
 
 def sweep(
-    key: str,
-    points: Sequence[tuple[float | str, Body]],
+    key: str | tuple[str, ...],
+    points: Sequence[tuple[Any, Body]],
     asked: Asked,
     jobs: int,
     done: Callable[[], None],
