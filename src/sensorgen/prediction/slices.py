@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
     from sensorgen.export.gcode.drags import Lifted
 
+_LAST: dict[tuple[str, ...], asprinted.Printed] = {}  # body of the file that was read last
 VARIABLE = "SENSORGEN_SLICER"  # environment: prusa, cura, or none for estimates; the first that is installed if not set
 NONE = "none"
 GCODE = "13-gcode"  # rule of what the check of a G-code file reports
@@ -132,7 +133,11 @@ class PrintFile:
         """Body that the lines print."""
         from sensorgen.export.gcode import paths
 
-        return asprinted.body(design, paths.read(self.content, design.machine), slicer=self.source)
+        key = (self.report.sha256, self.source, design.id())
+        if key not in _LAST:  # pictures, pages and the prediction of one print ask in turn
+            _LAST.clear()
+            _LAST[key] = asprinted.body(design, paths.read(self.content, design.machine), slicer=self.source)
+        return _LAST[key]
 
 
 @dataclass(frozen=True, eq=False)
