@@ -78,13 +78,11 @@ def in_parallel(
         spent, done, ready = 0.0, 0, list[tuple[int, Result]]()
         while todo or again or running:
             while free and (todo or again):
-                if again and not (opened[0].shared and (todo or running)):
-                    chunk = again.popleft()
-                elif todo:
-                    size = max(1, min(int(CHUNK_S * done / spent) if spent else 1, len(todo) // (2 * len(opened))))
-                    chunk = _Chunk(tuple(todo.popleft() for _ in range(size)))
-                else:
+                alone = opened[0].shared and (todo or running)  # a chunk that killed waits until others are safe
+                if not todo and alone:
                     break
+                size = min(int(CHUNK_S * done / spent) if spent else 1, len(todo) // (2 * len(opened)))
+                chunk = again.popleft() if again and not alone else _taken(todo, size)
                 lane = free.pop()
                 running[lane.submit(work, [inputs[k] for k in chunk.numbers])] = lane, chunk
             yield from ready  # after the lanes have got work: what is done with a result takes time
@@ -107,6 +105,11 @@ def in_parallel(
                 spent, done = spent + seconds, done + len(results)
                 ready.extend(zip(chunk.numbers, results, strict=True))
         yield from ready
+
+
+def _taken(todo: deque[int], size: int) -> "_Chunk":
+    """The next works, one at least."""
+    return _Chunk(tuple(todo.popleft() for _ in range(max(1, size))))
 
 
 def remembered(
