@@ -46,61 +46,21 @@ def why_not_applicable(scene: Scene) -> str | None:
     return None
 
 
-@dataclass(frozen=True)
-class Step:
-    """One mesh on the way to an accuracy.
-
-    Attributes
-    ----------
-    order : int
-        Of the potential's polynomials.
-    elements, unknowns : int
-        Tetrahedra and others, and the unknowns that they couple.
-    interval : Interval
-        Capacitance of the whole sensor [F].
-    """
-
-    order: int
-    elements: int
-    unknowns: int
-    interval: Interval
-
-
 def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:
     """Bounds of the capacitance between the terminals, fringes at the sensor's edge left out.
 
-    Parameters
-    ----------
-    scene : Scene
-        As drawn, for which :func:`why_not_applicable` is None.
-    permittivity : mapping of str to float
-        Relative permittivity of each material that does not conduct, and of "air", above 0 [-].
-    width : float
-        Relative width of the interval; wider where the finest mesh is reached [-].
-
-    Returns
-    -------
-    Interval
-        Capacitance of the whole sensor [F].
+    Parameters, result and errors as of :class:`sensorgen.models.CapacitanceModel`.
 
     Raises
     ------
-    OutOfRange
-        A permittivity is not above 0, or the width is.
-    KeyError
-        A material between the electrodes has no permittivity.
-    ValueError
-        The model does not apply to the scene.
     Unsolved
         The electrodes touch, one does not cover the sensor, or bodies are too near each other for a mesh.
-    CrossedBounds
-        The lower bound lies above the upper one: a fault of the solver.
     """
     fem.check(permittivity, width)
-    return min((step.interval for step in steps(scene, permittivity, width)), key=Interval.width)
+    return fem.narrowest(steps(scene, permittivity, width))
 
 
-def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[Step]:
+def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[fem.FieldStep]:
     """The meshes that :func:`capacitance` goes through, until the interval is narrow enough."""
     own, x, y = cell(scene)
     values = [float(permittivity[name]) for name in own.materials]
@@ -119,7 +79,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
         for level, elements, found in bounds(plan, width):
             interval = fem.whole(found, shares.ravel().tolist())
             reached = True
-            yield Step(level.order, elements, found.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
+            yield fem.FieldStep(level.order, elements, found.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
             if interval.width() <= width:
                 return
     except fem.Unsolved:
