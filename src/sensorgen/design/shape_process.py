@@ -26,7 +26,7 @@ LIBRARIES = ("numpy", "shapely")  # of others, that a shape may import
 _MODULES = (
     *LIBRARIES, "array", "bisect", "cmath", "collections", "copy", "dataclasses", "decimal", "enum", "fractions",
     "functools", "hashlib", "heapq", "itertools", "json", "math", "numbers", "numpy.linalg", "numpy.random", "operator",
-    "random", "re", "statistics", "string", "struct", "textwrap", "time", "typing", "sensorgen.scene.array",
+    "random", "re", "statistics", "string", "struct", "textwrap", "time", "typing", "sensorgen.scene.array", "sensorgen.scene.strips",
     "sensorgen.scene.layers", "sensorgen.scene.polyhedra", "sensorgen.scene.revolved", "sensorgen.scene.triangles",
     "sensorgen.scene.sections",
 )  # fmt: skip

@@ -265,6 +265,11 @@ class Envelope:
         """Number of cells of a repeating pattern in the sensor; 1 without a pattern [-]."""
         return 1.0
 
+    def plate(self, low_mm: float, high_mm: float) -> tuple[Prism, ...]:
+        """All of the plan between two heights; nothing where they are one [mm]."""
+        plates = (box(0.0, self.length_mm, 0.0, self.width_mm, low_mm, high_mm),)
+        return plates if high_mm - low_mm > SLIVER_MM else ()
+
 
 def seen_from_above(piece: Piece) -> Outline:
     """Outline of an upright prism, or of a box, in (x, y) [mm].
