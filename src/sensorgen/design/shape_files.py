@@ -19,7 +19,7 @@ from functools import cache, lru_cache
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
-from typing import IO, Any, Protocol, cast
+from typing import IO, TYPE_CHECKING, Any, Protocol, cast
 
 from pydantic import ValidationError
 
@@ -28,7 +28,12 @@ from sensorgen.core import files
 from sensorgen.core.errors import BadInput, OutOfRange, Unwritable
 from sensorgen.core.records import problem
 from sensorgen.design import packs, shape_process
-from sensorgen.scene.scene import FLOATING, Body, Envelope, Fill, Scene
+from sensorgen.scene.polyhedra import Loft, Polyhedron
+from sensorgen.scene.revolved import Revolved
+from sensorgen.scene.scene import FLOATING, Body, Envelope, Fill, Prism, Scene
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
 
 SECONDS = 5  # of processor time for one question; a scene takes milliseconds
 MEMORY_BYTES = 1 << 30
@@ -159,7 +164,7 @@ class _Foreign:
     def _scene(self, p: Envelope, fill: Fill) -> Scene:
         data = self._ask({"parameters": dataclasses.asdict(p), "fill": dataclasses.asdict(fill)})
         try:
-            return _checked(self._name, _adapter().validate_python(data), fill)
+            return _checked(self._name, _decoded(data), fill)
         except ValidationError as error:
             raise BadInput(f"{self._name}.py: scene() gives no scene: {problem(error, data)}") from None
 
@@ -178,15 +183,34 @@ def _foreign(name: str, text: str) -> Shape:
     return cast(Shape, _Foreign(name, text))
 
 
+@dataclasses.dataclass(frozen=True)
+class _ReadBody(Body):
+    """A body by its plain data: of the kinds of pieces that there are."""
+
+    pieces: tuple[Prism | Revolved | Loft | Polyhedron, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class _ReadScene(Scene):
+    """A scene by its plain data."""
+
+    bodies: tuple[_ReadBody, ...]
+
+
 @cache
-def _adapter() -> Any:
+def _adapter() -> "TypeAdapter[_ReadScene]":
     from pydantic import TypeAdapter
 
-    from sensorgen.scene import polyhedra, revolved, scene
+    return TypeAdapter(_ReadScene)
 
-    made = TypeAdapter(Scene)
-    made.rebuild(_types_namespace=vars(scene) | vars(polyhedra) | vars(revolved))
-    return made
+
+def _decoded(data: object) -> Scene:
+    """A scene of plain data; raises ValidationError."""
+    found = _adapter().validate_python(data)
+    bodies = (
+        Body(**{field.name: getattr(body, field.name) for field in dataclasses.fields(Body)}) for body in found.bodies
+    )
+    return Scene(tuple(bodies), found.size_mm, found.repeats)
 
 
 def _fields(name: str, reply: Mapping[str, Any]) -> list[tuple[str, type, Any]]:

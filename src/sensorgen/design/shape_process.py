@@ -26,9 +26,9 @@ LIBRARIES = ("numpy", "shapely")  # of others, that a shape may import
 _MODULES = (
     *LIBRARIES, "array", "bisect", "cmath", "collections", "copy", "dataclasses", "decimal", "enum", "fractions",
     "functools", "hashlib", "heapq", "itertools", "json", "math", "numbers", "numpy.linalg", "numpy.random", "operator",
-    "random", "re", "statistics", "string", "struct", "textwrap", "time", "typing", "sensorgen.scene.array", "sensorgen.scene.strips",
+    "random", "re", "statistics", "string", "struct", "textwrap", "time", "typing", "sensorgen.scene.array",
     "sensorgen.scene.layers", "sensorgen.scene.polyhedra", "sensorgen.scene.revolved", "sensorgen.scene.triangles",
-    "sensorgen.scene.sections",
+    "sensorgen.scene.sections", "sensorgen.scene.strips",
 )  # fmt: skip
 
 
