@@ -60,10 +60,11 @@ class Shape(Protocol):
 class NotTrusted(BadInput):
     """A shape's file whose content the user has not trusted."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, text: str) -> None:
         super().__init__(
             f"{name}.py is not trusted and did not run: a shape is a program; read it, then: sensorgen pack trust "
-            f"shapes/{name}.py (its file, or the design's that contains it), and again after each change"
+            f"shapes/{name}.py (its file, or the design's that contains it), and again after each change; SHA-256 "
+            f"{digest(text)}"
         )
 
 
@@ -78,7 +79,7 @@ def load(name: str, text: str) -> Shape:
         The file is no shape; the message names its line.
     """
     if not is_trusted(text):
-        raise NotTrusted(name)
+        raise NotTrusted(name, text)
     return _foreign(name, text)
 
 
@@ -281,7 +282,7 @@ class _Process:
 
     def __init__(self, name: str, text: str) -> None:
         if not is_trusted(text):
-            raise NotTrusted(name)
+            raise NotTrusted(name, text)
         self.name = name
         self._process = subprocess.Popen(  # noqa: S603 - this very program
             [sys.executable, "-I", "-S", "-B", shape_process.__file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE,

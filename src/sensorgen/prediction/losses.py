@@ -12,6 +12,7 @@ from sensorgen.design.values import MaterialValue, dielectrics, permittivities
 from sensorgen.prediction.capacitance import capacitance
 
 LOSSES = ("loss_tangent", "resistivity_ohm_m")
+LARGEST_TANGENT = 0.05  # assumed of an elastomer of which nothing is stated, its conduction included
 LOWEST_HZ = 1.1e3  # of the bench's tones: a leak is strongest there
 
 _ACCURACY = 1e-5
@@ -22,7 +23,7 @@ def set_losses(design: Design) -> list[MaterialValue]:
     """Loss tangents and resistivities that a design sets for its dielectrics itself.
 
     No source gives a loss tangent, and the one resistivity that a source prints is a slip: what the user does not set
-    is taken for lossless.
+    is taken for lossless; only the range of an impedance holds up to ``LARGEST_TANGENT``.
     """
     names = dielectrics(design) | {"air"}
     return [
@@ -88,6 +89,8 @@ class Lost:
     ----------
     tan_delta : float
         Of the whole, the same at every frequency [-].
+    largest_tangent : float
+        Up to which it may be, where the design states none for its dielectrics [-].
     leak_s : float
         Conductance between the electrodes, the same at every frequency [S].
     taken : tuple of MaterialValue
@@ -97,6 +100,7 @@ class Lost:
     """
 
     tan_delta: float = 0.0
+    largest_tangent: float = LARGEST_TANGENT
     leak_s: float = 0.0
     taken: tuple[MaterialValue, ...] = ()
     doubts: tuple[str, ...] = ()
@@ -122,10 +126,9 @@ def lost(design: Design) -> Lost:
     tangents, leaks = (_tangent(design, taken, parts[quantity]) for quantity in LOSSES)
     film = _film_leak(design)
     through_film_s = sum(t.value for t in film) * design.area_mm2 * M_PER_MM**2
-    return Lost(
-        tangents[0], 2 * pi * LOWEST_HZ * leaks[1] + through_film_s, (*sets, *film),
-        tuple(_strong(taken, parts[LOSSES[1]])),
-    )  # fmt: skip
+    largest = tangents[0] if parts[LOSSES[0]] else LARGEST_TANGENT
+    leak_s, doubts = 2 * pi * LOWEST_HZ * leaks[1] + through_film_s, tuple(_strong(taken, parts[LOSSES[1]]))
+    return Lost(tangents[0], largest, leak_s, (*sets, *film), doubts)
 
 
 def _film_leak(design: Design) -> list[MaterialValue]:

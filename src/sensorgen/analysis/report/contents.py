@@ -7,7 +7,7 @@ from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison, of_iteration
 from sensorgen.analysis.comparison.runs import Run, runs
-from sensorgen.analysis.comparison.specimens import known_iterations
+from sensorgen.analysis.comparison.specimens import UNTRUSTED, known_iterations
 from sensorgen.analysis.plots.figure import Figure
 from sensorgen.analysis.report import (
     alternating,
@@ -152,7 +152,9 @@ def report(
     shorts = (*yields.findings(found), *direction.findings(found)) if found.direct else ()
     ac = alternating.rows(found)
     changes = history.rows(found, ac)
-    headline = (*electrodes.headline(found), *verdicts, *alternating.headline(ac))
+    shapes = [f"Not compared: {what}: {why}." for what, why in left_out if what.startswith(UNTRUSTED)]
+    more = [f"Not compared either: {len(shapes) - 1} more, listed in the report."] if len(shapes) > 1 else []
+    headline = (*electrodes.headline(found), *verdicts, *alternating.headline(ac), *shapes[:1], *more)
     by_frequency = (
         *alternating.findings(ac),
         *alternating.behind_leak(found),

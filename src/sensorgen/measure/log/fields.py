@@ -36,6 +36,7 @@ def _kinds(annotation: Any) -> _Kinds:
 
 
 _TEXT = _kinds(str)
+_ENCODER = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"))
 _HELD: dict[type[Entry], dict[str, tuple[_Kinds, object]]] = {  # by a record: types and defaults
     kind: {f.name: (_kinds(of[f.name]), f.default) for f in fields(kind) if f.name not in UNHASHED}
     for kind, of in _COLUMNS.items()
@@ -61,8 +62,9 @@ def encode(entry: Entry) -> str:
         value = getattr(entry, name)
         if value != usual:
             data[name] = value
-            _checked(name, kinds, list(value) if isinstance(value, tuple) else value, kind)
-    text = json.dumps(data, ensure_ascii=False, separators=(",", ":"))
+            if kinds is not _TEXT or type(value) is not str:
+                _checked(name, kinds, list(value) if isinstance(value, tuple) else value, kind)
+    text = _ENCODER.encode(data)
     if "Infinity" not in text:
         return text
     return f"{{{','.join(f'{json.dumps(name)}:{_json(value)}' for name, value in data.items())}}}"
