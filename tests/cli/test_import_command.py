@@ -425,6 +425,7 @@ ELLIPSE = (
 )
 
 
+@pytest.mark.usefixtures("unpressed")
 def test_a_sensor_cut_to_an_outline_is_sliced_and_predicted(run, program):
     """The skirt follows the outline into the corners of its box, which is no collision."""
     program("prusa-slicer", "prusa-slicer")

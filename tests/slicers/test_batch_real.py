@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from no_numbers import nothing
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.design import design
@@ -19,6 +20,7 @@ from sensorgen.export.gcode import paths
 from sensorgen.export.slicers import run
 from sensorgen.measure.log import batches
 from sensorgen.measure.log.entries import Prediction, RawFile
+from sensorgen.prediction import quantities
 from sensorgen.workflows.batch import make, tab
 from sensorgen.workflows.batch.record import RECORD
 from sensorgen.workflows.sealed import batch_differences
@@ -86,7 +88,10 @@ def small(tmp_path_factory, made):
 
 @pytest.fixture(scope="module", params=["short", pytest.param("whole", marks=pytest.mark.nightly)])
 def twenty(request, tmp_path_factory, without_press):
-    """Twenty sensors of three designs on one plate, 24 mm long, or the example as it stands; and their length [mm]."""
+    """Twenty sensors of three designs on one plate, 14 mm long, or the example as it stands; and their length [mm].
+
+    No test of these looks at a prediction.
+    """
     needed("prusa-slicer")
     folder = tmp_path_factory.mktemp("twenty")
     if request.param == "whole":
@@ -95,9 +100,12 @@ def twenty(request, tmp_path_factory, without_press):
     data["designs"] = [{**data["designs"][k], "replicates": count} for k, count in ((0, 7), (3, 7), (4, 6))]
     for each in data["designs"]:
         given = yamlfile.read(EXAMPLE.parent / each.pop("design")) if "design" in each else each
-        each |= {"shape": given["shape"], "parameters": given["parameters"] | {"length_mm": 24.0, "width_mm": 10.0}}
+        each |= {"shape": given["shape"], "parameters": given["parameters"] | {"length_mm": 14.0, "width_mm": 10.0}}
     (folder / EXAMPLE.name).write_text(json.dumps(data), "utf-8")
-    return without_press(folder / EXAMPLE.name, folder / "out"), 24.0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(quantities, "prediction", nothing)
+        patch.setenv("SENSORGEN_CACHE", str(folder / "cache"))
+        return make(folder / EXAMPLE.name, folder / "out"), 14.0
 
 
 def printed_by(batch, slicer):

@@ -2,6 +2,7 @@
 
 from array import array
 from collections.abc import Callable, Container, Iterator, Sequence
+from dataclasses import replace
 from hashlib import sha256
 from itertools import chain
 from math import isfinite, log, nan, sqrt
@@ -9,7 +10,7 @@ from math import isfinite, log, nan, sqrt
 import numpy as np
 
 from sensorgen.analysis.calibration import Bench, Known, known
-from sensorgen.analysis.comparison import Compared, Comparison, Predicted, of_iteration, predicted
+from sensorgen.analysis.comparison import Compared, Comparison, Predicted, of_iteration
 from sensorgen.analysis.comparison.allowed import Allowed, allowed, usable
 from sensorgen.analysis.comparison.moved import Movable, at_rest
 from sensorgen.analysis.fit import resistance, tones
@@ -20,6 +21,7 @@ from sensorgen.design.design import Design
 from sensorgen.measure.log import BenchRun, Log, Reading
 from sensorgen.measure.log.notes import specimen as named
 from sensorgen.prediction import bodies
+from sensorgen.prediction.electrodes import electrode_resistance
 
 HELD_BACK = 0.25  # of the specimens
 SEED = 23
@@ -176,8 +178,9 @@ def _reading_errors(specimens: Container[str], found: Comparison, values: Sequen
         of = row.predicted
         if of is None or row.reading.specimen not in specimens or not usable(row):
             continue
-        if of.design not in after:
-            after[of.design] = predicted(with_values(found.bodies[of.design], values))
+        if of.design not in after:  # of all quantities its resistance alone is compared
+            fitted = electrode_resistance(with_values(found.bodies[of.design], values), list(of.prediction.resistance))
+            after[of.design] = replace(of, prediction=replace(of.prediction, resistance=fitted))
         expected = after[of.design].along_ohm(row.across_ohm)
         before.append(row.residual)
         residuals.append(log(row.verdict.ry_ohm / expected.value) if expected else nan)

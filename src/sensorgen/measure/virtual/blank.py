@@ -6,7 +6,7 @@ from functools import cache
 from hashlib import sha256
 from math import exp, log
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from sensorgen.asprinted.film import thicker
 from sensorgen.core import cache as answers
 from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
-from sensorgen.design.design import Design
+from sensorgen.design.design import Design, Slots
 from sensorgen.design.values import film, material_value, of_all_materials, resistivities
 from sensorgen.measure.virtual.bricks import bricks
 from sensorgen.measure.virtual.cell import AIR, Bricks, Raster, Solid, capacitance, conductance, pressed
@@ -97,14 +97,16 @@ _SOLVED: dict[tuple[str, float], Blank] = {}
 
 
 def _stored(design: Design) -> Blank:
+    """Solved anew where the cell or its solids differ, not where a track's resistivity does."""
+    names = {part: slot and slot.partition("@")[0] for part, slot in design.materials}
+    cell = design.model_copy(update={"materials": Slots(**names), "material_values": {}})
     question = {
-        "what": "virtual blank", "design": design.id(), "source": _source(),
+        "what": "virtual blank", "design": cell.id(), "source": _source(),
+        "solids": {name: asdict(solid) for name, solid in _solids(design).items()},
         "film_mm": design.machine.tool_height_error_mm,
     }  # fmt: skip
-    found = answers.answer(question, lambda: asdict(_solved(design)))
-    table = tuple(tuple(tuple(row) for row in of) for of in found["table_f_per_m"])
-    top, bottom = found["track_ohm_per_m"]
-    return Blank(table, (top, bottom), found["by_film_per_mm"])
+    table, by_film_per_mm = answers.answer(question, lambda: _solved(design))
+    return Blank(tuple(tuple(map(tuple, of)) for of in table), tracks(design), by_film_per_mm)
 
 
 @cache
@@ -115,7 +117,8 @@ def _source() -> str:
     return sha256(b"".join(f.read_bytes() for f in files)).hexdigest()
 
 
-def _solved(design: Design) -> Blank:
+def _solved(design: Design) -> list[Any]:
+    """Table, and derivative by the film's thickness."""
     from sensorgen.asprinted import printed
 
     cell = printed.body(design).cell
@@ -130,8 +133,7 @@ def _solved(design: Design) -> Blank:
     rise[:, :, 1:] *= finer  # as of the design's values: others change both grids alike
     per_length = _per_length(design, cell, grids[0])
     table = per_length * _at_rest(design, cell.scene, _LN_PERMITTIVITY)[:, None] * (1 + rise)
-    by_film = _by_film(design, cell.scene)
-    return Blank(tuple(tuple(map(tuple, of)) for of in table.tolist()), tracks(design), by_film)
+    return [table.tolist(), _by_film(design, cell.scene)]
 
 
 def tracks(design: Design) -> tuple[float, float]:

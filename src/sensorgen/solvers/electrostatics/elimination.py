@@ -17,7 +17,7 @@ from sensorgen.core.arrays import Whole
 Numbers = NDArray[Any]  # real or complex
 
 HELD = 2  # unknowns 0 and 1 have the values 0 and 1
-_LEAF = 12  # blocks that are joined together
+_LEAF = 30  # blocks that are joined together
 
 
 @dataclass(frozen=True)
