@@ -17,7 +17,7 @@ from sensorgen.core import plugins as registry
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding
 from sensorgen.core.records import Strict, checked, shown
-from sensorgen.design import borders, imported, packs, shapes
+from sensorgen.design import arrays, borders, imported, packs, shapes
 from sensorgen.design import materials as material_files
 from sensorgen.design.effects import Effects
 from sensorgen.design.packs import Kind
@@ -131,6 +131,7 @@ class Design(Strict):
         default=None, description="File of the bodies of an imported sensor, relative to the design's own file."
     )
     bodies: dict[str, imported.Filled] = Field(default={}, description="Imported body to material and terminal.")
+    cell: arrays.Cell | None = Field(default=None, description="Of an array: what lies between crossing tracks.")
     border: str | None = Field(
         default=None, description="SVG or DXF file of the sensor's outline in plan, relative to the design's own file."
     )
@@ -214,8 +215,31 @@ class Design(Strict):
         if self.geometry:
             return imported.scene(self.geometry, self.bodies)
         names = {part: (value or "").partition("@")[0] for part, value in self.materials.model_dump().items()}
+        if self.layout:
+            return arrays.scene(self.layout, Fill(**names), self.crossing.form.scene, self.crossing.params)
         scene = self.form.scene(self.params, Fill(**names))
         return borders.cut(scene, self.border) if self.border else scene
+
+    @cached_property
+    def layout(self) -> arrays.Layout | None:
+        """Tracks of an array in plan; None of any other sensor."""
+        return arrays.layout(self.params, self.border) if isinstance(self.params, arrays.Params) else None
+
+    @cached_property
+    def crossing(self) -> "Design":
+        """One crossing of an array as a sensor of its own: cell, materials and printer are those of all crossings."""
+        cell = self.cell or arrays.Cell()
+        if not isinstance(self.params, arrays.Params):
+            raise BadInput(f"{self.shape} has no crossings; expected shape: {arrays.SHAPE}")
+        others = self.model_dump(
+            exclude={"name", "shape", "parameters", "cell", "border", "waivers", "tip"}, exclude_defaults=True,
+            mode="json",
+        )  # fmt: skip
+        others["tip"] = arrays.crossing_tip(self.params, self.tip)
+        own = arrays.cell_parameters(self.params, cell)
+        made = make({**others, "name": f"{self.name[:80] or 'array'}-crossing", "shape": cell.shape, "parameters": own})
+        arrays.check_cell(made.params, self.params)
+        return made
 
     @property
     def area_mm2(self) -> float:
@@ -282,7 +306,7 @@ class Design(Strict):
         """Parts that have come later and are not used: without them the identities of older designs last."""
         usual = {
             "profile": Profile(), "tip": TipData(), "effects": Effects(), "own": {}, "geometry": None, "bodies": {},
-            "border": None, "leads": Leads(),
+            "border": None, "leads": Leads(), "cell": None,
         }  # fmt: skip
         return {key for key, value in usual.items() if getattr(self, key) == value}
 
@@ -358,6 +382,7 @@ class Design(Strict):
         ]
 
 
+_BUILT_IN = {imported.SHAPE: imported, arrays.SHAPE: arrays}  # shapes that are more than a scene of parameters
 # Version 0.1.0 hashed its own number, and its identities last: the logs, labels and batches that name them stay valid.
 _FIRST = {"sensorgen": "0.1.0"}
 _HOMED = "diabase-h5"  # which homes by G28 alone since it was found that its G32 does not
@@ -402,8 +427,8 @@ def shape(name: str) -> "Shape":
 
 def _shape(name: str, text: str | None) -> "Shape":
     """A shape by its name, or by the text of its file where that does not ship."""
-    if name == imported.SHAPE:
-        return cast("Shape", imported)
+    if name in _BUILT_IN:
+        return cast("Shape", _BUILT_IN[name])
     if text is None:
         return shape(name)
     from sensorgen.design import shape_files
@@ -445,9 +470,11 @@ def parameters(shape_name: str, given: Mapping[str, float | str], text: str | No
     return params
 
 
-def unit_of(parameter: str) -> str:
-    """Unit of a shape's parameter, in words."""
-    return "degrees" if parameter.endswith("_deg") else "mm"
+def unit_of(field: dataclasses.Field[Any]) -> str:
+    """Unit of a shape's parameter, in words; "" of a number of things."""
+    if field.metadata.get("count"):
+        return ""
+    return "degrees" if field.name.endswith("_deg") else "mm"
 
 
 def _checked(field: dataclasses.Field[Any], value: float | str) -> float | str:
@@ -459,9 +486,10 @@ def _checked(field: dataclasses.Field[Any], value: float | str) -> float | str:
     low, high = field.metadata["range"]
     if isinstance(value, str) or not math.isfinite(value) or not low <= value <= high:
         shown = repr(value) if isinstance(value, str) else f"{value:g}"
-        unit = unit_of(field.name)
+        unit = unit_of(field)
         own = f": write it in {unit}, without a unit" if isinstance(value, str) and value[:1].isdigit() else ""
-        raise OutOfRange(f"{field.name} is {shown}; expected a number from {low:g} to {high:g} {unit}{own}")
+        limits = f"a number from {low:g} to {high:g} {unit}".rstrip()
+        raise OutOfRange(f"{field.name} is {shown}; expected {limits}{own}")
     return float(value)
 
 
@@ -485,6 +513,8 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
         design = checked(Design, with_own_files(dict(data), Path(where).parent) if isinstance(data, Mapping) else data)
         if design.shape == imported.SHAPE or design.geometry or design.bodies:
             design = _imported(design)
+        if design.cell and design.shape != arrays.SHAPE:
+            raise BadInput(f"cell: {design.shape} has no crossings; expected shape: {arrays.SHAPE}")
         _check_names(design)
         if "own" not in data and design.own.keys() & {"printers"}:  # a record needs no materials that it does not use
             design.machine.check_tools(Path(where).parent)
@@ -635,7 +665,7 @@ def name_of(design: Design) -> str:
         parts.append("" if given == usual else _plain(Path(given).stem))
     if design.orientation != default.orientation:
         parts.append("upside-down")
-    said_if_set = {key for key in ("material_values", "border") if getattr(design, key)}
+    said_if_set = {key for key in ("material_values", "border", "cell") if getattr(design, key)}
     said_if_set |= {"profile"} - design._plain()
     others = design.model_dump(include={"materials", "nozzle_mm", "tools", "infill", "shrinkage"} | said_if_set)
     if others != default.model_dump(include=set(others)):
