@@ -16,27 +16,18 @@ from functools import cached_property, lru_cache
 from math import ceil
 from typing import TYPE_CHECKING, Any
 
-from pydantic import Field
-
 from sensorgen.core.errors import BadInput, OutOfRange
-from sensorgen.core.records import Strict
 from sensorgen.design.tip import EVEN, TipData
 from sensorgen.scene.scene import SLIVER_MM, Body, Envelope, Fill, Piece, Point, Prism, Scene, box, rounded
 
 if TYPE_CHECKING:
     import shapely
 
-SHAPE = "array"
+    from sensorgen.design.design import Cell
+
 MOST_CROSSINGS = 10_000  # the mat of Tekscan has 8448
 ENVELOPE = ("length_mm", "width_mm", "electrode_mm", "isolation_mm")  # that the array gives to its cell
 _WHOLE = 1e-6
-
-
-class Cell(Strict):
-    """Shape of the cell at each crossing."""
-
-    shape: str = "reference"
-    parameters: dict[str, float | str] = Field(default={}, description="Of that shape; its size is that of a crossing.")
 
 
 @dataclass(frozen=True)
@@ -359,7 +350,7 @@ def _rounded(x0: float, x1: float, y0: float, y1: float) -> tuple[float, float, 
     return rounded(x0), rounded(x1), rounded(y0), rounded(y1)
 
 
-def cell_parameters(p: Params, cell: Cell) -> dict[str, float | str]:
+def cell_parameters(p: Params, cell: "Cell") -> dict[str, float | str]:
     """Parameters of the cell's shape for one crossing.
 
     Raises

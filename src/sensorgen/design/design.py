@@ -17,7 +17,7 @@ from sensorgen.core import plugins as registry
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding
 from sensorgen.core.records import Strict, checked, shown
-from sensorgen.design import arrays, borders, imported, packs, shapes
+from sensorgen.design import borders, imported, packs, shapes
 from sensorgen.design import materials as material_files
 from sensorgen.design.effects import Effects
 from sensorgen.design.packs import Kind
@@ -27,8 +27,10 @@ from sensorgen.design.tip import EVEN, STIFF, TipData
 from sensorgen.scene.scene import Envelope, Fill, Scene
 
 if TYPE_CHECKING:
+    from sensorgen.design.arrays import Layout
     from sensorgen.design.shape_files import Shape
 
+ARRAY = "array"  # shape of crossing tracks, with cells of another one
 MAX_CELLS = 50_000  # crossed strips of 330 x 330 mm have 27 225
 MAX_LAYERS = 5_000  # 30 mm in layers of 0.06 mm have 500
 _NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]{0,98}[A-Za-z0-9])?")
@@ -83,6 +85,13 @@ class Waiver(Strict):
     reason: Annotated[str, Field(min_length=5)]
 
 
+class Cell(Strict):
+    """Shape of the cell at each crossing of an array."""
+
+    shape: str = "reference"
+    parameters: dict[str, float | str] = Field(default={}, description="Of that shape; its size is that of a crossing.")
+
+
 class Design(Strict):
     """A named variant of a sensor."""
 
@@ -131,7 +140,7 @@ class Design(Strict):
         default=None, description="File of the bodies of an imported sensor, relative to the design's own file."
     )
     bodies: dict[str, imported.Filled] = Field(default={}, description="Imported body to material and terminal.")
-    cell: arrays.Cell | None = Field(default=None, description="Of an array: what lies between crossing tracks.")
+    cell: Cell | None = Field(default=None, description="Of an array: what lies between crossing tracks.")
     border: str | None = Field(
         default=None, description="SVG or DXF file of the sensor's outline in plan, relative to the design's own file."
     )
@@ -216,29 +225,37 @@ class Design(Strict):
             return imported.scene(self.geometry, self.bodies)
         names = {part: (value or "").partition("@")[0] for part, value in self.materials.model_dump().items()}
         if self.layout:
+            from sensorgen.design import arrays
+
             return arrays.scene(self.layout, Fill(**names), self.crossing.form.scene, self.crossing.params)
         scene = self.form.scene(self.params, Fill(**names))
         return borders.cut(scene, self.border) if self.border else scene
 
     @cached_property
-    def layout(self) -> arrays.Layout | None:
+    def layout(self) -> "Layout | None":
         """Tracks of an array in plan; None of any other sensor."""
-        return arrays.layout(self.params, self.border) if isinstance(self.params, arrays.Params) else None
+        if self.shape != ARRAY:
+            return None
+        from sensorgen.design import arrays
+
+        return arrays.layout(cast(arrays.Params, self.params), self.border)
 
     @cached_property
     def crossing(self) -> "Design":
         """One crossing of an array as a sensor of its own: cell, materials and printer are those of all crossings."""
-        cell = self.cell or arrays.Cell()
-        if not isinstance(self.params, arrays.Params):
-            raise BadInput(f"{self.shape} has no crossings; expected shape: {arrays.SHAPE}")
+        if not self.layout:
+            raise BadInput(f"{self.shape} has no crossings; expected shape: {ARRAY}")
+        from sensorgen.design import arrays
+
+        cell, params = self.cell or Cell(), self.layout.params
         others = self.model_dump(
             exclude={"name", "shape", "parameters", "cell", "border", "waivers", "tip"}, exclude_defaults=True,
             mode="json",
         )  # fmt: skip
-        others["tip"] = arrays.crossing_tip(self.params, self.tip)
-        own = arrays.cell_parameters(self.params, cell)
+        others["tip"] = arrays.crossing_tip(params, self.tip)
+        own = arrays.cell_parameters(params, cell)
         made = make({**others, "name": f"{self.name[:80] or 'array'}-crossing", "shape": cell.shape, "parameters": own})
-        arrays.check_cell(made.params, self.params)
+        arrays.check_cell(made.params, params)
         return made
 
     @property
@@ -382,7 +399,6 @@ class Design(Strict):
         ]
 
 
-_BUILT_IN = {imported.SHAPE: imported, arrays.SHAPE: arrays}  # shapes that are more than a scene of parameters
 # Version 0.1.0 hashed its own number, and its identities last: the logs, labels and batches that name them stay valid.
 _FIRST = {"sensorgen": "0.1.0"}
 _HOMED = "diabase-h5"  # which homes by G28 alone since it was found that its G32 does not
@@ -427,8 +443,12 @@ def shape(name: str) -> "Shape":
 
 def _shape(name: str, text: str | None) -> "Shape":
     """A shape by its name, or by the text of its file where that does not ship."""
-    if name in _BUILT_IN:
-        return cast("Shape", _BUILT_IN[name])
+    if name == imported.SHAPE:
+        return cast("Shape", imported)
+    if name == ARRAY:
+        from sensorgen.design import arrays
+
+        return cast("Shape", arrays)
     if text is None:
         return shape(name)
     from sensorgen.design import shape_files
@@ -513,8 +533,8 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
         design = checked(Design, with_own_files(dict(data), Path(where).parent) if isinstance(data, Mapping) else data)
         if design.shape == imported.SHAPE or design.geometry or design.bodies:
             design = _imported(design)
-        if design.cell and design.shape != arrays.SHAPE:
-            raise BadInput(f"cell: {design.shape} has no crossings; expected shape: {arrays.SHAPE}")
+        if design.cell and design.shape != ARRAY:
+            raise BadInput(f"cell: {design.shape} has no crossings; expected shape: {ARRAY}")
         _check_names(design)
         if "own" not in data and design.own.keys() & {"printers"}:  # a record needs no materials that it does not use
             design.machine.check_tools(Path(where).parent)
