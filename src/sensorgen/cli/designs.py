@@ -165,7 +165,7 @@ def _parameter_options(params: type, taken: set[str]) -> list[click.Parameter]:
     return options
 
 
-def _number_type(field: "dataclasses.Field[Any]") -> click.ParamType:
+def _number_type(field: "dataclasses.Field[Any]") -> "click.ParamType[Any]":
     return click.FLOAT if field.name.endswith("_deg") or field.metadata.get("count") else Length()
 
 

@@ -16,10 +16,12 @@ from sensorgen.design.arrays import Layout, Track
 from sensorgen.design.design import Design
 from sensorgen.models.compression import Curve
 from sensorgen.prediction import bodies
-from sensorgen.prediction.query import DEFAULT, Query
+from sensorgen.prediction.query import Query
 from sensorgen.prediction.sensor_model import SensorModel
 from sensorgen.solvers.tracks import Tracks
 
+USUAL_KPA = 90.0  # of 6 N on 8 x 8 mm
+_N_PER_KPA_MM2 = 1e-3
 _NEWTON = 12  # steps: the law is smooth and nearly straight
 SHORT_OHM = 1e3  # of a shorted crossing: one bead of the electrodes' material across the film
 
@@ -214,8 +216,15 @@ def wire_table(design: Design) -> Table:
     return Table.of("wires", "", array_model(design).wires())
 
 
-def array_model(design: Design, query: Query = DEFAULT) -> ArrayModel:
+def array_model(design: Design, until_kpa: float = USUAL_KPA) -> ArrayModel:
     """Numbers of an array as printed: by G-code of one crossing where a slicer is there, else estimated.
+
+    Parameters
+    ----------
+    design : Design
+        An array.
+    until_kpa : float
+        Pressure on a cell up to which its law is wanted [kPa]; beyond the usual one a cell is solved, for a minute.
 
     Raises
     ------
@@ -229,6 +238,7 @@ def array_model(design: Design, query: Query = DEFAULT) -> ArrayModel:
     if not design.layout:
         raise BadInput(f"{design.name}: {design.shape} has no crossings; expected shape: array")
     p = design.layout.params
+    query = Query(force_n=until_kpa * p.column_mm * p.row_mm * _N_PER_KPA_MM2)
     model, _ = sensor_model(bodies.default_body(design.crossing), query)
     top, bottom = (model.rest.resistance[end] for end in ("top", "bottom"))
     scene = model.body.cells.first()
