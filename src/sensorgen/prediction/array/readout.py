@@ -16,7 +16,7 @@ MOST_DENSE = 2000  # crossings of which the information is a whole matrix; beyon
 FULL_SCALE_PA = 1103e3  # prior standard deviation of a pressure: full scale of a Tekscan HR mat 7101E
 _TAUS = 7.0  # time constants of the slowest track until a reading is within 0.1 %
 _PERIODS = 10.0  # of the lowest frequency that a reading takes
-_FAULT = re.compile(r"(?P<row>r\d+)?(?P<column>c\d+)?(?::(?P<after>\d+))?")
+_SHORT, _BREAK = re.compile(r"r(\d+)c(\d+)"), re.compile(r"([rc])(\d+):(\d+)")
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def crosstalk(read: Readings) -> Real:
     return found
 
 
-def faulty(model: ArrayModel, tracks: Tracks, faults: Iterable[str]) -> Tracks:
+def faulty(tracks: Tracks, faults: Iterable[str]) -> Tracks:
     """A network with faults: ``r3:5`` breaks row 3 behind column 5 (0: its lead), ``r2c4`` shorts that crossing.
 
     Raises
@@ -129,19 +129,23 @@ def faulty(model: ArrayModel, tracks: Tracks, faults: Iterable[str]) -> Tracks:
     BadInput
         A word that is none of these, or a track that the array has not.
     """
-    m, n = model.here.shape
     for word in faults:
-        match = _FAULT.fullmatch(word)
-        row, column, after = match.group("row", "column", "after") if match else (None, None, None)
-        i, j = (int(name[1:]) - 1 if name else 0 for name in (row, column))
-        known = 0 <= i < m and 0 <= j < n
-        if known and row and column and after is None:
-            tracks = tracks.shorted(i, j, SHORT_OHM)
-        elif known and bool(row) != bool(column) and after is not None and int(after) < (n if row else m):
-            tracks = tracks.broken("row" if row else "column", i if row else j, int(after) - 1)
-        else:
-            raise BadInput(
-                f"fault {word!r:.40}: expected r3:5 (row 3 broken behind column 5; :0 its lead), c2:1, or r2c4 (a "
-                f"short), of {m} rows and {n} columns"
-            )
+        tracks = _with_fault(tracks, word)
     return tracks
+
+
+def _with_fault(tracks: Tracks, word: str) -> Tracks:
+    m, n = tracks.capacitance_f.shape
+    if short := _SHORT.fullmatch(word):
+        i, j = (int(number) - 1 for number in short.groups())
+        if 0 <= i < m and 0 <= j < n:
+            return tracks.shorted(i, j, SHORT_OHM)
+    if cut := _BREAK.fullmatch(word):
+        track, after = int(cut[2]) - 1, int(cut[3])
+        count, length = (m, n) if cut[1] == "r" else (n, m)
+        if 0 <= track < count and after < length:
+            return tracks.broken("row" if cut[1] == "r" else "column", track, after - 1)
+    raise BadInput(
+        f"fault {word!r:.40}: expected r3:5 (row 3 broken behind column 5; :0 its lead), c2:1, or r2c4 (a short), of "
+        f"{m} rows and {n} columns"
+    )

@@ -181,7 +181,7 @@ def study(
         raise OutOfRange(f"a pressure of {pressure_kpa:g} kPa; expected 0 or more")
     ratio, slope = model.under(np.array(pressure_kpa * PA_PER_KPA))
     per_pa = model.capacitance.value * float(slope)
-    tracks = faulty(model, model.tracks(model.capacitances(float(ratio))), faults)
+    tracks = faulty(model.tracks(model.capacitances(float(ratio))), faults)
     read = readout.read(tracks)
     prior = np.where(model.here, per_pa * FULL_SCALE_PA, 1e-6 * model.capacitance.value).ravel()
     spread = covariance(information(read, readout), prior)
