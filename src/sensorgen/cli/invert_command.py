@@ -316,6 +316,6 @@ command = _Specimens(
     _work, OWN, name="invert",
     help="Force and position behind the impedances in MEASURED.csv ('-' reads the standard input): one row per sample, "
     "columns re_ohm_1.1kHz and im_ohm_1.1kHz for every tone, 'rest' with 1 where nothing was on the sensor, and time_s "
-    "if known. The first word is a specimen that was calibrated, or a design. Of an array: pressure maps of its frames, "
+    "if known. The first word is a specimen that was calibrated, or a design. Of an array: pressure maps of frames, "
     "CSV with columns r1c1, r1c2 ... [F], or NPZ.",
 )  # fmt: skip
