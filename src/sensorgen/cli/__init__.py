@@ -34,6 +34,7 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
         "cell": "Capacitance between certified bounds.",
         "compress": "Displacement and capacitance under stress.",
         "invert": "Force and position from measured impedances.",
+        "array": "What an array of crossing tracks resolves.",
         "sheet": "Which contacts and frequencies locate a load in two dimensions.",
         "stack": "Double sensor, and isolation against touch.",
     },

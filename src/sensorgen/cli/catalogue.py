@@ -91,7 +91,7 @@ def _shape(file: packs.File) -> Entry:
 def _said(field: Field[Any]) -> str:
     choices = field.metadata.get("choices")
     low, high = field.metadata.get("range", (0.0, 0.0))
-    limits = f"one of {', '.join(choices)}" if choices else f"{low:g} to {high:g} {design.unit_of(field.name)}"
+    limits = f"one of {', '.join(choices)}" if choices else f"{low:g} to {high:g} {design.unit_of(field)}"
     default = field.default if choices else f"{field.default:g}"
     return f"{field.metadata['help']} ({limits}; default {default})"
 

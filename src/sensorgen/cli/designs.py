@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 from click.shell_completion import CompletionItem
@@ -40,12 +40,12 @@ class DesignGroup(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         """Names of the shapes."""
-        return registry.names(shapes)
+        return sorted([ARRAY, *registry.names(shapes)])
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command:  # noqa: ARG002
         """The command for a shape, or for a design file."""
-        if name in registry.names(shapes):
-            return self._command(name, registry.load(shapes, name), {"shape": name})
+        if name == ARRAY or name in registry.names(shapes):
+            return self._command(name, _shape_of({"shape": name}), {"shape": name})
         if name.endswith(".py") or not _is_file(name):
             base = _of_packs({"shape": name}, Path())
             return self._command(base["shape"], _shape_of(base), base)
@@ -102,7 +102,7 @@ class DesignGroup(click.Group):
 
 def _of_packs(base: Data, folder: Path) -> Data:
     """A design's data with its shape's file, where that does not ship."""
-    if not isinstance(base.get("shape"), str) or base["shape"] in (IMPORTED, *registry.names(shapes)):
+    if not isinstance(base.get("shape"), str) or base["shape"] in (IMPORTED, ARRAY, *registry.names(shapes)):
         return base
     from sensorgen.design import packs
 
@@ -115,6 +115,10 @@ def _shape_of(base: Data) -> "Shape | ModuleType | None":
     name = base.get("shape")
     if not isinstance(name, str) or name == IMPORTED:
         return None
+    if name == ARRAY:
+        from sensorgen.design import arrays
+
+        return cast("Shape", arrays)
     if name in registry.names(shapes):
         return registry.load(shapes, name)
     from sensorgen.design import shape_files
@@ -136,6 +140,7 @@ def _is_file(word: str) -> bool:
 
 
 IMPORTED = "imported"  # shape of a design whose bodies came from a CAD file: it has no parameters
+ARRAY = "array"  # shape of crossing tracks, with cells of another one
 _OF_SHAPE = "of_shape_"  # before names of parameters, which a command's own may equal
 
 
@@ -153,11 +158,15 @@ def _parameter_options(params: type, taken: set[str]) -> list[click.Parameter]:
         options.append(
             click.Option(
                 [option, _OF_SHAPE + field.name],
-                type=OneOf(choices) if choices else click.FLOAT if field.name.endswith("_deg") else Length(),
+                type=OneOf(choices) if choices else _number_type(field),
                 help=f"{field.metadata['help']}  [default: {_plainly(field.default)}]",
             )
         )
     return options
+
+
+def _number_type(field: "dataclasses.Field[Any]") -> "click.ParamType[Any]":
+    return click.FLOAT if field.name.endswith("_deg") or field.metadata.get("count") else Length()
 
 
 def _plainly(default: Any) -> str:

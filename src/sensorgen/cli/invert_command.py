@@ -69,7 +69,7 @@ OWN: list[click.Parameter] = [
         ["--compression"], type=OneOf(("unconfined", "bonded")),
         help="Compression law of a plate; the best of the cell if not given.",
     ),
-    *body_options.body_options(),
+    *options.array_frames(), *body_options.body_options(),
     *render.options("json", "markdown", file=False),
 ]  # fmt: skip
 
@@ -78,6 +78,13 @@ def _work(
     design: "Design", *, measured: str, output: str | None, perfect: bool, rest_file: str | None,
     compression: str | None, **how: Any,
 ) -> int:  # fmt: skip
+    of_array = {key: how.pop(key) for key in ("readout", "input_ohm", "frequency", "scatter", "plot")}
+    if design.layout:
+        from sensorgen.cli import array_frames
+
+        others = {"perfect": perfect, "compression": compression, **how}
+        noise = others.pop("noise")
+        return array_frames.invert(design, measured, output, noise, rest_file, **of_array, **others)
     from sensorgen.prediction.query import Query
 
     query = Query(law=compression or "")
@@ -309,5 +316,6 @@ command = _Specimens(
     _work, OWN, name="invert",
     help="Force and position behind the impedances in MEASURED.csv ('-' reads the standard input): one row per sample, "
     "columns re_ohm_1.1kHz and im_ohm_1.1kHz for every tone, 'rest' with 1 where nothing was on the sensor, and time_s "
-    "if known. The first word is a specimen that was calibrated, or a design.",
+    "if known. The first word is a specimen that was calibrated, or a design. Of an array: pressure maps of frames, "
+    "CSV with columns r1c1, r1c2 ... [F], or NPZ.",
 )  # fmt: skip

@@ -352,6 +352,9 @@ def with_files(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     texts: dict[Kind, dict[str, Any]] = {kind: dict(given.get(kind, {})) for kind in SINGULAR}
     made = dict(data)
     made.update(_shape_and_machine(data, texts, folder))
+    cell = data.get("cell")
+    if isinstance(cell, dict) and isinstance(cell.get("shape"), str):
+        made["cell"] = cell | {"shape": _add(texts, "shapes", cell["shape"], folder)}
     if isinstance(data.get("materials"), dict):
         made["materials"] = {part: _slot(word, texts, folder) for part, word in slots(data["materials"]).items()}
     if isinstance(data.get("bodies"), dict):
@@ -385,7 +388,9 @@ def _shape_and_machine(
     kinds: tuple[tuple[str, Kind], ...] = (("shape", "shapes"), ("printer", "printers"), ("quality", "qualities"))
     for key, kind in kinds:
         word = data.get(key)
-        if isinstance(word, str) and not (key == "shape" and "geometry" in data):  # that of imported bodies is no file
+        if isinstance(word, str) and not (
+            key == "shape" and ("geometry" in data or word == "array")
+        ):  # those are no file
             yield key, _add(texts, kind, word, folder)
 
 

@@ -374,6 +374,15 @@ def of_own_machine(design: Design) -> list[Finding]:
     return machine.of_design(design) if design.own.keys() & {"printers", "qualities"} else []
 
 
+def _at_crossing(finding: Finding, design: Design) -> Finding:
+    """A finding about an array with the name of the crossing at which it shows, if it does at one."""
+    if not finding.place_mm or not design.layout:
+        return finding
+    x, y, _ = (at * (1 - design.shrinkage) for at in finding.place_mm)
+    name = design.layout.crossing(x, design.layout.size_mm[1] - y if design.orientation == "upside-down" else y)
+    return replace(finding, message=f"{finding.message} ({name})") if name else finding
+
+
 def combined(
     design: Design, drawn: Review, source: str, of_print: list[Finding], file: PrintFile | None = None
 ) -> PrintReview:  # fmt: skip
@@ -398,6 +407,7 @@ def combined(
     except MissingValue as error:
         own.append(unpredicted(str(error)))
     found = [*own, *(advised(f, names) for f in of_print), *(f for f in drawn.findings if f.rule not in replaced)]
+    found = [_at_crossing(f, design) for f in found] if design.layout else found
     waived = [f if f.rule == GCODE else w for f, w in zip(found, design.waived(found), strict=True)]
     listed = grouped([*waived, *design.idle_waivers(found)])
     return PrintReview(drawn.meshes, listed, source, drawn=drawn, file=file)
