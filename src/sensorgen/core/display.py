@@ -69,7 +69,7 @@ class Displayed:
         return figure(self)
 
     def to_pandas(self) -> Any:
-        """Its table, the first of several, as a pandas DataFrame; raises MissingValue without pandas."""
+        """The table, the first of several, as a pandas DataFrame; raises MissingValue without pandas."""
         from sensorgen.core.document import Table
         from sensorgen.core.errors import MissingValue
 

@@ -366,7 +366,7 @@ def cell_parameters(p: Params, cell: "Cell") -> dict[str, float | str]:
 
 
 def crossing_tip(p: Params, tip: TipData) -> dict[str, object]:
-    """What presses one crossing: an even pressure on all of it, unless the design has another tip."""
+    """Tip on one crossing: an even pressure on all of it, unless the design has another tip."""
     if tip == TipData():
         return {"width_mm": p.column_mm, "block": EVEN}
     return tip.model_dump() | {"width_mm": min(tip.width_mm, p.column_mm)}

@@ -272,7 +272,7 @@ def _height_error(design: Design) -> str:
 
 
 def _one(design: Design) -> Design:
-    """What is predicted of a design: one crossing of an array, any other sensor as a whole."""
+    """Design to predict: one crossing of an array, any other sensor as a whole."""
     return design.crossing if design.layout else design
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from sensorgen.scene.polyhedra import Loft, Polyhedron
+from sensorgen.scene.polyhedra import Loft, Polyhedron, surface
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import AXES, PLANE, Outline, Piece, Place, Prism, rounded
 
@@ -28,8 +28,9 @@ def shifted(piece: Piece, by_mm: Place) -> Piece:
     if isinstance(piece, Loft):
         lower, upper = _moved(piece.lower, x, y), _moved(piece.upper, x, y)
         return Loft(lower, upper, rounded(piece.bottom_mm + z), rounded(piece.top_mm + z))
-    corners = tuple((rounded(a + x), rounded(b + y), rounded(c + z)) for a, b, c in piece.vertices)
-    return Polyhedron(corners, piece.triangles)
+    whole = surface(piece)
+    corners = tuple((rounded(a + x), rounded(b + y), rounded(c + z)) for a, b, c in whole.vertices)
+    return Polyhedron(corners, whole.triangles)
 
 
 def _moved(outline: Outline, u_mm: float, v_mm: float) -> Outline:
