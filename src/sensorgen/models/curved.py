@@ -15,6 +15,7 @@ import shapely
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.scene.layers import Region
 from sensorgen.scene.repetition import Repeat, halved, repeat
 from sensorgen.scene.scene import SLIVER_MM, Piece, Scene
 from sensorgen.solvers.electrostatics import bounds as fem
@@ -97,6 +98,20 @@ class Window:
     materials: tuple[str, ...]
 
 
+def _looks(scene: Scene) -> Iterator[Region]:
+    """Regions of each material and terminal, at some heights between any two levels."""
+    levels = sorted(
+        {z for body in scene.bodies for piece in body.pieces for z in (*piece.levels_mm(), *piece.span("z"))}
+    )
+    for bottom, top in pairwise(levels):
+        for share in _CUTS if top - bottom > SLIVER_MM else ():
+            z, outlines = bottom + share * (top - bottom), dict[tuple[str, str], list[shapely.Polygon]]()
+            for body in scene.bodies:
+                cut = [shapely.Polygon(outline) for piece in body.pieces for outline in piece.cut("z", z)]
+                outlines.setdefault((body.material, body.terminal), []).extend(cut)
+            yield from (shapely.union_all(own) for own in outlines.values() if own)
+
+
 @lru_cache(maxsize=8)
 def cell(scene: Scene) -> tuple[Window, Repeat, Repeat]:
     """The cell of a scene, and how it repeats along x and y.
@@ -109,17 +124,7 @@ def cell(scene: Scene) -> tuple[Window, Repeat, Repeat]:
     spans = {end: [p.span("z") for b in scene.bodies if b.terminal == end for p in b.pieces] for end in _ENDS}
     if missing := [end for end in _ENDS if not spans[end]]:
         raise ValueError(f"the scene has no {missing[0]} electrode")
-    levels = sorted(
-        {z for body in scene.bodies for piece in body.pieces for z in (*piece.levels_mm(), *piece.span("z"))}
-    )
-    looks = []
-    for bottom, top in pairwise(levels):
-        for share in _CUTS if top - bottom > SLIVER_MM else ():
-            z, outlines = bottom + share * (top - bottom), dict[tuple[str, str], list[shapely.Polygon]]()
-            for body in scene.bodies:
-                cut = [shapely.Polygon(outline) for piece in body.pieces for outline in piece.cut("z", z)]
-                outlines.setdefault((body.material, body.terminal), []).extend(cut)
-            looks += [shapely.union_all(own) for own in outlines.values() if own]
+    looks = list(_looks(scene))
     x, y = (repeat(looks, scene.size_mm[:2], axis) for axis in (0, 1))
     if x.shifts or y.shifts:
         raise ValueError("the pattern repeats by shifts, not by mirrors")

@@ -207,6 +207,12 @@ class Touch:
         return found
 
 
+def _faces(box: Real, at_mm: Real, z_mm: float, upwards: bool) -> bool:
+    """True where a box (3, 2) has a level face at a place and height, above or below it [mm]."""
+    over = (box[:2, 0] < at_mm + SAME_MM) & (box[:2, 1] > at_mm - SAME_MM)
+    return bool(abs(box[2, int(upwards)] - z_mm) < SAME_MM and over.all())
+
+
 def touches(cell: Cell) -> list[Touch]:
     """All places in a cell where a dome meets a level face."""
     found = []
@@ -216,15 +222,10 @@ def touches(cell: Cell) -> list[Touch]:
         arcs = [edge for edge in profile(piece) if edge.bulge]
         poles = [(edge.circle(), z) for edge in arcs for r, z in (edge.start, edge.end) if r < SAME_MM]
         for (centre, radius), z in poles:
-            upwards, middle = z < centre[1], own[:2].mean(1)
-            faces = [
-                box for box, _, its in cell.boxes()
-                if its != kind and abs(box[2, int(upwards)] - z) < SAME_MM
-                and ((box[:2, 0] < middle + SAME_MM) & (box[:2, 1] > middle - SAME_MM)).all()
-            ]  # fmt: skip
-            if faces and abs(centre[0]) < SAME_MM:
+            upwards, others = z < centre[1], [(box, its) for box, _, its in cell.boxes() if its != kind]
+            if abs(centre[0]) < SAME_MM and any(_faces(box, own[:2].mean(1), z, upwards) for box, _ in others):
                 way = -1.0 if upwards else 1.0
-                metal = [b[2, int(upwards)] for b, _, its in cell.boxes() if its < cell.conductors and its != kind]
+                metal = [box[2, int(upwards)] for box, its in others if its < cell.conductors]
                 apart = min((off for end in metal if (off := way * (end - z)) > SAME_MM), default=radius)
                 found.append(Touch(piece, kind, z, upwards, radius, float(apart)))
     return found

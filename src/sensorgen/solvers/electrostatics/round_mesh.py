@@ -175,14 +175,19 @@ def _shape(cell: Cell, cusps: Sequence[tuple[Touch, float]]) -> tuple[Any, "_Gra
     places = [{_key(v.p) for f in held.get(f"c{k}", ()) for v in f.vertices} for k in range(cell.conductors)]
     if not kept or any(a & b for k, a in enumerate(places) for b in places[:k]):
         raise Unsolved("the electrodes touch: the capacitance grows without bound")
+    _refuse_open(cell, kept)
+    grading = _Grading(cell)
+    grading.mark([face for name, faces in held.items() if name[0] == "c" for face in faces])
+    return occ.Compound(kept), grading
+
+
+def _refuse_open(cell: Cell, kept: Sequence[Any]) -> None:
+    """Refuse a dielectric that reaches the bottom or the top of the cell."""
     for face in (face for one in kept for face in one.faces if (face.name or "x")[0] != "c"):
         low, high = face.bounding_box
         for end in (cell.low_mm[2], cell.high_mm[2]):
             if max(abs(low.z - end), abs(high.z - end)) < SAME_MM * 10:
                 raise Unsolved("an electrode does not cover the whole sensor")
-    grading = _Grading(cell)
-    grading.mark([face for name, faces in held.items() if name[0] == "c" for face in faces])
-    return occ.Compound(kept), grading
 
 
 def _solids(cell: Cell, cusps: Sequence[tuple[Touch, float]]) -> list[tuple[str, Any]]:

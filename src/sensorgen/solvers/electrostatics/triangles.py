@@ -2,7 +2,7 @@
 
 from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -78,7 +78,20 @@ def _triangulated(points: NDArray[np.float64], found: "_Found") -> tuple[Triangl
     for number, (corners, _) in enumerate(found):
         for edge in edges_of(corners):
             owners[edge].append(number)
-    # The dielectric triangles whose field runs from one electrode to the other
+    inside = _between_electrodes(found, owners)
+    terminals = {}
+    for edge, sides in owners.items():
+        names = {found[n][1][0] for n in sides}
+        if names & {"@top", "@bottom"} and any(n in inside for n in sides):
+            terminals[edge] = next(n[1:] for n in names if n.startswith("@"))
+    kept = sorted(inside)
+    regions = [found[n][1] for n in kept]
+    mesh = Triangles(points, flipped(points, [found[n][0] for n in kept], regions), regions, terminals)
+    return apart(mesh), owners, inside
+
+
+def _between_electrodes(found: "_Found", owners: Mapping[Edge, Sequence[int]]) -> set[int]:
+    """Dielectric triangles whose field runs from one electrode to the other."""
     beside: dict[int, list[int]] = defaultdict(list)
     for pair in (sides for sides in owners.values() if len(sides) == 2):
         beside[pair[0]].append(pair[1])
@@ -91,15 +104,7 @@ def _triangulated(points: NDArray[np.float64], found: "_Found") -> tuple[Triangl
         inside |= piece if len(ends) == 2 else set()
     if not inside:
         raise ValueError("no dielectric lies between a top and a bottom electrode")
-    terminals = {}
-    for edge, sides in owners.items():
-        names = {found[n][1][0] for n in sides}
-        if names & {"@top", "@bottom"} and any(n in inside for n in sides):
-            terminals[edge] = next(n[1:] for n in names if n.startswith("@"))
-    kept = sorted(inside)
-    regions = [found[n][1] for n in kept]
-    mesh = Triangles(points, flipped(points, [found[n][0] for n in kept], regions), regions, terminals)
-    return apart(mesh), owners, inside
+    return inside
 
 
 def apart(mesh: Triangles) -> Triangles:
