@@ -381,7 +381,7 @@ def check_cell(params: Envelope, p: Params) -> None:
         A track's width, or the distance of the rows, that is no whole number of periods.
     """
     period = getattr(params, "period_mm", None)
-    if not period:
+    if not period or hasattr(params, "space_mm"):  # lines with a least space are spread evenly, whatever the width
         return
     along = getattr(params, "along", None)
     ways = {"column_mm": (p.column_mm, along in (None, "x", "xy", "yx")), "row_mm": (p.row_mm, along != "x"),
