@@ -21,7 +21,7 @@ _SHORT, _BREAK = re.compile(r"r(\d+)c(\d+)"), re.compile(r"([rc])(\d+):(\d+)")
 
 @dataclass(frozen=True)
 class ArrayReadout:
-    """How an array is read.
+    """Readout of an array.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What an array resolves: pressure and force of every crossing, crosstalk, and the smallest press."""
+"""Resolution of an array: pressure and force of every crossing, crosstalk, and the smallest press."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
