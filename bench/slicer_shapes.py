@@ -28,7 +28,11 @@ def outcome(shape, slicer, program):
         report = slice_now(made, slicer, program=program).file.report
     except SensorgenError as error:
         return "", f"refused: {error!s:.120}"
-    errors = [f for f in (*report.findings, *report.printed.findings) if f.severity == "error" and not getattr(f, "waiver", "")]
+    errors = [
+        f
+        for f in (*report.findings, *report.printed.findings)
+        if f.severity == "error" and not getattr(f, "waiver", "")
+    ]
     name = f"{report.slicer.name} {report.slicer.version}"
     if not errors:
         return name, "accepted"

@@ -159,3 +159,11 @@ def test_no_array_is_an_error(data, words):
 def test_only_arrays_have_wires():
     with pytest.raises(BadInput, match="has no crossings"):
         wire_table(make({"shape": "tri"}))
+
+
+def test_lines_that_are_spread_evenly_need_no_whole_periods():
+    cell = {"shape": "porous", "parameters": {"dielectric_mm": 0.6, "space_mm": 0.35}}
+    design = array(cell, column_mm=8.15, row_mm=8.15)
+    scene = design.drawn
+    assert not list(validity.faults(scene, {body.name: mesh(body) for body in scene.bodies}))
+    assert design.crossing.params.cells() == pytest.approx((8.15 / 0.85) ** 2)

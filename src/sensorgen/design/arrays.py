@@ -23,7 +23,6 @@ from sensorgen.scene.scene import SLIVER_MM, Body, Envelope, Fill, Piece, Point,
 if TYPE_CHECKING:
     import shapely
 
-    from sensorgen.design.design import Cell
 
 MOST_CROSSINGS = 10_000  # the mat of Tekscan has 8448
 ENVELOPE = ("length_mm", "width_mm", "electrode_mm", "isolation_mm")  # that the array gives to its cell
@@ -350,7 +349,7 @@ def _rounded(x0: float, x1: float, y0: float, y1: float) -> tuple[float, float, 
     return rounded(x0), rounded(x1), rounded(y0), rounded(y1)
 
 
-def cell_parameters(p: Params, cell: "Cell") -> dict[str, float | str]:
+def cell_parameters(p: Params, given: Mapping[str, float | str]) -> dict[str, float | str]:
     """Parameters of the cell's shape for one crossing.
 
     Raises
@@ -359,14 +358,14 @@ def cell_parameters(p: Params, cell: "Cell") -> dict[str, float | str]:
         A size in ``cell``, which the array gives.
     """
     for key in ENVELOPE:
-        if key in cell.parameters:
+        if key in given:
             raise BadInput(f"cell.parameters.{key}: the array gives it; set it, or the width of its tracks, there")
     own = {"length_mm": p.column_mm, "width_mm": p.row_mm, "electrode_mm": p.electrode_mm, "isolation_mm": 0.0}
-    return {**cell.parameters, **own}
+    return {**given, **own}
 
 
 def crossing_tip(p: Params, tip: TipData) -> dict[str, object]:
-    """Tip on one crossing: an even pressure on all of it, unless the design has another tip."""
+    """Tip of one crossing: an even pressure on all of it, unless the design has another tip."""
     if tip == TipData():
         return {"width_mm": p.column_mm, "block": EVEN}
     return tip.model_dump() | {"width_mm": min(tip.width_mm, p.column_mm)}
@@ -381,7 +380,7 @@ def check_cell(params: Envelope, p: Params) -> None:
         A track's width, or the distance of the rows, that is no whole number of periods.
     """
     period = getattr(params, "period_mm", None)
-    if not period:
+    if not period or hasattr(params, "space_mm"):  # lines with a least space are spread evenly, whatever the width
         return
     along = getattr(params, "along", None)
     ways = {"column_mm": (p.column_mm, along in (None, "x", "xy", "yx")), "row_mm": (p.row_mm, along != "x"),
@@ -415,7 +414,7 @@ def scene(of: Layout, fill: Fill, strip: Any, params: Envelope) -> Scene:
     BadInput
         A cell whose bottom electrode is no plate, so that rows cannot replace it.
     """
-    stack = _Stack({})
+    stack = _GrowingBodies({})
     strips = [_strip(of, track, strip, fill, params) for track in of.columns]
     roof = max(piece.span("z")[1] for own in strips for pieces in own.values() for piece in pieces)
     z = _Levels.of(of.params, roof, getattr(params, "dielectric_mm", 0.0))
@@ -461,7 +460,7 @@ class _Levels:
 
 
 @dataclass(frozen=True)
-class _Stack:
+class _GrowingBodies:
     """Bodies that grow: pieces by name, material and terminal."""
 
     bodies: dict[str, tuple[str, list[Piece], str]]

@@ -269,7 +269,7 @@ class Design(Strict):
             mode="json",
         )  # fmt: skip
         others["tip"] = arrays.crossing_tip(params, self.tip)
-        own = arrays.cell_parameters(params, cell)
+        own = arrays.cell_parameters(params, cell.parameters)
         made = make({**others, "name": f"{self.name[:80] or 'array'}-crossing", "shape": cell.shape, "parameters": own})
         arrays.check_cell(made.params, params)
         return made
@@ -549,8 +549,7 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
         design = checked(Design, with_own_files(dict(data), Path(where).parent) if isinstance(data, Mapping) else data)
         if design.shape == imported.SHAPE or design.geometry or design.bodies:
             design = _imported(design)
-        if design.cell and design.shape != ARRAY:
-            raise BadInput(f"cell: {design.shape} has no crossings; expected shape: {ARRAY}")
+        _refuse_cell(design)
         _check_names(design)
         if "own" not in data and design.own.keys() & {"printers"}:  # a record needs no materials that it does not use
             design.machine.check_tools(Path(where).parent)
@@ -635,6 +634,12 @@ def _check_names(design: Design) -> None:
         if tool not in machine.tool_numbers:
             raise BadInput(f"tools.{name}: {machine.name} has no tool {tool}; it has {list(machine.tool_numbers)}")
     _one_tool_each(design)
+
+
+def _refuse_cell(design: Design) -> None:
+    """Refuse a cell of a sensor that has no crossings."""
+    if design.cell and design.shape != ARRAY:
+        raise BadInput(f"cell: {design.shape} has no crossings; expected shape: {ARRAY}")
 
 
 def _one_source_each(design: Design) -> None:

@@ -352,9 +352,7 @@ def with_files(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     texts: dict[Kind, dict[str, Any]] = {kind: dict(given.get(kind, {})) for kind in SINGULAR}
     made = dict(data)
     made.update(_shape_and_machine(data, texts, folder))
-    cell = data.get("cell")
-    if isinstance(cell, dict) and isinstance(cell.get("shape"), str):
-        made["cell"] = cell | {"shape": _add(texts, "shapes", cell["shape"], folder)}
+    made.update(_cell(data, texts, folder))
     if isinstance(data.get("materials"), dict):
         made["materials"] = {part: _slot(word, texts, folder) for part, word in slots(data["materials"]).items()}
     if isinstance(data.get("bodies"), dict):
@@ -392,6 +390,14 @@ def _shape_and_machine(
             key == "shape" and ("geometry" in data or word == "array")
         ):  # those are no file
             yield key, _add(texts, kind, word, folder)
+
+
+def _cell(data: Mapping[str, Any], texts: dict[Kind, dict[str, Any]], folder: Path) -> dict[str, Any]:
+    """Cell of an array, its shape's file by its name."""
+    cell = data.get("cell")
+    if not isinstance(cell, dict) or not isinstance(cell.get("shape"), str):
+        return {}
+    return {"cell": cell | {"shape": _add(texts, "shapes", cell["shape"], folder)}}
 
 
 def _slot(word: Any, texts: dict[Kind, dict[str, Any]], folder: Path) -> Any:

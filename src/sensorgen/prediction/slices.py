@@ -9,7 +9,7 @@ import tempfile
 import zlib
 from base64 import b64decode, b64encode
 from dataclasses import dataclass, fields, replace
-from functools import cache
+from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -374,7 +374,7 @@ def of_own_machine(design: Design) -> list[Finding]:
     return machine.of_design(design) if design.own.keys() & {"printers", "qualities"} else []
 
 
-def _at_crossing(finding: Finding, design: Design) -> Finding:
+def _at_crossing(design: Design, finding: Finding) -> Finding:
     """A finding about an array with the name of the crossing at which it shows, if it does at one."""
     if not finding.place_mm or not design.layout:
         return finding
@@ -407,7 +407,7 @@ def combined(
     except MissingValue as error:
         own.append(unpredicted(str(error)))
     found = [*own, *(advised(f, names) for f in of_print), *(f for f in drawn.findings if f.rule not in replaced)]
-    found = [_at_crossing(f, design) for f in found] if design.layout else found
+    found = list(map(partial(_at_crossing, design), found))
     waived = [f if f.rule == GCODE else w for f, w in zip(found, design.waived(found), strict=True)]
     listed = grouped([*waived, *design.idle_waivers(found)])
     return PrintReview(drawn.meshes, listed, source, drawn=drawn, file=file)

@@ -181,7 +181,7 @@ class MapInverter:
 
     @cached_property
     def parts(self) -> tuple[Mask, Mask]:
-        """Masks of the real and the imaginary parts of readings that count, (m, n) each."""
+        """Parts of the readings that count, real and imaginary, (m, n) each."""
         return np.isfinite(self.rest_s.real), np.isfinite(self.rest_s.imag) & self.model.here
 
     @cached_property
