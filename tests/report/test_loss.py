@@ -26,8 +26,10 @@ def ladder(folder, frequency_hz, tangent):
         for k in range(CELLS)
     ]
     deck = [
-        "* lossy line", "i1 0 n0 dc 0 ac 1", *parts, f"rend n{CELLS} 0 1e15", f".ac lin 1 {frequency_hz} {frequency_hz}",
-        ".control", "run", "set numdgt=12", f"print real(v(n0)) imag(v(n0)) > {folder}/z.txt", "quit 0", ".endc", ".end",
+        "* lossy line", "i1 0 n0 dc 0 ac 1", *parts, f"rend n{CELLS} 0 1e15",
+        f".ac lin 1 {frequency_hz} {frequency_hz}",
+        ".control", "run", "set numdgt=12", f"print real(v(n0)) imag(v(n0)) > {folder}/z.txt", "quit 0", ".endc",
+        ".end",
     ]  # fmt: skip
     (folder / "line.cir").write_text("\n".join(deck) + "\n")
     subprocess.run(["ngspice", "-b", folder / "line.cir"], check=True, capture_output=True, timeout=60)

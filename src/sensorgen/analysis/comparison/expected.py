@@ -18,7 +18,6 @@ from sensorgen.prediction.losses import NOTHING_LOST, Lost, lost
 from sensorgen.prediction.quantities import impedance_at
 from sensorgen.prediction.results import Prediction, from_json
 
-
 _MOST_FILMS = 1 << 14  # readings across films, of one design, that are kept with what they predict
 
 
@@ -81,8 +80,11 @@ class Predicted:
             if not ends:
                 return None
             least, most = (0.0, inf) if isnan(rz_ohm) else (rz_ohm, rz_ohm)
-            whole, *each = (Interval(min(_read(low, least)), max(_read(high, most))) for low, high in ranges)
-            alone = Bounds(geometric_mean(_read(values, most)), whole.lower, whole.upper, "ohm", *each)
+            whole, model, by_print, material = (
+                Interval(min(_read(low, least)), max(_read(high, most))) for low, high in ranges
+            )
+            value = geometric_mean(_read(values, most))
+            alone = Bounds(value, whole.lower, whole.upper, "ohm", model, by_print, material)
             return alone.plus(0.0, 0.0, max(leads)) if leads else alone
 
         return lru_cache(maxsize=_MOST_FILMS)(law)

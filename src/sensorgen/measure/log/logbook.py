@@ -470,7 +470,7 @@ class Log:
     def _with_print(self, entry: Reading | BenchRun, writer: "_Writer") -> Reading | BenchRun:
         """Entry with batch and design of the specimen's latest print."""
         if entry.specimen not in writer.printed:
-            printed, changes = self.bound(entry.specimen), dict[str, str]()
+            printed, changes = self.bound(entry.specimen), dict[str, Any]()
             if printed:
                 batch = next((row.batch for row in self._of_uid(Batch, printed.batch_uid)), "")
                 changes = {"batch": batch, "design_id": printed.design_id, "design": printed.design}
@@ -553,7 +553,7 @@ class _Writer:
         self._connection = connection
         self.sequence, self.head = sequence, head
         self._numbers: dict[str, int] = {}
-        self.printed: dict[str, dict[str, str]] = {}  # batch and design of the latest print, by specimen
+        self.printed: dict[str, dict[str, Any]] = {}  # batch and design of the latest print, by specimen
 
     def append(self, record: Record, copy: bool) -> int:
         """Append a record; a copy of a row that the log has gets no number of its own."""
