@@ -23,7 +23,11 @@ from sensorgen.measure.lab.clock import RealClock, SimulatedClock
 from sensorgen.measure.lab.handyscope import Handyscope, load
 from sensorgen.measure.lab.live import LiveView, Sample
 from sensorgen.measure.signal.multisine import TONES_HZ
-from sensorgen.measure.virtual.handyscope import SERIAL, PhasorMeter, SimulatedScope
+from sensorgen.measure.virtual.handyscope import SERIAL, PhasorMeter
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "lab"))
+
+from simulated_scope import SimulatedScope
 
 TONES = np.array(TONES_HZ)
 PERIOD_S = 0.01  # of the control loop

@@ -73,6 +73,26 @@ def of_readings(folder):
     yield "`Log.readings()`, all of them", f"{time.process_time() - start:.1f} s", ""
 
 
+def of_a_table(folder):
+    """Import of a table of 1000 specimens of eight designs, each row with other readings, and its report."""
+    table, log = folder / "table.csv", folder / "table.db"
+    kinds = ("triX", "triY", "sqXY", "sqYX")
+    rows = (
+        f"23 {kinds[k % 4]} .{k // 4 % 2 + 1}mm {2 + k // 40 % 125},0.{40 + k % 60}k,{20 + k % 51} / 2.{k % 9 + 1}k,"
+        f"{('', 'small holes', 'not baked')[k % 3]}"
+        for k in range(READINGS)
+    )
+    table.write_text("\n".join(["specimen,y,z,remark", *rows]) + "\n", "utf-8")
+    seconds, _, peak = spent("log", "import", table, "--log", log)
+    yield f"`log import` of a table of {READINGS} readings", f"{seconds:.1f} s, {peak:.2f} GB", "6 s, 0.2 GB"
+    spent("report", "--iteration", 23, "--log", log, "-o", folder / "table.html")  # predictions are kept then
+    for form in ("html", "md", "csv"):
+        seconds, _, peak = spent(
+            "report", "--iteration", 23, "--log", log, "--format", form, "-o", folder / "table.out"
+        )
+        yield f"`report` of it as {form}", f"{seconds:.1f} s, {peak:.2f} GB", "5 s" * (form == "html")
+
+
 def of_records(folder):
     path, share = folder / "big.db", folder / "share"
     times = []
@@ -162,6 +182,7 @@ def main():
         folder = Path(name)
         for work in (
             of_readings(folder),
+            of_a_table(folder),
             of_records(folder),
             of_an_iteration(folder),
             of_a_recording(folder),

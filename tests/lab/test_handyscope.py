@@ -5,13 +5,14 @@ import time
 
 import numpy as np
 import pytest
+from simulated_scope import SimulatedScope
 
 from sensorgen.core.errors import BadInput, NotInstalled, OutOfRange
 from sensorgen.measure.lab.clock import RealClock, SimulatedClock
 from sensorgen.measure.lab.devices import DeviceFault, WrongDevice
 from sensorgen.measure.lab.handyscope import Bridge, Handyscope, gains, load
 from sensorgen.measure.signal.multisine import TONES_HZ, WEIGHTS, multisine
-from sensorgen.measure.virtual.handyscope import FAULTS, SERIAL, Analyser, PhasorMeter, SimulatedScope
+from sensorgen.measure.virtual.handyscope import FAULTS, SERIAL, Analyser, PhasorMeter
 
 TONES = np.array(TONES_HZ)
 SILENT = Analyser(noise_a=0.0)

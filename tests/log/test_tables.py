@@ -5,8 +5,10 @@ import zipfile
 
 import pytest
 
-from sensorgen.core.errors import SensorgenError
-from sensorgen.measure.log import Log, importing, tables
+from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.design import specimen_name
+from sensorgen.design.design import Design
+from sensorgen.measure.log import Log, importing, notes, tables
 from sensorgen.measure.log.withdrawing import withdraw
 
 HEAD = "specimen,y,z,remark\n"
@@ -198,3 +200,30 @@ def test_another_table_of_the_same_name_is_refused_with_the_way_out(take, log):
     withdraw(log, "reading", 1, "corrected")
     assert take(HEAD + "23 triX,710,40,\n").new == 1
     assert [r.y_ohm[0] for r in log.readings()] == [700.0, 700.0, 710.0]
+
+
+def test_a_design_is_identified_once_however_many_rows_it_has(tmp_path, monkeypatch):
+    """Rows of two designs in many copies; identifying one takes longer than logging ten rows."""
+    identified, real = [], Design.id
+    monkeypatch.setattr(Design, "id", lambda design: identified.append(design.name) or real(design))
+    notes._design.cache_clear()
+    notes._by_name.cache_clear()
+    rows = [f"31 tri{'XY'[k % 2]} .1mm {2 + k // 2},0.{k + 10}k,40" for k in range(80)]
+    path = tmp_path / "many.csv"
+    path.write_text("\n".join(["specimen,y,z", *rows]) + "\n")
+    with Log(tmp_path / "log.db", create=True) as log:
+        assert importing.import_file(log, path, {}).new == 80
+        found = log.readings()
+    assert sorted(identified) == ["trix-d0.1", "triy-d0.1"]
+    expected = {x: specimen_name.design_of(specimen_name.parse(f"tri{x} .1mm")) for x in "XY"}
+    assert all((r.design, r.design_id) == (expected[r.axes].name, real(expected[r.axes])) for r in found)
+
+
+def test_a_fault_in_the_last_row_logs_none_of_those_before(tmp_path):
+    path = tmp_path / "long.csv"
+    path.write_text("\n".join(["specimen,y", *["23 triX,0.6k"] * 300, "23 triX,hello"]) + "\n")
+    with Log(tmp_path / "log.db", create=True) as log:
+        with pytest.raises(BadInput, match=r"row 302"):
+            importing.import_file(log, path, {})
+        assert log.head() == (0, "")
+        assert importing.thesis(log).new == 69  # no transaction is left open

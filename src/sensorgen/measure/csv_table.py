@@ -256,12 +256,16 @@ class Table:
         return self.error(row, f"this is no row of a CSV file ({error}); {advice}")
 
     def _counted(self, row: int, cells: list[str]) -> list[str]:
-        wanted = len(self.names)
-        if len(cells) == wanted:
-            return cells
-        decimal = self._separator == "," and len(cells) > wanted
-        advice = "; if the numbers have decimal commas, write ';' between the columns" if decimal else ""
-        raise self.error(row, f"{len(cells)} cells, but the header has {wanted}{advice}")
+        if wrong := miscounted(cells, len(self.names), self._separator):
+            raise self.error(row, wrong)
+        return cells
+
+
+def miscounted(cells: Sequence[str], wanted: int, separator: str) -> str:
+    """Words on a row with too few or too many cells; "" of any other."""
+    decimal = separator == "," and len(cells) > wanted
+    advice = "; if the numbers have decimal commas, write ';' between the columns" if decimal else ""
+    return f"{len(cells)} cells, but the header has {wanted}{advice}" if len(cells) != wanted else ""
 
 
 @contextmanager

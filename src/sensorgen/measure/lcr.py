@@ -13,6 +13,7 @@ from pathlib import Path
 
 from sensorgen.core.errors import BadInput
 from sensorgen.measure import immittance
+from sensorgen.measure.csv_table import miscounted
 from sensorgen.measure.immittance import AcReading
 from sensorgen.measure.input_file import checked_head
 
@@ -117,13 +118,8 @@ def read(path: Path) -> LcrTable:
         cells = _cells(lines[number], header.separator)
         if not any(cells) or lines[number].lstrip().startswith(_COMMENTS):
             continue
-        if len(cells) < len(header.heads):
-            raise BadInput(f"{path}, row {number + 1}: {len(cells)} cells, but the header has {len(header.heads)}")
-        if len(cells) > len(header.heads):
-            advice = "; if the numbers have decimal commas, write ';' between the columns" * (header.separator == ",")
-            raise BadInput(
-                f"{path}, row {number + 1}: {len(cells)} cells, but the header has {len(header.heads)}{advice}"
-            )
+        if wrong := miscounted(cells, len(header.heads), header.separator):
+            raise BadInput(f"{path}, row {number + 1}: {wrong}")
         if any(cells[k].strip("+0. ") for k in status):
             faulty += 1
             continue

@@ -80,11 +80,11 @@ class Predicted:
             if not ends:
                 return None
             least, most = (0.0, inf) if isnan(rz_ohm) else (rz_ohm, rz_ohm)
-            whole, model, of_print, material = (
+            whole, model, by_print, material = (
                 Interval(min(_read(low, least)), max(_read(high, most))) for low, high in ranges
             )
             value = geometric_mean(_read(values, most))
-            alone = Bounds(value, whole.lower, whole.upper, "ohm", model=model, print=of_print, material=material)
+            alone = Bounds(value, whole.lower, whole.upper, "ohm", model, by_print, material)
             return alone.plus(0.0, 0.0, max(leads)) if leads else alone
 
         return lru_cache(maxsize=_MOST_FILMS)(law)

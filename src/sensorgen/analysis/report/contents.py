@@ -152,9 +152,7 @@ def report(
     shorts = (*yields.findings(found), *direction.findings(found)) if found.direct else ()
     ac = alternating.rows(found)
     changes = history.rows(found, ac)
-    shapes = [f"Not compared: {what}: {why}." for what, why in left_out if what.startswith(UNTRUSTED)]
-    more = [f"Not compared either: {len(shapes) - 1} more, listed in the report."] if len(shapes) > 1 else []
-    headline = (*electrodes.headline(found), *verdicts, *alternating.headline(ac), *shapes[:1], *more)
+    headline = (*electrodes.headline(found), *verdicts, *alternating.headline(ac), *_untrusted(left_out))
     by_frequency = (
         *alternating.findings(ac),
         *alternating.behind_leak(found),
@@ -174,6 +172,13 @@ def report(
         (*headline, *recordings.headline(impedances), *_basis(found, recorded)), findings,
         tuple(s for s in sections if s.tables or s.figures or s.variants),
     )  # fmt: skip
+
+
+def _untrusted(left_out: Sequence[tuple[str, str]]) -> Iterator[str]:
+    """Specimens of shapes that did not run, in a sentence for each shape that is to be trusted."""
+    for why in dict.fromkeys(why for what, why in left_out if what.startswith(UNTRUSTED)):
+        names = [what for what, reason in left_out if reason == why]
+        yield f"Not compared: {names[0]}{f' and {len(names) - 1} more' if names[1:] else ''}: {why}."
 
 
 def _basis(found: Comparison, recorded: Sequence[Run]) -> Iterator[str]:

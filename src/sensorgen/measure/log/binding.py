@@ -2,7 +2,8 @@
 
 import re
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 
 from sensorgen.core.errors import BadInput, MissingValue
@@ -102,12 +103,8 @@ def _logged(log: Log, design_id: str) -> Design:
 
 def _check_measured(log: Log, name: str, design_id: str, design: str) -> None:
     """Refuse a name under which another design was measured: its readings would change their design."""
-
-    def rows() -> Iterator[Reading | BenchRun]:
-        yield from log.entries(Reading, specimen=name)
-        yield from log.entries(BenchRun, specimen=name)
-
-    other = next((row for row in rows() if row.design_id not in ("", design_id)), None)
+    rows = chain(log.entries(Reading, specimen=name), log.entries(BenchRun, specimen=name))
+    other = next((row for row in rows if row.design_id not in ("", design_id)), None)
     if other:
         raise BadInput(
             f"{shown(name)} was measured as {other.design} ({other.design_id}) and cannot become {design} "

@@ -3,33 +3,16 @@
 import dataclasses
 from collections.abc import Iterable, Iterator
 from hashlib import sha256
+from operator import attrgetter
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.log.entries import SPECIMEN_COLUMNS, Reading
-from sensorgen.measure.log.fields import columns
+from sensorgen.measure.log.entries import Reading
 from sensorgen.measure.log.logbook import Log
 
-_WORDS = {
-    "remark",
-    "baked",
-    "doubts",
-    "measured_at",
-    "written",
-    *SPECIMEN_COLUMNS,
-}  # edits that are no other measurement
-_ORIGIN = {
-    "uid",
-    "number",
-    "logged_at",
-    "claimed_at",
-    "source",
-    "source_row",
-    "supersedes",
-    "batch",
-    "design_id",
-    "design",
-}
-_MEASURED = [name for name in columns(Reading) if name not in _WORDS | _ORIGIN]
+_measured = attrgetter(  # what makes a row another measurement; edits of all else correct it
+    "y_words", "z_words", "y_ohm", "z_ohm", "instrument", "quantity", "value", "frequency_hz", "uncertainty", "wires",
+    "temperature_c", "humidity_percent", "photo", "file", "defects",
+)  # fmt: skip
 
 
 def corrections(log: Log, rows: Iterable[Reading], table: str) -> Iterator[Reading]:
@@ -81,7 +64,3 @@ def corrections(log: Log, rows: Iterable[Reading], table: str) -> Iterator[Readi
             )
         else:
             yield row
-
-
-def _measured(reading: Reading) -> list[object]:
-    return [getattr(reading, name) for name in _MEASURED]

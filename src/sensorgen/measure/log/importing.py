@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from itertools import count
 from pathlib import Path
 
 from sensorgen.core.document import Part
@@ -161,17 +162,9 @@ def _is_log_table(path: Path) -> bool:
 
 
 def _add(log: Log, rows: Iterable[Entry], left_out: Iterable[str] = ()) -> Imported:
-    count = dict.fromkeys(("rows", "new", "doubtful", "exported", "corrections"), 0)
-
-    def counted() -> Iterator[Entry]:
-        for row in rows:
-            count["rows"] += 1
-            count["exported"] += bool(row.logged_at)
-            yield row
-
-    for new in log.adding(counted()):
-        count["new"] += 1
-        count["doubtful"] += isinstance(new, Reading) and bool(new.doubts)
-        count["corrections"] += bool(getattr(new, "supersedes", ""))
-    corrections = 0 if count["exported"] else count["corrections"]
-    return Imported(count["rows"], count["new"], count["doubtful"], corrections, tuple(left_out))
+    numbers, new, doubtful, corrections = count(), 0, 0, 0
+    for row in log.adding(row for row, _ in zip(rows, numbers, strict=False)):
+        new += 1
+        doubtful += isinstance(row, Reading) and bool(row.doubts)
+        corrections += bool(getattr(row, "supersedes", "")) and not row.claimed_at  # of no export
+    return Imported(next(numbers), new, doubtful, corrections, tuple(left_out))

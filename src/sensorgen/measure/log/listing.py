@@ -18,6 +18,9 @@ _REMARK = 20  # letters of a remark in a list
 _READING = (
     Column("no."), Column("specimen"), Column("Y", "ohm", right=True), Column("Z", "ohm", right=True), Column("remark"),
 )  # fmt: skip
+_OTHER = (  # of a recording, a print or a prediction
+    "file", "rig_file", "remark", "design", "design_id", "printed", "batch", "batch_uid", "of", "reason", "head",
+)  # fmt: skip
 _RECORDING = tuple(map(Column, ("no.", "specimen", "recording", "remark")))
 
 
@@ -86,7 +89,7 @@ class Detail:
         name = f"{kind} {row.number}: {getattr(row, 'specimen', '')}".rstrip()
         yield f"{name}, written {row.written!r}" if isinstance(row, Reading) and row.written != row.specimen else name
         known = (
-            *(_of_reading(row) if isinstance(row, Reading) else _of_other(row)),
+            *(_of_reading(row) if isinstance(row, Reading) else ((name, getattr(row, name, "")) for name in _OTHER)),
             ("logged", row.logged_at),
             ("claimed", row.claimed_at),
         )
@@ -135,24 +138,6 @@ def _ac_lines(r: Reading) -> list[str]:
 def _ac(r: Reading) -> str:
     first, *more = _ac_lines(r) or ["-"]
     return f"{first}, {len(more)} more" if more else first
-
-
-def _of_other(row: Entry) -> Iterator[tuple[str, str]]:
-    """A recording, a print or a prediction."""
-    names = (
-        "file",
-        "rig_file",
-        "remark",
-        "design",
-        "design_id",
-        "printed",
-        "batch",
-        "batch_uid",
-        "of",
-        "reason",
-        "head",
-    )
-    return ((name, getattr(row, name, "")) for name in names)
 
 
 @dataclass(frozen=True)

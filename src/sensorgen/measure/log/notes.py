@@ -178,25 +178,22 @@ def design_fields(written: str, log: "Log | None" = None) -> tuple[str, str]:
 
 def design_of(written: str) -> Design | None:
     """Design that a specimen's name stands for, or None."""
-    return _design(_without_copy(specimen_name.parse(written)))
+    return _design(_kind(specimen_name.parse(written)))[0]
 
 
-def _without_copy(name: specimen_name.Specimen) -> specimen_name.Specimen:
+def _kind(name: specimen_name.Specimen) -> specimen_name.Specimen:
     """The part of a name that decides its design."""
     return dataclasses.replace(name, iteration=None, replicate=None, place="", raw="", assumed=())
 
 
-def _design(name: specimen_name.Specimen) -> Design | None:
-    try:
-        return specimen_name.design_of(name)
-    except SensorgenError:  # a film that no design may have
-        return None
-
-
 @lru_cache(maxsize=256)
-def _identity(name: specimen_name.Specimen) -> tuple[str, str]:
-    design = _design(name)
-    return (design.id(), design.name) if design else ("", "")
+def _design(name: specimen_name.Specimen) -> tuple[Design | None, tuple[str, str]]:
+    """Design, and its identity and name."""
+    try:
+        design = specimen_name.design_of(name)
+    except SensorgenError:  # a film that no design may have
+        design = None
+    return design, (design.id(), design.name) if design else ("", "")
 
 
 @lru_cache(maxsize=1 << 14)
@@ -204,4 +201,4 @@ def _by_name(written: str) -> tuple[Specimen, tuple[str, str], tuple[str, ...]]:
     """Specimen, identity and name of its design, and doubts, by a name that is bound to no design."""
     name = specimen_name.parse(written)
     columns = {key: getattr(name, key) for key in SPECIMEN_COLUMNS[1:]}
-    return Specimen(specimen=name.name, **columns), _identity(_without_copy(name)), name.assumed
+    return Specimen(specimen=name.name, **columns), _design(_kind(name))[1], name.assumed
