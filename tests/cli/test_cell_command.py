@@ -380,7 +380,7 @@ def test_wrong_words(run, words, said):
     ],
 )
 def test_values_of_materials_in_words(word, quantity, value):
-    from sensorgen.cli.settings import setting
+    from sensorgen.design.settings import setting
 
     key, _, typed = word.partition("=")
     assert setting(key, typed, {"dielectric_mm"}) == {"material_values": {"x60": {quantity: value}}}

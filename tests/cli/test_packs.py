@@ -5,6 +5,7 @@ import pickle
 import re
 import shutil
 import sys
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -629,3 +630,40 @@ def test_the_commands_of_the_page(run, here):
     put(here, "printer", "mine").rename(here / "lab-printer.yaml")
     (here / "design.yaml").write_text(re.search(r"```yaml\n(.*?)```", page, re.DOTALL)[1])
     assert run("check", "design.yaml").code == 0
+
+
+def test_a_synced_log_is_reported_where_its_shape_is_not_trusted(run, here, monkeypatch):
+    """Nothing of it runs; the report is of all else, and names what to trust, by the file's own SHA-256."""
+    shape = put(here, "shape", "zig")
+    Path("z.yaml").write_text("shape: zig\n", "utf-8")
+    assert run("log", "specimen", "Z1", "--design", "z.yaml", "--log", "one.db").code == 0
+    for name in ("Z1", "23 triX .2mm"):
+        assert run("log", "add", name, "--y", "0.7k", "--z", "OL", "--log", "one.db").code == 0
+    assert run("log", "sync", "share", "--log", "one.db").code == 0
+    monkeypatch.setenv(packs.PLACE, str(here / "another"))
+    shape.unlink()
+    assert run("log", "sync", "share", "--log", "two.db").code == 0
+    words = ("report", "--log", "two.db", "--format", "md", "-o", "r.md")
+    monkeypatch.setattr(shape_files.shape_process, "module_of", lambda *_: pytest.fail("it ran"))
+    said = run(*words)
+    assert said.code == 0
+    text = " ".join(said.out.split())
+    key = sha256((TEMPLATES / "shape.py").read_bytes().replace(b"NAME", b"zig")).hexdigest()
+    assert "Electrode resistance of 23 triX .2mm: measured 700 ohm" in text
+    assert "Not compared: shape of Z1, z: zig.py is not trusted and did not run" in text
+    assert f"sensorgen pack trust shapes/zig.py (its file, or the design's that contains it), and again after each " \
+           f"change; SHA-256 {key}." in text  # fmt: skip
+    assert "another version of sensorgen" not in Path("r.md").read_text("utf-8")
+
+
+def test_a_synced_log_is_reported_whole_once_its_shape_is_trusted(run, here, monkeypatch):
+    shape = put(here, "shape", "zig")
+    Path("z.yaml").write_text("shape: zig\n", "utf-8")
+    run("log", "specimen", "Z1", "--design", "z.yaml", "--log", "one.db")
+    run("log", "add", "Z1", "--y", "0.7k", "--z", "OL", "--log", "one.db")
+    monkeypatch.setenv(packs.PLACE, str(here / "another"))
+    assert "Not compared" in run("report", "Z1", "--log", "one.db", "--format", "md", "-o", "r.md").out
+    assert run("pack", "trust", str(shape.relative_to(here))).code == 0
+    said = run("report", "Z1", "--log", "one.db", "--format", "md", "-o", "r.md").out
+    assert said.startswith("Electrode resistance of Z1: measured 700 ohm, predicted")
+    assert "Not compared" not in said

@@ -6,8 +6,9 @@ import pytest
 from sensorgen.core.errors import BadInput
 from sensorgen.core.records import checked
 from sensorgen.design.design import make
-from sensorgen.measure.virtual.faults import FAULTS, VirtualSpecimen, rig_of
+from sensorgen.measure.virtual.faults import FAULTS
 from sensorgen.measure.virtual.mechanics import OPEN_OHM, Mechanics, Rig
+from sensorgen.measure.virtual.rig import VirtualSpecimen, rig_of
 from sensorgen.measure.virtual.specimen import Specimen, Truth, drawn
 
 DESIGN = make({"shape": "reference"})

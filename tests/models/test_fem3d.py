@@ -16,6 +16,7 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.shapes import rect
 from sensorgen.models import columns, fem3d
 from sensorgen.scene.scene import Body, Fill, Scene, box
+from sensorgen.solvers.electrostatics.bounds import FieldStep
 from sensorgen.solvers.electrostatics.boxes import Pair, boxes_of, flux, potential, whole
 from sensorgen.solvers.electrostatics.bricks import grid, layered
 from sensorgen.solvers.electrostatics.elimination import HELD
@@ -28,7 +29,7 @@ def close(expected: float, rel: float):
 
 
 @pytest.fixture(scope="module")
-def rungs() -> dict[float, list[fem3d.Step]]:
+def rungs() -> dict[float, list[FieldStep]]:
     return {d: list(fem3d.steps(rect_cell(d), EPS, 1e-3)) for d in (0.1, 0.2)}
 
 

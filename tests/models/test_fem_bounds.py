@@ -50,7 +50,7 @@ def test_the_energy_of_cut_cells_lies_between_its_bounds(off):
 
 def test_the_narrowest_step_is_the_answer(monkeypatch):
     """Doubles may end before orders do: the last step is then wider than one before."""
-    found = [fem2d.Step(p, 1, 1, Interval(low, 2.0)) for p, low in ((4, 1.0), (6, 1.9), (8, 1.5))]
+    found = [_fem_bounds.FieldStep(p, 1, 1, Interval(low, 2.0)) for p, low in ((4, 1.0), (6, 1.9), (8, 1.5))]
     monkeypatch.setattr(fem2d, "steps", lambda *_: iter(found))
     assert fem2d.capacitance(tri_cell(0.1), EPS, 1e-6) == found[1].interval
 

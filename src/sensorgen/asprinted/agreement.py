@@ -41,7 +41,7 @@ def check(
     piece: str = "",
     lines: Beads | None = None,
 ) -> list[Found]:
-    """What disagrees with the design, as findings about lines of the file.
+    """Disagreements with the design, as findings about lines of the file.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def check(
 
 
 def check_motion(design: Design, motion: Motion) -> list[Found]:
-    """The same for a file that prints the design at any place, once or more often, alone or with others.
+    """Disagreements of a file that prints the design at any place, once or more often, alone or with others.
 
     Raises
     ------
@@ -236,7 +236,7 @@ def _purged(design: Design, paths: Paths, changes: Sequence[Change], piece: Mask
 
 
 def _plan(design: Design, layers: Sequence[LayerRegions]) -> shapely.Geometry:
-    """What the piece covers of the bed: its rectangle, unless it was drawn elsewhere or cut to a border."""
+    """Area of the bed that the piece covers: its rectangle, unless it was drawn elsewhere or cut to a border."""
     if design.border or design.geometry:
         return shapely.union_all([region for layer in layers for region in layer.regions.values()])
     return shapely.box(0.0, 0.0, *design.printed.size_mm[:2])

@@ -144,7 +144,7 @@ def _inside(start_mm: Real, end_mm: Real, size_mm: Real) -> tuple[list[Real], Re
 def layers(
     design: Design, lines: Beads, convention: str = "vol", *, electrode_wins: bool = False
 ) -> list[LayerRegions]:
-    """What every layer of a print holds.
+    """Regions of every layer of a print.
 
     Parameters
     ----------

@@ -119,7 +119,7 @@ def films(design: Design, lines: Beads) -> list[Film]:
 
 
 def opened(film: Film, widths: Sequence[float], shifts_mm: Sequence[Point] = ()) -> list[Region]:
-    """What each layer of a film leaves open, its lines as wide as a share of what the file says, and shifted [mm]."""
+    """Openings of each layer of a film, its lines as wide as a share of what the file says, and shifted [mm]."""
     found = []
     for k, (lines, width) in enumerate(zip(film.lines, widths, strict=True)):
         shift = np.array(shifts_mm[k] if shifts_mm else (0.0, 0.0))
@@ -178,7 +178,7 @@ def pinholes(
 
 
 def of_lines(design: Design, lines: Beads, *, widths: Sequence[float], most_layers: int) -> Pinholes:
-    """The same by the lines of the piece."""
+    """Pinholes by the lines of the piece."""
     found = [film for film in films(design, lines) if len(film.lines) <= most_layers]
     return Pinholes(design.name, tuple(_row(film, width) for film in found for width in widths))
 

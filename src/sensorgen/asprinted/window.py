@@ -41,11 +41,11 @@ class Window:
     repeats: tuple[bool, bool] = (False, False)
 
     def sides_mm(self) -> Point:
-        """Its lengths along x and y [mm]."""
+        """Lengths along x and y [mm]."""
         return rounded(self.x_mm[1] - self.x_mm[0]), rounded(self.y_mm[1] - self.y_mm[0])
 
     def area_mm2(self) -> float:
-        """Its area [mm2]."""
+        """Area [mm2]."""
         x, y = self.sides_mm()
         return x * y
 

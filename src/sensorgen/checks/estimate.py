@@ -28,7 +28,7 @@ Shift = tuple[float, float]
 
 @dataclass(frozen=True)
 class Lines:
-    """How the lines of a material are laid.
+    """Layout of a material's lines.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Lines:
 
 
 def lines(design: Design) -> dict[str, Lines]:
-    """How the lines of each material of a design are laid, as far as its print settings are known."""
+    """Layout of the lines of each material of a design, as far as its print settings are known."""
     found = {}
     for name, source in design.used().items():
 
@@ -113,7 +113,7 @@ def layers(
     laid: Mapping[str, Lines] | None = None,
     shift: Shift | None = None,
 ) -> list[LayerRegions]:
-    """What gets printed of every layer.
+    """Printed part of every layer.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def _sparse(region: Region, lines: Lines, line_mm: float, way: str, shift: float
 def _printed(
     layer: LayerRegions, scene: Scene, printer: Printer, wide: Rule, laid: Mapping[str, Lines]
 ) -> dict[str, Region]:
-    """What the walls make of one layer; a place that two bodies swell into goes to the one that is printed first."""
+    """Regions that walls make of a layer; a place that two bodies swell into goes to the one that is printed first."""
     length, width, _ = scene.size_mm
     regions: dict[str, Region] = {}
     # Electrodes first and support last, as their tools are.

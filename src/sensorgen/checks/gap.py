@@ -38,7 +38,7 @@ def check(slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> 
 
 
 def _on_edge(pair: Pair, slices: Slices, gap_mm: float) -> bool:
-    """Whether the electrodes are nearest beside each other: lines make such a film (rules 5 and 6), layers do not."""
+    """Test whether electrodes are nearest beside each other: lines make such a film (rules 5 and 6), layers do not."""
     regions = ([slices.body(body, k) for body in pair] for k in range(len(slices.layers)))
     return any(float(shapely.distance(*each)) <= gap_mm + TOUCH_MM for each in regions)
 

@@ -60,7 +60,7 @@ def _samples(body: Body, layers: Layers) -> Iterator[Finding]:
 
 
 def _within(z_mm: float, span: tuple[float, float]) -> bool:
-    """Whether a sample hits: one on a face between two bodies hits the lower one."""
+    """Test whether a sample hits: one on a face between two bodies hits the lower one."""
     return span[0] + TOUCH_MM < z_mm < span[1] + TOUCH_MM
 
 

@@ -7,8 +7,8 @@ from typing import Self
 from sensorgen import checks
 from sensorgen.checks import estimate
 from sensorgen.core.display import Displayed
-from sensorgen.core.document import Part, comma_separated
-from sensorgen.core.findings import Finding, Verdict, counts, headline, listed, table, verdict
+from sensorgen.core.document import Part, Table, comma_separated
+from sensorgen.core.findings import Finding, Verdict, counted, counts, headline, listed, table, verdict
 from sensorgen.design.design import Design
 from sensorgen.design.tower import tower
 from sensorgen.design.walls import rule
@@ -30,8 +30,17 @@ class Review(Displayed):
     findings: list[Finding]
     source: str = "rules of the drawing"
 
+    def document(self) -> Iterator[Part]:
+        """Verdict, then the findings."""
+        yield f"{self.verdict}: {counted(self.counts())}; {self.source}"
+        yield from listed(self.findings)
+
+    def table(self) -> Table:
+        """The findings."""
+        return table(self.findings)
+
     def with_meshes(self, design: Design) -> Self:
-        """The same review, with the meshes that a misfit on the bed had spared."""
+        """Review with the meshes that a misfit on the bed had spared."""
         return self if self.meshes else replace(self, meshes=_meshes(design))
 
     def errors(self, strict: bool = False) -> list[Finding]:
@@ -50,7 +59,7 @@ class Review(Displayed):
         return verdict(self.findings)
 
     def counts(self) -> dict[str, int]:
-        """How many findings there are of each severity, and how many are waived."""
+        """Number of findings of each severity, and of those that are waived."""
         return counts(self.findings)
 
 

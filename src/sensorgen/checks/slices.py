@@ -57,7 +57,7 @@ class Slices:
         return region_at(body, self.layers.mids_mm[layer] + above_mm)
 
     def printed(self, body: Body, layer: int, least_mm: float) -> Region:
-        """What of a body is wider than ``least_mm`` in a layer: one object for equal layers, which share a region."""
+        """Part of a body wider than ``least_mm`` in a layer: one object for equal layers, which share a region."""
         region = self.body(body, layer)
         key = id(region), least_mm
         if key not in self._wider:

@@ -58,7 +58,7 @@ class Row:
 
     @property
     def grown(self) -> bool:
-        """Whether more is printed than drawn."""
+        """True if more is printed than drawn."""
         return self.printed_mm3 > self.exact_mm3
 
 
@@ -174,7 +174,7 @@ def _of_body(body: Body, outside: Sequence[Row]) -> Iterator[Finding]:
 
 
 def _fault(row: Row) -> str:
-    """What happens to a body that is absent from a layer; "" where it is there."""
+    """Fate of a body that is absent from a layer; "" where it is there."""
     if row.printed_mm3 > 0:
         return ""
     return "is not printed at all" if row.strips else "ends below mid-layer and is not printed"

@@ -29,7 +29,7 @@ _NEAR = 1e-3  # of half a layer: a step in height within which flanks are straig
 
 @dataclass(frozen=True)
 class _Band:
-    """What becomes of stretches up to a width."""
+    """Fate of stretches up to a width."""
 
     upto_mm: float
     severity: str
@@ -58,7 +58,7 @@ class Stretch:
 
 
 def _bands(printer: Printer) -> tuple[_Band, ...]:
-    """What a printer's nozzle makes of narrow stretches, from the narrowest on; a whole line prints."""
+    """Fate of narrow stretches by a printer's nozzle, from the narrowest on; a whole line prints."""
     line, swells = printer.line_mm(), SWELLS * printer.nozzle_mm
     widen = f"widen it to {line:.2g} mm"
     return (

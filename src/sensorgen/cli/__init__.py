@@ -34,6 +34,7 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
         "cell": "Capacitance between certified bounds.",
         "compress": "Displacement and capacitance under stress.",
         "invert": "Force and position from measured impedances.",
+        "array": "What an array of crossing tracks resolves.",
         "sheet": "Which contacts and frequencies locate a load in two dimensions.",
         "stack": "Double sensor, and isolation against touch.",
     },
@@ -81,7 +82,7 @@ def harmless(text: str) -> str:
 
 
 def escaped(text: str) -> str:
-    r"""The same for JSON, where nothing of the text may be lost.
+    r"""Escape a text for JSON, where nothing of it may be lost.
 
     >>> escaped('"a\u202eb"' + "\n")
     '"a\\u202eb"\n'

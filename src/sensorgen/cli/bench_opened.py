@@ -85,7 +85,7 @@ def _part(parts: "Iterator[tuple[Recording, ...]]", which: int | None) -> "tuple
 
 
 def _chosen(found: "tuple[Recording, ...]", lockin: int | None) -> int:
-    """Which of the lock-ins, from 0."""
+    """Number of the chosen lock-in, from 0."""
     if lockin is None and len(found) > 1:
         raise BadInput(f"{len(found)} lock-ins; choose one with --lockin 1 to {len(found)}")
     if lockin is not None and lockin > len(found):
@@ -94,5 +94,5 @@ def _chosen(found: "tuple[Recording, ...]", lockin: int | None) -> int:
 
 
 def name_of(what: str) -> str:
-    """What a recording is called in a title: its file, or its number in the log."""
+    """Name of a recording in a title: its file, or its number in the log."""
     return f"recording {what}" if what.isdigit() and not Path(what).is_file() else Path(what).name

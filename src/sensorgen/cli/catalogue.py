@@ -1,4 +1,4 @@
-"""What there is to choose from, and what a design file may hold."""
+"""Lists of all that can be chosen, and the content of a design file."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -18,7 +18,7 @@ from sensorgen.scene.scene import Envelope
 
 @dataclass(frozen=True)
 class Entry:
-    """What goes by a name: in one sentence, its parameters or values, a line each, and where it comes from."""
+    """Entry of a list: in one sentence, its parameters or values, a line each, and where it comes from."""
 
     about: str
     values: tuple[str, ...] = ()
@@ -91,7 +91,7 @@ def _shape(file: packs.File) -> Entry:
 def _said(field: Field[Any]) -> str:
     choices = field.metadata.get("choices")
     low, high = field.metadata.get("range", (0.0, 0.0))
-    limits = f"one of {', '.join(choices)}" if choices else f"{low:g} to {high:g} {design.unit_of(field.name)}"
+    limits = f"one of {', '.join(choices)}" if choices else f"{low:g} to {high:g} {design.unit_of(field)}"
     default = field.default if choices else f"{field.default:g}"
     return f"{field.metadata['help']} ({limits}; default {default})"
 
@@ -182,7 +182,7 @@ def models() -> Catalogue:
 
 
 def sources() -> Catalogue:
-    """What the names of the sources stand for."""
+    """References behind the names of the sources."""
     return Catalogue({name: Entry(where) for name, where in material_files.citations().items()})
 
 

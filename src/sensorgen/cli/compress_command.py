@@ -70,10 +70,11 @@ def _work(
         with sweeps.pressing(asked.stress_kpa) as step:
             found = compression.answer(of(design), asked, step=step)
     if plot:
-        from sensorgen.analysis.plots import compression as figure
+        from sensorgen.analysis.plots import compression as figures
+        from sensorgen.analysis.plots import static
         from sensorgen.core import files
 
-        files.replace(Path(plot), figure.png(found))
+        files.replace(Path(plot), static.png(figures.figure(found)))
     render.deliver(found, before=found.explained() if explain else ())
     return render.verdict(*found.problems())
 

@@ -4,12 +4,12 @@ import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 from click.shell_completion import CompletionItem
 
-from sensorgen.cli.settings import merged, pairs, setting
+from sensorgen.cli.settings import pairs
 from sensorgen.cli.words import Length, OneOf, Share, completed
 from sensorgen.core import plugins as registry
 from sensorgen.core import units
@@ -40,12 +40,12 @@ class DesignGroup(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         """Names of the shapes."""
-        return registry.names(shapes)
+        return sorted([ARRAY, *registry.names(shapes)])
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command:  # noqa: ARG002
         """The command for a shape, or for a design file."""
-        if name in registry.names(shapes):
-            return self._command(name, registry.load(shapes, name), {"shape": name})
+        if name == ARRAY or name in registry.names(shapes):
+            return self._command(name, _shape_of({"shape": name}), {"shape": name})
         if name.endswith(".py") or not _is_file(name):
             base = _of_packs({"shape": name}, Path())
             return self._command(base["shape"], _shape_of(base), base)
@@ -102,7 +102,7 @@ class DesignGroup(click.Group):
 
 def _of_packs(base: Data, folder: Path) -> Data:
     """A design's data with its shape's file, where that does not ship."""
-    if not isinstance(base.get("shape"), str) or base["shape"] in (IMPORTED, *registry.names(shapes)):
+    if not isinstance(base.get("shape"), str) or base["shape"] in (IMPORTED, ARRAY, *registry.names(shapes)):
         return base
     from sensorgen.design import packs
 
@@ -115,6 +115,10 @@ def _shape_of(base: Data) -> "Shape | ModuleType | None":
     name = base.get("shape")
     if not isinstance(name, str) or name == IMPORTED:
         return None
+    if name == ARRAY:
+        from sensorgen.design import arrays
+
+        return cast("Shape", arrays)
     if name in registry.names(shapes):
         return registry.load(shapes, name)
     from sensorgen.design import shape_files
@@ -126,7 +130,7 @@ def _shape_of(base: Data) -> "Shape | ModuleType | None":
 
 
 def _about(module: "Shape | ModuleType | None") -> str:
-    """What a shape's file says of it; click leaves a picture alone that follows a backspace."""
+    """Description by a shape's file; click leaves a picture alone that follows a backspace."""
     about = (module.__doc__ or "").strip() if module else ""
     return about.replace("\n\n::\n\n", "\n\n\b\n").replace("::\n\n", ":\n\n\b\n")
 
@@ -136,6 +140,7 @@ def _is_file(word: str) -> bool:
 
 
 IMPORTED = "imported"  # shape of a design whose bodies came from a CAD file: it has no parameters
+ARRAY = "array"  # shape of crossing tracks, with cells of another one
 _OF_SHAPE = "of_shape_"  # before names of parameters, which a command's own may equal
 
 
@@ -153,11 +158,15 @@ def _parameter_options(params: type, taken: set[str]) -> list[click.Parameter]:
         options.append(
             click.Option(
                 [option, _OF_SHAPE + field.name],
-                type=OneOf(choices) if choices else click.FLOAT if field.name.endswith("_deg") else Length(),
+                type=OneOf(choices) if choices else _number_type(field),
                 help=f"{field.metadata['help']}  [default: {_plainly(field.default)}]",
             )
         )
     return options
+
+
+def _number_type(field: "dataclasses.Field[Any]") -> "click.ParamType[Any]":
+    return click.FLOAT if field.name.endswith("_deg") or field.metadata.get("count") else Length()
 
 
 def _plainly(default: Any) -> str:
@@ -221,12 +230,12 @@ def _qualities() -> list[str]:
 
 
 def _design(base: Data, given: Data, word: str) -> "Design":
-    from sensorgen.design import design, packs
+    from sensorgen.design import design, packs, settings
 
     unnamed = {k: v for k, v in base.items() if k != "name"}
     if isinstance(unnamed.get("materials"), dict):
         unnamed["materials"] = packs.slots(unnamed["materials"])
-    data = merged(unnamed, _changes(base, given))
+    data = settings.merged(unnamed, _changes(base, given))
     if given["name"] is not None:
         data["name"] = given["name"]
     elif data == unnamed and "name" in base:
@@ -236,6 +245,8 @@ def _design(base: Data, given: Data, word: str) -> "Design":
 
 def _changes(base: Data, given: Data) -> Data:
     """The options that were given, as the part of a design file that they stand for."""
+    from sensorgen.design.settings import merged, setting
+
     known = {f.name for f in dataclasses.fields(shape.Params)} if (shape := _shape_of(base)) else set()
     parameters = {k: given[_OF_SHAPE + k] for k in known if given.get(_OF_SHAPE + k) is not None}
     parameters |= _size(given["size"]) if given["size"] is not None else {}

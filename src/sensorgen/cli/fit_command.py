@@ -66,7 +66,7 @@ def _opened(file: str | None, *, thesis: bool) -> "Iterator[Log]":
 
 
 def _taken(made: "Fit") -> str:
-    """How the next design takes the values."""
+    """Command by which the next design takes the values."""
     from sensorgen.design.design import material
 
     named = dict.fromkeys(value.material for value in made.values)

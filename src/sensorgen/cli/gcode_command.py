@@ -105,7 +105,7 @@ def _pinholes(file: str, design: str, log: str | None, pictures: str | None) -> 
 
 
 def _subject(design: str | None, printer: str | None) -> "tuple[Design | None, Printer]":
-    """What a file prints, as far as it is known, and on which printer."""
+    """Design that a file prints, as far as it is known, and on which printer."""
     from pathlib import Path
 
     from sensorgen.core.errors import BadInput

@@ -69,7 +69,7 @@ OWN: list[click.Parameter] = [
         ["--compression"], type=OneOf(("unconfined", "bonded")),
         help="Compression law of a plate; the best of the cell if not given.",
     ),
-    *body_options.body_options(),
+    *options.array_frames(), *body_options.body_options(),
     *render.options("json", "markdown", file=False),
 ]  # fmt: skip
 
@@ -78,6 +78,13 @@ def _work(
     design: "Design", *, measured: str, output: str | None, perfect: bool, rest_file: str | None,
     compression: str | None, **how: Any,
 ) -> int:  # fmt: skip
+    of_array = {key: how.pop(key) for key in ("readout", "input_ohm", "frequency", "scatter", "plot")}
+    if design.layout:
+        from sensorgen.cli import array_frames
+
+        others = {"perfect": perfect, "compression": compression, **how}
+        noise = others.pop("noise")
+        return array_frames.invert(design, measured, output, noise, rest_file, **of_array, **others)
     from sensorgen.prediction.query import Query
 
     query = Query(law=compression or "")
@@ -198,7 +205,7 @@ def _by_ratio(
 
 
 def _beside(source: "Readings", block: "Block") -> tuple[Any, Any]:
-    """Which rows are at rest, and the time of each [s]."""
+    """Mask of the rows at rest, and the time of each [s]."""
     columns = dict(zip(source.numbers, block.numbers.T, strict=True))
     nothing = np.full(len(block.rows), np.nan)
     return np.nan_to_num(columns.get(_REST, nothing)) != 0, columns.get(_TIME, nothing)
@@ -220,7 +227,7 @@ def _taken_apart(path: str, tones_hz: Any) -> tuple[Any, float]:
 
 
 def _writer(stack: ExitStack, measured: str, output: str | None) -> tuple[Callable[[str], None], bool]:
-    """What takes rows: the terminal, at once, or a file that is there when it is whole; and whether it is the first."""
+    """Writer of rows: the terminal, at once, or a file that is there when it is whole; and whether it is the first."""
     terminal = output == "-" or (measured == "-" and output is None)
     file = stack.enter_context(store.replacing(Path(output))) if output and not terminal else None
 
@@ -309,5 +316,6 @@ command = _Specimens(
     _work, OWN, name="invert",
     help="Force and position behind the impedances in MEASURED.csv ('-' reads the standard input): one row per sample, "
     "columns re_ohm_1.1kHz and im_ohm_1.1kHz for every tone, 'rest' with 1 where nothing was on the sensor, and time_s "
-    "if known. The first word is a specimen that was calibrated, or a design.",
+    "if known. The first word is a specimen that was calibrated, or a design. Of an array: pressure maps of frames, "
+    "CSV with columns r1c1, r1c2 ... [F], or NPZ.",
 )  # fmt: skip

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def where() -> click.Option:
-    """Which log."""
+    """Option of the log's place."""
     about = "The log; what SENSORGEN_LOG says, or the one of this user, if not given."
     return click.Option(["--log", "file"], metavar="FILE", help=about)
 

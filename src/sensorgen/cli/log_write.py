@@ -92,7 +92,7 @@ def _predict_ahead(log: "Log", specimen: str) -> None:
 
 
 def _asked_mega(**typed: str) -> bool:
-    """Whether a person says that a small m means mega; no question where there is no m, or no person."""
+    """Test whether a person says that a small m means mega; no question where there is no m, or no person."""
     from sensorgen.measure.log.notes import resistance
 
     found = [word for axis, words in typed.items() for word in resistance(axis, words).mega]

@@ -1,5 +1,6 @@
 """Options that several commands have."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -105,6 +106,32 @@ def frequencies() -> click.Option:
 def noise() -> click.Option:
     """``--noise`` [-]."""
     return option("--noise", Share(), "Standard error of R and of X of a reading, relative to |Z|.", default="0.1%")
+
+
+def array_readout() -> list[click.Parameter]:
+    """``--readout`` and ``--input`` of an array."""
+    return [
+        option(
+            "--readout", OneOf(("guarded", "two-terminal")),
+            "Of an array: guarded, a row is driven and all other tracks are at 0 V; or two-terminal, a meter between "
+            "two and the rest open.", default="guarded",
+        ),
+        option("--input input_ohm", Ratio(), "Of an array, guarded: input resistance of a terminal.", default="50",
+               metavar="OHM"),
+    ]  # fmt: skip
+
+
+def array_frames() -> list[click.Parameter]:
+    """Options of the frames of an array."""
+    return [
+        *array_readout(),
+        option(
+            "--frequency", Values(units.FREQUENCY_HZ, zero=False), "Of an array's frames, where their file has none.",
+            metavar="HZ",
+        ),
+        option("--scatter", Share(), "Of an array: gain from cell to cell, 5 % before a calibration.", default="5%"),
+        option("--plot", click.Path(path_type=Path), "Of an array: write its heaviest map there.", metavar="DIR"),
+    ]  # fmt: skip
 
 
 def explain() -> click.Option:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from sensorgen.design.design import Design
     from sensorgen.prediction.loaded import Loaded
     from sensorgen.prediction.query import Query
+    from sensorgen.prediction.results import Prediction
 
 _WORK = ("cell, press, line",)
 
@@ -71,8 +72,7 @@ def _work(
     proper("--noise", noise)
     if compression and sides != "bonded":
         raise BadInput("--compression and --sides at once; expected one of them")
-    from sensorgen.prediction.evaluate import evaluate
-    from sensorgen.prediction.query import DEFAULT, FLAT, Query
+    from sensorgen.prediction.query import DEFAULT, Query
     from sensorgen.prediction.results import Overview, Prediction
 
     tip = design.tip.tip()
@@ -83,29 +83,40 @@ def _work(
     query = Query(frequencies, tip=tip, law=compression or sides * (sides != "bonded"), accuracy=accuracy, noise=noise)
     if sweep:
         return _sweep(design, sweep, query, sweeps.at_once(jobs), cluster, alone=not (force_n or position_mm or plot))
-    found: Prediction | Loaded
-    body = body_options.body_of()(design)
     with show.progress(_WORK) as step:
         step(_WORK[0])
-        if force_n or position_mm or plot or render.form() == "csv":
-            from sensorgen.prediction.loaded import loaded
-
-            found = loaded(body, query, force_n or (), position_mm or ())
-            prediction = found.prediction
-        else:
-            found = prediction = evaluate(body, query)
-            asked = query.law or tip != FLAT
-            if found.capacitance and not found.budget and asked:
-                raise BadInput(found.reason)
-            found = prediction if details or explain or accuracy or frequency_hz else Overview(**vars(prediction))
+        found = _asked(design, query, force_n or (), position_mm or (), everywhere=bool(plot))
+    prediction = found if isinstance(found, Prediction) else found.prediction
     if plot and not isinstance(found, Prediction):
         _plot(found, Path(plot))
     else:
-        render.deliver(found, before=prediction.explained() if explain else ())
+        whole = details or explain or accuracy or frequency_hz or found is not prediction
+        render.deliver(
+            found if whole else Overview(**vars(prediction)), before=prediction.explained() if explain else ()
+        )
     if missing := prediction.missing():
         render.say(f"sensorgen: {missing}", err=True)
         return WRONG_INPUT
     return render.verdict(*prediction.problems(accuracy))
+
+
+def _asked(
+    design: "Design", query: "Query", force_n: Sequence[float], position_mm: Sequence[float], *, everywhere: bool
+) -> "Prediction | Loaded":
+    """The prediction, with the impedance over force and position where one of them, or CSV, is asked for."""
+    from sensorgen.prediction.query import FLAT
+
+    body = body_options.body_of()(design)
+    if force_n or position_mm or everywhere or render.form() == "csv":
+        from sensorgen.prediction.loaded import loaded
+
+        return loaded(body, query, force_n, position_mm)
+    from sensorgen.prediction.evaluate import evaluate
+
+    found = evaluate(body, query)
+    if found.capacitance and not found.budget and (query.law or query.tip != FLAT):
+        raise BadInput(found.reason)
+    return found
 
 
 def _sweep(design: "Design", words: str, query: "Query", jobs: int, cluster: str, *, alone: bool) -> int:

@@ -46,7 +46,7 @@ def _to(ctx: click.Context, param: click.Parameter, given: str | None) -> None: 
 
 
 def form() -> str:
-    """What was asked for, or what the file's name ends in: "json", "csv", "markdown"; "" for text."""
+    """Form that was asked for, or that the file's name ends in: "json", "csv", "markdown"; "" for text."""
     meta = click.get_current_context().meta
     suffix = Path(meta.get(_FILE) or "").suffix
     return str(meta.get(_FORM, {".json": "json", ".csv": "csv", ".md": "markdown"}.get(suffix, "")))

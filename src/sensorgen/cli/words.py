@@ -164,7 +164,7 @@ def proper(option: str, share: float) -> float:
 
 
 def completed(names: Callable[[], Iterable[str]]) -> Callable[[click.Context, click.Parameter, str], list[Any]]:
-    """What the shell offers for an option: the names that begin as typed, looked up only then."""
+    """Completion of an option by the shell: the names that begin as typed, looked up only then."""
     return lambda ctx, param, begun: [name for name in names() if name.startswith(begun)]  # noqa: ARG005
 
 

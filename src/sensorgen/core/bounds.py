@@ -44,7 +44,7 @@ class Disc:
         return Disc(self.centre * factor, self.radius * factor)
 
     def holds(self, value: complex) -> bool:
-        """Whether a value lies in it."""
+        """Test whether a value lies in it."""
         return abs(value - self.centre) <= self.radius
 
 

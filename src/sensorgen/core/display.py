@@ -1,8 +1,20 @@
-"""How results show themselves in a notebook: by their document, or as the packages above register."""
+"""Display of results in a notebook: by their document, or as the packages above register."""
 
 from functools import singledispatch
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from sensorgen.core.document import Part
+
+LINES = 20  # of a result where it is not printed on purpose
+_STYLE = (  # as that of pages, which a notebook's own colours may overlay
+    ".sensorgen table{border-collapse:collapse;font-size:.86rem}"
+    ".sensorgen td,.sensorgen th{padding:.2rem .55rem;border-bottom:1px solid #8886;text-align:left}"
+    ".sensorgen p{margin:.2rem 0}.sensorgen .scroll{overflow-x:auto}"
+)
 
 
 @singledispatch
@@ -22,11 +34,48 @@ def figure(thing: object) -> Any:
 
 
 class Displayed:
-    """A result that a notebook shows as a table, with a figure by :meth:`plot`."""
+    """A result that shows itself: a table in a notebook, its first lines elsewhere, a figure by :meth:`plot`."""
+
+    if TYPE_CHECKING:
+
+        def document(self) -> "Iterable[Part]":
+            """Paragraphs, facts and tables."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        cls.__repr__ = Displayed.__repr__  # type: ignore[method-assign]  # a dataclass would write all that it holds
+
+    def __repr__(self) -> str:
+        from sensorgen.core.errors import SensorgenError
+
+        try:
+            lines = self.text().splitlines()
+        except SensorgenError as error:  # as of too many points for a table
+            return f"<{type(self).__name__}: {error}>"
+        more = [f"... {len(lines) - LINES + 1} more lines in text()"]
+        return "\n".join(lines if len(lines) <= LINES else lines[: LINES - 1] + more)
 
     def _repr_html_(self) -> str:
-        return html(self)
+        return f'<div class="sensorgen"><style>{_STYLE}</style>{html(self)}</div>'
+
+    def text(self) -> str:
+        """The result as the command line prints it."""
+        from sensorgen.core import document
+
+        return "\n".join(document.text(self.document()))
 
     def plot(self) -> Any:
         """The result as a matplotlib figure."""
         return figure(self)
+
+    def to_pandas(self) -> Any:
+        """The table, the first of several, as a pandas DataFrame; raises MissingValue without pandas."""
+        from sensorgen.core.document import Table
+        from sensorgen.core.errors import MissingValue
+
+        try:
+            import pandas as pd
+        except ImportError as error:
+            raise MissingValue("to_pandas() needs pandas: pip install pandas") from error
+        table = self.table() if hasattr(self, "table") else next(p for p in self.document() if isinstance(p, Table))
+        return pd.DataFrame(list(table.cells), columns=[column.key or column.head for column in table.columns])

@@ -1,4 +1,4 @@
-"""What a result shows: paragraphs, facts and tables; as text, Markdown, HTML, CSV or JSON.
+"""Content of a result: paragraphs, facts and tables; as text, Markdown, HTML, CSV or JSON.
 
 A result that a command prints or a notebook displays has a method ``document()`` that yields these parts.
 """
@@ -175,6 +175,8 @@ def visible(words: str) -> str:
     >>> visible("a\x1b[2J")
     'a\\x1b[2J'
     """
+    if words.isprintable():
+        return words
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
 
 
@@ -233,11 +235,9 @@ def _aligned(table: Table) -> Iterator[str]:
 
 
 def _worded(table: Table) -> list[bool]:
-    """Which columns hold words that stand to the left."""
-    return [
-        not column.right and any(isinstance(row[k], str) for row in table.cells)
-        for k, column in enumerate(table.columns)
-    ]
+    """Mask of the columns of words, which stand to the left."""
+    words = {k for row in table.cells for k, cell in enumerate(row) if isinstance(cell, str)}
+    return [k in words and not column.right for k, column in enumerate(table.columns)]
 
 
 def markdown(parts: Iterable[Part]) -> Iterator[str]:

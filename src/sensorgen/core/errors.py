@@ -1,4 +1,4 @@
-"""What went wrong, in words that tell the user what to do."""
+"""Errors, in words that tell the user what to do."""
 
 import difflib
 import re
@@ -11,7 +11,7 @@ class SensorgenError(Exception):
     """Anything a user can put right; the command line shows it as one line and exits with 2."""
 
     def within(self, where: str) -> Self:
-        """The same error, its message led by the file or key that it is about, unless it names that already."""
+        """Lead the message by the file or key that it is about, unless it names that already."""
         said = str(self)
         if where and not (said.startswith((f"{where}:", f"{where},")) or f" {where!r}: " in said):
             self.args = (f"{where}: {said}",)

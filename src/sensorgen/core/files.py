@@ -59,7 +59,7 @@ def reading(path: Path | str) -> Iterator[None]:
 
 
 def unwritable(path: Path, error: OSError) -> Unwritable:
-    """What to raise where a place cannot be written to."""
+    """Error of a place that cannot be written to."""
     return Unwritable(f"cannot write to {str(path)!r}: {error.strerror or error}; name another place with --out")
 
 
@@ -102,7 +102,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def alive(pid: int) -> bool:
-    """Whether another process of that number runs; on Windows, where asking would end it, always."""
+    """Test whether another process of that number runs; on Windows, where asking would end it, always."""
     if pid == os.getpid():  # left by an earlier process of our number, as containers have them
         return False
     try:

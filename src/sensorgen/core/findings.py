@@ -72,7 +72,7 @@ class Finding:
 
     @property
     def text(self) -> str:
-        """What is the matter, where, and what to change."""
+        """Message: the fault, its place, and the change to make."""
         x, y, z = self.place_mm or (0.0, 0.0, 0.0)
         at = f" ({'first ' if self.count > 1 else ''}at x {x:g}, y {y:g}, z {z:g} mm)" if self.place_mm else ""
         return f"{self.message}{at} {f'accepted: {self.waiver}' if self.waiver else f'-> {self.advice}'}"
@@ -129,7 +129,7 @@ def table(found: Iterable[Finding]) -> Table:
 
 
 def counts(found: Sequence[Finding]) -> dict[str, int]:
-    """How many findings there are of each severity, and how many are waived [-]."""
+    """Number of findings of each severity, and of those that are waived [-]."""
     heads = ["waived" if f.waiver else f.severity for f in found]
     return {head: heads.count(head) for head in (*SEVERITIES, "waived")}
 

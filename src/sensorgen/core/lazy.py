@@ -44,7 +44,7 @@ class Lazy(Sequence[Member], Generic[Member]):
         return map(self._make, self._places)
 
     def map(self, change: "Callable[[Member], Other]") -> "Lazy[Other]":
-        """The same members, changed."""
+        """Members after a change."""
         return Lazy(lambda place: change(self._make(place)), self._places)
 
     def where(self, wanted: Callable[[Member], bool]) -> "Lazy[Member]":

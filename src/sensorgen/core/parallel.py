@@ -1,4 +1,4 @@
-"""The same work for many, in processes of this computer or on a Dask cluster; a process that dies costs one chunk."""
+"""Work on many inputs, in processes of this computer or on a Dask cluster; a process that dies costs one chunk."""
 
 import json
 import os
@@ -78,13 +78,11 @@ def in_parallel(
         spent, done, ready = 0.0, 0, list[tuple[int, Result]]()
         while todo or again or running:
             while free and (todo or again):
-                if again and not (opened[0].shared and (todo or running)):
-                    chunk = again.popleft()
-                elif todo:
-                    size = max(1, min(int(CHUNK_S * done / spent) if spent else 1, len(todo) // (2 * len(opened))))
-                    chunk = _Chunk(tuple(todo.popleft() for _ in range(size)))
-                else:
+                alone = opened[0].shared and (todo or running)  # a chunk that killed waits until others are safe
+                if not todo and alone:
                     break
+                size = min(int(CHUNK_S * done / spent) if spent else 1, len(todo) // (2 * len(opened)))
+                chunk = again.popleft() if again and not alone else _taken(todo, size)
                 lane = free.pop()
                 running[lane.submit(work, [inputs[k] for k in chunk.numbers])] = lane, chunk
             yield from ready  # after the lanes have got work: what is done with a result takes time
@@ -109,11 +107,16 @@ def in_parallel(
         yield from ready
 
 
+def _taken(todo: deque[int], size: int) -> "_Chunk":
+    """The next works, one at least."""
+    return _Chunk(tuple(todo.popleft() for _ in range(max(1, size))))
+
+
 def remembered(
     work: Work[Result], inputs: Sequence[tuple[Any, ...]], jobs: int, *, cluster: str = "", keep: bool = True,
     lost: Lost[Result] | None = None, lanes: "Sequence[Lane]" = (),
 ) -> Iterator[tuple[int, Result]]:  # fmt: skip
-    """The same, of works that ask :mod:`sensorgen.core.cache`: those it has all answers to first, and in this process.
+    """Results of works that ask :mod:`sensorgen.core.cache`: those it has all answers to first, and in this process.
 
     What the others have worked out is stored as it comes: work that is stopped goes on where it was.
 
@@ -167,7 +170,7 @@ class _Chunk:
     deaths: int = 0
 
     def after_death(self) -> "list[_Chunk]":
-        """What to send after another death: the same again, its works one by one, or nothing."""
+        """Chunks to send after another death: this one again, its works one by one, or nothing."""
         if not self.deaths:
             return [_Chunk(self.numbers, 1)]
         return [_Chunk((k,), 1) for k in self.numbers] if len(self.numbers) > 1 else []
@@ -192,7 +195,7 @@ def _within(limit_s: float, work: Work[Result], *given: Any) -> Result:
 
 
 def said(work: Work[Result], *given: Any, refused: tuple[type[SensorgenError], ...]) -> Result | str:
-    """What a work finds, or why it finds nothing.
+    """Result of a work, or the reason why there is none.
 
     Parameters
     ----------

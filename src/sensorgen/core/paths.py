@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def data(variable: str, name: str) -> Path:
-    """What is to last, as the log.
+    """Place of what is to last, as the log.
 
     Parameters
     ----------
@@ -19,12 +19,12 @@ def data(variable: str, name: str) -> Path:
 
 
 def config(variable: str, name: str) -> Path:
-    """What the user writes by hand, as packs; parameters as :func:`data`."""
+    """Place of what the user writes by hand, as packs; parameters as :func:`data`."""
     return _own(variable) or _below("XDG_CONFIG_HOME", ".config", "Application Support") / "sensorgen" / name
 
 
 def cache(variable: str) -> Path:
-    """What may be deleted; parameters as :func:`data`."""
+    """Place of what may be deleted; parameters as :func:`data`."""
     return _own(variable) or _below("XDG_CACHE_HOME", ".cache", "Caches") / "sensorgen"
 
 

@@ -137,7 +137,7 @@ def _first(faults: Sequence[Mapping[str, Any]], data: object) -> tuple[Mapping[s
 
 
 def _branches(fault: Mapping[str, Any], first: Mapping[str, Any], data: object) -> bool:
-    """Whether two faults are of alternatives for one value: their ways part at the name of a type."""
+    """Test whether two faults are of alternatives for one value: their ways part at the name of a type."""
     if fault is first:
         return True
     pairs = enumerate(zip_longest(fault["loc"], first["loc"]))
@@ -147,7 +147,7 @@ def _branches(fault: Mapping[str, Any], first: Mapping[str, Any], data: object) 
 
 
 def _expected(fault: Mapping[str, Any], kind: type[Strict] | None) -> str:
-    """What one fault asks for."""
+    """Expectation behind one fault."""
     example = _example(kind, fault["loc"]) if kind else "others of its kind"
     if fault["type"] == "model_type" and kind:
         return f"a mapping with {', '.join(_keys(_record_at(kind, fault['loc'])))}"

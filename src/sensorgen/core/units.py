@@ -22,7 +22,7 @@ _PREFIXES = {6: "M", 3: "k", 0: ""}
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a number can be typed as.
+    """Quantity that a number can be typed as.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Quantity:
         raise self._no(text, "; decimals take a point, as in 1.5" if "," in text else "")
 
     def factor(self, text: str, unit: str) -> Decimal:
-        """What the number is to be multiplied by; m and M are distinct wherever both have a meaning."""
+        """Factor of the number; m and M are distinct wherever both have a meaning."""
         if not unit:
             return Decimal(1)
         if unit in self.units:

@@ -1,1 +1,1 @@
-"""What was asked for: shape, parameters, materials with sources, printer, quality."""
+"""Request for a sensor: shape, parameters, materials with sources, printer, quality."""

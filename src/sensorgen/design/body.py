@@ -78,7 +78,7 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """What there is of a design.
+    """Body of a design: drawn, or as printed.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class Body:
         return self.make()
 
     def with_values(self, material_values: Mapping[str, Mapping[str, float]]) -> "Body":
-        """The same geometry of materials with other values, by material and quantity."""
+        """Geometry of materials with other values, by material and quantity."""
         data = self.design.model_dump(exclude_defaults=True, mode="json")
         known = data.get("material_values", {})
         changed = {name: known.get(name, {}) | dict(values) for name, values in material_values.items()}
@@ -122,7 +122,7 @@ class Body:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether it is the drawing."""
+        """True if it is the drawing."""
         return self.kind == DRAWN
 
 

@@ -8,15 +8,15 @@ import re
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, cast
 
-from pydantic import Field, field_validator
+from pydantic import Field, ModelWrapValidatorHandler, ValidationError, field_validator, model_validator
 
 from sensorgen.core import display, yamlfile
 from sensorgen.core import plugins as registry
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding
-from sensorgen.core.records import Strict, checked, shown
+from sensorgen.core.records import Strict, checked, problem, shown
 from sensorgen.design import borders, imported, packs, shapes
 from sensorgen.design import materials as material_files
 from sensorgen.design.effects import Effects
@@ -27,8 +27,10 @@ from sensorgen.design.tip import EVEN, STIFF, TipData
 from sensorgen.scene.scene import Envelope, Fill, Scene
 
 if TYPE_CHECKING:
+    from sensorgen.design.arrays import Layout
     from sensorgen.design.shape_files import Shape
 
+ARRAY = "array"  # shape of crossing tracks, with cells of another one
 MAX_CELLS = 50_000  # crossed strips of 330 x 330 mm have 27 225
 MAX_LAYERS = 5_000  # 30 mm in layers of 0.06 mm have 500
 _NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]{0,98}[A-Za-z0-9])?")
@@ -46,7 +48,7 @@ class SVG(str):
 
 
 class Slots(Strict):
-    """Which material fills which part, each with the source of its values: ``x60`` or ``x60@thesis-4.1``."""
+    """Materials of the parts, each with the source of its values: ``x60`` or ``x60@thesis-4.1``."""
 
     top_electrode: Slot = "etpu"
     bottom_electrode: Slot = "etpu"
@@ -69,7 +71,7 @@ class Leads(Strict):
 
 
 class Infill(Strict):
-    """How densely one material is printed."""
+    """Density that one material is printed with."""
 
     percent: Annotated[float, Field(gt=0, le=100)] | None = None
     pattern: Pattern | None = None
@@ -83,8 +85,31 @@ class Waiver(Strict):
     reason: Annotated[str, Field(min_length=5)]
 
 
+class Cell(Strict):
+    """Shape of the cell at each crossing of an array."""
+
+    shape: str = "reference"
+    parameters: dict[str, float | str] = Field(default={}, description="Of that shape; its size is that of a crossing.")
+
+
 class Design(Strict):
     """A named variant of a sensor."""
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _constructed(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """Errors of a design that is constructed in Python, in the words of a file's."""
+        try:
+            return handler(data)
+        except ValidationError as error:
+            own = (
+                fields(data["shape"])
+                if isinstance(data, Mapping) and str(data.get("shape")) in packs.names("shapes")
+                else {}
+            )
+            for key in own.keys() & data:
+                raise BadInput(f"{key} is a parameter; expected parameters: {{{key}: {data[key]}}}") from None
+            raise BadInput(problem(error, data, cls)) from None
 
     def _repr_html_(self) -> str:
         return display.html(self)
@@ -131,6 +156,7 @@ class Design(Strict):
         default=None, description="File of the bodies of an imported sensor, relative to the design's own file."
     )
     bodies: dict[str, imported.Filled] = Field(default={}, description="Imported body to material and terminal.")
+    cell: Cell | None = Field(default=None, description="Of an array: what lies between crossing tracks.")
     border: str | None = Field(
         default=None, description="SVG or DXF file of the sensor's outline in plan, relative to the design's own file."
     )
@@ -191,7 +217,7 @@ class Design(Strict):
         return [body.material for body in self.bodies.values()] or [slot for _, slot in self.materials if slot]
 
     def conducts(self, name: str) -> bool:
-        """Whether a material does."""
+        """Test whether a material does."""
         return self.material(name).conductor
 
     def slot(self, part: str) -> tuple[material_files.Material, str]:
@@ -214,8 +240,39 @@ class Design(Strict):
         if self.geometry:
             return imported.scene(self.geometry, self.bodies)
         names = {part: (value or "").partition("@")[0] for part, value in self.materials.model_dump().items()}
+        if self.layout:
+            from sensorgen.design import arrays
+
+            return arrays.scene(self.layout, Fill(**names), self.crossing.form.scene, self.crossing.params)
         scene = self.form.scene(self.params, Fill(**names))
         return borders.cut(scene, self.border) if self.border else scene
+
+    @cached_property
+    def layout(self) -> "Layout | None":
+        """Tracks of an array in plan; None of any other sensor."""
+        if self.shape != ARRAY:
+            return None
+        from sensorgen.design import arrays
+
+        return arrays.layout(cast(arrays.Params, self.params), self.border)
+
+    @cached_property
+    def crossing(self) -> "Design":
+        """One crossing of an array as a sensor of its own: cell, materials and printer are those of all crossings."""
+        if not self.layout:
+            raise BadInput(f"{self.shape} has no crossings; expected shape: {ARRAY}")
+        from sensorgen.design import arrays
+
+        cell, params = self.cell or Cell(), self.layout.params
+        others = self.model_dump(
+            exclude={"name", "shape", "parameters", "cell", "border", "waivers", "tip"}, exclude_defaults=True,
+            mode="json",
+        )  # fmt: skip
+        others["tip"] = arrays.crossing_tip(params, self.tip)
+        own = arrays.cell_parameters(params, cell)
+        made = make({**others, "name": f"{self.name[:80] or 'array'}-crossing", "shape": cell.shape, "parameters": own})
+        arrays.check_cell(made.params, params)
+        return made
 
     @property
     def area_mm2(self) -> float:
@@ -282,7 +339,7 @@ class Design(Strict):
         """Parts that have come later and are not used: without them the identities of older designs last."""
         usual = {
             "profile": Profile(), "tip": TipData(), "effects": Effects(), "own": {}, "geometry": None, "bodies": {},
-            "border": None, "leads": Leads(),
+            "border": None, "leads": Leads(), "cell": None,
         }  # fmt: skip
         return {key for key, value in usual.items() if getattr(self, key) == value}
 
@@ -404,6 +461,10 @@ def _shape(name: str, text: str | None) -> "Shape":
     """A shape by its name, or by the text of its file where that does not ship."""
     if name == imported.SHAPE:
         return cast("Shape", imported)
+    if name == ARRAY:
+        from sensorgen.design import arrays
+
+        return cast("Shape", arrays)
     if text is None:
         return shape(name)
     from sensorgen.design import shape_files
@@ -445,9 +506,11 @@ def parameters(shape_name: str, given: Mapping[str, float | str], text: str | No
     return params
 
 
-def unit_of(parameter: str) -> str:
-    """Unit of a shape's parameter, in words."""
-    return "degrees" if parameter.endswith("_deg") else "mm"
+def unit_of(field: dataclasses.Field[Any]) -> str:
+    """Unit of a shape's parameter, in words; "" of a number of things."""
+    if field.metadata.get("count"):
+        return ""
+    return "degrees" if field.name.endswith("_deg") else "mm"
 
 
 def _checked(field: dataclasses.Field[Any], value: float | str) -> float | str:
@@ -459,9 +522,10 @@ def _checked(field: dataclasses.Field[Any], value: float | str) -> float | str:
     low, high = field.metadata["range"]
     if isinstance(value, str) or not math.isfinite(value) or not low <= value <= high:
         shown = repr(value) if isinstance(value, str) else f"{value:g}"
-        unit = unit_of(field.name)
+        unit = unit_of(field)
         own = f": write it in {unit}, without a unit" if isinstance(value, str) and value[:1].isdigit() else ""
-        raise OutOfRange(f"{field.name} is {shown}; expected a number from {low:g} to {high:g} {unit}{own}")
+        limits = f"a number from {low:g} to {high:g} {unit}".rstrip()
+        raise OutOfRange(f"{field.name} is {shown}; expected {limits}{own}")
     return float(value)
 
 
@@ -485,6 +549,8 @@ def make(data: Mapping[str, Any], where: str = "") -> Design:
         design = checked(Design, with_own_files(dict(data), Path(where).parent) if isinstance(data, Mapping) else data)
         if design.shape == imported.SHAPE or design.geometry or design.bodies:
             design = _imported(design)
+        if design.cell and design.shape != ARRAY:
+            raise BadInput(f"cell: {design.shape} has no crossings; expected shape: {ARRAY}")
         _check_names(design)
         if "own" not in data and design.own.keys() & {"printers"}:  # a record needs no materials that it does not use
             design.machine.check_tools(Path(where).parent)
@@ -635,7 +701,7 @@ def name_of(design: Design) -> str:
         parts.append("" if given == usual else _plain(Path(given).stem))
     if design.orientation != default.orientation:
         parts.append("upside-down")
-    said_if_set = {key for key in ("material_values", "border") if getattr(design, key)}
+    said_if_set = {key for key in ("material_values", "border", "cell") if getattr(design, key)}
     said_if_set |= {"profile"} - design._plain()
     others = design.model_dump(include={"materials", "nozzle_mm", "tools", "infill", "shrinkage"} | said_if_set)
     if others != default.model_dump(include=set(others)):

@@ -38,7 +38,7 @@ def _kinds() -> "dict[str, type[Piece]]":
 
 
 class Filled(Strict):
-    """What an imported body is printed of, and where it is connected."""
+    """Material of an imported body, and its connections."""
 
     material: Annotated[str, Field(pattern=r"^[a-z0-9-]+(@[a-z0-9.-]+)?$", examples=["x60", "x60@thesis-4.1"])]
     terminal: Literal["", "top", "middle", "bottom"] = ""

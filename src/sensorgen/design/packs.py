@@ -44,7 +44,7 @@ _PackName = Annotated[str, Field(pattern=f"^{NAME.pattern}$", examples=["lab-fil
 
 
 class Manifest(Strict):
-    """What ``pack.yaml`` says; all of it may be left out."""
+    """Content of ``pack.yaml``; all of it may be left out."""
 
     version: str = ""
     about: str = ""
@@ -131,17 +131,17 @@ class File:
 
 
 def suffix(kind: Kind) -> str:
-    """How names of files of a kind end."""
+    """Ending of the names of files of a kind."""
     return ".py" if kind == "shapes" else ".yaml"
 
 
 def is_name(kind: Kind, name: str) -> bool:
-    """Whether something of that kind can have the name."""
+    """Test whether something of that kind can have the name."""
     return bool(_NAMES.get(kind, NAME).fullmatch(name))
 
 
 def is_path(kind: Kind, word: str) -> bool:
-    """Whether a word is meant as a file, not as a name."""
+    """Test whether a word is meant as a file, not as a name."""
     return word.endswith((suffix(kind), ".yml")) or "/" in word or "\\" in word
 
 
@@ -352,6 +352,9 @@ def with_files(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     texts: dict[Kind, dict[str, Any]] = {kind: dict(given.get(kind, {})) for kind in SINGULAR}
     made = dict(data)
     made.update(_shape_and_machine(data, texts, folder))
+    cell = data.get("cell")
+    if isinstance(cell, dict) and isinstance(cell.get("shape"), str):
+        made["cell"] = cell | {"shape": _add(texts, "shapes", cell["shape"], folder)}
     if isinstance(data.get("materials"), dict):
         made["materials"] = {part: _slot(word, texts, folder) for part, word in slots(data["materials"]).items()}
     if isinstance(data.get("bodies"), dict):
@@ -385,7 +388,9 @@ def _shape_and_machine(
     kinds: tuple[tuple[str, Kind], ...] = (("shape", "shapes"), ("printer", "printers"), ("quality", "qualities"))
     for key, kind in kinds:
         word = data.get(key)
-        if isinstance(word, str) and not (key == "shape" and "geometry" in data):  # that of imported bodies is no file
+        if isinstance(word, str) and not (
+            key == "shape" and ("geometry" in data or word == "array")
+        ):  # those are no file
             yield key, _add(texts, kind, word, folder)
 
 

@@ -29,7 +29,7 @@ class MaxSpeed(Strict):
 
 
 class Reach(Strict):
-    """How far the axes go, in the printer's own coordinates [mm]."""
+    """Reach of the axes, in the printer's own coordinates [mm]."""
 
     x: Annotated[tuple[Finite, Finite], Field(strict=False)]
     y: Annotated[tuple[Finite, Finite], Field(strict=False)]
@@ -56,7 +56,7 @@ class Macro(Strict):
 
 
 class Control(Strict):
-    """What the printer's firmware and macros make of G-code, where printers differ."""
+    """Effect of the printer's firmware and macros on G-code, where printers differ."""
 
     reach_mm: Reach | None = None  # the bed and the height, where nobody says
     spindles: Annotated[tuple[int, ...], Field(strict=False)] = ()  # tools that cut and do not print
@@ -156,7 +156,7 @@ class Printer(Strict):
         return None if self.gcode_flavour == "reprapfirmware" else self.tool_numbers[0]
 
     def reach_mm(self) -> Reach:
-        """How far the axes go [mm]."""
+        """Reach of the axes [mm]."""
         if self.control.reach_mm is not None:
             return self.control.reach_mm
         (x, y), (wide, deep) = self.bed_centre_mm(), self.bed_mm
@@ -168,7 +168,7 @@ class Printer(Strict):
 
 
 class Quality(Strict):
-    """How a print is cut into layers."""
+    """Heights of the layers of a print."""
 
     name: str
     title: Line

@@ -1,4 +1,4 @@
-"""How a slicer is set where a design wants it otherwise than our profiles, down to settings of the user's own."""
+"""Settings of a slicer where a design wants it otherwise than our profiles, down to settings of the user's own."""
 
 import json
 import re

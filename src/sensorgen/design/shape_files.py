@@ -19,7 +19,7 @@ from functools import cache, lru_cache
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
-from typing import IO, Any, Protocol, cast
+from typing import IO, TYPE_CHECKING, Any, Protocol, cast
 
 from pydantic import ValidationError
 
@@ -28,7 +28,12 @@ from sensorgen.core import files
 from sensorgen.core.errors import BadInput, OutOfRange, Unwritable
 from sensorgen.core.records import problem
 from sensorgen.design import packs, shape_process
-from sensorgen.scene.scene import FLOATING, Body, Envelope, Fill, Scene
+from sensorgen.scene.polyhedra import Loft, Polyhedron
+from sensorgen.scene.revolved import Revolved
+from sensorgen.scene.scene import FLOATING, Body, Envelope, Fill, Prism, Scene
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
 
 SECONDS = 5  # of processor time for one question; a scene takes milliseconds
 MEMORY_BYTES = 1 << 30
@@ -40,7 +45,7 @@ _OUTSIDE_MM = 1e-6
 
 
 class Shape(Protocol):
-    """What a shape is."""
+    """Shape by the answers of its file."""
 
     __doc__: str | None
 
@@ -55,10 +60,11 @@ class Shape(Protocol):
 class NotTrusted(BadInput):
     """A shape's file whose content the user has not trusted."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, text: str) -> None:
         super().__init__(
             f"{name}.py is not trusted and did not run: a shape is a program; read it, then: sensorgen pack trust "
-            f"shapes/{name}.py (its file, or the design's that contains it), and again after each change"
+            f"shapes/{name}.py (its file, or the design's that contains it), and again after each change; SHA-256 "
+            f"{digest(text)}"
         )
 
 
@@ -73,7 +79,7 @@ def load(name: str, text: str) -> Shape:
         The file is no shape; the message names its line.
     """
     if not is_trusted(text):
-        raise NotTrusted(name)
+        raise NotTrusted(name, text)
     return _foreign(name, text)
 
 
@@ -83,7 +89,7 @@ def digest(text: str) -> str:
 
 
 def varies(name: str, text: str, fill: Mapping[str, str]) -> bool:
-    """Whether a file's scene differs between two questions with its default parameters, in one process or in two.
+    """Test whether a file's scene differs between two questions with its default parameters, in one process or in two.
 
     Raises
     ------
@@ -105,7 +111,7 @@ def varies(name: str, text: str, fill: Mapping[str, str]) -> bool:
 
 
 def is_trusted(text: str) -> bool:
-    """Whether the user has trusted a file with this very content."""
+    """Test whether the user has trusted a file with this very content."""
     with suppress(OSError, UnicodeDecodeError):
         lines = (packs.place() / TRUSTED).read_text("utf-8").splitlines()
         return digest(text) in {line.partition(" ")[0] for line in lines}
@@ -128,7 +134,7 @@ def trust(name: str, text: str) -> Path:
 
 
 def _short(name: str, reply: Mapping[str, Any]) -> str:
-    """How a shape's designs begin their names, which are those of files."""
+    """Beginning of the names of a shape's designs, which are those of files."""
     return str(reply["short"]) if _NAME.fullmatch(str(reply["short"])) else name
 
 
@@ -159,12 +165,12 @@ class _Foreign:
     def _scene(self, p: Envelope, fill: Fill) -> Scene:
         data = self._ask({"parameters": dataclasses.asdict(p), "fill": dataclasses.asdict(fill)})
         try:
-            return _checked(self._name, _adapter().validate_python(data), fill)
+            return _checked(self._name, _decoded(data), fill)
         except ValidationError as error:
             raise BadInput(f"{self._name}.py: scene() gives no scene: {problem(error, data)}") from None
 
     def _ask(self, question: Mapping[str, Any]) -> Any:
-        """What the file answers, or answered before."""
+        """Answer of the file, or its stored answer."""
         key = {"shape": digest(self._text), "question": question}
         known = answers.known(key)
         if known is None:
@@ -178,15 +184,34 @@ def _foreign(name: str, text: str) -> Shape:
     return cast(Shape, _Foreign(name, text))
 
 
+@dataclasses.dataclass(frozen=True)
+class _ReadBody(Body):
+    """A body by its plain data: of the kinds of pieces that there are."""
+
+    pieces: tuple[Prism | Revolved | Loft | Polyhedron, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class _ReadScene(Scene):
+    """A scene by its plain data."""
+
+    bodies: tuple[_ReadBody, ...]
+
+
 @cache
-def _adapter() -> Any:
+def _adapter() -> "TypeAdapter[_ReadScene]":
     from pydantic import TypeAdapter
 
-    from sensorgen.scene import polyhedra, revolved, scene
+    return TypeAdapter(_ReadScene)
 
-    made = TypeAdapter(Scene)
-    made.rebuild(_types_namespace=vars(scene) | vars(polyhedra) | vars(revolved))
-    return made
+
+def _decoded(data: object) -> Scene:
+    """A scene of plain data; raises ValidationError."""
+    found = _adapter().validate_python(data)
+    bodies = (
+        Body(**{field.name: getattr(body, field.name) for field in dataclasses.fields(Body)}) for body in found.bodies
+    )
+    return Scene(tuple(bodies), found.size_mm, found.repeats)
 
 
 def _fields(name: str, reply: Mapping[str, Any]) -> list[tuple[str, type, Any]]:
@@ -257,7 +282,7 @@ class _Process:
 
     def __init__(self, name: str, text: str) -> None:
         if not is_trusted(text):
-            raise NotTrusted(name)
+            raise NotTrusted(name, text)
         self.name = name
         self._process = subprocess.Popen(  # noqa: S603 - this very program
             [sys.executable, "-I", "-S", "-B", shape_process.__file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE,

@@ -28,7 +28,7 @@ _MODULES = (
     "functools", "hashlib", "heapq", "itertools", "json", "math", "numbers", "numpy.linalg", "numpy.random", "operator",
     "random", "re", "statistics", "string", "struct", "textwrap", "time", "typing", "sensorgen.scene.array",
     "sensorgen.scene.layers", "sensorgen.scene.polyhedra", "sensorgen.scene.revolved", "sensorgen.scene.triangles",
-    "sensorgen.scene.sections",
+    "sensorgen.scene.sections", "sensorgen.scene.strips",
 )  # fmt: skip
 
 
@@ -46,7 +46,7 @@ def module_of(name: str, text: str) -> ModuleType:
 
 
 def described(module: ModuleType) -> dict[str, Any]:
-    """What a module says of its shape."""
+    """Description of a shape by its module."""
     params = module.Params
     return {
         "about": module.__doc__ or "",

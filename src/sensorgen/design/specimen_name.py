@@ -16,6 +16,7 @@ The grammar is that of Table D.1 of the thesis, and its slips are read too: each
 import re
 import unicodedata
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from sensorgen.core.errors import BadInput
 from sensorgen.core.records import shown
@@ -117,6 +118,7 @@ def _short(film_mm: float) -> str:
     return text.removeprefix("0") if film_mm < 1 else text + "0" * text.endswith(".")
 
 
+@lru_cache(maxsize=1 << 14)
 def parse(text: str) -> Specimen:
     """Read a specimen's name, misspelt ones too.
 
@@ -204,7 +206,7 @@ def _case(text: str, word: str) -> list[str]:
 
 
 def _rest(text: str, rest: str) -> dict[str, re.Match[str]]:
-    """What follows the shape, each kind of word at most once, in any order, with or without blanks between."""
+    """Words after the shape, each kind at most once, in any order, with or without blanks between."""
     found: dict[str, re.Match[str]] = {}
     at = 0
     while at < len(rest):

@@ -12,7 +12,7 @@ WALLS = {
 
 
 def rule(slicer: str, walls: str) -> str:
-    """Which of ``WALLS`` a slicer makes of a design's walls (arachne or classic)."""
+    """Choice among ``WALLS`` that a slicer makes of a design's walls (arachne or classic)."""
     return _RULES[slicer][walls]
 
 

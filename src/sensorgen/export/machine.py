@@ -1,4 +1,4 @@
-"""Whether a printer and a quality of the user's own work: slicers' profiles, and the printer's start and end code.
+"""Check of a printer and a quality of the user's own: slicers' profiles, and the printer's start and end code.
 
 What ships is tested before it ships; the file of a user by ``pack test`` and with each design that it prints.
 """

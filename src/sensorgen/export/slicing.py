@@ -60,7 +60,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class Sliced:
-    """What slicing has left behind.
+    """Results of slicing.
 
     Attributes
     ----------
@@ -196,7 +196,7 @@ def check(pieces: Sequence[Placed]) -> None:
 
 
 def plate_loads(pieces: Sequence[Placed]) -> dict[int, Load]:
-    """What each tool prints on a plate, by the printer's own tool number.
+    """Loads of a plate, by the printer's own tool number.
 
     Raises
     ------

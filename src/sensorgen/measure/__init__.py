@@ -1,1 +1,1 @@
-"""What was measured: log, instruments, recordings, signal processing."""
+"""Measurements: log, instruments, recordings, signal processing."""

@@ -31,7 +31,7 @@ SAME_NAMES: Mapping[str, str] = {}
 
 
 class Lines(Protocol):
-    """What a table needs of a text stream."""
+    """Part of a text stream that a table needs."""
 
     def readline(self, limit: int, /) -> str:
         """The next line with its line feed, at most so many characters of it; empty at the end."""

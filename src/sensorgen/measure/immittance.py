@@ -116,7 +116,7 @@ def _decimal(text: str) -> Decimal:
 
 
 def factor(quantity: str, unit: str) -> Decimal:
-    """What a number in a unit is to be multiplied by for SI; 1 where there is no unit.
+    """Factor from a unit to SI; 1 where there is no unit.
 
     Raises
     ------

@@ -143,7 +143,7 @@ def read(path: Path) -> LcrTable:
 
 
 def looks_like(path: Path) -> bool:
-    """Whether a file has the header of an LCR meter's export."""
+    """Test whether a file has the header of an LCR meter's export."""
     try:
         header = _header(_lines(path, _HEAD_BYTES))
     except BadInput:
@@ -272,7 +272,7 @@ def _readings(
 
 
 def _degrees(rows: Sequence[Mapping[_Column, tuple[float, bool]]], columns: Sequence[_Column], path: Path) -> bool:
-    """Whether angles without a unit are in degrees: only if one is too large for radians."""
+    """Test whether angles without a unit are in degrees: only if one is too large for radians."""
     bare = [value for row in rows for column, (value, known) in row.items() if column.quantity == "phase" and not known]
     if bare and max(map(abs, bare)) <= math.pi:
         head = next(column.head for column in columns if column.quantity == "phase")

@@ -35,7 +35,33 @@ class CapacitanceModel(Protocol):
         """Why the model does not apply to a scene, or None."""
 
     def capacitance(self, scene: Scene, permittivity: Mapping[str, float], width: float = ...) -> Interval:
-        """Bounds at real relative permittivities, no wider than ``width`` where the model can [F]."""
+        """Bounds of the capacitance between the terminals, fringes at the sensor's edge left out.
+
+        Parameters
+        ----------
+        scene : Scene
+            As drawn or printed, for which :meth:`why_not_applicable` is None.
+        permittivity : mapping of str to float
+            Relative permittivity of each material that does not conduct, and of "air", above 0 [-].
+        width : float
+            Relative width of the interval; wider where the finest mesh, the order or doubles limit it [-].
+
+        Returns
+        -------
+        Interval
+            Capacitance of the whole sensor [F].
+
+        Raises
+        ------
+        OutOfRange
+            A permittivity is not above 0, or the width is.
+        KeyError
+            A material between the electrodes has no permittivity.
+        ValueError
+            The model does not apply to the scene.
+        CrossedBounds
+            The lower bound lies above the upper one: a fault of the solver.
+        """
         ...
 
 

@@ -166,7 +166,7 @@ class _Stack:
         return float(self.width_mm / left * (np.log1p(ratio) / ratio if abs(ratio) > 1e-12 else 1.0))
 
     def sideways(self) -> float:
-        """What the column potential's horizontal field adds to its energy, per depth and over eps0 [-].
+        """Term that the column potential's horizontal field adds to its energy, per depth and over eps0 [-].
 
         Quadrature in log s, which resolves an apex of any sharpness; exact to rounding for thin films too.
         """
@@ -212,7 +212,7 @@ class _Row:
         return self.depth_mm * sum(times * energy(self.stacks[name]) for name, times in Counter(self.names).items())
 
     def is_smooth(self) -> bool:
-        """Whether the columns' own potentials agree along all lines between them."""
+        """Test whether the columns' own potentials agree along all lines between them."""
         for a, b in set(pairwise(self.names)):
             (za, ua), (zb, ub) = self.stacks[a].potential(1), self.stacks[b].potential(0)
             z = np.concatenate([za, zb])

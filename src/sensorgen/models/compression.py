@@ -67,7 +67,7 @@ class Plate:
         return self.modulus_pa / gap_m
 
     def scaled_modulus(self, factor: float) -> "Plate":
-        """The same plate with its Young's modulus multiplied by a factor."""
+        """Plate with its Young's modulus multiplied by a factor."""
         return replace(self, modulus_pa=self.modulus_pa * factor)
 
     def doubt(self, stress_pa: float) -> str:  # noqa: ARG002 - a law has no last point
@@ -145,7 +145,7 @@ class Curve:
         return self.stress_pa[-1] / self.displacement_m
 
     def scaled_modulus(self, factor: float) -> "Curve":
-        """The same cell with all Young's moduli multiplied by a factor: stresses scale."""
+        """Cell with all Young's moduli multiplied by a factor: stresses scale."""
         return replace(
             self,
             stress_pa=tuple(p * factor for p in self.stress_pa),
@@ -153,7 +153,7 @@ class Curve:
         )
 
     def scaled_rise(self, factor: float) -> "Curve":
-        """The same curve with its rise C/C(0) - 1 multiplied by a factor."""
+        """Curve with its rise C/C(0) - 1 multiplied by a factor."""
         return replace(
             self,
             ratio=tuple(1 + (g - 1) * factor for g in self.ratio),

@@ -134,7 +134,7 @@ def _interrupted(alone: Scene, axis: str, why: str) -> OutOfRange:
 
 
 def _best(steps: Iterator[Interval], simple: Interval) -> Interval:
-    """What all bounds of one number leave of it."""
+    """Interval that all bounds of one number leave."""
     for found in steps:
         simple = Interval(max(simple.lower, found.lower), min(simple.upper, found.upper))
     return simple

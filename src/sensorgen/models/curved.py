@@ -15,6 +15,7 @@ import shapely
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.scene.layers import Region
 from sensorgen.scene.repetition import Repeat, halved, repeat
 from sensorgen.scene.scene import SLIVER_MM, Piece, Scene
 from sensorgen.solvers.electrostatics import bounds as fem
@@ -46,61 +47,21 @@ def why_not_applicable(scene: Scene) -> str | None:
     return None
 
 
-@dataclass(frozen=True)
-class Step:
-    """One mesh on the way to an accuracy.
-
-    Attributes
-    ----------
-    order : int
-        Of the potential's polynomials.
-    elements, unknowns : int
-        Tetrahedra and others, and the unknowns that they couple.
-    interval : Interval
-        Capacitance of the whole sensor [F].
-    """
-
-    order: int
-    elements: int
-    unknowns: int
-    interval: Interval
-
-
 def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:
     """Bounds of the capacitance between the terminals, fringes at the sensor's edge left out.
 
-    Parameters
-    ----------
-    scene : Scene
-        As drawn, for which :func:`why_not_applicable` is None.
-    permittivity : mapping of str to float
-        Relative permittivity of each material that does not conduct, and of "air", above 0 [-].
-    width : float
-        Relative width of the interval; wider where the finest mesh is reached [-].
-
-    Returns
-    -------
-    Interval
-        Capacitance of the whole sensor [F].
+    Parameters, result and errors as of :class:`sensorgen.models.CapacitanceModel`.
 
     Raises
     ------
-    OutOfRange
-        A permittivity is not above 0, or the width is.
-    KeyError
-        A material between the electrodes has no permittivity.
-    ValueError
-        The model does not apply to the scene.
     Unsolved
         The electrodes touch, one does not cover the sensor, or bodies are too near each other for a mesh.
-    CrossedBounds
-        The lower bound lies above the upper one: a fault of the solver.
     """
     fem.check(permittivity, width)
-    return min((step.interval for step in steps(scene, permittivity, width)), key=Interval.width)
+    return fem.narrowest(steps(scene, permittivity, width))
 
 
-def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[Step]:
+def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[fem.FieldStep]:
     """The meshes that :func:`capacitance` goes through, until the interval is narrow enough."""
     own, x, y = cell(scene)
     values = [float(permittivity[name]) for name in own.materials]
@@ -119,7 +80,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
         for level, elements, found in bounds(plan, width):
             interval = fem.whole(found, shares.ravel().tolist())
             reached = True
-            yield Step(level.order, elements, found.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
+            yield fem.FieldStep(level.order, elements, found.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
             if interval.width() <= width:
                 return
     except fem.Unsolved:
@@ -137,6 +98,20 @@ class Window:
     materials: tuple[str, ...]
 
 
+def _looks(scene: Scene) -> Iterator[Region]:
+    """Regions of each material and terminal, at some heights between any two levels."""
+    levels = sorted(
+        {z for body in scene.bodies for piece in body.pieces for z in (*piece.levels_mm(), *piece.span("z"))}
+    )
+    for bottom, top in pairwise(levels):
+        for share in _CUTS if top - bottom > SLIVER_MM else ():
+            z, outlines = bottom + share * (top - bottom), dict[tuple[str, str], list[shapely.Polygon]]()
+            for body in scene.bodies:
+                cut = [shapely.Polygon(outline) for piece in body.pieces for outline in piece.cut("z", z)]
+                outlines.setdefault((body.material, body.terminal), []).extend(cut)
+            yield from (shapely.union_all(own) for own in outlines.values() if own)
+
+
 @lru_cache(maxsize=8)
 def cell(scene: Scene) -> tuple[Window, Repeat, Repeat]:
     """The cell of a scene, and how it repeats along x and y.
@@ -149,17 +124,7 @@ def cell(scene: Scene) -> tuple[Window, Repeat, Repeat]:
     spans = {end: [p.span("z") for b in scene.bodies if b.terminal == end for p in b.pieces] for end in _ENDS}
     if missing := [end for end in _ENDS if not spans[end]]:
         raise ValueError(f"the scene has no {missing[0]} electrode")
-    levels = sorted(
-        {z for body in scene.bodies for piece in body.pieces for z in (*piece.levels_mm(), *piece.span("z"))}
-    )
-    looks = []
-    for bottom, top in pairwise(levels):
-        for share in _CUTS if top - bottom > SLIVER_MM else ():
-            z, outlines = bottom + share * (top - bottom), dict[tuple[str, str], list[shapely.Polygon]]()
-            for body in scene.bodies:
-                cut = [shapely.Polygon(outline) for piece in body.pieces for outline in piece.cut("z", z)]
-                outlines.setdefault((body.material, body.terminal), []).extend(cut)
-            looks += [shapely.union_all(own) for own in outlines.values() if own]
+    looks = list(_looks(scene))
     x, y = (repeat(looks, scene.size_mm[:2], axis) for axis in (0, 1))
     if x.shifts or y.shifts:
         raise ValueError("the pattern repeats by shifts, not by mirrors")

@@ -5,7 +5,6 @@ distance of the bounds falls exponentially. See docs/cells.md.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -55,30 +54,10 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
 
     .. math:: 2 Q(D) - \int \frac{|D|^2}{\varepsilon} \le C \le \int \varepsilon |\nabla u|^2
 
-    Parameters
-    ----------
-    scene : Scene
-        As drawn, for which :func:`why_not_applicable` is None.
-    permittivity : mapping of str to float
-        Relative permittivity of each material that lies between the electrodes, and of "air", above 0 [-].
-    width : float
-        Relative width of the interval; wider where double precision or the highest order limits it [-].
-
-    Returns
-    -------
-    Interval
-        Capacitance of the whole sensor [F].
+    Parameters, result and errors as of :class:`sensorgen.models.CapacitanceModel`.
 
     Raises
     ------
-    OutOfRange
-        A permittivity is not above 0, or the width is.
-    KeyError
-        A material between the electrodes has no permittivity.
-    ValueError
-        The model does not apply to the scene.
-    CrossedBounds
-        The lower bound lies above the upper one: a fault of the solver.
     Unsolved
         The scene is too slender for doubles at any order.
 
@@ -88,34 +67,10 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
     within the sensor's length counts; see :func:`sensorgen.solvers.electrostatics.bounds.whole`.
     """
     fem.check(permittivity, width)
-    best = Interval(0.0, np.inf)
-    for step in steps(scene, permittivity, width):
-        if step.interval.upper - step.interval.lower < best.upper - best.lower:
-            best = step.interval
-    return best
+    return fem.narrowest(steps(scene, permittivity, width))
 
 
-@dataclass(frozen=True)
-class Step:
-    """One mesh and order on the way to an accuracy.
-
-    Attributes
-    ----------
-    order : int
-        Of the polynomials.
-    elements, unknowns : int
-        Triangles, and the unknowns that they couple.
-    interval : Interval
-        Capacitance of the whole sensor [F], or another quantity of the field.
-    """
-
-    order: int
-    elements: int
-    unknowns: int
-    interval: Interval
-
-
-def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[Step]:
+def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[fem.FieldStep]:
     """The orders that :func:`capacitance` goes through, until the interval is narrow enough or gains no more."""
     section, coarse = _triangles(scene)
     shares = [share for _, share in coarse.regions]
@@ -125,7 +80,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
 
 def narrowed(
     coarse: Triangles, permittivity: Mapping[str, float], interval: Callable[[fem.Energies], Interval], width: float
-) -> Iterator[Step]:
+) -> Iterator[fem.FieldStep]:
     """Meshes and orders on the way to an accuracy of a quantity that the energies of a field give.
 
     Parameters
@@ -150,7 +105,7 @@ def narrowed(
             if last == np.inf:
                 raise
             return  # doubles end here: what was solved before stands
-        yield Step(order, mesh.elements(), found.unknowns, here)
+        yield fem.FieldStep(order, mesh.elements(), found.unknowns, here)
         if here.width() <= width or here.width() > _STALLED * last:
             return
         order, last = order + _more(here.width(), width), here.width()
@@ -162,7 +117,7 @@ def _first(width: float) -> int:
 
 
 def _more(now: float, width: float) -> int:
-    """How many orders to add for a width, when the last had another; 4 at most."""
+    """Number of orders to add for a width, when the last had another; 4 at most."""
     return int(np.clip(np.ceil(np.log(now / width) / _GAIN), 1, 4))
 
 
@@ -281,7 +236,7 @@ def _best_multiple(plane: Plane, eps: NDArray[Any], u: Field, psi: Field) -> flo
 
 
 def _rounding(plane: Plane, eps: Numbers, rho: Numbers, u: Field, psi: Field) -> float:
-    r"""How far :math:`\int |\varepsilon \nabla u - D|^2 / \rho` may be off, and each of its three parts with it.
+    r"""Rounding error of :math:`\int |\varepsilon \nabla u - D|^2 / \rho`, and each of its three parts with it.
 
     However badly a system was solved, its potential and its flux bound the capacitance: all that doubles can spoil is
     what these two are worth, by the roundings of each term, and of the triangles' corners.

@@ -6,7 +6,6 @@ docs/cells.md.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -66,67 +65,24 @@ def why_not_applicable(scene: Scene) -> str | None:
     return None
 
 
-@dataclass(frozen=True)
-class Step:
-    """One mesh on the way to an accuracy.
-
-    Attributes
-    ----------
-    layers, order, flux_order : int
-        That shrink towards edges; orders of the potential's and of the flux's polynomials.
-    elements, unknowns : int
-        Bricks, and the unknowns that they couple.
-    interval : Interval
-        Capacitance of the whole sensor [F].
-    """
-
-    layers: int
-    order: int
-    flux_order: int
-    elements: int
-    unknowns: int
-    interval: Interval
-
-
 def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:
     """Bounds of the capacitance between the terminals, fringes at the sensor's edge left out.
 
-    Parameters
-    ----------
-    scene : Scene
-        As drawn, for which :func:`why_not_applicable` is None.
-    permittivity : mapping of str to float
-        Relative permittivity of each material that lies between the electrodes, and of "air", above 0 [-].
-    width : float
-        Relative width of the interval; wider where the finest mesh is reached [-].
-
-    Returns
-    -------
-    Interval
-        Capacitance of the whole sensor [F].
-
-    Raises
-    ------
-    OutOfRange
-        A permittivity is not above 0, or the width is.
-    KeyError
-        A material between the electrodes has no permittivity.
-    ValueError
-        The model does not apply to the scene.
-    CrossedBounds
-        The lower bound lies above the upper one: a fault of the solver.
+    Parameters, result and errors as of :class:`sensorgen.models.CapacitanceModel`.
     """
     fem.check(permittivity, width)
-    return min((step.interval for step in steps(scene, permittivity, width)), key=Interval.width)
+    return fem.narrowest(steps(scene, permittivity, width))
 
 
-def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[Step]:
+def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[fem.FieldStep]:
     """The meshes that :func:`capacitance` goes through, until the interval is narrow enough."""
     coarse = grid(scene)
     values = [0.0, 0.0, *(permittivity[name] for name in coarse.names[2:])]
     for mesh, pair, cell in narrowed(total, coarse, values, width):
         interval = cell.times(EPS0_F_PER_M * M_PER_MM)
-        yield Step(mesh.layers, mesh.order, mesh.flux_order, len(pair.flux.eps), pair.unknowns(), interval)
+        yield fem.FieldStep(
+            mesh.order, len(pair.flux.eps), pair.unknowns(), interval, layers=mesh.layers, flux_order=mesh.flux_order
+        )
 
 
 def narrowed(

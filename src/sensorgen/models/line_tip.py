@@ -247,7 +247,7 @@ def _pieces(track: Track, tip: Tip, law: Compression, frequency_hz: Real) -> lis
 
 
 def _matter(track: Track, tip: Tip, k: int, by_stress: Complex, motion: Motion, newtons: float) -> tuple[Real, Complex]:
-    """How resistance and admittance of a piece change as the tip moves, or as the force grows."""
+    """Change of resistance and admittance of a piece as the tip moves, or as the force grows."""
     weight, moved, mean = tip.pieces.pressure[..., k], motion.pressure[..., k], tip.mean_pa()
     grown = newtons / (tip.width_m * tip.length_m) - mean * (motion.length / tip.length_m)
     stress = moved * mean + weight * grown

@@ -105,7 +105,7 @@ def _checked(share: float) -> float:
 
 @dataclass(frozen=True)
 class Filling:
-    """What lies between two flat electrodes.
+    """Filling between two flat electrodes.
 
     Attributes
     ----------

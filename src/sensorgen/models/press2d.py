@@ -122,7 +122,7 @@ def _solved(
 def _with_fields(
     found: Pressed, cell: Cell, run: Run[Mesh], permittivity: Mapping[str, float], fineness: Fineness
 ) -> Pressed:
-    """The same with the capacitance of the deformed outlines."""
+    """Add the capacitance of the deformed outlines."""
     states, growth = run.states[: len(found.stress_pa)], _FIELD_SHARE * fineness.growth
     fields = [_field(cell, run, state.u_m, permittivity, growth) for state in states]
     return with_capacitances(found, [c for c, _ in fields], tuple(outline for _, outline in fields))

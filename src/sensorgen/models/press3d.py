@@ -208,7 +208,7 @@ def _solved(
 
 
 def _with_fields(found: Pressed, run: "Run[BrickMesh]", permittivity: Mapping[str, float], orders: Orders) -> Pressed:
-    """The same with the capacitance of the deformed boxes; gaps that are shut are boundary open by a little."""
+    """Add the capacitance of the deformed boxes; gaps that are shut are boundary open by a little."""
     from sensorgen.solvers.contact.air import AirMap
     from sensorgen.solvers.contact.bricks import mesh_of
     from sensorgen.solvers.contact.mapped_field import Field, Folded

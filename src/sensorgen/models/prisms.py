@@ -70,55 +70,15 @@ def why_not_applicable(scene: Scene) -> str | None:
     return "the electrodes touch: the capacitance grows without bound" if cell.gap_mm <= SLIVER_MM else None
 
 
-@dataclass(frozen=True)
-class Step:
-    """One mesh on the way to an accuracy.
-
-    Attributes
-    ----------
-    order : int
-        Of the potential's polynomials.
-    elements, unknowns : int
-        Prisms, and the unknowns that they couple.
-    interval : Interval
-        Capacitance of the whole sensor [F].
-    """
-
-    order: int
-    elements: int
-    unknowns: int
-    interval: Interval
-
-
 def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Interval:
     """Bounds of the capacitance between the terminals, fringes at the sensor's edge left out.
 
-    Parameters
-    ----------
-    scene : Scene
-        As drawn or printed, for which :func:`why_not_applicable` is None.
-    permittivity : mapping of str to float
-        Relative permittivity of each material that does not conduct, and of "air", above 0 [-].
-    width : float
-        Relative width of the interval; wider where the finest mesh is reached [-].
-
-    Returns
-    -------
-    Interval
-        Capacitance of the whole sensor [F].
+    Parameters, result and errors as of :class:`sensorgen.models.CapacitanceModel`.
 
     Raises
     ------
-    OutOfRange
-        A permittivity is not above 0, or the width is.
-    KeyError
-        A material between the electrodes has no permittivity.
-    ValueError
-        The model does not apply to the scene.
     Unsolved
         Outlines too near each other for doubles, or too many of them.
-    CrossedBounds
-        The lower bound lies above the upper one: a fault of the solver.
 
     Notes
     -----
@@ -127,10 +87,10 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
     bounds are those of two cells that enclose the true one.
     """
     fem.check(permittivity, width)
-    return min((step.interval for step in steps(scene, permittivity, width)), key=Interval.width)
+    return fem.narrowest(steps(scene, permittivity, width))
 
 
-def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[Step]:
+def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[fem.FieldStep]:
     """The meshes that :func:`capacitance` goes through, until the interval is narrow enough."""
     cell = _cell(scene)
     layers = cell.layers([permittivity[name] for name in cell.dielectrics])
@@ -152,7 +112,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
             continue
         interval = fem.whole(found, np.outer(cell.x.shares, cell.y.shares).ravel().tolist())
         reached = True
-        yield Step(order, int(outer.free.sum()), found.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
+        yield fem.FieldStep(order, int(outer.free.sum()), found.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
         if interval.width() <= width:
             return
     if failed and not reached:
@@ -251,7 +211,7 @@ class _Cell:
         )
 
     def shares(self, mesh: Mesh) -> np.ndarray:
-        """How often each triangle of a mesh occurs in the sensor, beyond the least (t,)."""
+        """Number of times that each triangle of a mesh occurs in the sensor, beyond the least (t,)."""
         middle = mesh.plan.points_mm[mesh.plan.triangles].mean(1)
         found = np.ones(len(middle))
         for at, side in zip(middle.T, (self.x, self.y), strict=True):

@@ -135,7 +135,7 @@ class Sensor:
         return Patch(left, np.where(self.whole(at), self.tip_m, right - left))
 
     def whole(self, position_m: ArrayLike) -> Mask:
-        """Whether a tip centred at ``position_m`` [m] lies on the sensor whole, flush with an end or not."""
+        """Mask: true where a tip centred at ``position_m`` [m] lies on the sensor whole, flush with an end or not."""
         at = np.asarray(position_m, float)
         return np.asarray((at - self.tip_m / 2 >= 0) & (at + self.tip_m / 2 <= self.length_m))
 

@@ -108,7 +108,7 @@ def admittance(
 
 
 def port(upper: int, lower: int, films: int) -> Real:
-    """Which films a port between two tracks spans, as a vector; ``p @ z @ q`` is an impedance between ports [-].
+    """Films that a port between two tracks spans, as a vector; ``p @ z @ q`` is an impedance between ports [-].
 
     Parameters
     ----------
@@ -277,7 +277,7 @@ class Stack:
         return [away, under, away], [loose, pressed, loose], [left, length, np.maximum(right, 0.0)]
 
     def _changes(self, omega: Real, press: Press) -> tuple[list[Any], list[Any]]:
-        """What pressing adds to each track and each film, exactly 0 without force."""
+        """Additions of pressing to each track and each film, exactly 0 without force."""
         stress = np.asarray(press.force_n, float) / (self.width_m * np.asarray(press.length_m, float))
         thinner = [film.capacitive_strain(stress)[0] for film in self.films]
         denser = [_turned(film, omega) * (s / (1 - s)) for film, s in zip(self.films, thinner, strict=True)]
@@ -334,7 +334,7 @@ class Stack:
         return Response(np.broadcast_to(z, by_force.shape), by_force, by_position, tuple(by_film))
 
     def _by_force(self, omega: Real, press: Press) -> tuple[Complex, Complex]:
-        """How R and Y under the tip rise per newton."""
+        """Rise of R and Y under the tip per newton."""
         area = self.width_m * np.asarray(press.length_m, float)
         rise = [track.r_ohm_per_m * track.piezoresistance_per_pa / area for track in self.tracks]
         stress = np.asarray(press.force_n, float) / area
@@ -346,7 +346,7 @@ class Stack:
         return loops(_last(rise)).astype(complex), diagonal(_last(slopes))
 
     def _by_film(self, y: Sequence[ArrayLike], which: int) -> Complex:
-        """How Y rises with the logarithm of one film's capacitance."""
+        """Rise of Y with the logarithm of one film's capacitance."""
         changes = [
             (np.asarray(value) - film.leak_s_per_m) * (k == which)
             for k, (value, film) in enumerate(zip(y, self.films, strict=True))

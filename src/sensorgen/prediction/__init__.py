@@ -1,1 +1,1 @@
-"""What a sensor should measure, with its error budget, identifiability and inverse."""
+"""Prediction of a sensor's readings, with its error budget, identifiability and inverse."""

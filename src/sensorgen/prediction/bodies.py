@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 
 def drawn(design: Design) -> Body:
-    """The body as drawn, support removed."""
+    """The body as drawn, support removed; of an array one crossing."""
+    design = _one(design)
     return Body(design, DRAWN, "drawn", _identity(design, DRAWN), partial(_drawn_cells, design))
 
 
@@ -53,7 +54,7 @@ def _connected(design: Design, scene: "Scene") -> "Scene":
 
 
 def _parts(design: Design) -> "list[tuple[Scene, float]]":
-    """What stands for the sensor as drawn, and how many of each: of an array that is no prisms one cell, and its rims.
+    """Parts of the sensor as drawn, with their numbers: of an array that is no prisms one cell, and its rims.
 
     Other patterns are whole: models of prisms find the cell, and what the sensor's ends cut off.
     """
@@ -130,6 +131,7 @@ def estimated(design: Design, walls: str = "") -> Body:
     walls : str
         One of ``WALLS`` alone; if not given, all that the design's walls can come out as, the likeliest first.
     """
+    design = _one(design)
     rules = (walls,) if walls else wall_rules(design.profile.walls)
     said = f"printed, estimated ({WALLS.get(rules[0], rules[0])})"
     identity = _identity(design, "estimated", *rules, _height_error(design))
@@ -193,7 +195,7 @@ def from_gcode(design: Design, file: str | Path) -> Body:
 
 
 def registered(design: Design, path: Path) -> "Printed":
-    """What a file of G-code prints of a design; parameters and errors as of :func:`from_gcode`."""
+    """Print of a design by a file of G-code; parameters and errors as of :func:`from_gcode`."""
     from sensorgen.asprinted import printed, registration
 
     try:
@@ -219,7 +221,14 @@ def default_body(design: Design, folder: Path | None = None) -> Body:
 
 
 def of_file(design: Design, file: "PrintFile | None") -> Body:
-    """The print by a G-code file of this very design; by the rules of slicers where there is none."""
+    """The print by a G-code file of this very design; by the rules of slicers where there is none.
+
+    Of an array it is one crossing, sliced alone by the same slicer.
+    """
+    if design.layout and file:
+        from sensorgen.prediction import slices
+
+        return of_file(design.crossing, slices.at_hand(design.crossing, slicer=file.report.slicer.name)[0])
     if file is None:
         return estimated(design)
     return sliced(design, partial(file.printed, design), file.source, file.content)
@@ -259,6 +268,11 @@ def _printed_gaps(scenes: "Mapping[str, Scene]") -> dict[str, float]:
 
 def _height_error(design: Design) -> str:
     return f"tools to {design.machine.tool_height_error_mm:g} mm"
+
+
+def _one(design: Design) -> Design:
+    """Design to predict: one crossing of an array, any other sensor as a whole."""
+    return design.crossing if design.layout else design
 
 
 def _identity(design: Design, *parts: str) -> str:

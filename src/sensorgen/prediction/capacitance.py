@@ -82,11 +82,11 @@ class Answer:
     loss_f: Interval | None = None
 
     def reached(self) -> bool:
-        """Whether the interval is as narrow as wanted."""
+        """Test whether the interval is as narrow as wanted."""
         return self.width() <= self.wanted
 
     def width(self) -> float:
-        """How far the bounds are apart, relative to their middle; of a complex value, to its modulus [-]."""
+        """Distance of the bounds, relative to their middle; of a complex value, to its modulus [-]."""
         if self.loss_f is None:
             return self.capacitance_f.width()
         real, loss = self.capacitance_f, self.loss_f
@@ -257,7 +257,7 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
 
 
 def _together(refused: Sequence[str]) -> str:
-    """What models said, each reason once."""
+    """Refusals of models, each reason once."""
     names: dict[str, list[str]] = {}
     for line in refused:
         name, _, reason = line.partition(": ")
@@ -342,7 +342,7 @@ def _of_plain(data: dict[str, Any]) -> Answer:
 
 
 def is_plate(answer: Answer, scene: Scene) -> bool:
-    """Whether a capacitance is that of a solid plate: its cell has no other bounds than itself, and no air in it."""
+    """True for the capacitance of a solid plate: its cell has no other bounds than itself, and no air in it."""
     widths = [c.width for c in answer.plan if c.model == answer.model and c.width is not None]
     if min(widths, default=answer.capacitance_f.width()) >= _EXACT:
         return False

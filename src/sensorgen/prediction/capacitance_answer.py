@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import inf
-from typing import Annotated
+from typing import Annotated, Any
 
+from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.units import M_PER_MM, si
 from sensorgen.design.body import Body
@@ -25,7 +26,7 @@ QUANTITIES = {
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked about every design.
+    """Question about every design.
 
     Attributes
     ----------
@@ -46,7 +47,7 @@ class Asked:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CellCapacitance:
+class CellCapacitance(Displayed):
     """Capacitance per area of a body's most likely cell; values are None where there is no answer.
 
     Attributes
@@ -194,10 +195,10 @@ def answer(body: Body, asked: Asked) -> CellCapacitance:
 
 
 def sweep(
-    key: str, points: Sequence[tuple[float | str, Body]], asked: Asked, jobs: int, done: Callable[[], None],
+    key: str | tuple[str, ...], points: Sequence[tuple[Any, Body]], asked: Asked, jobs: int, done: Callable[[], None],
     cluster: str = "",
 ) -> Sweep[CellCapacitance]:  # fmt: skip
-    """The same along a sweep; a reason stands in place of what no model applies to, or at which one fails.
+    """Answers along a sweep; a reason stands in place of what no model applies to, or at which one fails.
 
     Parameters and errors as of :func:`answer` and :func:`sensorgen.prediction.sweep.sweep`.
     """

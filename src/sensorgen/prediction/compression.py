@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
 from math import inf, isfinite, nan
+from typing import Any
 
 import numpy as np
 
@@ -66,7 +67,7 @@ _MEASURE = "relative error of the rise of C, at the worst stress"
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked about a press.
+    """Question about a press.
 
     Attributes
     ----------
@@ -193,11 +194,11 @@ class CompressionResult(Displayed):
         yield from self.remarks()
 
     def explained(self) -> Iterator[Part]:
-        """Which meshes were used, their cost and error."""
+        """Meshes that were used, their cost and error."""
         yield from (*self.plan.document(), "") if self.plan else ()
 
     def remarks(self) -> Sequence[str]:
-        """How the cell was held, what is wrong with the answer, and what is uncertain."""
+        """Remarks on how the cell was held, on faults of the answer, and on what is uncertain."""
         if self.model is None:
             return (f"no answer: {self.reason}",)
         return (
@@ -259,14 +260,14 @@ def answer(body: Body, asked: Asked, *, step: Step | None = None) -> Compression
 
 
 def sweep(
-    key: str,
-    points: Sequence[tuple[float | str, Body]],
+    key: str | tuple[str, ...],
+    points: Sequence[tuple[Any, Body]],
     asked: Asked,
     jobs: int,
     done: Callable[[], None],
     cluster: str = "",
 ) -> Sweep[CompressionResult]:
-    """The same along a sweep; a reason stands in place of a point that has no answer.
+    """Answers along a sweep; a reason stands in place of a point that has no answer.
 
     Parameters and errors as of :func:`answer` and :func:`sensorgen.prediction.sweep.sweep`.
     """
@@ -280,7 +281,7 @@ def _failed(body: Body, reason: str) -> CompressionResult:
 
 
 def planned(body: Body, asked: Asked) -> Plan:
-    """What an accuracy takes, before anything is pressed; parameters and errors as of :func:`answer`."""
+    """Plan of an accuracy, before anything is pressed; parameters and errors as of :func:`answer`."""
     if not asked.accuracy > 0:
         raise OutOfRange(f"an accuracy of {asked.accuracy:g}; expected a number above 0, as 1e-2")
     piece = piece_of(body)
@@ -341,7 +342,7 @@ def _rise_error(found: Estimate) -> float:
 
 
 def _case(body: Body, asked: Asked) -> Case:
-    """What is pressed; refuses what would be answered, but not as it was asked."""
+    """Case to press; refuses one that would be answered, but not as it was asked."""
     piece = piece_of(body)
     ends = sorted({body.terminal for body in piece.scene.bodies if body.terminal})
     if ends != ["bottom", "top"]:

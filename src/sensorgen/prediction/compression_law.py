@@ -238,7 +238,7 @@ def _stored(design: Design, youngs_modulus_pa: Mapping[str, float]) -> Curve | N
 
 
 def _incompressible(design: Design) -> bool:
-    """Whether all materials have the Poisson's ratio of the stored cells."""
+    """Test whether all materials have the Poisson's ratio of the stored cells."""
     ratios = (taken.value for taken in of_all_materials(design, "poisson_ratio").values())
     return all(abs(ratio - compression.SOLVED_RATIO) < _SAME_RATIO for ratio in ratios)
 

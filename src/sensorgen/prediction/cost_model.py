@@ -33,7 +33,7 @@ class Measured(NamedTuple):
 
 
 class Size(NamedTuple):
-    """How many parts the repeating cell of a scene has, and whether the sensor's end cuts one."""
+    """Number of parts of the repeating cell of a scene, and whether the sensor's end cuts one."""
 
     parts: int
     is_cut: bool

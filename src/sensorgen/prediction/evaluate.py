@@ -10,7 +10,7 @@ from sensorgen.prediction.results import SCHEMA, Prediction, adapter, from_json
 
 
 def evaluate(body: Body, query: Query = DEFAULT, *, keep: bool = True, beside: bool = True) -> Prediction:
-    """What a body should measure.
+    """Prediction of a body.
 
     Parameters
     ----------

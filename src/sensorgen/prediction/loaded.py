@@ -4,10 +4,11 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table
-from sensorgen.core.errors import OutOfRange
+from sensorgen.core.errors import MissingValue, OutOfRange
 from sensorgen.core.units import M_PER_MM, si
 from sensorgen.design.body import Body
 from sensorgen.models.sensor import Sensor
@@ -118,6 +119,15 @@ class Loaded(Displayed):
         }
         lines = (f"  {json.dumps(k)}: {json.dumps(v, ensure_ascii=False, allow_nan=False)}" for k, v in data.items())
         return "{\n" + ",\n".join(lines) + "\n}\n"
+
+    def to_xarray(self) -> Any:
+        """Impedance [ohm] as an xarray DataArray; raises MissingValue where xarray is not installed."""
+        try:
+            import xarray as xr
+        except ImportError as error:
+            raise MissingValue("to_xarray() needs xarray: pip install xarray") from error
+        axes = zip(("frequency_hz", "force_n", "position_mm"), self.axes, strict=True)
+        return xr.DataArray(self.impedance.impedance_ohm, dict(axes), name="impedance_ohm")
 
     def csv(self) -> Iterator[str]:
         """R and X, a row per force and position, as :func:`sensorgen.prediction.grid.csv_blocks`."""

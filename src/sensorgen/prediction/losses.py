@@ -1,4 +1,4 @@
-"""What dielectrics lose: the complex permittivities of a design at a frequency, and what the line makes of them."""
+"""Losses of dielectrics: the complex permittivities of a design at a frequency, and what the line makes of them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ from sensorgen.design.values import MaterialValue, dielectrics, permittivities
 from sensorgen.prediction.capacitance import capacitance
 
 LOSSES = ("loss_tangent", "resistivity_ohm_m")
+LARGEST_TANGENT = 0.05  # assumed of an elastomer of which nothing is stated, its conduction included
 LOWEST_HZ = 1.1e3  # of the bench's tones: a leak is strongest there
 
 _ACCURACY = 1e-5
@@ -22,7 +23,7 @@ def set_losses(design: Design) -> list[MaterialValue]:
     """Loss tangents and resistivities that a design sets for its dielectrics itself.
 
     No source gives a loss tangent, and the one resistivity that a source prints is a slip: what the user does not set
-    is taken for lossless.
+    is taken for lossless; only the range of an impedance holds up to ``LARGEST_TANGENT``.
     """
     names = dielectrics(design) | {"air"}
     return [
@@ -76,18 +77,20 @@ def _with(
 
 
 def _conduction(resistivity_ohm_m: float, frequency_hz: float) -> float:
-    """What a leak adds to the permittivity, minus its imaginary part [-]."""
+    """Addition of a leak to the permittivity, minus its imaginary part [-]."""
     return 1 / (2 * pi * frequency_hz * EPS0_F_PER_M * resistivity_ohm_m)
 
 
 @dataclass(frozen=True)
 class Lost:
-    """What the dielectrics of a whole sensor lose.
+    """Losses of the dielectrics of a whole sensor.
 
     Attributes
     ----------
     tan_delta : float
         Of the whole, the same at every frequency [-].
+    largest_tangent : float
+        Up to which it may be, where the design states none for its dielectrics [-].
     leak_s : float
         Conductance between the electrodes, the same at every frequency [S].
     taken : tuple of MaterialValue
@@ -97,6 +100,7 @@ class Lost:
     """
 
     tan_delta: float = 0.0
+    largest_tangent: float = LARGEST_TANGENT
     leak_s: float = 0.0
     taken: tuple[MaterialValue, ...] = ()
     doubts: tuple[str, ...] = ()
@@ -106,7 +110,7 @@ NOTHING_LOST = Lost()
 
 
 def lost(design: Design) -> Lost:
-    r"""What the dielectrics of a design lose, as far as the design or a source that it names says.
+    r"""Losses of the dielectrics of a design, as far as the design or a source that it names says.
 
     A weak leak is a conductance :math:`G = \omega C''`: to first order in :math:`1 / (\omega \varepsilon \varrho)` it
     does not depend on the frequency, whatever lies in series with what leaks. It is taken at the lowest tone. What a
@@ -122,10 +126,9 @@ def lost(design: Design) -> Lost:
     tangents, leaks = (_tangent(design, taken, parts[quantity]) for quantity in LOSSES)
     film = _film_leak(design)
     through_film_s = sum(t.value for t in film) * design.area_mm2 * M_PER_MM**2
-    return Lost(
-        tangents[0], 2 * pi * LOWEST_HZ * leaks[1] + through_film_s, (*sets, *film),
-        tuple(_strong(taken, parts[LOSSES[1]])),
-    )  # fmt: skip
+    largest = tangents[0] if parts[LOSSES[0]] else LARGEST_TANGENT
+    leak_s, doubts = 2 * pi * LOWEST_HZ * leaks[1] + through_film_s, tuple(_strong(taken, parts[LOSSES[1]]))
+    return Lost(tangents[0], largest, leak_s, (*sets, *film), doubts)
 
 
 def _film_leak(design: Design) -> list[MaterialValue]:

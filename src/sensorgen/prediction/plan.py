@@ -78,7 +78,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Plan:
-    """How a tolerance is met, level by level.
+    """Plan to meet a tolerance, level by level.
 
     Attributes
     ----------

@@ -67,7 +67,7 @@ def rough_sensor(body: Body, law: str = "", tip: Tip = FLAT, force_n: float = 0.
 
 
 def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", tip: Tip = FLAT) -> PredictionPlan:
-    """What an accuracy takes: by closed-form models, and by the expected errors of the others.
+    """Plan of an accuracy: by closed-form models, and by the expected errors of the others.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def execute(planned: PredictionPlan) -> tuple[SensorModel, Plan]:
 
 
 def _left(accuracy: float, level: Level) -> float:
-    """What the levels before left; where that is nothing, what was planned."""
+    """Accuracy that the levels before left; where that is nothing, the planned one."""
     return accuracy if accuracy > 0 else level.allowed
 
 

@@ -48,7 +48,7 @@ _SAME = 0.05  # capacitances that differ by less are not told apart: solving tak
 
 
 def prediction(body: Body, query: Query) -> Prediction:
-    """What a body should measure, computed now; parameters and errors as of :mod:`sensorgen.prediction.evaluate`."""
+    """Prediction of a body, computed now; parameters and errors as of :mod:`sensorgen.prediction.evaluate`."""
     design, load = body.design, query.load(body.design)
     found = Prediction(
         SCHEMA, design.name, design.id(), body.provenance, "not predicted", load.force_n, load.position_m
@@ -153,32 +153,35 @@ def _impedance(
 ) -> Impedance:  # fmt: skip
     """Of the unloaded line at one frequency, at the end of its leads; r and c of the whole sensor.
 
-    A permittivity that falls as f^-n loses tan(n pi / 2) at least: the best value has none, the range up to that.
+    A permittivity that falls as f^-n loses tan(n pi / 2) at least: the best value has none, the range up to that, and
+    up to the largest loss tangent that the dielectric may have.
     """
     omega, (lead_f, lead_ohm) = 2 * pi * frequency_hz, leads
 
     @cache  # the same line at the end of other leads
-    def own(ohm: float, farad: float, n: float) -> complex:
-        lossy = 1j + gone.tan_delta + tan(n * pi / 2)
+    def own(ohm: float, farad: float, n: float, tangent: float) -> complex:
+        lossy = 1j + tangent + tan(n * pi / 2)
         admittance = omega * farad * (frequency_hz / LOWEST_HZ) ** -n * lossy + gone.leak_s
         return complex(line.cascade([ohm], [np.array([admittance])], [1.0])[0])
 
     def z(
-        ohm: float, farad: float, parallel: float = lead_f.value, series: float = lead_ohm.value, n: float = 0.0
+        ohm: float, farad: float, parallel: float = lead_f.value, series: float = lead_ohm.value, n: float = 0.0,
+        tangent: float = gone.tan_delta,
     ) -> complex:  # fmt: skip
-        alone = own(ohm, farad, n)
+        alone = own(ohm, farad, n, tangent)
         return series + alone / (1 + 1j * omega * parallel * alone)
 
     by_leads = list(product(lead_f[1:], lead_ohm[1:]))
     rest = list(product((r.lower, r.upper), (c.lower, c.upper)))
-    ends = [z(*of, *by, n) for of in rest for by in by_leads for n in (0.0, dispersion)]
+    losses = [*product((0.0, dispersion), (gone.tan_delta, gone.largest_tangent))]
+    ends = [z(*of, *by, *loss) for of in rest for by in by_leads for loss in losses]
     alone = [z(r.value, c.value, *by) for by in by_leads]
 
     def part(name: str) -> Bounds:
         known = _of_line(r, c, lambda ohm, farad: float(getattr(z(ohm, farad), name)), "ohm")
         over, by = ([float(getattr(one, name)) for one in many] for many in (ends, alone))
-        lost = float(getattr(z(r.value, c.value, n=dispersion), name))
-        material = Interval(min(known.material.lower, lost), max(known.material.upper, lost))
+        lost = [float(getattr(z(r.value, c.value, n=n, tangent=tangent), name)) for n, tangent in losses]
+        material = Interval(min(known.material.lower, *lost), max(known.material.upper, *lost))
         low, high = min(known.lower, *over), max(known.upper, *over)
         return replace(known, lower=low, upper=high, material=material, leads=Interval(min(by), max(by)))
 
@@ -360,7 +363,7 @@ def _mean_slope(law: Compression, range_pa: tuple[float, float]) -> float:
 
 
 def _is_beyond(of: Callable[[Compression], float], law: Compression) -> bool:
-    """Whether the pressure is more than a law, of softer material, is known for."""
+    """Test whether the pressure is more than a law, of softer material, is known for."""
     try:
         of(law)
     except OutOfRange:
@@ -448,7 +451,7 @@ def _ranges_assumed(design: Design, values: Iterable[MaterialValue]) -> Iterator
 
 
 def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
-    """What is taken for granted."""
+    """Assumptions of the model."""
     if is_open(body.cells.first()):
         yield "electrodes are equipotential for the capacitance, and the fringe at their edges is in free air"
     else:

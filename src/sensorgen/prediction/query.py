@@ -1,4 +1,4 @@
-"""What is asked of a body; the default is the same for every command."""
+"""Question about a body; the default is one for all commands."""
 
 from dataclasses import dataclass, replace
 
@@ -24,7 +24,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Query:
-    """What is asked of a body; the default is the same for every command.
+    """Question about a body; the default is one for all commands.
 
     Attributes
     ----------

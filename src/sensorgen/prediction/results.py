@@ -153,7 +153,7 @@ class ErrorBudget:
         return tuple(sorted(seen, key=effect, reverse=True))
 
     def met_by(self, *kinds: str) -> bool:
-        """Whether the terms of some kinds together are within the accuracy."""
+        """Test whether the terms of some kinds together are within the accuracy."""
         return sum(t.magnitude() for t in self.terms if t.kind in kinds) <= (self.accuracy or 0.0)
 
     def beyond(self) -> tuple[str, ...]:
@@ -273,7 +273,7 @@ class UnderTop:
 
 @dataclass(frozen=True)
 class Prediction(Displayed):
-    """What a sensor should measure.
+    """Prediction of a sensor's readings.
 
     Attributes
     ----------
@@ -445,7 +445,7 @@ class Prediction(Displayed):
         yield from (f"doubtful: {doubt}" for doubt in self.doubts)
 
     def explained(self) -> Iterator[Part]:
-        """Which models were used, their cost and error."""
+        """Models that were used, their cost and error."""
         yield from (*self.plan.document(), "") if self.plan else ()
 
     def judgement(self) -> Iterator[Part]:

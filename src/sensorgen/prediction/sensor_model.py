@@ -61,7 +61,7 @@ class SensorModel:
 
 
 def piece(body: Body) -> Piece:
-    """What is pressed of a body: its most likely cell, and the period of the pattern."""
+    """Piece of a body to press: its most likely cell, and the period of the pattern."""
     return Piece(body.cells.first(), body.cells.period_mm)
 
 

@@ -238,7 +238,7 @@ def study(
 
 
 def _press(sensor: Sensor, tip_m: float, force_n: float) -> tuple[Patch, dict[str, float]]:
-    """What a force does under the tip, and the derivatives of that by the force."""
+    """Effect of a force under the tip, and its derivatives by the force."""
     shorter = min(sensor.length_m, sensor.width_m)
     if not 0 < tip_m < shorter:
         raise OutOfRange(

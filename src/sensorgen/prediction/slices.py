@@ -8,7 +8,7 @@ import shutil
 import tempfile
 import zlib
 from base64 import b64decode, b64encode
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -25,12 +25,13 @@ from sensorgen.core.errors import MissingValue, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding, grouped
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
+from sensorgen.design.printer import folder as profiles
 from sensorgen.design.values import permittivities, resistivities
 from sensorgen.design.walls import WALLS, rule
 from sensorgen.export import machine
 from sensorgen.export.gcode.check import Checked
 from sensorgen.export.gcode.drags import Lifting
-from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, curaengine, prusa, versions
+from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, versions
 from sensorgen.export.slicers.loads import loads
 from sensorgen.export.slicers.run import find
 from sensorgen.prediction.results import unpredicted
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 
     from sensorgen.export.gcode.drags import Lifted
 
+_LAST: dict[tuple[str, ...], asprinted.Printed] = {}  # body of the file that was read last
 VARIABLE = "SENSORGEN_SLICER"  # environment: prusa, cura, or none for estimates; the first that is installed if not set
 NONE = "none"
 GCODE = "13-gcode"  # rule of what the check of a G-code file reports
@@ -131,7 +133,11 @@ class PrintFile:
         """Body that the lines print."""
         from sensorgen.export.gcode import paths
 
-        return asprinted.body(design, paths.read(self.content, design.machine), slicer=self.source)
+        key = (self.report.sha256, self.source, design.id())
+        if key not in _LAST:  # pictures, pages and the prediction of one print ask in turn
+            _LAST.clear()
+            _LAST[key] = asprinted.body(design, paths.read(self.content, design.machine), slicer=self.source)
+        return _LAST[key]
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,7 +273,7 @@ def _sliced(design: Design, slicer: str, program: str, step: Step) -> PrintFile:
 
 
 def _question(design: Design, slicer: str, program: str) -> dict[str, Any]:
-    """All that decides a slice and its findings."""
+    """All that decides a slice and its findings: files and values that a profile is written by, not its text."""
     changed = Path(program).stat().st_mtime_ns
     version = tuple(
         stored.answer(
@@ -275,12 +281,9 @@ def _question(design: Design, slicer: str, program: str) -> dict[str, Any]:
             lambda: list(versions.of_program(slicer, program)),
         )
     )
-    printer, layers, all_loads = design.machine, design.layers, loads(design)
-    profile = (
-        prusa.profile(printer, layers, all_loads, version) if slicer == "prusa"
-        else repr(asdict(curaengine.engine_settings(printer, layers, all_loads, version)))
-    )  # fmt: skip
-    decides = f"{profile}{printer!r}{layers!r}{[w.model_dump() for w in design.waivers]}"
+    files = sorted(path for path in profiles().rglob("*") if path.is_file())
+    waivers = [waiver.model_dump() for waiver in design.waivers]
+    decides = repr((design.machine, design.layers, loads(design), waivers, [path.read_bytes() for path in files]))
     return {
         "what": "slice", "design": design.id(), "slicer": slicer, "version": version, "program": program,
         "changed": changed, "profile": sha256(decides.encode()).hexdigest(),
@@ -371,6 +374,15 @@ def of_own_machine(design: Design) -> list[Finding]:
     return machine.of_design(design) if design.own.keys() & {"printers", "qualities"} else []
 
 
+def _at_crossing(finding: Finding, design: Design) -> Finding:
+    """A finding about an array with the name of the crossing at which it shows, if it does at one."""
+    if not finding.place_mm or not design.layout:
+        return finding
+    x, y, _ = (at * (1 - design.shrinkage) for at in finding.place_mm)
+    name = design.layout.crossing(x, design.layout.size_mm[1] - y if design.orientation == "upside-down" else y)
+    return replace(finding, message=f"{finding.message} ({name})") if name else finding
+
+
 def combined(
     design: Design, drawn: Review, source: str, of_print: list[Finding], file: PrintFile | None = None
 ) -> PrintReview:  # fmt: skip
@@ -395,6 +407,7 @@ def combined(
     except MissingValue as error:
         own.append(unpredicted(str(error)))
     found = [*own, *(advised(f, names) for f in of_print), *(f for f in drawn.findings if f.rule not in replaced)]
+    found = [_at_crossing(f, design) for f in found] if design.layout else found
     waived = [f if f.rule == GCODE else w for f, w in zip(found, design.waived(found), strict=True)]
     listed = grouped([*waived, *design.idle_waivers(found)])
     return PrintReview(drawn.meshes, listed, source, drawn=drawn, file=file)

@@ -5,8 +5,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
+from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Part, Table, shown, to_json
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.parallel import remembered, said
@@ -24,11 +25,11 @@ class Point(Protocol):
         ...
 
     def table(self) -> Table:
-        """Its rows; of all results of a sweep with the same columns."""
+        """Rows of the result; of all results of a sweep with one set of columns."""
         ...
 
     def remarks(self) -> Sequence[str]:
-        """What is to be said of it besides its rows."""
+        """Remarks besides the rows."""
         ...
 
     def problems(self) -> Sequence[str]:
@@ -40,35 +41,47 @@ Result = TypeVar("Result", bound=Point)
 
 
 @dataclass(frozen=True)
-class Sweep(Generic[Result]):
-    """Results along values of one setting.
+class Sweep(Displayed, Generic[Result]):
+    """Results along values of a setting, or of several.
 
     Attributes
     ----------
-    key : str
-        The setting.
-    values : tuple of float or str
-        That it takes.
+    key : str, or tuple of str
+        The setting, or settings.
+    values : tuple of float or str, or of tuples of these
+        That it takes, or that each takes.
     results : tuple
         One for each value, of one type.
     """
 
-    key: str
-    values: tuple[Value, ...]
+    key: str | tuple[str, ...]
+    values: tuple[Any, ...]
     results: tuple[Result, ...]
 
     def document(self) -> Iterator[Part]:
         """All rows in one table, and each remark once, with the values it is about unless it is about all."""
-        points = list(zip(self.values, self.results, strict=True))
-        key = Column(self.key, digits=6, key=self.key)
-        cells = tuple((value, *row) for value, result in points for row in result.table().cells)
-        yield Table("sweep", "", (key, *self.results[0].table().columns), cells)
+        points = list(zip(self.settings(), self.results, strict=True))
+        yield self.table()
         for remark in dict.fromkeys(chain(*(result.remarks() for result in self.results))):
-            of = [shown(value, 6) for value, result in points if remark in result.remarks()]
-            yield f"{remark} ({self.key} {', '.join(of)})" if len(of) < len(self.values) else remark
+            of = [" and ".join(shown(v, 6) for v in chosen.values()) for chosen, r in points if remark in r.remarks()]
+            yield f"{remark} ({', '.join(points[0][0])} {', '.join(of)})" if len(of) < len(self.values) else remark
+
+    def table(self) -> Table:
+        """Rows of all results, each with its settings before it."""
+        settings = self.settings()
+        keys = tuple(Column(key, digits=6, key=key) for key in settings[0])
+        points = zip(settings, (result.table() for result in self.results), strict=True)
+        cells = tuple((*chosen.values(), *row) for chosen, table in points for row in table.cells)
+        return Table("sweep", "", (*keys, *self.results[0].table().columns), cells)
+
+    def settings(self) -> list[dict[str, Value]]:
+        """Settings of each result by key."""
+        if isinstance(self.key, str):
+            return [{self.key: value} for value in self.values]
+        return [dict(zip(self.key, values, strict=True)) for values in self.values]
 
     def problems(self) -> Sequence[str]:
-        """What is wrong with the first that has a problem, and how many have one."""
+        """Problem of the first that has one, and the number of those that have."""
         found = [(result.design, problem) for result in self.results for problem in result.problems()[:1]]
         more = f" ({len(found)} of {len(self.results)} like this)" if len(found) > 1 else ""
         return [f"{design}: {problem}{more}" for design, problem in found[:1]]
@@ -76,21 +89,21 @@ class Sweep(Generic[Result]):
     def to_json(self) -> str:
         """A list of the results, each with the value of the setting before it."""
         results = json.loads(to_json(self.results))
-        rows = [{self.key: value} | result for value, result in zip(self.values, results, strict=True)]
+        rows = [chosen | result for chosen, result in zip(self.settings(), results, strict=True)]
         return json.dumps(rows, indent=2, ensure_ascii=False) + "\n"
 
 
 def sweep(
-    key: str, points: Sequence[tuple[Value, Body]], work: Callable[[Body], Result],
+    key: str | tuple[str, ...], points: Sequence[tuple[Any, Body]], work: Callable[[Body], Result],
     failed: Callable[[Body, str], Result], *, refused: tuple[type[SensorgenError], ...], keep: bool = True,
     jobs: int = 1, cluster: str = "", done: Callable[[], None] = lambda: None,
 ) -> Sweep[Result]:  # fmt: skip
-    """The same work for each body, those whose answer is not cached in several processes.
+    """Work on each body, those whose answer is not cached in several processes.
 
     Parameters
     ----------
-    key : str
-        The setting that is varied.
+    key : str, or tuple of str
+        The setting that is varied, or the settings.
     points : sequence of (value, Body)
         Its values, and the body of each.
     work : callable

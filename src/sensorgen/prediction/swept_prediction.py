@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from sensorgen.core.document import Cell, Column, Table
 from sensorgen.core.errors import SensorgenError
@@ -12,7 +12,7 @@ from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.results import Prediction, timeless
-from sensorgen.prediction.sweep import Sweep, Value
+from sensorgen.prediction.sweep import Sweep
 from sensorgen.prediction.sweep import sweep as swept
 
 _SHOWN = (
@@ -84,7 +84,12 @@ class PredictedPoint:
 
 
 def sweep(
-    key: str, points: Sequence[tuple[Value, Body]], query: Query, jobs: int, done: Callable[[], None], cluster: str = ""
+    key: str | tuple[str, ...],
+    points: Sequence[tuple[Any, Body]],
+    query: Query,
+    jobs: int,
+    done: Callable[[], None],
+    cluster: str = "",
 ) -> Sweep[PredictedPoint]:
     """A prediction for each body; parameters and errors as of :func:`sensorgen.prediction.sweep.sweep`."""
     work = partial(_point, query=query)

@@ -93,9 +93,6 @@ def array_scene(
         for j in range(counts[1])
     ]
 
-    def plate(z0: float, z1: float) -> tuple[Prism, ...]:
-        return (box(0.0, p.length_mm, 0.0, p.width_mm, z0, z1),) if z1 > z0 else ()
-
     cogs = tuple(piece for x, y in places for piece in structure(x, y, rounded(film)))
     is_electrode = p.cog == "electrode"
     support: list[Piece] = []
@@ -110,13 +107,13 @@ def array_scene(
         )
         support += [box(*rim, film, roof) for rim in rims if rim[1] - rim[0] > 1e-9 and rim[3] - rim[2] > 1e-9]
     bodies = (
-        Body("bottom_electrode", fill.bottom_electrode, plate(0.0, low), "bottom"),
-        Body("film", fill.film, plate(low, film)),
+        Body("bottom_electrode", fill.bottom_electrode, p.plate(0.0, low), "bottom"),
+        Body("film", fill.film, p.plate(low, film)),
         Body("support", fill.support, tuple(support)),
         Body("hanging_dielectric", fill.dielectric, () if is_electrode else cogs),
         Body("top_electrode_with_cogs" if is_electrode else "top_electrode", fill.top_electrode,
-             (cogs if is_electrode else ()) + plate(roof, top), "top"),
-        Body("isolation", fill.isolation, plate(top, top + p.isolation_mm)),
+             (cogs if is_electrode else ()) + p.plate(roof, top), "top"),
+        Body("isolation", fill.isolation, p.plate(top, top + p.isolation_mm)),
     )  # fmt: skip
     return Scene(bodies, (p.length_mm, p.width_mm, rounded(top + p.isolation_mm)))
 

@@ -11,6 +11,7 @@ from sensorgen.scene.scene import (
     PLANE,
     SLIVER_MM,
     Outline,
+    Piece,
     Place,
     Point,
     area_mm2,
@@ -302,6 +303,13 @@ class Loft:
     def polyhedron(self) -> Polyhedron:
         """It as a closed surface of triangles."""
         return _of_loft(self)
+
+
+def surface(piece: Piece) -> Polyhedron:
+    """Closed surface of a piece with flat faces."""
+    if not isinstance(piece, Loft | Polyhedron):
+        raise TypeError(f"{type(piece).__name__} has faces that are not flat, or an outline of its own")
+    return piece.polyhedron() if isinstance(piece, Loft) else piece
 
 
 @lru_cache(maxsize=64)

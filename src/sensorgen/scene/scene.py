@@ -7,24 +7,52 @@ disagree about the sensor. x runs along the sensor, y across it, z up; the corne
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from math import inf, isfinite
-from typing import TYPE_CHECKING, TypeAlias
+from typing import Any, ClassVar, Protocol, Self
 
 from sensorgen.core.errors import BadInput
-
-if TYPE_CHECKING:
-    from sensorgen.scene.polyhedra import Loft, Polyhedron
-    from sensorgen.scene.revolved import Revolved
 
 Point = tuple[float, float]
 Place = tuple[float, float, float]
 Outline = tuple[Point, ...]
-Piece: TypeAlias = "Prism | Revolved | Loft | Polyhedron"
 
 AXES = "xyz"
 PLANE = {"x": ("y", "z"), "y": ("x", "z"), "z": ("x", "y")}  # the two axes of an outline, by the axis square to it
 SLIVER_MM = 1e-6  # a nanometre: narrower pieces are rounding, not geometry, and the CAD kernel refuses them from 1e-7
 FLOATING = "floating"  # terminal of a conductor that no contact reaches
 _SHOWN = 5  # corners of an outline that an error shows
+
+
+class Piece(Protocol):
+    """Solid of a body: :class:`Prism` here, others in :mod:`sensorgen.scene.revolved` and ``polyhedra``."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def span(self, axis: str) -> Point:
+        """Lowest and highest coordinate along an axis [mm]."""
+
+    def volume_mm3(self, low_mm: float = -inf, high_mm: float = inf) -> float:
+        """Exact volume, of all of it or between two heights [mm3]."""
+
+    def is_box(self) -> bool:
+        """True for a box with six faces square to the axes."""
+
+    def is_round(self) -> bool:
+        """True for curved faces, of which cuts and meshes have the chords."""
+
+    def is_constant(self, axis: str) -> bool:
+        """True where all cuts square to an axis are the same."""
+
+    def levels_mm(self) -> set[float]:
+        """Heights of level faces and edges [mm]."""
+
+    def cut(self, axis: str, at_mm: float) -> list[Outline]:
+        """Outlines in which the plane ``axis = at_mm`` cuts it, in ``PLANE[axis]`` [mm]."""
+
+    def turned_over(self, size_mm: Place) -> Self:
+        """It in a box of some size that is turned by half a turn about x."""
+
+    def stretched(self, factor: float) -> Self:
+        """It scaled in x and y."""
 
 
 @dataclass(frozen=True)
@@ -236,6 +264,11 @@ class Envelope:
     def cells(self) -> float:
         """Number of cells of a repeating pattern in the sensor; 1 without a pattern [-]."""
         return 1.0
+
+    def plate(self, low_mm: float, high_mm: float) -> tuple[Prism, ...]:
+        """All of the plan between two heights; nothing where they are one [mm]."""
+        plates = (box(0.0, self.length_mm, 0.0, self.width_mm, low_mm, high_mm),)
+        return plates if high_mm - low_mm > SLIVER_MM else ()
 
 
 def seen_from_above(piece: Piece) -> Outline:

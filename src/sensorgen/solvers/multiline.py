@@ -20,7 +20,7 @@ _TERMS = 17  # of exp(N l) with |N l| up to 0.5: the next is below 1e-19 of the 
 
 
 class Line(NamedTuple):
-    """What a length of line is made of, per length, and how these matrices move in one direction of interest."""
+    """Matrices of a length of line, per length, and their change in one direction of interest."""
 
     series: Complex  # R [ohm/m]
     shunt: Complex  # Y [S/m]
@@ -238,7 +238,7 @@ def directions(deep: int, *changes: Complex | float) -> Complex:
 
 
 class Body(NamedTuple):
-    """What ties a body to the ground of the instrument: a resistor and a capacitor in series.
+    """Tie of a body to the ground of the instrument: a resistor and a capacitor in series.
 
     The defaults are the human body model of ANSI/ESDA/JEDEC JS-001, 1.5 kohm and 100 pF: an assumption, made for
     discharges, that stands here for a person on an isolating floor. The resistor lies in the skin, over the touch.
@@ -290,7 +290,7 @@ def with_body(r: list[Any], y: list[Any], touching: Complex) -> tuple[list[Any],
 
 
 def reading(admittance_s: Complex, across: Real, tie: Real, body_s: Complex, bridge: bool) -> Complex:
-    """What the instrument reads between driven and low track [ohm].
+    """Reading of the instrument between driven and low track [ohm].
 
     Parameters
     ----------

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from math import inf
 from pathlib import Path
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,25 +14,36 @@ from sensorgen.analysis.comparison import Comparison, of_iteration
 from sensorgen.analysis.fit import Fit
 from sensorgen.analysis.fit import fit as fit_values
 from sensorgen.checks.review import Review
+from sensorgen.core import files
 from sensorgen.core.errors import BadInput
 from sensorgen.design import design as designs
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
+from sensorgen.design.settings import varied
 from sensorgen.measure.log import Log
-from sensorgen.prediction import bodies, compression, evaluate
+from sensorgen.prediction import bodies, compression, evaluate, swept_prediction
+from sensorgen.prediction import capacitance_answer as at_rest
 from sensorgen.prediction.calibration.calibration import Calibration
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
 from sensorgen.prediction.loaded import Loaded, loaded
 from sensorgen.prediction.planning import sensor_model
-from sensorgen.prediction.query import FLAT, NOISE, TONES_HZ, Query, Tip
+from sensorgen.prediction.query import DEFAULT, FLAT, NOISE, TONES_HZ, Query, Tip
 from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.slices import reviewed
+from sensorgen.prediction.sweep import Sweep
+from sensorgen.prediction.swept_prediction import PredictedPoint
 from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.workflows import build as builds
 from sensorgen.workflows import display as display
 from sensorgen.workflows import slice as slicing
 from sensorgen.workflows.build import Built
 from sensorgen.workflows.slice import Printed
+
+if TYPE_CHECKING:
+    from sensorgen.analysis.report.contents import Report
+    from sensorgen.workflows.batch import Batch
+    from sensorgen.workflows.characterise import Planned
+    from sensorgen.workflows.optimise.result import Optimised
 
 
 def load(path: str | Path) -> Design:
@@ -59,17 +71,21 @@ def load(path: str | Path) -> Design:
     return designs.load(Path(path))
 
 
-def check(design: Design) -> Review:
+@overload
+def check(design: Design) -> Review: ...
+@overload
+def check(design: Sequence[Design]) -> list[Review]: ...
+def check(design: Design | Sequence[Design]) -> Review | list[Review]:
     """Check a design against nozzle, layers and bed.
 
     Parameters
     ----------
-    design : Design
+    design : Design, or sequence of Design
         What to check.
 
     Returns
     -------
-    Review
+    Review, or list of Review
         Its ``findings``, each with place, limit and advice.
 
     Examples
@@ -77,22 +93,22 @@ def check(design: Design) -> Review:
     >>> check(Design(shape="reference")).counts()["error"]
     0
     """
-    return reviewed(_named(design))
+    return [check(one) for one in design] if isinstance(design, Sequence) else reviewed(_named(design))
 
 
 def predict(
-    what: Design | Body, *, force_n: Sequence[float] = (), position_mm: Sequence[float] = (),
+    what: Design | Body | Sequence[Design | Body], *, force_n: Sequence[float] = (), position_mm: Sequence[float] = (),
     frequency_hz: Sequence[float] = TONES_HZ, accuracy: float | None = None, law: str = "", tip: Tip = FLAT,
     noise: float = NOISE,
-) -> Prediction | Loaded:  # fmt: skip
-    """What a sensor should measure: of the print, with the drawing beside it.
+) -> Prediction | Loaded | Sweep[PredictedPoint]:  # fmt: skip
+    """Prediction of a sensor: of the print, with the drawing beside it.
 
     Parameters
     ----------
-    what : Design or Body
+    what : Design or Body, or a sequence of these
         A design is printed: by the G-code in ``out/NAME`` where there is one, else as slicers should print it.
     force_n, position_mm : sequence of float
-        Rising [N], [mm]; if either is given, impedance over both comes with the prediction.
+        Rising [N], [mm]; if either is given, impedance over both comes with the prediction. Of one design alone.
     frequency_hz : sequence of float
         Frequencies [Hz].
     accuracy : float, optional
@@ -106,8 +122,8 @@ def predict(
 
     Returns
     -------
-    Prediction or Loaded
-        Each quantity with its range, divided into model, print and material.
+    Prediction or Loaded, or Sweep
+        Each quantity with its range, divided into model, print and material; of a sequence a row for each.
 
     Examples
     --------
@@ -115,21 +131,83 @@ def predict(
     >>> p.status, round(p.drawn.resistance["top"].value)  # ohm
     ('predicted', 1400)
     """
-    body = _body(what)
     query = Query(tuple(frequency_hz), law=law, tip=tip, accuracy=accuracy, noise=noise)
+    if isinstance(what, Sequence):
+        if len(force_n) or len(position_mm):
+            raise BadInput("force_n and position_mm are of one design; expected Design or Body, or neither of them")
+        return swept_prediction.sweep("design", _points(what), query, 1, _silent)
+    body = _body(what)
     if not len(force_n) and not len(position_mm):
         return evaluate.evaluate(body, query)
     return loaded(body, query, force_n, position_mm)
 
 
+def sweep(
+    design: Design, *, unloaded: bool = False, jobs: int = 1, query: Query = DEFAULT, **values: Sequence[float | str]
+) -> Sweep[PredictedPoint] | Sweep[at_rest.CellCapacitance]:  # fmt: skip
+    """Predictions of a design along the values of settings, in all their combinations.
+
+    Parameters
+    ----------
+    design : Design
+        That is varied.
+    unloaded : bool
+        Bounds of the unit cell as of :func:`cell` alone: seconds, where pressing the cells takes minutes.
+    jobs : int
+        Processes at once.
+    query : Query
+        What is asked of each.
+    **values : sequence
+        Values by key: a parameter of the shape as ``dielectric_mm``, a material's value as ``eps_x60``.
+
+    Examples
+    --------
+    >>> found = sweep(Design(shape="reference"), electrode_mm=[0.3, 0.4], dielectric_mm=[0.4, 0.6])
+    >>> [round(point.prediction.drawn.capacitance.value * 1e12) for point in found.results]  # pF
+    [104, 69, 104, 69]
+    """
+    if not values:
+        raise BadInput("sweep() without values; expected some of a setting, as dielectric_mm=[0.2, 0.3]")
+    points = [(chosen, _body(one)) for chosen, one in varied(_named(design), values)]
+    if unloaded:
+        return at_rest.sweep(tuple(values), points, at_rest.Asked(query.accuracy), jobs, _silent)
+    return swept_prediction.sweep(tuple(values), points, query, jobs, _silent)
+
+
+def cell(
+    what: Design | Body | Sequence[Design | Body], *, accuracy: float | None = None, frequency_hz: float | None = None
+) -> at_rest.CellCapacitance | Sweep[at_rest.CellCapacitance]:
+    """Certified bounds of the capacitance of the unit cell at rest.
+
+    Parameters
+    ----------
+    what : Design or Body, or a sequence of these
+        As of :func:`predict`.
+    accuracy : float, optional
+        Relative width of the bounds [-].
+    frequency_hz : float, optional
+        Of the field, where a dielectric leaks [Hz].
+
+    Examples
+    --------
+    >>> found = cell(as_printed(Design(shape="reference"), walls="arachne"))
+    >>> round(found.lower_f_per_m2 * 1e9, 2)  # nF/m2
+    69.06
+    """
+    asked = at_rest.Asked(accuracy, frequency_hz=frequency_hz)
+    if isinstance(what, Sequence):
+        return at_rest.sweep("design", _points(what), asked, 1, _silent)
+    return at_rest.answer(_body(what), asked)
+
+
 def compress(
-    what: Design | Body, pressure_kpa: Sequence[float], *, accuracy: float | None = None
-) -> compression.CompressionResult:
+    what: Design | Body | Sequence[Design | Body], pressure_kpa: Sequence[float], *, accuracy: float | None = None
+) -> compression.CompressionResult | Sweep[compression.CompressionResult]:
     """Displacement and capacitance of a unit cell under pressure.
 
     Parameters
     ----------
-    what : Design or Body
+    what : Design or Body, or a sequence of these
         As of :func:`predict`.
     pressure_kpa : sequence of float
         Rising [kPa].
@@ -149,6 +227,8 @@ def compress(
     """
     wanted = inf if accuracy is None else accuracy
     asked = compression.Asked(compression.stresses_kpa(tuple(pressure_kpa)), BoundaryConditions(), accuracy=wanted)
+    if isinstance(what, Sequence):
+        return compression.sweep("design", _points(what), asked, 1, _silent)
     return compression.answer(_body(what), asked)
 
 
@@ -209,6 +289,77 @@ def slice_design(design: Design, out: str | Path = "out", *, slicer: str = "prus
     return slicing.slice_design(_named(design), Path(out), slicer, force=force)
 
 
+def export_design(design: Design, path: str | Path, gcode: str | Path | None = None) -> list[Path]:
+    """Write the body as printed for other programs: ``.3mf``, ``.step``, ``.stl`` or ``.vtu``.
+
+    Parameters of the design and its G-code as of :func:`as_printed`, errors as of
+    :func:`sensorgen.workflows.export.export`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     [file.name for file in export_design(Design(shape="reference"), Path(folder) / "plate.3mf")]
+    ['plate.3mf']
+    """
+    from sensorgen.asprinted import printed as asprinted
+    from sensorgen.export.gcode import paths
+    from sensorgen.workflows import export as exports
+
+    design = _named(design)
+    content = None if gcode is None else Path(gcode).read_bytes()
+    made = asprinted.body(design, paths.read(content, design.machine)) if content else reviewed(design).printed(design)
+    return exports.export(made, Path(path))
+
+
+def show(design: Design, path: str | Path = "") -> Path:
+    """Write a design as one offline page, as ``sensorgen show`` does, and give its name: ``NAME.html`` if not given."""
+    from sensorgen.workflows import preview
+
+    design = _named(design)
+    file = Path(path or f"{design.name}.html")
+    files.replace(file, preview.page_of(design).encode())
+    return file
+
+
+def batch(plan: str | Path, out: str | Path = "out", *, gcode: bool = True, force: bool = False) -> "Batch":
+    """Write all files of a plan's plate into ``out/NAME``; as :func:`sensorgen.workflows.batch.make`."""
+    from sensorgen.workflows.batch import make
+
+    return make(Path(plan), Path(out), gcode=gcode, force=force)
+
+
+def characterise(printer: str, conductor: str, dielectric: str, out: str | Path = "out") -> "Planned":
+    """Choose coupons that measure two materials on a printer, and write the files of their plate.
+
+    As :func:`sensorgen.workflows.characterise.plan`; the filled form is read by ``sensorgen characterise``.
+    """
+    from sensorgen.workflows.characterise import Study, plan
+
+    return plan(Study.of(printer, (conductor, dielectric)), Path(out))
+
+
+def optimise(target: str | Path, out: str | Path = "out") -> "Optimised":
+    """Find the best printable designs for a target's file; as :func:`sensorgen.workflows.optimise.run.optimise`."""
+    from sensorgen.workflows.optimise.run import optimise
+
+    return optimise(Path(target), Path(out))
+
+
+def report(log: Log, iteration: int | None = None, *specimens: str, path: str | Path = "report.html") -> "Report":
+    """Write predictions beside measurements of an iteration, or of specimens, as a page; ``.md``, ``.csv``, ``.json``.
+
+    Errors as of :func:`sensorgen.analysis.report.contents.report`.
+    """
+    from sensorgen.analysis.report import contents, pieces
+
+    file = Path(path)
+    made = contents.report(log, iteration, specimens=specimens)
+    with files.replacing(file) as target:
+        target.writelines(piece.encode() for piece in pieces(made, file.suffix.lstrip(".") or "html"))
+    return made
+
+
 def invert(what: Design | Body, frequency_hz: Sequence[float], impedance_ohm: ArrayLike, *, noise: float) -> Estimates:
     """Force and position from measured impedances, as if the sensor were exactly as predicted.
 
@@ -266,6 +417,15 @@ def _named(design: Design) -> Design:
     if not isinstance(design, Design):
         raise BadInput(f"{design!r:.60}: expected a Design or a Body, as Design(shape='tri') or load('mine.yaml')")
     return design if design.name else designs.make(design.model_dump(exclude_defaults=True, mode="json"))
+
+
+def _points(many: Sequence[Design | Body]) -> list[tuple[str, Body]]:
+    bodies_of = [_body(what) for what in many]
+    return [(body.design.name, body) for body in bodies_of]
+
+
+def _silent() -> None:
+    """Progress of a notebook, which shows none."""
 
 
 def _body(what: Design | Body) -> Body:

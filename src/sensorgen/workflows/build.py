@@ -41,7 +41,7 @@ STEPS = ("meshes", "checks", "validity", "prediction", "3MF", "profiles", "drawi
 
 @dataclass(frozen=True)
 class Built:
-    """What a build has left behind.
+    """Results of a build.
 
     Attributes
     ----------
@@ -224,6 +224,10 @@ def _files(
     yield "check.json", document.to_json(report(design, held)).encode()
     yield "prediction.json", json_bytes(json.loads(to_json(predicted)))
     yield "design.json", json_bytes(design.model_dump(mode="json"))
+    if design.layout:
+        from sensorgen.prediction.array.model import wire_table
+
+        yield "wires.csv", document.comma_separated(wire_table(design)).encode()
 
 
 def _await(job: "Future[None]", step: Step) -> None:

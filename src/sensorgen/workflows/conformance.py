@@ -1,4 +1,4 @@
-"""Whether the files of a pack are what sensorgen needs: values with sources, valid scenes, profiles, code that runs."""
+"""Check of a pack's files: values with sources, valid scenes, profiles, code that runs."""
 
 import ast
 import dataclasses
@@ -32,7 +32,7 @@ Step = Callable[[str], None]
 
 @dataclass(frozen=True)
 class PackReport:
-    """What is wrong with a pack.
+    """Faults of a pack.
 
     Attributes
     ----------
@@ -221,7 +221,7 @@ def _listed(folder: Path) -> list[Path]:
 
 
 def _where_to(path: Path, kind: Kind) -> str:
-    """What to do with a file that nothing reads."""
+    """Advice on a file that nothing reads."""
     found = _kind_of(path) or kind
     name = re.sub("[^a-z0-9]+", "-", path.stem.lower()).strip("-") or "own"
     folder = "" if found == kind else f"move it to {found}, as "

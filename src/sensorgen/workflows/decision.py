@@ -1,4 +1,4 @@
-"""Whether to print a design: verdict, the numbers that decide, each finding once, and changes that were tried."""
+"""Decision to print a design: verdict, the numbers that decide, each finding once, and changes that were tried."""
 
 import json
 import time
@@ -88,7 +88,7 @@ class TriedChange:
 
 @dataclass(frozen=True)
 class Advice:
-    """What was tried to remove the findings of a design.
+    """Attempts to remove the findings of a design.
 
     Attributes
     ----------
@@ -297,7 +297,7 @@ def _adapter(kind: type) -> "TypeAdapter[Any]":
 
 
 def grade(tried: Trial) -> tuple[int, int]:
-    """Whether the print senses force, and locates: 2 yes, 1 roughly, 0 no."""
+    """Grade of the print's sensing of force, and of locating: 2 yes, 1 roughly, 0 no."""
     length_m = 2 * tried.position_m  # the reference load is in the middle
     force, place = tried.printed.force_resolution, tried.printed.position_resolution
     return (

@@ -37,7 +37,7 @@ remark: {remark}
 
 @dataclass(frozen=True)
 class Found:
-    """What a specimen was found to be, beside what it is."""
+    """Values found of a specimen, beside the true ones."""
 
     specimen: Annotated[str, Column("specimen")]
     material: Annotated[str, Column("material")]
@@ -62,7 +62,7 @@ class Inverted:
 
 @dataclass(frozen=True)
 class Demo:
-    """What the demonstration did.
+    """Results of the demonstration.
 
     Attributes
     ----------

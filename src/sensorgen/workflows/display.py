@@ -1,11 +1,16 @@
 """Drawings, tables and figures of results, as a notebook shows them."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from sensorgen.checks.review import Review
 from sensorgen.core import display, document, findings
 from sensorgen.design.design import Design
+from sensorgen.prediction.compression import CompressionResult
+from sensorgen.prediction.loaded import Loaded
 from sensorgen.prediction.results import Prediction
+from sensorgen.prediction.sweep import Sweep
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,6 +27,36 @@ def _(design: Design) -> str:
     from sensorgen.prediction.slices import reviewed
 
     return draw(design, reviewed(design))
+
+
+@display.figure.register(Review)
+def _(found: Review) -> "Figure":
+    from sensorgen.analysis.plots import results, static
+
+    return static.whole(results.findings(found))
+
+
+@display.figure.register(Sweep)
+def _(found: Sweep[Any]) -> "Figure":
+    from sensorgen.analysis.plots import results, static
+
+    return static.whole(results.sweep(found))
+
+
+@display.figure.register(CompressionResult)
+def _(found: CompressionResult) -> "Figure":
+    from sensorgen.analysis.plots import compression, static
+
+    return static.whole(compression.figure(found))
+
+
+@display.figure.register(Loaded)
+def _(found: Loaded) -> "Figure":
+    from sensorgen.analysis.plots import response, static
+
+    z = found.impedance
+    axes = (np.asarray(z.force_n), np.asarray(z.position_mm))
+    return static.whole(response.lines(z.frequency_hz, *axes, z.impedance_ohm, found.prediction.design))
 
 
 @display.figure.register(Prediction)

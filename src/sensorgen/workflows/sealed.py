@@ -27,7 +27,7 @@ STALE = ".stale"  # suffix of G-code of another design
 
 @dataclass(frozen=True)
 class Differences:
-    """How a folder differs from its record.
+    """Differences of a folder from its record.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Differences:
     record: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
-        """Whether anything differs."""
+        """Test whether anything differs."""
         return bool(self.missing or self.changed or self.extra or self.links or self.record)
 
     def document(self) -> Iterator[Part]:

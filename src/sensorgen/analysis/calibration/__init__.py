@@ -60,7 +60,7 @@ class Made:
     held: Found | None
 
     def document(self) -> Iterator[Part]:
-        """What the calibration says."""
+        """Paragraphs and tables of the calibration."""
         return self.calibration.document()
 
     def to_json(self) -> str:
@@ -193,7 +193,7 @@ def _ln_rise_as_drawn(predicted: SensorModel) -> Real:
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What the log has of a specimen, and the model that it is compared with.
+    """Entries of the log about a specimen, and the model that it is compared with.
 
     Attributes
     ----------
@@ -224,7 +224,7 @@ class Known:
 
     @property
     def recorded(self) -> bool:
-        """Whether the bench measured it."""
+        """True if the bench measured it."""
         return bool((self.data.rest_noise < 1).all())
 
 
@@ -397,7 +397,7 @@ class Recheck:
         return abs(self.z) > _ALARM or bool(self.change)
 
     def document(self) -> Iterator[Part]:
-        """What the presses say."""
+        """Paragraphs and tables of the presses."""
         said = "ALARM: the calibration no longer held" if self.alarm else "the calibration still held"
         yield (
             f"{said}: {self.inside} of {self.presses} known forces in their 90 % intervals, their mean off by "

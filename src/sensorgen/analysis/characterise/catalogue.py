@@ -38,7 +38,7 @@ Values = Mapping[str, Real]  # of unknowns in SI, or of sizes [mm]
 
 @dataclass(frozen=True)
 class Unknown:
-    """What the readings depend on, with its prior: a normal distribution, of ln unless linear.
+    """Quantity that the readings depend on, with its prior: a normal distribution, of ln unless linear.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Size:
 
 @dataclass(frozen=True)
 class Reading:
-    """What is read on a coupon.
+    """Reading of a coupon.
 
     Attributes
     ----------
@@ -237,7 +237,7 @@ def _crossed_ohm_m(values: Values, line_m: float) -> Real:
 
 
 def targets(conductor: str, dielectric: str, line_mm: float) -> tuple[Target, ...]:
-    """What is wanted of a pair of materials, by their names."""
+    """Quantities wanted of a pair of materials, by their names."""
     line_m = line_mm * M_PER_MM
 
     def of(key: str) -> Callable[[Values], Real]:

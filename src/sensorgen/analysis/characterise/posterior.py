@@ -1,4 +1,4 @@
-"""What readings of coupons say of the unknowns: Gaussian in their logarithms, with coupons that may be dead.
+"""Posterior of the unknowns by readings of coupons: Gaussian in their logarithms, with coupons that may be dead.
 
 Each set of dead coupons is a model of its own: its evidence (Laplace) weighs it, and the sum over sets is the result.
 A dead coupon's readings may be anything within some decades.
@@ -44,7 +44,7 @@ class Observation:
 
     @cached_property
     def read(self) -> Mask:
-        """Which readings there are."""
+        """Mask of the readings that exist."""
         return np.isfinite(self.log_values)
 
 

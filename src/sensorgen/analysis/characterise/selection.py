@@ -1,4 +1,4 @@
-r"""Which coupons to print: D-optimal for the targets, with none or one of the coupons dead, each goal missed at a cost.
+r"""Choice of coupons: D-optimal for the targets, with none or one of the coupons dead, each goal missed at a cost.
 
 .. math:: \max_S \; (1 - p n) \, D(S) + p \sum_{i \in S} D(S \setminus i)
           - \lambda \sum_t \left[\ln^+ \frac{w_t(S)}{g_t} + \beta \sum_{i \in S} \ln^+ \frac{w_t(S \setminus i)}

@@ -1,4 +1,4 @@
-"""What was predicted of a specimen beside what was measured of it."""
+"""Prediction of a specimen beside its measurements."""
 
 from sensorgen.analysis.comparison.expected import Predicted, predicted
 from sensorgen.analysis.comparison.specimens import Compared, Comparison, of_iteration

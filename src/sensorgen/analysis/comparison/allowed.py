@@ -28,7 +28,7 @@ class Allowed:
 
 
 def usable(row: Compared) -> bool:
-    """Whether a reading is one of a sound electrode."""
+    """Test whether a reading is one of a sound electrode."""
     return row.verdict.electrode == "sound" and isfinite(row.verdict.ry_ohm) and row.verdict.ry_ohm > 0
 
 

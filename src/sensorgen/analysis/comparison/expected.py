@@ -1,8 +1,8 @@
-"""What a design should measure: the earliest prediction in the log, else one that is made now and named so."""
+"""Expected readings of a design: the earliest prediction in the log, else one that is made now and named so."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import inf, isnan
 from statistics import fmean, geometric_mean
 
@@ -17,6 +17,8 @@ from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.losses import NOTHING_LOST, Lost, lost
 from sensorgen.prediction.quantities import impedance_at
 from sensorgen.prediction.results import Prediction, from_json
+
+_MOST_FILMS = 1 << 14  # readings across films, of one design, that are kept with what they predict
 
 
 @dataclass(frozen=True)
@@ -64,29 +66,28 @@ class Predicted:
         both electrodes, as the readings do not say which was measured; the range is that of the best and the worst,
         with the errors of models, print and materials.
         """
-        with_leads = list(self.prediction.resistance.values())
-        if not with_leads:
-            return None
-        ends = [r.alone() for r in with_leads]
+        return self._along_ohm(rz_ohm)
 
-        def reading(of: Callable[[Bounds], float], across: float) -> list[float]:
-            ohms = [of(r) for r in ends]
-            if len(ohms) < 2 or inf in ohms:  # as where walls interrupt an electrode
-                return ohms
-            leak = leak_s(across, fmean(ohms))
-            return [along_ohm(ohm, leak, sum(ohms) / ohm - 1) for ohm in ohms]
+    @cached_property
+    def _along_ohm(self) -> Callable[[float], Bounds | None]:
+        """Law of the reading, evaluated once for films that are alike."""
+        ends = [r.alone() for r in self.prediction.resistance.values()]
+        values, parts = [r.value for r in ends], [*zip(*((r, r.model, r.print, r.material) for r in ends), strict=True)]
+        ranges = [([of.lower for of in part], [of.upper for of in part]) for part in parts]
+        leads = [r.leads.upper - r.value for r in self.prediction.resistance.values() if r.leads]
 
-        least, most = (0.0, inf) if isnan(rz_ohm) else (rz_ohm, rz_ohm)
+        def law(rz_ohm: float) -> Bounds | None:
+            if not ends:
+                return None
+            least, most = (0.0, inf) if isnan(rz_ohm) else (rz_ohm, rz_ohm)
+            whole, model, of_print, material = (
+                Interval(min(_read(low, least)), max(_read(high, most))) for low, high in ranges
+            )
+            value = geometric_mean(_read(values, most))
+            alone = Bounds(value, whole.lower, whole.upper, "ohm", model=model, print=of_print, material=material)
+            return alone.plus(0.0, 0.0, max(leads)) if leads else alone
 
-        def interval(part: Callable[[Bounds], Bounds | Interval]) -> Interval:
-            low, high = reading(lambda r: part(r).lower, least), reading(lambda r: part(r).upper, most)
-            return Interval(min(low), max(high))
-
-        whole = interval(lambda r: r)
-        parts = (interval(lambda r: r.model), interval(lambda r: r.print), interval(lambda r: r.material))
-        alone = Bounds(geometric_mean(reading(lambda r: r.value, most)), whole.lower, whole.upper, "ohm", *parts)
-        leads = [r.leads.upper - r.value for r in with_leads if r.leads]
-        return alone.plus(0.0, 0.0, max(leads)) if leads else alone
+        return lru_cache(maxsize=_MOST_FILMS)(law)
 
     @property
     def capacitance_f(self) -> Interval | None:
@@ -96,12 +97,12 @@ class Predicted:
 
     @cached_property
     def touches(self) -> bool:
-        """Whether the electrodes touch as printed, so that the film is a short by design."""
+        """True if the electrodes touch as printed, so that the film is a short by design."""
         return self.prediction.status == "short"
 
     @property
     def parted(self) -> bool:
-        """Whether the electrodes touch as drawn, but have a gap as printed."""
+        """True if the electrodes touch as drawn, but have a gap as printed."""
         return self.prediction.drawn is not None and self.prediction.drawn.status == "short" and not self.touches
 
     def impedance_at(self, frequency_hz: float) -> tuple[complex, complex, complex] | None:
@@ -126,6 +127,14 @@ class Predicted:
         if self.stored_at:
             return f"stored {self.stored_at} by sensorgen {self.version}; {self.order}"
         return f"made afterwards by sensorgen {self.version}: none was stored before"
+
+
+def _read(ohms: list[float], across_ohm: float) -> list[float]:
+    """Readings along each electrode of a film that reads ``across_ohm`` [ohm]."""
+    if len(ohms) < 2 or inf in ohms:  # as where walls interrupt an electrode
+        return ohms
+    leak = leak_s(across_ohm, fmean(ohms))
+    return [along_ohm(ohm, leak, sum(ohms) / ohm - 1) for ohm in ohms]
 
 
 def predicted(body: Body) -> Predicted:

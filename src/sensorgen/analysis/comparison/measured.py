@@ -10,7 +10,7 @@ from sensorgen.measure.log import Reading
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """What many readings have in common; attributes as of :class:`sensorgen.measure.log.Reading`."""
+    """Texts that many readings share; attributes as of :class:`sensorgen.measure.log.Reading`."""
 
     specimen: str
     shape: str
@@ -52,7 +52,7 @@ class Measured:
 
     @property
     def shape(self) -> str:
-        """Its shape."""
+        """Name of the shape."""
         return self.words.shape
 
 

@@ -57,7 +57,7 @@ class Movable:
 
     @cached_property
     def by_film(self) -> tuple[Real, Real]:
-        """The same over ln of the film's factor, of the drawing; flat where a design has no film.
+        """Slopes over ln of the film's factor, of the drawing; flat where a design has no film.
 
         A print has whole layers, so that its capacitance jumps with the film that is asked for.
         """

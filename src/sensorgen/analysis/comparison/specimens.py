@@ -32,6 +32,7 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.query import TONES_HZ
 
 _MOST_LEFT_OUT = 1000  # readings that are listed for one reason
+UNTRUSTED = "shape of"  # a specimen, in the list of what was left out
 _KEPT = 120_000  # rows that are kept, in 0.1 GB: a report reads each some 16 times
 
 
@@ -73,7 +74,7 @@ class Compared:
 
     @property
     def inside(self) -> bool | None:
-        """Whether a reading of R_Y lies within the prediction's interval; None where one is missing."""
+        """True if a reading of R_Y lies within the prediction's interval; None where one is missing."""
         expected = self.expected_ohm
         if expected is None or not self.evidence.ry_ohm:
             return None
@@ -149,7 +150,8 @@ def of_iteration(
     measured = readings(log.about(Reading, iteration, specimens))
     left_out = list(_superseded(log, iteration, specimens))
     printed = _printed(log, left_out)
-    by_specimen = _by_specimen(log, iteration, specimens, printed, left_out)
+    refused = dict[str, str]()
+    by_specimen = _by_specimen(log, iteration, specimens, printed, refused, left_out)
     by_id = {design.id(): design for design in {id(d): d for d in by_specimen.values()}.values()}
     alike = Counter(design.name for design in by_id.values())
     names = {name: _label(design, alike) for name, design in by_specimen.items()}
@@ -157,7 +159,7 @@ def of_iteration(
     ids = {name: design.ids() for name, design in designs.items()}
     for specimen in by_specimen.keys() & printed.keys():
         ids[names[specimen]].add(printed[specimen].design_id)  # another version of sensorgen may have named it
-    left_out += _other_designs(measured.designs, set().union(*ids.values()))
+    left_out += _other_designs(measured.designs, set(refused).union(*ids.values()))
     begun = _begun(log, iteration, specimens, names)
     made, found = {}, {}
     for name, design in designs.items():
@@ -221,7 +223,7 @@ def _superseded(log: Log, iteration: int | None, specimens: Sequence[str]) -> It
 
 
 def _first(left_out: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
-    """What was left out, and the number of readings beyond those that anybody reads."""
+    """Omitted readings, and the number of those beyond what a person reads."""
     more = Counter[str]()
     for what, why in left_out:
         more[why] += 1
@@ -247,11 +249,11 @@ def _printed(log: Log, left_out: list[tuple[str, str]]) -> dict[str, Print]:
 
 def _by_specimen(
     log: Log, iteration: int | None, specimens: Sequence[str], printed: Mapping[str, Print],
-    left_out: list[tuple[str, str]],
+    refused: dict[str, str], left_out: list[tuple[str, str]],
 ) -> dict[str, Design]:  # fmt: skip
     """The designs of specimens: those that they are bound to, else what their names stand for."""
     found: dict[str, Design] = {}
-    recorded = on_beds(log)
+    recorded = on_beds(log, refused)
     made: dict[Specimen, Design | None] = {}
     for specimen in log.specimens(iteration=iteration):
         name, of = specimen.specimen, printed.get(specimen.specimen)
@@ -259,6 +261,9 @@ def _by_specimen(
             continue
         if of and of.design_id in recorded:
             found[name] = recorded[of.design_id]
+            continue
+        if of and of.design_id in refused:
+            left_out.append((f"{UNTRUSTED} {name}, {of.design}", refused[of.design_id]))
             continue
         try:
             kind = replace(parse(name), iteration=None, replicate=None, place="")
@@ -279,7 +284,7 @@ def _by_specimen(
 
 
 def _other_designs(logged: Iterable[tuple[str, str]], known: Container[str]) -> list[tuple[str, str]]:
-    """What the log says of designs that the names do not stand for."""
+    """Entries of the log on designs that the names do not stand for."""
     others = {(name, uid) for name, uid in logged if uid and uid not in known}
     return [
         (f"design {name} ({uid})", "the log names it for a specimen whose name stands for another design, or for this "

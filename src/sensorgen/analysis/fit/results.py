@@ -1,4 +1,4 @@
-"""What a fit gives: values with their uncertainty, what the data do not determine, and errors before and after."""
+"""Results of a fit: values with their uncertainty, what the data do not determine, and errors before and after."""
 
 import re
 from collections.abc import Iterator
@@ -131,7 +131,7 @@ class Fit:
 
     @property
     def of(self) -> str:
-        """What was fitted, in words."""
+        """Name of the fitted quantity, in words."""
         return f"iteration {self.iteration}" if self.iteration is not None else ", ".join(self.names)
 
     def document(self) -> Iterator[Part]:

@@ -28,7 +28,7 @@ _SOFTER = 1.05  # factor on a force, to see how the rise depends on it
 
 @dataclass(frozen=True, eq=False)
 class OfSpecimen:
-    """What a specimen says: ln of factors to the prediction, with standard errors; leak of the whole film [S]."""
+    """Evidence of a specimen: ln of factors to the prediction, with standard errors; leak of the whole film [S]."""
 
     name: str
     print_: str
@@ -70,7 +70,7 @@ def _at(model: SpecimenModel, found: Posterior, name: str) -> tuple[float, float
 
 
 def _alone(model: SpecimenModel, found: Posterior, name: str, scale: float) -> tuple[float, float]:
-    """What the readings say of a parameter without the prior, which is standard normal."""
+    """Estimate of a parameter by the readings without the prior, which is standard normal."""
     at, sd = _at(model, found, name)
     known = 1 - sd**2
     return (scale * at / known, scale * sd / sqrt(known)) if known > _LEAST else (0.0, inf)
@@ -107,7 +107,7 @@ def _slopes(model: SpecimenModel) -> Real:
 
 
 def values(fits: Sequence[OfSpecimen]) -> list[Fitted | Untold]:
-    """What the recordings say together, each counting the same."""
+    """Values by all recordings, of equal weight."""
     if not fits:
         none = "no recording of the bench: resistances at direct current do not depend on it"
         return [Untold(PERMITTIVITY, none), Untold(MODULUS, none)]

@@ -29,7 +29,7 @@ def text(made: Fit) -> str:
 
 
 def about(made: Fit) -> str:
-    """What the source is, in a sentence."""
+    """Description of the source, in a sentence."""
     return (
         f"fit of {made.of}: {made.specimens} specimens, {len(made.held_back)} held back (seed "
         f"{made.seed}); sensorgen {__version__}; data {made.log[:16]}"

@@ -1,12 +1,11 @@
 """Displacement and capacitance of a cell over stress, as a figure."""
 
-from sensorgen.analysis.plots import static
 from sensorgen.analysis.plots.figure import BLUE, ORANGE, Axis, Curve, Figure, Panel
 from sensorgen.prediction.compression import CompressionResult
 
 
-def png(result: CompressionResult) -> bytes:
-    """A picture of a result, as PNG."""
+def figure(result: CompressionResult) -> Figure:
+    """Displacement and capacitance of a result over stress."""
     stress, displacement = result.stress_kpa, result.displacement_um
     x = Axis("stress [kPa]", low=0.0)
     curve = (Curve("line", "", stress, displacement), Curve("points", "", stress, displacement))
@@ -22,4 +21,4 @@ def png(result: CompressionResult) -> bytes:
         panels.append(Panel(curves, x, Axis("capacitance [nF/m²]")))
     held = ", ".join(f"{key} {value}" for key, value in result.held.items())
     alt = "Displacement of the top and capacitance per area over stress."
-    return static.png(Figure("compression", f"{result.model}: {held}", alt, {"": tuple(panels)}, columns=2))
+    return Figure("compression", f"{result.model}: {held}", alt, {"": tuple(panels)}, columns=2)

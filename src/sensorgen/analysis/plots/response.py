@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sensorgen.analysis.plots.figure import Axis, Curve, Figure, Map, Panel, frequency, scale
+from sensorgen.analysis.plots.figure import Axis, Curve, Figure, Map, Panel, frequency, look, scale
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
@@ -114,6 +114,36 @@ def response(
     by_mm = found.by_position_ohm_per_m * M_PER_MM
     size = (sensor.tip_m / M_PER_MM, sensor.length_m / M_PER_MM)
     return Response(f, force, at, found.impedance_ohm, found.by_force_ohm_per_n, by_mm, *size)
+
+
+def lines(frequency_hz: Sequence[float], force_n: Real, position_mm: Real, impedance_ohm: Complex, name: str) -> Figure:
+    """R and X as lines over the longer of force and position, for some values of the other, at two frequencies.
+
+    Parameters
+    ----------
+    frequency_hz, force_n, position_mm : (f,), (n,), (m,) array
+        Axes [Hz], [N], [mm].
+    impedance_ohm : (f, n, m) complex array
+        Over them [ohm].
+    name : str
+        Of the design.
+    """
+    over_force = len(force_n) > len(position_mm)
+    x, others, unit = (force_n, position_mm, "mm") if over_force else (position_mm, force_n, "N")
+    z = impedance_ohm.swapaxes(1, 2) if over_force else impedance_ohm  # the longer axis last
+    which = np.unique(np.linspace(0, len(others) - 1, min(LINES, len(others))).round().astype(int)).tolist()
+    panels = []
+    for k in sorted({0, len(frequency_hz) - 1}):
+        at = frequency(frequency_hz[k])
+        for symbol, part in (("R", z[k].real), ("X", z[k].imag)):
+            divisor, ohm = scale(part, "Ω")
+            curves = tuple(
+                Curve(kind, f"{others[j]:g} {unit}" if kind == "line" else "", x, part[j] / divisor, **look(n))
+                for n, j in enumerate(which) for kind in ("line", "points")
+            )  # fmt: skip
+            panels.append(Panel(curves, FORCE if over_force else POSITION, Axis(f"{symbol} [{ohm}] at {at}")))
+    along = "force" if over_force else "position"
+    return Figure("response", f"{name} under load", f"R and X over {along}.", {"": tuple(panels)}, columns=2)
 
 
 def quantity(of: Response, name: str) -> Figure:

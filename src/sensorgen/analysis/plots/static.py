@@ -35,6 +35,15 @@ def png(figure: Figure) -> bytes:
     return _written(figure, tuple(p for panels in figure.choices.values() for p in panels), figure.title, "png")
 
 
+def whole(figure: Figure) -> "Drawn":
+    """All choices of a figure as matplotlib has them; errors as of :func:`png`."""
+    needed("matplotlib")
+    import matplotlib as mpl
+
+    with mpl.rc_context(_HOW):
+        return drawn(figure, tuple(p for panels in figure.choices.values() for p in panels), figure.title)
+
+
 def files(figure: Figure) -> Iterator[tuple[str, bytes]]:
     """Name and content of a figure's files: each of its choices as PNG and as SVG."""
     for k, (choice, panels) in enumerate(figure.choices.items()):

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison, of_iteration
 from sensorgen.analysis.comparison.runs import Run, runs
-from sensorgen.analysis.comparison.specimens import known_iterations
+from sensorgen.analysis.comparison.specimens import UNTRUSTED, known_iterations
 from sensorgen.analysis.plots.figure import Figure
 from sensorgen.analysis.report import (
     alternating,
@@ -152,7 +152,9 @@ def report(
     shorts = (*yields.findings(found), *direction.findings(found)) if found.direct else ()
     ac = alternating.rows(found)
     changes = history.rows(found, ac)
-    headline = (*electrodes.headline(found), *verdicts, *alternating.headline(ac))
+    shapes = [f"Not compared: {what}: {why}." for what, why in left_out if what.startswith(UNTRUSTED)]
+    more = [f"Not compared either: {len(shapes) - 1} more, listed in the report."] if len(shapes) > 1 else []
+    headline = (*electrodes.headline(found), *verdicts, *alternating.headline(ac), *shapes[:1], *more)
     by_frequency = (
         *alternating.findings(ac),
         *alternating.behind_leak(found),
@@ -175,7 +177,7 @@ def report(
 
 
 def _basis(found: Comparison, recorded: Sequence[Run]) -> Iterator[str]:
-    """What was measured, in one sentence; none of a single reading."""
+    """Summary of the measurements, in one sentence; none of a single reading."""
     specimens = {row.reading.specimen for row in found.rows} | {run.entry.specimen for run in recorded}
     if len(found.rows) + len(recorded) > 1:
         yield (

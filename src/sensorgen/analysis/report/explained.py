@@ -1,4 +1,4 @@
-r"""Which parameter explains the residuals best: one at a time, by least squares.
+r"""Parameter that explains the residuals best: one at a time, by least squares.
 
 For every kind of measurement, the residual is :math:`r = \ln(\text{measured} / \text{predicted})`, of every reading or
 frequency, complex where Z is. One parameter is moved for all of them until :math:`\sum |r|^2` is least; its share is
@@ -109,18 +109,23 @@ def _resistances(found: Comparison) -> Iterator[Kind]:
     kind = np.dtype([(name, "f8") for name in ("y", "z", "expected", "alone", "leak")] + [("apart", "?")])
     known = np.fromiter(rows, kind)
     if len(known):
-        yield Kind("electrode resistance", np.log(known["y"]).astype(complex), partial(_along, known))
+        yield Kind("electrode resistance", np.log(known["y"]).astype(complex), _along(known))
     both = known[(known["z"] > 0) & known["apart"]]
     if len(both):
         measured = np.log(np.minimum(both["z"], INTACT_OHM)).astype(complex)
         yield Kind("film resistance", measured, _of_electrodes(both["alone"], across))
 
 
-def _along(known: Any, parameter: str, value: float) -> Complex:
+def _along(known: Any) -> Model:
     """Ln of predicted readings along an electrode; a leakage is in addition to what was measured across the film."""
-    leak = np.nan_to_num(known["leak"], posinf=np.inf)
-    more = _carried(known["alone"], leak + (value if parameter == LEAK else 0.0)) / _carried(known["alone"], leak)
-    return np.asarray(np.log(known["expected"] * more * (value if parameter == RESISTIVITY else 1.0) + 0j))
+    leak, expected = np.nan_to_num(known["leak"], posinf=np.inf), np.log(known["expected"])
+    measured = np.log(_carried(known["alone"], leak))
+
+    def model(parameter: str, value: float) -> Complex:
+        more = np.log(_carried(known["alone"], leak + value)) - measured if parameter == LEAK else 0.0
+        return np.asarray(expected + more + (log(value) if parameter == RESISTIVITY else 0.0) + 0j)
+
+    return model
 
 
 def _carried(ohm: Real, leak_s: Real) -> Real:

@@ -152,7 +152,7 @@ def _name(group: Group) -> str:
 
 
 def notes(found: Comparison) -> tuple[str, ...]:
-    """How verdicts come about, and what is counted."""
+    """Notes on the rules of verdicts and counts."""
     how = (
         "The verdict is the gravest of the electrode's and the film's. An electrode is compared with the median of its "
         "own shape. A film resistance up to that of two electrodes in series is a short. A film is intact from "

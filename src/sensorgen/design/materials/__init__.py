@@ -219,7 +219,7 @@ def check_own(name: str, values: Mapping[str, float], texts: Texts = NO_TEXTS) -
 
 
 def _said(low: float, high: float, unsigned: str) -> str:
-    """What numbers a quantity can be, in words."""
+    """Numbers that a quantity can take, in words."""
     if high < inf:
         return f"{low:g} to {high:g}"
     return unsigned if low == 0 else "a finite number"
@@ -354,7 +354,7 @@ def first_form(material: Material) -> Material:
 
 
 def fault(quantity: str, given: Value, *, advised: bool = False) -> str:
-    """What is wrong with a value of a material's file, or ""; its range may be ``advised``, as of printing."""
+    """Fault of a value of a material's file, or ""; its range may be ``advised``, as of printing."""
     low, high = _RANGES.get(quantity, (0.0, inf))
     if not low <= given.value <= high or (isinf(given.value) and given.default):
         return f"is {given.value:g}; expected {_said(low, high, 'a number from 0 on')}"
@@ -370,7 +370,7 @@ def fault(quantity: str, given: Value, *, advised: bool = False) -> str:
 
 
 def disorder(given: Value | OwnValue, *, advised: bool = False) -> str:
-    """What is wrong with the ends of a value's range, or ""; advice need not be followed."""
+    """Fault of the ends of a value's range, or ""; advice need not be followed."""
     low, high = (-inf if given.low is None else given.low), (inf if given.high is None else given.high)
     if not low <= high:
         return f"has low {low:g} above high {high:g}; exchange them"
@@ -380,7 +380,7 @@ def disorder(given: Value | OwnValue, *, advised: bool = False) -> str:
 
 
 def citations() -> dict[str, str]:
-    """What each source's name stands for, those of the user's own and of packs too; a damaged material has none."""
+    """References by the name of each source, those of the user's own and of packs too; a damaged material has none."""
     cited = dict[str, str]()
     for file in packs.files("materials"):
         if file.pack.where != "shipped":
@@ -390,7 +390,7 @@ def citations() -> dict[str, str]:
 
 
 def cited(texts: Texts) -> dict[str, str]:
-    """What the sources of a design's own files stand for."""
+    """References by the sources of a design's own files."""
     own_materials = (parse(name, text) for name, text in texts.get("materials", {}).items())
     said = {key: value for material in own_materials for key, value in material.citations.items()}
     return said | {name: _own(name, text).about for name, text in texts.get("sources", {}).items()}
@@ -398,7 +398,7 @@ def cited(texts: Texts) -> dict[str, str]:
 
 @cache
 def shipped_citations() -> dict[str, str]:
-    """What each source's name stands for, of the materials that ship."""
+    """References by the name of each source, of the materials that ship."""
     text = (resources.files(__name__) / "sources.yaml").read_text("utf-8")
     data = yamlfile.parse(text, "sources.yaml")
     theses = {str(name): f"{data['thesis']}: {where}" for name, where in data["sources"].items()}

@@ -47,7 +47,7 @@ class Params(Envelope):
         return self.line_mm + self.space_mm
 
     def cells(self) -> float:
-        """How many cells of the pattern the sensor holds, in all layers [-]."""
+        """Number of cells of the pattern in the sensor, in all layers [-]."""
         return self.length_mm * self.width_mm / self.period_mm**2
 
 
@@ -55,9 +55,6 @@ def scene(p: Params, fill: Fill) -> Scene:
     """Bodies of the porous plate; the lowest lines run along y."""
     low = p.electrode_mm
     high, top = low + p.dielectric_mm, low + p.dielectric_mm + p.electrode_mm
-
-    def plate(z0: float, z1: float) -> tuple[Prism, ...]:
-        return (box(0.0, p.length_mm, 0.0, p.width_mm, z0, z1),) if z1 > z0 else ()
 
     def lines(of_air: bool) -> tuple[Prism, ...]:
         found = []
@@ -68,11 +65,11 @@ def scene(p: Params, fill: Fill) -> Scene:
         return tuple(found)
 
     bodies = (
-        Body("bottom_electrode", fill.bottom_electrode, plate(0.0, low), "bottom"),
+        Body("bottom_electrode", fill.bottom_electrode, p.plate(0.0, low), "bottom"),
         Body("porous_dielectric", fill.dielectric, lines(of_air=False)),
         Body("support", fill.support, lines(of_air=True) if fill.support else ()),
-        Body("top_electrode", fill.top_electrode, plate(high, top), "top"),
-        Body("isolation", fill.isolation, plate(top, top + p.isolation_mm)),
+        Body("top_electrode", fill.top_electrode, p.plate(high, top), "top"),
+        Body("isolation", fill.isolation, p.plate(top, top + p.isolation_mm)),
     )
     return Scene(bodies, (p.length_mm, p.width_mm, rounded(top + p.isolation_mm)))
 

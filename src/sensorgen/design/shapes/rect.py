@@ -64,7 +64,7 @@ class Params(Envelope):
         return self.etpu_width_mm + self.x60_width_mm + 2 * self.air_width_mm
 
     def cells(self) -> float:
-        """How many cells of the pattern the sensor holds [-]."""
+        """Number of cells of the pattern in the sensor [-]."""
         return self.length_mm * self.width_mm / self.period_mm**2
 
 
@@ -77,9 +77,6 @@ def scene(p: Params, fill: Fill) -> Scene:
     top = roof + p.electrode_mm
     upper, lower = p.along[0], p.along[1]
 
-    def plate(z0: float, z1: float) -> tuple[Prism, ...]:
-        return (box(0.0, p.length_mm, 0.0, p.width_mm, z0, z1),) if z1 - z0 > SLIVER_MM else ()
-
     def both(part: str) -> tuple[Prism, ...]:
         return _strips(p, part, lower, film, middle) + upper_strips(part)
 
@@ -91,12 +88,12 @@ def scene(p: Params, fill: Fill) -> Scene:
 
     feet = _strips(p, "x60", lower, film, middle)
     bodies = [
-        Body("bottom_electrode", fill.bottom_electrode, plate(0.0, low), "bottom"),
-        *_lower(plate(low, film), feet, fill),
+        Body("bottom_electrode", fill.bottom_electrode, p.plate(0.0, low), "bottom"),
+        *_lower(p.plate(low, film), feet, fill),
         Body("support", fill.support, both("air") if fill.support else ()),
         Body("hanging_dielectric", fill.dielectric, upper_strips("x60")),
-        Body("top_electrode_with_cogs", fill.top_electrode, both("etpu") + plate(roof, top), "top"),
-        Body("isolation", fill.isolation, plate(top, top + p.isolation_mm)),
+        Body("top_electrode_with_cogs", fill.top_electrode, both("etpu") + p.plate(roof, top), "top"),
+        Body("isolation", fill.isolation, p.plate(top, top + p.isolation_mm)),
     ]
     return Scene(tuple(bodies), (p.length_mm, p.width_mm, rounded(top + p.isolation_mm)))
 

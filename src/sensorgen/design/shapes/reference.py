@@ -9,7 +9,7 @@
 
 from dataclasses import dataclass, field
 
-from sensorgen.scene.scene import Body, Envelope, Fill, Prism, Scene, box, rounded
+from sensorgen.scene.scene import Body, Envelope, Fill, Scene, rounded
 
 
 @dataclass(frozen=True)
@@ -26,13 +26,10 @@ def scene(p: Params, fill: Fill) -> Scene:
     low, high = p.electrode_mm, p.electrode_mm + p.dielectric_mm
     top = high + p.electrode_mm
 
-    def plate(z0: float, z1: float) -> tuple[Prism, ...]:
-        return (box(0.0, p.length_mm, 0.0, p.width_mm, z0, z1),) if z1 > z0 else ()
-
     bodies = (
-        Body("bottom_electrode", fill.bottom_electrode, plate(0.0, low), "bottom"),
-        Body("dielectric", fill.dielectric, plate(low, high)),
-        Body("top_electrode", fill.top_electrode, plate(high, top), "top"),
-        Body("isolation", fill.isolation, plate(top, top + p.isolation_mm)),
+        Body("bottom_electrode", fill.bottom_electrode, p.plate(0.0, low), "bottom"),
+        Body("dielectric", fill.dielectric, p.plate(low, high)),
+        Body("top_electrode", fill.top_electrode, p.plate(high, top), "top"),
+        Body("isolation", fill.isolation, p.plate(top, top + p.isolation_mm)),
     )
     return Scene(bodies, (p.length_mm, p.width_mm, rounded(top + p.isolation_mm)))

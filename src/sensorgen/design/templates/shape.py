@@ -23,7 +23,7 @@ class Params(Envelope):
     film_mm: float = field(default=0.2, metadata={"help": "Thickness of the film.", "range": (0.05, 5.0)})
 
     def cells(self) -> float:
-        """How many periods the sensor holds [-]."""
+        """Number of periods in the sensor [-]."""
         return self.length_mm / self.period_mm
 
 

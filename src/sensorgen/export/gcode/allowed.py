@@ -19,7 +19,7 @@ _WORD = re.compile(f"([A-Z])(?:({_NUMBER})(?:[.][.]({_NUMBER}))?)?")
 
 @dataclass(frozen=True)
 class Allowed:
-    """What a command may say.
+    """Words that a command may have.
 
     Attributes
     ----------

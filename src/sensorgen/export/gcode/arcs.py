@@ -55,7 +55,7 @@ class Arcs:
         return cls(row, start_mm, end_mm, centre_mm, np.where(clockwise, -turn, turn))
 
     def __len__(self) -> int:
-        """How many there are [-]."""
+        """Number of arcs [-]."""
         return len(self.row)
 
     def chosen(self, rows: Mask) -> "Arcs":

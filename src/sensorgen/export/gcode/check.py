@@ -18,7 +18,7 @@ from sensorgen.export.gcode.report import Report, report
 
 @dataclass(frozen=True, kw_only=True)
 class Checked(Report):
-    """What a file takes, and what was found.
+    """Needs of a file, and findings.
 
     Attributes
     ----------
@@ -34,11 +34,11 @@ class Checked(Report):
         return [f for f in self.findings if f.severity in bad]
 
     def with_more(self, found: Iterable[Found]) -> Self:
-        """The same with further findings."""
+        """Add further findings."""
         return replace(self, findings=merged([*self.findings, *found]))
 
     def counts(self) -> dict[str, int]:
-        """How many findings there are of each severity [-]."""
+        """Number of findings of each severity [-]."""
         return {severity: sum(f.severity == severity for f in self.findings) for severity in SEVERITIES}
 
     def document(self) -> Iterator[Part]:

@@ -30,7 +30,7 @@ _COLUMN = np.array([max(_BYTES[WORD].find(byte), 0) for byte in range(256)])
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """What a piece of G-code says.
+    """Content of a piece of G-code in columns.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the commands of a file ask of the machine, one after the other: tools, heat, homing, modes, fans, macros."""
+"""Commands of a file, executed one after the other: tools, heat, homing, modes, fans, macros."""
 
 from collections.abc import Mapping
 
@@ -147,7 +147,7 @@ class _Simulation:
             self.found.error("tool-change", change.number, message, "leave one of them out")
 
     def _modes(self, event: Event) -> None:
-        """What later lines mean, and what the axes still know."""
+        """Modes of later lines, and what the axes still know."""
         code, command = event.command.code, event.command
         if code in ("M82", "M83"):
             self.absolute_e = code == "M82"
@@ -182,7 +182,20 @@ class _Simulation:
         lines = (int(self.lines[0]), int(self.lines[-1])) if len(self.lines) else (len(self.motion.rows), 0)
         reached = (e for e in (*self.motion.events, *self.motion.odd) if e.number <= (self.end_line or e.number))
         allowed.check(reached, self.machine, lines, self.found)
-        last, error, warning = max(1, self.motion.lines), self.found.error, self.found.warning
+        last = max(1, self.motion.lines)
+        self._ends(last)
+        self._left_on(last)
+        settings = [e.command for e in self.motion.events if e.command.code == "G10" and e.command.has("S")]
+        untouched = settings and not any(command.has("R") for command in settings)
+        fan_missed = any(f.rule == "fan" for f in self.found)
+        if self.control.names_tools and self.motion.maker == PRUSA and untouched and fan_missed:
+            # those of its tools that the printer has too would be the wrong ones
+            message = "this is PrusaSlicer's own file: it counts tools from 0, and the printer from 1"
+            self.found.error("raw", 1, message, "let sensorgen slice write it")
+
+    def _ends(self, last: int) -> None:
+        """Commands that a whole file has at its start and at its end."""
+        error, warning = self.found.error, self.found.warning
         if self.relative:
             error("relative", last, "the file ends in relative coordinates (G91)", "write G90 after the last G91")
         if not len(self.prints):
@@ -194,14 +207,6 @@ class _Simulation:
         if self.control.ends and not self.ended:
             ends = " or ".join(self.control.ends)
             warning("end", last, f"no {ends}: the file may be cut short", f"end with {ends}")
-        self._left_on(last)
-        settings = [e.command for e in self.motion.events if e.command.code == "G10" and e.command.has("S")]
-        untouched = settings and not any(command.has("R") for command in settings)
-        fan_missed = any(f.rule == "fan" for f in self.found)
-        if self.control.names_tools and self.motion.maker == PRUSA and untouched and fan_missed:
-            # those of its tools that the printer has too would be the wrong ones
-            message = "this is PrusaSlicer's own file: it counts tools from 0, and the printer from 1"
-            error("raw", 1, message, "let sensorgen slice write it")
 
     def _left_on(self, last: int) -> None:
         names = ", ".join(map(str, self.heaters.hot()))

@@ -129,7 +129,7 @@ class Stretches:
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """What moves of a file pass over.
+    """Crossings of other tools' material by the moves of a file.
 
     Attributes
     ----------
@@ -227,7 +227,7 @@ def _blocks(motion: Motion, tool: Whole, rows: Whole) -> Iterator[Pieces]:
 
 
 def _counts(way_mm: Real) -> Whole:
-    """How many pieces each way in plan is cut to."""
+    """Number of pieces that each way in plan is cut to."""
     found: Whole = np.maximum(np.ceil(np.hypot(*way_mm.T) / _PIECE_MM), 1).astype(np.int64)
     return found
 

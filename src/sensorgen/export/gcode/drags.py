@@ -93,7 +93,7 @@ class Drags:
 
 @dataclass(frozen=True)
 class Lifting:
-    """What lifts have changed.
+    """Changes by lifts.
 
     Attributes
     ----------

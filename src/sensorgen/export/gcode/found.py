@@ -1,4 +1,4 @@
-"""What a check of G-code has found, as plain data: the form of :class:`sensorgen.core.findings.Finding`, with lines."""
+"""Findings of a check of G-code, as plain data: the form of :class:`sensorgen.core.findings.Finding`, with lines."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace

@@ -68,7 +68,7 @@ class Heaters:
         return [tool for tool, heat in self.tools.items() if heat.on and max(heat.active_c, heat.standby_c) > 0]
 
     def check_cold(self, tool: int, number: int) -> None:
-        """Whether a tool that moves filament is too cold for it."""
+        """Check that a tool that moves filament is not too cold for it."""
         heat, coldest_c = self.tools.get(tool), self.machine.control.coldest_c
         given_c = heat.active_c if heat and heat.on else 0.0
         if heat and given_c < coldest_c:
@@ -76,7 +76,7 @@ class Heaters:
             self.found.error("cold", number, message, f"heat it before (G10 P{tool} S..)")
 
     def check_printing(self, tool: int, number: int) -> None:
-        """Whether the tool that prints a line, and the bed, suit its material and have been waited for."""
+        """Check that the tool that prints a line, and the bed, suit its material and have been waited for."""
         self._check_material(tool, number)
         heat, advice = self.tools.get(tool), f"wait for it before (M116 P{tool})"
         if heat and heat.active_c > heat.awaited_c + WITHIN_C:
@@ -150,7 +150,7 @@ class Heaters:
             heat.on |= command.code in ("M104", "M109")  # G10 and M568 S leave on or off what is
 
     def check_tool(self, number: int, tool: float, what: str) -> None:
-        """Whether the printer has a tool; ``what`` happens to it in line ``number``."""
+        """Check that the printer has a tool; ``what`` happens to it in line ``number``."""
         if tool not in self.machine.tool_numbers:
             known = ", ".join(map(str, self.machine.tool_numbers))
             message = f"tool {tool:g} {what}; {self.machine.name} has {known}"

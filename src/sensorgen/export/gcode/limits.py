@@ -1,4 +1,4 @@
-"""What the moves of a file ask of the axes: each rule looks at all moves at once."""
+"""Limits of the axes, compared with the moves of a file: each rule looks at all moves at once."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping

@@ -113,7 +113,7 @@ class _Steps:
         return np.asarray(stated >= _last(turned[:-1]))[self.moves]
 
     def _held(self, holding: Holding, before: float) -> Floats:
-        """What holds for each step."""
+        """Value that applies to each step."""
         rows = np.searchsorted(self.place, np.array(holding.places, np.int64))
         return Track(rows.tolist(), holding.values.tolist()).column(len(self.place), before)
 
@@ -139,7 +139,7 @@ class _Steps:
         return Arcs.of(row[fits], start[fits], end[fits], centre[fits], clockwise[fits]), faults
 
     def _rows(self, places: Sequence[int]) -> list[int]:
-        """How many moves come before each of some places."""
+        """Number of moves before each of some places."""
         found: list[int] = np.searchsorted(self.place[self.moves], np.array(places, np.int64)).tolist()
         return found
 

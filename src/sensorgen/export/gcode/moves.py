@@ -1,4 +1,4 @@
-"""What a file makes a printer do, as plain data: moves in columns, and everything else as events between them."""
+"""Actions of a printer by a file, as plain data: moves in columns, and everything else as events between them."""
 
 import math
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What could not be read or followed, and where."""
+    """Part of a file that could not be read or followed, with its place."""
 
     number: int
     what: str
@@ -52,7 +52,7 @@ class Track:
     values: list[float]
 
     def column(self, count: int, before: float = math.nan) -> Floats:
-        """What holds for each of ``count`` moves."""
+        """Value that applies to each of ``count`` moves."""
         edges = np.array([0, *self.rows, count], dtype=np.int64)
         spans: NDArray[np.int64] = edges[1:] - edges[:-1]
         return np.repeat(np.array([before, *self.values]), spans)

@@ -135,7 +135,7 @@ def _own(machine: Printer, index: float) -> int:
 
 
 class _Writer:
-    """What has been written so far, as far as later lines depend on it."""
+    """Writer that knows of its lines what later ones depend on."""
 
     def __init__(self, machine: Printer) -> None:
         self.machine, self.control = machine, machine.control
@@ -165,7 +165,7 @@ class _Writer:
             self.ended |= command.code in self.control.ends
 
     def take(self) -> list[str]:
-        """What was held until the first move."""
+        """Lines that waited for the first move."""
         held, self.held = self.held, []
         return held
 

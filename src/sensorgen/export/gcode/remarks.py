@@ -1,4 +1,4 @@
-"""What slicers say in comments: kind, width and height of the lines that follow, and the layer."""
+"""Remarks of slicers in comments: kind, width and height of the lines that follow, and the layer."""
 
 import re
 

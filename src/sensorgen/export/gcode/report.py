@@ -1,4 +1,4 @@
-"""What a file takes: time, filament and mass of each tool, changes of tool, and what goes into purging."""
+"""Needs of a file: time, filament and mass of each tool, changes of tool, and what goes into purging."""
 
 import math
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ from sensorgen.export.gcode.timing import seconds
 
 @dataclass(frozen=True)
 class OfTool:
-    """What one tool prints: filament and its part that is no body [mm], volume [mm3], mass [g] where known."""
+    """Material of one tool: filament and its part that is no body [mm], volume [mm3], mass [g] where known."""
 
     tool: Annotated[int, Column("tool")]
     material: Annotated[str, Column("material")]
@@ -31,7 +31,7 @@ class OfTool:
 
 @dataclass(frozen=True)
 class Report:
-    """What a file takes.
+    """Needs of a file.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Report:
     box_mm: tuple[tuple[float, ...], tuple[float, ...]] | None
 
     def document(self) -> Iterator[Part]:
-        """What the file takes."""
+        """Tables of the file's needs."""
         facts = [
             ("time", f"{clock(self.time_s)} at its feeds, without acceleration, heating and changing tools"),
             ("tool changes", str(self.tool_changes)),

@@ -1,4 +1,4 @@
-"""How long moves take, as far as a file says: feeds and the axes' limits, without acceleration."""
+"""Duration of moves, as far as a file says: feeds and the axes' limits, without acceleration."""
 
 import numpy as np
 from numpy.typing import NDArray

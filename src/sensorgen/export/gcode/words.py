@@ -60,13 +60,13 @@ class Command:
         return float(first) if _NUMBER.fullmatch(first) else math.nan
 
     def has(self, letters: str) -> bool:
-        """Whether it has a word with any of these letters."""
+        """Test whether it has a word with any of these letters."""
         return any(name in letters for name, _ in self.words)
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """What a line says: its commands, its remarks, and what could not be read."""
+    """Content of a line: its commands, its remarks, and what could not be read."""
 
     commands: tuple[Command, ...]
     remark: str = ""
@@ -105,7 +105,7 @@ def parse(text: str) -> Line:
 
 
 def is_meta(text: str) -> bool:
-    """Whether a line is of the firmware's own language, as ``if`` and ``while``."""
+    """Test whether a line is of the firmware's own language, as ``if`` and ``while``."""
     return _META.match(text) is not None
 
 

@@ -82,7 +82,7 @@ def material_id(r: Recipe) -> str:
 
 
 def context(printer: Printer, quality: Quality, used: Mapping[int, Recipe]) -> dict[str, Any]:
-    """What all templates show."""
+    """Values of all templates."""
     return {
         "printer": printer, "quality": quality, "used": used, "tower": tower(printer, quality, len(used)),
         "line_mm": printer.line_mm(), "directions": DIRECTIONS, "prime_mm3": PRIME_MM3,

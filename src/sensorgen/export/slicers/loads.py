@@ -1,4 +1,4 @@
-"""What each tool prints, as numbers that the printer can do: the one source of every profile."""
+"""Settings of each tool, as numbers that the printer can do: the one source of every profile."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -24,7 +24,7 @@ RETRACTION_SPEED_MM_S = 40.0  # PrusaSlicer's default; slower where the printer'
 
 @dataclass(frozen=True)
 class Load:
-    """What a tool prints: the material, the source of its numbers, and what the design overrides.
+    """Material of a tool: the source of its numbers, and what the design overrides.
 
     ``profile`` is the design's, for all its tools.
     """
@@ -37,19 +37,19 @@ class Load:
 
 
 def load(design: Design, name: str) -> Load:
-    """What the tool of a material prints for a design."""
+    """Load of a material's tool for a design."""
     infill = design.infill.get(name, Infill())
     return Load(design.material(name), design.used()[name], infill.percent, infill.pattern, design.profile)
 
 
 def loads(design: Design) -> dict[int, Load]:
-    """What each tool prints for a design, by the printer's own tool number."""
+    """Loads of a design, by the printer's own tool number."""
     return {design.tool(name): load(design, name) for name in design.used()}
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """How one tool prints its material: lengths [mm], temperatures [C], speeds [mm/s], shares [%]."""
+    """Settings by which one tool prints its material: lengths [mm], temperatures [C], speeds [mm/s], shares [%]."""
 
     material: Material
     source: str
@@ -186,7 +186,7 @@ def overlaid(text: str, settings: Mapping[str, str]) -> str:
 
 
 def by_hand(material: Material) -> list[str]:
-    """What the operator sets by hand, in words: the extruder's cam dial, and drying."""
+    """Settings by hand, in words: the extruder's cam dial, and drying."""
     found = [f"Drying: {material.drying}"] if material.drying else []
     if "cam_dial" in material.print:
         found.insert(0, f"Cam dial of the extruder: {number(material.value('cam_dial').value)}")

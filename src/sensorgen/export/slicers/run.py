@@ -24,7 +24,7 @@ _SIGNALS = {number.value: number.name for number in signal.Signals}  # SIGXFSZ w
 
 @dataclass(frozen=True)
 class Runner:
-    """How to run a slicer: which program, for how long, and whom to tell that time passes.
+    """Way to run a slicer: program, time allowed, and a callback while time passes.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ def _wait(command: Sequence[str], said: BinaryIO, environment: Mapping[str, str]
 
 
 def _last_words(said: BinaryIO) -> str:
-    """What the slicer calls an error, or else the end of what it said; the rest is licence and progress."""
+    """Errors named by the slicer, or else the end of its output; the rest is licence and progress."""
     said.seek(max(0, said.seek(0, os.SEEK_END) - _KEPT_BYTES))
     text = said.read().decode(errors="replace").replace("\t", " ")
     lines = ["".join(filter(str.isprintable, line)).strip() for line in text.splitlines()]

@@ -27,7 +27,7 @@ _SETTING = re.compile(r"^([a-z0-9_]+) = (.*)$")
 
 
 class Change(Strict):
-    """What a version does differently from the one before.
+    """Difference of a version from the one before.
 
     Attributes
     ----------

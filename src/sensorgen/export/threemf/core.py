@@ -1,4 +1,4 @@
-"""What all families share: the zip of a 3MF, and its model file by the core specification.
+"""Parts that all families share: the zip of a 3MF, and its model file by the core specification.
 
 The zip's bytes depend on its files only: no clock, no user, no operating system.
 

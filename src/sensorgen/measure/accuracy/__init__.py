@@ -64,7 +64,7 @@ class Band:
 
 @dataclass(frozen=True)
 class Instrument:
-    """What an instrument's maker specifies.
+    """Specification by an instrument's maker.
 
     Attributes
     ----------
@@ -168,7 +168,7 @@ class Value:
 
 @dataclass(frozen=True, eq=False)
 class At:
-    """What one reading says at one frequency.
+    """Reading at one frequency.
 
     Attributes
     ----------
@@ -215,7 +215,7 @@ class At:
 
 
 def at_frequency(reading: Reading, frequency_hz: float) -> At:
-    """What a reading says at one frequency."""
+    """Reading at one frequency."""
     values, stated = dict[str, list[float]](), dict[str, float]()
     errors = reading.uncertainty or (0.0,) * len(reading.value)
     for name, value, at, error in zip(reading.quantity, reading.value, reading.frequency_hz, errors, strict=True):
@@ -268,12 +268,12 @@ def names() -> Sequence[str]:
 
 
 def is_named(name: str, text: str) -> bool:
-    """Whether a text names an instrument, by its type: as a label, or a reply to ``*IDN?``."""
+    """Test whether a text names an instrument, by its type: as a label, or a reply to ``*IDN?``."""
     return is_of(_all()[name], text)
 
 
 def is_of(one: Instrument, text: str) -> bool:
-    """Whether a text names this instrument; as :func:`is_named`."""
+    """Test whether a text names this instrument; as :func:`is_named`."""
     types = (one.name.split()[-1], *one.also)
     return any(re.search(rf"(?<![0-9A-Za-z]){re.escape(each)}(?![0-9])", text, re.IGNORECASE) for each in types)
 

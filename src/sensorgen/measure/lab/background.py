@@ -39,7 +39,7 @@ class Background:
         self._thread.start()
 
     def read(self) -> Readings:
-        """What has been read since the last call; a failure of the meter is raised here."""
+        """Readings since the last call; a failure of the meter is raised here."""
         if self._fault:
             raise self._fault
         parts = []

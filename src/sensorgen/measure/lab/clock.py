@@ -6,7 +6,7 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """What a run and its devices tell the time by."""
+    """Clock of a run and its devices."""
 
     def now(self) -> float:
         """Time since any moment; never goes back [s]."""

@@ -22,7 +22,7 @@ class WrongDevice(DeviceFault):
 
 @dataclass(frozen=True)
 class Identity:
-    """What a device says that it is.
+    """Identity by the device's own words.
 
     Attributes
     ----------
@@ -174,7 +174,7 @@ class ImpedanceMeter(Protocol):
         """Begin to measure at (m,) frequencies with an amplitude [Hz], [V]."""
 
     def read(self) -> Readings:
-        """What has been measured since the last call; nothing is an answer."""
+        """Readings since the last call; nothing is an answer."""
 
     def stop(self) -> None:
         """End the measurement and switch the output off."""

@@ -9,7 +9,7 @@ from pydantic import Field, ValidationError, model_validator
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, OutOfRange, within
 from sensorgen.core.records import Line, Strict, checked, problem
-from sensorgen.measure.virtual.faults import VirtualSpecimen
+from sensorgen.measure.virtual.rig import VirtualSpecimen
 from sensorgen.prediction.query import TONES_HZ
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -48,7 +48,7 @@ class Devices(Strict):
 
 
 class Tip(Strict):
-    """What presses.
+    """Tip that presses.
 
     Attributes
     ----------
@@ -68,14 +68,14 @@ TIPS = {"flat": Tip(length_mm=5.0), "soft": Tip(length_mm=10.0)}
 
 
 class Readout(Strict):
-    """What the impedance meter measures: frequencies [Hz] and amplitude [V]."""
+    """Settings of the impedance meter: frequencies [Hz] and amplitude [V]."""
 
     tones_hz: Frequencies = TONES_HZ
     voltage_v: Positive = 1.0
 
 
 class Limits(Strict):
-    """What no device may leave.
+    """Limits that no device may leave.
 
     Attributes
     ----------
@@ -173,7 +173,7 @@ class Sine(Strict):
 
 
 class Sweep(Strict):
-    """The same force at places side by side."""
+    """One force at places side by side."""
 
     force_n: Positive
     position_mm: Span
@@ -215,12 +215,12 @@ class Part(Strict):
 
     @property
     def kind(self) -> str:
-        """Which key it has."""
+        """Key of the step."""
         return next(iter(self.model_fields_set))
 
     @property
     def content(self) -> Kind:
-        """What that key holds."""
+        """Value of that key."""
         found: Kind = getattr(self, self.kind)
         return found
 

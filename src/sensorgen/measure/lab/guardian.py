@@ -39,7 +39,7 @@ _STALL = 2.0  # of the guardian itself, in its own periods: a stalled judge judg
 
 @dataclass(frozen=True)
 class Orders:
-    """What a guardian is to do.
+    """Orders of a guardian.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Orders:
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """What :meth:`to_json` wrote."""
+        """Read the text of :meth:`to_json`."""
         data = json.loads(text)
         devices = {role: Device.model_validate_json(json.dumps(each)) for role, each in data["devices"].items()}
         return cls(devices, data["dead_man_s"], Path(data["folder"]))
@@ -257,7 +257,7 @@ class Rescue:
         return made[0] if made else None
 
     def _tried(self, role: str, call: Callable[[], object]) -> bool:
-        """Whether a call worked, tried again until the time is over."""
+        """Test whether a call worked, tried again until the time is over."""
         until = time.monotonic() + _TRIES_S
         while True:
             try:

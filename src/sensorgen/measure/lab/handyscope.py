@@ -216,7 +216,7 @@ class Handyscope:
         self._count, self._least, self._late = 0, 0.0, 0.0  # samples; least lag so far; lag beyond it [s]
 
     def read(self) -> Readings:
-        """What has been measured since the last call.
+        """Readings since the last call.
 
         Raises
         ------
@@ -316,7 +316,7 @@ class Handyscope:
             self._ranges.append(float(channel.range))
 
     def _alive(self) -> None:
-        """Whether the device is there and the generator still plays, once a second."""
+        """Check that the device is there and the generator still plays, once a second."""
         if self._scope.is_removed:
             raise DeviceFault(f"Handyscope {self.address} was unplugged")
         now = self._clock.now()

@@ -34,7 +34,7 @@ _NUMBERS = re.compile(r"\s*([-+][0-9.]+E[-+]?[0-9]+)\s*,\s*([-+][0-9.]+E[-+]?[0-
 
 @dataclass(frozen=True)
 class Model:
-    """What distinguishes the models.
+    """Differences between the models.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ LOWEST_HZ, LOWEST_V, HIGHEST_V = 20.0, 0.005, 2.0  # rms, without the option of 
 
 
 class Settings(Strict):
-    """How it measures.
+    """Settings of the measurement.
 
     Attributes
     ----------

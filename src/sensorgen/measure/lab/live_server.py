@@ -31,7 +31,7 @@ _COMMAND_BYTES = 32
 
 @dataclass(frozen=True)
 class Served:
-    """What the server asks the view for.
+    """Part of the view that the server asks for.
 
     Attributes
     ----------

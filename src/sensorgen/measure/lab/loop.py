@@ -28,7 +28,7 @@ _DEEP_MM = 0.5  # beyond the deepest position
 
 
 class View(Protocol):
-    """What shows a run, as :class:`sensorgen.measure.lab.live.LiveView`."""
+    """Display of a run, as :class:`sensorgen.measure.lab.live.LiveView`."""
 
     def update(self, sample: Sample) -> None:
         """Show a sample."""
@@ -38,7 +38,7 @@ class View(Protocol):
 
 
 class Alive(Protocol):
-    """What lifts the tip when the run gives no sign of life, as :class:`sensorgen.measure.lab.guardian.Guardian`."""
+    """Guard that lifts the tip without a sign of life, as :class:`sensorgen.measure.lab.guardian.Guardian`."""
 
     def arm(self) -> None:
         """From now on."""
@@ -138,7 +138,7 @@ class Loop:
 
     @property
     def down(self) -> bool:
-        """Whether the tip has landed."""
+        """True if the tip has landed."""
         return isfinite(self.down_mm)
 
     def beat(self) -> None:
@@ -214,7 +214,7 @@ class Loop:
             raise DeviceFault(f"{wrong}: lifted")
 
     def _wrong(self) -> str:
-        """What is wrong with the actuator's reading; "" if nothing is."""
+        """Fault of the actuator's reading, or ""."""
         at, limits, now = self.extension, self.experiment.limits, self.clock.now()
         if not (isfinite(at.force_n) and isfinite(at.position_mm)):
             return "actuator: a force or position that is no number"

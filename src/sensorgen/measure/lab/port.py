@@ -55,7 +55,7 @@ class Web(Protocol):
 
 
 class Simulator(Protocol):
-    """What stands in for a device at the other end of a line.
+    """Simulator of a device at the other end of a line.
 
     Attributes
     ----------

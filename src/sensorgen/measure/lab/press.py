@@ -119,7 +119,7 @@ def land(loop: Loop) -> None:
 
 
 def _rests(loop: Loop, begun_s: float) -> bool:
-    """Whether the piston has come to rest: the same position for a while."""
+    """Test whether the piston has come to rest: the same position for a while."""
     now, at = loop.clock.now(), loop.extension.position_mm
     if now - begun_s > _LAND_S:
         raise DeviceFault(f"actuator: still on its way down after {_LAND_S:g} s, at {at:.2f} mm")

@@ -173,7 +173,7 @@ class Recorder:
 
 
 class Journal:
-    """What happened, one JSON object per line with ``event`` and ``at``, in seconds since 1970."""
+    """Events, one JSON object per line with ``event`` and ``at``, in seconds since 1970."""
 
     def __init__(self, path: Path, clock: Clock) -> None:
         self.file, self._clock = Appended(path), clock
@@ -227,7 +227,7 @@ class Run:
 
     @property
     def attempts(self) -> int:
-        """How often it was begun."""
+        """Number of starts."""
         return sum(1 for _ in self.of("begun"))
 
     @property
@@ -237,7 +237,7 @@ class Run:
 
     @property
     def finished(self) -> bool:
-        """Whether all of its plan was done."""
+        """True if all of its plan was done."""
         return any(each["end"] == "done" for each in self.of("ended"))
 
 

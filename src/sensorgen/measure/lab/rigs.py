@@ -11,7 +11,7 @@ from sensorgen.measure.lab import catalogue
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.experiment import Device, Devices, Experiment
 from sensorgen.measure.lab.safety import Rig
-from sensorgen.measure.virtual import faults, mechanics
+from sensorgen.measure.virtual import faults, mechanics, rig
 
 _HEARD = 1000  # messages that a simulator remembers
 ROLES = ("actuator", "stage", "impedance")
@@ -58,11 +58,11 @@ def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Rig
         As :func:`real`; a virtual specimen that cannot be; a fault of a device that is not in use; a kind without a
         simulator.
     """
-    virtual = experiment.virtual or faults.VirtualSpecimen()
+    virtual = experiment.virtual or rig.VirtualSpecimen()
     devices = experiment.devices or SIMULATED
     with within("virtual"):
         _strike(virtual, devices)
-        plant = faults.rig_of(virtual, design, experiment.pressing.length_mm * 1e-3)
+        plant = rig.rig_of(virtual, design, experiment.pressing.length_mm * 1e-3)
         plant.specimen.blank  # noqa: B018 - solved now: one that cannot be is refused before the run begins
     found: dict[str, Any] = {}
     for role in ROLES:
@@ -81,7 +81,7 @@ def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Rig
     return Rig(**found), plant
 
 
-def _strike(virtual: faults.VirtualSpecimen, devices: Devices) -> None:
+def _strike(virtual: rig.VirtualSpecimen, devices: Devices) -> None:
     """Refuse planted faults of devices that are not in use."""
     struck = {"rig", *(_STRIKES.get(getattr(devices, role).kind, "") for role in ROLES)}
     for one in virtual.faults:

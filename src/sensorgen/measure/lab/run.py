@@ -42,7 +42,7 @@ USUAL_MM = 100.0  # length of a specimen whose design is unknown
 
 @dataclass(frozen=True)
 class RunResult:
-    """What became of a run.
+    """Outcome of a run.
 
     Attributes
     ----------
@@ -419,7 +419,7 @@ def _beside(loop: Loop, choose: Callable[[], Choice]) -> Choice:
 
 
 def _kept(pressed: Pressed) -> dict[str, Any]:
-    """What the journal keeps of a press."""
+    """Part of a press that the journal keeps."""
     step = pressed.step
     return {
         "place_mm": step.place_mm, "force_n": step.force_n, "peak_n": step.peak_n, "hold_s": step.hold_s,

@@ -60,7 +60,7 @@ class _Attempts:
     problems: list[str] = field(default_factory=list)
 
     def __call__(self, what: str, call: Callable[[], object]) -> bool:
-        """Whether it worked."""
+        """Test whether it worked."""
         with suppress(SensorgenError):  # a dead guardian must not keep the tip down
             self.beat()
         try:

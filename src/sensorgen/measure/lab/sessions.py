@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Asked:
-    """What a session is to do.
+    """Task of a session.
 
     Attributes
     ----------

@@ -107,7 +107,7 @@ class _Reported(DeviceFault):
 
 @dataclass
 class _State:
-    """What the driver knows of the controller."""
+    """Knowledge of the driver about the controller."""
 
     known: bool = False
     on: bool = False

@@ -18,7 +18,7 @@ _MOST = 1 << 14  # readings of a window, whatever the rate
 
 
 def circuit(tones_hz: Real, impedance_ohm: Complex) -> str:
-    """What a specimen is not, by its (m,) impedances: "short", "open", or "".
+    """Circuit fault of a specimen, by its (m,) impedances: "short", "open", or "".
 
     At the lowest frequency an intact specimen is a capacitor: its reactance exceeds its resistance. At the highest,
     where the noise of a reading is least, an open circuit has a smaller capacitance than any specimen.
@@ -86,7 +86,7 @@ class Watch:
             raise DeviceFault(f"impedance meter: {what} readings for {SILENT_S:g} s; check cables, range and specimen")
 
     def circuit(self) -> str:
-        """What the specimen has not been for half of the last readings: "short", "open", or "".
+        """Circuit fault of the specimen in half of the last readings: "short", "open", or "".
 
         Clipped readings count: a short drives more current than an input takes.
         """

@@ -13,6 +13,7 @@ from sensorgen.core.errors import BadInput, SensorgenError, within
 from sensorgen.core.records import Strict, checked
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design, of_resolved
+from sensorgen.design.shape_files import NotTrusted
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.log import notes
 from sensorgen.measure.log.entries import Batch, DesignRow, Entry, Prediction, Print, RawFile
@@ -94,8 +95,11 @@ def _piece(batch: str, name: str, piece: _Piece, record: _Record) -> Iterator[En
         yield prediction(piece.design_id, piece.design, piece.expected | ({"printed": printed} if printed else {}))
 
 
-def designs(log: "Log") -> dict[str, Design]:
-    """Designs in the log by their identity when they were logged; without those that cannot be read here."""
+def designs(log: "Log", refused: dict[str, str] | None = None) -> dict[str, Design]:
+    """Designs in the log by their identity when they were logged; without those that cannot be read here.
+
+    Of those whose shape the user has not trusted, ``refused`` gets the reason.
+    """
     found = dict[str, Design]()
     recorded = [(row.uid, row.design, row.data) for row in log.entries(DesignRow)]
     for batch in log.batches():  # before version 3 the log had them in the files of batches only
@@ -103,8 +107,13 @@ def designs(log: "Log") -> dict[str, Design]:
             data = _json(log.raw(batch.file)).get("designs", {})
             recorded += [(key, of["name"], json.dumps(of["resolved"])) for key, of in data.items()]
     for key, name, data in recorded:
-        with suppress(SensorgenError, KeyError, TypeError):
+        try:
             found.setdefault(key, of_resolved(name, json.loads(data)))
+        except NotTrusted as error:
+            if refused is not None:
+                refused[key] = str(error)
+        except (SensorgenError, KeyError, TypeError):
+            continue
     return found
 
 

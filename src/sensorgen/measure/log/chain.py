@@ -64,7 +64,7 @@ def made(parents: Sequence[str], kind: str, version: int, logged_at: str, conten
 
 
 def sound(record: Record) -> bool:
-    """Whether a record is what its identity says."""
+    """Test whether a record is what its identity says."""
     return (
         _WORD.fullmatch(record.kind) is not None
         and _WORD.fullmatch(record.logged_at) is not None
@@ -74,7 +74,7 @@ def sound(record: Record) -> bool:
 
 
 class Ancestry:
-    """Which records of a log were written after which, where several machines wrote.
+    """Order of the records of a log in which several machines wrote.
 
     Each record is a place on a line, which goes on until another record follows the same one; where lines are merged,
     the new record knows how far each line had come.
@@ -112,6 +112,6 @@ class Ancestry:
         return next(known for start, known in reversed(self._known[line]) if start <= number)
 
     def before(self, first: str, second: str) -> bool:
-        """Whether the chain of the second record leads to the first."""
+        """Test whether the chain of the second record leads to the first."""
         (line, number), (other, at) = self._place[first], self._place[second]
         return number < at if line == other else self._seen(other, at).get(line, -1) >= number

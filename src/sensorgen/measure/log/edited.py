@@ -1,7 +1,7 @@
 """Rows of a table that was edited after it was logged: each corrects the reading that it came from, or is refused."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
 from hashlib import sha256
 
 from sensorgen.core.errors import BadInput
@@ -32,7 +32,7 @@ _ORIGIN = {
 _MEASURED = [name for name in columns(Reading) if name not in _WORDS | _ORIGIN]
 
 
-def corrections(log: Log, rows: Sequence[Reading], table: str) -> list[Reading]:
+def corrections(log: Log, rows: Iterable[Reading], table: str) -> Iterator[Reading]:
     """Rows of a table; those that were edited correct the readings that they came from.
 
     A row was edited where the log has a reading of a table of this name that the table does not have any more: with
@@ -43,8 +43,8 @@ def corrections(log: Log, rows: Sequence[Reading], table: str) -> list[Reading]:
     ----------
     log : Log
         An open log.
-    rows : sequence of Reading
-        All rows of the table.
+    rows : iterable of Reading
+        All rows of the table; given on as they come where the log has none of a table of this name.
     table : str
         Its name.
 
@@ -54,12 +54,12 @@ def corrections(log: Log, rows: Sequence[Reading], table: str) -> list[Reading]:
         A row that may be another measurement, or an edit.
     """
     current = {reading.uid: reading for reading in log.entries(Reading, source=table)}
-    kept = {row.uid for row in rows} & current.keys()
+    rows = list(rows) if current else rows
+    kept = {row.uid for row in rows} & current.keys() if current else set()
     gone = {reading.uid: reading for reading in current.values() if reading.uid not in kept}
-    found = []
     for row in rows:
         if row.uid in kept or not gone or next(log.entries(Reading, uid=row.uid), None):
-            found.append(row)
+            yield row
             continue
         replaced = next(
             log.entries(Reading, replaced=True, uid=row.uid), None
@@ -72,7 +72,7 @@ def corrections(log: Log, rows: Sequence[Reading], table: str) -> list[Reading]:
         if old:
             del gone[old.uid]
             uid = sha256(f"{row.uid} {old.uid}".encode()).hexdigest()[:32] if replaced else row.uid
-            found.append(dataclasses.replace(row, uid=uid, supersedes=old.uid))
+            yield dataclasses.replace(row, uid=uid, supersedes=old.uid)
         elif other and not replaced:
             raise BadInput(
                 f"{table}, row {(row.source_row or 0) + 1}: not what reading {other.number} of {other.specimen} was in "
@@ -80,8 +80,7 @@ def corrections(log: Log, rows: Sequence[Reading], table: str) -> list[Reading]:
                 "--reason corrected, and import again. If it is another table: give the file another name"
             )
         else:
-            found.append(row)
-    return found
+            yield row
 
 
 def _measured(reading: Reading) -> list[object]:

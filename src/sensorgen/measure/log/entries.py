@@ -101,7 +101,7 @@ class _OfSpecimen(Specimen, Entry):
 
 @dataclass(frozen=True, kw_only=True)
 class Reading(_OfSpecimen):
-    """What meters showed of a specimen, measured together.
+    """Readings of a specimen by meters, measured together.
 
     Version 1 had the fields up to ``source_row``.
 
@@ -187,7 +187,7 @@ class BenchRun(_OfSpecimen):
 
     @property
     def simulated(self) -> bool:
-        """Whether ``bench run --simulate`` made it, or its remark begins with that word."""
+        """True if ``bench run --simulate`` made it, or its remark begins with that word."""
         return self.remark.partition(";")[0].strip() == "simulated"
 
 

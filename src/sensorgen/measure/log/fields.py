@@ -26,7 +26,7 @@ _Kinds = tuple[bool, Any, frozenset[type]]
 
 @cache
 def _kinds(annotation: Any) -> _Kinds:
-    """Whether a field may be None, its type in JSON, and the types of its items if that is a list."""
+    """Kinds of a field: True if it may be None, its type in JSON, and the types of its items if that is a list."""
     if annotation == tuple[float, ...]:
         return False, list, frozenset((int, float))
     if annotation == tuple[str, ...]:
@@ -36,6 +36,7 @@ def _kinds(annotation: Any) -> _Kinds:
 
 
 _TEXT = _kinds(str)
+_ENCODER = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"))
 _HELD: dict[type[Entry], dict[str, tuple[_Kinds, object]]] = {  # by a record: types and defaults
     kind: {f.name: (_kinds(of[f.name]), f.default) for f in fields(kind) if f.name not in UNHASHED}
     for kind, of in _COLUMNS.items()
@@ -61,8 +62,9 @@ def encode(entry: Entry) -> str:
         value = getattr(entry, name)
         if value != usual:
             data[name] = value
-            _checked(name, kinds, list(value) if isinstance(value, tuple) else value, kind)
-    text = json.dumps(data, ensure_ascii=False, separators=(",", ":"))
+            if kinds is not _TEXT or type(value) is not str:
+                _checked(name, kinds, list(value) if isinstance(value, tuple) else value, kind)
+    text = _ENCODER.encode(data)
     if "Infinity" not in text:
         return text
     return f"{{{','.join(f'{json.dumps(name)}:{_json(value)}' for name, value in data.items())}}}"
@@ -91,7 +93,7 @@ def decode(kind: type[_Kind], content: str, number: int, logged_at: str) -> _Kin
 
 
 def indexed(content: str) -> tuple[str | int | None, ...]:
-    """What the log's index has of a record's content: the fields of ``INDEXED``, None for those that it has not."""
+    """Entries of the log's index for a record's content: the fields of ``INDEXED``, None for those that it has not."""
     held = _object(content) or {}
     return tuple([held[name] if type(held.get(name)) is kind else None for name, kind in INDEXED.items()])
 

@@ -1,7 +1,7 @@
 """Import files into the log: tables of readings, print beds, and exported logs; each file as a whole or not at all."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
@@ -115,9 +115,8 @@ def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> Imported:
     if path.suffix.lower() == ".json":
         return _add(log, list(batches.rows(path, files.keep(log.files, path))))
     if not path.is_dir():
-        rows, left_out = _table(path, columns)
-        readings = [row for row in rows if isinstance(row, Reading) and not row.logged_at]  # of no export
-        return _add(log, edited.corrections(log, readings, path.name) if readings else rows, left_out)
+        with _table(log, path, columns) as (rows, left_out):
+            return _add(log, rows, left_out)
     exported: list[Entry] = []
     for kind, name in exchange.FILES.items():
         file = next((p for suffix in exchange.FORMATS if (p := path / f"{name}.{suffix}").is_file()), None)
@@ -125,7 +124,8 @@ def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> Imported:
             continue
         if file is None:
             raise BadInput(f"{str(path)!r} has no {name}.csv; expected the folder of an exported log")
-        rows = _table(file, {})[0]
+        with _table(log, file, {}) as (found, _):
+            rows = list(found)
         if not all(isinstance(row, kind) for row in rows):
             raise BadInput(f"{file}: columns of another table; expected those of {name}")
         exported += rows
@@ -135,19 +135,24 @@ def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> Imported:
     return _add(log, exported)
 
 
-def _table(path: Path, columns: Mapping[str, str]) -> tuple[Sequence[Entry], Sequence[str]]:
-    """Rows of a table, and the columns that are ignored."""
+@contextmanager
+def _table(log: Log, path: Path, columns: Mapping[str, str]) -> Iterator[tuple[Iterable[Entry], Sequence[str]]]:
+    """Rows of a table as it is read, and the columns that are ignored."""
     if path.suffix.lower() == ".parquet":
-        return exchange.from_parquet(path)[1], ()
+        yield exchange.from_parquet(path)[1], ()
+        return
     if not columns and lcr.looks_like(path) and not _is_log_table(path):
         raise BadInput(f"{path}: the export of an LCR meter; say of which specimen, as --specimen S1")
     with tables.opened(path) as table:
-        kind = exchange.kind_of(table.names)
-        return (list(exchange.from_csv(kind, table)), ()) if kind else tables.readings(table, columns, path.name)
+        if kind := exchange.kind_of(table.names):
+            yield exchange.from_csv(kind, table), ()
+        else:
+            rows, left_out = tables.readings(table, columns, path.name)
+            yield edited.corrections(log, rows, path.name), left_out
 
 
 def _is_log_table(path: Path) -> bool:
-    """Whether a file is an exported table of a log, or has a column of specimens."""
+    """Test whether a file is an exported table of a log, or has a column of specimens."""
     with suppress(BadInput), tables.opened(path) as table:
         return exchange.kind_of(table.names) is not None or bool(
             {name.casefold() for name in table.names} & {*tables.NAMES["specimen"]}
@@ -155,8 +160,18 @@ def _is_log_table(path: Path) -> bool:
     return False
 
 
-def _add(log: Log, rows: Sequence[Entry], left_out: Iterable[str] = ()) -> Imported:
-    new = log.add(rows)
-    doubtful = sum(isinstance(row, Reading) and bool(row.doubts) for row in new)
-    corrections = 0 if any(row.logged_at for row in rows) else sum(bool(getattr(row, "supersedes", "")) for row in new)
-    return Imported(len(rows), len(new), doubtful, corrections, tuple(left_out))
+def _add(log: Log, rows: Iterable[Entry], left_out: Iterable[str] = ()) -> Imported:
+    count = dict.fromkeys(("rows", "new", "doubtful", "exported", "corrections"), 0)
+
+    def counted() -> Iterator[Entry]:
+        for row in rows:
+            count["rows"] += 1
+            count["exported"] += bool(row.logged_at)
+            yield row
+
+    for new in log.adding(counted()):
+        count["new"] += 1
+        count["doubtful"] += isinstance(new, Reading) and bool(new.doubts)
+        count["corrections"] += bool(getattr(new, "supersedes", ""))
+    corrections = 0 if count["exported"] else count["corrections"]
+    return Imported(count["rows"], count["new"], count["doubtful"], corrections, tuple(left_out))

@@ -248,17 +248,17 @@ class Log:
         return ((_record(row[:6]), row[6], row[7], row[8:]) for row in self._rows(sql))
 
     def known(self, key: str, before: int = 2**62) -> bool:
-        """Whether the log has a record with that identity, before a number."""
+        """Test whether the log has a record with that identity, before a number."""
         sql = "SELECT 1 FROM record WHERE id = ? AND sequence < ?"
         return next(self._rows(sql, [key, before]), None) is not None
 
     def merged_after(self, sequence: int) -> bool:
-        """Whether a merge follows a record, as it does where another machine's log begins."""
+        """Test whether a merge follows a record, as it does where another machine's log begins."""
         sql = "SELECT 1 FROM record WHERE sequence > ? AND instr(parents, ',') > 0 LIMIT 1"
         return next(self._rows(sql, [sequence]), None) is not None
 
     def is_copy(self, sequence: int) -> bool:
-        """Whether a row of the same kind and ``uid`` stands before a record."""
+        """Test whether a row of the same kind and ``uid`` stands before a record."""
         sql = ("SELECT 1 FROM record copy JOIN record row ON row.kind = copy.kind AND row.uid = copy.uid "
                "WHERE copy.sequence = ? AND row.sequence < copy.sequence")  # fmt: skip
         return next(self._rows(sql, [sequence]), None) is not None
@@ -270,7 +270,7 @@ class Log:
         return int(sequence), str(key)
 
     def before(self, first: Entry, others: Sequence[Entry]) -> bool | None:
-        """Whether a row was logged before all of some others by the order of the records, which no clock decides.
+        """Test whether a row was logged before all of some others by the order of the records, which no clock decides.
 
         Returns
         -------
@@ -302,7 +302,7 @@ class Log:
 
     @property
     def merged(self) -> bool:
-        """Whether several machines have written the log."""
+        """True if several machines have written the log."""
         return self._ancestry is not None
 
     @cached_property
@@ -313,7 +313,7 @@ class Log:
 
     @cached_property
     def _ancestry(self) -> chain.Ancestry | None:
-        """Who knew of which records; None in a log of one machine, where the sequence tells."""
+        """Ancestry of the records; None in a log of one machine, where the sequence tells."""
         merged = self._rows("SELECT 1 FROM record WHERE instr(parents, ',') > 0 OR parents = '' LIMIT 2")
         if len(list(merged)) < 2:
             return None
@@ -341,12 +341,20 @@ class Log:
         Unwritable
             The disk is full, or the log cannot be written to.
         """
+        return list(self.adding(entries))
+
+    def adding(self, entries: Iterable[Entry]) -> Iterator[Entry]:
+        """The new rows one after the other, in little memory; none is logged unless the last one is asked for.
+
+        Parameters and errors as of :meth:`add`.
+        """
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         with database.transaction(self._connection, self.path):
             writer = _Writer(self._connection, *self.head())
-            new = [added for entry in entries if (added := self._add(entry, now, writer))]
+            for entry in entries:
+                if added := self._add(entry, now, writer):
+                    yield added
             writer.finish()
-        return new
 
     @contextmanager
     def merging(self) -> Iterator["Merging"]:
@@ -384,11 +392,13 @@ class Log:
         return decode(KINDS[record.kind], record.content, 0, record.logged_at)
 
     def has(self, entry: Entry) -> bool:
-        """Whether the log has a row already, apart from what each machine adds to it."""
+        """Test whether the log has a row already, apart from what each machine adds to it."""
+        kind, uid = type(entry), entry.uid
+        return self._exists(kind, uid) and any(_same(entry, row, but=_LOCAL) for row in self._of_uid(kind, uid))
+
+    def _exists(self, kind: type[Entry], uid: str) -> bool:
         sql = "SELECT 1 FROM record WHERE kind = ? AND uid = ? AND number IS NOT NULL"
-        if not self._connection.execute(sql, [NAMES[type(entry)], entry.uid]).fetchone():
-            return False
-        return any(_same(entry, row, but=_LOCAL) for row in self._of_uid(type(entry), entry.uid))
+        return bool(uid) and self._connection.execute(sql, [NAMES[kind], uid]).fetchone() is not None
 
     def _of_uid(self, kind: type[_Kind], uid: str) -> Iterator[_Kind]:
         """Rows of a kind with a ``uid``, corrected or not."""
@@ -397,8 +407,8 @@ class Log:
 
     def _add(self, entry: Entry, now: str, writer: "_Writer") -> Entry | None:
         kind = type(entry)
-        known = next(self._of_uid(kind, entry.uid), None)
-        if known:
+        if self._exists(kind, entry.uid):
+            known = next(self._of_uid(kind, entry.uid))
             if entry.logged_at and not _same(known, entry, but=("number", "logged_at", "claimed_at")):
                 raise BadInput(f"row {entry.uid} has other content in the log; expected the same")
             return None
@@ -411,17 +421,17 @@ class Log:
             if before and before.design_id != entry.design_id:
                 raise BadInput(_two_designs(before, entry))
         if isinstance(entry, Reading | BenchRun) and not (entry.batch or entry.logged_at):
-            entry = self._with_print(entry)
-        claimed = entry.claimed_at or entry.logged_at
-        entry = dataclasses.replace(entry, logged_at=now, claimed_at=claimed, number=0)
+            entry = self._with_print(entry, writer)
+        if entry.logged_at and not entry.claimed_at:
+            entry = dataclasses.replace(entry, claimed_at=entry.logged_at)
         version = VERSIONS.get(NAMES[kind], 1)
         record = chain.made([writer.head] if writer.head else [], NAMES[kind], version, now, encode(entry))
-        return dataclasses.replace(entry, number=writer.append(record, copy=False))
+        return dataclasses.replace(entry, logged_at=now, number=writer.append(record, copy=False))
 
     def _check_references(self, entry: Entry) -> None:
         for name, kind in REFERENCES.get(type(entry), {}).items():
             uid = getattr(entry, name)
-            if uid and next(self._of_uid(kind, uid), None) is None:
+            if uid and not self._exists(kind, uid):
                 raise BadInput(f"a {word(type(entry))} refers to {word(kind)} {uid!r:.80}, which the log does not have")
 
     def _check_correction(self, entry: Entry) -> None:
@@ -457,13 +467,15 @@ class Log:
         found = next(self._rows(sql, [NAMES[type(entry)], entry.number]), None)
         return self._row(*found) if found else None
 
-    def _with_print(self, entry: Reading | BenchRun) -> Reading | BenchRun:
+    def _with_print(self, entry: Reading | BenchRun, writer: "_Writer") -> Reading | BenchRun:
         """Entry with batch and design of the specimen's latest print."""
-        printed = self.bound(entry.specimen)
-        if printed is None:
-            return entry
-        batch = next((row.batch for row in self._of_uid(Batch, printed.batch_uid)), "")
-        return dataclasses.replace(entry, batch=batch, design_id=printed.design_id, design=printed.design)
+        if entry.specimen not in writer.printed:
+            printed, changes = self.bound(entry.specimen), dict[str, Any]()
+            if printed:
+                batch = next((row.batch for row in self._of_uid(Batch, printed.batch_uid)), "")
+                changes = {"batch": batch, "design_id": printed.design_id, "design": printed.design}
+            writer.printed[entry.specimen] = changes
+        return dataclasses.replace(entry, **changes) if (changes := writer.printed[entry.specimen]) else entry
 
     def bound(self, specimen: str) -> Print | None:
         """The latest print of a specimen, which binds its name to a design; None of a name that is not bound.
@@ -541,12 +553,15 @@ class _Writer:
         self._connection = connection
         self.sequence, self.head = sequence, head
         self._numbers: dict[str, int] = {}
+        self.printed: dict[str, dict[str, Any]] = {}  # batch and design of the latest print, by specimen
 
     def append(self, record: Record, copy: bool) -> int:
         """Append a record; a copy of a row that the log has gets no number of its own."""
         if record.kind not in self._numbers:
             sql = "SELECT max(number) FROM record WHERE kind = ?"
             self._numbers[record.kind] = self._connection.execute(sql, [record.kind]).fetchone()[0] or 0
+        if record.kind in (NAMES[Batch], NAMES[Print], NAMES[Withdrawal]):
+            self.printed.clear()
         self._numbers[record.kind] += not copy
         number = None if copy else self._numbers[record.kind]
         self.sequence, self.head = self.sequence + 1, record.id
@@ -579,7 +594,7 @@ def _two_designs(one: Print, other: Print) -> str:
 
 
 def _same(one: Entry, other: Entry, but: tuple[str, ...]) -> bool:
-    """Whether two rows of a kind have the same content, apart from some fields."""
+    """Test whether two rows of a kind have the same content, apart from some fields."""
     return type(one) is type(other) and all(
         getattr(one, name) == getattr(other, name) for name in columns(type(one)) if name not in but
     )

@@ -43,10 +43,9 @@ def specimen(written: str, log: "Log | None" = None) -> Specimen:
     if bound:
         return Specimen(**{key: getattr(bound, key) for key in SPECIMEN_COLUMNS})
     try:
-        name = specimen_name.parse(written)
+        return _by_name(written)[0]
     except BadInput as error:
         raise BadInput(f"{error}; or bind it to its design: sensorgen log specimen NAME --design FILE") from None
-    return Specimen(specimen=name.name, **{key: getattr(name, key) for key in SPECIMEN_COLUMNS[1:]})
 
 
 def _bound(written: str, log: "Log | None") -> Print | None:
@@ -100,7 +99,7 @@ def reading(
     y, z = resistance("y", y_words, mega=mega), resistance("z", z_words, mega=mega)
     unbaked = bool(_UNBAKED.search(remark))
     film_expected = (of.iteration or 0) < FIRST_WITH_FILMS
-    assumed = () if bound else specimen_name.parse(written).assumed
+    assumed = () if bound else _by_name(written)[2]
     doubts = [doubt for doubt in assumed if doubt != specimen_name.NO_FILM or film_expected]
     doubts += [f"{axis}: {doubt}" for axis, parsed in (("y", y), ("z", z)) for doubt in parsed.doubts]
     if table and not (y.ohm and z.ohm):
@@ -174,18 +173,35 @@ def design_fields(written: str, log: "Log | None" = None) -> tuple[str, str]:
     bound = _bound(written, log)
     if bound:
         return bound.design_id, bound.design
-    design = design_of(written)
-    return (design.id(), design.name) if design else ("", "")
+    return _by_name(written)[1]
 
 
 def design_of(written: str) -> Design | None:
     """Design that a specimen's name stands for, or None."""
-    return _design(dataclasses.replace(specimen_name.parse(written), iteration=None, replicate=None, place=""))
+    return _design(_without_copy(specimen_name.parse(written)))
 
 
-@lru_cache(maxsize=256)
+def _without_copy(name: specimen_name.Specimen) -> specimen_name.Specimen:
+    """The part of a name that decides its design."""
+    return dataclasses.replace(name, iteration=None, replicate=None, place="", raw="", assumed=())
+
+
 def _design(name: specimen_name.Specimen) -> Design | None:
     try:
         return specimen_name.design_of(name)
     except SensorgenError:  # a film that no design may have
         return None
+
+
+@lru_cache(maxsize=256)
+def _identity(name: specimen_name.Specimen) -> tuple[str, str]:
+    design = _design(name)
+    return (design.id(), design.name) if design else ("", "")
+
+
+@lru_cache(maxsize=1 << 14)
+def _by_name(written: str) -> tuple[Specimen, tuple[str, str], tuple[str, ...]]:
+    """Specimen, identity and name of its design, and doubts, by a name that is bound to no design."""
+    name = specimen_name.parse(written)
+    columns = {key: getattr(name, key) for key in SPECIMEN_COLUMNS[1:]}
+    return Specimen(specimen=name.name, **columns), _identity(_without_copy(name)), name.assumed

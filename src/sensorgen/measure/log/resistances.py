@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import lru_cache
 
 from sensorgen.core.errors import BadInput
 from sensorgen.core.records import shown
@@ -49,6 +50,7 @@ class Resistances:
     mega: tuple[str, ...] = ()
 
 
+@lru_cache(maxsize=1 << 14)
 def parse(text: str, *, mega: bool = False) -> Resistances:
     """Parse a cell of a table of resistances, or typed text.
 

@@ -46,8 +46,8 @@ def opened(path: Path) -> Iterator[Table]:
         yield table
 
 
-def readings(table: Table, columns: Mapping[str, str], source: str) -> tuple[list[Reading], list[str]]:
-    """Readings of a table, and the columns that are ignored.
+def readings(table: Table, columns: Mapping[str, str], source: str) -> tuple[Iterator[Reading], list[str]]:
+    """Readings of a table as it is read, and the columns that are ignored.
 
     Parameters
     ----------
@@ -64,12 +64,16 @@ def readings(table: Table, columns: Mapping[str, str], source: str) -> tuple[lis
         A cell that cannot be parsed; with file, row and column.
     """
     places = _places(table, columns)
+    left_out = [name for k, name in enumerate(table.names) if k not in set(places.values()) and name]
+    return _rows(table, places, source), left_out
+
+
+def _rows(table: Table, places: Mapping[str, int], source: str) -> Iterator[Reading]:
     seen: Counter[str] = Counter()
-    rows = [_row(table, number, cells, places, seen, source) for number, cells in table.text_rows()]
-    if not rows:
+    for number, cells in table.text_rows():
+        yield _row(table, number, cells, places, seen, source)
+    if not seen:
         raise BadInput(f"{table.name}: no rows below the header")
-    used = set(places.values())
-    return rows, [name for k, name in enumerate(table.names) if k not in used and name]
 
 
 def _places(table: Table, columns: Mapping[str, str]) -> dict[str, int]:
@@ -120,4 +124,4 @@ def thesis() -> list[Reading]:
     (69, '23 triX', '0.68k', (45.0,))
     """
     with opened(Path(__file__).with_name("table_d1.csv")) as table:
-        return readings(table, {}, THESIS)[0]
+        return list(readings(table, {}, THESIS)[0])

@@ -119,7 +119,7 @@ def _chain_faults(log: Log, notes: list[str]) -> Iterator[str]:
 
 
 def _follows(log: Log, record: chain.Record, sequence: int, before: str) -> bool:
-    """Whether all that a record follows is there; another machine's log may begin anywhere before a merge."""
+    """Test whether all that a record follows is there; another machine's log may begin anywhere before a merge."""
     if not record.parents:
         return not before or log.merged_after(sequence)
     return all(parent == before or log.known(parent, sequence) for parent in record.parents)

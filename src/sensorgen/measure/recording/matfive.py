@@ -179,7 +179,7 @@ def _unpacked(element: _Element, order: str, spool: Spool) -> _Element:
 
 
 def _inflated(element: _Element) -> Iterator[bytes]:
-    """What a packed array unpacks to, block by block."""
+    """Content of a packed array, block by block."""
     unpacker = zlib.decompressobj()
     try:
         for at in range(0, len(element.data), _BLOCK):

@@ -273,7 +273,7 @@ def _of_way(start_s: float, way: Hysteresis) -> PressHysteresis:
 
 @dataclass(frozen=True)
 class SetResult:
-    """What the presses of a recording change: a row for each press, a column for each frequency."""
+    """Changes by the presses of a recording: a row for each press, a column for each frequency."""
 
     force_n: Values
     position_mm: Values

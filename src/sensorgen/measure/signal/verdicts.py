@@ -96,7 +96,7 @@ class Verdict:
 
     @property
     def same_order(self) -> bool | None:
-        """Whether R_Z is below ten times R_Y; None where one is missing."""
+        """True if R_Z is below ten times R_Y; None where one is missing."""
         return None if isnan(self.ratio) else self.ratio <= ORDER
 
 

@@ -34,7 +34,7 @@ _PRESSED, _AT_REST = (0.175, 500), (0.07, 5500)  # longest edge [mm] and number 
 
 @dataclass(frozen=True)
 class Blank:
-    """What follows from the body and the design's values.
+    """Quantities that follow from the body and the design's values.
 
     Attributes
     ----------

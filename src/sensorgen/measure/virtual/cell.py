@@ -101,7 +101,7 @@ class Raster:
 
     @cached_property
     def grid(self) -> Grid:
-        """Its elements."""
+        """Elements of the cell."""
         z = self.z_m
         rise = np.diff(z, axis=0) > _FLAT * np.ptp(z)
         number = np.concatenate([np.zeros((1, z.shape[1]), int), rise.cumsum(0)])  # along each side
@@ -140,7 +140,7 @@ class Bricks:
 
     @cached_property
     def grid(self) -> Grid:
-        """Its elements."""
+        """Elements of the cell."""
         at = np.stack(np.meshgrid(self.x_m, self.y_m, self.z_m, indexing="ij"), -1)
         number = np.arange(at[..., 0].size).reshape(at.shape[:3])
         fixed, top = np.zeros((number.size, 3), bool), np.zeros(number.size)

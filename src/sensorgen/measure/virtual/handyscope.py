@@ -35,7 +35,7 @@ _INPUT_LSB = 0.5  # noise of an input
 
 @dataclass(frozen=True)
 class Analyser:
-    """What lies between the specimen and the numbers.
+    """Analyser between the specimen and the numbers.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class _Channel:
 
 
 class _Part:
-    """What oscilloscope and generator have in common."""
+    """Part that oscilloscope and generator share."""
 
     def __init__(self, owner: "SimulatedScope") -> None:
         self._owner = owner
@@ -414,7 +414,7 @@ class PhasorMeter:
         return measured, self.fault == "clipped" or self._beyond(output)
 
     def _beyond(self, output: Complex) -> bool:
-        """Whether the waveform of the output leaves its range."""
+        """Test whether the waveform of the output leaves its range."""
         if np.abs(output).sum() < self._limit_v:
             return False
         wave = multisine(self._tones, RATE_HZ, round(WINDOW_S * RATE_HZ))

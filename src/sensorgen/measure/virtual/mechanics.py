@@ -3,16 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import copysign, exp, inf, sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
+from sensorgen.measure.virtual.faults import Schedule
 from sensorgen.measure.virtual.specimen import Line, Specimen
-
-if TYPE_CHECKING:
-    from sensorgen.measure.virtual.faults import Schedule
 
 STEP_S = 2e-3  # of the mechanism
 _OWN_MM_S = 2.0  # of a stage that moves by itself
@@ -29,7 +26,7 @@ _SECONDS_OF_DRIFT = 1.0  # between steps of the drift
 
 @dataclass(frozen=True)
 class Mechanics:
-    """What the rig is made of.
+    """Parts of the rig.
 
     Attributes
     ----------
@@ -154,7 +151,7 @@ class Rig:
     peak_n: float = 0.0
     fault: str = ""
     violations: list[Violation] = field(default_factory=list)
-    planted: "Schedule | None" = None
+    planted: Schedule | None = None
 
     def __post_init__(self) -> None:
         """At rest, raised."""
@@ -224,7 +221,7 @@ class Rig:
         return self.mechanics.clearance_mm + self._axes["z"].at_mm - self.extension_mm
 
     def impedance(self, frequency_hz: Real) -> Complex:
-        """What an ideal instrument at the end of the leads would read now, of (m,) frequencies [ohm]."""
+        """Reading of an ideal instrument at the end of the leads now, of (m,) frequencies [ohm]."""
         frequency = np.atleast_1d(np.asarray(frequency_hz, float))
         if self.fault == "cable out":
             return np.full(len(frequency), OPEN_OHM, complex)
@@ -247,7 +244,7 @@ class Rig:
         return found
 
     def resistance(self, *, wires: int) -> float:
-        """What an ideal multimeter would read across the bottom electrode [ohm]."""
+        """Reading of an ideal multimeter across the bottom electrode [ohm]."""
         truth = self.specimen.truth
         if self.fault == "cable out":
             return OPEN_OHM

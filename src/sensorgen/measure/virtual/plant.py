@@ -1,4 +1,4 @@
-"""What the simulated controllers act on: piston, tip, stage and specimen as one mechanism with one time."""
+"""Plant of the simulated controllers: piston, tip, stage and specimen as one mechanism with one time."""
 
 from typing import Protocol
 
@@ -43,10 +43,10 @@ class Plant(Protocol):
         """Position of an axis [mm], and whether it moves."""
 
     def impedance(self, frequency_hz: Real) -> Complex:
-        """What an ideal instrument at the end of the leads would read now, of (m,) frequencies [ohm]."""
+        """Reading of an ideal instrument at the end of the leads now, of (m,) frequencies [ohm]."""
 
     def resistance(self, *, wires: int) -> float:
-        """What an ideal multimeter would read across the bottom electrode [ohm]."""
+        """Reading of an ideal multimeter across the bottom electrode [ohm]."""
 
 
 def lines(received: bytearray, data: bytes, end: bytes) -> list[bytes]:

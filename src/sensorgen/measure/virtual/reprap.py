@@ -155,7 +155,7 @@ class RepRapFirmware:
                     self._plant.travel(axis, position, speed)
 
     def _waits(self, code: str) -> bool:
-        """Whether a command cannot be carried out yet."""
+        """Test whether a command cannot be carried out yet."""
         if code.startswith(("G1 ", "G0 ")):
             return len(self._moves) >= _QUEUE
         if code == "G28" and not self._homing and not self._busy():

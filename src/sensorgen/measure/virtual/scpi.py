@@ -19,7 +19,7 @@ _TIMES = {"SHOR": (0.03, 24), "MED": (0.18, 22), "LONG": (0.82, 22)}  # constant
 
 
 class _Instrument:
-    """What all of them have in common.
+    """Part that all instruments share.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class _Instrument:
             self._errors.append('-113,"Undefined header"')
 
     def _own(self, command: str, value: str, time_s: float, /) -> bool:
-        """Whether this instrument has a command."""
+        """Test whether this instrument has a command."""
         raise NotImplementedError
 
     def _spoilt(self, text: str) -> bytes:

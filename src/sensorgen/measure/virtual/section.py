@@ -107,7 +107,7 @@ def _lines(column: Column, levels: Sequence[float]) -> Real:
 
 
 def _joined(lines: Sequence[Real]) -> bool:
-    """Whether interfaces of neighbours meet, and none crosses another."""
+    """Test whether interfaces of neighbours meet, and none crosses another."""
     meet = all(np.allclose(a[:, 1], b[:, 0], atol=10 * _NONE_MM) for a, b in pairwise(lines))
     return meet and all((np.diff(of, axis=0) >= -10 * _NONE_MM).all() for of in lines)
 

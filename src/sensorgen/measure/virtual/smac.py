@@ -74,7 +74,7 @@ class SmacController:
         return b"" if self.fault in ("silent", "hung") else sent
 
     def _step(self) -> None:
-        """What the controller does by itself."""
+        """Step of the controller by itself."""
         if self.fault == "hung":
             return
         if self.fault == "error" and not self._failed:

@@ -24,7 +24,7 @@ _SIZES = 0.02, 0.01  # of ln R and ln C: thickness and width of printed tracks, 
 
 @dataclass(frozen=True)
 class Truth:
-    """What one specimen, its leads and its rig really are; all errors 0 by default.
+    """True values of one specimen, its leads and its rig; all errors 0 by default.
 
     Attributes
     ----------
@@ -232,7 +232,7 @@ class Specimen:
         return found * (1 + self.truth.creep * decades)
 
     def line(self, frequency_hz: Real) -> "Line":
-        """Its line at (m,) frequencies [Hz]."""
+        """Line of the specimen at (m,) frequencies [Hz]."""
         return Line(self, frequency_hz)
 
 

@@ -1,4 +1,4 @@
-"""What an inversion found, as rows of a CSV file, and its summary with advice."""
+"""Answers of an inversion, as rows of a CSV file, and its summary with advice."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence

@@ -111,7 +111,7 @@ class Calibration:
         return BEYOND * self.force_n
 
     def inverter(self, noise: ArrayLike | None = None, prior: Prior | None = None, limit_n: float = 0.0) -> Inverter:
-        """What finds force and position behind readings of this specimen.
+        """Inverter of readings of this specimen to force and position.
 
         Parameters
         ----------
@@ -194,7 +194,7 @@ class Calibration:
         return tuple(value.name for value in self.values() if value.by == "prediction")
 
     def document(self) -> Iterator[Part]:
-        """What the calibration is worth, its values, and what it could not tell."""
+        """Quality of the calibration, its values, and what it could not determine."""
         p, held = self.posterior, self.held_out
         by = f"{p.presses} known press{'es' * (p.presses != 1)} up to {self.force_n:.3g} N under a tip of "
         by += f"{self.model.sensor.tip_m * 1e3:g} mm and its readings at rest"

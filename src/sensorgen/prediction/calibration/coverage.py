@@ -1,4 +1,4 @@
-"""How far a calibration's own intervals hold: presses are held back in turn, and found again from the others."""
+"""Coverage of a calibration's own intervals: presses are held back in turn, and found again from the others."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -40,7 +40,7 @@ class Coverage:
 
 
 def inside(found: Found, presses: Presses) -> tuple[Mask, Mask]:
-    """Whether each force and each position lies in its interval."""
+    """Masks of the forces and of the positions that lie in their intervals."""
     return tuple(  # type: ignore[return-value]
         (ends[:, 0] <= truth) & (truth <= ends[:, 1])
         for ends, truth in ((found.force_90_n, presses.force_n), (found.position_90_m, presses.position_m))

@@ -63,7 +63,7 @@ class Meter:
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """What a calibration knows.
+    """Data of a calibration.
 
     Attributes
     ----------

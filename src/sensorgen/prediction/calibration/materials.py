@@ -33,7 +33,7 @@ _TOLD = 0.8  # of the prior's standard deviation: a value that keeps more was no
 
 @dataclass(frozen=True)
 class Link:
-    """How a parameter of the specimen depends on a material's value.
+    """Dependence of a specimen's parameter on a material's value.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class MaterialEstimate:
 
     @property
     def told(self) -> bool:
-        """Whether the readings say more than the prediction did."""
+        """True if the readings say more than the prediction did."""
         return self.by == _BY_READINGS
 
     def interval(self, level: float) -> tuple[float, float]:
@@ -112,7 +112,7 @@ def source_text(about: str, estimates: Sequence[MaterialEstimate]) -> str:
 
 
 def links(predicted: SensorModel) -> tuple[Link, ...]:
-    """What a calibration of a body can tell of its materials; without those that no source gives a value of.
+    """Links from a calibration of a body to its materials; without those that no source gives a value of.
 
     Parameters
     ----------

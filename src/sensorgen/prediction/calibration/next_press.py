@@ -129,7 +129,7 @@ class NextPress:
         return KnownPress(force, position, force / (1 - unloading), 10**decades)
 
     def left(self, known: Posterior, presses: Presses) -> Real:
-        """What each of n presses would leave of the aim's uncertainty, (n,); the less the better [-]."""
+        """Uncertainty of the aim that each of n presses would leave, (n,); the less the better [-]."""
         c, slopes = known.covariance, self.model.slopes(known.at, presses)
         gain = slopes @ c  # (n, 2 m, p)
         of_ratios = self._noise(known, presses) + gain @ slopes.transpose(0, 2, 1)
@@ -140,7 +140,7 @@ class NextPress:
         return np.asarray(np.einsum("ab,nab->n", self._weight(known), c - less))
 
     def _weight(self, known: Posterior) -> Real:
-        """What a covariance is multiplied by for the mean variance of ratios anywhere, over their own."""
+        """Factor from a covariance to the mean variance of ratios anywhere, over their own."""
         slopes = self.model.slopes(known.at, self._everywhere)
         own = np.linalg.inv(self._noise(known, self._everywhere))
         return np.asarray(np.einsum("nia,nij,njb->ab", slopes, own, slopes, optimize=True) / len(slopes))

@@ -1,4 +1,4 @@
-"""What a calibration would leave open of a press, before there is a specimen."""
+"""Outlook on a press after a calibration, before there is a specimen."""
 
 from dataclasses import replace
 

@@ -111,12 +111,12 @@ class Rest:
             return np.where(known, latest, 0).sum(0) / known.sum(0), len(latest)
 
     def __bool__(self) -> bool:
-        """Whether there is one."""
+        """Test whether there is one."""
         return bool(self._latest)
 
     @property
     def tells_noise(self) -> bool:
-        """Whether there were enough of them."""
+        """True if there were enough of them."""
         return len(self._squares) >= FEWEST
 
     def noise(self) -> "Real | float":

@@ -68,7 +68,7 @@ class Setup:
         return bounds(slopes(self.sensor, self.frequency_hz, self.force_n, self.position_m), self.noise)
 
     def on(self, sensor: Sensor) -> "Setup":
-        """The same press on another sensor."""
+        """Press another sensor alike."""
         return replace(self, sensor=sensor)
 
 

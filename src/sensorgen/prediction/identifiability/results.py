@@ -63,7 +63,7 @@ class ReferencePress:
 
 @dataclass(frozen=True, kw_only=True)
 class Stiffest(StandardErrors):
-    """The same with the stiffest law of compression, and what that means for the verdict."""
+    """Result by the stiffest law of compression, and its meaning for the verdict."""
 
     verdict: str
 
@@ -193,7 +193,7 @@ class ChangeResult(StandardErrors):
 
 @dataclass(frozen=True, kw_only=True)
 class Identifiability(StandardErrors):
-    """How precisely impedance determines a press.
+    """Precision at which impedance determines a press.
 
     Attributes
     ----------

@@ -43,16 +43,16 @@ class Required:
         return StandardErrors(sigma_force_n=self.force_n, sigma_position_m=self.position_m)
 
     def force(self, sigma_n: float) -> str:
-        """Whether force is sensed at a standard error [N]: yes, roughly or no."""
+        """Verdict on sensing force at a standard error [N]: yes, roughly or no."""
         return _grade(sigma_n, self.force_n, self.guess_force_n)
 
     def position(self, sigma_m: float) -> str:
-        """Whether a press is located at a standard error [m]: yes, roughly or no."""
+        """Verdict on locating a press at a standard error [m]: yes, roughly or no."""
         return _grade(sigma_m, self.position_m, self.guess_position_m)
 
 
 def required(setup: Setup) -> Required:
-    """What is required of a press: a tenth of its force, and one length of the tip."""
+    """Requirements of a press: a tenth of its force, and one length of the tip."""
     force, sensor = abs(setup.force_n), setup.sensor
     return Required(FORCE_SHARE * force, sensor.tip_m, GUESS * force, GUESS * sensor.length_m)
 
@@ -64,7 +64,7 @@ def _grade(sigma: float, serves: float, guess: float) -> str:
 
 
 def verdict(setup: Setup, bounds: Bounds, need: Required, reason: str) -> str:
-    """What a design can do, in one sentence; ``reason`` says why position is undefined."""
+    """Verdict on a design, in one sentence; ``reason`` says why position is undefined."""
     where = f"at {setup.force_n:g} N and {setup.position_m * 1e3:g} mm"
     unless = f"not known, as {setup.assumed}; if it did: " if setup.assumed else ""
     position = f", but {reason}" if reason else f", position to {metres(bounds.position_m)}"

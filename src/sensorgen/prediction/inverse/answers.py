@@ -158,7 +158,7 @@ class Summary:
         )
 
     def _advice(self) -> Iterator[str]:
-        """What to do where most samples have the same problem."""
+        """Advice where most samples have the same problem."""
         excess = _middle(self._excess)
         if self._most(Status.NO_FIT) and excess is not None:
             yield (

@@ -53,7 +53,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class Target:
-    """What is to be explained: responses with their weights, and a normal prior.
+    """Goal of a fit: responses with their weights, and a normal prior.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Target:
         return Target(self.response[rows], self.weight[rows], self.expected, self.information)
 
     def fit(self, press: Real, local: Local) -> Fit:
-        """How well presses explain the responses."""
+        """Fit of the responses by presses."""
         residual = (self.response - local.value) * self.weight
         slope = local.slope * self.weight[:, None]
         off = self.expected - press

@@ -53,7 +53,7 @@ class _Normal(NamedTuple):
         return within, inside
 
     def gain(self, by_force: float, by_position: float) -> float:
-        """What the step takes from the sum of squares."""
+        """Gain of the step in the sum of squares."""
         return by_force * self.by_force + by_position * self.by_position
 
     def distance(self, force: float, position: float) -> float:
@@ -127,7 +127,7 @@ class Single:
         return row * self._table.shape[1] + bisect_right(positions, position, 1, len(positions) - 1) - 1
 
     def _alone(self, response: Real, press: tuple[float, float], best: _Normal) -> bool:
-        """Whether the rival's valley has no minimum near this sum of squares; False if undecided."""
+        """Test whether the rival's valley has no minimum near this sum of squares; False if undecided."""
         rival = self._rival[self._cell(*press)]
         if rival < 0:
             return True

@@ -39,12 +39,12 @@ class Status(IntEnum):
 
     @property
     def force_counts(self) -> bool:
-        """Whether the force may be used."""
+        """True if the force may be used."""
         return self <= Status.FORCE_ONLY
 
     @property
     def position_counts(self) -> bool:
-        """Whether the position may be used."""
+        """True if the position may be used."""
         return self <= Status.AT_THE_END
 
 

@@ -95,12 +95,12 @@ def mesh(body: Body) -> Mesh:
 def _of_piece(piece: Piece) -> Mesh:
     if isinstance(piece, Prism):
         return _prism(piece)
-    from sensorgen.scene.polyhedra import Loft
+    from sensorgen.scene.polyhedra import surface
     from sensorgen.scene.revolved import Revolved
 
     if isinstance(piece, Revolved):
         return _revolved(piece)
-    flat = piece.polyhedron() if isinstance(piece, Loft) else piece
+    flat = surface(piece)
     return Mesh(np.array(flat.vertices), np.array(flat.triangles, np.int32))
 
 

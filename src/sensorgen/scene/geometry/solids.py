@@ -34,7 +34,6 @@ from sensorgen.scene.scene import AXES, PLANE, Body, Piece, Point, Prism, Scene
 if TYPE_CHECKING:
     from build123d import Compound, Solid
 
-    from sensorgen.scene.polyhedra import Loft, Polyhedron
     from sensorgen.scene.revolved import Revolved
 
 VOLUME_RATIO = 1e-9  # how far a solid's volume may be from its piece's; the kernel reaches 1e-13
@@ -99,15 +98,16 @@ def _revolved(piece: "Revolved") -> "Solid":
     return Solid.revolve(Face(Wire(edges)), 360.0, Axis((piece.x_mm, piece.y_mm, 0.0), (0.0, 0.0, 1.0)))
 
 
-def _sewn(piece: "Loft | Polyhedron") -> "Solid":
+def _sewn(piece: Piece) -> "Solid":
     from build123d import Face, Shell, Solid, Wire
 
-    from sensorgen.scene.polyhedra import Loft
+    from sensorgen.scene.polyhedra import Loft, surface
 
     if isinstance(piece, Loft):
         rings = piece.faces()
     else:
-        rings = [tuple(piece.vertices[number] for number in triangle) for triangle in piece.triangles]
+        whole = surface(piece)
+        rings = [tuple(whole.vertices[number] for number in triangle) for triangle in whole.triangles]
     faces = [Face(Wire.make_polygon((*ring, ring[0]), close=False)) for ring in rings]
     made = Solid(Shell(faces))
     return made if made.volume > 0 else Solid(made.wrapped.Reversed())

@@ -53,7 +53,7 @@ class Cell:
     turned: bool = False
 
     def width_mm(self) -> float:
-        """Its width [mm]."""
+        """Width [mm]."""
         return self.right_mm - self.left_mm
 
     def without_block(self) -> "Cell":
@@ -68,7 +68,7 @@ class Cell:
         return next((k for k, region in enumerate(self.regions, 1) if region.material == AIR), OUTSIDE)
 
     def solid(self, region: int) -> bool:
-        """Whether a region is filled by a body."""
+        """Test whether a region is filled by a body."""
         return region != OUTSIDE and self.regions[region - 1].material != AIR
 
 
@@ -110,7 +110,7 @@ Strip = tuple[float, float, list[tuple[Region, Point, Point]]]
 
 
 def _is_mirror(whole: list[Column], axis: float, period: float) -> bool:
-    """Whether the half period after ``axis`` and the one after that are mirror images."""
+    """Test whether the half period after ``axis`` and the one after that are mirror images."""
     middle, end = axis + period / 2, axis + period
     ahead = _strips(whole, axis, middle)
     turned: list[Strip] = [
@@ -227,7 +227,7 @@ def _uprights(
 
 
 def _spans(strip: Strip | None, end: int, number: Mapping[Region, int]) -> list[tuple[float, float, int]]:
-    """Which region lies between which heights at one end of a strip."""
+    """Regions and their heights at one end of a strip."""
     layers = strip[2] if strip else []
     heights = [(round(low[end], _DIGITS), round(high[end], _DIGITS), number[r]) for r, low, high in layers]
     return [(low, high, region) for low, high, region in heights if high - low > _SLIVER_MM]

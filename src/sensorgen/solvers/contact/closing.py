@@ -126,7 +126,7 @@ class _Seen:
     behind: Real
 
     def near(self, limit: Real | float) -> Mask:
-        """Which gaps are none: less than a share of the scale, and not so deep that it is another side."""
+        """Mask of gaps that are none: less than a share of the scale, and not so deep that it is another side."""
         return np.asarray((self.ahead < limit * self.scale) & (self.ahead > -self.behind))
 
 
@@ -174,7 +174,7 @@ def _fixed(edges: Sides, air: int, faces: Faces) -> Mask:
 
 
 def _joined(border: _Air, fixed: Mask) -> tuple[Whole, Mask]:
-    """Which point stands for each, where two that touch are near each other, and which touch at all."""
+    """Point that stands for each, where two that touch are near each other, and mask of all that touch."""
     instead, touched = np.arange(len(border.places)), np.zeros(len(border.places), bool)
     seen = border.seen(instead)
     touches, share = seen.near(_CLOSED), seen.share

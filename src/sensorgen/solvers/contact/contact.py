@@ -132,7 +132,7 @@ class Faces:
 
     @cached_property
     def _depth_m(self) -> Real:
-        """How deep each point may be in another body: a side's length, or less where its own is thin [m]."""
+        """Largest depth of each point in another body: a side's length, or less where its own is thin [m]."""
         found = np.repeat(self._edges_m.min(axis=1), len(self._at))
         rays = self.rays(self.points_m)
         back, _, _, distance = hit(rays, self.points_m[self.nodes], np.zeros(len(found)), inwards=True)
@@ -141,7 +141,7 @@ class Faces:
 
     @cached_property
     def depth_m(self) -> Real:
-        """How deep another body's points may be in each face's [m]."""
+        """Largest depth of another body's points in each face's [m]."""
         return np.asarray(self._depth_m.reshape(len(self.nodes), len(self._at)).min(axis=1))
 
     def rays(self, places_m: Real) -> Rays:
@@ -207,7 +207,7 @@ class Faces:
         return Pairs(gap, slips, stiffness, length, first + point, np.zeros(len(point), bool), still)
 
     def crossed(self, places_m: Real, outline: Whole, share: float) -> bool:
-        """Whether a face is inside two bodies, or beyond a mirror, deeper than a share of its side; in a plane.
+        """Test whether a face is inside two bodies, or beyond a mirror, deeper than a share of its side; in a plane.
 
         ``outline`` (k, 2) are the straight pieces of all bodies' outlines, anticlockwise.
         """
@@ -378,7 +378,7 @@ def _divided(right: Real, matrix: Real) -> Real:
 
 
 def winding_number(here: Real, starts: Real, ends: Real) -> Whole:
-    """How often closed outlines of straight pieces (m, 2) run anticlockwise around points (k, 2)."""
+    """Number of times that closed outlines of straight pieces (m, 2) run anticlockwise around points (k, 2)."""
     order = np.argsort(here[:, 0], kind="stable")
     low, high = np.sort([starts[:, 0], ends[:, 0]], axis=0)
     first, last = (np.searchsorted(here[order, 0], edge) for edge in (low, high))

@@ -136,7 +136,7 @@ class Factors:
     parts: list[tuple[Real, Real]]
 
     def solve(self, right: Real) -> Real:
-        """What a right side makes."""
+        """Solution of a right side."""
         x = right[self.order.turn]
         for front, (inverse, coupling) in zip(self.order.fronts, self.parts, strict=True):
             own = x[front.start : front.stop] = inverse @ x[front.start : front.stop]

@@ -74,7 +74,7 @@ def of_triangles(points_m: Real, corners: Whole, region: Whole, *, turned: bool 
 
 
 def at_border(mesh: Mesh) -> Mask:
-    """Which sides of the rim lie on the straight border of the cell, and not within it."""
+    """Mask of the rim's sides on the straight border of the cell."""
     a, b = (mesh.points_m[mesh.rim[:, k]] for k in range(2))
     ends = np.array([mesh.points_m.min(axis=0), mesh.points_m.max(axis=0)])
     near = _SAME * (ends[1] - ends[0]).max()
@@ -154,13 +154,13 @@ def _cut(
 
 
 def _is_flat(cell: Cell, place: Point) -> bool:
-    """Whether a dome and a level face meet at a point of the axis."""
+    """Test whether a dome and a level face meet at a point of the axis."""
     ends = [p if q == place else q for (p, q), sides in cell.edges.items() if place in (p, q) and cell.air in sides]
     return place[0] == 0 and all(abs(z - place[1]) < _LEVEL * r for r, z in ends)
 
 
 def _parted(net: Net, node: int) -> Net:
-    """The same, where the triangles above a node have one of their own."""
+    """Net in which the triangles above a node have one of their own."""
     corners = net.corners.copy()
     above = net.points_m[corners].mean(axis=1)[:, 1] > net.points_m[node, 1]
     corners[(corners == node) & above[:, None]] = len(net.points_m)

@@ -115,7 +115,7 @@ class Pressed:
         return len(holds) if holds.all() else int(holds.argmin())
 
     def first(self, n: int) -> "Pressed":
-        """Its first pressures."""
+        """First pressures of the curve."""
         return replace(self, **{name: getattr(self, name)[:n] for name in _BY_LOAD})
 
 
@@ -261,7 +261,7 @@ def _work(stress: Real, moved: Real) -> Real:
 
 
 def with_capacitances(found: Pressed, bounds: Sequence[Interval | None], outlines: tuple[Cell, ...] = ()) -> Pressed:
-    """The same with the capacitance of the deformed outlines, and its faults."""
+    """Add the capacitance of the deformed outlines, and its faults."""
     faults, known = list(found.faults), [c.middle() for c in bounds if c]
     if len(known) < len(bounds):
         unknown = len(bounds) - len(known)

@@ -63,13 +63,13 @@ def wedges(edges: Mapping[Edge, tuple[int, int]], air: int) -> list[Wedge]:
 
 
 def _is_tip(tip: Point, out: Point, into: Point, ahead: Mapping[Point, list[Point]]) -> bool:
-    """Whether air lies, sharp and undivided, between the edges to ``out`` and from ``into``."""
+    """Test whether air lies, sharp and undivided, between the edges to ``out`` and from ``into``."""
     angle = _turn(tip, out, into)
     return 0 < angle < _SHARP and not any(0 < _turn(tip, out, other) < angle for other in ahead[tip] if other != out)
 
 
 def _is_free(a: Point, b: Point, c: Point, points: Real) -> bool:
-    """Whether a, b and c turn left, and no other of the points (n, 2) lies in their triangle or on its sides."""
+    """Test whether a, b and c turn left, and no other of the points (n, 2) lies in their triangle or on its sides."""
     x, y = points.T
     inside = np.ones(len(points), bool)
     for p, q in ((a, b), (b, c), (c, a)):

@@ -29,7 +29,7 @@ ROUNDING = 1e-9  # relative: what edges nearer than a nanometre's thousandth los
 
 @dataclass(frozen=True)
 class Energies:
-    """What one mesh and order give, each over eps0: [mm], or per depth in two dimensions [-].
+    """Energies by one mesh and order, each over eps0: [mm], or per depth in two dimensions [-].
 
     Attributes
     ----------
@@ -51,6 +51,36 @@ class Energies:
     unknowns: int
     rounding: float = 0.0
     enclosed: bool = False
+
+
+@dataclass(frozen=True)
+class FieldStep:
+    """One mesh and order on the way to an accuracy.
+
+    Attributes
+    ----------
+    order : int
+        Of the potential's polynomials.
+    elements, unknowns : int
+        Of the mesh, and the unknowns that they couple.
+    interval : Interval
+        Capacitance of the whole sensor [F], or another quantity of the field.
+    layers, flux_order : int
+        Layers that shrink towards edges, and order of the flux's polynomials, where a model has these.
+    """
+
+    order: int
+    elements: int
+    unknowns: int
+    interval: Interval
+    layers: int = 0
+    flux_order: int = 0
+
+
+def narrowest(steps: Iterable[FieldStep]) -> Interval:
+    """The narrowest interval of some steps; all from 0 on where there are none."""
+    found = (step.interval for step in steps)
+    return min(found, key=lambda interval: interval.upper - interval.lower, default=Interval(0.0, np.inf))
 
 
 def third_conductor(scene: Scene) -> str | None:

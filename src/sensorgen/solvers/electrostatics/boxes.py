@@ -160,7 +160,7 @@ def flux(order: int) -> Element:
 
 @cache
 def traces(order: int, flux_order: int) -> Real:
-    """What fluxes feel of potentials: moments of :func:`potential` with the functions on the faces of :func:`flux`.
+    """Coupling of fluxes to potentials: moments of :func:`potential` with the functions on the faces of :func:`flux`.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ class Boxes:
     load: Matrix | None = None
 
     def unknowns(self) -> int:
-        """How many the boxes share."""
+        """Number of unknowns that the boxes share."""
         return len(np.unique(self.ids[self.ids >= HELD]))
 
     def least(self, keep: bool = False) -> Solution:
@@ -262,11 +262,11 @@ class Boxes:
         return found
 
     def pushed(self, load: Matrix) -> "Boxes":
-        """The same with both electrodes at 0 V and forces (n, b) on the unknowns."""
+        """Boxes with both electrodes at 0 V and forces (n, b) on the unknowns."""
         return replace(self, ids=np.where(self.ids < HELD, 0, self.ids), load=load)
 
     def answers(self, unknowns: Matrix) -> Matrix:
-        """What the unknowns (n, b) are met with (n, b): from a flux's, its moments on the six faces."""
+        """Answers (n, b) to the unknowns (n, b): of a flux's, its moments on the six faces."""
         return np.array([e * (self.shape(box) @ x) for box, (e, x) in enumerate(zip(self.eps, unknowns, strict=True))])
 
 
@@ -304,7 +304,7 @@ class Pair:
         return max(self.potential.unknowns(), self.flux.unknowns())
 
     def apart(self, u: Matrix, level: Matrix, rho: Real) -> float:
-        r"""How far fields with these unknowns are apart, :math:`\int |\varepsilon \nabla u - D|^2 / \rho`."""
+        r"""Distance of fields with these unknowns, :math:`\int |\varepsilon \nabla u - D|^2 / \rho`."""
         found = np.empty(len(rho))
         for box, (here, there) in enumerate(zip(u, level, strict=True)):
             into, out = self.potential.shape(box) @ here, self.flux.shape(box) @ there

@@ -1,4 +1,4 @@
-"""How singular the field is at each corner: u grows as r^lambda, and lambda below 1 means an infinite field."""
+"""Singularity of the field at each corner: u grows as r^lambda, and lambda below 1 means an infinite field."""
 
 from collections import defaultdict
 from collections.abc import Collection, Mapping

@@ -80,7 +80,7 @@ def _levels(cell: Layers, own: dict[int, Any], order: Any) -> Levels:
 
 
 def _regions(cell: Layers, levels: Levels, order: Any) -> dict[int, Any]:
-    """What fills a layer, from its levels."""
+    """Fillings of a layer, from its levels."""
     metal = [k for k in range(cell.conductors) if not levels[k].is_empty]
     if any(shapely.intersects(levels[a], levels[b]) for a, b in combinations(metal, 2)):
         raise Unsolved("conductors are nearer than the grid that outlines are rounded to")
@@ -95,7 +95,7 @@ def _regions(cell: Layers, levels: Levels, order: Any) -> dict[int, Any]:
 
 
 def _far(cell: Layers, far_mm: float) -> list[bool]:
-    """Which layers are far, and no plates."""
+    """Mask of the layers that are far, and no plates."""
     low, high = cell.heights_mm[:-1], cell.heights_mm[1:]
     holds = [np.array([k in own for own in cell.regions]) for k in range(cell.conductors)]
     spans = {k: (low[own].min(), high[own].max()) for k, own in enumerate(holds) if own.any()}
@@ -114,7 +114,7 @@ def _both(pair: Sequence[Any], outwards: bool) -> Any:
 
 
 def _near(wider: Any, other: Any, outwards: bool, by_mm: float) -> bool:
-    """Whether the union of some layers is within a distance of what they share."""
+    """Test whether the union of some layers is within a distance of what they share."""
     union, shared = (wider, other) if outwards else (other, wider)
     return bool(shapely.covers(shapely.buffer(shared, by_mm), union))
 

@@ -191,7 +191,7 @@ class Cones:
         return np.asarray((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0])
 
     def thinness(self) -> Numbers:
-        """How many times the share by which its corners' coordinates are off each triangle's area is [-].
+        """Ratio of each triangle's relative error of area to that of its corners' coordinates [-].
 
         A micrometre of height, a metre up or along a slope that is a metre long, makes it a million.
         """

@@ -31,7 +31,7 @@ class Field:
     cones: list[tuple[Numbers, Numbers]]
 
     def conj(self) -> "Field":
-        """Its complex conjugate."""
+        """Complex conjugate of the field."""
         return Field(self.plain.conj(), [(rings.conj(), tips.conj()) for rings, tips in self.cones])
 
     def moduli(self) -> "Field":
@@ -44,7 +44,7 @@ Jumps = list[tuple[int, int]]
 
 @dataclass(frozen=True)
 class _Share:
-    """How values on one block are made from the unknowns.
+    """Map from the unknowns to the values on one block.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ class Problem:
 
     @cached_property
     def _unknowns(self) -> tuple[int, Whole, Whole]:
-        """How many there are; the unknown of each point; the first of each side, 0 where it has none."""
+        """Number of unknowns; the unknown of each point; the first of each side, 0 where it has none."""
         mesh, count = self.mesh, self.count
         vertex = np.full(len(mesh.triangles.points), -1)
         vertex[list(self.held)] = list(self.held.values())
@@ -161,7 +161,7 @@ class Problem:
         return (min(a, b), max(a, b)) in self.walls
 
     def _rim(self, corner: int, layout: Layout) -> _Share:
-        """What a cone shares with its neighbours, in its own turn."""
+        """Values that a cone shares with its neighbours, in its own turn."""
         _, vertex, first = self._unknowns
         mesh, fan = self.mesh, self.mesh.fans[corner]
         spokes = np.array(fan.spokes)

@@ -122,7 +122,7 @@ def crossed(order: int) -> Real:
 
 
 def numbered(corners: Whole, vertex: Whole, first: Whole, order: int) -> tuple[Whole, Real]:
-    """Which unknown each value on the sides of triangles is, and its sign there.
+    """Unknown of each value on the sides of triangles, and its sign there.
 
     Parameters
     ----------

@@ -190,7 +190,7 @@ def _repeated(noded: Any, size: Sequence[float], periodic: Sequence[bool]) -> An
 
 
 def _filled(layers: Sequence[dict[int, Any]], faces: Any, cell: Layers) -> Whole:
-    """What fills each face in every layer, by a place inside it."""
+    """Filling of each face in every layer, by a place inside it."""
     inside = shapely.point_on_surface(faces)
     found = np.full((len(layers), len(faces)), cell.conductors + len(cell.permittivity) - 1)
     for row, layer in zip(found, layers, strict=True):
@@ -275,7 +275,7 @@ class Mesh:
 
     @cached_property
     def _kinds(self) -> Whole:
-        """What the prisms are made of; conductors that are meshed, of the first dielectric."""
+        """Materials of the prisms; conductors that are meshed, of the first dielectric."""
         return np.where(self.free, self.fill, self.cell.conductors)
 
     @cached_property
@@ -358,7 +358,7 @@ class Mesh:
 
     @cached_property
     def _seams(self) -> Whole:
-        """The same of those that are neighbours across sides that repeat, with the points of its own edge."""
+        """Neighbours across sides that repeat, with the points of its own edge."""
         (edges, owner), at = self._edges, self.plan.points_mm
         found = [np.zeros((0, 4), np.int64)]
         for axis in np.flatnonzero(self.cell.periodic):

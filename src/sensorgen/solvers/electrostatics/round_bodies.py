@@ -118,7 +118,7 @@ def fluxes(space: Any, eps: Any, metal: Sequence[str], order: int) -> tuple[Any,
 
 
 def _moved(mesh: RoundMesh, density: Any) -> float:
-    """What the distance of curved elements from round faces changes, to first order [mm].
+    """Change by the distance of curved elements from round faces, to first order [mm].
 
     A conductor whose face moves changes the energy by that of the layer that it passes; a dielectric by at most that,
     on the side where it is greater: fields along the face and fluxes across it are continuous.

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from sensorgen.core.arrays import Mask, Real
-from sensorgen.scene.polyhedra import Loft
+from sensorgen.scene.polyhedra import surface
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import AXES, Piece, Point, Prism
 
@@ -56,7 +56,7 @@ class Cell:
         return [((i[0], j[0], z[0]), (i[1], j[1], z[1])) for i, j in product(x, y)]
 
     def weights(self) -> Real:
-        """How often each part occurs beyond the least."""
+        """Number of times that each part occurs beyond the least."""
         return np.zeros(1) if self.shares is None else np.asarray(self.shares - self.shares.min()).ravel()
 
     def boxes(self) -> list[tuple[Real, Piece, int]]:
@@ -66,12 +66,12 @@ class Cell:
         return [own for own in spans if ((own[0][:, 0] < high) & (own[0][:, 1] > low)).all()]
 
     def holds(self, places_mm: Real) -> Mask:
-        """Which places (n, 3) lie in the cell [mm]."""
+        """Mask of the places (n, 3) in the cell [mm]."""
         low, high = np.array(self.low_mm) - SAME_MM, np.array(self.high_mm) + SAME_MM
         return np.asarray(((places_mm > low) & (places_mm < high)).all(1))
 
     def conducts(self, places_mm: Real) -> Mask:
-        """Whether a conductor is at each of some places (n, 3), those beyond a side being mirrored [mm]."""
+        """Mask: true where a conductor is at each of some places (n, 3), those beyond a side being mirrored [mm]."""
         p = places_mm.copy()
         for axis in (0, 1):
             low, high = self.low_mm[axis], self.high_mm[axis]
@@ -149,7 +149,7 @@ class ProfileEdge(NamedTuple):
         return (r - self.start[0]) * way[1] - (z - self.start[1]) * way[0]
 
     def is_tip(self) -> bool:
-        """Whether it leaves the axis straight and neither level nor along it."""
+        """Test whether it leaves the axis straight and neither level nor along it."""
         (ra, za), (rb, zb) = self.start, self.end
         return not self.bulge and min(ra, rb) < SAME_MM < max(ra, rb) and abs(za - zb) > SAME_MM
 
@@ -207,6 +207,12 @@ class Touch:
         return found
 
 
+def _faces(box: Real, at_mm: Real, z_mm: float, upwards: bool) -> bool:
+    """True where a box (3, 2) has a level face at a place and height, above or below it [mm]."""
+    over = (box[:2, 0] < at_mm + SAME_MM) & (box[:2, 1] > at_mm - SAME_MM)
+    return bool(abs(box[2, int(upwards)] - z_mm) < SAME_MM and over.all())
+
+
 def touches(cell: Cell) -> list[Touch]:
     """All places in a cell where a dome meets a level face."""
     found = []
@@ -216,22 +222,17 @@ def touches(cell: Cell) -> list[Touch]:
         arcs = [edge for edge in profile(piece) if edge.bulge]
         poles = [(edge.circle(), z) for edge in arcs for r, z in (edge.start, edge.end) if r < SAME_MM]
         for (centre, radius), z in poles:
-            upwards, middle = z < centre[1], own[:2].mean(1)
-            faces = [
-                box for box, _, its in cell.boxes()
-                if its != kind and abs(box[2, int(upwards)] - z) < SAME_MM
-                and ((box[:2, 0] < middle + SAME_MM) & (box[:2, 1] > middle - SAME_MM)).all()
-            ]  # fmt: skip
-            if faces and abs(centre[0]) < SAME_MM:
+            upwards, others = z < centre[1], [(box, its) for box, _, its in cell.boxes() if its != kind]
+            if abs(centre[0]) < SAME_MM and any(_faces(box, own[:2].mean(1), z, upwards) for box, _ in others):
                 way = -1.0 if upwards else 1.0
-                metal = [b[2, int(upwards)] for b, _, its in cell.boxes() if its < cell.conductors and its != kind]
+                metal = [box[2, int(upwards)] for box, its in others if its < cell.conductors]
                 apart = min((off for end in metal if (off := way * (end - z)) > SAME_MM), default=radius)
                 found.append(Touch(piece, kind, z, upwards, radius, float(apart)))
     return found
 
 
 def inside(piece: Piece, places_mm: Real) -> Mask:
-    """Whether places (n, 3) lie in a piece [mm]."""
+    """Mask: true where places (n, 3) lie in a piece [mm]."""
     x, y, z = places_mm.T
     if isinstance(piece, Prism):
         first, second = {"x": (y, z), "y": (x, z), "z": (x, y)}[piece.axis]
@@ -239,7 +240,7 @@ def inside(piece: Piece, places_mm: Real) -> Mask:
     if isinstance(piece, Revolved):
         outline = np.concatenate([edge.places(_ARC if edge.bulge else 1)[:-1] for edge in profile(piece)])
         return np.asarray(shapely.contains_xy(shapely.Polygon(outline), np.hypot(x - piece.x_mm, y - piece.y_mm), z))
-    whole = piece.polyhedron() if isinstance(piece, Loft) else piece
+    whole = surface(piece)
     a, b, c = (np.array(whole.vertices)[np.array(whole.triangles)[:, k]] for k in range(3))
     # How often a ray leaves (Moeller and Trumbore, 1997)
     way = np.array([0.5377, 0.3819, 0.7517])

@@ -13,7 +13,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.errors import NotInstalled
-from sensorgen.scene.polyhedra import Loft
+from sensorgen.scene.polyhedra import surface
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Piece, Prism
 from sensorgen.solvers.electrostatics.bounds import Unsolved
@@ -123,7 +123,7 @@ def mesh_of(cell: Cell, order: int, layers: int, closed: float) -> RoundMesh:
 
 
 def unsound(mesh: Any, order: int) -> Mask:
-    """Which elements are turned inside out somewhere."""
+    """Mask of the elements that are turned inside out somewhere."""
     import ngsolve as ng
 
     kinds = [element.type for element in mesh.Elements()]
@@ -175,14 +175,19 @@ def _shape(cell: Cell, cusps: Sequence[tuple[Touch, float]]) -> tuple[Any, "_Gra
     places = [{_key(v.p) for f in held.get(f"c{k}", ()) for v in f.vertices} for k in range(cell.conductors)]
     if not kept or any(a & b for k, a in enumerate(places) for b in places[:k]):
         raise Unsolved("the electrodes touch: the capacitance grows without bound")
+    _refuse_open(cell, kept)
+    grading = _Grading(cell)
+    grading.mark([face for name, faces in held.items() if name[0] == "c" for face in faces])
+    return occ.Compound(kept), grading
+
+
+def _refuse_open(cell: Cell, kept: Sequence[Any]) -> None:
+    """Refuse a dielectric that reaches the bottom or the top of the cell."""
     for face in (face for one in kept for face in one.faces if (face.name or "x")[0] != "c"):
         low, high = face.bounding_box
         for end in (cell.low_mm[2], cell.high_mm[2]):
             if max(abs(low.z - end), abs(high.z - end)) < SAME_MM * 10:
                 raise Unsolved("an electrode does not cover the whole sensor")
-    grading = _Grading(cell)
-    grading.mark([face for name, faces in held.items() if name[0] == "c" for face in faces])
-    return occ.Compound(kept), grading
 
 
 def _solids(cell: Cell, cusps: Sequence[tuple[Touch, float]]) -> list[tuple[str, Any]]:
@@ -226,7 +231,7 @@ def solid(piece: Piece) -> Any:
         at, way = piece.start_mm, [(piece.end_mm - piece.start_mm) * (piece.axis == axis) for axis in "xyz"]
         corners = [{"x": (at, u, v), "y": (u, at, v), "z": (u, v, at)}[piece.axis] for u, v in piece.outline]
         return occ.Prism(_flat(corners), occ.Vec(*way))
-    whole = piece.polyhedron() if isinstance(piece, Loft) else piece
+    whole = surface(piece)
     faces = [_flat([whole.vertices[k] for k in triangle]) for triangle in whole.triangles]
     return occ.Solid(occ.Sew(faces)).UnifySameDomain()
 
@@ -311,7 +316,7 @@ class _Grading:
         return bool(1 - self.cell.conducts(place + radius * ball).mean() > _REENTRANT)
 
     def _is_corner(self, place: tuple[float, ...], ways: Sequence[Real]) -> bool:
-        """Whether marked edges, mirrored at the sides of the cell, end or turn at a place."""
+        """Test whether marked edges, mirrored at the sides of the cell, end or turn at a place."""
         found = list(ways)
         for axis in (0, 1):
             if (

@@ -2,7 +2,7 @@
 
 from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -80,7 +80,20 @@ def _triangulated(points: NDArray[np.float64], found: "_Found") -> tuple[Triangl
     for number, (corners, _) in enumerate(found):
         for edge in edges_of(corners):
             owners[edge].append(number)
-    # The dielectric triangles whose field runs from one electrode to the other
+    inside = _between_electrodes(found, owners)
+    terminals = {}
+    for edge, sides in owners.items():
+        names = {found[n][1][0] for n in sides}
+        if names & {"@top", "@bottom"} and any(n in inside for n in sides):
+            terminals[edge] = next(n[1:] for n in names if n.startswith("@"))
+    kept = sorted(inside)
+    regions = [found[n][1] for n in kept]
+    mesh = Triangles(points, flipped(points, [found[n][0] for n in kept], regions), regions, terminals)
+    return apart(mesh), owners, inside
+
+
+def _between_electrodes(found: "_Found", owners: Mapping[Edge, Sequence[int]]) -> set[int]:
+    """Dielectric triangles whose field runs from one electrode to the other."""
     beside: dict[int, list[int]] = defaultdict(list)
     for pair in (sides for sides in owners.values() if len(sides) == 2):
         beside[pair[0]].append(pair[1])
@@ -93,19 +106,11 @@ def _triangulated(points: NDArray[np.float64], found: "_Found") -> tuple[Triangl
         inside |= piece if len(ends) == 2 else set()
     if not inside:
         raise ValueError("no dielectric lies between a top and a bottom electrode")
-    terminals = {}
-    for edge, sides in owners.items():
-        names = {found[n][1][0] for n in sides}
-        if names & {"@top", "@bottom"} and any(n in inside for n in sides):
-            terminals[edge] = next(n[1:] for n in names if n.startswith("@"))
-    kept = sorted(inside)
-    regions = [found[n][1] for n in kept]
-    mesh = Triangles(points, flipped(points, [found[n][0] for n in kept], regions), regions, terminals)
-    return apart(mesh), owners, inside
+    return inside
 
 
 def apart(mesh: Triangles) -> Triangles:
-    """The same, with a point for each of the pieces that only touch there: no field runs through a point."""
+    """Triangles with a point for each of the pieces that only touch there: no field runs through a point."""
     for corner, found in fans(mesh.triangles).items():
         if len(found) > 1:
             # One of a corner's fans with a new point at the same place
@@ -215,7 +220,7 @@ _STRAIGHT = 1e-9  # sine of the angle of three corners on a line
 
 
 def flipped(points: NDArray[np.float64], triangles: Sequence[Triangle], regions: Sequence[Hashable]) -> list[Triangle]:
-    """The same regions in triangles of the same number and corners, no two of which would be blunter if turned.
+    """Regions in triangles of equal number and corners, no two of which would be blunter if turned.
 
     Parameters
     ----------
@@ -259,7 +264,7 @@ _Point = tuple[float, float]
 
 
 def _is_better(a: _Point, b: _Point, c: _Point, d: _Point) -> bool:
-    """Whether d-c is the better diagonal of a, d, b, c than a-b: the angles at c and d are more than half a turn."""
+    """True if d-c is a better diagonal of a, d, b, c than a-b: the angles at c and d are more than half a turn."""
     if min(_sine(a, d, c), _sine(d, b, c)) < _STRAIGHT:
         return False
     return _angle(a, c, b) + _angle(a, d, b) > np.pi + _GAIN
@@ -294,7 +299,7 @@ class Fan:
 
     @property
     def closed(self) -> bool:
-        """Whether it goes all around the corner."""
+        """True if it goes all around the corner."""
         return len(self.members) == len(self.spokes)
 
 

@@ -150,7 +150,7 @@ class Inputs:
         return self["force_n"] * self.track_change_per_newton()
 
     def track_change_per_newton(self) -> Real:
-        """The same per force [ohm/m/N]."""
+        """Change of resistance per length and force [ohm/m/N]."""
         top, bottom = (
             self[f"{end}_resistivity_ohm_m"] * self[f"{end}_piezoresistance_per_n"] / self.section(end)
             for end in ("top", "bottom")

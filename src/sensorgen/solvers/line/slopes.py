@@ -115,11 +115,11 @@ class Chain:
         return self._gains[index]
 
     def shunt_and_series(self, of_r: Array, of_y: Array) -> tuple[Array, Array]:
-        """What the recursion takes for u and v: admittance is marched from an open end, impedance from any other."""
+        """Pair u, v of the recursion: admittance is marched from an open end, impedance from any other."""
         return (of_y, of_r) if self.opened else (of_r, of_y)
 
     def by_matter(self, index: int, by_r: Array | float, by_y: Array | float) -> Iterator[Array]:
-        """What a change of resistance and admittance per length of a section does."""
+        """Effect of a change of resistance and admittance per length of a section."""
         by_shunt, by_series = self.shunt_and_series(by_r, by_y)
         if np.ndim(by_shunt) or by_shunt:
             yield self.gain(index) * self.sections[index].by_shunt * by_shunt
@@ -127,11 +127,11 @@ class Chain:
             yield self.gain(index) * self.sections[index].by_series * by_series
 
     def by_length(self, index: int) -> Array:
-        """What a longer section does."""
+        """Effect of a longer section."""
         return self.gain(index) * self.sections[index].by_length
 
     def by_shift(self, index: int, contrast: Array) -> Array:
-        """What a move of a section towards the far end does, within a line that it differs from by r0 y - r y0."""
+        """Effect of a move of a section towards the far end, within a line that it differs from by r0 y - r y0."""
         return self.gain(index) * self.sections[index].by_shift * (contrast if self.opened else -contrast)
 
 
@@ -169,7 +169,7 @@ class _Pressed(Chain):
             yield self.by_length(2)
 
     def _raised(self) -> tuple[Array, Array]:
-        """What pressing adds to r [ohm/m] and y [S/m], exactly 0 without force."""
+        """Additions of pressing to r [ohm/m] and y [S/m], exactly 0 without force."""
         denser = self.strain / (1 - self.strain)
         return self.inputs.track_change(), self.turned * (self.susceptance * denser)
 

@@ -26,7 +26,7 @@ _STRETCH = 4096  # unknowns that are eliminated at once, or four times the band
 
 
 class _Rest(NamedTuple):
-    """What elimination leaves to the unknowns after a stretch: of their matrix, as a band, and of both right sides."""
+    """Remainder of elimination after a stretch: of the matrix, as a band, and of both right sides."""
 
     band: Real
     sides: Real

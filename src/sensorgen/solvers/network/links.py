@@ -308,7 +308,7 @@ class _Ends:
 
 
 def _reach(one: tuple[float | Real, Real], other: tuple[float | Real, Real], apart: Real) -> Real:
-    """How far two neighbours touch, of where each ends and what room it has there.
+    """Length by which two neighbours touch, by the end of each and its room there.
 
     Where both end on one wall, thus not far apart, to where the line between them meets it; else to the end of the
     shorter one.

@@ -43,7 +43,7 @@ class Lines:
         return np.asarray((self.end_m - self.start_m) / self.length_m()[:, None])
 
     def goes_on(self) -> Mask:
-        """Whether another piece goes on where this one ends."""
+        """Mask: true where another piece goes on where this one ends."""
         return np.append(self.joined[1:], False)
 
     def at(self, piece: Whole, share: Real) -> Real:

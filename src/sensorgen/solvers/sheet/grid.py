@@ -112,7 +112,7 @@ def _lines(size: float, borders: list[float], corners: set[float], cells: int) -
 
 
 def _crowding(at: Real, size: float, corners: set[float]) -> Real:
-    """How many lines lie before a place, up to a factor."""
+    """Number of lines before a place, up to a factor."""
     found = at / size
     for corner in sorted(corners):
         away = (at - corner) / size
@@ -121,7 +121,7 @@ def _crowding(at: Real, size: float, corners: set[float]) -> Real:
 
 
 def folds(ports: Sequence[Port], patch: Patch | None) -> bool:
-    """Whether the currents in both sheets are opposite everywhere, so that only u_t - u_b counts.
+    """Test whether the currents in both sheets are opposite everywhere, so that only u_t - u_b counts.
 
     They are where every port joins two contacts that face each other, and the resistances have one ratio everywhere.
     """

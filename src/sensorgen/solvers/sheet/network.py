@@ -118,7 +118,7 @@ def _along(axis: Axis, start_m: float, stop_m: float) -> tuple[Real, Real]:
 
 
 def _folded(values: Real) -> Real:
-    """What the two ends of the axis hold, given to the steps next to them."""
+    """Give the values of the axis's two ends to the steps next to them."""
     found = values[1:-1].copy()
     found[0] += values[0]
     found[-1] += values[-1]

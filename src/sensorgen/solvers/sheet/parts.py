@@ -1,4 +1,4 @@
-"""What a sheet is made of: the film between two resistive sheets, contacts, a pressed patch; each checked at birth."""
+"""Parts of a sheet: the film between two resistive sheets, contacts, a pressed patch; each checked at birth."""
 
 import math
 from collections.abc import Sequence
@@ -114,7 +114,7 @@ class Contact:
         return "{} contact at x {:g}..{:g}, y {:g}..{:g} m".format(self.side, *self.x_m, *self.y_m)
 
     def touches(self, other: "Contact") -> bool:
-        """Whether the two are connected through a common place of one sheet."""
+        """Test whether the two are connected through a common place of one sheet."""
         return self.side == other.side and all(
             a[0] <= b[1] and b[0] <= a[1] for a, b in ((self.x_m, other.x_m), (self.y_m, other.y_m))
         )

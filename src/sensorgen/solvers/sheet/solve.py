@@ -230,7 +230,7 @@ class Bounds:
         return sorted(everyone, key=lambda k: -missed[k])
 
     def verdict(self) -> str:
-        """Whether these readings locate a press, in one sentence."""
+        """Verdict on locating a press by these readings, in one sentence."""
         share = self.located()
         where = "everywhere" if share == 1 else f"on {share:.0%} of the sheet" if share else "nowhere"
         x, y = (float(np.median(self.sigma(outline=True)[..., k])) / self.guess_m[k - 1] for k in (1, 2))

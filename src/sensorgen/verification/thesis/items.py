@@ -10,8 +10,8 @@ from pydantic import Field
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import within
 from sensorgen.core.records import Strict, checked
-from sensorgen.verification.thesis.verdicts import EXACT
 
+EXACT = 1e-6
 CHAPTERS = ("1", "2", "3", "4", "5", "6", "7", "B", "C", "D")
 Kind = Literal["equation", "figure", "table", "claim"]
 KINDS: tuple[Kind, ...] = ("equation", "figure", "table", "claim")

@@ -3,13 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import floor, log10
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-if TYPE_CHECKING:
-    from sensorgen.verification.thesis.items import Item
+from sensorgen.verification.thesis.items import EXACT, Item
 
 AGREES = "agrees"
 MISPRINT = "misprint confirmed"
@@ -22,7 +21,6 @@ WORDS = (AGREES, MISPRINT, DIFFERS, TRANSCRIBED, NOT_COVERED, LOST, UNEXPLAINED)
 JUDGED = (AGREES, MISPRINT, DIFFERS)  # compared with something that does not come from the number itself
 
 MOST_DIGITS = 9  # what is left is rounding, which machines do differently
-EXACT = 1e-6
 
 Numbers = NDArray[Any]
 
@@ -96,7 +94,7 @@ class Verdict:
         return f"{self.word}{self.why and ' '}{self.why}"
 
 
-def judged(item: "Item", parts: Sequence[Part]) -> Verdict:
+def judged(item: Item, parts: Sequence[Part]) -> Verdict:
     """The verdict over all parts of an item: the worst of them decides.
 
     Parameters
@@ -112,7 +110,7 @@ def judged(item: "Item", parts: Sequence[Part]) -> Verdict:
     return replace(found, why=f"{found.why}; transcribed: {copies}") if copies and found.word in JUDGED else found
 
 
-def _agreeing(item: "Item", parts: Sequence[Part], copies: int) -> Verdict:
+def _agreeing(item: Item, parts: Sequence[Part], copies: int) -> Verdict:
     if item.off or any(part.corrected is not None for part in parts):
         return Verdict(UNEXPLAINED, "(what is announced as wrong agrees with ours)")
     if copies and not compared(parts):
@@ -121,7 +119,7 @@ def _agreeing(item: "Item", parts: Sequence[Part], copies: int) -> Verdict:
     return Verdict(AGREES, f"to {digits(max(off))}" if off else "with the limit")
 
 
-def _explained(item: "Item", wrong: Sequence[Part]) -> Verdict:
+def _explained(item: Item, wrong: Sequence[Part]) -> Verdict:
     mended, copied = [part.mended() for part in wrong], any(part.copied for part in wrong)
     if all(off <= item.tolerance for off in mended) and item.erratum and not copied:
         return Verdict(MISPRINT, f"(corrected: to {digits(max(mended))})")
@@ -138,7 +136,7 @@ def _how_far(part: Part) -> str:
     return f"the thesis has {share(part.off())}"
 
 
-def _as_announced(part: Part, item: "Item") -> bool:
+def _as_announced(part: Part, item: Item) -> bool:
     known = item.off.get(part.name, np.nan)
     return bool(abs(part.off() - known) <= item.within * max(1.0, abs(known)))
 

@@ -57,13 +57,13 @@ class Arranged:
 
     @cached_property
     def tools(self) -> dict[int, str]:
-        """What each tool prints."""
+        """Materials by tool."""
         return tools(self.designs.values())
 
 
 @dataclass(frozen=True)
 class Batch:
-    """What a batch has left behind.
+    """Results of a batch.
 
     Attributes
     ----------
@@ -224,7 +224,7 @@ def _refuse_unprintable(found: Arranged, held: Mapping[str, Review], *, force: b
 
 
 def _files(found: Arranged, log_head: str) -> Iterator[tuple[str, bytes]]:
-    """What is for people: designs, plate and labels."""
+    """Files for people: designs, plate and labels."""
     plan, machine = found.plan, found.pieces[0].design.machine
     for key, design in found.designs.items():
         yield f"designs/{key}.json", json_bytes(design.model_dump(mode="json"))

@@ -25,18 +25,18 @@ class Rect:
 
     @property
     def centre_mm(self) -> tuple[float, float]:
-        """Its middle [mm]."""
+        """Middle [mm]."""
         return (self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2
 
     def meets(self, other: "Rect") -> bool:
-        """Whether the two overlap; a shared edge is none."""
+        """Test whether the two overlap; a shared edge is none."""
         return (
             min(self.x1, other.x1) - max(self.x0, other.x0) > _ROUNDING_MM
             and min(self.y1, other.y1) - max(self.y0, other.y0) > _ROUNDING_MM
         )
 
     def holds(self, other: "Rect") -> bool:
-        """Whether the other lies inside."""
+        """Test whether the other lies inside."""
         return (
             other.x0 >= self.x0 - _ROUNDING_MM
             and other.y0 >= self.y0 - _ROUNDING_MM
@@ -55,7 +55,7 @@ class Rect:
 
 @dataclass(frozen=True)
 class Room:
-    """What a plate has to offer.
+    """Room of a plate.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Room:
     gap_mm: float
 
     def free(self, place: Rect) -> bool:
-        """Whether a specimen may lie there, were it alone."""
+        """Test whether a specimen may lie there, were it alone."""
         around = place.grown(*[self.gap_mm] * 4)
         return self.area.holds(place) and not any(around.meets(k) for k in self.kept)
 
@@ -82,7 +82,7 @@ Layouts = Callable[[Sequence[Size], Room], list[Plate]]
 
 
 def room(printer: Printer, quality: Quality, tools: int, spacing_mm: float, brim_mm: float) -> Room:
-    """What the plate of a printer has to offer.
+    """Room of a printer's plate.
 
     Parameters
     ----------

@@ -131,7 +131,7 @@ def texts(designs: Iterable[Design]) -> Texts:
 
 
 def tools(designs: Iterable[Design]) -> dict[int, str]:
-    """What each tool prints, by the printer's own tool number.
+    """Materials by the printer's own tool number.
 
     Raises
     ------

@@ -48,7 +48,7 @@ class Item(Strict):
 
 
 class Layout(Strict):
-    """How the specimens lie on the plate; all of them along x, since printed lines have a direction."""
+    """Layout of the specimens on the plate; all of them along x, since printed lines have a direction."""
 
     kind: Literal["column", "packed"] = "packed"
     spacing_mm: Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)] = Field(
@@ -77,7 +77,7 @@ class Bake(Strict):
 
 
 class Labels(Strict):
-    """How specimens are labelled."""
+    """Labels of specimens."""
 
     tab: bool = Field(default=False, description="Print the name on a tab at the far end of each specimen.")
     sheet: bool = Field(default=True, description="A page of labels with QR codes to print.")
@@ -105,7 +105,7 @@ class Plan(Strict):
 
     @cached_property
     def total(self) -> int:
-        """How many specimens there are."""
+        """Number of specimens."""
         return sum(item.replicates for item in self.designs)
 
     def made(self, item: Item, folder: Path) -> Design:

@@ -1,4 +1,4 @@
-"""What slicers get, and what they give: the plate as one 3MF per family, and as G-code."""
+"""Input and output of slicers: the plate as one 3MF per family, and as G-code."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict

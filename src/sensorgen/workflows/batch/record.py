@@ -57,7 +57,7 @@ class Specimen:
 
 @dataclass(frozen=True)
 class Spool:
-    """What is on a tool; None for what neither the plan nor the material's file gives."""
+    """Spool on a tool; None for what neither the plan nor the material's file gives."""
 
     material: str
     title: str
@@ -107,7 +107,7 @@ class PrintedDesign:
 
     @property
     def lost(self) -> int:
-        """How many layers of bodies are not printed at all, against the will of the design [-]."""
+        """Number of layers of bodies that are not printed at all, against the will of the design [-]."""
         return sum(f.severity == "error" and not f.waiver for f in self.findings)
 
     @property
@@ -263,7 +263,7 @@ def specimens(pieces: Sequence[Piece], plate: Plate) -> dict[str, Specimen]:
 
 
 def tools(plan: Plan, loaded: Mapping[int, str], texts: materials.Texts) -> dict[str, Spool]:
-    """What is on each tool, by the printer's own number; ``texts`` as of :func:`sensorgen.design.materials.load`."""
+    """Spools by the printer's own number of the tool; ``texts`` as of :func:`sensorgen.design.materials.load`."""
     found = {}
     for tool, name in loaded.items():
         material, filament = materials.load(name, texts=texts), plan.filaments.get(name, Filament())
@@ -277,7 +277,7 @@ def tools(plan: Plan, loaded: Mapping[int, str], texts: materials.Texts) -> dict
 
 
 def checklist(plan: Plan, loaded: Mapping[str, Spool]) -> tuple[str, ...]:
-    """What is done by hand before, at and after the print, in this order."""
+    """Steps by hand before, at and after the print, in this order."""
     numbers = ", ".join(f"T{tool}" for tool in loaded)
     bake = [f"Bake at {b.temperature_c:g} C for {b.hours:g} h" + (f": {b.note}" if b.note else "") for b in plan.bake]
     return (

@@ -22,7 +22,7 @@ h1 { font-size: 11pt; margin: 0 0 3mm }
 
 @dataclass(frozen=True)
 class Label:
-    """What stands on one label.
+    """Content of one label.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Label:
 
     @property
     def code(self) -> str:
-        """What the QR code holds: the name first, then batch and design, a line each."""
+        """Content of the QR code: the name first, then batch and design, a line each."""
         return f"{self.name}\n{self.batch}\n{self.design_id}"
 
 

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
 
@@ -20,10 +19,10 @@ from sensorgen.analysis.characterise.catalogue import (
     targets,
     unknowns,
 )
-from sensorgen.analysis.characterise.posterior import Interval95, Posterior, physical, posterior, prior
+from sensorgen.analysis.characterise.posterior import physical, posterior, prior
 from sensorgen.checks.review import Step
 from sensorgen.core import files as store
-from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.document import Facts, Part, Table
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError
 from sensorgen.core.version import __version__
 from sensorgen.design import materials, packs
@@ -34,57 +33,12 @@ from sensorgen.export.slicers.loads import load, recipe
 from sensorgen.workflows.build import json_bytes, profiles, versions
 from sensorgen.workflows.characterise import form as forms
 from sensorgen.workflows.characterise import plate as plates
-from sensorgen.workflows.characterise.intervals import svg
+from sensorgen.workflows.characterise.intervals import IntervalRow, compared, svg
 
 STEPS = ("catalogue", "selection", "3MF", "profiles", "picture", "done")
 FORM = "form.yaml"
 MOST, HOURS = 12, 4.0  # coupons with the piece for lines and shorts, and print time
 _SLOWER, _CHANGE_S = 1.15, 20.0  # of a print against its flow; two tool changes of a layer [s]
-_DETERMINED = 0.5  # of an interval before, below which one after counts as measured
-
-
-@dataclass(frozen=True)
-class Row:
-    """A target before and after.
-
-    Attributes
-    ----------
-    quantity, material : str
-        As a material's file has them.
-    value, low, high : float
-        Afterwards: median and 95 % interval.
-    half_width, goal : float
-        Half of the interval, relative to the value, and what is wanted [%].
-    before_low, before_high : float
-        The 95 % interval before.
-    """
-
-    quantity: Annotated[str, Column("quantity")]
-    material: Annotated[str, Column("material")]
-    before_low: Annotated[float, Column("before", digits=2)]
-    before_high: Annotated[float, Column("to", digits=2)]
-    value: Annotated[float, Column("after", digits=3)]
-    low: Annotated[float, Column("low", digits=3)]
-    high: Annotated[float, Column("high", digits=3)]
-    half_width: Annotated[float, Column("+-", "%", digits=2)]
-    goal: Annotated[float, Column("goal", "%", digits=2)]
-    title: Annotated[str, Column("meaning", hidden=True)]
-
-    def determined(self) -> bool:
-        """Whether the readings say more than what was known before."""
-        return self.high - self.low < _DETERMINED * (self.before_high - self.before_low)
-
-
-def rows(before: Posterior, after: Posterior, wanted: Sequence[Target]) -> tuple[Row, ...]:
-    """All targets, with their intervals before and after."""
-
-    def row(target: Target, was: Interval95, now: Interval95) -> Row:
-        goal = 100 * target.goal if target.goal else np.nan
-        half = 100 * now.half_width() if target.goal else np.nan
-        return Row(target.quantity, target.material, was.low, was.high, now.value, now.low, now.high, half, goal,
-                   target.title)  # fmt: skip
-
-    return tuple(row(target, before.interval(target), after.interval(target)) for target in wanted)
 
 
 @dataclass(frozen=True)
@@ -136,7 +90,7 @@ class Study:
 
     @cached_property
     def targets(self) -> tuple[Target, ...]:
-        """What is wanted."""
+        """Quantities that are wanted."""
         return targets(self.conductor, self.dielectric, self.design.machine.line_mm())
 
     @cached_property
@@ -160,7 +114,7 @@ class Study:
                 "tools": json.dumps({m: self.design.tool(m) for m in (self.conductor, self.dielectric)})}  # fmt: skip
 
     def fits(self, chosen: Sequence[int], hours: float) -> bool:
-        """Whether bed and print time have room for coupons, by their numbers."""
+        """Test whether bed and print time have room for coupons, by their numbers."""
         coupons = [self.coupons[k] for k in chosen]
         if self.hours(coupons) > hours:
             return False
@@ -218,7 +172,7 @@ class Planned:
         Their names, in the order of the plate.
     hours : float
         Print time, estimated [h].
-    rows : tuple of Row
+    rows : tuple of IntervalRow
         Intervals before, and as expected if all coupons are sound.
     exposed : tuple of (str, str)
         Coupons without which an interval is beyond three times its goal, with the quantities.
@@ -229,7 +183,7 @@ class Planned:
     files: tuple[str, ...]
     coupons: tuple[str, ...]
     hours: float
-    rows: tuple[Row, ...]
+    rows: tuple[IntervalRow, ...]
     exposed: tuple[tuple[str, str], ...]
 
     def document(self) -> Iterator[Part]:
@@ -287,7 +241,7 @@ def plan(
     step("selection")
     chosen = selection.select(found, count - 1, lambda chosen: study.fits(chosen, hours))
     coupons = named([study.coupons[k] for k in chosen])
-    result = rows(prior(study.unknowns), found.expected(chosen, study.unknowns), study.targets)
+    result = compared(prior(study.unknowns), found.expected(chosen, study.unknowns), study.targets)
     plate = plates.arranged(coupons, study.design)
     usual = study.expected()
     expected = {c.name: usual[study.coupons[k].name] for c, k in zip(coupons, chosen, strict=True)}
@@ -345,7 +299,7 @@ class Characterised:
         Materials that they are of.
     coupons, readings : int
         How many were read.
-    rows : tuple of Row
+    rows : tuple of IntervalRow
         Intervals before and after.
     dead : mapping of str to float
         Probability that a coupon is broken, where it exceeds one half [-].
@@ -360,7 +314,7 @@ class Characterised:
     dielectric: str
     coupons: int
     readings: int
-    rows: tuple[Row, ...]
+    rows: tuple[IntervalRow, ...]
     dead: Mapping[str, float]
     findings: tuple[str, ...]
     file: str | None = None
@@ -448,7 +402,7 @@ def read(path: Path, source: str = "", *, keep: bool = True, force: bool = False
         raise error.within(str(path)) from None
     made = Characterised(
         label, study.conductor, study.dielectric, sum(bool(o.read.any()) for o in observed),
-        sum(int(o.read.sum()) for o in observed), rows(prior(study.unknowns), found, study.targets), found.dead(),
+        sum(int(o.read.sum()) for o in observed), compared(prior(study.unknowns), found, study.targets), found.dead(),
         tuple(_findings(piece, study.design.machine.line_mm())),
     )  # fmt: skip
     if not keep:

@@ -35,7 +35,7 @@ _SIZES, _DEFECT = 3.0, 1e5  # by which a size, a reading of a dead coupon, may d
 
 @dataclass(frozen=True)
 class Lines:
-    """What is read on the piece for lines and shorts; None where nothing was.
+    """Readings of the piece for lines and shorts; None where nothing was.
 
     Attributes
     ----------
@@ -297,7 +297,7 @@ def _si(
 
 
 def lines_of(form: Form) -> Lines:
-    """What the form has of the piece for lines and shorts.
+    """Entries of the form for the piece for lines and shorts.
 
     Raises
     ------

@@ -13,7 +13,7 @@ from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, Unknow
 from sensorgen.core.findings import Finding
 from sensorgen.design import design as designs
 from sensorgen.design import imported, packs
-from sensorgen.workflows.importing.reading import Assembly, shared_mm
+from sensorgen.workflows.importing.reading import Assembly, ReadBody, shared_mm
 
 if TYPE_CHECKING:
     pass
@@ -26,7 +26,7 @@ _ROLES = (("support", "bvoh"), ("electrode", "etpu"), ("conduct", "etpu"), ("die
 
 @dataclass(frozen=True)
 class Assigned:
-    """What the bodies of files are printed of, and which are electrodes.
+    """Materials of the bodies of files, and their electrodes.
 
     Attributes
     ----------
@@ -139,23 +139,36 @@ def _terminals(
     Of conductors that touch and have two terminals, a finding says that they are a short.
     """
     bodies = sorted((b for b in assembly.bodies if b.name in conductors), key=lambda b: float(b.box_mm[:, 2].mean()))
+    every = _touching(bodies)
+    if len(every) == 1 and len(bodies) > 1:  # its lowest and its highest body are shorted
+        ends = {**dict.fromkeys(every[0], ""), bodies[0].name: "bottom", bodies[-1].name: "top", **given}
+        return ends, tuple(_shorts(every, ends))
+    ends = _by_height(every, {body.name: float(body.box_mm[:, 2].mean()) for body in bodies}, given)
+    return ends, tuple(_shorts(every, ends))
+
+
+def _touching(bodies: Sequence[ReadBody]) -> list[list[str]]:
+    """Names of bodies in groups of those that touch."""
     solids, boxes = {body.name: body.solid() for body in bodies}, {body.name: body.box_mm for body in bodies}
     groups = {body.name: frozenset([body.name]) for body in bodies}
     for a, b in combinations(groups, 2):
         if (shared_mm(boxes[a], boxes[b]) > -_CONTACT_MM).all() and solids[a].min_gap(solids[b], 1.0) < _CONTACT_MM:
             joined = groups[a] | groups[b]
             groups |= dict.fromkeys(joined, joined)
-    every = [[name for name in groups if groups[name] == own] for own in dict.fromkeys(groups.values())]
-    if len(every) == 1 and len(bodies) > 1:  # its lowest and its highest body are shorted
-        ends = {**dict.fromkeys(groups, ""), bodies[0].name: "bottom", bodies[-1].name: "top", **given}
-        return ends, tuple(_shorts(every, ends))
+    return [[name for name in groups if groups[name] == own] for own in dict.fromkeys(groups.values())]
+
+
+def _by_height(
+    every: Sequence[Sequence[str]], middle_mm: Mapping[str, float], given: Mapping[str, str]
+) -> dict[str, str]:
+    """Terminal of each conductor: as given, else by the height of its group."""
     decided = {k: {given[name] for name in group if name in given} for k, group in enumerate(every)}
     ends = {name: end for k, group in enumerate(every) for name in group for end in decided[k]}
     ends.update(given)
     left = [k for k, named in decided.items() if not named]
     by_height = sorted(
         (k for k, named in decided.items() if named != {""}),
-        key=lambda k: sum(float(boxes[name][:, 2].mean()) for name in every[k]) / len(every[k]),
+        key=lambda k: sum(middle_mm[name] for name in every[k]) / len(every[k]),
     )
     if left and len(by_height) > len(_BY_HEIGHT):
         apart = ", ".join(sorted(every[k][0] for k in by_height))
@@ -165,7 +178,7 @@ def _terminals(
         )
     places = _BY_HEIGHT if len(by_height) == len(_BY_HEIGHT) else ("bottom", "top")
     ends |= {name: end for k, end in zip(by_height, places, strict=False) if k in left for name in every[k]}
-    return ends, tuple(_shorts(every, ends))
+    return ends
 
 
 def _shorts(groups: Sequence[Sequence[str]], ends: Mapping[str, str]) -> Iterator[Finding]:

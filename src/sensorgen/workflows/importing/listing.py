@@ -68,6 +68,6 @@ class Listing:
         yield f"To import it: {self.words()}"
 
     def words(self) -> str:
-        """What to type to import it."""
+        """Words to type to import it."""
         maps = " ".join(f"--map {body.name}={body.material.replace('?', 'MATERIAL')}" for body in self.bodies)
         return f"sensorgen import {self.source} {maps}"

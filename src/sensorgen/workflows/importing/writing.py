@@ -62,7 +62,7 @@ class Imported:
         return [finding for finding in self.findings if finding.severity == "error"]
 
     def document(self) -> Iterator[Part]:
-        """What was written, and what applies to it."""
+        """Files written, and what applies to them."""
         size = " x ".join(f"{edge:g}" for edge in self.size_mm)
         moved = ", ".join(f"{way:g}" for way in self.moved_mm)
         able = [name for name, reason in self.models.items() if not reason]

@@ -1,0 +1,56 @@
+"""Maps over the outline of an array."""
+
+from math import nan
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sensorgen.analysis.plots import static
+from sensorgen.analysis.plots.figure import GREY, Axis, Curve, Figure, Map, Panel
+from sensorgen.core.arrays import Real
+
+if TYPE_CHECKING:
+    from sensorgen.design.arrays import Layout
+    from sensorgen.prediction.array.frames import PressureMaps
+    from sensorgen.prediction.array.study import ArrayStudy
+
+
+def png(study: "ArrayStudy") -> bytes:
+    """Standard errors of pressure over the outline, and crosstalk where it is known, as PNG.
+
+    Crossings that are not determined are left white.
+    """
+    layout = study.model.layout
+    shown = np.where(study.determined, study.sigma_kpa, np.nan)
+    panels = [panel(layout, shown, "standard error [kPa]", f"one frame at {study.pressure_kpa:g} kPa")]
+    if study.crosstalk is not None:
+        panels.append(panel(layout, np.where(study.determined, study.crosstalk, np.nan), "crosstalk [-]", "crosstalk"))
+    alt = "Standard error of the pressure at every crossing, over the outline; crosstalk beside it."
+    return static.png(Figure("array", f"{study.model.design.name}, {study.readout.kind}", alt, {"": tuple(panels)},
+                             columns=len(panels)))  # fmt: skip
+
+
+def maps(found: "PressureMaps", true: "Real | None" = None) -> bytes:
+    """The heaviest frame's pressures, and the true ones beside them where these are known, as PNG.
+
+    What is not determined is left white, never drawn as no pressure.
+    """
+    k, layout = found.heaviest(), found.model.layout
+    shown = {f"frame at {found.time_s[k]:g} s": found.pressure_kpa[k]}
+    if true is not None:
+        shown = {"true": np.where(found.model.here, true[k], np.nan)} | shown
+    most = max(float(np.nanmax(values, initial=1.0)) for values in shown.values())
+    panels = [panel(layout, values, "pressure [kPa]", title, most) for title, values in shown.items()]
+    alt = "Pressure at every crossing over the outline, the true one beside it where it is known."
+    return static.png(Figure("map", found.model.design.name, alt, {"": tuple(panels)}, columns=len(panels)))
+
+
+def panel(layout: "Layout", values: Real, label: str, title: str, most: float = nan) -> Panel:
+    """One map of a value of every crossing, with the outline of the print."""
+    import shapely
+
+    x, y = shapely.get_coordinates(layout.footprint.exterior).T
+    (length, width), edge = layout.size_mm, layout.params.margin_mm
+    ends = (Axis("x [mm]", low=-edge, high=length + edge), Axis("y [mm]", low=-edge, high=width + edge))
+    drawn = Map(np.array(layout.x_mm), np.array(layout.y_mm), values, label, low=0.0, high=most)
+    return Panel((drawn, Curve("line", "", x, y, colour=GREY)), *ends, title=title, equal=True)

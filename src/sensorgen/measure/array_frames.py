@@ -1,0 +1,161 @@
+"""Frames of an array: files NPZ and CSV with a reading of every crossing, and which of them are at rest."""
+
+import csv
+import re
+import zipfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sensorgen.core.arrays import Complex, Mask, Real
+from sensorgen.core.errors import BadInput
+from sensorgen.core.files import reading
+
+MOST_BYTES = 4_000_000_000
+_CROSSING = re.compile(r"r(\d+)c(\d+)")
+_TRUE = ("1", "1.0", "true")
+KEYS = ("siemens", "capacitance_f")
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """Frames of one recording.
+
+    Attributes
+    ----------
+    siemens : (k, m, n) array
+        Readings [S]; nan where one is missing or saturated. Of capacitances alone the real part is nan.
+    time_s : (k,) array
+        Of each frame; its number where none is known [s].
+    rest : (k,) array of bool
+        Frames with nothing on the array.
+    frequency_hz : float
+        Of the readings [Hz].
+    pressure_kpa : (k, m, n) array or None
+        True pressures, where the array was virtual [kPa].
+    """
+
+    siemens: Complex
+    time_s: Real
+    rest: Mask
+    frequency_hz: float
+    pressure_kpa: "Real | None" = None
+
+
+def read(path: Path, shape: tuple[int, int], frequency_hz: float | None) -> Frames:
+    """Frames of a file.
+
+    Parameters
+    ----------
+    path : Path
+        NPZ with ``siemens`` (frames, rows, columns), complex, or ``capacitance_f``, and perhaps ``time_s``, ``rest``,
+        ``frequency_hz``; or CSV with a row per frame, columns ``r1c1`` ... [F], and perhaps ``time_s`` and ``rest``.
+    shape : (int, int)
+        Rows and columns of the array.
+    frequency_hz : float, optional
+        Of the readings, where the file does not have it [Hz].
+
+    Raises
+    ------
+    BadInput
+        A file that is neither, has frames of another size, or no frequency.
+    """
+    with reading(path):
+        if path.stat().st_size > MOST_BYTES:
+            raise BadInput(f"{path}: {path.stat().st_size / 1e9:.1f} GB; expected at most {MOST_BYTES / 1e9:g} GB")
+        found = _of_npz(path) if path.suffix == ".npz" else _of_csv(path, shape)
+    try:
+        return _checked(found, shape, frequency_hz)
+    except BadInput as error:
+        raise error.within(str(path)) from None
+
+
+def _checked(found: dict[str, np.ndarray], shape: tuple[int, int], frequency_hz: float | None) -> Frames:
+    key = next((key for key in KEYS if key in found), None)
+    if key is None:
+        raise BadInput(f"no readings; expected {' or '.join(KEYS)} by frame, row and column")
+    values = found[key]
+    if values.ndim != 3 or values.shape[1:] != shape or not len(values):
+        sizes = " x ".join(map(str, values.shape))
+        raise BadInput(f"{key} is {sizes}; expected frames x {shape[0]} rows x {shape[1]} columns of this array")
+    hertz = _frequency(found, frequency_hz)
+    if key == "capacitance_f":
+        values = 2j * np.pi * hertz * values
+        values.real = np.nan
+    count = len(values)
+    true = found.get("pressure_kpa", np.zeros(0))
+    return Frames(
+        values.astype(complex), _each(found, "time_s", np.arange(float(count))),
+        _each(found, "rest", np.zeros(count)).astype(bool), hertz, true if true.shape == values.shape else None,
+    )  # fmt: skip
+
+
+def _frequency(found: dict[str, np.ndarray], given: float | None) -> float:
+    own = found.get("frequency_hz", np.zeros(1)).ravel()
+    hertz = given or (float(own[0]) if own.size == 1 else 0.0)
+    if not 0 < hertz < np.inf:
+        raise BadInput("no frequency of the readings; expected frequency_hz in the file, or --frequency 10kHz")
+    return hertz
+
+
+def _each(found: dict[str, np.ndarray], name: str, default: Real) -> Real:
+    """One value for each frame."""
+    values = found.get(name, default)
+    if values.shape != default.shape:
+        raise BadInput(f"{name} has {values.size} values; expected one for each of {default.size} frames")
+    return values
+
+
+def _of_npz(path: Path) -> dict[str, np.ndarray]:
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return {key: data[key] for key in data.files if data[key].dtype.kind in "bifuc"}
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise BadInput(f"{path}: no NPZ file of numbers ({str(error)[:80]})") from None
+
+
+def _of_csv(path: Path, shape: tuple[int, int]) -> dict[str, np.ndarray]:
+    try:
+        rows = list(csv.reader(path.read_text("utf-8").splitlines()))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise BadInput(f"{path}: no CSV table ({str(error)[:80]})") from None
+    if len(rows) < 2:
+        raise BadInput(f"{path}: no frames; expected a head with r1c1, r1c2 ... and a row for each frame")
+    for line, row in enumerate(rows[1:], 2):
+        if len(row) != len(rows[0]):
+            raise BadInput(f"{path}, line {line}: {len(row)} values; expected {len(rows[0])} as in the head")
+    columns = dict(zip((name.strip() for name in rows[0]), zip(*rows[1:], strict=True), strict=True))
+    values = np.full((len(rows) - 1, *shape), np.nan)
+    for name, (i, j) in _crossings(columns, shape, path).items():
+        values[:, i, j] = _numbers(columns[name], path)
+    found = {"capacitance_f": values}
+    if "time_s" in columns:
+        found["time_s"] = _numbers(columns["time_s"], path)
+    if "rest" in columns:
+        found["rest"] = np.array([word.strip().lower() in _TRUE for word in columns["rest"]])
+    return found
+
+
+def _crossings(names: Iterable[str], shape: tuple[int, int], path: Path) -> dict[str, tuple[int, int]]:
+    """Row and column of each name of a crossing."""
+    found = {name: (int(m[1]) - 1, int(m[2]) - 1) for name in names if (m := _CROSSING.fullmatch(name))}
+    wrong = [name for name, at in found.items() if at not in set(np.ndindex(shape))]
+    if wrong or not found:
+        words = ", ".join(wrong[:3]) or "without any crossing"
+        raise BadInput(f"{path}: columns {words}; expected r1c1 to r{shape[0]}c{shape[1]} of this array")
+    return found
+
+
+def _numbers(words: Sequence[str], path: Path) -> Real:
+    """Numbers of a column; nan where a word is empty."""
+    return np.array([_number(word, path, line) for line, word in enumerate(words, 2)])
+
+
+def _number(word: str, path: Path, line: int) -> float:
+    """A number; nan where the word is empty."""
+    try:
+        return float(word) if word.strip() else np.nan
+    except ValueError:
+        raise BadInput(f"{path}, line {line}: {word!r:.30} is no number; leave it empty where none was read") from None

@@ -1,0 +1,344 @@
+"""Frames of an array to pressure maps: by C/C0 where that suffices, else with the network of the tracks."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+
+from sensorgen.core.arrays import Complex, Mask, Real
+from sensorgen.core.document import Column, Facts, Part, Table, comma_separated, to_json
+from sensorgen.core.errors import BadInput
+from sensorgen.prediction.array.model import ArrayModel
+from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayReadout, own_slopes
+from sensorgen.prediction.array.study import DETECTED, DETERMINED, PA_PER_KPA
+from sensorgen.solvers.tracks import Readings, readings
+
+SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration of each
+_STEPS = 25  # of Gauss-Newton with the slopes at rest
+_DONE = 0.02  # of a standard error: a smaller step ends it
+_SUFFICES = 1.0  # standard error by which C/C0 may differ from the network
+_ALIVE = 3.0  # factor of a reading at rest to the predicted one; prints differ by less
+_SHOWN = 6  # crossings that are named
+_CI = 1.96  # standard errors of 95 %
+
+
+@dataclass(frozen=True, eq=False)
+class PressureMaps:
+    """Pressure maps of a recording.
+
+    Attributes
+    ----------
+    model : ArrayModel
+        The array.
+    by : str
+        Model that inverted the readings, and why.
+    time_s : (k,) array
+        Of each frame [s].
+    pressure_kpa, sigma_kpa : (k, m, n) array
+        Pressure on the surface and its standard error; nan where it is not determined [kPa].
+    """
+
+    model: ArrayModel
+    by: str
+    time_s: Real
+    pressure_kpa: Real
+    sigma_kpa: Real
+
+    @cached_property
+    def interval_kpa(self) -> tuple[Real, Real]:
+        """Lower and upper end of 95 % [kPa]."""
+        half = _CI * self.sigma_kpa
+        return self.pressure_kpa - half, self.pressure_kpa + half
+
+    @property
+    def _newtons(self) -> Real:
+        return self.pressure_kpa * PA_PER_KPA * self.model.pitch_area_m2
+
+    @cached_property
+    def force_n(self) -> tuple[Real, Real]:
+        """Total force of each frame and its standard error: crossings that are not determined are left out [N]."""
+        sigma = self.sigma_kpa * PA_PER_KPA * self.model.pitch_area_m2
+        return np.nansum(self._newtons, (1, 2)), np.sqrt(np.nansum(sigma**2, (1, 2)))
+
+    @cached_property
+    def touched(self) -> Mask:
+        """Crossings with a pressure above three standard errors, (k, m, n)."""
+        return np.asarray(self.pressure_kpa > DETECTED * self.sigma_kpa)
+
+    @cached_property
+    def centre_mm(self) -> tuple[Real, Real]:
+        """Centre of pressure of the touched crossings, from the print's corner; nan where nothing is [mm]."""
+        weight = np.where(self.touched, self._newtons, 0.0)
+        total = weight.sum((1, 2))
+        layout = self.model.layout
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return (weight.sum(1) @ layout.x_mm) / total, (weight.sum(2) @ layout.y_mm) / total
+
+    @property
+    def area_mm2(self) -> Real:
+        """Area of contact of each frame [mm2]."""
+        return np.asarray(self.touched.sum((1, 2)) * self.model.pitch_area_m2 * 1e6)
+
+    def table(self) -> Table:
+        """Force, centre of pressure, area and peak of each frame."""
+        (force, sigma), (x, y) = self.force_n, self.centre_mm
+        peak = np.nanmax(np.where(np.isnan(self.pressure_kpa), -np.inf, self.pressure_kpa), (1, 2))
+        columns = (
+            Column("time", "s", key="time_s"), Column("force", "N", key="force_n"),
+            Column("sigma F", "N", key="sigma_force_n"), Column("x", "mm", key="x_mm"), Column("y", "mm", key="y_mm"),
+            Column("contact", "mm2", key="area_mm2"), Column("peak", "kPa", key="peak_kpa"),
+            Column("not determined", key="undetermined"),
+        )  # fmt: skip
+        dark = (np.isnan(self.pressure_kpa) & self.model.here).sum((1, 2))
+        values = np.stack([self.time_s, force, sigma, x, y, self.area_mm2, peak, dark], 1).tolist()
+        return Table("frames", "", columns, tuple(tuple(None if v != v else v for v in row) for row in values))
+
+    def heaviest(self) -> int:
+        """Number of the frame with the largest force."""
+        return int(self.force_n[0].argmax())
+
+    def document(self) -> Iterator[Part]:
+        """Summary and the heaviest frame; CSV has all frames."""
+        table, k, count = self.table(), self.heaviest(), int(self.model.here.sum())
+        dark = int(np.isnan(self.pressure_kpa[k])[self.model.here].sum())
+        sigma = self.sigma_kpa[k][np.isfinite(self.sigma_kpa[k])]
+        low, high = (float(each) for each in (sigma.min(initial=np.inf), sigma.max(initial=0.0)))
+        yield Facts((
+            ("frames", f"{len(self.time_s)}, inverted by {self.by}"),
+            ("pressures", f"standard errors {low:.3g} to {high:.3g} kPa in the heaviest frame"),
+            *((("not determined", f"{dark} of {count} crossings: {self._names(k)}"),) if dark else ()),
+        ))  # fmt: skip
+        yield ""
+        shown = tuple(float(f"{v:.4g}") if isinstance(v, float) else v for v in table.cells[k])
+        yield Table("heaviest", "the heaviest frame", table.columns, (shown,))
+        yield from (f"doubtful: {doubt}" for doubt in self.model.crossing.doubts)
+
+    def _names(self, k: int) -> str:
+        """First crossings that a frame does not determine."""
+        found = np.argwhere(np.isnan(self.pressure_kpa[k]) & self.model.here).tolist()
+        return ", ".join(f"r{i + 1}c{j + 1}" for i, j in found[:_SHOWN]) + (", ..." if len(found) > _SHOWN else "")
+
+    def csv(self) -> Iterator[str]:
+        """All frames, a row each."""
+        yield comma_separated(self.table())
+
+    def npz(self) -> bytes:
+        """Maps and numbers of every frame as NPZ."""
+        target, (force, sigma), (x, y) = BytesIO(), self.force_n, self.centre_mm
+        np.savez_compressed(
+            target, time_s=self.time_s, pressure_kpa=self.pressure_kpa, sigma_kpa=self.sigma_kpa, force_n=force,
+            sigma_force_n=sigma, centre_x_mm=x, centre_y_mm=y, area_mm2=self.area_mm2,
+        )  # fmt: skip
+        return target.getvalue()
+
+    def to_json(self) -> str:
+        """Numbers of every frame as indented JSON."""
+        table = self.table()
+        keys = [column.key for column in table.columns]
+        frames = [dict(zip(keys, row, strict=True)) for row in table.cells]
+        found: dict[str, Any] = {"array": self.model.design.name, "by": self.by, "frames": frames}
+        return to_json(found)
+
+
+@dataclass(frozen=True, eq=False)
+class MapInverter:
+    """Readings of one array to pressures, after its readings at rest.
+
+    Attributes
+    ----------
+    model, readout : ArrayModel, ArrayReadout
+        The array, and how it is read, at one frequency.
+    rest_s : (m, n) array
+        Mean of the readings at rest [S]; nan where one is missing, and the real part of capacitances alone.
+    rest_count : int
+        Frames in that mean.
+    scatter : float
+        Standard deviation of the gain from cell to cell [-].
+    """
+
+    model: ArrayModel
+    readout: ArrayReadout
+    rest_s: Complex
+    rest_count: int
+    scatter: float = SCATTER
+
+    def __post_init__(self) -> None:
+        """Refuse arrays too large for two terminals, of which no reading is its own crossing's alone."""
+        if self.readout.kind == "two-terminal" and self.model.here.size > MOST_DENSE:
+            raise BadInput(
+                f"{self.model.here.size} crossings by two terminals; expected at most {MOST_DENSE}: read it guarded"
+            )
+
+    def read(self, capacitance_f: Real) -> Readings:
+        """Readings of the network."""
+        return readings(
+            self.model.tracks(capacitance_f), self.readout.frequency_hz[0], readout=self.readout.kind,
+            input_ohm=self.readout.input_ohm,
+        )  # fmt: skip
+
+    @cached_property
+    def parts(self) -> tuple[Mask, Mask]:
+        """Masks of the real and the imaginary parts of readings that count, (m, n) each."""
+        return np.isfinite(self.rest_s.real), np.isfinite(self.rest_s.imag) & self.model.here
+
+    @cached_property
+    def nominal(self) -> Readings:
+        """Readings of the array as predicted, at rest."""
+        return self.read(self.model.capacitances())
+
+    @cached_property
+    def alive(self) -> Mask:
+        """Crossings that read at rest within a factor of what is predicted, (m, n): others are broken or shorted."""
+        real, imaginary = self.parts
+        nominal = self.nominal.siemens
+        with np.errstate(invalid="ignore", divide="ignore"):
+            size = np.where(real, np.abs(self.rest_s), np.abs(self.rest_s.imag))
+            ratio = size / np.where(real, np.abs(nominal), np.abs(nominal.imag))
+            return np.asarray(imaginary & (ratio > 1 / _ALIVE) & (ratio < _ALIVE))
+
+    @cached_property
+    def prior_f(self) -> Real:
+        """Standard deviation of the capacitances before any reading, (m, n) [F]."""
+        _, slope = self.model.under(np.zeros(1))
+        c = self.model.capacitance.value
+        return np.where(self.model.here, c * (float(slope[0]) * FULL_SCALE_PA + 1.0), 1e-6 * c)
+
+    @cached_property
+    def gain(self) -> tuple[Real, Real]:
+        """Capacitances by weighed readings, (m n, 2 m n) or of each crossing alone, and their variances [F2]."""
+        real, imaginary = self.parts
+        weight = np.concatenate([part.ravel() for part in self._weights(real, imaginary)])
+        if self.model.here.size > MOST_DENSE:
+            slopes = own_slopes(self.nominal)
+            by = np.stack([slopes.real.ravel(), slopes.imag.ravel()]) * weight.reshape(2, -1)
+            variance = 1 / ((by**2).sum(0) + 1 / self.prior_f.ravel() ** 2)
+            return by * variance, variance
+        matrix = self.nominal.matrix()
+        slopes_all = np.vstack([matrix.real, matrix.imag]) * weight[:, None]
+        spread = np.linalg.inv(slopes_all.T @ slopes_all + np.diag(1 / self.prior_f.ravel() ** 2))
+        return spread @ slopes_all.T, np.diag(spread)
+
+    def _weights(self, real: Mask, imaginary: Mask) -> tuple[Real, Real]:
+        sigma = self.readout.sigma_s(self.nominal.siemens)
+        return np.where(real, 1 / sigma, 0.0), np.where(imaginary, 1 / sigma, 0.0)
+
+    def capacitances(self, siemens: Complex, start: Real) -> Real:
+        """Capacitances behind one frame, with the network, (m, n) [F].
+
+        Gauss-Newton with the slopes at rest; the prior, as wide as full scale, keeps what no reading tells.
+        """
+        weights, (gain, variance) = self._weights(*self.parts), self.gain
+        c, (m, n) = start, start.shape
+        for _ in range(_STEPS):
+            left = siemens - self.read(c).siemens
+            off = np.stack([np.nan_to_num(left.real) * weights[0], np.nan_to_num(left.imag) * weights[1]])
+            if gain.shape[0] == 2:
+                step = (gain * off.reshape(2, -1)).sum(0)
+            else:
+                step = gain @ off.ravel() - variance * ((c - start) / self.prior_f**2).ravel()
+            c = np.maximum(c + step.reshape(m, n), 1e-3 * start)
+            if (np.abs(step) < _DONE * np.sqrt(variance)).all():
+                break
+        return c
+
+    @cached_property
+    def rest_f(self) -> Real:
+        """Capacitances at rest of this print, with the network, (m, n) [F]."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.nan_to_num(self.rest_s.imag / self.nominal.siemens.imag, nan=1.0, posinf=1.0, neginf=1.0)
+        start = self.model.capacitances() * np.where(self.model.here, np.clip(ratio, 0.1, 10.0), 1.0)
+        return self.capacitances(self.rest_s, start)
+
+    def by_ratio(self, siemens: Complex) -> Real:
+        """Capacitance over that at rest, of each crossing by its own reading alone [-]."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(siemens.imag / self.rest_s.imag)
+
+    def by_network(self, siemens: Complex) -> Real:
+        """Capacitance over that at rest with the network, frame by frame [-]."""
+        start = np.nan_to_num(self.by_ratio(siemens), nan=1.0, posinf=1.0, neginf=1.0)
+        return np.stack([
+            self.capacitances(one, self.rest_f * np.clip(own, 0.5, 5.0)) / self.rest_f
+            for one, own in zip(siemens, start, strict=True)
+        ])  # fmt: skip
+
+    def maps(self, siemens: Complex, time_s: Real) -> PressureMaps:
+        """Pressure maps of frames; C/C0 where it agrees with the network in the heaviest frame."""
+        ratio = self.by_ratio(siemens)
+        heaviest = int(np.nansum(np.where(self.alive, ratio, 0), (1, 2)).argmax())
+        network = self.by_network(siemens[heaviest : heaviest + 1])[0]
+        variance = self.gain[1].reshape(self.model.here.shape)
+        known = np.sqrt(variance) < DETERMINED * self.prior_f
+        error = np.sqrt(variance) / np.where(known, self.rest_f, 1.0)
+        counted = known & self.alive & np.isfinite(ratio[heaviest])
+        worst = float((np.abs(network - ratio[heaviest]) / error)[counted].max(initial=0.0))
+        if worst < _SUFFICES:
+            by = f"C/C0: the network differs by at most {worst:.2g} standard errors in the heaviest frame"
+        else:
+            by = f"the network of the tracks: C/C0 differs by {worst:.2g} standard errors in the heaviest frame"
+            ratio = self.by_network(siemens)
+        pressure, per = self.model.pressures(np.nan_to_num(ratio, nan=1.0, posinf=1.0, neginf=1.0))
+        noise = error * per * np.sqrt(1 + 1 / self.rest_count)
+        sigma = np.hypot(noise, self.scatter * pressure)
+        given = known & self.alive & np.isfinite(siemens.imag)
+        shown = (np.where(given, each / PA_PER_KPA, np.nan) for each in (pressure, sigma))
+        return PressureMaps(self.model, by, time_s, *shown)
+
+
+def inverted(
+    model: ArrayModel, readout: ArrayReadout, siemens: Complex, rest: Mask, time_s: Real, scatter: float = SCATTER,
+    apart: "Complex | None" = None,
+) -> PressureMaps:  # fmt: skip
+    """Pressure maps of a recording.
+
+    Parameters
+    ----------
+    model, readout : ArrayModel, ArrayReadout
+        The array, and how it is read, at one frequency.
+    siemens : (k, m, n) array
+        Readings [S].
+    rest : (k,) array of bool
+        Frames with nothing on the array.
+    time_s : (k,) array
+        Of each frame [s].
+    scatter : float
+        Standard deviation of the gain from cell to cell [-].
+    apart : (r, m, n) array, optional
+        Readings at rest of another file, in place of those of this one [S].
+
+    Raises
+    ------
+    BadInput
+        No frame at rest, or none under load.
+    """
+    siemens, at_rest = _missing(siemens), siemens[rest] if apart is None else apart
+    at_rest = _missing(at_rest)
+    if not len(at_rest):
+        raise BadInput(
+            "no frame at rest; expected 'rest' with 1 where nothing was on the array, or --rest FILE: what counts is "
+            "the ratio to it, and a standing load is never taken for rest"
+        )
+    loaded = ~rest
+    if not loaded.any():
+        raise BadInput("all frames are at rest; expected some under load")
+    inverter = MapInverter(model, readout, _mean(at_rest), len(at_rest), scatter)
+    return inverter.maps(siemens[loaded], time_s[loaded])
+
+
+def _missing(siemens: Complex) -> Complex:
+    """Readings with both parts nan where one is missing: a complex nan may have an imaginary part of 0."""
+    lost = np.isnan(siemens.real) & (siemens.imag == 0) | ~np.isfinite(siemens.imag)
+    return np.asarray(np.where(lost, complex(np.nan, np.nan), siemens))
+
+
+def _mean(frames: Complex) -> Complex:
+    """Mean over frames; nan where a reading is missing in all of them."""
+    count = np.isfinite(frames.imag).sum(0)
+    real, imaginary = (np.nansum(part, 0) for part in (frames.real, frames.imag))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean = np.asarray(imaginary / count) * 1j
+        mean.real = np.where(np.isfinite(frames.real).any(0), real / count, np.nan)
+    return mean

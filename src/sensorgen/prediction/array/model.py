@@ -1,0 +1,252 @@
+"""An array in numbers: the cell of every crossing as printed, and the resistance of every track to its pad."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated
+
+import numpy as np
+
+from sensorgen.core.arrays import Real
+from sensorgen.core.bounds import Bounds
+from sensorgen.core.document import Column, Table
+from sensorgen.core.errors import BadInput, MissingValue
+from sensorgen.core.units import M_PER_MM
+from sensorgen.design.arrays import Layout, Track
+from sensorgen.design.design import Design
+from sensorgen.models.compression import Curve
+from sensorgen.prediction import bodies
+from sensorgen.prediction.query import Query
+from sensorgen.prediction.sensor_model import SensorModel
+from sensorgen.solvers.tracks import Tracks
+
+USUAL_KPA = 90.0  # of 6 N on 8 x 8 mm
+_N_PER_KPA_MM2 = 1e-3
+_NEWTON = 12  # steps: the law is smooth and nearly straight
+SHORT_OHM = 1e3  # of a shorted crossing: one bead of the electrodes' material across the film
+
+
+@dataclass(frozen=True)
+class Wire:
+    """A wire of the connector."""
+
+    wire: Annotated[int, Column("wire")]
+    track: Annotated[str, Column("track")]
+    pad_x_mm: Annotated[float, Column("pad x", "mm")]
+    pad_y_mm: Annotated[float, Column("pad y", "mm")]
+    lead_mm: Annotated[float, Column("lead", "mm")]
+    track_mm: Annotated[float, Column("length of the track", "mm")]
+    lead_ohm: Annotated[float, Column("lead", "ohm", si=True)]
+    end_ohm: Annotated[float, Column("to the far end", "ohm", si=True)]
+    least_ohm: Annotated[float, Column("at least", "ohm", si=True)]
+    most_ohm: Annotated[float, Column("at most", "ohm", si=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class ArrayModel:
+    """Numbers of an array.
+
+    Attributes
+    ----------
+    design : Design
+        The array.
+    crossing : SensorModel
+        One crossing as printed.
+    row_ohm, column_ohm : Bounds
+        Resistance of the tracks per square [ohm].
+    lead_ohm : (float, float)
+        Of the leads of rows and of columns per square: flat tracks [ohm].
+    """
+
+    design: Design
+    crossing: SensorModel
+    row_ohm: Bounds
+    column_ohm: Bounds
+    lead_ohm: tuple[float, float]
+
+    @property
+    def layout(self) -> Layout:
+        """Tracks in plan."""
+        found = self.design.layout
+        if found is None:
+            raise BadInput(f"{self.design.name}: {self.design.shape} has no crossings; expected shape: array")
+        return found
+
+    @cached_property
+    def here(self) -> np.ndarray:
+        """Crossings that the outline has, (m, n)."""
+        return np.array(self.layout.here)
+
+    @property
+    def capacitance(self) -> Bounds:
+        """Of one crossing at rest [F]."""
+        return self.crossing.rest.capacitance
+
+    @property
+    def pitch_area_m2(self) -> float:
+        """Area of the surface for each crossing [m2]."""
+        px, py = self.layout.params.pitch
+        return px * py * M_PER_MM**2
+
+    @cached_property
+    def load_factor(self) -> float:
+        """Pressure on a cell per pressure on the surface [-].
+
+        Springs side by side under a stiff cover: the cells, and the solid dielectric between them; with air between,
+        the cells carry all.
+        """
+        p = self.layout.params
+        share = p.column_mm * p.row_mm / (p.pitch[0] * p.pitch[1])
+        scene, law = self.crossing.body.cells.first(), self.crossing.law.compression
+        if p.between == "air":
+            return 1 / share
+        if getattr(self.design.crossing.params, "period_mm", None) is None:
+            return 1.0  # a plate like what is between the tracks
+        height_m = (scene.size_mm[2] - 2 * p.electrode_mm) * M_PER_MM
+        material, source = self.design.slot("dielectric")
+        try:
+            wall = material.value("youngs_modulus_pa", source).value / height_m
+            cell = law.foundation_stiffness_pa_per_m(height_m)
+        except MissingValue:
+            return 1.0
+        return cell / (share * cell + (1 - share) * wall)
+
+    @cached_property
+    def known_pa(self) -> float:
+        """Pressure on the surface up to which the law of the cell is known, further straight; infinite of a plate."""
+        law = self.crossing.law.compression
+        return law.stress_pa[-1] / self.load_factor if isinstance(law, Curve) else float("inf")
+
+    def under(self, pressure_pa: Real) -> tuple[Real, Real]:
+        """Capacitance over that at rest [-] and its derivative by the pressure on the surface [1/Pa].
+
+        Beyond the last pressure of the law, and below 0, it goes on straight.
+        """
+        law, pressure_pa = self.crossing.law.compression, np.asarray(pressure_pa, float)
+        inside = np.clip(pressure_pa, 0.0, self.known_pa)
+        strain, slope = law.capacitive_strain(inside * self.load_factor)
+        slope = slope * self.load_factor / (1 - strain) ** 2
+        return np.asarray(1 / (1 - strain) + (pressure_pa - inside) * slope), np.asarray(slope)
+
+    def pressures(self, ratio: Real) -> tuple[Real, Real]:
+        """Pressure on the surface by capacitance over that at rest [Pa], and its derivative [Pa]: Newton's method."""
+        pressure = (np.asarray(ratio) - 1) / self.under(np.zeros(1))[1]
+        for _ in range(_NEWTON):
+            value, slope = self.under(pressure)
+            pressure = pressure + (ratio - value) / slope
+        return np.asarray(pressure), np.asarray(1 / self.under(pressure)[1])
+
+    def capacitances(self, ratio: "Real | float" = 1.0) -> Real:
+        """Of all crossings, those of leads outside the outline at rest, (m, n) [F]."""
+        per_mm2 = self.capacitance.value / (self.layout.params.column_mm * self.layout.params.row_mm)
+        return np.where(self.here, self.capacitance.value * np.asarray(ratio), per_mm2 * self._lead_crossings_mm2)
+
+    @cached_property
+    def _lead_crossings_mm2(self) -> Real:
+        """Area in which leads cross other tracks outside the outline, (m, n) [mm2]."""
+        found = np.zeros(self.here.shape)
+        if self.here.all():
+            return found
+        import shapely
+
+        rows, columns = ([self.layout.plan(t) for t in tracks] for tracks in (self.layout.rows, self.layout.columns))
+        shared = shapely.area(shapely.intersection(np.array(rows)[:, None], np.array(columns)[None]))
+        i, j = ([int(t.name[1:]) - 1 for t in tracks] for tracks in (self.layout.rows, self.layout.columns))
+        found[np.ix_(i, j)] = shared
+        return np.where(self.here, 0.0, found)
+
+    def tracks(self, capacitance_f: "Real | None" = None, ohm: float = 1.0) -> Tracks:
+        """The network, its resistances by a factor.
+
+        Parameters
+        ----------
+        capacitance_f : (m, n) array, optional
+            Of the crossings; at rest if not given [F].
+        ohm : float
+            Factor of all resistances [-].
+        """
+        of, (m, n) = self.layout, self.here.shape
+        row_ohm, column_ohm = np.full((m, n - 1), np.inf), np.full((n, m - 1), np.inf)
+        row_lead, column_lead = np.full(m, np.inf), np.full(n, np.inf)
+        for i, track in ((int(t.name[1:]) - 1, t) for t in of.rows):
+            row_ohm[i], row_lead[i] = self._stretches(track, of.x_mm)
+        for j, track in ((int(t.name[1:]) - 1, t) for t in of.columns):
+            column_ohm[j], column_lead[j] = self._stretches(track, of.y_mm)
+        c = self.capacitances() if capacitance_f is None else capacitance_f
+        return Tracks(
+            c, ohm * row_ohm, ohm * column_ohm.T, ohm * row_lead, ohm * column_lead, np.zeros(m, dtype=np.int64),
+            np.zeros(n, dtype=np.int64), self.crossing.lost.tan_delta, np.zeros((m, n)),
+        )  # fmt: skip
+
+    def _stretches(self, track: Track, at_mm: Sequence[float]) -> tuple[Real, float]:
+        """Resistances between crossings, infinite beyond the track's end, and from crossing 0 to the pad [ohm]."""
+        start, per_track, per_lead = self._per_mm(track)
+        ends = np.asarray(at_mm)
+        ohm = np.where(ends < start, (ends - start) * per_lead, (ends - start) * per_track)
+        stretches = np.where(np.arange(1, len(ends)) <= track.last, np.diff(ohm), np.inf)
+        return stretches, float(track.lead_length_mm * per_lead + ohm[0])
+
+    def _per_mm(self, track: Track) -> tuple[float, float, float]:
+        """Where a track begins along itself [mm], and resistances of track and lead per length [ohm/mm]."""
+        p, is_row = self.layout.params, track.name.startswith("r")
+        sheet, width = (self.row_ohm, p.row_mm) if is_row else (self.column_ohm, p.column_mm)
+        return track.body[0 if is_row else 2], sheet.value / width, self.lead_ohm[0 if is_row else 1] / p.lead_mm
+
+    def wires(self) -> tuple[Wire, ...]:
+        """Wires of the connector from left to right: first the rows, then the columns."""
+        found = sorted([*self.layout.rows, *self.layout.columns], key=lambda t: t.pad[0])
+        return tuple(self._wire(k, track) for k, track in enumerate(found, 1))
+
+    def _wire(self, number: int, track: Track) -> Wire:
+        _, per_track, per_lead = self._per_mm(track)
+        x0, x1, y0, y1 = track.body
+        is_row = track.name.startswith("r")
+        length, sheet = (x1 - x0, self.row_ohm) if is_row else (y1 - y0, self.column_ohm)
+        lead = track.lead_length_mm * per_lead
+        whole = lead + length * per_track
+        pad_x, pad_y = ((track.pad[k] + track.pad[k + 1]) / 2 for k in (0, 2))
+        return Wire(
+            number, track.name, round(pad_x, 3), round(pad_y, 3), round(track.lead_length_mm, 3), round(length, 3),
+            lead, whole, whole * sheet.lower / sheet.value, whole * sheet.upper / sheet.value,
+        )  # fmt: skip
+
+
+def wire_table(design: Design) -> Table:
+    """Wires of an array's connector; BadInput of any other design."""
+    return Table.of("wires", "", array_model(design).wires())
+
+
+def array_model(design: Design, until_kpa: float = USUAL_KPA) -> ArrayModel:
+    """Numbers of an array as printed: by G-code of one crossing where a slicer is there, else estimated.
+
+    Parameters
+    ----------
+    design : Design
+        An array.
+    until_kpa : float
+        Pressure on a cell up to which its law is wanted [kPa]; beyond the usual one a cell is solved, for a minute.
+
+    Raises
+    ------
+    BadInput
+        A design that is no array.
+    SensorgenError
+        What one crossing cannot be predicted for, as :func:`sensorgen.prediction.planning.sensor_model`.
+    """
+    from sensorgen.prediction.planning import sensor_model
+
+    if not design.layout:
+        raise BadInput(f"{design.name}: {design.shape} has no crossings; expected shape: array")
+    p = design.layout.params
+    query = Query(force_n=until_kpa * p.column_mm * p.row_mm * _N_PER_KPA_MM2)
+    model, _ = sensor_model(bodies.default_body(design.crossing), query)
+    top, bottom = (model.rest.resistance[end] for end in ("top", "bottom"))
+    scene = model.body.cells.first()
+    mean_mm = sum(b.volume_mm3() for b in scene.bodies if b.terminal == "top") / (scene.size_mm[0] * scene.size_mm[1])
+    rho_top, rho_bottom = model.rest.resistivity_ohm_m
+    # Current in columns runs along y, where the cell's cross-section is the same, so that its mean thickness counts
+    column = top.times(rho_top / (mean_mm * M_PER_MM) / top.value, "ohm")
+    flat = p.electrode_mm * M_PER_MM
+    return ArrayModel(
+        design, model, bottom.times(p.row_mm / p.column_mm, "ohm"), column, (rho_bottom / flat, rho_top / flat)
+    )

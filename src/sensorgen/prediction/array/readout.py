@@ -1,0 +1,151 @@
+"""Readout of an array: noise, information of its readings on every crossing, frames per second, faults."""
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sensorgen.core.arrays import Complex, Real
+from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.prediction.array.model import SHORT_OHM, ArrayModel
+from sensorgen.solvers.tracks import Readings, Tracks, readings
+from sensorgen.solvers.tracks import Readout as Kind
+
+MOST_DENSE = 2000  # crossings of which the information is a whole matrix; beyond, each crossing as if it were alone
+FULL_SCALE_PA = 1103e3  # prior standard deviation of a pressure: full scale of a Tekscan HR mat 7101E
+_TAUS = 7.0  # time constants of the slowest track until a reading is within 0.1 %
+_PERIODS = 10.0  # of the lowest frequency that a reading takes
+_SHORT, _BREAK = re.compile(r"r(\d+)c(\d+)"), re.compile(r"([rc])(\d+):(\d+)")
+
+
+@dataclass(frozen=True)
+class ArrayReadout:
+    """Readout of an array.
+
+    Attributes
+    ----------
+    kind : str
+        "guarded" or "two-terminal".
+    input_ohm : float
+        Of each terminal, guarded [ohm].
+    frequency_hz : tuple of float
+        Tones, read at once [Hz].
+    noise : float
+        Standard deviation of the real and of the imaginary part of a reading, relative to its magnitude [-].
+    noise_s : float
+        The same, absolute [S].
+    """
+
+    kind: Kind = "guarded"
+    input_ohm: float = 50.0
+    frequency_hz: tuple[float, ...] = (10e3,)
+    noise: float = 1e-3
+    noise_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse readings without noise, and no frequency."""
+        if not (self.noise >= 0 and self.noise_s >= 0 and self.noise + self.noise_s > 0):
+            raise OutOfRange(f"noise {self.noise:g} and {self.noise_s:g} S; expected one above 0")
+        if not self.frequency_hz:
+            raise OutOfRange("no frequency; expected one or more")
+
+    def read(self, tracks: Tracks) -> list[Readings]:
+        """Readings of a network at each frequency."""
+        return [readings(tracks, f, readout=self.kind, input_ohm=self.input_ohm) for f in self.frequency_hz]
+
+    def sigma_s(self, siemens: Complex) -> Real:
+        """Standard deviation of real and imaginary parts [S]; infinite of readings that are nothing."""
+        sigma = np.hypot(self.noise * np.abs(siemens), self.noise_s)
+        return np.where(np.abs(siemens) > 0, sigma, np.inf)
+
+    def frame_s(self, model: ArrayModel) -> float:
+        """Time of a frame: settling and ten periods for each row, columns at once; of each crossing by two terminals.
+
+        Settling is seven time constants of the slowest track: its resistance to the far end times its capacitance.
+        """
+        m, n = model.here.shape
+        tau = max(wire.end_ohm for wire in model.wires()) * model.capacitance.value * max(m, n)
+        return float((_TAUS * tau + _PERIODS / min(self.frequency_hz)) * (m if self.kind == "guarded" else m * n))
+
+
+def information(read: Sequence[Readings], readout: ArrayReadout) -> Real:
+    """Information of all readings on the capacitances, (m n, m n); beyond ``MOST_DENSE`` its diagonal, (m n,) [1/F2].
+
+    The diagonal is that of each crossing by its own reading: what others contribute and take is left out.
+    """
+    m, n = read[0].siemens.shape
+    if m * n > MOST_DENSE:
+        total = np.zeros((m, n))
+        for one in read:
+            own = np.abs(own_slopes(one)) / readout.sigma_s(one.siemens)
+            total += own**2
+        return total.ravel()
+    found = np.zeros((m * n, m * n))
+    for one in read:
+        slopes = one.matrix() / readout.sigma_s(one.siemens).reshape(-1, 1)
+        found += slopes.real.T @ slopes.real + slopes.imag.T @ slopes.imag
+    return found
+
+
+def own_slopes(read: Readings) -> Complex:
+    """Slope of each reading by the capacitance of its own crossing, (m, n) [S/F]."""
+    i, j = np.indices(read.siemens.shape)
+    u, v = read.by_row[i, j, i], read.by_column[i, j, j]
+    product = -u * v if read.readout == "guarded" else (u - v) ** 2
+    return np.asarray(read.factor * read.per_farad * product)
+
+
+def covariance(found: Real, prior_f: Real) -> Real:
+    """Covariance of the capacitances after a reading, or the variances alone [F2].
+
+    Parameters
+    ----------
+    found : (k, k) or (k,) array
+        Of :func:`information` [1/F2].
+    prior_f : (k,) array
+        Standard deviation before [F].
+    """
+    before = 1 / prior_f**2
+    return np.asarray(1 / (found + before) if found.ndim == 1 else np.linalg.inv(found + np.diag(before)))
+
+
+def crosstalk(read: Readings) -> Real:
+    """Largest effect of another crossing on each reading, relative to that of its own, (m, n) [-]."""
+    found = np.empty(read.siemens.shape)
+    own = np.abs(own_slopes(read))
+    for i, j in np.ndindex(*found.shape):
+        others = np.abs(read.slopes(i, j))
+        others[i, j] = 0.0
+        found[i, j] = others.max() / own[i, j] if own[i, j] else np.inf
+    return found
+
+
+def faulty(tracks: Tracks, faults: Iterable[str]) -> Tracks:
+    """A network with faults: ``r3:5`` breaks row 3 behind column 5 (0: its lead), ``r2c4`` shorts that crossing.
+
+    Raises
+    ------
+    BadInput
+        A word that is none of these, or a track that the array has not.
+    """
+    for word in faults:
+        tracks = _with_fault(tracks, word)
+    return tracks
+
+
+def _with_fault(tracks: Tracks, word: str) -> Tracks:
+    m, n = tracks.capacitance_f.shape
+    if short := _SHORT.fullmatch(word):
+        i, j = (int(number) - 1 for number in short.groups())
+        if 0 <= i < m and 0 <= j < n:
+            return tracks.shorted(i, j, SHORT_OHM)
+    if cut := _BREAK.fullmatch(word):
+        track, after = int(cut[2]) - 1, int(cut[3])
+        count, length = (m, n) if cut[1] == "r" else (n, m)
+        if 0 <= track < count and after < length:
+            return tracks.broken("row" if cut[1] == "r" else "column", track, after - 1)
+    raise BadInput(
+        f"fault {word!r:.40}: expected r3:5 (row 3 broken behind column 5; :0 its lead), c2:1, or r2c4 (a short), of "
+        f"{m} rows and {n} columns"
+    )

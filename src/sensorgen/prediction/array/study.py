@@ -1,0 +1,198 @@
+"""Resolution of an array: pressure and force of every crossing, crosstalk, and the smallest press."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sensorgen.core.arrays import Mask, Real
+from sensorgen.core.document import Cell, Column, Facts, Part, Table, to_json
+from sensorgen.core.errors import OutOfRange
+from sensorgen.core.units import si
+from sensorgen.prediction.array.model import ArrayModel
+from sensorgen.prediction.array.readout import (
+    FULL_SCALE_PA,
+    MOST_DENSE,
+    ArrayReadout,
+    covariance,
+    crosstalk,
+    faulty,
+    information,
+)
+
+PA_PER_KPA = 1e3
+DETECTED = 3.0  # standard errors
+DETERMINED = 0.5  # of the prior's standard deviation: a pressure known no better is not determined
+LOADS_KPA = (100.0, 200.0, 357.0)  # 357: the peak of a foot's map
+
+
+@dataclass(frozen=True, eq=False)
+class ArrayStudy:
+    """An array under an even pressure, read in one way.
+
+    Attributes
+    ----------
+    model : ArrayModel
+        The array.
+    readout : ArrayReadout
+        How it is read.
+    pressure_kpa : float
+        Even on the surface [kPa].
+    sigma_kpa : (m, n) array
+        Standard error of each pressure from one frame; nan outside the outline [kPa].
+    crosstalk : (m, n) array or None
+        Largest effect of another crossing at the lowest frequency [-]; None of large arrays.
+    faults : tuple of str
+        That the network has.
+    """
+
+    model: ArrayModel
+    readout: ArrayReadout
+    pressure_kpa: float
+    sigma_kpa: Real
+    crosstalk: "Real | None"
+    faults: tuple[str, ...] = ()
+
+    @property
+    def determined(self) -> Mask:
+        """Crossings whose pressure a frame determines, (m, n) of bool."""
+        return np.asarray(self.sigma_kpa < DETERMINED * FULL_SCALE_PA / PA_PER_KPA)
+
+    @property
+    def sigma_n(self) -> Real:
+        """Standard error of the force on the square of each crossing, (m, n) [N]."""
+        return self.sigma_kpa * PA_PER_KPA * self.model.pitch_area_m2
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        model, readout = self.model, self.readout
+        (m, n), p, count = model.here.shape, model.layout.params, int(model.here.sum())
+        yield (
+            "array",
+            (
+                f"{m} rows x {n} columns, {count} crossings of {p.column_mm:g} x {p.row_mm:g} mm, pitch "
+                f"{p.pitch[0]:.4g} x {p.pitch[1]:.4g} mm, {len(model.wires())} wires; {model.crossing.body.provenance}"
+            ),
+        )
+        yield "crossing", f"{model.capacitance.words()} at rest, {self._rises()}"
+        if model.load_factor != 1:
+            yield "load", f"a cell carries {model.load_factor:.2f} times the pressure on the surface"
+        ends = [wire.end_ohm for wire in model.wires()]
+        yield (
+            "tracks",
+            (
+                f"rows {model.row_ohm.words()}, columns {model.column_ohm.words()} per square; "
+                f"{si(min(ends), 'ohm', 3)} to {si(max(ends), 'ohm', 3)} from pad to far end"
+            ),
+        )
+        tones = ", ".join(si(f, "Hz") for f in readout.frequency_hz)
+        by = f"through {readout.input_ohm:g} ohm" if readout.kind == "guarded" else "the rest floating"
+        noise = " and ".join([*([f"{readout.noise:.2g} of a reading"] if readout.noise else []),
+                              *([si(readout.noise_s, "S")] if readout.noise_s else [])])  # fmt: skip
+        yield "readout", f"{readout.kind}, {by}, {tones}, noise {noise}; {1 / readout.frame_s(model):.3g} frames/s"
+        if self.faults:
+            yield "faults", f"{', '.join(self.faults)}: {self._lost()}"
+
+    def _lost(self) -> str:
+        dark = int((self.model.here & ~self.determined).sum())
+        return f"{dark} of {int(self.model.here.sum())} crossings are not determined"
+
+    def _rises(self) -> str:
+        model = self.model
+        ratio, _ = model.under(np.array(LOADS_KPA) * PA_PER_KPA)
+        words = (f"{100 * (r - 1):+.3g} % at {p:g} kPa" for r, p in zip(ratio.tolist(), LOADS_KPA, strict=True))
+        known = model.known_pa / PA_PER_KPA
+        return ", ".join(words) + (f" (law known to {known:.0f} kPa, then straight)" if known < LOADS_KPA[-1] else "")
+
+    def document(self) -> Iterator[Part]:
+        """Cell, tracks, readout, and a table of what is resolved."""
+        yield Facts(tuple(self._facts()))
+        yield ""
+        sigma, force = (each[self.model.here & self.determined] for each in (self.sigma_kpa, self.sigma_n))
+        if not sigma.size:
+            yield f"no pressure is determined at {self.pressure_kpa:g} kPa: a standard error is the prior's"
+            return
+        rows: list[tuple[Cell, ...]] = [
+            (name, *(float(f"{value:.4g}") for value in (of(sigma), of(force), DETECTED * of(force))))
+            for name, of in (("best crossing", np.min), ("median", np.median), ("worst", np.max))
+        ]
+        columns = (
+            Column("", key="crossing"), Column("sigma p", "kPa", key="sigma_kpa"),
+            Column("sigma F", "N", key="sigma_n"), Column("smallest press", "N", key="least_n"),
+        )  # fmt: skip
+        yield Table("resolution", "", columns, tuple(rows))
+        yield (
+            f"(standard errors of one frame at {self.pressure_kpa:g} kPa; smallest press: {DETECTED:g} sigma on one "
+            "crossing; two presses show apart from two pitches on)"
+        )
+        if self.crosstalk is not None:
+            finite = self.crosstalk[self.determined]
+            yield (
+                f"crosstalk: another crossing changes a reading by at most {finite.max():.2g} of what its own does "
+                f"(median {np.median(finite):.2g})"
+            )
+        if self.model.here.size > MOST_DENSE:
+            yield f"above {MOST_DENSE} crossings each standard error is as if all other capacitances were known"
+        yield from (f"doubtful: {doubt}" for doubt in self.model.crossing.doubts)
+        yield ("left out: fringe between neighbouring tracks, spreading of the load by the cover, strays of the cable")
+
+    def record(self) -> dict[str, Any]:
+        """Numbers by crossing, null outside the outline and where nothing is determined."""
+        return {
+            "rows": self.model.here.shape[0],
+            "columns": self.model.here.shape[1],
+            "capacitance_f": self.model.capacitance,
+            "row_ohm_per_square": self.model.row_ohm,
+            "column_ohm_per_square": self.model.column_ohm,
+            "load_factor": self.model.load_factor,
+            "pressure_kpa": self.pressure_kpa,
+            "sigma_kpa": _map(np.where(self.determined, self.sigma_kpa, np.nan)),
+            "sigma_n": _map(np.where(self.determined, self.sigma_n, np.nan)),
+            "crosstalk": None if self.crosstalk is None else _map(self.crosstalk),
+            "frames_per_s": 1 / self.readout.frame_s(self.model),
+            "faults": self.faults,
+        }
+
+    def to_json(self) -> str:
+        """The record as indented JSON."""
+        return to_json(self.record())
+
+
+def study(
+    model: ArrayModel, readout: ArrayReadout, pressure_kpa: float = 100.0, faults: Sequence[str] = ()
+) -> ArrayStudy:  # fmt: skip
+    """Resolution of an array under an even pressure.
+
+    Parameters
+    ----------
+    model, readout : ArrayModel, ArrayReadout
+        The array, and how it is read.
+    pressure_kpa : float
+        On the surface [kPa].
+    faults : sequence of str
+        As of :func:`sensorgen.prediction.array.readout.faulty`.
+
+    Raises
+    ------
+    OutOfRange
+        A pressure below 0.
+    """
+    if not 0 <= pressure_kpa < np.inf:
+        raise OutOfRange(f"a pressure of {pressure_kpa:g} kPa; expected 0 or more")
+    ratio, slope = model.under(np.array(pressure_kpa * PA_PER_KPA))
+    per_pa = model.capacitance.value * float(slope)
+    tracks = faulty(model.tracks(model.capacitances(float(ratio))), faults)
+    read = readout.read(tracks)
+    prior = np.where(model.here, per_pa * FULL_SCALE_PA, 1e-6 * model.capacitance.value).ravel()
+    spread = covariance(information(read, readout), prior)
+    variance = spread if spread.ndim == 1 else np.diag(spread)
+    sigma = np.sqrt(variance).reshape(model.here.shape) / per_pa / PA_PER_KPA
+    small = model.here.size <= MOST_DENSE
+    return ArrayStudy(
+        model, readout, pressure_kpa, np.where(model.here, sigma, np.nan), crosstalk(read[0]) if small else None,
+        tuple(faults),
+    )  # fmt: skip
+
+
+def _map(values: Real) -> list[list[float | None]]:
+    return [[float(v) if np.isfinite(v) else None for v in row] for row in values.tolist()]

@@ -1,0 +1,187 @@
+"""Frames to pressure maps: truth by another formulation of the network, coverage, missing readings, files."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from array_network import by_currents
+
+from sensorgen.analysis.plots import array as plots
+from sensorgen.core.errors import BadInput
+from sensorgen.design.design import make
+from sensorgen.measure.array_frames import read
+from sensorgen.prediction.array.frames import inverted
+from sensorgen.prediction.array.model import array_model
+from sensorgen.prediction.array.readout import ArrayReadout
+from sensorgen.prediction.array.virtual import foot, simulated, step
+
+TRI = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
+PRESSURE = np.random.default_rng(1).uniform(0, 300, (2, 5, 6)) * 1e3  # Pa
+
+
+@pytest.fixture(scope="module")
+def model():
+    given = {"length_mm": 60, "width_mm": 50, "between": "air"}
+    return array_model(make({"shape": "array", "name": "a", "parameters": given, "cell": TRI}))
+
+
+def frames_of(model, readout, ohm=1.0, pressures_pa=PRESSURE):
+    """Three frames at rest and one for each map, of cells that differ at rest by 10 %, without noise."""
+    rest = model.capacitances(1 + 0.1 * np.random.default_rng(2).normal(size=(5, 6)))
+    ratios = [np.ones((5, 6))] * 3 + [model.under(p)[0] for p in pressures_pa]
+    tracks = model.tracks(ohm=ohm)
+    return np.array([
+        by_currents(replace(tracks, capacitance_f=rest * ratio), readout.frequency_hz[0], readout.input_ohm,
+                    readout.kind == "two-terminal")
+        for ratio in ratios
+    ])  # fmt: skip
+
+
+def maps(model, readout, frames, **more):
+    rest = np.arange(len(frames)) < 3
+    return inverted(model, readout, frames, rest, np.arange(len(frames)) / 100, **{"scatter": 0.0} | more)
+
+
+@pytest.mark.parametrize(
+    ("kind", "hertz", "by", "kpa"),
+    [
+        ("guarded", 1e3, "C/C0", 0.02),
+        ("guarded", 300e3, "the network", 0.2),
+        ("two-terminal", 10e3, "the network", 0.2),
+    ],
+)
+def test_pressures_come_back(model, kind, hertz, by, kpa):
+    readout = ArrayReadout(kind, 50.0, (hertz,), 1e-4)
+    frames = frames_of(model, readout)
+    found = maps(model, readout, frames)
+    assert found.by.startswith(by)
+    assert np.abs(found.pressure_kpa - PRESSURE / 1e3).max() < kpa
+    own = frames.imag[3:] / frames[0].imag
+    alone = np.abs(model.pressures(own)[0] - PRESSURE).max() / 1e3
+    assert (alone > 10 * kpa) == (by != "C/C0")  # and so C/C0 does not do everywhere
+
+
+def test_force_centre_and_area_are_those_of_the_map(model):
+    readout = ArrayReadout(frequency_hz=(1e3,), noise=1e-4)
+    pressure = np.zeros((1, 5, 6))
+    pressure[0, 1, 2], pressure[0, 3, 2] = 100e3, 300e3
+    found = maps(model, readout, frames_of(model, readout, pressures_pa=pressure))
+    x, y = model.layout.x_mm, model.layout.y_mm
+    assert found.force_n[0] == pytest.approx([40.0], rel=1e-3)
+    assert found.centre_mm[0] == pytest.approx([x[2]], abs=0.05)
+    assert found.centre_mm[1] == pytest.approx([(y[1] + 3 * y[3]) / 4], abs=0.05)
+    assert found.area_mm2 == pytest.approx([200.0])
+    row = found.table().cells[0]
+    assert row[1] == pytest.approx(40.0, rel=1e-3)
+    assert row[6] == pytest.approx(300.0, rel=1e-3)
+
+
+def test_capacitances_alone_do(model):
+    readout = ArrayReadout(frequency_hz=(10e3,), noise=1e-4)
+    frames = frames_of(model, readout)
+    frames.real = np.nan
+    assert np.abs(maps(model, readout, frames).pressure_kpa - PRESSURE / 1e3).max() < 0.1
+
+
+@pytest.mark.parametrize("kind", ["guarded", "two-terminal"])
+def test_intervals_hold_and_the_foot_is_found(model, kind):
+    """Scatter of 5 % at rest and in gain, noise of 0.1 %: 95 % of the pressures in their intervals."""
+    readout, pressure = ArrayReadout(kind), np.concatenate([np.zeros((3, 5, 6)), PRESSURE / 1e3])
+    inside, off = [], []
+    for seed in range(8):
+        found = maps(model, readout, simulated(model, readout, pressure, seed=seed), scatter=0.05)
+        low, high = found.interval_kpa
+        inside.append((low < PRESSURE / 1e3) & (high > PRESSURE / 1e3))
+        off.append((found.force_n[0] - pressure[3:].sum((1, 2)) * 0.1) / found.force_n[1])
+    assert 0.9 < np.mean(inside) < 0.985
+    assert 0.5 < np.std(off) < 1.6
+    whole = foot(model.layout)
+    assert whole.max() == pytest.approx(357)
+    assert 40 < whole.mean() < 120
+
+
+def test_what_is_not_read_is_not_no_pressure(model):
+    readout = ArrayReadout()
+    frames = frames_of(model, readout)
+    frames[4, 2, 3] = np.nan  # one reading of one frame
+    frames[:3, 0, 1] = np.nan  # never read at rest
+    found = maps(model, readout, frames)
+    dark = np.isnan(found.pressure_kpa)
+    assert [tuple(k) for k in np.argwhere(dark).tolist()] == [(0, 0, 1), (1, 0, 1), (1, 2, 3)]
+    expected = np.where(dark, 0, PRESSURE / 1e3).sum((1, 2)) * 0.1
+    assert found.force_n[0] == pytest.approx(expected, rel=1e-2)
+    assert found.table().cells[1][7] == 2
+    pressure = np.concatenate([np.zeros((3, 5, 6)), PRESSURE / 1e3])
+    broken = maps(model, readout, simulated(model, readout, pressure, faults=["r2:3"]))
+    assert np.isnan(broken.pressure_kpa[:, 1, 3:]).all()
+    assert np.isnan(broken.pressure_kpa).sum() == 2 * 3
+    assert plots.maps(broken, PRESSURE)[:4] == b"\x89PNG"
+
+
+def test_a_standing_load_is_never_taken_for_rest(model):
+    readout = ArrayReadout()
+    frames = frames_of(model, readout)
+    with pytest.raises(BadInput, match="never taken for rest"):
+        inverted(model, readout, frames[3:], np.zeros(2, bool), np.arange(2.0))
+    with pytest.raises(BadInput, match="all frames are at rest"):
+        inverted(model, readout, frames[:3], np.ones(3, bool), np.arange(3.0))
+    apart = inverted(model, readout, frames[3:], np.zeros(2, bool), np.arange(2.0), 0.0, frames[:3])
+    assert np.abs(apart.pressure_kpa - maps(model, readout, frames).pressure_kpa).max() < 1e-6
+
+
+def test_files_of_both_kinds_say_the_same(tmp_path, model):
+    readout = ArrayReadout()
+    frames = frames_of(model, readout)
+    farad = frames.imag / (2 * np.pi * 10e3)
+    np.savez(tmp_path / "f.npz", siemens=frames, rest=np.arange(5) < 3, frequency_hz=10e3, time_s=np.arange(5) / 50)
+    names = [f"r{i + 1}c{j + 1}" for i, j in np.ndindex(5, 6)]
+    lines = [",".join(["time_s", "rest", *names])]
+    for k, frame in enumerate(farad):
+        words = [repr(v) for v in frame.ravel().tolist()]
+        words[7] = "" if k == 4 else words[7]
+        lines.append(",".join([f"{k / 50}", "1" if k < 3 else "", *words]))
+    (tmp_path / "f.csv").write_text("\n".join(lines) + "\n")
+    one, other = read(tmp_path / "f.npz", (5, 6), None), read(tmp_path / "f.csv", (5, 6), 10e3)
+    assert one.time_s.tolist() == other.time_s.tolist()
+    assert one.rest.tolist() == other.rest.tolist() == [True] * 3 + [False] * 2
+    assert np.isnan(other.siemens.real).all()
+    assert np.argwhere(np.isnan(other.siemens.imag)).tolist() == [[4, 1, 1]]
+    assert np.nan_to_num(other.siemens.imag[:4]) == pytest.approx(one.siemens.imag[:4])
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("f.csv", "r1c1,r9c1\n1,2\n", "columns r9c1; expected r1c1 to r5c6"),
+        ("f.csv", "time_s\n1\n", "without any crossing"),
+        ("f.csv", "r1c1,r1c2\n1\n", "line 2: 1 values; expected 2"),
+        ("f.csv", "r1c1\nmany\n", "line 2: 'many' is no number"),
+        ("f.csv", "r1c1\n", "no frames"),
+        ("f.csv", "r1c1\n1e-12\n", "no frequency of the readings"),
+        ("f.npz", "text", "no NPZ file"),
+        ("f.npz", {"siemens": np.ones((2, 6, 5))}, "siemens is 2 x 6 x 5; expected frames x 5 rows x 6 columns"),
+        ("f.npz", {"other": np.ones(2)}, "no readings; expected siemens or capacitance_f"),
+        ("f.npz", {"siemens": np.ones((2, 5, 6)), "frequency_hz": 1e4, "rest": [1]}, "rest has 1 values"),
+        ("f.npz", {"siemens": np.array([{}])}, "no NPZ file"),
+        ("none.npz", None, "none.npz"),
+    ],
+)
+def test_no_frames_are_an_error(tmp_path, name, content, words):
+    path = tmp_path / name
+    if isinstance(content, dict):
+        np.savez(path, **content)
+    elif content is not None:
+        path.write_text(content)
+    with pytest.raises(BadInput, match=words):
+        read(path, (5, 6), None)
+
+
+def test_a_virtual_step_is_a_recording(tmp_path, model):
+    (tmp_path / "step.npz").write_bytes(step(model, ArrayReadout()))
+    found = read(tmp_path / "step.npz", (5, 6), None)
+    assert found.siemens.shape == (65, 5, 6)
+    assert found.rest.sum() == 5
+    back = inverted(model, ArrayReadout(), found.siemens, found.rest, found.time_s)
+    true = found.pressure_kpa[~found.rest]
+    off = back.force_n[0] - true.sum((1, 2)) * 0.1
+    assert np.abs(off / back.force_n[1]).max() < 3.5

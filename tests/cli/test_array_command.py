@@ -1,0 +1,86 @@
+"""``sensorgen array``, ``build`` and ``invert`` of an array: words in, numbers and files out."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+ARRAY = """
+shape: array
+parameters: {length_mm: 40, width_mm: 30, between: air}
+cell: {shape: tri, parameters: {dielectric_mm: 0.2}}
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    (tmp_path / "a.yaml").write_text(ARRAY)
+    return "a.yaml"
+
+
+def test_it_says_what_is_resolved(run, file):
+    said = run("array", file, "--frequencies", "10kHz", "--fault", "c3:0")
+    assert said.code == 0, said.err
+    for words in ("3 rows x 4 columns, 12 crossings", "+11.2 % at 100 kPa", "guarded, through 50 ohm, 10 kHz",
+                  "3 of 12 crossings are not determined", "left out: fringe"):  # fmt: skip
+        assert words in said.words
+    data = json.loads(run("array", file, "--json", "--pressure", "50").out)
+    assert data["pressure_kpa"] == 50
+    assert np.shape(data["sigma_kpa"]) == (3, 4)
+
+
+def test_a_virtual_step_is_inverted(run, file, tmp_path):
+    said = run("array", file, "--simulate", "step.npz", "--plot", ".")
+    assert said.code == 0, said.err
+    assert (tmp_path / "a-array.png").is_file()
+    said = run("invert", file, "step.npz", "-o", "maps.npz", "--plot", ".")
+    assert said.code == 0, said.err
+    assert "60, inverted by" in said.words
+    assert (tmp_path / "a-map.png").is_file()
+    with np.load(tmp_path / "maps.npz") as found, np.load(tmp_path / "step.npz") as true:
+        off = (found["pressure_kpa"] - true["pressure_kpa"][5:]) / found["sigma_kpa"]
+        assert found["pressure_kpa"].shape == (60, 3, 4)
+        assert np.mean(np.abs(off) < 1.96) > 0.85
+    said = run("invert", file, "step.npz", "-o", "frames.csv")
+    rows = list(csv.DictReader((tmp_path / "frames.csv").read_text().splitlines()))
+    assert len(rows) == 60
+    assert float(rows[30]["force_n"]) > 20
+
+
+def test_build_writes_the_wires(run, file, tmp_path, monkeypatch):
+    monkeypatch.setenv("SENSORGEN_SLICER", "none")
+    (tmp_path / "p.yaml").write_text("shape: array\nparameters: {length_mm: 20, width_mm: 20}\n")
+    said = run("build", "p.yaml", "--no-cad")
+    assert said.code == 0, said.err
+    rows = list(csv.DictReader((tmp_path / "out" / "p" / "wires.csv").read_text().splitlines()))
+    assert [row["track"] for row in rows] == ["r2", "r1", "c1", "c2"]
+    assert {"p.prusa.3mf", "p.html", "check.json"} <= {path.name for path in (tmp_path / "out" / "p").iterdir()}
+
+
+def test_the_shape_has_options_like_others(run):
+    said = run("check", "array", "--rows", "2", "--columns", "3", "--budget", "0", "--json")
+    assert said.code == 0, said.err
+    assert "PRINT" in said.out
+
+
+@pytest.mark.parametrize(
+    ("words", "answer"),
+    [
+        (("array", "tri"), "tri has no crossings"),
+        (("array", "a.yaml", "--fault", "r9:1"), "expected r3:5"),
+        (("array", "a.yaml", "--pressure", "-3"), "--pressure"),
+        (("array", "a.yaml", "--input", "0"), "--input"),
+        (("array", "array", "--rows", "1.5"), "rows is 1.5; expected a whole number"),
+        (("check", "array", "--pitch-x", "4mm"), "leaves no space between columns"),
+        (("invert", "a.yaml", "none.npz"), "none.npz"),
+        (("invert", "a.yaml", "f.csv", "--perfect"), "--perfect is for lines"),
+        (("invert", "a.yaml", "f.csv"), "no frequency of the readings"),
+        (("invert", "a.yaml", "f.csv", "--frequency", "10kHz"), "no frame at rest"),
+    ],
+)
+def test_wrong_words_are_one_line(run, file, tmp_path, words, answer):
+    (tmp_path / "f.csv").write_text("time_s,r1c1\n0,1e-12\n")
+    said = run(*words)
+    assert said.code == 2
+    assert answer in said.line

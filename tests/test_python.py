@@ -1,0 +1,111 @@
+"""Results in Python: a few lines, tables, figures, lists of designs, and names that are refused at once."""
+
+import re
+import sys
+
+import numpy as np
+import pytest
+
+import sensorgen as sg
+from sensorgen.core.display import LINES
+from sensorgen.core.errors import BadInput, MissingValue
+
+PLATE = sg.Design(shape="reference")
+TRI = sg.Design(shape="tri", parameters={"length_mm": 6.0, "width_mm": 6.0})
+
+
+@pytest.fixture(scope="module")
+def results():
+    return {
+        "check": sg.check(TRI),
+        "predict": sg.predict(PLATE),
+        "loaded": sg.predict(PLATE, force_n=[1.0, 2.0, 3.0], position_mm=[30.0, 50.0]),
+        "compress": sg.compress(PLATE, [10.0, 20.0]),
+        "cell": sg.cell(PLATE),
+        "sweep": sg.sweep(PLATE, electrode_mm=[0.3, 0.4], dielectric_mm=[0.4, 0.6]),
+        "list": sg.cell([PLATE, TRI]),
+    }
+
+
+@pytest.mark.parametrize("name", ["check", "predict", "loaded", "compress", "cell", "sweep", "list"])
+def test_a_result_is_shown_in_a_few_lines(results, name):
+    lines = repr(results[name]).splitlines()
+    assert 1 < len(lines) <= LINES
+    assert lines[:3] == results[name].text().splitlines()[:3]
+    assert "<table>" in results[name]._repr_html_()
+
+
+@pytest.mark.parametrize("name", ["check", "predict", "loaded", "compress", "sweep", "list"])
+def test_a_result_has_a_figure(results, name):
+    axes = results[name].plot().axes
+    drawn = [line for one in axes for line in one.lines if np.size(line.get_xdata())]
+    assert drawn, name
+    assert any(one.get_xlabel() for one in axes)
+
+
+def test_lines_of_a_figure_are_the_impedances(results):
+    loaded = results["loaded"]
+    first = loaded.plot().axes[0]  # R at the lowest frequency, a line and points for each position
+    z = loaded.impedance.impedance_ohm[0].real
+    assert first.lines[0].get_xdata() == pytest.approx([1.0, 2.0, 3.0])
+    ratio = first.lines[0].get_ydata() / z[:, 0]
+    assert ratio == pytest.approx(np.full(3, ratio[0]))
+    assert ratio[0] in (pytest.approx(1.0), pytest.approx(1e-3))  # ohm or kohm
+
+
+def test_a_sweep_has_all_combinations(results):
+    sweep = results["sweep"]
+    assert sweep.settings() == [
+        {"electrode_mm": e, "dielectric_mm": d} for e in (0.3, 0.4) for d in (0.4, 0.6)
+    ]  # fmt: skip
+    pf = [point.prediction.drawn.capacitance.value * 1e12 for point in sweep.results]
+    plate = [8.8541878128 * 4.68 * 1000e-6 / (d * 1e-3) for d in (0.4, 0.6)]  # eps0 eps A / d [pF]
+    assert pf == pytest.approx([*plate, *plate], rel=1e-6)
+    with pytest.raises(BadInput, match="without values"):
+        sg.sweep(PLATE)
+
+
+def test_tables_for_pandas(results):
+    pd = pytest.importorskip("pandas")
+    table = results["sweep"].to_pandas()
+    assert isinstance(table, pd.DataFrame)
+    assert list(table.columns[:3]) == ["electrode_mm", "dielectric_mm", "capacitance [pF]"]
+    assert len(table) == 4
+    assert len(results["check"].to_pandas()) == len(results["check"].findings)
+
+
+def test_libraries_that_are_missing_are_named(results, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(MissingValue, match="pip install pandas"):
+        results["cell"].to_pandas()
+    with pytest.raises(MissingValue, match="pip install xarray"):
+        results["loaded"].to_xarray()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"shape": "tri", "dielectric_mm": 0.2}, "dielectric_mm is a parameter; expected parameters: {dielectric_mm:"),
+        ({"shape": "tri", "qualty": "fine"}, "unknown key 'qualty'; did you mean 'quality'"),
+        ({"shape": "tri", "materials": {"filn": "x60"}}, "did you mean 'film'"),
+        ({"shape": "tri", "quality": 3}, "quality is 3; expected text"),
+        ({}, "shape is missing"),
+    ],
+)  # fmt: skip
+def test_wrong_names_are_refused_when_a_design_is_made(wrong, message):
+    with pytest.raises(BadInput, match=re.escape(message)):
+        sg.Design(**wrong)
+
+
+def test_lists_of_designs():
+    assert [found.verdict for found in sg.check([PLATE, PLATE])] == ["PRINT", "PRINT"]
+    with pytest.raises(BadInput, match="of one design"):
+        sg.predict([PLATE], force_n=[1.0])
+
+
+def test_files_are_written(tmp_path):
+    (body,) = sg.export_design(PLATE, tmp_path / "plate.3mf")
+    assert body.read_bytes()[:2] == b"PK"
+    page = sg.show(PLATE, tmp_path / "plate.html")
+    assert page.read_text("utf-8").startswith("<!doctype html>")
