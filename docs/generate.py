@@ -49,8 +49,16 @@ def sensorgen(*words: str, folder: str = ".") -> str:
 
 def reference() -> str:
     """The command reference."""
+    from click.testing import CliRunner  # in this process: seventy others take seconds to start
+
+    from sensorgen.cli import cli
+
+    def text(page: list[str]) -> str:
+        words = [*page, "--help"]
+        return CliRunner().invoke(cli, words, prog_name="sensorgen", terminal_width=98).output.rstrip()
+
     head = "# Command reference\n\nWritten by `make docs` from the `--help` texts; a test holds the two together.\n"
-    pages = (f"## {' '.join(['sensorgen', *p])}\n\n```text\n{sensorgen(*p, '--help').rstrip()}\n```\n" for p in PAGES)
+    pages = (f"## {' '.join(['sensorgen', *page])}\n\n```text\n{text(page)}\n```\n" for page in PAGES)
     return "\n".join([head, *pages])
 
 

@@ -124,12 +124,12 @@ def pytest_terminal_summary(terminalreporter):
 
 FIRST = (  # ten seconds and more of work or waiting: a worker that began one of them last would be left alone with it
     "test_one_answer", "test_docs", "thesis/test_faults", "lab/test_faults", "report/test_browser", "lab/test_kills",
-    "lab/test_live", "lab/test_run", "lab/test_truths", "lab/test_day", "lab/test_handyscope", "asprinted/test_real",
+    "lab/test_live", "lab/test_run", "lab/test_truths", "lab/test_handyscope", "asprinted/test_real",
     "asprinted/test_compensation", "slicers/test_batch_real", "cli/test_writing", "cli/test_import_command",
     "cli/test_calibrate_command", "cli/test_characterise_command", "cli/test_optimise_command",
     "cli/test_invert_command", "cli/test_compress_command", "models/test_press2d", "models/test_press3d",
     "models/test_press_round", "attacks/test_inputs_fuzz", "test_build", "test_chart", "test_design_chart",
-    "test_calibration", "test_fit", "test_new_user", "test_invert", "test_drawing",
+    "test_calibration", "lab/test_day", "test_fit", "test_new_user", "test_invert", "test_drawing",
 )  # fmt: skip
 
 

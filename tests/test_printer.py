@@ -41,12 +41,12 @@ def test_layers_of_the_qualities(name, layer):
     quality = printer.load_quality(name)
     assert quality.layer_mm == quality.first_layer_mm == layer
     grid = quality.boundaries_mm(1.0)
-    assert grid[:3] == [0.0, layer, pytest.approx(2 * layer)]
+    assert grid[:3] == (0.0, layer, pytest.approx(2 * layer))
     assert grid[-2] < 1.0 <= grid[-1]
 
 
 def test_a_height_on_the_grid_needs_no_further_layer():
-    assert printer.load_quality("fine").boundaries_mm(0.3) == [0.0, 0.1, 0.2, 0.3]
+    assert printer.load_quality("fine").boundaries_mm(0.3) == (0.0, 0.1, 0.2, 0.3)
 
 
 def test_bed_centre():

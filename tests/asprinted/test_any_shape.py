@@ -51,7 +51,7 @@ LAYERS = drawn(POSTS, FINE.boundaries_mm(1.2))
 
 
 def test_a_pattern_of_posts_repeats_both_ways():
-    found = window.window(LAYERS, POSTS)
+    found = window.window(POSTS, FINE.boundaries_mm(1.2))
     assert found.sides_mm() == pytest.approx((PERIOD, PERIOD))
     assert found.x_mm[0] % PERIOD == pytest.approx(0.0)  # from the middle between two posts: no post is cut
 
@@ -61,14 +61,14 @@ def test_a_pattern_about_the_middle_that_both_ends_cut_is_solved_as_one_period()
     middles = SIZE / 2 + 1.1 * np.arange(-5, 6)
     spans = [(rounded(max(x - 0.3, 0.0)), rounded(min(x + 0.3, SIZE))) for x in middles]
     strips = sensor([((a, 0.0), (b, 0.0), (b, SIZE), (a, SIZE)) for a, b in spans])
-    found = window.window(drawn(strips, FINE.boundaries_mm(1.2)), strips)
+    found = window.window(strips, FINE.boundaries_mm(1.2))
     assert found.sides_mm()[0] == pytest.approx(1.1)
 
 
 def test_a_pattern_without_mirrors_is_solved_as_a_whole():
     steps = np.arange(0.5, SIZE - 4, PERIOD)
     slanted = sensor([((x, 0.0), (x + 1, 0.0), (x + 4, 3.0), (x + 3, 3.0)) for x in steps])
-    found = window.window(drawn(slanted, FINE.boundaries_mm(1.2)), slanted)
+    found = window.window(slanted, FINE.boundaries_mm(1.2))
     assert found.sides_mm() == (SIZE, SIZE)
     assert found.repeats == (False, False)
 
@@ -77,7 +77,7 @@ def test_a_pattern_of_slanted_strips_repeats_by_shifts():
     strips = [((x, 0.0), (x + 1, 0.0), (x + 1 + SIZE, SIZE), (x + SIZE, SIZE)) for x in np.arange(-SIZE, SIZE, PERIOD)]
     plan = shapely.clip_by_rect(shapely.union_all([shapely.Polygon(o) for o in strips]), 0, 0, SIZE, SIZE)
     slanted = sensor(list(outlines(plan)))
-    found = window.window(drawn(slanted, FINE.boundaries_mm(1.2)), slanted)
+    found = window.window(slanted, FINE.boundaries_mm(1.2))
     assert found.sides_mm() == pytest.approx((PERIOD, PERIOD))
     assert found.repeats == (True, True)
 
@@ -91,7 +91,7 @@ def test_the_estimate_of_a_post_is_a_rounding_narrower():
 
 def test_the_cell_of_a_print_has_the_gap_and_volume_of_its_layers():
     made = estimate.layers(POSTS, PRINTER, FINE)
-    cell = scene_of(window.cut(made, window.window(LAYERS, POSTS)), POSTS)
+    cell = scene_of(window.cut(made, window.window(POSTS, FINE.boundaries_mm(1.2))), POSTS)
     assert gap_mm(cell) == pytest.approx(0.2)
     assert cell.body("pattern").volume_mm3() == pytest.approx(0.4 * made[6].region("pattern").area / 16, rel=1e-3)
 

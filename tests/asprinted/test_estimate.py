@@ -12,7 +12,7 @@ from sensorgen.core.errors import UnknownName
 from sensorgen.design import design
 from sensorgen.models import columns, fem2d
 from sensorgen.prediction.bodies import estimated
-from sensorgen.scene.layers import LayerRegions, drawn, scene_of
+from sensorgen.scene.layers import LayerRegions, scene_of
 from sensorgen.scene.scene import Body, Prism, Scene, area_mm2, box
 
 RING = ((1, 4, 1, 2), (1, 4, 3, 4), (1, 2, 2, 3), (3, 4, 2, 3))  # 3 x 3 mm around a hole of 1 x 1
@@ -45,7 +45,7 @@ def tri(quality="fine", orientation="as-drawn", **more):
 
 def one_period(d, walls):
     scene = d.printed
-    plan = window.window(drawn(scene, d.layers.boundaries_mm(scene.size_mm[2])), scene)
+    plan = window.window(scene, d.layers.boundaries_mm(scene.size_mm[2]))
     found = window.cut(layers(scene, d.machine, d.layers, walls), plan)
     return scene_of(found, replace(scene, size_mm=(*plan.sides_mm(), scene.size_mm[2]))), plan
 
@@ -185,13 +185,13 @@ def test_a_window_is_one_period_wherever_the_sensor_ends(end_mm):
     """Also where its end is an edge of a layer, but for rounding."""
     size = {"length_mm": 33 * 2.4 + end_mm, "period_mm": 2.4, "lower_height_mm": 0.2, "dielectric_mm": 0.2}
     d = design.make({"shape": "tri", "parameters": size})
-    plan = window.window(drawn(d.printed, d.layers.boundaries_mm(d.printed.size_mm[2])), d.printed)
+    plan = window.window(d.printed, d.layers.boundaries_mm(d.printed.size_mm[2]))
     assert plan.sides_mm()[0] == pytest.approx(2.4)
 
 
 def test_a_window_is_the_whole_where_nothing_repeats():
     d = design.make({"shape": "tri", "parameters": {"length_mm": 2.0}})
-    plan = window.window(drawn(d.printed, d.layers.boundaries_mm(d.printed.size_mm[2])), d.printed)
+    plan = window.window(d.printed, d.layers.boundaries_mm(d.printed.size_mm[2]))
     assert (plan.x_mm, plan.y_mm) == ((0.0, 2.0), (0.0, 10.0))
 
 

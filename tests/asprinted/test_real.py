@@ -31,7 +31,12 @@ FEET = 4  # layer of the feet on the film, from 0
 
 
 def cell_of(variant, layers_of):
-    return cell(variant, layers_of, variant.printed.bodies, window(plan_of(variant), variant.printed))
+    return cell(
+        variant,
+        layers_of,
+        variant.printed.bodies,
+        window(variant.printed, variant.layers.boundaries_mm(variant.printed.size_mm[2])),
+    )
 
 
 def plan_of(variant):

@@ -236,3 +236,16 @@ def test_it_is_written_apart_from_what_analyses_it(name):
     imported = {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     apart = ("models", "prediction", "solvers", "analysis", "measure.lab")
     assert not [module for module in imported if module.startswith(tuple(f"sensorgen.{one}" for one in apart))]
+
+
+def test_a_cell_is_solved_once_whatever_its_tracks_resist(monkeypatch):
+    """Its modulus, which the pressed cell has to do with, is solved anew."""
+    solved = []
+    monkeypatch.setattr(tables, "_SOLVED", {})
+    monkeypatch.setattr(tables, "_solved", lambda design: solved.append(design) or [[[[1.0]]], 0.0])
+    ends = dict.fromkeys(("top_electrode", "bottom_electrode"), "etpu@thesis-3.2")
+    usual, other = blank(make(TRI)), blank(make({**TRI, "materials": ends}))
+    assert len(solved) == 1
+    assert other.track_ohm_per_m[1] == pytest.approx(usual.track_ohm_per_m[1] * 0.833333 / 0.042, rel=1e-5)
+    blank(make({**TRI, "material_values": {"etpu": {"youngs_modulus_pa": 1e7}}}))
+    assert len(solved) == 2

@@ -85,7 +85,7 @@ class Disagreement:
 def sampled(design: Design, off: float) -> tuple[LayerRegions, ...]:
     """Layers of a design, sampled ``off`` layers above mid-height."""
     scene, shift = design.printed, off * design.layers.layer_mm
-    return drawn(scene, [z + shift for z in design.layers.boundaries_mm(scene.size_mm[2])])
+    return drawn(scene, tuple(z + shift for z in design.layers.boundaries_mm(scene.size_mm[2])))
 
 
 def check(design: Design, lines: Beads) -> Iterator[Found]:

@@ -82,9 +82,8 @@ class Printed:
 
         whole = self.design.unbordered.printed
         boundaries = self.design.layers.boundaries_mm(whole.size_mm[2])
-        plan = Window((0.0, whole.size_mm[0]), (0.0, whole.size_mm[1]))
-        if not is_open(self.design.unbordered.in_use):  # else its fringe is part of the capacitance
-            plan = window(drawn(whole, boundaries), whole)
+        fringe = is_open(self.design.unbordered.in_use)  # is part of the capacitance
+        plan = Window((0.0, whole.size_mm[0]), (0.0, whole.size_mm[1])) if fringe else window(whole, boundaries)
         if self.design.border:
             plan = inside(plan, whole, drawn(self.design.printed, boundaries))
         return {name: cell(self.design, found.layers, found.bodies, plan) for name, found in self._connected.items()}

@@ -6,6 +6,7 @@ would have to solve the whole sensor. The drawing's mirrors say where a period s
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +15,7 @@ from shapely.affinity import translate
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput
-from sensorgen.scene.layers import LayerRegions, Region, cleaned, parts
+from sensorgen.scene.layers import LayerRegions, Region, cleaned, drawn, parts
 from sensorgen.scene.repetition import repeat
 from sensorgen.scene.scene import SLIVER_MM, Point, Scene, rounded
 from sensorgen.scene.sections import square_to
@@ -49,7 +50,8 @@ class Window:
         return x * y
 
 
-def window(layers: Sequence[LayerRegions], scene: Scene) -> Window:
+@lru_cache(maxsize=64)  # by whatever walls a drawing is printed, its period is the same
+def window(scene: Scene, boundaries_mm: tuple[float, ...]) -> Window:
     """One period of a drawing near its middle, along x and y.
 
     It starts and ends where least conducts in the patterned layers, so that a cog that is printed lopsided is whole.
@@ -57,13 +59,13 @@ def window(layers: Sequence[LayerRegions], scene: Scene) -> Window:
 
     Parameters
     ----------
-    layers : sequence of LayerRegions
-        The drawing's layers.
     scene : Scene
         The drawing.
+    boundaries_mm : tuple of float
+        Of its layers, from the bed up [mm].
     """
     conducting = {body.name for body in scene.bodies if body.terminal}
-    (x, one), (y, other) = (_period(layers, conducting, scene.size_mm, axis) for axis in (0, 1))
+    (x, one), (y, other) = (_period(drawn(scene, boundaries_mm), conducting, scene.size_mm, axis) for axis in (0, 1))
     return Window(x, y, (one, other))
 
 

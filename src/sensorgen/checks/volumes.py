@@ -95,7 +95,7 @@ def rows(
     volumes_mm3 : mapping, optional
         Volume extruded by layer, from 0, and body [mm3]; area times height of what is printed if not given.
     """
-    boundaries = [printed[0].bottom_mm, *(layer.top_mm for layer in printed)]
+    boundaries = (printed[0].bottom_mm, *(layer.top_mm for layer in printed))
     exact_mm3 = {body.name: _drawn_mm3(body, boundaries) for body in scene.bodies}
     found = []
     for number, (meant, made) in enumerate(zip(drawn(scene, boundaries), printed, strict=True)):

@@ -180,12 +180,12 @@ class Quality(Strict):
     bridge_warning_mm: Positive
     bridge_error_mm: Positive
 
-    def boundaries_mm(self, height_mm: float) -> list[float]:
+    def boundaries_mm(self, height_mm: float) -> tuple[float, ...]:
         """Heights of the layer boundaries from the bed to the first at or above ``height_mm`` [mm]."""
         grid = [0.0]
         while grid[-1] < height_mm - 1e-9:
             grid.append(round(self.first_layer_mm + (len(grid) - 1) * self.layer_mm, 9))
-        return grid
+        return tuple(grid)
 
 
 TRUST = "SENSORGEN_TRUST_PRINTER"  # environment variable: printer files may widen limits, also in processes of ours

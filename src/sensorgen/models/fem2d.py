@@ -5,7 +5,6 @@ distance of the bounds falls exponentially. See docs/cells.md.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -187,7 +186,6 @@ def _disc(mesh: Cones, permittivity: Mapping[str, complex], turn: Turned, order:
     return disc(found, turn, [share for _, share in mesh.triangles.regions])
 
 
-@lru_cache(maxsize=8)  # of why_not_applicable() and capacitance(): a long sensor's cell takes as long as its field
 def _triangles(scene: Scene) -> tuple[Section, Triangles]:
     """The scene's only cross-section, and its repeating cell in few triangles."""
     found = sections(scene)

@@ -83,14 +83,14 @@ def _one_period(scene: "Scene") -> "tuple[Scene, float]":
     pieces = [p for body in scene.bodies for p in body.pieces]
     if not all(p.is_constant("z") for p in pieces):
         return scene, 1.0
-    found = layers(scene, sorted({z for p in pieces for z in p.span("z")}))
-    plan, area = window(found, scene), scene.size_mm[0] * scene.size_mm[1]
+    heights = tuple(sorted({z for p in pieces for z in p.span("z")}))
+    plan, area = window(scene, heights), scene.size_mm[0] * scene.size_mm[1]
     if plan.area_mm2() > 0.99 * area:
         return scene, 1.0
     (x0, x1), (y0, y1) = plan.x_mm, plan.y_mm
     inside = [
         layer.mapped({n: translate(clip_by_rect(r, x0, y0, x1, y1), -x0, -y0) for n, r in layer.regions.items()})
-        for layer in found
+        for layer in layers(scene, heights)
     ]
     like = replace(scene, size_mm=(*plan.sides_mm(), scene.size_mm[2]), repeats=plan.repeats)
     return scene_of(inside, like), area / plan.area_mm2()
@@ -101,10 +101,9 @@ def _inside(design: Design, whole: Cells) -> Cells:
     from sensorgen.asprinted.window import window
     from sensorgen.design import borders
     from sensorgen.scene.border import share
-    from sensorgen.scene.layers import drawn as layers
 
     scene = design.unbordered.drawn
-    plan = window(layers(scene, design.layers.boundaries_mm(scene.size_mm[2])), scene)
+    plan = window(scene, design.layers.boundaries_mm(scene.size_mm[2]))
     sides = whole.first().size_mm[:2] if whole.beside else plan.sides_mm()
     left = share(scene, borders.region(design.border or ""), sides)
     remark = (

@@ -108,21 +108,17 @@ def narrow_mm(polygons: Sequence[Polygon] | NDArray[np.object_]) -> NDArray[np.f
     return narrow
 
 
-def drawn(scene: Scene, boundaries_mm: Sequence[float]) -> tuple[LayerRegions, ...]:
+@lru_cache(maxsize=16)
+def drawn(scene: Scene, boundaries_mm: tuple[float, ...]) -> tuple[LayerRegions, ...]:
     """Every layer of a scene as a slicer samples it, at mid-height, or just below it where faces lie there.
 
     Parameters
     ----------
     scene : Scene
         As it lies on the bed.
-    boundaries_mm : sequence of float
+    boundaries_mm : tuple of float
         Of its layers, from the bed up [mm].
     """
-    return _drawn(scene, tuple(boundaries_mm))
-
-
-@lru_cache(maxsize=16)
-def _drawn(scene: Scene, boundaries_mm: tuple[float, ...]) -> tuple[LayerRegions, ...]:
     layers, faces = [], {rounded(z) for body in scene.bodies for z in faces_mm(body)}
     for bottom, top in pairwise(boundaries_mm):
         middle = rounded((bottom + top) / 2)

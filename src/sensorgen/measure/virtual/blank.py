@@ -97,7 +97,7 @@ _SOLVED: dict[tuple[str, float], Blank] = {}
 
 
 def _stored(design: Design) -> Blank:
-    """Solved anew where the cell or its solids differ, not where a track's resistivity does."""
+    """Solve a design's cell, once for all resistivities of its tracks."""
     names = {part: slot and slot.partition("@")[0] for part, slot in design.materials}
     cell = design.model_copy(update={"materials": Slots(**names), "material_values": {}})
     question = {

@@ -18,8 +18,7 @@ def energy(section: Section, height_mm: float, permittivity: Mapping[str, float]
         The electrodes touch, none lies opposite the other, or the field between them would leave the sensor.
     """
     mesh = triangles(cell(section, height_mm))
-    corners = np.array(mesh.triangles)
-    used, corners = np.unique(corners, return_inverse=True)
+    used, corners = np.unique(np.array(mesh.triangles), return_inverse=True)
     corners = corners.reshape(-1, 3)
     points = mesh.points[used][corners]
     sides = np.roll(points, -1, axis=1) - np.roll(points, -2, axis=1)

@@ -4,6 +4,7 @@ from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -38,6 +39,7 @@ class Triangles:
     terminals: dict[Edge, str]
 
 
+@lru_cache(maxsize=16)  # a cell is solved with many permittivities
 def triangles(cell: Cell) -> Triangles:
     """Triangulate the dielectric of a cell between its electrodes.
 
