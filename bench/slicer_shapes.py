@@ -6,11 +6,10 @@ A cell counts the findings of the print that are errors, with the gravest: what 
 import sys
 import time
 
-from slicers import NEWER, RESULTS
-
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design import design, packs
 from sensorgen.prediction.slices import slice_now
+from slicers import NEWER, RESULTS
 
 PROGRAMS = (("prusa", ""), ("prusa", str(NEWER / "prusa-slicer")), ("cura", ""), ("cura", str(NEWER / "CuraEngine")))
 HEAD = """# Shapes at their default sizes through slicers

@@ -1,37 +1,43 @@
 """Compression of the thesis's triangular cells as slicers print them: writes models/solved_prints.yaml.
 
-Films of 0.1 and 0.2 mm are sliced by the PrusaSlicer that is installed too, by every convention for a line's width.
+Films of 0, 0.1 and 0.2 mm are sliced by the PrusaSlicer that is installed too, by every convention for a line's width.
+With "prototypes" as argument it writes what the drawn cells of models/solved_cells.yaml do under a block, instead.
 
 A cell that the file has is not solved again: delete the file to solve all anew, which takes a quarter of an hour.
 """
 
 import re
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterator, Sequence
 from itertools import product
 from json import dumps
 from pathlib import Path
 
 import numpy as np
 
+from sensorgen.core import yamlfile
+from sensorgen.core.arrays import Real
 from sensorgen.design.design import Design, make
 from sensorgen.design.tip import EVEN, STIFF, Tip
 from sensorgen.prediction.bodies import WALLS, estimated, of_file
 from sensorgen.prediction.compression_law import case_of, content, solved
-from sensorgen.prediction.mesh_ladder import COARSEST, Piece, model_of, pressed
+from sensorgen.prediction.mesh_ladder import COARSEST, USUAL, Piece, drawn, model_of, pressed
 from sensorgen.prediction.sensor_model import piece
 from sensorgen.prediction.slices import at_hand
 
-FILE = Path(__file__).parents[1] / "src" / "sensorgen" / "models" / "solved_prints.yaml"
+MODELS = Path(__file__).parents[1] / "src" / "sensorgen" / "models"
+FILE, CELLS = MODELS / "solved_prints.yaml", MODELS / "solved_cells.yaml"
 HEAD = """\
 # Rise of the capacitance of printed triangular cells with stress, as bench/solved_prints.py solved it: by press2d, its
 # usual mesh; "within" by bench/rise_errors.py, of slices ("prusa") against the next coarser mesh; layers of 0.1 and
 # 0.06 mm, walls as named, the film as thin and as thick as the printer's tools may make it, too. Keys are the content
-# of the section. "stiff" is the change under a stiff plate, from the even pressure, at 60 kPa on the coarsest mesh.
+# of the section. "stiff" and "block" are the changes under a stiff plate and
+# under 10 mm of NinjaFlex, from the even pressure, at 60 kPa on the coarsest mesh.
 source: plane-strain finite elements with frictionless contact, neo-Hookean, nu 0.4999, of the printed cell
 youngs_modulus_pa: {etpu: 22.0e6, x60: 6.0e6}
 cells:
 """
-EVEN_PRESSURE = Tip(block=EVEN)
+EVEN_PRESSURE, COARSE_PA = Tip(block=EVEN), (0.0, 2e4, 4e4, 6e4)
 
 
 def main() -> None:
@@ -41,7 +47,7 @@ def main() -> None:
     found: dict[str, str] = {}
     films = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
     estimates = product(WALLS, ("fine", "extrafine"), "xy", films)
-    for walls, quality, along, film in (*product(["prusa"], ["fine"], "xy", (0.2, 0.1)), *estimates):
+    for walls, quality, along, film in (*product(["prusa"], ["fine"], "xy", (0.2, 0.1, 0.0)), *estimates):
         sizes = {"dielectric_mm": film, "along": along}
         design = make({"shape": "tri", "quality": quality, "parameters": sizes})
         for what, cell in cells(design, walls):
@@ -49,7 +55,7 @@ def main() -> None:
             if key in found:
                 continue
             if key in before:
-                found[key] = with_stiff(before[key], design, cell)
+                found[key] = with_tops(before[key], design, cell)
                 FILE.write_text(HEAD + "".join((before | found).values()), "utf-8")
                 continue
             name = f"tri repeating along {along}, film {film:g}{what} mm, {quality}, {walls}"
@@ -59,7 +65,7 @@ def main() -> None:
                 print(name, error, flush=True)
                 continue
             curve = law.compression
-            found[key] = with_stiff(
+            found[key] = with_tops(
                 f"  {key}:  # {name}\n"
                 f"    displacement_um: {curve.displacement_m * 1e6:.5g}\n"
                 f"    stress_kpa: {[round(p / 1e3, 6) for p in curve.stress_pa]}\n"
@@ -72,19 +78,38 @@ def main() -> None:
     FILE.write_text(HEAD + "".join(found.values()), "utf-8")
 
 
-def with_stiff(entry: str, design: Design, cell: Piece) -> str:
-    """A cell's entry with the change of its rise under a stiff plate."""
-    if "    stiff: " in entry:
-        return entry
-    rises = []
-    for block in (EVEN, STIFF):
-        found = pressed(case_of(design, cell, model_of(cell), Tip(block=block)), [0.0, 2e4, 4e4, 6e4], COARSEST)
-        values = [c.middle() if c else np.nan for c in found.capacitance_f_per_m2]
-        rises.append(np.append(values, [np.nan] * (4 - len(values)))[1:] - values[0])
-    changes = rises[1] / rises[0] - 1
-    change = changes[np.isfinite(changes)][-1]  # at the highest pressure at which both are known
-    print(entry.partition("\n")[0], changes, flush=True)
-    return f"{entry}    stiff: {change:.4g}\n"
+def with_tops(entry: str, design: Design, cell: Piece) -> str:
+    """A cell's entry with the changes of its rise under a stiff plate and a block."""
+    tips = {"stiff": Tip(block=STIFF), "block": Tip()}
+    missing = {key: tip for key, tip in tips.items() if f"    {key}: " not in entry}
+    even = rises(design, cell, EVEN_PRESSURE, COARSE_PA, COARSEST) if missing else np.zeros(0)
+    for key, tip in missing.items():
+        changes = rises(design, cell, tip, COARSE_PA, COARSEST) / even - 1
+        change = float(changes[np.isfinite(changes)][-1])  # at the highest pressure at which both are known
+        print(entry.partition("\n")[0], key, changes, flush=True)
+        entry += f"    {key}: {f'[{change:.4g}]' if key == 'block' else f'{change:.4g}'}\n"
+    return entry
+
+
+def rises(design: Design, cell: Piece, tip: Tip, stress_pa: Sequence[float], level: int) -> Real:
+    """Rise of the capacitance at each pressure but the first [F/m2]; NaN where unknown."""
+    found = pressed(case_of(design, cell, model_of(cell), tip), stress_pa, level)
+    values = [c.middle() if c else np.nan for c in found.capacitance_f_per_m2]
+    return np.append(values, [np.nan] * (len(stress_pa) - len(values)))[1:] - values[0]
+
+
+def prototypes() -> None:
+    """Write the changes under a block of all drawn cells, on the usual mesh."""
+    text = CELLS.read_text("utf-8")
+    for known in yamlfile.parse(text, CELLS.name)["cells"]:
+        design = make({"shape": known["shape"], "parameters": {"dielectric_mm": known["parameters"]["dielectric_mm"]}})
+        stress_pa = [1e3 * kpa for kpa in known["stress_kpa"]]
+        even, block = (rises(design, drawn(design), tip, stress_pa, USUAL) for tip in (EVEN_PRESSURE, Tip()))
+        changes = [float(f"{change:.3g}") for change in block / even - 1]
+        rise = re.escape(f"    rise_percent: {known['rise_percent']}".replace("0.0,", "0,", 1))
+        text = re.sub(rf"({rise}\n)(    block: .*\n)?", rf"\g<1>    block: {changes}\n", text)
+        print(known["parameters"], changes, flush=True)
+        CELLS.write_text(text, "utf-8")
 
 
 def cells(design: Design, walls: str) -> Iterator[tuple[str, Piece]]:
@@ -101,4 +126,4 @@ def cells(design: Design, walls: str) -> Iterator[tuple[str, Piece]]:
 
 
 if __name__ == "__main__":
-    main()
+    prototypes() if "prototypes" in sys.argv else main()

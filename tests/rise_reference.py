@@ -19,6 +19,12 @@ def scenes():
     return json.loads(FILE.read_text("utf-8"))["scenes"]
 
 
+def of_another_program():
+    """Entries whose rise another program solved, which shares no code: bench/rise_ngsolve.py."""
+    found, own = json.loads(FILE.with_name("rise_other.json").read_text("utf-8"))["scenes"], scenes()
+    return [own[other["scene"]] | {"rise_nf_per_m2": other["rise_nf_per_m2"]} for other in found]
+
+
 def case(entry):
     """The scene of an entry under its top: the stored print, or the drawing of its parameters."""
     design = make({"shape": "tri", "quality": entry["quality"], "parameters": entry["parameters"]})

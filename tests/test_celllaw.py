@@ -52,7 +52,7 @@ def test_a_prototype_is_known_and_nothing_is_solved(monkeypatch):
         law = law_of(make({"shape": "tri"}), GAPS, name)
         assert (law.compression.name, law.doubts, law.bounded) == ("solved", (), True)
     low, high = (c.ratio[-1] for c in law.others)
-    within = 0.006 + 0.010 / 2  # of the mesh, and half of what a stiff plate differs by from an even pressure
+    within = 0.006  # of the mesh: the usual block was solved
     assert (low - 1) / (law.compression.ratio[-1] - 1) == pytest.approx(1 - within)
     assert (high - 1) / (law.compression.ratio[-1] - 1) == pytest.approx(1 + within)
     assert set(law.tops) == {"even", "stiff"}

@@ -60,7 +60,7 @@ def test_without_an_accuracy_no_cell_is_solved_in_3d():
 def test_the_cheapest_of_each_level_is_taken_and_the_whole_holds_the_truth():
     """Of a prototype, whose law is stored: against the capacitance to 1e-7."""
     exact, _ = worked_out(tri(0.1), 1e-7)
-    for accuracy, model in ((2.0, "fem2d"), (1e-2, "fem2d"), (5e-4, "fem2d")):
+    for accuracy, model in ((2.0, "fem2d"), (1e-2, "fem2d"), (2e-4, "fem2d")):
         sensed, plan = worked_out(tri(0.1), accuracy)
         assert chosen(plan) == {"cell": model, "compression": "solved", "line": "line, 1 section"}
         assert off(sensed.sensor, exact.sensor) <= plan.width <= accuracy

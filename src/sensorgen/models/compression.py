@@ -25,6 +25,7 @@ SOURCE = (
 COST = 0
 
 PROTOTYPE_PA = 6e6  # Young's modulus of the films of the stored cells [Pa]
+BLOCK_PA = 12e6  # the same of the block that stored cells were pressed with: the usual tip's [Pa]
 SOLVED_RATIO = 0.4999  # Poisson's ratio of all materials of the stored cells [-]
 REACH = 3.0  # factor on its last stress up to which a curve is extrapolated by its last slope [-]
 _PA_PER_KPA, _UM_PER_M = 1e3, 1e6
@@ -89,6 +90,8 @@ class Curve:
         Relative error of the rise [-].
     stiff_change : float
         Relative change of the rise under a stiff plate, from that under an even pressure [-].
+    block_changes : tuple of float
+        The same under the usual block, at each stress above 0, or one for all [-]; empty where it was not solved.
     boundary_changes : tuple of float
         Relative changes of the rise under other boundary and contact conditions of this cell [-].
     displacement_m : float or None
@@ -112,6 +115,7 @@ class Curve:
     slope_per_pa: tuple[float, ...]
     within: float = 0.0
     stiff_change: float = 0.0
+    block_changes: tuple[float, ...] = ()
     boundary_changes: tuple[float, ...] = ()
     displacement_m: float | None = None
     onset: float = 1.0
@@ -159,6 +163,15 @@ class Curve:
             ratio=tuple(1 + (g - 1) * factor for g in self.ratio),
             slope_per_pa=tuple(m * factor for m in self.slope_per_pa),
         )
+
+    def under_block(self, *, usual: bool) -> "Curve":
+        """The cell under a block on its top; one that is not the usual lies between even pressure and stiff plate."""
+        if not (usual and self.block_changes):
+            half = self.stiff_change / 2
+            return replace(self.scaled_rise(1 + half), within=self.within + abs(half))
+        ratio = 1 + (np.array(self.ratio) - 1) * np.append(1.0, 1 + np.resize(self.block_changes, len(self.ratio) - 1))
+        slopes = _slopes(np.array(self.stress_pa), ratio)
+        return replace(self, ratio=tuple(ratio.tolist()), slope_per_pa=tuple(slopes.tolist()))
 
     def doubt(self, stress_pa: float) -> str:
         """Remark on a stress beyond the last point [Pa]."""
@@ -350,10 +363,11 @@ def _curve(cell: Mapping[str, Any], scale: float) -> Curve:
     """A stored cell's curve, its moduli multiplied by a factor."""
     stress = [kpa * _PA_PER_KPA * scale for kpa in cell["stress_kpa"]]
     found = curve("solved", cell["source"], stress, [1 + percent / 100 for percent in cell["rise_percent"]])
-    changes = dict(cell.get("held", {}))
+    changes, block = dict(cell.get("held", {})), cell.get("block", ()) if abs(scale - 1) < _SAME else ()
     return replace(
-        found, within=cell["within"], stiff_change=cell["stiff"], boundary_changes=tuple(changes.values()),
-        displacement_m=cell["displacement_um"] / _UM_PER_M, doubts=tuple(cell.get("doubts", ())),
+        found, within=cell["within"], stiff_change=cell["stiff"], block_changes=tuple(block),
+        boundary_changes=tuple(changes.values()), displacement_m=cell["displacement_um"] / _UM_PER_M,
+        doubts=tuple(cell.get("doubts", ())),
     )  # fmt: skip
 
 

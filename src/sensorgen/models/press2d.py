@@ -29,7 +29,8 @@ __all__ = ["BoundaryConditions", "Elastic", "Fineness", "Pressed", "cell", "comp
 
 _STEP = 1 / 150  # longest load step over the least Young's modulus: 40 kPa for 6 MPa [-]
 _STICKING_STEP = _STEP / 16  # the same where faces stick: how far they had slid when they touched counts [-]
-_FIELD_SHARE = 0.4  # growth of the triangles of the capacitance's mesh, over that of the solids' mesh [-]
+# Of the capacitance's mesh: growth of its triangles over that of the solids' mesh [-], and rings around corners
+_SHARP_FIELD, _BLUNT_FIELD = (0.4, 6), (0.8, 4)
 _UM = 1e-3  # in mm
 _MISFIT = 1e-3  # of a solid's area: gaps that were closed in the wrong place change more [-]
 _APEX = (1.0, 3.0, 9.0, 20.0)  # times the size of the triangles at an apex, the next where pressure folds the finer [-]
@@ -122,26 +123,37 @@ def _solved(
 def _with_fields(
     found: Pressed, cell: Cell, run: Run[Mesh], permittivity: Mapping[str, float], fineness: Fineness
 ) -> Pressed:
-    """Add the capacitance of the deformed outlines."""
-    states, growth = run.states[: len(found.stress_pa)], _FIELD_SHARE * fineness.growth
-    fields = [_field(cell, run, state.u_m, permittivity, growth) for state in states]
-    return with_capacitances(found, [c for c, _ in fields], tuple(outline for _, outline in fields))
+    """The same with the capacitance of the deformed outlines.
 
-
-def _field(
-    cell: Cell, run: Run[Mesh], u_m: Real, permittivity: Mapping[str, float], growth: float
-) -> tuple[Interval | None, Cell]:
-    """Capacitance and outlines of a deformed cell; None where no sound mesh of them was found."""
+    Where no gap ends in an apex, the mesh as drawn is carried along until a gap closes: its errors cancel in the rise.
+    """
     from sensorgen.solvers.contact import deformed, plane_field
+    from sensorgen.solvers.contact.carried import Carried
 
-    mesh = run.mesh
-    outline = deformed.deformed(cell, mesh, run.problem.faces, u_m)
-    if deformed.misfit(outline, mesh, u_m) > _MISFIT:
-        return None, outline
-    try:
-        return plane_field.capacitance(outline.without_block(), permittivity, cell.width_mm() / 4, growth), outline
-    except Unmeshed:
-        return None, outline
+    mesh, sharp = run.mesh, bool(found.apex_m)
+    share, rings = _SHARP_FIELD if sharp else _BLUNT_FIELD
+
+    def meshed(u_m: Real) -> Mesh | None:
+        outline = deformed.deformed(cell, mesh, run.problem.faces, u_m)
+        if deformed.misfit(outline, mesh, u_m) > _MISFIT:
+            return None
+        try:
+            return plane_field.meshed(outline.without_block(), cell.width_mm() / 4, share * fineness.growth, rings)
+        except Unmeshed:
+            return None
+
+    def bounds(field: Mesh | None) -> Interval | None:
+        try:
+            return plane_field.capacitance(cell, field, permittivity) if field else None
+        except Unmeshed:
+            return None
+
+    displacements = [state.u_m for state in run.states[: len(found.stress_pa)]]
+    drawn = None if sharp else meshed(displacements[0])
+    carried = Carried(drawn, mesh, cell) if drawn else None
+    own = [carried.at(u_m) if carried else None for u_m in displacements]
+    fields = [bounds(field or meshed(u_m)) for field, u_m in zip(own, displacements, strict=True)]
+    return replace(with_capacitances(found, fields), carried=tuple(field is not None for field in own))
 
 
 def why_not_applicable(scene: Scene) -> str | None:

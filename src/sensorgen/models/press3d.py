@@ -49,14 +49,6 @@ class Pieces:
     shrink: float = 0.3
     orders: Orders = field(default_factory=Orders)
 
-    def finer(self) -> "Pieces":
-        """One piece more."""
-        return replace(self, pieces=self.pieces + 1)
-
-    def coarser(self) -> "Pieces":
-        """One piece less."""
-        return replace(self, pieces=self.pieces - 1)
-
 
 @dataclass(frozen=True)
 class Limit:

@@ -137,7 +137,7 @@ def law_of(
     values = {n: t.value for n, t in moduli.items()}
     known = _stored_print(design, printed, values) if printed else _stored(design, values)
     if known and name != "unconfined" and until_pa <= _PAST * known.stress_pa[-1]:
-        return _stored_law(known, moduli, tip)
+        return _stored_law(known, moduli, tip, usual=_is_usual(design, tip))
     if name == "solved":
         return solved(design, printed, tip=tip, until_pa=until_pa)
     if not name and piece.period_mm is None and (found := infill(design, piece)):
@@ -245,22 +245,29 @@ def _incompressible(design: Design) -> bool:
 
 def _stored_print(design: Design, printed: Piece, youngs_modulus_pa: Mapping[str, float]) -> Curve | None:
     """The stored curve of a printed cell, as those of the thesis's designs are."""
-    keys = (content(printed, digits) for digits in (6, 3))  # estimates; G-code, of which equal slices differ by 4 nm
+    # Estimates; G-code, of which equal slices differ by 4 nm; both as the mirror image, as other counts of periods are
+    keys = (content(printed, digits, turned=turned) for turned in (False, True) for digits in (6, 3))
     found = next(filter(None, (compression.solved_print(key, youngs_modulus_pa) for key in keys)), None)
     return found if found and _incompressible(design) else None
 
 
-def content(piece: Piece, digits: int = 6) -> str:
-    """Identity of a cell's cross-section, to a digit of a millimetre; "" where it has several."""
+def content(piece: Piece, digits: int = 6, *, turned: bool = False) -> str:
+    """Identity of a cell's cross-section or its mirror image, to a digit of a millimetre; "" where it has several."""
     try:
         section, *others = sections(piece.scene)
     except ValueError:
         return ""
     if others:
         return ""
+    outlines = [outline for _, outline in section.regions]
+    if turned:
+        middle = sum(f(x for outline in outlines for x, _ in outline) for f in (min, max))
+        outlines = [tuple((middle - x, z) for x, z in outline[::-1]) for outline in outlines]
+        starts = [outline.index(min(outline, key=lambda p: p[::-1])) for outline in outlines]  # the lowest, leftmost
+        outlines = [outline[k:] + outline[:k] for outline, k in zip(outlines, starts, strict=True)]
     regions = sorted(
         (body.material, body.terminal, [[round(v, digits) for v in corner] for corner in outline])
-        for body, outline in section.regions
+        for (body, _), outline in zip(section.regions, outlines, strict=True)
     )
     return sha256(dumps([regions, piece.period_mm]).encode()).hexdigest()[:16]
 
@@ -327,12 +334,16 @@ def _cell(found: Curve, moduli: Mapping[str, MaterialValue], tops: Mapping[str, 
     return Law(found, tuple(moduli.values()), found.doubts, others, tops or {}, other_boundaries)
 
 
-def _stored_law(even: Curve, moduli: Mapping[str, MaterialValue], tip: Tip) -> Law:
-    """Law of a stored cell, solved under an even pressure; a block's lies between that and a stiff plate's."""
+def _stored_law(even: Curve, moduli: Mapping[str, MaterialValue], tip: Tip, *, usual: bool) -> Law:
+    """Law of a stored cell, solved under an even pressure, and under the ``usual`` block."""
     tops = {EVEN: even, STIFF: even.scaled_rise(1 + even.stiff_change)}
-    own = tops.get(tip.block, even.scaled_rise(1 + even.stiff_change / 2))
-    within = even.within + abs(even.stiff_change) / 2 * tip.soft
-    return _cell(replace(own, within=within), moduli, tops)
+    return _cell(tops.get(tip.block) or even.under_block(usual=usual), moduli, tops)
+
+
+def _is_usual(design: Design, tip: Tip) -> bool:
+    """Whether a tip is the block that stored cells were pressed with, or a higher one."""
+    modulus_pa = design.material(Tip.block).value("youngs_modulus_pa").value
+    return tip.block == Tip.block and tip.height_m >= Tip.height_m and modulus_pa == compression.BLOCK_PA
 
 
 def stresses_pa(until_pa: float) -> tuple[float, ...]:

@@ -42,7 +42,7 @@ VERIFIED = 7.5e-3  # error of the rise below which nothing is stated: other prog
 _OF_DISPLACEMENT = 0.6  # error of the displacement over that of the rise, as expected [-]
 _APART = 4  # loads of the fine mesh to one of the coarse mesh
 _ARRAYS = ("stress_pa", "displacement_m", "volume_ratio", "penetration", "imbalance")
-_TUPLES = ("faults", "doubts", "outlines", "apex_m")
+_TUPLES = ("faults", "doubts", "carried", "apex_m")
 _MEASURED_LOADS = 11  # under which expected times were measured, besides the one of 0
 
 Data = dict[str, Any]
@@ -188,7 +188,7 @@ def pressed(
     case: Case, stress_pa: Sequence[float], level: int = USUAL, *, keep: bool = True,
     step: Callable[[float], None] | None = None,
 ) -> "Pressed":  # fmt: skip
-    """A case under increasing pressure on one mesh, computed or from the cache; without the deformed outlines.
+    """A case under increasing pressure on one mesh, computed or from the cache.
 
     Parameters
     ----------
@@ -355,12 +355,14 @@ def _safety(case: Case, apex: bool, level: int) -> float:
 def _rise(found: "Pressed") -> tuple[Real, Real]:
     """Rise of the capacitance, and by how much its field's bounds leave it open [F/m2].
 
-    The air is meshed anew at each pressure: bounds are independent.
+    Where the field is meshed anew, bounds are independent; on one mesh they err alike before and after.
     """
     bounds = [(c.lower, c.upper) if c else (np.nan, np.nan) for c in found.capacitance_f_per_m2]
     lower, upper = np.array(bounds).reshape(-1, 2).T
     middle = (lower + upper) / 2
-    return middle - middle[:1], (upper - lower + (upper - lower)[:1]) / 2
+    width = upper - lower
+    alike = np.array(found.carried) if found.carried else np.zeros(len(middle), bool)
+    return middle - middle[:1], np.where(alike, abs(width - width[:1]), width + width[:1]) / 2
 
 
 def _press(case: Case) -> "tuple[Callable[..., Pressed], str]":
@@ -382,7 +384,7 @@ def _plain(found: "Pressed") -> Data:
     data = vars(found)
     bounds = [[c.lower, c.upper] if c else None for c in found.capacitance_f_per_m2]
     lists = {name: getattr(found, name).tolist() for name in _ARRAYS}
-    return data | lists | {"capacitance_f_per_m2": bounds, "outlines": []}
+    return data | lists | {"capacitance_f_per_m2": bounds}
 
 
 def _of_plain(data: Data) -> "Pressed":

@@ -11,7 +11,7 @@ import numpy as np
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models import compression
-from sensorgen.models.compression import Curve, Plate
+from sensorgen.models.compression import Plate
 from sensorgen.prediction.identifiability.fisher import Bounds, Setup, standard_errors
 from sensorgen.prediction.identifiability.frequencies import spread
 from sensorgen.prediction.identifiability.results import ChangeResult
@@ -132,11 +132,10 @@ def cell(setup: Setup) -> Setup:
     even = compression.solved("tri", _CELL, _CELL_PA)
     if even is None or setup.assumed:  # the gain over an unsolved cell is unknown
         return setup
-    tops = [even.scaled_rise(1 + share * even.stiff_change) for share in (0.0, 0.5, 1.0)]  # even, block, stiff
-    law = replace(tops[1], within=even.within + abs(even.stiff_change) / 2)
-    if isinstance(sensor.compression, Curve) and replace(sensor.compression, within=even.within) in tops:
+    blocks = [even.under_block(usual=usual) for usual in (True, False)]
+    if sensor.compression in (even, *blocks, even.scaled_rise(1 + even.stiff_change)):
         return setup
-    return setup.on(replace(sensor, capacitance_f_per_m=CELL_F_PER_M2 * sensor.width_m, compression=law))
+    return setup.on(replace(sensor, capacitance_f_per_m=CELL_F_PER_M2 * sensor.width_m, compression=blocks[0]))
 
 
 def soft_film(setup: Setup) -> Setup:

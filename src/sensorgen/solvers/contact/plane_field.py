@@ -30,30 +30,28 @@ from sensorgen.solvers.contact.wedge import Wedge, filled, wedges
 Edges = Mapping[Edge, tuple[int, int]]
 
 _ROUNDING = 1e-9
-_RINGS = 6
 _HOLE = 1e-6  # area that a mesh may miss, as a share
 
 
-def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float, growth: float) -> Interval:
+def capacitance(cell: Cell, mesh: Mesh, permittivity: Mapping[str, float]) -> Interval:
     """Bounds of the capacitance per area of a cell [F/m2].
 
     Parameters
     ----------
     cell : Cell
-        Its outlines, pressed or not; mirrored.
+        Mirrored.
+    mesh : Mesh
+        From :func:`meshed`, pressed or not.
     permittivity : mapping of str to float
         Relative permittivity by material, with "air" [-].
-    coarse_mm, growth : float
-        Largest triangle [mm], and by how much triangles grow per distance [-].
 
     Raises
     ------
     OutOfRange
         The electrodes touch.
     Unmeshed
-        The mesher gave up, left a hole, or the bounds are in the wrong order, which no sound mesh can do.
+        The bounds are in the wrong order, which no sound mesh can do.
     """
-    mesh = _meshed(cell, coarse_mm, growth)
     terminal = np.array([r.terminal for r in cell.regions])[mesh.region - 1]
     ends = [np.isin(np.arange(len(mesh.points_m)), mesh.outer[terminal == end]) for end in ("bottom", "top")]
     if (ends[0] & ends[1]).any():
@@ -82,11 +80,14 @@ def capacitance(cell: Cell, permittivity: Mapping[str, float], coarse_mm: float,
 def _energies(mesh: Mesh, inside: Whole) -> tuple[Real, Real]:
     """Quadratic forms (m, 6, 6) of some triangles: of potentials, and of stream functions."""
     at, weights = triangle_points()
-    gradients = np.einsum("qnk,mki->mqin", triangle_gradients(at)[:, :6], np.linalg.inv(mesh.jacobians_m[inside]))
-    weight = np.linalg.det(mesh.jacobians_m[inside])[:, None] * weights
+    slopes, jacobians = triangle_gradients(at)[:, :6], mesh.jacobians_m[inside]
+    inverse, volume = np.linalg.inv(jacobians), np.linalg.det(jacobians)
     if not mesh.turned:
-        found = _squares(gradients, weight)
+        table = np.einsum("q,qna,qmb->abnm", weights, slopes, slopes).reshape(4, 36)
+        metric = volume[:, None, None] * (inverse @ inverse.transpose(0, 2, 1))
+        found = (metric.reshape(-1, 4) @ table).reshape(-1, 6, 6)
         return found, found
+    gradients, weight = np.einsum("qnk,mki->mqin", slopes, inverse), volume[:, None] * weights
     values = triangle_values(at)[:, :6]
     r = mesh.points_m[mesh.outer[inside], 0] @ values.T
     streams = gradients.copy()
@@ -102,8 +103,23 @@ def _squares(fields: Real, weight: Real) -> Real:
     )
 
 
-def _meshed(cell: Cell, coarse_mm: float, growth: float) -> Mesh:
-    """Mesh everything but thin wedges of air, which are filled with triangles of their own; rings at corners."""
+def meshed(cell: Cell, coarse_mm: float, growth: float, count: int = 6) -> Mesh:
+    """Mesh everything but thin wedges of air, which are filled with triangles of their own.
+
+    Parameters
+    ----------
+    cell : Cell
+        Its outlines, pressed or not.
+    coarse_mm, growth : float
+        Largest triangle [mm], and by how much triangles grow per distance [-].
+    count : int
+        Of rings around corners.
+
+    Raises
+    ------
+    Unmeshed
+        The mesher gave up, or left a hole.
+    """
     edges, room = cell.edges, _ROUNDING * cell.width_mm()
     cut, thin = dict(edges), wedges(edges, cell.air) if cell.air != OUTSIDE else []
     for number, wedge in enumerate(thin, 1):
@@ -129,7 +145,7 @@ def _meshed(cell: Cell, coarse_mm: float, growth: float) -> Mesh:
         raise Unmeshed("the mesh has holes or folds")
     region = np.concatenate([net.region, np.full(len(new), cell.air)])
     tips = [nearest(net.points_m, place) for place in rings.corners(edges, cell.left_mm, cell.right_mm)]
-    return of_triangles(*rings.ringed(net.points_m, corners, region, tips, _RINGS), turned=cell.turned)
+    return of_triangles(*rings.ringed(net.points_m, corners, region, tips, count), turned=cell.turned)
 
 
 def _refuse_crossings(edges: Real) -> None:
@@ -156,6 +172,8 @@ def _filling(net: Net, number: int, wedge: Wedge) -> list[tuple[int, int, int]]:
         beside[a].append(b)
         beside[b].append(a)
     tip, ahead = (nearest(points, p) for p in wedge.first[:2])
+    if len(beside[tip]) != 2:
+        raise Unmeshed("the mesh has lost the tip of a gap")
     ways = points[beside[tip]] - points[tip]
     ring = [tip, beside[tip][int((ways @ (points[ahead] - points[tip]) / np.hypot(*ways.T)).argmax())]]
     while ring[-1] != tip:

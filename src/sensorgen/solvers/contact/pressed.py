@@ -11,7 +11,6 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.solvers.contact.boundary import CHOICES, BoundaryConditions
-from sensorgen.solvers.contact.cell import Cell
 from sensorgen.solvers.contact.mesh import Mesh
 
 if TYPE_CHECKING:
@@ -34,7 +33,7 @@ _SETTLED, _UPDATES = 0.005, 8  # of a cross-section: ``settled`` and ``updates``
 _NEAR = 0.2  # relative distance of two loads, of which only the one that was asked for is solved [-]
 
 _BY_LOAD = (
-    "stress_pa", "displacement_m", "capacitance_f_per_m2", "outlines", "volume_ratio", "penetration", "imbalance",
+    "stress_pa", "displacement_m", "capacitance_f_per_m2", "carried", "volume_ratio", "penetration", "imbalance",
     "apex_m",
 )  # fmt: skip
 
@@ -67,8 +66,9 @@ class Pressed:
         Pressure on the top, and the mean displacement of the top downwards [Pa], [m].
     capacitance_f_per_m2 : tuple of (Interval or None)
         Bounds for the deformed outlines; None where they could not be meshed [F/m2].
-    outlines : tuple of Cell
-        The deformed cell at each pressure; empty in three dimensions, and without capacitance.
+    carried : tuple of bool
+        Of each pressure, whether the field's mesh is the undeformed cell's, whose errors its bounds share; empty in
+        three dimensions, and without capacitance.
     volume_ratio, penetration, imbalance : (n,) array
         Least J, largest penetration over the side that it happens on, and work over energy less 1 [-].
     fall_m : float
@@ -86,7 +86,7 @@ class Pressed:
     stress_pa: Real
     displacement_m: Real
     capacitance_f_per_m2: tuple[Interval | None, ...]
-    outlines: tuple[Cell, ...]
+    carried: tuple[bool, ...]
     volume_ratio: Real
     penetration: Real
     imbalance: Real
@@ -260,8 +260,8 @@ def _work(stress: Real, moved: Real) -> Real:
     return np.concatenate([[0.0], np.cumsum(half * (weights @ (np.exp(at + law(at)) * law(at, 1))))])
 
 
-def with_capacitances(found: Pressed, bounds: Sequence[Interval | None], outlines: tuple[Cell, ...] = ()) -> Pressed:
-    """Add the capacitance of the deformed outlines, and its faults."""
+def with_capacitances(found: Pressed, bounds: Sequence[Interval | None]) -> Pressed:
+    """The same with the capacitance of the deformed outlines, and its faults."""
     faults, known = list(found.faults), [c.middle() for c in bounds if c]
     if len(known) < len(bounds):
         unknown = len(bounds) - len(known)
@@ -270,7 +270,7 @@ def with_capacitances(found: Pressed, bounds: Sequence[Interval | None], outline
         )
     if any(after < before * (1 - _LEVELS) for before, after in pairwise(known)):
         faults.append("the capacitance falls under pressure: some outlines were closed in the wrong place")
-    return replace(found, capacitance_f_per_m2=tuple(bounds), outlines=outlines, faults=tuple(faults))
+    return replace(found, capacitance_f_per_m2=tuple(bounds), faults=tuple(faults))
 
 
 def joined(parts: Sequence[Pressed], last_pa: float) -> Pressed:
@@ -280,7 +280,7 @@ def joined(parts: Sequence[Pressed], last_pa: float) -> Pressed:
     """
     kept = [parts[0], *(part for part in parts[1:] if len(part.stress_pa) > 1)]
     arrays = ("stress_pa", "displacement_m", "volume_ratio", "penetration", "imbalance")
-    lists = ("capacitance_f_per_m2", "outlines", "apex_m")
+    lists = ("capacitance_f_per_m2", "carried", "apex_m")
     tails = [part if part is kept[0] else replace(part, **{k: getattr(part, k)[1:] for k in _BY_LOAD}) for part in kept]
     whole: dict[str, Any] = {k: np.concatenate([getattr(part, k) for part in tails]) for k in arrays}
     whole |= {k: tuple(each for part in tails for each in getattr(part, k)) for k in lists}
