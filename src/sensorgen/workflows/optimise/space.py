@@ -103,7 +103,7 @@ def candidates(target: Target, folder: Path = Path()) -> list[Candidate]:
     found = [whole.candidate(chosen | values) for chosen, inside in whole.parts for values in _combinations(inside)]
     for key, given in target.parameters.items():
         for value in [] if isinstance(given, Range) else given:
-            own = [candidate for candidate in found if candidate.values[key] == value]
+            own = [candidate for candidate in found if candidate.values.get(key) == value]
             if own and not any(candidate.design for candidate in own):
                 raise BadInput(f"parameters.{key}: no design can have {value!r}: {own[0].reason}")
     return found
@@ -127,7 +127,7 @@ def space(target: Target, folder: Path = Path()) -> Space:
     whole = Space(base, folder, known, tuple(
         (chosen, {k: _values(k, v, with_own_files(_with(base, known, chosen), folder)) for k, v in inner.items()})
         for chosen in _combinations({k: _listed(v) for k, v in outer.items()})
-    ))  # fmt: skip
+    ) + tuple(({}, {k: [v] for k, v in one.items()}) for one in target.also))  # fmt: skip
     if not whole.size:
         empty = sorted(
             {k for _, inside in whole.parts for k, values in inside.items() if not values}
