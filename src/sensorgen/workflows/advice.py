@@ -11,9 +11,9 @@ from sensorgen.core.findings import Finding
 from sensorgen.design import best
 from sensorgen.design.design import Design
 from sensorgen.workflows import moves
-from sensorgen.workflows.decision import Advice, Change, TriedChange, effects, finding_counts, grade, words_of
+from sensorgen.workflows.decision import Advice, Change, TriedChange, effects, finding_counts
 from sensorgen.workflows.moves import Changes, Key, Value
-from sensorgen.workflows.trial import Trial, trial
+from sensorgen.workflows.trial import Trial, grade, trial, words_of
 
 BUDGET_S = 60.0
 SHOWN = 3

@@ -31,6 +31,7 @@ FARTHEST = 1.2  # distance of changed heights, as of moves.distance [-]
 _MARGIN = 1.04  # by which strips may be narrower without a layer less: at the limit itself a slicer may drop it
 _STEP = log(1.12)  # from one width or period to the next, in logarithms
 _SHARES = (log(0.5), log(5.0))  # of its own value, that a width or a period may take, in logarithms
+_STIFFNESS = "stiffness_kpa_per_mm"
 _ACCURACY = 1e-2  # of a capacitance, relative
 _HALVINGS = 12  # of a step between two widths
 _MOST_TRIED, _MOST_SOLVED = 250, 30  # designs whose gap, and whose capacitance is found, before it gives up
@@ -227,22 +228,12 @@ def _searched(
         nearest = min(nearest, real, key=lambda one: _distance(one, wanted))
         if nearest is not real or sliced is None or _reached(real, wanted):
             break
-        search.wanted = replace(
-            wanted,
-            capacitance_pf=_corrected(wanted.capacitance_pf, best.capacitance_pf, real.capacitance_pf),
-            stiffness_kpa_per_mm=_corrected(
-                wanted.stiffness_kpa_per_mm, best.stiffness_kpa_per_mm, real.stiffness_kpa_per_mm
-            ),
-        )
+        pairs = {key: [getattr(one, key) for one in (wanted, best, real)] for key in ("capacitance_pf", _STIFFNESS)}
+        search.wanted = replace(wanted, **{key: w * b / r for key, (w, b, r) in pairs.items() if w and b and r})
         if abs(real.gap_mm - best.gap_mm) > SLIVER_MM:
             search.margin *= _MARGIN**2
             search.tried.clear()
     return nearest
-
-
-def _corrected(wanted: float | None, estimate: float | None, real: float | None) -> float | None:
-    """Quantity that an estimate has to have so that the print has the wanted one."""
-    return wanted * estimate / real if wanted and estimate and real else wanted
 
 
 def _distance(one: Found, wanted: Found) -> tuple[float, float]:

@@ -11,16 +11,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from sensorgen.checks.review import CheckReport, Review, report, review
 from sensorgen.core import cache as answers
-from sensorgen.core.bounds import Bounds
-from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Finding, Refused, Verdict, grouped, headline, listed, verdict
 from sensorgen.design.design import Design
-from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE, FORCE_SHARE, GUESS
-from sensorgen.prediction.results import UNPREDICTED, caption_of, resolved
+from sensorgen.prediction.identifiability.results import GUESS
+from sensorgen.prediction.results import UNPREDICTED
 from sensorgen.prediction.slices import PrintReview
 from sensorgen.workflows.moves import changed
-from sensorgen.workflows.trial import Numbers, Trial, trial
+from sensorgen.workflows.trial import Trial, table, trial, words_of
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
@@ -312,20 +311,6 @@ def _adapter(kind: type) -> "TypeAdapter[Any]":
     return TypeAdapter(kind)
 
 
-def grade(tried: Trial) -> tuple[int, int]:
-    """Whether the print senses force, and locates: 2 yes, 1 roughly, 0 no."""
-    length_m = 2 * tried.position_m  # the reference load is in the middle
-    force, place = tried.printed.force_resolution, tried.printed.position_resolution
-    return (
-        _grade(force, FORCE_SHARE * tried.force_n, GUESS * tried.force_n),
-        _grade(place, FORCE_SHARE * length_m, GUESS * length_m),
-    )
-
-
-def _grade(error: Bounds | None, good: float, useless: float) -> int:
-    return 0 if error is None or not error.value < useless else 2 if error.value <= good else 1
-
-
 def effects(now: Trial, then: Trial) -> tuple[bool, str]:
     """Effects of a change on what the sensor is for: only good ones, and resolutions and sensitivity in words."""
     words, factors = [], list[float]()
@@ -353,59 +338,6 @@ def _factor(gain: float) -> str:
     if gain in (0.0, inf):
         return "gained" if gain else "lost"
     return f"{gain:.2g} x better" if gain > 1 else f"{1 / gain:.2g} x worse"
-
-
-def table(tried: Trial) -> Iterator[Part]:
-    """Electrode gap, capacitance, resistance of the electrodes, resolution, time of the print where known; doubts."""
-    both, length_m = (tried.drawn, tried.printed), 2 * tried.position_m
-    rows = [
-        ("electrode gap", *(_words(n.gap) for n in both)),
-        ("capacitance", *(_words(n.capacitance) for n in both)),
-        ("top electrode", *(_words(n.top_electrode) for n in both)),
-        ("bottom electrode", *(_words(n.bottom_electrode) for n in both)),
-        ("force resolution", *(_force(n, tried.force_n) for n in both)),
-        ("position resolution", *(_place(n, length_m) for n in both)),
-    ]
-    if tried.toolpath:
-        rows.append(("print time", "", f"at least {tried.toolpath.time_s / 60:.0f} min"))
-    yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
-    yield caption_of(tried.force_n, tried.position_m, tried.body)
-    if tried.printed.by_top:
-        yield f"printed, the worst of: {tried.printed.by_top}"
-    if tried.rests_on and any(grade(tried)):
-        yield f"largest assumption: a press is read wrongly by {tried.rests_on}"
-    if tried.reason:
-        yield f"{'not predicted: ' * (tried.status == 'not predicted')}{tried.reason}"
-    yield from (f"doubtful: {doubt}" for doubt in tried.doubts)
-
-
-def words_of(tried: Trial) -> str:
-    """Capacitance and resolutions of the print, in one line."""
-    printed = tried.printed
-    c = printed.capacitance
-    force, place = _force(printed, tried.force_n), _place(printed, 2 * tried.position_m)
-    return ", ".join((
-        f"C {_best(c)}" if c else tried.status,
-        force if force.startswith("cannot") else f"force {_best(printed.bench()[0])}",
-        place if place.startswith("cannot") else f"position {_best(printed.bench()[1])}",
-    ))  # fmt: skip
-
-
-def _force(numbers: Numbers, force_n: float) -> str:
-    return resolved(numbers.bench()[0], force_n, CANNOT_SENSE, conditional=numbers.conditional)
-
-
-def _place(numbers: Numbers, length_m: float) -> str:
-    return resolved(numbers.bench()[1], length_m, CANNOT_LOCATE, conditional=numbers.conditional)
-
-
-def _words(bounds: Bounds | None) -> str:
-    return bounds.words() if bounds else "–"
-
-
-def _best(bounds: Bounds | None) -> str:
-    """The best value alone, to two digits."""
-    return Bounds.of(float(f"{bounds.value:.2g}"), bounds.unit).words() if bounds else "–"
 
 
 def finding_counts(findings: Sequence[Finding]) -> tuple[int, int]:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict
 from heapq import heappop, heappush
 from math import ceil, floor, inf, log
+from typing import Any
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Finding
@@ -49,13 +50,18 @@ def changed(design: Design, changes: Changes) -> Design:
     SensorgenError
         There is no such design.
     """
-    data = design.model_dump(mode="json", exclude_unset=True) | {"name": design.name}
+    return make(with_values(design.model_dump(mode="json", exclude_unset=True) | {"name": design.name}, changes))
+
+
+def with_values(data: Mapping[str, Any], changes: Changes) -> dict[str, Any]:
+    """A design's data with other values."""
+    made = dict(data)
     for key, value in changes.items():
-        at = data
+        at = made
         for part in key[:-1]:
             at[part] = at = dict(at.get(part) or {})
         at[key[-1]] = value
-    return make(data)
+    return made
 
 
 def walk(

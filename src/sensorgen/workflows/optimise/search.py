@@ -145,10 +145,6 @@ class Searched:
                 found[alike, row.certified and bool(row.discarded)] += 1
         return [(words[alike], certified, count) for (alike, certified), count in found.most_common()]
 
-    def best(self, key: str) -> Row:
-        """Of the front, the one with the best value of an objective."""
-        return min(self.front, key=lambda row: badness(self.target, row)[key].lower)
-
     def nearest(self) -> Row | None:
         """Where nothing meets the target: the design that violates the fewest constraints, and these the least."""
         tried = [row for row in self.rows if row.violated]
