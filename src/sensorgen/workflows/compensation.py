@@ -139,12 +139,15 @@ def compensated(
 
     asked = _print(design, drawn, stiffness=stiffness)
     now, changes = printable(design, walls, bake=bake, gap_mm=asked.gap_mm)
-    before = _print(now, sliced, stiffness=stiffness) if sliced else _estimate(now, walls, stiffness=stiffness)
+    is_near = abs(_attainable_mm(now, asked.gap_mm) - asked.gap_mm) <= GAP_WITHIN * asked.gap_mm
+    by_slice = sliced if is_near else None  # of what cannot be, the nearest alone is sliced
+    before = _print(now, by_slice, stiffness=stiffness) if by_slice else _estimate(now, walls, stiffness=stiffness)
     if not 0 < asked.gap_mm < inf:
         return now, changes
     wanted = replace(asked, design=now, gap_mm=_attainable_mm(now, asked.gap_mm))
-    after = before if _reached(before, wanted) else _searched(before, wanted, walls, sliced, step)
-    is_near = abs(wanted.gap_mm - asked.gap_mm) <= GAP_WITHIN * asked.gap_mm
+    after = before if _reached(before, wanted) else _searched(before, wanted, walls, by_slice, step)
+    if sliced and not is_near:
+        after = _print(after.design, sliced, stiffness=stiffness)
     if not (_reached(after, wanted) and is_near):
         layers = f"{FILM_LAYERS} layers at least, {wanted.gap_mm:g} mm at layers of {now.layers.layer_mm:g} mm"
         why = f" of {design.name} by {walls} walls" if is_near else f": a film has {layers}"
