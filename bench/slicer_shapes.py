@@ -14,8 +14,8 @@ from slicers import NEWER, RESULTS
 PROGRAMS = (("prusa", ""), ("prusa", str(NEWER / "prusa-slicer")), ("cura", ""), ("cura", str(NEWER / "CuraEngine")))
 HEAD = """# Shapes at their default sizes through slicers
 
-By `bench/slicer_shapes.py`, 100 x 10 mm, printer diabase-h5, quality fine. Accepted: the check of the G-code, against the
-design too, has no error. Else the number of errors, and the first.
+By `bench/slicer_shapes.py`, 100 x 10 mm, printer diabase-h5, quality fine. Accepted: the check of the G-code, against
+the design too, has no error. Else the number of errors, and the first.
 
 """
 

@@ -1,6 +1,8 @@
 """Changes that are tried: the nearest that removes findings, checked again by hand, and written into the file."""
 
+from dataclasses import replace
 from math import log
+from pathlib import Path
 
 import pytest
 
@@ -9,14 +11,16 @@ from sensorgen.core import yamledit, yamlfile
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding, grouped
+from sensorgen.design import best
 from sensorgen.design.design import load, make
 from sensorgen.prediction.results import resolved
 from sensorgen.prediction.slices import reviewed
 from sensorgen.workflows import moves
 from sensorgen.workflows.advice import _Search, advise
-from sensorgen.workflows.decision import advised, decision
+from sensorgen.workflows.decision import advised, decision, effects
 from sensorgen.workflows.trial import trial
 
+DOCS = Path(__file__).parents[1] / "docs"
 OFF_GRID = """# my plate
 shape: reference   # no pattern
 
@@ -179,3 +183,66 @@ def test_the_budget_includes_what_the_prediction_took(plate):
     assert (late.checked, late.complete, late.tried) == (0, False, ())
     words = [part for part in late.document() if isinstance(part, str)]
     assert words[0].startswith("no change was tried: the design's own prediction took the budget")
+
+
+def numbers(one, **changed):
+    """A trial whose print has other resolutions [N, m] and sensitivity [1/kPa]."""
+    values = {"force_resolution": 0.4, "position_resolution": 0.02, "sensitivity": 1e-3} | changed
+    units = {"force_resolution": "N", "position_resolution": "m", "sensitivity": "1/kPa"}
+    bounds = {key: Bounds.of(value, units[key]) for key, value in values.items()}
+    rest = {"force_calibrated": values["force_resolution"], "position_calibrated": values["position_resolution"]}
+    return replace(one, force_n=6.0, position_m=0.05, printed=replace(one.printed, **bounds, **rest))
+
+
+@pytest.mark.parametrize(
+    ("changed", "better", "words"),
+    [
+        ({"force_resolution": 0.2}, True, "force resolution 2 x better"),
+        ({"force_resolution": 1.2}, False, "force resolution 3 x worse"),
+        ({"force_resolution": 0.2, "position_resolution": 0.025}, False,
+         "force resolution 2 x better, position resolution 1.2 x worse"),
+        ({"position_resolution": 0.04}, False, "position resolution lost"),  # more than 100 mm / sqrt(12)
+        ({"sensitivity": 5e-4}, False, "sensitivity 2 x worse"),
+        ({"sensitivity": 1.01e-3}, False, ""),
+    ],
+)  # fmt: skip
+def test_what_a_change_does_to_the_sensor_is_said(plate, changed, better, words):
+    _, made, _ = plate
+    assert effects(numbers(made), numbers(made, **changed)) == (better, words)
+
+
+def test_a_gain_is_no_loss(plate):
+    _, made, _ = plate
+    assert effects(numbers(made, position_resolution=0.05), numbers(made)) == (True, "position resolution gained")
+
+
+def test_what_improves_the_sensor_is_first_and_losses_are_in_its_line(plate, monkeypatch):
+    """Planted: the whole layer makes force three times worse; a known plate, further away, makes it twice as good."""
+    design, made, _ = plate
+    known = best.KnownDesign(
+        about="best known plate", numbers="0.2 N", seconds=1.0, quality="extrafine", parameters={"dielectric_mm": 0.3}
+    )
+
+    def planted(one, **_):
+        good = one.params.dielectric_mm == 0.3
+        return numbers(replace(made, findings=()), force_resolution=0.2 if good else 1.2)
+
+    monkeypatch.setattr(best, "of", lambda shape: (known,) if shape == "reference" else ())
+    monkeypatch.setattr("sensorgen.workflows.advice.trial", planted)
+    advice = advise(design, numbers(made), 1e9)
+    first, *others = [one.words() for one in advice.tried]
+    assert first.startswith("best known plate: quality fine -> extrafine, dielectric_mm 0.57 -> 0.3: ")
+    assert first.endswith("force resolution 2 x better")
+    assert others
+    assert all(words.endswith("force resolution 3 x worse") for words in others)
+    short = advise(design, numbers(made), 0.5)  # s: less than the known plate takes
+    assert any("--budget" in part and "(0.2 N)" in part for part in short.document() if isinstance(part, str))
+
+
+def test_the_best_known_designs_are_those_of_the_documentation():
+    """A user's machine has no docs: the values are packaged, too."""
+    pages = [load(DOCS / f"{name}-tri.yaml") for name in ("best", "locates")]
+    for one, page in zip(best.of("tri"), pages, strict=True):
+        made = make({"shape": "tri", **one.data()})
+        assert (made.params, made.quality) == (page.params, page.quality)
+    assert best.of("reference") == ()

@@ -49,18 +49,19 @@ def test_gap_and_capacitance_that_were_asked_for_come_out(film, walls, quality):
 
 
 def test_a_film_of_one_layer_is_refused_with_the_nearest():
-    with pytest.raises(
-        OutOfRange, match=r"2 layers at least, 0\.2 mm at layers of 0\.1 mm; nearest: a gap of 0\.2 mm and"
-    ):
-        compensated(small(parameters={"dielectric_mm": 0.1}))
+    """The printer's thinnest layers make 0.12 mm of two: the nearest says so, and what it costs."""
+    with pytest.raises(OutOfRange, match=r"2 layers at least, 0\.12 mm at layers of 0\.06 mm; nearest: ") as refused:
+        compensated(small("rect", SHORT | {"dielectric_mm": 0.1}))
+    for words in ("a gap of 0.12 mm and", "quality extrafine", "gap is off by +20%", "22 layers for 13"):
+        assert words in str(refused.value)
 
 
 def test_a_film_of_one_layer_that_prints_as_two_is_refused_all_the_same(monkeypatch):
     """A print with the nearest gap that can be had, and the capacitance asked for, is not what was asked for."""
     asked = small(parameters={"dielectric_mm": 0.1})
-    two = replace(found(drawn(asked)), gap_mm=0.2)
+    two = replace(found(drawn(asked)), gap_mm=0.12)
     monkeypatch.setattr(compensation, "_estimate", lambda design, walls, **_: replace(two, design=design))
-    with pytest.raises(OutOfRange, match=r"2 layers at least.*nearest: a gap of 0\.2 mm and"):
+    with pytest.raises(OutOfRange, match=r"2 layers at least.*nearest: a gap of 0\.12 mm and"):
         compensated(asked)
 
 
@@ -76,6 +77,48 @@ def test_heights_become_whole_layers():
     assert "period_mm" not in found
     levels = {round(z, 6) for b in made.drawn.bodies for p in b.pieces for z in p.span("z")}
     assert all(abs(z / 0.06 - round(z / 0.06)) < 1e-6 for z in levels)
+
+
+@pytest.mark.parametrize(
+    ("quality", "film", "layer", "named"),
+    [
+        ("extrafine", 0.2, 0.067, "extrafine-0.067"),  # 0.18 and 0.24 mm of its own layers are 10 and 20 % off
+        ("fine", 0.18, 0.09, "fine-0.09"),
+        ("fine", 0.12, 0.06, "extrafine"),
+        ("fine", 0.4, 0.1, "fine"),
+        ("fine", 0.1, 0.06, "extrafine"),  # of which two are too many: the nearest that can be printed
+    ],
+)
+def test_layers_are_those_that_make_up_the_gap(quality, film, layer, named):
+    made, changes = printable(small(parameters={"dielectric_mm": film}, quality=quality), gap_mm=film)
+    assert (made.layers.layer_mm, made.layers.first_layer_mm, made.quality) == (layer, layer, named)
+    assert ("layers [mm]" in changed(changes)) == (named != quality)
+    if film > 0.1:
+        assert made.params.dielectric_mm == pytest.approx(film, rel=0.03)
+    levels = {round(z, 6) for b in made.drawn.bodies for p in b.pieces for z in p.span("z")}
+    assert all(abs(z / layer - round(z / layer)) < 1e-6 for z in levels)
+
+
+@pytest.mark.parametrize("walls", ["arachne", "cura-gaps"])
+def test_strips_of_crossed_strips_are_changed(walls):
+    """Their period follows from widths, and is no parameter; by Cura strips are whole lines, and the air changes."""
+    asked = small("rect", {"length_mm": 11.2, "width_mm": 5.6, "dielectric_mm": 0.3, "x60_width_mm": 1.5})
+    made, _ = compensated(asked, walls)
+    wanted, printed = (rest_state(each).capacitance.value for each in (drawn(asked), estimated(made, walls)))
+    assert printed == pytest.approx(wanted, rel=0.03)
+    assert estimated_gap(made, walls) == 0.3
+    lines = [made.params.etpu_width_mm / 0.44, made.params.x60_width_mm / 0.44]
+    assert all(abs(n - round(n)) < 1e-6 for n in lines) == (walls == "cura-gaps")
+
+
+def test_an_array_keeps_its_period():
+    """Another one leaves rims without structures: 8 cells of 1.181 mm cover 9.45 of 10 mm."""
+    names = [key[-1] for key in compensation._widths(design.make({"shape": "cone"}), "arachne")]
+    assert names == ["root_mm", "tip_mm"]
+    cones = design.make({"shape": "cone", "parameters": {"length_mm": 10.0, "width_mm": 10.0, "period_mm": 1.5}})
+    larger = design.make({"shape": "cone", "parameters": {"length_mm": 9.0, "width_mm": 9.0, "period_mm": 1.5}})
+    one, other = (compensation._print(each, drawn).capacitance_pf for each in (cones, larger))
+    assert one == pytest.approx(other, rel=1e-6)  # both have 36 cells
 
 
 def test_strips_become_a_line_and_gaps_stay_open():
@@ -146,9 +189,9 @@ def test_a_stiffness_of_a_cell_in_3d_is_refused():
         compensated(small("rect"), stiffness=True)
 
 
-def few(design, gap_mm):
-    """Of all heights those of the drawing, and one layer more."""
-    return [({"dielectric_mm": gap_mm}, 0.0), ({"dielectric_mm": gap_mm, "lower_height_mm": 0.3}, 0.4)]
+def few(design, kinds):
+    """Of all heights one layer more of the lower prisms."""
+    return [(("parameters", "lower_height_mm"), 0.3)]
 
 
 def stiff(of_print):
@@ -164,7 +207,7 @@ def stiff(of_print):
 def test_a_stiffness_that_was_asked_for_comes_out_with_gap_and_capacitance(monkeypatch):
     """0.24 mm as drawn are 0.2 mm in whole layers; it is 0.3 mm that print as stiff."""
     asked = small(parameters={"dielectric_mm": 0.2})
-    monkeypatch.setattr(compensation, "_heights", few)
+    monkeypatch.setattr(compensation.moves, "steps", few)
     monkeypatch.setattr(compensation, "found", stiff(lambda height: height - 0.06))
     made, changes = compensated(asked, stiffness=True)
     assert made.params.lower_height_mm == pytest.approx(0.3)
@@ -175,7 +218,7 @@ def test_a_stiffness_that_was_asked_for_comes_out_with_gap_and_capacitance(monke
 
 
 def test_a_stiffness_that_cannot_be_had_is_refused_with_the_nearest(monkeypatch):
-    monkeypatch.setattr(compensation, "_heights", few)
+    monkeypatch.setattr(compensation.moves, "steps", few)
     monkeypatch.setattr(compensation, "found", stiff(lambda height: 10 * height))
     monkeypatch.setattr(compensation, "_MOST_SOLVED", 8)
     with pytest.raises(OutOfRange, match=r"and 240 kPa/mm cannot be printed.*nearest: a gap of 0\.2 mm, .* kPa/mm by"):

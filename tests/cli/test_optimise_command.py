@@ -15,6 +15,7 @@ from sensorgen.core.document import text
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 from sensorgen.core.findings import Finding
 from sensorgen.core.records import checked
+from sensorgen.design.design import load as load_design
 from sensorgen.design.design import make
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
@@ -24,9 +25,11 @@ from sensorgen.workflows.optimise.result import Recommended, Spread
 from sensorgen.workflows.optimise.sample import _objectives, sample
 from sensorgen.workflows.optimise.search import Row, Searched, search
 from sensorgen.workflows.optimise.space import MOST, Candidate, candidates, space
-from sensorgen.workflows.optimise.target import Target, load
+from sensorgen.workflows.optimise.target import AROUND, Target, load
 from sensorgen.workflows.optimise.ties import settled
+from sensorgen.workflows.templates import new
 
+DOCS = Path(__file__).parents[2] / "docs"
 EPS0, EPS_X60 = 8.8541878128e-12, 4.68  # thesis, Table 3.2
 PLATES = {
     "design": {"shape": "reference"},
@@ -371,3 +374,48 @@ def test_the_best_are_built_and_the_page_needs_nothing_else(tmp_path, run):
     assert len((tmp_path / "out" / "plates.csv").read_text().splitlines()) == 13
     assert load(tmp_path / "plates.yaml").objectives["capacitance_pf"] == "maximise"
     assert run("optimise", "nothing.yaml").code == 2
+
+
+@pytest.mark.parametrize("shape", ["tri", "rect", "cone", "reference"])
+def test_a_shape_is_a_target(shape):
+    """Designs like the best known of it, or like its defaults; every one can be made, or says why not."""
+    wanted = load(shape)
+    some = candidates(wanted)
+    assert 4 <= len(some) <= AROUND + len(wanted.also)
+    base = make(wanted.design)
+    assert base.id() in {one.design.id() for one in some if one.design}
+    if shape == "tri":
+        known = [load_design(DOCS / f"{name}-tri.yaml") for name in ("best", "locates")]
+        made = [(one.design.params, one.design.quality) for one in some if one.design]
+        assert all((each.params, each.quality) in made for each in known)
+
+
+def test_a_design_file_is_a_target(tmp_path, run):
+    """Around a plate, by the whole command: its own layers, and one more."""
+    file = tmp_path / "mine.yaml"
+    file.write_text("shape: reference\nparameters: {length_mm: 30}\n")
+    wanted = load(file)
+    assert wanted.parameters == {"electrode_mm": [0.3, 0.4], "dielectric_mm": [0.6, 0.7], "quality": ["fine"]}
+    said = run("optimise", str(file), "--no-build", "--out", str(tmp_path / "out"))
+    assert said.code == 0
+    assert "mine: no design in this space of 4 is better than" in said.out
+
+
+def test_neither_a_shape_nor_a_file(run):
+    said = run("optimise", "trj")
+    assert (
+        said.code,
+        said.line.startswith("sensorgen: unknown shape or file of a target 'trj'; did you mean 'tri'?"),
+    ) == (
+        2,
+        True,
+    )
+
+
+def test_the_template_locates(tmp_path, monkeypatch):
+    """The plate of before could not; this one has the best known design for it."""
+    monkeypatch.chdir(tmp_path)
+    new("target", "mine")
+    made = {(one.design.params, one.design.quality) for one in candidates(load("mine.yaml"))}
+    known = load_design(DOCS / "locates-tri.yaml")
+    assert (known.params, known.quality) in made

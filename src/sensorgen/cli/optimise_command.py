@@ -26,16 +26,16 @@ def _optimise(
 ) -> int:
     """Find the designs of a space that no other is better than, as printed, and write the files of up to three.
 
-    Every combination of the target's values is checked, bounded or evaluated; each one that is out has its reason.
-    docs/optimise.md has an example. A search that was stopped goes on where it was. Exit code 1 where no design meets
-    the target.
+    Every combination of the target's values is checked, bounded or evaluated; each one that is out has its reason. Of a
+    shape or a design, designs like it are tried for the best resolutions; docs/optimise.md has a target. A search that
+    was stopped goes on where it was. Exit code 1 where no design meets the target.
     """
     from sensorgen.workflows.optimise.run import optimise
     from sensorgen.workflows.optimise.search import Workers
 
     with _progress() as step:
         found = optimise(
-            Path(target), Path(out), Workers(sweeps.at_once(jobs), cluster), count=sample or 0, keep=not no_cache,
+            target, Path(out), Workers(sweeps.at_once(jobs), cluster), count=sample or 0, keep=not no_cache,
             built=not no_build, sliced=not no_gcode, tip=tip, progress=step,
         )  # fmt: skip
     render.deliver(found)
@@ -68,7 +68,7 @@ def _progress() -> Iterator[Callable[[str, int, int], None]]:
 command = click.Command(
     "optimise", callback=_optimise, help=_optimise.__doc__,
     params=[
-        click.Argument(["target"], metavar="TARGET.yaml"),
+        click.Argument(["target"], metavar="{SHAPE|DESIGN.yaml|TARGET.yaml}"),
         click.Option(["--out"], default="out", show_default=True, metavar="DIR", help="Folder of all files."),
         click.Option(
             ["--sample"], type=click.IntRange(1, 20_000), default=None, metavar="N",

@@ -56,7 +56,7 @@ def advice_options() -> list[click.Parameter]:
     """``--budget`` and ``--apply``: changes of a design that are tried, and written into its file."""
     return [
         click.Option(
-            ["--budget"], type=NumberRange(0, 3600), default=30.0, show_default=True, metavar="SECONDS",
+            ["--budget"], type=NumberRange(0, 3600), default=60.0, show_default=True, metavar="SECONDS",
             envvar="SENSORGEN_BUDGET",
             help="Processor time for prediction and for changes to try; 0 tries none.",
         ),

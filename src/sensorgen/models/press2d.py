@@ -123,7 +123,7 @@ def _solved(
 def _with_fields(
     found: Pressed, cell: Cell, run: Run[Mesh], permittivity: Mapping[str, float], fineness: Fineness
 ) -> Pressed:
-    """The same with the capacitance of the deformed outlines.
+    """Add the capacitance of the deformed outlines.
 
     Where no gap ends in an apex, the mesh as drawn is carried along until a gap closes: its errors cancel in the rise.
     """

@@ -341,7 +341,7 @@ def _stored_law(even: Curve, moduli: Mapping[str, MaterialValue], tip: Tip, *, u
 
 
 def _is_usual(design: Design, tip: Tip) -> bool:
-    """Whether a tip is the block that stored cells were pressed with, or a higher one."""
+    """Test whether a tip is the block that stored cells were pressed with, or a higher one."""
     modulus_pa = design.material(Tip.block).value("youngs_modulus_pa").value
     return tip.block == Tip.block and tip.height_m >= Tip.height_m and modulus_pa == compression.BLOCK_PA
 

@@ -1,21 +1,21 @@
 """Advice that was tried: the nearest changes of a design that remove its findings, each checked and predicted."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from heapq import heappop, heappush
 
 from sensorgen.checks.review import review
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Finding
+from sensorgen.design import best
 from sensorgen.design.design import Design
 from sensorgen.workflows import moves
-from sensorgen.workflows.decision import Advice, Change, TriedChange, finding_counts, grade, words_of
+from sensorgen.workflows.decision import Advice, Change, TriedChange, effects, finding_counts
 from sensorgen.workflows.moves import Changes, Key, Value
-from sensorgen.workflows.trial import Trial, trial
+from sensorgen.workflows.trial import Trial, grade, trial, words_of
 
-BUDGET_S = 30.0
+BUDGET_S = 60.0
 SHOWN = 3
 MOST_CHECKED, MOST_PREDICTED = 400, 8
 FARTHEST = 1.2  # distance of a change, as of moves.distance: at most by a factor of 3.3 in all [-]
@@ -60,37 +60,47 @@ class _Search:
     kept: list[TriedChange] = field(default_factory=list, init=False)
     checked: int = field(default=0, init=False)
     predicted: int = field(default=0, init=False)
+    known: list[str] = field(default_factory=list, init=False)
+    left: dict[frozenset[tuple[Key, Value]], tuple[int, int]] = field(default_factory=dict, init=False)
     reached: float = field(default=0.0, init=False)
-    complete: bool = field(default=False, init=False)
 
     def run(self) -> None:
-        """Visit designs until none is left, or the budget is used up."""
-        heap: list[tuple[float, int, dict[Key, Value], tuple[int, int]]] = []
-        heappush(heap, (0.0, 0, {}, (len(self.now.findings),) * 2))
-        seen: set[frozenset[tuple[Key, Value]]] = {frozenset()}
-        if "grid" in moves.kinds(self.now.findings):  # first: of many heights, single steps leave findings to the last
-            for together in moves.onto_grid(self.design):
-                mark = frozenset(together.items())
-                if mark not in seen and moves.distance(self.design, together) <= FARTHEST:
-                    seen.add(mark)
-                    heappush(heap, (0.0, len(seen), together, (len(self.now.findings),) * 2))
-        while heap and not self._over():
-            self.reached, _, changes, least = heappop(heap)
-            findings = self._reviewed(changes) if changes else self.now.findings
-            if findings is None:
+        """Try the best designs that are known, then visit changes until none is left, or the budget is used up."""
+        self._try_best()
+        # first: of many heights, single steps leave findings to the last
+        starts = moves.onto_grid(self.design) if "grid" in moves.kinds(self.now.findings) else []
+        self.reached = moves.walk(self.design, self._visit, FARTHEST, starts)
+
+    def _try_best(self) -> None:
+        """The best known designs of the shape, those whose prediction takes the least first; the rest in words."""
+        for one in sorted(best.of(self.design.shape), key=lambda known: known.seconds):
+            changes = {key: value for key, value in one.changes() if value != moves.own(self.design, key)}
+            if not changes:
                 continue
-            left = finding_counts(findings)
-            if changes and self._improves(left, changes) and self._is_kept(changes, left):
-                continue  # a further step on the same way changes more
-            if left >= least and changes and moves.is_choice(list(changes)[-1]):
-                continue  # another way to print that improves nothing
-            for key, value in self._neighbours(changes, findings):
-                further = {k: v for k, v in {**changes, key: value}.items() if v != self._own(k)}
-                mark, far = frozenset(further.items()), moves.distance(self.design, further)
-                if mark not in seen and far <= FARTHEST:
-                    seen.add(mark)
-                    heappush(heap, (far, len(seen), further, left))
-        self.complete = not heap
+            self.step(one.about)
+            left = self.budget_s - (time.process_time() - self.start_s)
+            made = self._good(changes) if one.seconds <= left else None
+            if made:
+                self._keep(changes, made, about=one.about)
+            elif one.seconds > left:
+                self.known.append(f"{one.about}: {moves.words(changes)} ({one.numbers})")
+
+    def _visit(self, changes: Changes, far: float) -> Iterable[tuple[Key, Value]] | None:
+        """Keep a change that is better than all nearer ones, and give the steps that go on from others."""
+        self.reached = far
+        if self._over():
+            return None
+        findings = self._reviewed(changes) if changes else self.now.findings
+        if findings is None:
+            return ()
+        left = finding_counts(findings)
+        self.left[frozenset(changes.items())] = left
+        if changes and self._improves(left, changes) and self._is_kept(changes, left):
+            return ()  # a further step on the same way changes more
+        before = self.left.get(frozenset(list(changes.items())[:-1]), (len(self.now.findings),) * 2)
+        if left >= before and changes and moves.is_choice(list(changes)[-1]):
+            return ()  # another way to print that improves nothing
+        return self._neighbours(changes, findings)
 
     def _over(self) -> bool:
         late = time.process_time() - self.start_s > self.budget_s
@@ -109,14 +119,14 @@ class _Search:
 
     @cached_property
     def _is_like_short(self) -> bool:
-        """Whether a few periods of the design have the same findings, so that they are enough to look for changes."""
+        """True if a few periods of the design have the same findings, so that they are enough to look for changes."""
         held = review(moves.short(self.design)).findings
         return {(f.rule, f.severity, f.body) for f in held if not f.waiver} == {
             (f.rule, f.severity, f.body) for f in self.now.findings
         }
 
     def _improves(self, left: tuple[int, int], changes: Changes) -> bool:
-        """Whether errors are gone, or warnings fewer, than of the design and of smaller changes.
+        """Test whether errors are gone, or warnings fewer, than of the design and of smaller changes.
 
         Of changes that leave as many warnings the nearest ``SHOWN`` count, of those of the same values the nearest.
         """
@@ -124,8 +134,9 @@ class _Search:
         if left[0] or left >= before:
             return False
         keys = {".".join(key) for key in changes}
-        same = (one for one in self.kept if {c.key for c in one.changes} <= keys)
-        known = [one.counts() for one in self.kept]
+        nearest = [one for one in self.kept if not one.about]
+        same = (one for one in nearest if {c.key for c in one.changes} <= keys)
+        known = [one.counts() for one in nearest]
         return all(left < one.counts() for one in same) and (len(known) < SHOWN or left < min(known))
 
     def _is_kept(self, changes: Changes, left: tuple[int, int]) -> bool:
@@ -140,13 +151,19 @@ class _Search:
             findings = self._reviewed(fewer)
             if findings is not None and finding_counts(findings) <= left and (smaller := self._good(fewer)):
                 changes, made = fewer, smaller
-        listed = tuple(Change(".".join(k), self._own(k), v) for k, v in changes.items())
-        if any(set(one.changes) == set(listed) for one in self.kept):
-            return True
-        self.kept.append(TriedChange(listed, moves.distance(self.design, changes), made))
-        if len(self.kept) > SHOWN:  # the last one leaves the fewest warnings, and takes the place of the farthest
-            del self.kept[-2]
+        self._keep(changes, made)
+        nearest = [one for one in self.kept if not one.about]
+        if len(nearest) > SHOWN:  # the last one leaves the fewest warnings, and takes the place of the farthest
+            self.kept.remove(nearest[-2])
         return True
+
+    def _keep(self, changes: Changes, made: Trial, about: str = "") -> None:
+        """Keep a change that was tried, once."""
+        listed = tuple(Change(".".join(k), moves.own(self.design, k), v) for k, v in changes.items())
+        if not any(set(one.changes) == set(listed) for one in self.kept):
+            better, words = effects(self.now, made)
+            far = moves.distance(self.design, changes)
+            self.kept.append(TriedChange(listed, far, made, about, better, words))
 
     def _good(self, changes: Changes) -> Trial | None:
         """The changed design tried, if its print can sense what the design's can, with no further doubt."""
@@ -165,23 +182,13 @@ class _Search:
         serious = errors or [f for f in findings if f.severity == "warning"]
         yield from moves.steps(moves.changed(self.design, changes), moves.kinds(serious))
 
-    def _own(self, key: Key) -> Value | None:
-        """The value of the design itself."""
-        if key[0] == "parameters":
-            value: Value | None = getattr(self.design.params, key[1])
-            return value
-        if key == ("profile", "walls"):
-            return self.design.walls
-        if key == ("nozzle_mm",):
-            return self.design.machine.nozzle_mm
-        return self.design.materials.support if key[0] == "materials" else getattr(self.design, key[0])
-
     @property
     def advice(self) -> Advice:
-        """What came of it."""
+        """Advice by the changes that were tried."""
+        complete = self.reached > FARTHEST
         return Advice(
-            tuple(sorted(self.kept, key=lambda one: (one.distance, one.counts()))), words_of(self.now),
+            tuple(sorted(self.kept, key=lambda one: (not one.better, one.distance, one.counts()))), words_of(self.now),
             self.checked, self.predicted,
-            round(time.process_time() - self.start_s, 2), self.budget_s, self.complete,
-            FARTHEST if self.complete else self.reached, NOT_TRIED,
+            round(time.process_time() - self.start_s, 2), self.budget_s, complete,
+            FARTHEST if complete else self.reached, NOT_TRIED, tuple(self.known),
         )  # fmt: skip

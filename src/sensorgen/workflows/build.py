@@ -32,7 +32,7 @@ from sensorgen.prediction.slices import PrintReview, reviewed
 from sensorgen.workflows import compensation, decision, sealed
 from sensorgen.workflows.compensation import Change
 from sensorgen.workflows.decision import Advice, Decision
-from sensorgen.workflows.trial import Trial
+from sensorgen.workflows.trial import Trial, table
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both
 LIBRARIES = ("build123d", "cadquery-ocp", "manifold3d", "numpy", "pydantic", "PyYAML", "click")
@@ -86,7 +86,7 @@ class Built:
     def document(self) -> Iterator[Part]:
         """Verdict, quantities drawn beside printed, and the three findings that matter most."""
         yield from self._head()
-        yield from decision.table(self.trial) if self.trial else self.prediction.summary()
+        yield from table(self.trial) if self.trial else self.prediction.summary()
         if shown := most_severe(self.findings, 3):
             yield ""
             yield from listed(shown)

@@ -3,37 +3,42 @@
 Asked for, its stiffness too: the pressure per displacement of its top.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
-from math import inf, log
+from functools import cached_property, partial
+from math import exp, inf, log, prod
 
 from sensorgen.checks.widths import GAP_CLOSES
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import OutOfRange, SensorgenError
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design, make, name_of
-from sensorgen.scene.scene import SLIVER_MM, Envelope
-from sensorgen.workflows.moves import levels
+from sensorgen.design.printer import load_quality, quality_names
+from sensorgen.scene.array import ArrayParams
+from sensorgen.scene.scene import SLIVER_MM
+from sensorgen.workflows import moves
+from sensorgen.workflows.moves import Key, Value
 
 BAKE = 0.2  # what the bake takes off in the plane (thesis 6.2)
-MOST_SLICES = 10  # with that of the design as it was, and the last one, which is written
+MOST_SLICES = 6  # with that of the design as it was
 FILM_LAYERS = 2  # of a film at least: through one layer leads every slit between two lines
-WITHIN = 0.02  # relative error of the capacitance that ends the search
+GAP_WITHIN = 0.03  # relative error of the gap
+WITHIN = 0.02  # of the capacitance, that ends the search
 STIFFNESS_WITHIN = 0.1  # the same of the stiffness, which whole layers leave few values
 PRESSURE_PA = 80e3  # 8 N on 10 x 10 mm: under which a stiffness is meant
-_ENOUGH = 6.0  # periods to estimate a print with
+FARTHEST = 1.2  # distance of changed heights, as of moves.distance [-]
 _MARGIN = 1.04  # by which strips may be narrower without a layer less: at the limit itself a slicer may drop it
-_LAYERS = 3  # by which a height may change
-_STEP = 1.12  # from one width or period to the next
-_SHARES = (0.5, 5.0)  # of its own value, that a width or a period may take
+_STEP = log(1.12)  # from one width or period to the next, in logarithms
+_SHARES = (log(0.5), log(5.0))  # of its own value, that a width or a period may take, in logarithms
+_STIFFNESS = "stiffness_kpa_per_mm"
 _ACCURACY = 1e-2  # of a capacitance, relative
 _HALVINGS = 12  # of a step between two widths
-_MOST_TRIED, _MOST_SOLVED = 300, 60  # designs whose gap, and whose capacitance is found, before it gives up
+_MOST_TRIED, _MOST_SOLVED = 250, 30  # designs whose gap, and whose capacitance is found, before it gives up
 _MOST_PRESSED = 12  # designs whose stiffness is found
 
-Slice = Callable[[Design], Body]
-_Values = tuple[tuple[str, float], ...]  # of parameters, by their names
+BodyOf = Callable[[Design], Body]
+_Changes = dict[Key, Value]
 
 
 @dataclass(frozen=True)
@@ -57,7 +62,7 @@ class Change:
 
 
 def document(changes: Sequence[Change]) -> Iterator[Part]:
-    """What was changed, if anything."""
+    """Changes, if any."""
     if changes:
         yield "compensated for the print:"
         yield Facts(tuple((f"  {c.what}", f"{c.before:.4g} -> {c.after:.4g}: {c.why}") for c in changes))
@@ -78,7 +83,7 @@ class Found:
         return _off(self.capacitance_pf, asked.capacitance_pf)
 
     def stiffer(self, asked: "Found") -> float:
-        """The same of the stiffness."""
+        """Request for the stiffness."""
         return _off(self.stiffness_kpa_per_mm, asked.stiffness_kpa_per_mm)
 
     def words(self) -> str:
@@ -98,7 +103,7 @@ def compensated(
     *,
     bake: bool = False,
     stiffness: bool = False,
-    sliced: Slice | None = None,
+    sliced: BodyOf | None = None,
     step: Callable[[str], None] = lambda _: None,
 ) -> tuple[Design, list[Change]]:
     """The design to print so that the requested one results, and what differs.
@@ -130,36 +135,49 @@ def compensated(
     OutOfRange
         No design was found that is printed so; the message has the nearest. A stiffness that only 3D would give.
     """
-    now, changes = printable(design, bake=bake)
     from sensorgen.prediction.bodies import drawn
 
-    asked = found(drawn(design), stiffness=stiffness)
-    before = _estimate(now, walls, stiffness=stiffness) if sliced is None else found(sliced(now), stiffness=stiffness)
-    wanted = replace(asked, design=now, gap_mm=_attainable_mm(now, asked.gap_mm))
+    asked = _print(design, drawn, stiffness=stiffness)
+    now, changes = printable(design, walls, bake=bake, gap_mm=asked.gap_mm)
+    is_near = abs(_attainable_mm(now, asked.gap_mm) - asked.gap_mm) <= GAP_WITHIN * asked.gap_mm
+    by_slice = sliced if is_near else None  # of what cannot be, the nearest alone is sliced
+    before = _print(now, by_slice, stiffness=stiffness) if by_slice else _estimate(now, walls, stiffness=stiffness)
     if not 0 < asked.gap_mm < inf:
         return now, changes
-    after = before if _reached(before, wanted) else _searched(now, wanted, walls, sliced, step)
-    if abs(wanted.gap_mm - asked.gap_mm) > now.layers.layer_mm / 2:
-        layer = now.layers.layer_mm
-        raise OutOfRange(
-            f"{asked.words()} cannot be printed: a film has {FILM_LAYERS} layers at least, {FILM_LAYERS * layer:g} mm "
-            f"at layers of {layer:g} mm; nearest: {_told(design, after)}"
-        )
+    wanted = replace(asked, design=now, gap_mm=_attainable_mm(now, asked.gap_mm))
+    after = before if _reached(before, wanted) else _searched(before, wanted, walls, by_slice, step)
+    if sliced and not is_near:
+        after = _print(after.design, sliced, stiffness=stiffness)
+    if not (_reached(after, wanted) and is_near):
+        layers = f"{FILM_LAYERS} layers at least, {wanted.gap_mm:g} mm at layers of {now.layers.layer_mm:g} mm"
+        why = f" of {design.name} by {walls} walls" if is_near else f": a film has {layers}"
+        raise OutOfRange(f"{asked.words()} cannot be printed{why}; nearest: {_nearest(design, after, asked)}")
     if after is before:
         return now, changes
     old, new = asdict(now.params), asdict(after.design.params)
     why = "gap, capacitance and stiffness" if stiffness else "gap and capacitance"
     changes += [Change(name, old[name], new[name], why) for name in old if old[name] != new[name]]
-    changes.append(Change("electrode gap as printed [mm]", before.gap_mm, after.gap_mm, f"{asked.gap_mm:g} mm asked"))
-    if after.capacitance_pf and asked.capacitance_pf:
-        was = before.capacitance_pf or 0.0
-        changes.append(
-            Change("capacitance as printed [pF]", was, after.capacitance_pf, f"{asked.capacitance_pf:.4g} pF asked")
+    return _named(after.design, design), [*changes, *_comes_out(before, after, asked)]
+
+
+def _comes_out(before: Found, after: Found, asked: Found) -> Iterator[Change]:
+    """Quantities of the print before and after all changes."""
+    yield Change("electrode gap as printed [mm]", before.gap_mm, after.gap_mm, f"{asked.gap_mm:g} mm asked")
+    for name, unit in (("capacitance", "pF"), ("stiffness", "kPa/mm")):
+        was, now, meant = (
+            getattr(one, f"{name}_{unit.replace('/', '_per_').lower()}") for one in (before, after, asked)
         )
-    if after.stiffness_kpa_per_mm and asked.stiffness_kpa_per_mm:
-        was, why = before.stiffness_kpa_per_mm or 0.0, f"{asked.stiffness_kpa_per_mm:.4g} kPa/mm asked"
-        changes.append(Change("stiffness as printed [kPa/mm]", was, after.stiffness_kpa_per_mm, why))
-    return after.design, changes
+        if now and meant:
+            yield Change(f"{name} as printed [{unit}]", was or 0.0, now, f"{meant:.4g} {unit} asked")
+
+
+def _named(changed: Design, design: Design) -> Design:
+    """The changed design with a name of its own: that of the first and what was done, or made of its values."""
+    if changed == design:
+        return design
+    own = design.name != name_of(design)
+    data = changed.model_dump(mode="json", exclude_unset=True, exclude={"name"})
+    return make(data | ({"name": design.name.removesuffix("-compensated")[:88] + "-compensated"} if own else {}))
 
 
 def found(body: Body, *, stiffness: bool = False) -> Found:
@@ -195,60 +213,44 @@ def found(body: Body, *, stiffness: bool = False) -> Found:
 
 
 def _reached(now: Found, wanted: Found) -> bool:
-    near = abs(now.gap_mm - wanted.gap_mm) < wanted.design.layers.layer_mm / 4
+    near = abs(now.gap_mm - wanted.gap_mm) <= GAP_WITHIN * wanted.gap_mm
     return near and abs(now.off(wanted)) <= WITHIN and abs(now.stiffer(wanted)) <= STIFFNESS_WITHIN
 
 
 def _searched(
-    design: Design, wanted: Found, walls: str, sliced: Slice | None, step: Callable[[str], None]
+    before: Found, wanted: Found, walls: str, sliced: BodyOf | None, step: Callable[[str], None]
 ) -> Found:  # fmt: skip
-    """The print that is wanted, by the estimate, or by slices that correct it in turn."""
-    corrected, margin, nearest = wanted, _MARGIN, None
-    for count in range(1, MOST_SLICES - 1):
+    """The print that is wanted, or the nearest: by the estimate, or by slices that correct it in turn."""
+    search, nearest = _Search(wanted, walls), before
+    for count in range(1, MOST_SLICES):
         step(f"design {count}" if sliced else "designs")
-        search = _Search(design, corrected, walls, margin)
-        best = search.best
+        best = search.run()
         if best is None:
-            raise OutOfRange(
-                f"{wanted.words()} cannot be printed of {design.name}, by the estimate for {walls} walls; nearest: "
-                f"{_told(design, search.nearest)}"
-            )
-        stiff = wanted.stiffness_kpa_per_mm is not None
-        real = best if sliced is None else found(sliced(best.design), stiffness=stiff)
-        if nearest is None or _distance(real, wanted) < _distance(nearest, wanted):
-            nearest = real
-        if sliced is None or _reached(real, wanted):
-            return real
-        corrected = replace(
-            wanted,
-            capacitance_pf=_corrected(wanted.capacitance_pf, best.capacitance_pf, real.capacitance_pf),
-            stiffness_kpa_per_mm=_corrected(
-                wanted.stiffness_kpa_per_mm, best.stiffness_kpa_per_mm, real.stiffness_kpa_per_mm
-            ),
-        )
+            break
+        real = best if sliced is None else _print(best.design, sliced, stiffness=bool(wanted.stiffness_kpa_per_mm))
+        nearest = min(nearest, real, key=lambda one: _distance(one, wanted))
+        if nearest is not real or sliced is None or _reached(real, wanted):
+            break
+        pairs = {key: [getattr(one, key) for one in (wanted, best, real)] for key in ("capacitance_pf", _STIFFNESS)}
+        search.wanted = replace(wanted, **{key: w * b / r for key, (w, b, r) in pairs.items() if w and b and r})
         if abs(real.gap_mm - best.gap_mm) > SLIVER_MM:
-            margin *= _MARGIN**2
-    raise OutOfRange(
-        f"{wanted.words()} was not reached by {MOST_SLICES} slices of {design.name}; nearest: {_told(design, nearest)}"
-    )
-
-
-def _corrected(wanted: float | None, estimate: float | None, real: float | None) -> float | None:
-    """What an estimate has to give so that the print gives what is wanted."""
-    return wanted * estimate / real if wanted and estimate and real else wanted
+            search.margin *= _MARGIN**2
+            search.tried.clear()
+    return nearest
 
 
 def _distance(one: Found, wanted: Found) -> tuple[float, float]:
     return round(abs(one.gap_mm - wanted.gap_mm), 6), abs(one.off(wanted)) + abs(one.stiffer(wanted))
 
 
-def _told(design: Design, nearest: Found | None) -> str:
-    """The nearest print and what makes it."""
-    if nearest is None:
-        return "none"
-    old, new = asdict(design.params), asdict(nearest.design.params)
-    values = ", ".join(f"{name} {value:.4g}" for name, value in new.items() if value != old[name])
-    return f"{nearest.words()} by {values or 'the design as it is'}"
+def _nearest(design: Design, nearest: Found, asked: Found) -> str:
+    """The nearest print, what makes it and what it costs."""
+    old, new = (asdict(each.params) | {"quality": each.quality} for each in (design, nearest.design))
+    values = ", ".join(f"{k} {v if isinstance(v, str) else f'{v:.4g}'}" for k, v in new.items() if v != old[k])
+    off = f"; its gap is off by {nearest.gap_mm / asked.gap_mm - 1:+.0%}"
+    off += f", its capacitance by {exp(nearest.off(asked)) - 1:+.0%}" if nearest.off(asked) < inf else ""
+    layers = [len(one.layers.boundaries_mm(one.printed.size_mm[2])) - 1 for one in (design, nearest.design)]
+    return f"{nearest.words()} by {values or 'the design as it is'}{off}; {layers[1]} layers for {layers[0]}"
 
 
 @dataclass(eq=False)
@@ -258,126 +260,131 @@ class _Search:
     The margin is the factor by which the width or period may shrink without another gap.
     """
 
-    design: Design
     wanted: Found
     walls: str
-    margin: float
-    tried: dict[_Values, Found | None] = field(default_factory=dict, init=False)
+    margin: float = _MARGIN
+    best: Found | None = field(default=None, init=False)
+    least: float = field(default=inf, init=False)
+    tried: dict[frozenset[tuple[Key, Value]], Found | None] = field(default_factory=dict, init=False)
     pressed: list[Found] = field(default_factory=list, init=False)
+    before: tuple[int, int] = field(default=(0, 0), init=False)
+
+    def run(self) -> Found | None:
+        """The wanted print with the least changes, else the nearest; estimates of a search before stay."""
+        self.best, self.least, self.before = None, inf, self._count()
+        self.pressed.clear()
+        moves.walk(self.wanted.design, self.visit, FARTHEST)
+        known = self.pressed or [one for one in self.tried.values() if one]
+        return self.best or min(known, key=lambda one: _distance(one, self.wanted), default=None)
 
     @cached_property
-    def best(self) -> Found | None:
-        """The one with the least changes."""
-        best, least = None, inf
-        for heights, moved in _heights(self.design, self.wanted.gap_mm):
-            if moved >= least or self._exhausted():
-                break
-            for name in _widths(self.design):
-                for way in (_STEP, 1 / _STEP):
-                    hit, further = self._along(heights, name, way, least - moved)
-                    if hit and self._stiff_enough(hit):
-                        best, least = hit, moved + further
-        if best is None and self.nearest and _reached(self.nearest, self.wanted):
-            best = self.nearest
-        return next((one for one in self.pressed if best and one.design == best.design), best)
+    def widths(self) -> list[Key]:
+        """Lengths in the plane that may change."""
+        return _widths(self.wanted.design, self.walls)
 
-    def _stiff_enough(self, hit: Found) -> bool:
-        """Whether a print has the wanted stiffness too, where one is wanted."""
-        if self.wanted.stiffness_kpa_per_mm is None:
-            return True
+    def visit(self, heights: moves.Changes, far: float) -> Iterable[tuple[Key, Value]] | None:
+        """Try every width with these heights, and give the next heights; None where no further one can be better."""
+        if far >= self.least or self._exhausted():
+            return None
         try:
-            self.pressed.append(replace(_estimate(hit.design, self.walls, stiffness=True), gap_mm=hit.gap_mm))
+            now = moves.changed(self.wanted.design, heights)
+        except SensorgenError:
+            return ()
+        for key in self.widths:
+            for way in (_STEP, -_STEP):
+                hit, further = self._along(dict(heights), key, way, self.least - far)
+                if hit and (one := self._stiff_enough(hit)):
+                    self.best, self.least = one, far + further
+        layer, film = self.wanted.design.layers.layer_mm, ("parameters", "dielectric_mm")
+        thick = (FILM_LAYERS * layer - SLIVER_MM, self.wanted.gap_mm + SLIVER_MM)
+        return [
+            (key, to)
+            for key, to in moves.steps(now, ("film", "height"))
+            if key != film or thick[0] <= float(to) <= thick[1]
+        ]
+
+    def _stiff_enough(self, hit: Found) -> Found | None:
+        """A print with its stiffness, if it is the wanted one, where one is wanted."""
+        if self.wanted.stiffness_kpa_per_mm is None:
+            return hit
+        try:
+            one = replace(_estimate(hit.design, self.walls, stiffness=True), gap_mm=hit.gap_mm)
         except SensorgenError:  # the solver gives up
-            return False
-        return abs(self.pressed[-1].stiffer(self.wanted)) <= STIFFNESS_WITHIN
+            return None
+        self.pressed.append(one)
+        return one if abs(one.stiffer(self.wanted)) <= STIFFNESS_WITHIN else None
+
+    def _count(self) -> tuple[int, int]:
+        """Designs whose gap, and whose capacitance is known [-]."""
+        return len(self.tried), sum(bool(one and one.capacitance_pf) for one in self.tried.values())
 
     def _exhausted(self) -> bool:
-        """Whether as many designs were tried as may be."""
-        solved = sum(bool(one and one.capacitance_pf) for one in self.tried.values())
-        return len(self.tried) > _MOST_TRIED or solved > _MOST_SOLVED or len(self.pressed) > _MOST_PRESSED
+        tried, solved = (now - then for now, then in zip(self._count(), self.before, strict=True))
+        return tried > _MOST_TRIED or solved > _MOST_SOLVED or len(self.pressed) > _MOST_PRESSED
 
-    @property
-    def nearest(self) -> Found | None:
-        """Of all that were tried, the one nearest to what is wanted."""
-        found = self.pressed or [one for one in self.tried.values() if one]
-        return min(found, key=lambda one: _distance(one, self.wanted), default=None)
-
-    def _along(self, heights: dict[str, float], name: str, way: float, most: float) -> tuple[Found | None, float]:
+    def _along(self, heights: _Changes, key: Key, way: float, most: float) -> tuple[Found | None, float]:
         """The first print with the wanted capacitance on the way up or down from a width, and how far it is."""
-        start, before = getattr(self.design.params, name), None
-        share = 1.0
-        while _SHARES[0] <= share <= _SHARES[1] and abs(log(share)) < most and not self._exhausted():
-            here = self._at(heights | {name: start * share})
+        start, share = float(moves.own(self.wanted.design, key) or 0.0), 0.0
+        before: tuple[float, Found] | None = None
+        while _SHARES[0] <= share <= _SHARES[1] and abs(share) < most and not self._exhausted():
+            here = self._at(heights | {key: start * exp(share)})
             if here and abs(here.off(self.wanted)) <= WITHIN / 2:
-                return here, abs(log(share))
-            if here and before and (here.off(self.wanted) > 0) != (before[1].off(self.wanted) > 0):
-                hit = self._between(heights, name, before[0], start * share, before[1].off(self.wanted) > 0)
-                if hit:
-                    return hit, abs(log(share))
-            before = (start * share, here) if here else None
-            share *= way
+                return here, abs(share)
+            if here and before:
+                one, other = before[1].off(self.wanted), here.off(self.wanted)
+                if (one > 0) != (other > 0):
+                    hit = self._between(heights, key, start, (before[0], share), one > 0)
+                    return hit, abs(share)
+                if abs(other) > abs(one):  # the other way
+                    break
+            before = (share, here) if here else None
+            share += way * (2 if here and abs(here.off(self.wanted)) > abs(3 * way) else 1)
         return None, inf
 
-    def _between(self, heights: dict[str, float], name: str, low: float, high: float, above: bool) -> Found | None:
+    def _between(
+        self, heights: _Changes, key: Key, start: float, ends: tuple[float, float], above: bool
+    ) -> Found | None:
+        low, high = ends
         for _ in range(_HALVINGS):
-            middle = (low * high) ** 0.5
-            here = self._at(heights | {name: middle})
-            if here is None:
-                return None
-            if abs(here.off(self.wanted)) <= WITHIN / 4:
+            middle = (low + high) / 2
+            here = self._at(heights | {key: start * exp(middle)})
+            if here is None or abs(here.off(self.wanted)) <= WITHIN / 4:
                 return here
             low, high = (middle, high) if (here.off(self.wanted) > 0) == above else (low, middle)
         return None
 
-    def _at(self, values: dict[str, float]) -> Found | None:
-        """The estimate of a design with other values, if it has the wanted gap, with the margin."""
-        key = tuple(sorted((name, round(value, 3)) for name, value in values.items()))
-        if key not in self.tried:
+    def _at(self, changes: _Changes) -> Found | None:
+        """The estimate of a changed design, if it has the wanted gap, with the margin."""
+        changes = {key: round(float(value), 3) for key, value in changes.items()}
+        mark = frozenset(changes.items())
+        if mark not in self.tried:
             try:
-                self.tried[key] = self._estimated(dict(key))
+                self.tried[mark] = self._estimated(changes)
             except SensorgenError:  # such a design cannot be made
-                self.tried[key] = None
-        one = self.tried[key]
+                self.tried[mark] = None
+        one = self.tried[mark]
         return one if one and one.gap_mm == self.wanted.gap_mm and one.off(self.wanted) < inf else None
 
-    def _estimated(self, values: dict[str, float]) -> Found:
-        """Its gap with the margin; where that is the wanted one, the capacitance too."""
-        narrower = {name: value / self.margin for name, value in values.items() if name in _widths(self.design)}
-        design = _with(self.design, **values)
-        gaps = {_gap_mm(each, self.walls) for each in (_with(self.design, **(values | narrower)), design)}
-        if any(abs(gap - self.wanted.gap_mm) > SLIVER_MM for gap in gaps):
-            return Found(design, max(gaps), None)
+    def _estimated(self, changes: _Changes) -> Found:
+        """Gap with the margin; where that is the wanted one, the capacitance too."""
+        now = self.wanted.design
+        narrower = {k: float(v) / self.margin for k, v in changes.items() if k in self.widths}
+        design = moves.changed(now, changes)
+        for each in (design, moves.changed(now, changes | narrower)):
+            if abs((gap := _gap_mm(each, self.walls)) - self.wanted.gap_mm) > SLIVER_MM:
+                return Found(design, gap, None)
         return replace(_estimate(design, self.walls), gap_mm=self.wanted.gap_mm)
 
 
-def _heights(design: Design, gap_mm: float) -> list[tuple[dict[str, float], float]]:
-    """Films and one other height in whole layers, the least changes first, with their sum of ln(after / before)."""
-    layer, params = design.layers.layer_mm, asdict(design.params)
-    film = params.get("dielectric_mm", 0.0)
-    films = [k * layer for k in range(FILM_LAYERS, round(gap_mm / layer) + 1)] if film else []
-    others: list[dict[str, float]] = [{}]
-    for name, value in _of_shape(design, "_height_mm"):
-        others += [
-            {name: value + k * layer} for k in range(-_LAYERS, _LAYERS + 1) if k and value + k * layer > layer / 2
-        ]
-    made = [other | ({"dielectric_mm": one} if film else {}) for other in others for one in films or [0.0]]
-    return sorted(
-        ((each, sum(abs(log(value / params[name])) for name, value in each.items())) for each in made),
-        key=lambda pair: pair[1],
-    )
-
-
-def _widths(design: Design) -> list[str]:
-    """Parameters in the plane that may change: the period, else the widths."""
-    if hasattr(design.params, "period_mm"):
-        return ["period_mm"]
-    return [name for name, _ in _of_shape(design, "_width_mm")]
-
-
-def _of_shape(design: Design, ending: str) -> list[tuple[str, float]]:
-    """The shape's own parameters by the end of their names, those of 0 left out."""
-    own = {name: value for name, value in asdict(design.params).items() if name not in asdict(Envelope())}
-    return [(name, value) for name, value in own.items() if name.endswith(ending) and value]
+def _widths(design: Design, walls: str) -> list[Key]:
+    """Lengths in the plane that may change: no period of an array, nor, by Cura, strips whose lines would overlap."""
+    names = [name for name, _, vertical in moves.lengths(design) if not vertical]
+    is_array, is_cura = isinstance(design.params, ArrayParams), walls.startswith("cura")
+    return [
+        ("parameters", name) for name in names
+        if not (is_array and name == "period_mm")
+        and not (is_cura and name.endswith("_width_mm") and _is_material(design, name))
+    ]  # fmt: skip
 
 
 def _attainable_mm(design: Design, gap_mm: float) -> float:
@@ -387,80 +394,97 @@ def _attainable_mm(design: Design, gap_mm: float) -> float:
     return round(max(round(gap_mm / layer), least) * layer, 9) if gap_mm < inf else gap_mm
 
 
+def _print(design: Design, body: BodyOf, *, stiffness: bool = False) -> Found:
+    """Quantities of a body; of an array, of a few cells without rims, counted to all of its cells."""
+    is_array = isinstance(design.params, ArrayParams)
+    few = moves.short(design) if is_array or isinstance(body, partial) else design
+    one = found(body(few), stiffness=stiffness)
+    params = design.params, few.params
+    sizes = [p.fitting() if isinstance(p, ArrayParams) else (p.length_mm, p.width_mm) for p in params]
+    larger = prod(sizes[0]) / prod(sizes[1])
+    return replace(one, design=design, capacitance_pf=one.capacitance_pf and one.capacitance_pf * larger)
+
+
 def _estimate(design: Design, walls: str, *, stiffness: bool = False) -> Found:
-    """Gap, capacitance and stiffness as estimated, from a few periods, counted to the whole sensor."""
+    """Quantities of the print of a few periods by the rules of slicers, counted to the whole sensor."""
     from sensorgen.prediction.bodies import estimated
 
-    few = _few(design)
-    one = found(estimated(few, walls), stiffness=stiffness)
-    larger = design.params.length_mm * design.params.width_mm / (few.params.length_mm * few.params.width_mm)
-    return replace(one, design=design, capacitance_pf=one.capacitance_pf and one.capacitance_pf * larger)
+    return _print(design, partial(estimated, walls=walls), stiffness=stiffness)
 
 
 def _gap_mm(design: Design, walls: str) -> float:
     """Electrode gap as estimated, of a few periods [mm]: by far sooner than their unit cell is found."""
     from sensorgen.asprinted import printed
 
-    return printed.gap_mm(printed.body(_few(design), walls=walls).scene.stretched(1.0 - design.shrinkage))
+    return printed.gap_mm(printed.body(moves.short(design), walls=walls).scene.stretched(1.0 - design.shrinkage))
 
 
-def _few(design: Design) -> Design:
-    enough = _ENOUGH * float(getattr(design.params, "period_mm", 1.0))
-    return _with(
-        design, **{name: min(getattr(design.params, name), max(enough, 1.0)) for name in ("length_mm", "width_mm")}
-    )
-
-
-def printable(design: Design, *, bake: bool = False) -> tuple[Design, list[Change]]:
-    """The design with heights in whole layers, widths that print, and larger by the bake; and what was changed."""
+def printable(
+    design: Design, walls: str = "arachne", *, bake: bool = False, gap_mm: float = inf
+) -> tuple[Design, list[Change]]:
+    """The design in layers that make up its gap, with widths that print, larger by the bake; and what was changed."""
     changes: list[Change] = []
     now = design
     if bake and not design.shrinkage:
-        now = _with(now, shrinkage=BAKE)
+        now = moves.changed(now, {("shrinkage",): BAKE})
         changes.append(Change("shrinkage", 0.0, BAKE, "the bake takes it off in the plane"))
-    for name, value, why in _steps(now):
+    layer = _layer_mm(now, gap_mm)
+    if layer != now.layers.layer_mm:
+        changes.append(Change("layers [mm]", now.layers.layer_mm, layer, "the gap in whole layers"))
+        now = _in_layers(now, layer)
+    for name, value, why in _steps(now, walls):
         changes.append(Change(name, getattr(now.params, name), value, why))
-        now = _with(now, **{name: value})
-    return now, changes
+        now = moves.changed(now, {("parameters", name): value})
+    return _named(now, design), changes
 
 
-def _with(design: Design, **changed: float) -> Design:
-    """The design with other parameters or shrinkage."""
-    data = design.model_dump(mode="json", exclude_unset=True)
-    for name, value in changed.items():
-        if name == "shrinkage":
-            data["shrinkage"] = value
-        else:
-            data["parameters"] = data.get("parameters", {}) | {name: round(value, 9)}
-    own = design.name != name_of(design)
-    data["name"] = design.name.removesuffix("-compensated")[:88] + "-compensated" if own else ""
-    return make({k: v for k, v in data.items() if k != "name" or v})
+def _layer_mm(design: Design, gap_mm: float) -> float:
+    """Layer height nearest to the design's own with the gap in whole layers; the least where there is none [mm]."""
+    own, machine = design.layers.layer_mm, design.machine
+    if not 0 < gap_mm < inf or abs(_attainable_mm(design, gap_mm) - gap_mm) <= GAP_WITHIN * gap_mm:
+        return own
+    counts = range(FILM_LAYERS, int(gap_mm / machine.min_layer_mm + SLIVER_MM) + 1)
+    fit = [one for n in counts if (one := round(gap_mm / n, 3)) <= 0.75 * machine.nozzle_mm]  # microns: Cura's grid
+    return min(fit, key=lambda one: abs(log(one / own)), default=min(own, machine.min_layer_mm))
 
 
-def _steps(design: Design) -> Iterator[tuple[str, float, str]]:
+def _in_layers(design: Design, layer_mm: float) -> Design:
+    """The design in other layers: by a quality that ships, or by its own with that height."""
+    for name in quality_names():
+        if load_quality(name).layer_mm == layer_mm:
+            return moves.changed(design, {("quality",): name})
+    name = f"{design.quality}-{layer_mm:g}"
+    text = json.dumps(
+        design.layers.model_dump(exclude={"name"}) | dict.fromkeys(("layer_mm", "first_layer_mm"), layer_mm)
+    )
+    return moves.changed(design, {("quality",): name, ("own", "qualities", name): text})
+
+
+def _steps(design: Design, walls: str) -> Iterator[tuple[str, float, str]]:
     """Heights off the layer grid and widths below what prints, with what they should be."""
     layer, larger = design.layers.layer_mm, 1.0 / (1.0 - design.shrinkage)
-    for name, value in asdict(design.params).items():
-        if not isinstance(value, float) or not value:
-            continue
-        try:
-            nudged = _with(design, **{name: value * 1.01})
-        except SensorgenError:
-            continue
-        if not levels(design) <= levels(nudged):  # a face has moved up or down: a cut at the end only adds levels
-            whole = max(round(value / layer), 1) * layer
-            if abs(whole - value) > SLIVER_MM:
-                yield name, round(whole, 9), f"whole layers of {layer:g} mm"
+    line = design.machine.line_mm() / larger
+    for name, value, vertical in moves.lengths(design):
+        to, why = value, ""
+        if vertical:
+            to, why = max(round(value / layer), 1) * layer, f"whole layers of {layer:g} mm"
+        elif name.endswith("_width_mm") and not _is_material(design, name):
+            to, why = max(value, GAP_CLOSES * design.machine.nozzle_mm / larger), "a gap that stays open"
         elif name.endswith("_width_mm"):
-            is_material = _share(nudged) > _share(design)
-            least = design.machine.line_mm() if is_material else GAP_CLOSES * design.machine.nozzle_mm
-            if value * larger < least - SLIVER_MM:
-                yield name, round(least / larger, 9), "one line" if is_material else "a gap that stays open"
+            to, why = max(value, line), "one line"
+            if walls.startswith("cura"):  # it lays two lines one over the other
+                to, why = max(round(value / line), 1) * line, "whole lines"
+        if abs(to - value) > SLIVER_MM:
+            yield name, round(to, 9), why
 
 
-def _share(design: Design) -> float:
-    """Share of whole periods that is filled [-]."""
-    period = float(getattr(design.params, "period_mm", 1.0))
-    whole = _with(design, length_mm=_ENOUGH * period, width_mm=_ENOUGH * period)
-    x, y, z = whole.drawn.size_mm
-    return sum(b.volume_mm3() for b in whole.in_use.bodies) / (x * y * z)
+def _is_material(design: Design, name: str) -> bool:
+    """True for a width of strips, with which the filled share of whole periods grows."""
+    sides = ("parameters", "length_mm"), ("parameters", "width_mm")
+
+    def share(one: Design) -> float:
+        whole = moves.changed(one, dict.fromkeys(sides, moves.PERIODS * float(getattr(one.params, "period_mm", 1.0))))
+        x, y, z = whole.drawn.size_mm
+        return sum(b.volume_mm3() for b in whole.in_use.bodies) / (x * y * z)
+
+    return share(moves.changed(design, {("parameters", name): 1.01 * getattr(design.params, name)})) > share(design)

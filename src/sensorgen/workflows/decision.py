@@ -6,20 +6,20 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
+from math import inf
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from sensorgen.checks.review import CheckReport, Review, report, review
 from sensorgen.core import cache as answers
-from sensorgen.core.bounds import Bounds
-from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Finding, Refused, Verdict, grouped, headline, listed, verdict
 from sensorgen.design.design import Design
-from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE, FORCE_SHARE, GUESS
-from sensorgen.prediction.results import UNPREDICTED, caption_of, resolved
+from sensorgen.prediction.identifiability.results import GUESS
+from sensorgen.prediction.results import UNPREDICTED
 from sensorgen.prediction.slices import PrintReview
 from sensorgen.workflows.moves import changed
-from sensorgen.workflows.trial import Numbers, Trial, trial
+from sensorgen.workflows.trial import Trial, table, trial, words_of
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
     from sensorgen.prediction.results import Prediction
 
-_VERSION = 5  # of the search for changes: stored advice of another one is not read
+_VERSION = 6  # of the search for changes: stored advice of another one is not read
+SAME = 0.02  # relative difference of resolutions that is none [-]
 STEPS = ("prediction", "changes", "done")
 Step = Callable[[str], None]
 
@@ -67,11 +68,20 @@ class TriedChange:
         How far: sum of abs(ln(after / before)), with a constant for each choice [-].
     trial : Trial
         The changed design.
+    about : str
+        What it is, of a design that is known to be good; "" for a change that removes findings.
+    better : bool
+        Something that the sensor is for is better, and nothing is worse.
+    effects : str
+        How resolutions and sensitivity change.
     """
 
     changes: tuple[Change, ...]
     distance: float
     trial: Trial
+    about: str = ""
+    better: bool = False
+    effects: str = ""
 
     def counts(self) -> tuple[int, int]:
         """Errors and warnings that are left, each sentence once."""
@@ -83,7 +93,8 @@ class TriedChange:
         numbers = words_of(self.trial)
         changes = ", ".join(change.words() for change in self.changes)
         left = f"{errors} error{'s' * (errors != 1)}, {warnings} warning{'s' * (warnings != 1)}"
-        return f"{changes}: {left}; {numbers}"
+        parts = "; ".join(filter(None, (left, numbers, self.effects)))
+        return ": ".join(filter(None, (self.about, changes, parts)))
 
 
 @dataclass(frozen=True)
@@ -93,7 +104,7 @@ class Advice:
     Attributes
     ----------
     tried : tuple of TriedChange
-        The nearest first.
+        Those that improve the sensor first, then the nearest.
     now : str
         Numbers of the design itself, in words.
     checked, predicted : int
@@ -106,6 +117,8 @@ class Advice:
         Up to which distance changes were tried [-].
     not_tried : str
         What was left out.
+    known : tuple of str
+        Good designs of the shape that the budget left no time to predict.
     """
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
@@ -119,18 +132,20 @@ class Advice:
     complete: bool
     farthest: float
     not_tried: str
+    known: tuple[str, ...] = ()
 
     def document(self) -> Iterator[Part]:
-        """The changes, the nearest first, and what was tried."""
+        """The changes, those that improve the sensor first, then the nearest, and what was tried."""
         effort = f"{self.checked} designs checked, {self.predicted} predicted"
         if self.tried:
             rows = ((f"{k}.", one.words()) for k, one in enumerate(self.tried, 1))
-            yield f"changes that were tried, the smallest first (now {self.now}):"
+            yield f"changes that were tried, those that improve the sensor first (now {self.now}):"
             yield Facts(tuple(rows))
         elif not self.checked and not self.complete:
             yield "no change was tried: the design's own prediction took the budget; a second run reads it from disk"
         else:
             yield "no change was found that removes findings and keeps what the sensor senses"
+        yield from (f"not predicted for lack of time (--budget): {one}" for one in self.known)
         spent = self.seconds >= round(self.budget_s, 2)  # which is how it is rounded
         ended = f"; ended by the budget of {self.budget_s:g} s (--budget)" if spent else "; that many are tried at most"
         limit = "" if self.complete else ended
@@ -296,71 +311,33 @@ def _adapter(kind: type) -> "TypeAdapter[Any]":
     return TypeAdapter(kind)
 
 
-def grade(tried: Trial) -> tuple[int, int]:
-    """Grade of the print's sensing of force, and of locating: 2 yes, 1 roughly, 0 no."""
-    length_m = 2 * tried.position_m  # the reference load is in the middle
-    force, place = tried.printed.force_resolution, tried.printed.position_resolution
-    return (
-        _grade(force, FORCE_SHARE * tried.force_n, GUESS * tried.force_n),
-        _grade(place, FORCE_SHARE * length_m, GUESS * length_m),
-    )
+def effects(now: Trial, then: Trial) -> tuple[bool, str]:
+    """Effects of a change on what the sensor is for: only good ones, and resolutions and sensitivity in words."""
+    words, factors = [], list[float]()
+    ends = zip(now.printed.bench(), then.printed.bench(), (now.force_n, 2 * now.position_m), strict=True)
+    for name, (old, new, whole) in zip(("force resolution", "position resolution"), ends, strict=True):
+        known = [bool(one and one.value < GUESS * whole) for one in (old, new)]
+        if all(known) and old and new:
+            factors.append(old.value / new.value)
+        elif any(known):
+            factors.append(inf if known[1] else 0.0)
+        else:
+            continue
+        words.append(f"{name} {_factor(factors[-1])}")
+    if (old := now.printed.sensitivity) and (new := then.printed.sensitivity):
+        factors.append(new.value / old.value)
+        words.append(f"sensitivity {_factor(factors[-1])}")
+    better = max(factors, default=1.0) > 1 + SAME and min(factors, default=1.0) >= 1 - SAME
+    return better, ", ".join(word for word in words if not word.endswith("as now"))
 
 
-def _grade(error: Bounds | None, good: float, useless: float) -> int:
-    return 0 if error is None or not error.value < useless else 2 if error.value <= good else 1
-
-
-def table(tried: Trial) -> Iterator[Part]:
-    """Electrode gap, capacitance, resistance of the electrodes, resolution, time of the print where known; doubts."""
-    both, length_m = (tried.drawn, tried.printed), 2 * tried.position_m
-    rows = [
-        ("electrode gap", *(_words(n.gap) for n in both)),
-        ("capacitance", *(_words(n.capacitance) for n in both)),
-        ("top electrode", *(_words(n.top_electrode) for n in both)),
-        ("bottom electrode", *(_words(n.bottom_electrode) for n in both)),
-        ("force resolution", *(_force(n, tried.force_n) for n in both)),
-        ("position resolution", *(_place(n, length_m) for n in both)),
-    ]
-    if tried.toolpath:
-        rows.append(("print time", "", f"at least {tried.toolpath.time_s / 60:.0f} min"))
-    yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
-    yield caption_of(tried.force_n, tried.position_m, tried.body)
-    if tried.printed.by_top:
-        yield f"printed, the worst of: {tried.printed.by_top}"
-    if tried.rests_on and any(grade(tried)):
-        yield f"largest assumption: a press is read wrongly by {tried.rests_on}"
-    if tried.reason:
-        yield f"{'not predicted: ' * (tried.status == 'not predicted')}{tried.reason}"
-    yield from (f"doubtful: {doubt}" for doubt in tried.doubts)
-
-
-def words_of(tried: Trial) -> str:
-    """Capacitance and resolutions of the print, in one line."""
-    printed = tried.printed
-    c = printed.capacitance
-    force, place = _force(printed, tried.force_n), _place(printed, 2 * tried.position_m)
-    return ", ".join((
-        f"C {_best(c)}" if c else tried.status,
-        force if force.startswith("cannot") else f"force {_best(printed.bench()[0])}",
-        place if place.startswith("cannot") else f"position {_best(printed.bench()[1])}",
-    ))  # fmt: skip
-
-
-def _force(numbers: Numbers, force_n: float) -> str:
-    return resolved(numbers.bench()[0], force_n, CANNOT_SENSE, conditional=numbers.conditional)
-
-
-def _place(numbers: Numbers, length_m: float) -> str:
-    return resolved(numbers.bench()[1], length_m, CANNOT_LOCATE, conditional=numbers.conditional)
-
-
-def _words(bounds: Bounds | None) -> str:
-    return bounds.words() if bounds else "–"
-
-
-def _best(bounds: Bounds | None) -> str:
-    """The best value alone, to two digits."""
-    return Bounds.of(float(f"{bounds.value:.2g}"), bounds.unit).words() if bounds else "–"
+def _factor(gain: float) -> str:
+    """A gain in words."""
+    if 1 - SAME <= gain <= 1 + SAME:
+        return "as now"
+    if gain in (0.0, inf):
+        return "gained" if gain else "lost"
+    return f"{gain:.2g} x better" if gain > 1 else f"{1 / gain:.2g} x worse"
 
 
 def finding_counts(findings: Sequence[Finding]) -> tuple[int, int]:

@@ -1,8 +1,10 @@
 """Single steps from a design to a neighbour on the printable grid: layers for heights, line widths for widths."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict
-from math import ceil, floor, log
+from heapq import heappop, heappush
+from math import ceil, floor, inf, log
+from typing import Any
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Finding
@@ -48,29 +50,94 @@ def changed(design: Design, changes: Changes) -> Design:
     SensorgenError
         There is no such design.
     """
-    data = design.model_dump(mode="json", exclude_unset=True) | {"name": design.name}
+    return make(with_values(design.model_dump(mode="json", exclude_unset=True) | {"name": design.name}, changes))
+
+
+def with_values(data: Mapping[str, Any], changes: Changes) -> dict[str, Any]:
+    """A design's data with other values."""
+    made = dict(data)
     for key, value in changes.items():
-        at = data
+        at = made
         for part in key[:-1]:
             at[part] = at = dict(at.get(part) or {})
         at[key[-1]] = value
-    return make(data)
+    return made
+
+
+def walk(
+    design: Design, visit: Callable[[Changes, float], Iterable[tuple[Key, Value]] | None], farthest: float,
+    starts: Iterable[Changes] = (),
+) -> float:  # fmt: skip
+    """Visit changes of a design by distance (Dijkstra), from none on.
+
+    Parameters
+    ----------
+    design : Design
+        As it is.
+    visit : callable
+        Of changes and their distance: steps that go on from there, or None to end.
+    farthest : float
+        Largest distance that is visited [-].
+    starts : iterable of changes
+        Visited first.
+
+    Returns
+    -------
+    float
+        Distance up to which all were visited; infinite where none is left [-].
+    """
+    heap: list[tuple[float, int, Changes]] = [(0.0, 0, {})]
+    seen: set[frozenset[tuple[Key, Value]]] = {frozenset()}
+
+    def push(changes: Changes, *, first: bool = False) -> None:
+        mark, far = frozenset(changes.items()), distance(design, changes)
+        if mark not in seen and far <= farthest:
+            seen.add(mark)
+            heappush(heap, (0.0 if first else far, len(seen), changes))
+
+    for together in starts:
+        push(together, first=True)
+    while heap:
+        far, _, changes = heappop(heap)
+        further = visit(changes, far)
+        if further is None:
+            return far
+        for key, value in further:
+            push({k: v for k, v in {**changes, key: value}.items() if v != own(design, k)})
+    return inf
+
+
+def own(design: Design, key: Key) -> Value | None:
+    """The value of a design itself."""
+    if key[0] == "parameters":
+        value: Value | None = getattr(design.params, key[1])
+        return value
+    if key == ("profile", "walls"):
+        return design.walls
+    if key == ("nozzle_mm",):
+        return design.machine.nozzle_mm
+    return design.materials.support if key[0] == "materials" else getattr(design, key[0])
 
 
 def distance(design: Design, changes: Changes) -> float:
-    """How far a changed design is: sum of abs(ln(after / before)), and a constant for each choice [-]."""
+    """Distance of a changed design: sum of abs(ln(after / before)), and a constant for each choice [-]."""
     own = asdict(design.params)
     total = 0.0
     for key, value in changes.items():
         if key[0] == "parameters" and isinstance(value, float):
-            total += abs(log(value / own[key[1]]))
+            total += abs(log(value / own[key[1]])) if value and own[key[1]] else 1.0
         else:
             total += CHOICES["walls" if key[0] == "profile" else key[0]]
     return total
 
 
+def words(changes: Changes) -> str:
+    """Changed values, by the last part of their keys."""
+    return ", ".join(f"{key[-1]} {value if isinstance(value, str) else f'{value:g}'}" for key, value in changes.items())
+
+
 def is_choice(key: Key) -> bool:
-    """Whether a value is another way to print, and no length."""
+    """Test whether a value is another way to print, and no length."""
     return key[0] != "parameters"
 
 
@@ -117,7 +184,7 @@ def _heights(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
         for name, value in _off_grid(design):
             yield from _beside(name, value, layer)
         return
-    for name, value, vertical in _lengths(design):
+    for name, value, vertical in lengths(design):
         is_film = name.endswith("dielectric_mm")
         if vertical and (is_film if kind == "film" else not is_film and name not in plain):
             yield from _beside(name, value, layer)
@@ -126,12 +193,12 @@ def _heights(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
 def _off_grid(design: Design) -> list[tuple[str, float]]:
     """Heights that are no whole number of layers [mm]."""
     layer = design.layers.layer_mm
-    return [(n, v) for n, v, vertical in _lengths(design) if vertical and abs(v / layer - round(v / layer)) > _EPS]
+    return [(n, v) for n, v, vertical in lengths(design) if vertical and abs(v / layer - round(v / layer)) > _EPS]
 
 
 def _widths(design: Design, kind: str) -> Iterator[tuple[Key, Value]]:
     """The nearest whole number of lines above, or of half lines below, each width: air may be narrower than a line."""
-    for name, value, vertical in _lengths(design):
+    for name, value, vertical in lengths(design):
         if not vertical:
             line = design.machine.line_mm()
             found = _beside(name, value, line)[1] if kind == "wider" else _beside(name, value, line / 2)[0]
@@ -163,11 +230,11 @@ def _beside(name: str, value: float, step: float) -> list[tuple[Key, float]]:
     return [(("parameters", name), round(max(each, step), 6)) for each in (low, high)]
 
 
-def _lengths(design: Design) -> Iterator[tuple[str, float, bool]]:
+def lengths(design: Design) -> Iterator[tuple[str, float, bool]]:
     """The shape's own lengths that are not 0, and whether a face moves up or down with them."""
     drawn = levels(design)
     for name, value in asdict(design.params).items():
-        if not isinstance(value, float) or not value or name in ("length_mm", "width_mm"):
+        if not isinstance(value, float) or not value or not name.endswith("_mm") or name in ("length_mm", "width_mm"):
             continue
         try:
             moved = levels(changed(design, {("parameters", name): 1.01 * value}))

@@ -1,7 +1,7 @@
 """One design tried: findings, verdict, and the numbers that decide, drawn beside printed."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
@@ -13,9 +13,9 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
+from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE, FORCE_SHARE, GUESS
 from sensorgen.prediction.query import DEFAULT, Query
-from sensorgen.prediction.results import Prediction, on_bench, resolved
+from sensorgen.prediction.results import Prediction, caption_of, on_bench, resolved
 from sensorgen.prediction.slices import PrintReview, SliceReport, reviewed
 
 
@@ -90,12 +90,9 @@ class Numbers:
         )
 
 
-UNITS = {"force_calibrated": "N", "position_calibrated": "m", "force_typical": "N", "position_typical": "m"}
-
-
 @dataclass(frozen=True)
 class Toolpath:
-    """What a G-code file takes, and how it exposes the film to shorts.
+    """Needs of a G-code file, and how it exposes the film to shorts.
 
     Attributes
     ----------
@@ -179,33 +176,75 @@ class Trial(Displayed):
         """Verdict, numbers drawn beside printed, doubts, and the findings that matter most."""
         yield f"{self.verdict}  {self.name}: {counted(counts(self.findings))}"
         yield ""
-        rows = (
-            (f.name.replace("_", " "), *(self._shown(f.name, n) for n in (self.drawn, self.printed)))
-            for f in fields(Numbers) if f.name != "conditional"
-        )  # fmt: skip
-        yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
-        yield f"(at {self.force_n:g} N and {self.position_m * 1e3:g} mm; {self.body})"
-        if self.reason:
-            yield self.reason
-        if self.toolpath:
-            path = self.toolpath
-            yield (
-                f"print time {path.time_s / 60:.0f} min at least; nozzles touch another material over "
-                f"{path.exposure_mm:.0f} mm, {path.crossings} crossings"
-            )
-        yield from (f"doubtful: {doubt}" for doubt in self.doubts)
+        yield from table(self)
         yield from listed(most_severe(self.findings, 3))
 
-    def _shown(self, name: str, numbers: Numbers) -> str:
-        """A number in words; what the sensor cannot do where an error holds no information."""
-        value: Bounds | float | None = getattr(numbers, name)
-        if isinstance(value, float):
-            value = Bounds.of(value, UNITS[name])
-        if name.startswith("position"):
-            return resolved(value, self.length_m, CANNOT_LOCATE)
-        if name in ("force_resolution", "force_calibrated"):
-            return resolved(value, self.force_n, CANNOT_SENSE)
-        return value.words() if value else "–"
+
+def grade(tried: Trial) -> tuple[int, int]:
+    """Grade of the print's sensing of force, and of locating: 2 yes, 1 roughly, 0 no."""
+    length_m = 2 * tried.position_m  # the reference load is in the middle
+    force, place = tried.printed.force_resolution, tried.printed.position_resolution
+    return (
+        _grade(force, FORCE_SHARE * tried.force_n, GUESS * tried.force_n),
+        _grade(place, FORCE_SHARE * length_m, GUESS * length_m),
+    )
+
+
+def _grade(error: Bounds | None, good: float, useless: float) -> int:
+    return 0 if error is None or not error.value < useless else 2 if error.value <= good else 1
+
+
+def table(tried: Trial) -> Iterator[Part]:
+    """Electrode gap, capacitance, resistance of the electrodes, resolution, time of the print where known; doubts."""
+    both, length_m = (tried.drawn, tried.printed), 2 * tried.position_m
+    rows = [
+        ("electrode gap", *(_words(n.gap) for n in both)),
+        ("capacitance", *(_words(n.capacitance) for n in both)),
+        ("top electrode", *(_words(n.top_electrode) for n in both)),
+        ("bottom electrode", *(_words(n.bottom_electrode) for n in both)),
+        ("force resolution", *(_force(n, tried.force_n) for n in both)),
+        ("position resolution", *(_place(n, length_m) for n in both)),
+    ]
+    if tried.toolpath:
+        rows.append(("print time", "", f"at least {tried.toolpath.time_s / 60:.0f} min"))
+    yield Table("numbers", "", (Column(""), Column("drawn"), Column("printed")), tuple(rows))
+    yield caption_of(tried.force_n, tried.position_m, tried.body)
+    if tried.printed.by_top:
+        yield f"printed, the worst of: {tried.printed.by_top}"
+    if tried.rests_on and any(grade(tried)):
+        yield f"largest assumption: a press is read wrongly by {tried.rests_on}"
+    if tried.reason:
+        yield f"{'not predicted: ' * (tried.status == 'not predicted')}{tried.reason}"
+    yield from (f"doubtful: {doubt}" for doubt in tried.doubts)
+
+
+def words_of(tried: Trial) -> str:
+    """Capacitance and resolutions of the print, in one line."""
+    printed = tried.printed
+    c = printed.capacitance
+    force, place = _force(printed, tried.force_n), _place(printed, 2 * tried.position_m)
+    return ", ".join((
+        f"C {_best(c)}" if c else tried.status,
+        force if force.startswith("cannot") else f"force {_best(printed.bench()[0])}",
+        place if place.startswith("cannot") else f"position {_best(printed.bench()[1])}",
+    ))  # fmt: skip
+
+
+def _force(numbers: Numbers, force_n: float) -> str:
+    return resolved(numbers.bench()[0], force_n, CANNOT_SENSE, conditional=numbers.conditional)
+
+
+def _place(numbers: Numbers, length_m: float) -> str:
+    return resolved(numbers.bench()[1], length_m, CANNOT_LOCATE, conditional=numbers.conditional)
+
+
+def _words(bounds: Bounds | None) -> str:
+    return bounds.words() if bounds else "–"
+
+
+def _best(bounds: Bounds | None) -> str:
+    """The best value alone, to two digits."""
+    return Bounds.of(float(f"{bounds.value:.2g}"), bounds.unit).words() if bounds else "–"
 
 
 def trial(

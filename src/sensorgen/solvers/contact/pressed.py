@@ -261,7 +261,7 @@ def _work(stress: Real, moved: Real) -> Real:
 
 
 def with_capacitances(found: Pressed, bounds: Sequence[Interval | None]) -> Pressed:
-    """The same with the capacitance of the deformed outlines, and its faults."""
+    """Add the capacitance of the deformed outlines, and its faults."""
     faults, known = list(found.faults), [c.middle() for c in bounds if c]
     if len(known) < len(bounds):
         unknown = len(bounds) - len(known)

@@ -200,14 +200,14 @@ class Optimised(Displayed):
 
     def table(self) -> Table:
         """The front: parameters that differ, objectives with what the models leave open, verdict."""
-        keys = [k for k in self.front[0].values if len({c.values[k] for c in self.designs}) > 1]
+        keys = [k for k in self._keys() if len({c.values.get(k) for c in self.designs}) > 1]
         names = list(dict.fromkeys((*self.objectives, *self.front[0].numbers)))[: len(self.objectives) + 2]
         columns = (
             Column("", key="number"), Column("", key="leads"), *(Column(k.removesuffix("_mm"), key=k) for k in keys),
             *(Column(n, digits=3, key=n) for n in names), Column("verdict"),
         )  # fmt: skip
         cells = (
-            (c.number, ">" if c.leads else "=" if c.tied else "", *(c.values[k] for k in keys),
+            (c.number, ">" if c.leads else "=" if c.tied else "", *(c.values.get(k) for k in keys),
              *(c.cell(n) for n in names), c.verdict)
             for c in self.front
         )  # fmt: skip
@@ -218,8 +218,12 @@ class Optimised(Displayed):
             tuple(cells),
         )
 
+    def _keys(self) -> list[str]:
+        """Parameters that are varied."""
+        return list(dict.fromkeys(key for c in self.designs for key in c.values))
+
     def proof(self) -> str:
-        """How good the front is, in words."""
+        """Quality of the front, in words."""
         tried = f"{self.size} designs tried of {self.whole} (NSGA-II)" if self.whole else f"{self.size} designs"
         if not self.front:
             return f"{self.name}: none of {tried} meets the target ({self.evaluated} evaluated)"
@@ -254,7 +258,7 @@ class Optimised(Displayed):
 
     def csv(self) -> Iterator[str]:
         """Every design with its numbers, or why it has none."""
-        keys = list(self.designs[0].values)
+        keys = self._keys()
         names = list(dict.fromkeys(n for c in self.designs for n in c.numbers))
         ends = [Column(f"{n}{end}") for n in names for end in ("", "_lower", "_upper")]
         columns = (
@@ -266,7 +270,7 @@ class Optimised(Displayed):
         front = {c.number for c in self.front}
 
         def cells(c: Chosen) -> Iterator[Cell]:
-            yield from (c.number, *(c.values[k] for k in keys))
+            yield from (c.number, *(c.values.get(k) for k in keys))
             for name in names:
                 b = c.numbers.get(name)
                 yield from (b.value, b.lower, b.upper) if b else (None, None, None)
@@ -293,7 +297,7 @@ def _designs(some: Sequence[Recommended]) -> Iterator[Part]:
 
 
 def _numbers(one: Recommended) -> Table:
-    """Its numbers, as estimated, in the worst case, and by a real slicer."""
+    """Numbers of one, as estimated, in the worst case, and by a real slicer."""
 
     def words(key: str, value: float | None = None) -> str:
         return shown(one.design.cell(key, value), 3)

@@ -17,15 +17,15 @@ from sensorgen.workflows.optimise.target import load
 
 
 def optimise(
-    path: Path, out: Path, workers: Workers = HERE, *, count: int = 0, keep: bool = True, built: bool = True,
+    word: str | Path, out: Path, workers: Workers = HERE, *, count: int = 0, keep: bool = True, built: bool = True,
     sliced: bool = True, tip: Mapping[str, Any] | None = None, progress: Progress = lambda *_: None,
 ) -> Optimised:  # fmt: skip
     """The best printable designs for a target; page, JSON and CSV are written into ``out``.
 
     Parameters
     ----------
-    path : Path
-        The target.
+    word : str or Path
+        The target, as of :func:`sensorgen.workflows.optimise.target.load`.
     out : Path
         Folder of all files.
     count : int
@@ -42,7 +42,8 @@ def optimise(
     SensorgenError
         A target that is none, or an empty or too large space; a cluster that goes away.
     """
-    target, name = load(path, tip), path.stem
+    path = Path(word)
+    target, name = load(word, tip), path.stem
     chosen: tuple[Recommended, ...] = ()
     with within(str(path)):
         designs = space(target, path.parent) if count else candidates(target, path.parent)

@@ -36,7 +36,7 @@ class Workers:
 
     @contextmanager
     def opened(self) -> "Iterator[Workers]":
-        """The same, which stay for several rounds of works: a process that begins anew imports the solvers again."""
+        """Workers that stay for several rounds of works: a process that begins anew imports the solvers again."""
         if self.lanes or (self.jobs < 2 and not self.cluster):
             yield self
             return
@@ -88,7 +88,7 @@ class Row:
 
     @property
     def design(self) -> Design:
-        """Its design."""
+        """Design of the candidate."""
         if self.candidate.design is None:
             raise BadInput(self.candidate.reason)
         return self.candidate.design
@@ -144,10 +144,6 @@ class Searched:
                 words.setdefault(alike, why)
                 found[alike, row.certified and bool(row.discarded)] += 1
         return [(words[alike], certified, count) for (alike, certified), count in found.most_common()]
-
-    def best(self, key: str) -> Row:
-        """Of the front, the one with the best value of an objective."""
-        return min(self.front, key=lambda row: badness(self.target, row)[key].lower)
 
     def nearest(self) -> Row | None:
         """Where nothing meets the target: the design that violates the fewest constraints, and these the least."""
@@ -320,7 +316,7 @@ def _hoped(target: Target, key: str, number: Known, margin: float) -> Interval:
 
 
 def _beats(one: dict[str, Interval], other: dict[str, Interval]) -> bool:
-    """Whether one is at least as good in every objective and better in one, wherever both lie in their intervals."""
+    """Test whether one is at least as good in every objective and better in one, wherever both lie in their intervals."""
     return all(one[key].upper <= other[key].lower for key in other) and any(
         one[key].upper < other[key].lower for key in other
     )

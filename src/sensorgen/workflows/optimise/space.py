@@ -9,7 +9,7 @@ from typing import Any
 
 from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
 from sensorgen.design.design import Design, make, with_own_files
-from sensorgen.workflows.moves import levels
+from sensorgen.workflows.moves import lengths, with_values
 from sensorgen.workflows.optimise.target import Range, Target
 
 MOST = 20_000  # designs: their checks alone take half an hour on two cores
@@ -60,7 +60,7 @@ class Space:
 
     @property
     def size(self) -> int:
-        """How many designs it has."""
+        """Number of designs."""
         return sum(prod(len(values) for values in inside.values()) for _, inside in self.parts)
 
     def candidate(self, values: dict[str, Value]) -> Candidate:
@@ -103,7 +103,7 @@ def candidates(target: Target, folder: Path = Path()) -> list[Candidate]:
     found = [whole.candidate(chosen | values) for chosen, inside in whole.parts for values in _combinations(inside)]
     for key, given in target.parameters.items():
         for value in [] if isinstance(given, Range) else given:
-            own = [candidate for candidate in found if candidate.values[key] == value]
+            own = [candidate for candidate in found if candidate.values.get(key) == value]
             if own and not any(candidate.design for candidate in own):
                 raise BadInput(f"parameters.{key}: no design can have {value!r}: {own[0].reason}")
     return found
@@ -127,7 +127,7 @@ def space(target: Target, folder: Path = Path()) -> Space:
     whole = Space(base, folder, known, tuple(
         (chosen, {k: _values(k, v, with_own_files(_with(base, known, chosen), folder)) for k, v in inner.items()})
         for chosen in _combinations({k: _listed(v) for k, v in outer.items()})
-    ))  # fmt: skip
+    ) + tuple(({}, {k: [v] for k, v in one.items()}) for one in target.also))  # fmt: skip
     if not whole.size:
         empty = sorted(
             {k for _, inside in whole.parts for k, values in inside.items() if not values}
@@ -146,15 +146,10 @@ def _combinations(space: Mapping[str, list[Value]]) -> Iterator[dict[str, Value]
 
 def _with(base: Data, known: frozenset[str], values: Mapping[str, Value]) -> Data:
     """The base design as data with other values."""
-    made: Data = {k: dict(v) if isinstance(v, dict) else v for k, v in base.items() if k != "name"}
-    for key, value in values.items():
-        *path, last = ["parameters", key] if key in known else key.split(".")
-        place = made
-        for part in path:
-            place[part] = dict(place.get(part) or {})
-            place = place[part]
-        place[last] = value
-    return made
+    return with_values(
+        {k: v for k, v in base.items() if k != "name"},
+        {("parameters", key) if key in known else tuple(key.split(".")): value for key, value in values.items()},
+    )
 
 
 def _listed(given: Range | list[Value]) -> list[Value]:
@@ -184,11 +179,5 @@ def _steps(first: float, step: float, count: int) -> list[Value]:
 
 def grid_mm(design: Design, key: str) -> float:
     """Printable step of a length: a layer where it moves a face up or down, else half a line [mm]."""
-    value = float(asdict(design.params)[key])
-    try:
-        data = design.model_dump(mode="json", exclude_unset=True)
-        nudged = make(data | {"parameters": data.get("parameters", {}) | {key: value * 1.01 or 0.01}})
-        is_height = not levels(design) <= levels(nudged)
-    except SensorgenError:
-        is_height = "height" in key
+    is_height = {name: up for name, _, up in lengths(design)}.get(key, "height" in key or key == "isolation_mm")
     return design.layers.layer_mm if is_height else design.machine.line_mm() / 2

@@ -1,8 +1,8 @@
 """A target as it is written, in a YAML file: what to vary, what to reach, and what is not accepted."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from math import inf
+from dataclasses import asdict, dataclass
+from math import inf, prod
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,13 +11,16 @@ from pydantic import Field, model_validator
 from sensorgen.checks import RULES
 from sensorgen.core import yamlfile
 from sensorgen.core.bounds import Bounds, Interval
-from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
+from sensorgen.core.errors import BadInput, UnknownName, within
 from sensorgen.core.records import Strict, checked
 from sensorgen.core.units import M_PER_MM
-from sensorgen.design.design import with_own_files
+from sensorgen.design import best, packs
+from sensorgen.design.design import Design, make, with_own_files
 from sensorgen.export.slicers import SLICERS
 from sensorgen.prediction.identifiability.results import GUESS
 from sensorgen.prediction.query import DEFAULT, FORCE_N, NOISE, Query
+from sensorgen.scene.scene import Envelope
+from sensorgen.workflows.moves import lengths
 from sensorgen.workflows.trial import Numbers, Toolpath, Trial
 
 
@@ -44,7 +47,7 @@ class Number:
     like: str = ""
 
     def of(self, found: Numbers, path: Toolpath | None = None) -> Bounds | None:
-        """Its value with its range, in the unit of its name; None where unknown."""
+        """Value with its range, in the unit of its name; None where unknown."""
         value = getattr(path, self.field, None) if self.of_path else getattr(found, self.field)
         if value is None:
             return None
@@ -80,6 +83,7 @@ _NOT_PREDICTED = {
     "hysteresis": "cannot be predicted: no material file has the viscoelastic data (loss factor or relaxation times) "
     "that a model of it needs; leave it out, and measure the printed designs (sensorgen bench hysteresis)"
 }
+AROUND = 120  # designs around one, at most: two to ten minutes
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -106,7 +110,7 @@ class Near(Strict):
 
 
 class Limit(Strict):
-    """What a number may be, in the unit of its name."""
+    """Range of a number, in the unit of its name."""
 
     least: Finite = -inf
     most: Finite = inf
@@ -118,7 +122,7 @@ class Limit(Strict):
         return self
 
     def beyond(self, value: float) -> float:
-        """How far a value is outside, relative to the limit [-]; 0 within."""
+        """Distance of a value outside, relative to the limit [-]; 0 within."""
         over = max(self.least - value, value - self.most, 0.0)
         return over / (abs(self.least if value < self.least else self.most) or 1.0)
 
@@ -140,7 +144,7 @@ class Loading(Strict):
 
 
 class Target(Strict):
-    """What the best design is to be best at, and among which designs."""
+    """Aim of a search, and the designs that it is among."""
 
     design: dict[str, Any] | str = Field(description="The design that is varied, as in a design file; or its file.")
     parameters: dict[str, Range | list[float | str]] = Field(
@@ -156,6 +160,9 @@ class Target(Strict):
         default=(), strict=False, description="Parts of doubts that are accepted; a design with another one is out."
     )
     load: Loading = Loading()
+    also: tuple[dict[str, float | str], ...] = Field(
+        default=(), strict=False, description="Further designs: values in place of those of the varied design."
+    )
     slicer: Literal["", "prusa", "cura"] = Field(
         default="", description="Slice every design that is evaluated; estimated if not given."
     )
@@ -185,7 +192,7 @@ class Target(Strict):
         return self
 
     def query(self) -> Query:
-        """What is asked of every design."""
+        """Question about every design."""
         load = self.load
         at = None if load.position_mm is None else load.position_mm * M_PER_MM
         pressures = None if load.pressures_kpa is None else (load.pressures_kpa[0], load.pressures_kpa[1])
@@ -220,17 +227,17 @@ class Target(Strict):
         return found | ({f"unknown {key}": 1.0 for key in unknown} if trial.status == "predicted" else {})
 
     def refuses(self, severity: str, rule: str) -> bool:
-        """Whether a design with such a finding is out."""
+        """Test whether a design with such a finding is out."""
         return severity == "error" or (severity == "warning" and rule in self.refuse_warnings)
 
 
-def load(path: Path, tip: Mapping[str, Any] | None = None) -> Target:
+def load(word: str | Path, tip: Mapping[str, Any] | None = None) -> Target:
     """Read a target; its design file is seen from its own folder.
 
     Parameters
     ----------
-    path : Path
-        Its file.
+    word : str or Path
+        Its file; or a shape or the file of a design, for designs like it with the best resolutions.
     tip : mapping, optional
         Keys of the design's tip, in place of the file's.
 
@@ -238,19 +245,54 @@ def load(path: Path, tip: Mapping[str, Any] | None = None) -> Target:
     ------
     BadInput
         Not readable, not YAML, or not a target; the message names file and key.
+    UnknownName
+        Neither a file nor a shape.
     """
-    try:
-        target = checked(Target, yamlfile.read(path))
+    path, names = Path(word), packs.names("shapes")
+    if str(word) in names:
+        known = [dict([("shape", path.name), *one.data().items()]) for one in best.of(path.name)]
+        return _with_tip(around(make(known[0] if known else {"shape": path.name})), tip or {})
+    if not path.suffix and not path.exists():
+        raise UnknownName("shape or file of a target", str(word), names)
+    with within(str(path)):
+        data = yamlfile.read(path)
+        if "shape" in data:
+            return _with_tip(around(make({"name": path.stem} | data, str(path))), tip or {})
+        target = checked(Target, data)
         if isinstance(target.design, str):
             file = path.parent / target.design
             data = with_own_files({k: v for k, v in yamlfile.read(file).items() if k != "name"}, file.parent)
             target = target.model_copy(update={"design": data})
         target = _with_tip(target, tip or {})
-    except SensorgenError as error:
-        raise error.within(str(path)) from None
     if target.slicer and target.slicer not in SLICERS:
         raise BadInput(f"{path}: slicer {target.slicer!r}; expected one of {', '.join(SLICERS)}")
     return target
+
+
+def around(design: Design) -> Target:
+    """The target of designs like one, and of the best known of its shape, with the best resolutions.
+
+    Heights change by a layer, films and electrodes have one more, lengths in the plane change by a quarter.
+    """
+    layer, values = design.layers.layer_mm, dict[str, list[float | str]]()
+    for name, value, vertical in lengths(design):
+        whole = max(round(value / layer), 1)
+        if not vertical:
+            values[name] = [round(share * value, 3) for share in (0.8, 1.0, 1.25)]
+        elif name in asdict(Envelope()) or name.endswith("dielectric_mm"):
+            values[name] = [value, round((whole + 1) * layer, 6)]
+        else:
+            values[name] = [value if n == whole else round(n * layer, 6) for n in (whole - 1, whole, whole + 1) if n]
+    while prod(map(len, values.values())) > AROUND:
+        longest = max(values.values(), key=len)
+        longest.pop(0 if len(longest) > 2 else 1)
+    own = {name: getattr(design.params, name) for name in values}
+    return checked(Target, {
+        "design": design.model_dump(mode="json", exclude_unset=True, exclude={"name"}),
+        "parameters": values | {"quality": [design.quality]}, "accept_doubts": ["plate bonded"],
+        "objectives": dict.fromkeys(("force_resolution_n", "position_resolution_mm"), "minimise"),
+        "also": [own | one.parameters | {"quality": one.quality} for one in best.of(design.shape)],
+    })  # fmt: skip
 
 
 def _with_tip(target: Target, tip: Mapping[str, Any]) -> Target:

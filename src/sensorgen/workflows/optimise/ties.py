@@ -11,7 +11,7 @@ RULE = "fewest warnings, then most layers between the electrodes, then best valu
 
 
 def tied(one: Row, other: Row, keys: Sequence[str]) -> bool:
-    """Whether the best value of each lies within what the models leave open of the other, in every objective."""
+    """Test whether the best value of each lies within what the models leave open of the other, in every objective."""
     if one.trial is None or other.trial is None:
         return False
     for key in keys:
