@@ -57,12 +57,12 @@ class Carried:
 
     @cached_property
     def _air(self) -> Mask:
-        """Which triangles are air."""
+        """Mask of the triangles of air."""
         return np.asarray(self.field.region == self.cell.air)
 
     @cached_property
     def _inside(self) -> Mask:
-        """Which nodes move with a solid: its corners."""
+        """Mask of the nodes that move with a solid: its corners."""
         found = np.zeros(len(self.field.points_m), bool)
         found[self.field.outer[~self._air, :3]] = True
         return found
