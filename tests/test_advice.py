@@ -16,8 +16,9 @@ from sensorgen.design.design import load, make
 from sensorgen.prediction.results import resolved
 from sensorgen.prediction.slices import reviewed
 from sensorgen.workflows import moves
-from sensorgen.workflows.advice import _Search, advise
-from sensorgen.workflows.decision import advised, decision, effects
+from sensorgen.workflows.advice import _Search, advise, advised
+from sensorgen.workflows.changes import effects
+from sensorgen.workflows.decision import decision
 from sensorgen.workflows.trial import trial
 
 DOCS = Path(__file__).parents[1] / "docs"

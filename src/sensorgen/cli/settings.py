@@ -12,7 +12,7 @@ from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
-    from sensorgen.workflows.decision import Advice, Change
+    from sensorgen.workflows.changes import Advice, Change
 
 
 def pairs(words: tuple[str, ...], option: str) -> list[tuple[str, str]]:

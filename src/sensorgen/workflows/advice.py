@@ -1,26 +1,66 @@
 """Advice that was tried: the nearest changes of a design that remove its findings, each checked and predicted."""
 
+import json
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
+from hashlib import sha256
+from typing import TYPE_CHECKING, Any
 
 from sensorgen.checks.review import review
+from sensorgen.core import cache as answers
 from sensorgen.core.errors import SensorgenError
-from sensorgen.core.findings import Finding
+from sensorgen.core.findings import Finding, verdict
 from sensorgen.design import best
 from sensorgen.design.design import Design
+from sensorgen.prediction.results import UNPREDICTED
 from sensorgen.workflows import moves
-from sensorgen.workflows.decision import Advice, Change, TriedChange, effects, finding_counts
+from sensorgen.workflows.changes import Advice, Change, TriedChange, effects, finding_counts
 from sensorgen.workflows.moves import Changes, Key, Value
 from sensorgen.workflows.trial import Trial, grade, trial, words_of
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
 
 BUDGET_S = 60.0
 SHOWN = 3
 MOST_CHECKED, MOST_PREDICTED = 400, 8
 FARTHEST = 1.2  # distance of a change, as of moves.distance: at most by a factor of 3.3 in all [-]
 NOT_TRIED = "other materials, shapes, real slicers; sensorgen optimise looks for the best design"
+_VERSION = 6  # of the search for changes: stored advice of another one is not read
 Step = Callable[[str], None]
+
+
+def advised(
+    design: Design, made: Trial, budget_s: float, step: Step = lambda _: None, spent_s: float = 0.0
+) -> Advice | None:
+    """Changes of a design with findings, tried now or before; None where nothing is to be changed, or nothing known.
+
+    What its own prediction has ``spent_s`` counts as spent.
+    """
+    if verdict([f for f in made.findings if f.rule != UNPREDICTED]) == "PRINT":
+        return None
+    digest = sha256(_adapter(Trial).dump_json(made)).hexdigest()
+    question = {"advice": _VERSION, "design": design.id(), "trial": digest}
+    stored = answers.known(question)
+    known: Advice | None = _adapter(Advice).validate_json(json.dumps(stored)) if stored else None
+    if known and (known.complete or known.budget_s >= budget_s):
+        return known
+    if budget_s <= 0:
+        return None
+    advice = advise(design, made, budget_s, step, spent_s)
+    if not advice.checked:
+        return advice
+    answers.keep(question, json.loads(_adapter(Advice).dump_json(advice)))
+    return advice
+
+
+@cache
+def _adapter(kind: type) -> "TypeAdapter[Any]":
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(kind)
 
 
 def advise(

@@ -5,7 +5,7 @@ from pathlib import Path
 from sensorgen.core import files, yamledit, yamlfile
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import Design, load, make
-from sensorgen.workflows.decision import TriedChange
+from sensorgen.workflows.changes import TriedChange
 
 
 def apply(path: Path, design: Design, change: TriedChange) -> None:

@@ -30,8 +30,9 @@ from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless, to_json
 from sensorgen.prediction.slices import PrintReview, reviewed
 from sensorgen.workflows import compensation, decision, sealed
+from sensorgen.workflows.changes import Advice
 from sensorgen.workflows.compensation import Change
-from sensorgen.workflows.decision import Advice, Decision
+from sensorgen.workflows.decision import Decision
 from sensorgen.workflows.trial import Trial, table
 
 QUALITIES = ("fine", "extrafine")  # every build brings the profiles of both

@@ -316,7 +316,7 @@ def _hoped(target: Target, key: str, number: Known, margin: float) -> Interval:
 
 
 def _beats(one: dict[str, Interval], other: dict[str, Interval]) -> bool:
-    """Test whether one is at least as good in every objective and better in one, wherever both lie in their intervals."""
+    """True if one is at least as good in every objective and better in one, wherever both lie in their intervals."""
     return all(one[key].upper <= other[key].lower for key in other) and any(
         one[key].upper < other[key].lower for key in other
     )

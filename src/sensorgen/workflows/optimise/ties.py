@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from functools import partial
 
-from sensorgen.workflows.decision import finding_counts
+from sensorgen.workflows.changes import finding_counts
 from sensorgen.workflows.optimise.search import Row, Searched
 from sensorgen.workflows.optimise.target import NUMBERS, Target
 
