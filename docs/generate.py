@@ -18,7 +18,7 @@ PAGES = (
     ["gcode", "drags"], ["gcode", "pinholes"], ["batch"], ["batch", "PLAN.yaml"], ["batch", "verify"],
     ["predict"], ["predict", "tri"], ["cell"], ["cell", "tri"], ["chart"], ["chart", "tri"],
     ["compress"], ["compress", "tri"],
-    ["invert"], ["sheet"], ["stack"],
+    ["invert"], ["array"], ["sheet"], ["stack"],
     ["bench"], ["bench", "plan"], ["bench", "plan", "tri"], ["bench", "show"],
     ["bench", "hysteresis"], ["bench", "sets"], ["bench", "live"],
     ["log"],
