@@ -90,14 +90,14 @@ def test_a_short_line_is_a_capacitor():
 
 
 def test_a_solved_cell_is_known_to_its_share_of_the_rise():
-    """At a light press dZ/dF is in proportion to the rise: 0.6 % of the mesh and 0.5 % of the tops (film of 0.2 mm).
+    """At a light press dZ/dF is in proportion to the rise: 0.6 % of the mesh under the block (film of 0.2 mm).
 
     It is 2.8 % where faces stick.
 
     Below the first solved stress, 1 N, it is known less well: a contact grows from nothing.
     """
     got = found("tri", force=1.01)
-    assert shares(got, "compression").by_force == pytest.approx(0.011, rel=0.15)
+    assert shares(got, "compression").by_force == pytest.approx(0.006, rel=0.15)
     assert shares(found("tri", force=1e-3), "boundary").by_force == pytest.approx(0.028, rel=1e-2)
     assert shares(found("tri", force=0.1), "compression").by_force > 0.03
 

@@ -177,7 +177,7 @@ def test_the_whole_prediction():
     found = results.chart(body, QUERY, ("compression", "prediction"), budget_s=0.3, runner=here)
     rises = {p.model: p for p in found.points if p.question == "compression"}
     assert rises["compression: stored curve"].against == "two other programs"
-    assert rises["compression: stored curve"].error < 0.01
+    assert rises["compression: stored curve"].error < 0.013  # under a block, 1 % less than under their even pressure
     assert rises["compression: unconfined"].error > 0.9
     whole = {p.model: p for p in found.points if p.question == "prediction"}
     assert whole["predict: default"].error < 6e-3  # what the quick answers for C are known to

@@ -182,5 +182,8 @@ def test_first_screen_has_the_figures_of_a_bench():
     found = evaluate(bodies.drawn(make({"shape": "tri"})))
     force, place = found.bench()
     known = found.identifiability.calibrated
-    assert (force.value, place.value) == pytest.approx((known.sigma_force_n, known.sigma_position_m))
-    assert force.upper / force.value == pytest.approx(found.force_resolution.upper / found.force_resolution.value)
+    assert (force.value, place.value) == pytest.approx(
+        (known.sigma_force_n, known.sigma_position_m), rel=0.01
+    )  # of the worst top
+    alone = found.force_resolution.upper / found.force_resolution.value
+    assert alone <= force.upper / force.value < 1.5 * alone  # the range holds all tops

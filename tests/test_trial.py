@@ -36,7 +36,8 @@ def test_verdict_and_numbers_are_those_of_the_build(data, tmp_path):
     assert tried.verdict == built.verdict
     assert tried.findings == tuple(f for f in built.findings if not f.waiver)
     assert tried.printed.capacitance == built.prediction.capacitance
-    assert tried.drawn.force_resolution == built.prediction.drawn.force_resolution
+    of_tip = built.prediction.drawn.force_resolution  # the trial has that of the worst top
+    assert of_tip.value <= tried.drawn.force_resolution.value < 1.02 * of_tip.value
     assert tried.printed.force_calibrated == built.prediction.identifiability.calibrated.sigma_force_n
     assert TypeAdapter(Trial).validate_json(to_json(tried)) == tried == pickle.loads(pickle.dumps(tried))
     assert next(iter(text(tried.document()))).startswith(tried.verdict)

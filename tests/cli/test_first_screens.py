@@ -40,7 +40,7 @@ def test_verdict_and_numbers_come_before_any_file(tmp_path):
 
 def test_no_change_is_tried_unless_that_is_asked_for(run, monkeypatch):
     tried = []
-    monkeypatch.setattr("sensorgen.workflows.decision.advised", lambda *_: tried.append("changes"))
+    monkeypatch.setattr("sensorgen.workflows.advice.advised", lambda *_: tried.append("changes"))
     words = ("build", "reference", "--dielectric", "0.1", "--length", "10", "--no-cad")
     assert (run(*words).code, tried) == (0, [])
     assert (run(*words, "--advise").code, tried) == (0, ["changes"])

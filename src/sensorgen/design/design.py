@@ -102,12 +102,7 @@ class Design(Strict):
         try:
             return handler(data)
         except ValidationError as error:
-            own = (
-                fields(data["shape"])
-                if isinstance(data, Mapping) and str(data.get("shape")) in packs.names("shapes")
-                else {}
-            )
-            for key in own.keys() & data:
+            for key in _parameters_of(data) & set(data if isinstance(data, Mapping) else ()):
                 raise BadInput(f"{key} is a parameter; expected parameters: {{{key}: {data[key]}}}") from None
             raise BadInput(problem(error, data, cls)) from None
 
@@ -470,6 +465,12 @@ def _shape(name: str, text: str | None) -> "Shape":
     from sensorgen.design import shape_files
 
     return shape_files.load(name, text)
+
+
+def _parameters_of(data: object) -> set[str]:
+    """Names of the parameters of the shape that plain data name, if they do."""
+    word = data.get("shape") if isinstance(data, Mapping) else None
+    return set(fields(word)) if isinstance(word, str) and word in packs.names("shapes") else set()
 
 
 def fields(shape_name: str, text: str | None = None) -> dict[str, dataclasses.Field[Any]]:

@@ -203,7 +203,7 @@ def readings(tracks: Tracks, frequency_hz: float, *, readout: Readout = "guarded
     Examples
     --------
     >>> one = readings(Tracks.uniform(np.array([[1e-11]]), row_ohm=1.0, column_ohm=1.0), 1e4, input_ohm=1e-3)
-    >>> round(one.siemens[0, 0].imag * 1e9, 3)  # 2 pi f C, nS
+    >>> round(float(one.siemens[0, 0].imag) * 1e9, 3)  # 2 pi f C, nS
     628.319
     """
     if not 0 < frequency_hz < np.inf:

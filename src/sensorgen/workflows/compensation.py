@@ -15,7 +15,6 @@ from sensorgen.core.errors import OutOfRange, SensorgenError
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design, make, name_of
 from sensorgen.design.printer import load_quality, quality_names
-from sensorgen.scene.array import ArrayParams
 from sensorgen.scene.scene import SLIVER_MM
 from sensorgen.workflows import moves
 from sensorgen.workflows.moves import Key, Value
@@ -379,7 +378,7 @@ class _Search:
 def _widths(design: Design, walls: str) -> list[Key]:
     """Lengths in the plane that may change: no period of an array, nor, by Cura, strips whose lines would overlap."""
     names = [name for name, _, vertical in moves.lengths(design) if not vertical]
-    is_array, is_cura = isinstance(design.params, ArrayParams), walls.startswith("cura")
+    is_array, is_cura = hasattr(design.params, "fitting"), walls.startswith("cura")
     return [
         ("parameters", name) for name in names
         if not (is_array and name == "period_mm")
@@ -396,11 +395,11 @@ def _attainable_mm(design: Design, gap_mm: float) -> float:
 
 def _print(design: Design, body: BodyOf, *, stiffness: bool = False) -> Found:
     """Quantities of a body; of an array, of a few cells without rims, counted to all of its cells."""
-    is_array = isinstance(design.params, ArrayParams)
+    is_array = hasattr(design.params, "fitting")
     few = moves.short(design) if is_array or isinstance(body, partial) else design
     one = found(body(few), stiffness=stiffness)
     params = design.params, few.params
-    sizes = [p.fitting() if isinstance(p, ArrayParams) else (p.length_mm, p.width_mm) for p in params]
+    sizes = [p.fitting() if hasattr(p, "fitting") else (p.length_mm, p.width_mm) for p in params]
     larger = prod(sizes[0]) / prod(sizes[1])
     return replace(one, design=design, capacitance_pf=one.capacitance_pf and one.capacitance_pf * larger)
 

@@ -11,7 +11,6 @@ from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Refused, Verdict, headline, listed
 from sensorgen.design.design import Design
 from sensorgen.prediction.slices import PrintReview
-from sensorgen.workflows.advice import advised
 from sensorgen.workflows.changes import Advice
 from sensorgen.workflows.moves import changed
 from sensorgen.workflows.trial import Trial, table, trial
@@ -126,6 +125,8 @@ def decision(
     if made:
         reason = made.reason if made.status == "not predicted" else ""
         if budget_s is not None:
+            from sensorgen.workflows.advice import advised
+
             step("changes")
             advice = advised(design, made, budget_s, step, time.process_time() - start_s)
     return Decision(
