@@ -8,7 +8,7 @@ import pytest
 
 import sensorgen as sg
 from sensorgen.core.display import LINES
-from sensorgen.core.errors import BadInput, MissingValue
+from sensorgen.core.errors import BadInput, MissingValue, SensorgenError
 
 PLATE = sg.Design(shape="reference")
 TRI = sg.Design(shape="tri", parameters={"length_mm": 6.0, "width_mm": 6.0})
@@ -102,6 +102,27 @@ def test_lists_of_designs():
     assert [found.verdict for found in sg.check([PLATE, PLATE])] == ["PRINT", "PRINT"]
     with pytest.raises(BadInput, match="of one design"):
         sg.predict([PLATE], force_n=[1.0])
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        lambda: sg.check("tri"), lambda: sg.predict("tri"), lambda: sg.predict([]), lambda: sg.cell([]),
+        lambda: sg.sweep(PLATE, dielectric_mm=[]), lambda: sg.sweep(PLATE, dielectric_mm=0.2),
+        lambda: sg.compress(PLATE, []), lambda: sg.compress(PLATE, [-1.0]), lambda: sg.predict(PLATE, force_n=[-5.0]),
+        lambda: sg.predict(PLATE, force_n=[2.0, 1.0]), lambda: sg.predict(PLATE, noise=-1.0),
+        lambda: sg.predict(PLATE, frequency_hz=0.0), lambda: sg.cell(PLATE, frequency_hz=-1.0),
+        lambda: sg.invert(sg.Design(shape="array"), [1e4], [[1.0]], noise=1e-3),
+    ],
+)  # fmt: skip
+def test_what_makes_no_sense_is_refused(asked):
+    with pytest.raises(SensorgenError, match="expected"):
+        asked()
+
+
+def test_a_design_is_pressed_by_its_own_tip():
+    wide = sg.Design(shape="reference", tip={"shape": "flat", "width_mm": 30.0})
+    assert "tip 30 mm" in sg.predict(wide, force_n=6.0, position_mm=50.0).text()
 
 
 def test_files_are_written(tmp_path):

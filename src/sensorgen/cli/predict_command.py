@@ -75,7 +75,7 @@ def _work(
     from sensorgen.prediction.query import DEFAULT, Query
     from sensorgen.prediction.results import Overview, Prediction
 
-    tip = design.tip.tip()
+    tip = (design.crossing if design.layout else design).tip.tip()
     tip = replace(
         tip, profile=profile or tip.profile, radius_m=None if radius_mm is None else radius_mm * units.M_PER_MM
     )

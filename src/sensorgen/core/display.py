@@ -30,7 +30,7 @@ def html(thing: object) -> str:
 @singledispatch
 def figure(thing: object) -> Any:
     """A result as a matplotlib figure; raises TypeError where it has none."""
-    raise TypeError(f"{type(thing).__name__} has no figure; import sensorgen first")
+    raise TypeError(f"{type(thing).__name__} has no figure")
 
 
 class Displayed:

@@ -103,13 +103,13 @@ def _looks(scene: Scene) -> Iterator[Region]:
     levels = sorted(
         {z for body in scene.bodies for piece in body.pieces for z in (*piece.levels_mm(), *piece.span("z"))}
     )
-    for bottom, top in pairwise(levels):
-        for share in _CUTS if top - bottom > SLIVER_MM else ():
-            z, outlines = bottom + share * (top - bottom), dict[tuple[str, str], list[shapely.Polygon]]()
-            for body in scene.bodies:
-                cut = [shapely.Polygon(outline) for piece in body.pieces for outline in piece.cut("z", z)]
-                outlines.setdefault((body.material, body.terminal), []).extend(cut)
-            yield from (shapely.union_all(own) for own in outlines.values() if own)
+    spans = [(bottom, top) for bottom, top in pairwise(levels) if top - bottom > SLIVER_MM]
+    for z in (bottom + share * (top - bottom) for bottom, top in spans for share in _CUTS):
+        outlines: dict[tuple[str, str], list[shapely.Polygon]] = {}
+        for body in scene.bodies:
+            cut = [shapely.Polygon(outline) for piece in body.pieces for outline in piece.cut("z", z)]
+            outlines.setdefault((body.material, body.terminal), []).extend(cut)
+        yield from (shapely.union_all(own) for own in outlines.values() if own)
 
 
 @lru_cache(maxsize=8)

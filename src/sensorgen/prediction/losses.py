@@ -8,7 +8,7 @@ from sensorgen.core.errors import BadInput, MissingValue
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.materials import FILM_LEAK, SET
-from sensorgen.design.values import MaterialValue, dielectrics, permittivities
+from sensorgen.design.values import ASSUMED, MaterialValue, dielectrics, permittivities
 from sensorgen.prediction.capacitance import capacitance
 
 LOSSES = ("loss_tangent", "resistivity_ohm_m")
@@ -126,9 +126,21 @@ def lost(design: Design) -> Lost:
     tangents, leaks = (_tangent(design, taken, parts[quantity]) for quantity in LOSSES)
     film = _film_leak(design)
     through_film_s = sum(t.value for t in film) * design.area_mm2 * M_PER_MM**2
-    largest = tangents[0] if parts[LOSSES[0]] else LARGEST_TANGENT
+    largest = _largest(design, taken, parts[LOSSES[0]])
     leak_s, doubts = 2 * pi * LOWEST_HZ * leaks[1] + through_film_s, tuple(_strong(taken, parts[LOSSES[1]]))
     return Lost(tangents[0], largest, leak_s, (*sets, *film), doubts)
+
+
+def _largest(design: Design, taken: Sequence[MaterialValue], given: Sequence[MaterialValue]) -> float:
+    """Largest C''/C' [-]: as given, and ``LARGEST_TANGENT`` for each dielectric but air of which none is."""
+    known = {value.material for value in given} | {"air"}
+    assumed = [
+        MaterialValue(name, LOSSES[0], LARGEST_TANGENT, ASSUMED)
+        for name in dict.fromkeys(value.material for value in taken) if name not in known
+    ]  # fmt: skip
+    if not given or known == {"air"}:
+        return LARGEST_TANGENT
+    return _tangent(design, taken, [*given, *assumed])[0]
 
 
 def _film_leak(design: Design) -> list[MaterialValue]:

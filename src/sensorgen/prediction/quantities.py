@@ -27,7 +27,7 @@ from sensorgen.prediction.electrodes import electrode_resistance
 from sensorgen.prediction.error_budget import error_budget, material_ends, modulus_range
 from sensorgen.prediction.identifiability.fisher import Setup
 from sensorgen.prediction.identifiability.identify import identify
-from sensorgen.prediction.losses import LOWEST_HZ, Lost, lost
+from sensorgen.prediction.losses import LARGEST_TANGENT, LOWEST_HZ, Lost, lost
 from sensorgen.prediction.narrowing import narrowings
 from sensorgen.prediction.plan import Plan
 from sensorgen.prediction.planning import sensor_model
@@ -460,13 +460,13 @@ def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
     yield from _ranges_assumed(body.design, model.values if model else ())
     if not body.is_drawn:
         yield "contacts between extruded lines cost no resistance: no source gives their resistivity"
-    gone = lost(body.design).taken
-    said = " and ".join(f"{t.quantity} of {t.material}" for t in gone)
-    yield (
-        f"dielectric losses: {said} as given"
-        if gone
-        else "no leak, and dielectric loss in the range of Z alone: no source gives them"
-    )
+    gone = lost(body.design)
+    given = " and ".join(f"{t.quantity} of {t.material}" for t in gone.taken)
+    unknown = f"a loss tangent of up to {LARGEST_TANGENT:g} in the range of Z alone: no source gives it"
+    if not gone.taken:
+        yield f"no leak, and {unknown}"
+    else:
+        yield f"dielectric losses: {given} as given{f', else {unknown}' * (gone.largest_tangent > gone.tan_delta)}"
     rises = model.piezoresistance if model else {}
     if not rises:
         yield "resistivity under the tip as elsewhere: no source says how it changes with pressure"

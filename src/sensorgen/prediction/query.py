@@ -1,6 +1,7 @@
 """Question about a body; the default is one for all commands."""
 
 from dataclasses import dataclass, replace
+from math import inf
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
@@ -55,7 +56,11 @@ class Query:
     range_kpa: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse pressures that do not rise."""
+        """Refuse pressures that do not rise, and frequencies and noise that none can be."""
+        if not self.frequency_hz or not all(0 < one < inf for one in self.frequency_hz):
+            raise OutOfRange(f"frequencies {self.frequency_hz} Hz; expected some above 0")
+        if not 0 < self.noise < 1:
+            raise OutOfRange(f"noise {self.noise:g}; expected a share above 0 and below 1, as 1e-3")
         if self.range_kpa and not 0 <= self.range_kpa[0] < self.range_kpa[1]:
             low, high = self.range_kpa
             raise OutOfRange(f"sensitivity from {low:g} to {high:g} kPa; expected pressures that rise from 0 or more")

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,7 +27,7 @@ from sensorgen.prediction.calibration.calibration import Calibration
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
 from sensorgen.prediction.loaded import Loaded, loaded
 from sensorgen.prediction.planning import sensor_model
-from sensorgen.prediction.query import DEFAULT, FLAT, NOISE, TONES_HZ, Query, Tip
+from sensorgen.prediction.query import DEFAULT, NOISE, TONES_HZ, Query, Tip
 from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.slices import reviewed
 from sensorgen.prediction.sweep import Sweep
@@ -93,12 +93,12 @@ def check(design: Design | Sequence[Design]) -> Review | list[Review]:
     >>> check(Design(shape="reference")).counts()["error"]
     0
     """
-    return [check(one) for one in design] if isinstance(design, Sequence) else reviewed(_named(design))
+    return reviewed(_named(design)) if isinstance(design, Design) else [check(one) for one in _several(design)]
 
 
 def predict(
-    what: Design | Body | Sequence[Design | Body], *, force_n: Sequence[float] = (), position_mm: Sequence[float] = (),
-    frequency_hz: Sequence[float] = TONES_HZ, accuracy: float | None = None, law: str = "", tip: Tip = FLAT,
+    what: Design | Body | Sequence[Design | Body], *, force_n: ArrayLike = (), position_mm: ArrayLike = (),
+    frequency_hz: ArrayLike = TONES_HZ, accuracy: float | None = None, law: str = "", tip: Tip | None = None,
     noise: float = NOISE,
 ) -> Prediction | Loaded | Sweep[PredictedPoint]:  # fmt: skip
     """Prediction of a sensor: of the print, with the drawing beside it.
@@ -107,16 +107,16 @@ def predict(
     ----------
     what : Design or Body, or a sequence of these
         A design is printed: by the G-code in ``out/NAME`` where there is one, else as slicers should print it.
-    force_n, position_mm : sequence of float
+    force_n, position_mm : float or sequence of float
         Rising [N], [mm]; if either is given, impedance over both comes with the prediction. Of one design alone.
-    frequency_hz : sequence of float
+    frequency_hz : float or sequence of float
         Frequencies [Hz].
     accuracy : float, optional
         Of abs(Z), relative [-]; the default of all commands if not given.
     law : str
         Law of compression: "unconfined", "bonded", "infill" or "solved"; the best within seconds if not given.
-    tip : Tip
-        What presses.
+    tip : Tip, optional
+        What presses; the design's own if not given.
     noise : float
         Standard deviation of Re Z and of Im Z of a reading, relative to abs(Z) [-].
 
@@ -131,15 +131,15 @@ def predict(
     >>> p.status, round(p.drawn.resistance["top"].value)  # ohm
     ('predicted', 1400)
     """
-    query = Query(tuple(frequency_hz), law=law, tip=tip, accuracy=accuracy, noise=noise)
-    if isinstance(what, Sequence):
-        if len(force_n) or len(position_mm):
+    query = Query(_numbers("frequency_hz", frequency_hz), law=law, tip=tip, accuracy=accuracy, noise=noise)
+    forces, positions = _numbers("force_n", force_n), _numbers("position_mm", position_mm)
+    if not isinstance(what, Design | Body):
+        if forces or positions:
             raise BadInput("force_n and position_mm are of one design; expected Design or Body, or neither of them")
         return swept_prediction.sweep("design", _points(what), query, 1, _silent)
-    body = _body(what)
-    if not len(force_n) and not len(position_mm):
-        return evaluate.evaluate(body, query)
-    return loaded(body, query, force_n, position_mm)
+    if not forces and not positions:
+        return evaluate.evaluate(_body(what), query)
+    return loaded(_body(what), query, forces, positions)
 
 
 def sweep(
@@ -166,7 +166,7 @@ def sweep(
     >>> [round(point.prediction.drawn.capacitance.value * 1e12) for point in found.results]  # pF
     [104, 69, 104, 69]
     """
-    if not values:
+    if not values or not all(np.ndim(some) == 1 and len(some) for some in values.values()):
         raise BadInput("sweep() without values; expected some of a setting, as dielectric_mm=[0.2, 0.3]")
     points = [(chosen, _body(one)) for chosen, one in varied(_named(design), values)]
     if unloaded:
@@ -194,14 +194,15 @@ def cell(
     >>> round(found.lower_f_per_m2 * 1e9, 2)  # nF/m2
     69.06
     """
+    _numbers("frequency_hz", () if frequency_hz is None else frequency_hz)
     asked = at_rest.Asked(accuracy, frequency_hz=frequency_hz)
-    if isinstance(what, Sequence):
+    if not isinstance(what, Design | Body):
         return at_rest.sweep("design", _points(what), asked, 1, _silent)
     return at_rest.answer(_body(what), asked)
 
 
 def compress(
-    what: Design | Body | Sequence[Design | Body], pressure_kpa: Sequence[float], *, accuracy: float | None = None
+    what: Design | Body | Sequence[Design | Body], pressure_kpa: ArrayLike, *, accuracy: float | None = None
 ) -> compression.CompressionResult | Sweep[compression.CompressionResult]:
     """Displacement and capacitance of a unit cell under pressure.
 
@@ -209,7 +210,7 @@ def compress(
     ----------
     what : Design or Body, or a sequence of these
         As of :func:`predict`.
-    pressure_kpa : sequence of float
+    pressure_kpa : float or sequence of float
         Rising [kPa].
     accuracy : float, optional
         Largest relative error of the rise of the capacitance at any pressure [-].
@@ -226,8 +227,9 @@ def compress(
     (0.0, 10.0)
     """
     wanted = inf if accuracy is None else accuracy
-    asked = compression.Asked(compression.stresses_kpa(tuple(pressure_kpa)), BoundaryConditions(), accuracy=wanted)
-    if isinstance(what, Sequence):
+    pressures = compression.stresses_kpa(_numbers("pressure_kpa", pressure_kpa) or (0.0,))
+    asked = compression.Asked(pressures, BoundaryConditions(), accuracy=wanted)
+    if not isinstance(what, Design | Body):
         return compression.sweep("design", _points(what), asked, 1, _silent)
     return compression.answer(_body(what), asked)
 
@@ -389,6 +391,10 @@ def invert(what: Design | Body, frequency_hz: Sequence[float], impedance_ohm: Ar
     >>> round(float(found.force_n[0]), 2), round(float(found.position_m[0]), 3)
     (2.0, 0.03)
     """
+    if isinstance(what, Design) and what.layout:
+        raise BadInput(
+            "an array has many presses at once; expected its frames in a file, by the command sensorgen invert"
+        )
     model, _ = sensor_model(_body(what))
     return Estimator(model.sensor, tuple(frequency_hz), noise).batch(np.asarray(impedance_ohm))
 
@@ -419,8 +425,23 @@ def _named(design: Design) -> Design:
     return design if design.name else designs.make(design.model_dump(exclude_defaults=True, mode="json"))
 
 
+def _numbers(name: str, values: ArrayLike) -> tuple[float, ...]:
+    """Rising numbers from 0 on."""
+    found = np.atleast_1d(np.asarray(values, float))
+    if found.ndim > 1 or not (np.isfinite(found).all() and (found >= 0).all() and (np.diff(found) > 0).all()):
+        raise BadInput(f"{name}={values!r:.60}; expected a number, or rising numbers, from 0 on")
+    return tuple(found.tolist())
+
+
+def _several(what: object) -> Sequence[Any]:
+    """A sequence of designs that is none of characters, and not empty."""
+    if isinstance(what, str) or not isinstance(what, Sequence) or not what:
+        raise BadInput(f"{what!r:.60}: expected a Design, as Design(shape='tri') or load('mine.yaml'), or some of them")
+    return what
+
+
 def _points(many: Sequence[Design | Body]) -> list[tuple[str, Body]]:
-    bodies_of = [_body(what) for what in many]
+    bodies_of = [_body(what) for what in _several(many)]
     return [(body.design.name, body) for body in bodies_of]
 
 

@@ -247,6 +247,11 @@ def _best(bounds: Bounds | None) -> str:
     return Bounds.of(float(f"{bounds.value:.2g}"), bounds.unit).words() if bounds else "–"
 
 
+def _crossings(design: Design) -> str:
+    """Part of an array that numbers are of, in words; "" of any other design."""
+    return f"one of {sum(map(sum, design.layout.here))} crossings, " if design.layout else ""
+
+
 def trial(
     design: Design, query: Query = DEFAULT, *, folder: Path | None = None, slicer: str = "", keep: bool = True,
     drawn: bool = True, held: PrintReview | None = None,
@@ -285,7 +290,8 @@ def trial(
     findings = tuple(f for f in held.findings if not f.waiver)
     assumed = predicted.budget.by_press()[:1] if predicted.budget else ()
     return Trial(
-        design.name, design.id(), body.provenance, predicted.status, predicted.reason, verdict(findings), findings,
+        design.name, design.id(), f"{_crossings(design)}{body.provenance}",
+        predicted.status, predicted.reason, verdict(findings), findings,
         predicted.force_n, predicted.position_m, design.params.length_mm * M_PER_MM,
         Numbers.of(predicted.drawn) if predicted.drawn else Numbers(), Numbers.of(predicted), predicted.doubts,
         Toolpath.of(held.file.report) if held.file else None, "".join(term.words() for term in assumed),

@@ -1,6 +1,7 @@
 """Figures of results that notebooks show: findings in the section of a sensor, and sweeps."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,13 +21,18 @@ def findings(found: Review) -> Figure:
         Curve("line", name, *_from_side(mesh.vertices_mm, edges(mesh)), colour=COLOURS[2 + k % (len(COLOURS) - 2)])
         for k, (name, mesh) in enumerate(found.meshes.items())
     ]
-    for severity, colour in _SEVERITIES.items():
-        there = [f for f in found.findings if f.severity == severity and f.place_mm and not f.waiver]
-        x, z = ([f.place_mm[k] for f in there if f.place_mm] for k in (0, 2))
-        curves.append(Curve("points", severity, x, z, text=[f.message for f in there], colour=colour))
-    panel = Panel(tuple(curves), Axis("x [mm]"), Axis("z [mm]"))
+    panel = Panel((*curves, *_places(found)), Axis("x [mm]"), Axis("z [mm]"))
     alt = "Bodies of the sensor from the side, and where findings are."
     return Figure("findings", f"{found.verdict}: {found.source}", alt, {"": (panel,)})
+
+
+def _places(found: Review) -> Iterator[Curve]:
+    """Places of findings from the side, by severity."""
+    for severity, colour in _SEVERITIES.items():
+        there = [f for f in found.findings if f.severity == severity and not f.waiver]
+        x, z = ([f.place_mm[k] for f in there if f.place_mm] for k in (0, 2))
+        text = [f.message for f in there if f.place_mm]
+        yield Curve("points", severity, x, z, text=text, colour=colour)
 
 
 def _from_side(vertices_mm: Any, ends: Any) -> tuple[Any, Any]:
@@ -43,45 +49,52 @@ def sweep(found: Sweep[Any]) -> Figure:
     x = keys if len(table.cells) > len(found.results) else 0
     panels = tuple(
         _panel(table, x, y, [k for k in range(keys) if k != x])
-        for y, column in enumerate(table.columns)
-        if y >= keys
-        and y != x
-        and not column.hidden
-        and column.unit != "s"
-        and any(_is_number(row[y]) for row in table.cells)
+        for y in range(keys, len(table.columns))
+        if y != x and _is_shown(table, y)
     )
     title = ", ".join(table.columns[k].name for k in range(keys))
     return Figure("sweep", f"Along {title}", "Results along settings.", {"": panels}, columns=2)
 
 
+def _is_shown(table: Table, y: int) -> bool:
+    """True for a column of numbers for people, other than times."""
+    column = table.columns[y]
+    return not column.hidden and column.unit != "s" and any(_is_number(row[y]) for row in table.cells)
+
+
 def _panel(table: Table, x: int, y: int, others: Sequence[int]) -> Panel:
-    groups: dict[tuple[Cell, ...], list[tuple[Any, ...]]] = {}
+    """A line for each combination of the other settings; marks alone where the first setting is a name."""
+    groups: dict[str, list[tuple[Any, ...]]] = {}
     for row in table.cells:
         if _is_number(row[y]):
-            groups.setdefault(tuple(row[k] for k in others), []).append(row)
-    names = tuple(dict.fromkeys(str(row[x]) for row in table.cells)) if not _is_number(table.cells[0][x]) else ()
+            label = ", ".join(f"{table.columns[k].name} {row[k]}" for k in others)
+            groups.setdefault(label, []).append(row)
+    column, over = table.columns[y], Axis(table.columns[x].head)
+    every = np.array([row[y] for rows in groups.values() for row in rows], float)
+    divisor, unit = scale(every, column.unit) if column.unit.startswith("F/") else (1.0, column.unit)
+    what = Axis(f"{column.name} [{unit}]" if unit else column.name)
+    if _is_number(table.cells[0][x]):
+        return Panel(tuple(_lines(table, x, y, groups, divisor)), over, what)
+    names = tuple(dict.fromkeys(str(row[x]) for row in table.cells))
+    marks = tuple(
+        Curve("points", label, [row[y] / divisor for row in rows], [str(row[x]) for row in rows], **look(k))
+        for k, (label, rows) in enumerate(groups.items())
+    )
+    return Panel(marks, what, replace(over, names=names))
+
+
+def _lines(
+    table: Table, x: int, y: int, groups: Mapping[str, Sequence[tuple[Any, ...]]], divisor: float
+) -> Iterator[Curve]:
+    """Lines with marks, and dotted ends of the ranges where the table has them."""
     head = table.columns[y].name
-    ends = [k for k, c in enumerate(table.columns) if c.name in (f"{head}, least", f"{head}, most")]  # dotted
-    values_of = np.array([row[y] for rows in groups.values() for row in rows], float)
-    unit = table.columns[y].unit
-    divisor, prefixed = scale(values_of, unit) if unit.startswith("F/") else (1.0, unit)
-    what, over = Axis(f"{head} [{prefixed}]" if prefixed else head), Axis(table.columns[x].head, names=names)
-
-    def curves() -> Iterator[Curve]:
-        for k, (chosen, rows) in enumerate(groups.items()):
-            label = ", ".join(f"{table.columns[o].name} {v}" for o, v in zip(others, chosen, strict=True))
-            along, values = [str(row[x]) if names else row[x] for row in rows], [row[y] / divisor for row in rows]
-            if names:
-                yield Curve("points", label, values, along, **look(k))
-                continue
-            yield Curve("line", "", along, values, colour=look(k)["colour"])
-            for end in ends:
-                yield Curve(
-                    "line", "", along, [row[end] / divisor for row in rows], colour=look(k)["colour"], dash="dot"
-                )
-            yield Curve("points", label, along, values, **look(k))
-
-    return Panel(tuple(curves()), *((what, over) if names else (over, what)))
+    ends = [k for k, c in enumerate(table.columns) if c.name in (f"{head}, least", f"{head}, most")]
+    for k, (label, rows) in enumerate(groups.items()):
+        along = [row[x] for row in rows]
+        for column, dash in ((y, "solid"), *((end, "dot") for end in ends)):
+            values = [row[column] / divisor for row in rows]
+            yield Curve("line", "", along, values, colour=look(k)["colour"], dash=dash)
+        yield Curve("points", label, along, [row[y] / divisor for row in rows], **look(k))
 
 
 def _is_number(cell: Cell) -> bool:
