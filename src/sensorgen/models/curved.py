@@ -104,12 +104,18 @@ def _looks(scene: Scene) -> Iterator[Region]:
         {z for body in scene.bodies for piece in body.pieces for z in (*piece.levels_mm(), *piece.span("z"))}
     )
     spans = [(bottom, top) for bottom, top in pairwise(levels) if top - bottom > SLIVER_MM]
-    for z in (bottom + share * (top - bottom) for bottom, top in spans for share in _CUTS):
-        outlines: dict[tuple[str, str], list[shapely.Polygon]] = {}
-        for body in scene.bodies:
-            cut = [shapely.Polygon(outline) for piece in body.pieces for outline in piece.cut("z", z)]
-            outlines.setdefault((body.material, body.terminal), []).extend(cut)
-        yield from (shapely.union_all(own) for own in outlines.values() if own)
+    for bottom, top in spans:
+        for share in _CUTS:
+            yield from _at(scene, bottom + share * (top - bottom))
+
+
+def _at(scene: Scene, z_mm: float) -> Iterator[Region]:
+    """Regions of each material and terminal at a height."""
+    outlines: dict[tuple[str, str], list[shapely.Polygon]] = {}
+    for body in scene.bodies:
+        cut = [shapely.Polygon(outline) for piece in body.pieces for outline in piece.cut("z", z_mm)]
+        outlines.setdefault((body.material, body.terminal), []).extend(cut)
+    return (shapely.union_all(own) for own in outlines.values() if own)
 
 
 @lru_cache(maxsize=8)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
+from sensorgen.core.bounds import Bounds
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.findings import Finding, grouped
 from sensorgen.prediction.identifiability.results import GUESS
@@ -137,19 +138,22 @@ def effects(now: Trial, then: Trial) -> tuple[bool, str]:
     words, factors = [], list[float]()
     ends = zip(now.printed.bench(), then.printed.bench(), (now.force_n, 2 * now.position_m), strict=True)
     for name, (old, new, whole) in zip(("force resolution", "position resolution"), ends, strict=True):
-        known = [bool(one and one.value < GUESS * whole) for one in (old, new)]
-        if all(known) and old and new:
-            factors.append(old.value / new.value)
-        elif any(known):
-            factors.append(inf if known[1] else 0.0)
-        else:
-            continue
-        words.append(f"{name} {_factor(factors[-1])}")
+        if (gain := _gain(old, new, GUESS * whole)) is not None:
+            factors.append(gain)
+            words.append(f"{name} {_factor(gain)}")
     if (old := now.printed.sensitivity) and (new := then.printed.sensitivity):
         factors.append(new.value / old.value)
         words.append(f"sensitivity {_factor(factors[-1])}")
     better = max(factors, default=1.0) > 1 + SAME and min(factors, default=1.0) >= 1 - SAME
     return better, ", ".join(word for word in words if not word.endswith("as now"))
+
+
+def _gain(old: Bounds | None, new: Bounds | None, useless: float) -> float | None:
+    """Gain of a resolution, 0 where it is lost, infinite where there was none; None without one before and after."""
+    before, after = (one.value if one and one.value < useless else None for one in (old, new))
+    if before is None or after is None:
+        return None if before is after else inf if before is None else 0.0
+    return before / after
 
 
 def _factor(gain: float) -> str:

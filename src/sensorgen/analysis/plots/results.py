@@ -64,11 +64,7 @@ def _is_shown(table: Table, y: int) -> bool:
 
 def _panel(table: Table, x: int, y: int, others: Sequence[int]) -> Panel:
     """A line for each combination of the other settings; marks alone where the first setting is a name."""
-    groups: dict[str, list[tuple[Any, ...]]] = {}
-    for row in table.cells:
-        if _is_number(row[y]):
-            label = ", ".join(f"{table.columns[k].name} {row[k]}" for k in others)
-            groups.setdefault(label, []).append(row)
+    groups = _grouped(table, y, others)
     column, over = table.columns[y], Axis(table.columns[x].head)
     every = np.array([row[y] for rows in groups.values() for row in rows], float)
     divisor, unit = scale(every, column.unit) if column.unit.startswith("F/") else (1.0, column.unit)
@@ -81,6 +77,16 @@ def _panel(table: Table, x: int, y: int, others: Sequence[int]) -> Panel:
         for k, (label, rows) in enumerate(groups.items())
     )
     return Panel(marks, what, replace(over, names=names))
+
+
+def _grouped(table: Table, y: int, others: Sequence[int]) -> dict[str, list[tuple[Any, ...]]]:
+    """Rows with a number in a column, by the other settings in words."""
+    groups: dict[str, list[tuple[Any, ...]]] = {}
+    for row in table.cells:
+        if _is_number(row[y]):
+            label = ", ".join(f"{table.columns[k].name} {row[k]}" for k in others)
+            groups.setdefault(label, []).append(row)
+    return groups
 
 
 def _lines(
