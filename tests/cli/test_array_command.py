@@ -25,7 +25,9 @@ def test_it_says_what_is_resolved(run, file):
     for words in ("3 rows x 4 columns, 12 crossings", "+11.2 % at 100 kPa", "guarded, through 50 ohm, 10 kHz",
                   "3 of 12 crossings are not determined", "left out: fringe"):  # fmt: skip
         assert words in said.words
+    assert "share a factor 0.15 to 1.6: stiffness by its sources" in said.words
     data = json.loads(run("array", file, "--json", "--pressure", "50").out)
+    assert data["shared_factor"] == pytest.approx([0.15, 1.632], rel=1e-2)
     assert data["pressure_kpa"] == 50
     assert np.shape(data["sigma_kpa"]) == (3, 4)
 
@@ -37,6 +39,8 @@ def test_a_virtual_step_is_inverted(run, file, tmp_path):
     said = run("invert", file, "step.npz", "-o", "maps.npz", "--plot", ".")
     assert said.code == 0, said.err
     assert "60, inverted by" in said.words
+    assert "of noise and scatter alone" in said.words
+    assert "share a factor 0.15 to 1.6" in said.words
     assert (tmp_path / "a-map.png").is_file()
     with np.load(tmp_path / "maps.npz") as found, np.load(tmp_path / "step.npz") as true:
         off = (found["pressure_kpa"] - true["pressure_kpa"][5:]) / found["sigma_kpa"]

@@ -38,7 +38,7 @@ class PressureMaps:
     time_s : (k,) array
         Of each frame [s].
     pressure_kpa, sigma_kpa : (k, m, n) array
-        Pressure on the surface and its standard error; nan where it is not determined [kPa].
+        Pressure on the surface and its standard error of noise and scatter alone; nan where it is not determined [kPa].
     """
 
     model: ArrayModel
@@ -108,12 +108,13 @@ class PressureMaps:
         low, high = (float(each) for each in (sigma.min(initial=np.inf), sigma.max(initial=0.0)))
         yield Facts((
             ("frames", f"{len(self.time_s)}, inverted by {self.by}"),
-            ("pressures", f"standard errors {low:.3g} to {high:.3g} kPa in the heaviest frame"),
+            ("pressures", f"standard errors {low:.3g} to {high:.3g} kPa in the heaviest frame, of noise and scatter alone"),
             *((("not determined", f"{dark} of {count} crossings: {self._names(k)}"),) if dark else ()),
         ))  # fmt: skip
         yield ""
         shown = tuple(float(f"{v:.4g}") if isinstance(v, float) else v for v in table.cells[k])
         yield Table("heaviest", "the heaviest frame", table.columns, (shown,))
+        yield from self.model.shared()
         yield from (f"doubtful: {doubt}" for doubt in self.model.crossing.doubts)
 
     def _names(self, k: int) -> str:
@@ -139,7 +140,12 @@ class PressureMaps:
         table = self.table()
         keys = [column.key for column in table.columns]
         frames = [dict(zip(keys, row, strict=True)) for row in table.cells]
-        found: dict[str, Any] = {"array": self.model.design.name, "by": self.by, "frames": frames}
+        found: dict[str, Any] = {
+            "array": self.model.design.name,
+            "by": self.by,
+            "shared_factor": self.model.shared_factor,
+            "frames": frames,
+        }
         return to_json(found)
 
 

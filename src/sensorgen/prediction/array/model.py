@@ -1,6 +1,6 @@
 """An array in numbers: the cell of every crossing as printed, and the resistance of every track to its pad."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated
@@ -16,6 +16,7 @@ from sensorgen.design.arrays import Layout, Track
 from sensorgen.design.design import Design
 from sensorgen.models.compression import Curve
 from sensorgen.prediction import bodies
+from sensorgen.prediction.error_budget import modulus_range
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.sensor_model import SensorModel
 from sensorgen.solvers.tracks import Tracks
@@ -116,6 +117,20 @@ class ArrayModel:
         """Pressure on the surface up to which the law of the cell is known, further straight; infinite of a plate."""
         law = self.crossing.law.compression
         return law.stress_pa[-1] / self.load_factor if isinstance(law, Curve) else float("inf")
+
+    @cached_property
+    def shared_factor(self) -> tuple[float, float]:
+        """Least and largest true pressure per stated one, of all crossings at once, by the sources of the moduli [-]."""
+        return modulus_range(self.crossing)[:2]
+
+    def shared(self) -> Iterator[str]:
+        """A line of that factor; none where the law of the cell is measured."""
+        (low, high), words = self.shared_factor, modulus_range(self.crossing)[2]
+        if low < high:
+            yield (
+                f"all pressures and forces share a factor {low:.2g} to {high:.2g}: stiffness by its sources ({words}); "
+                "press with a known weight"
+            )
 
     def under(self, pressure_pa: Real) -> tuple[Real, Real]:
         """Capacitance over that at rest [-] and its derivative by the pressure on the surface [1/Pa].

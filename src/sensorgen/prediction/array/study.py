@@ -122,9 +122,10 @@ class ArrayStudy:
         )  # fmt: skip
         yield Table("resolution", "", columns, tuple(rows))
         yield (
-            f"(standard errors of one frame at {self.pressure_kpa:g} kPa; smallest press: {DETECTED:g} sigma on one "
+            f"(standard errors of one frame at {self.pressure_kpa:g} kPa, of noise alone; smallest press: {DETECTED:g} sigma on one "
             "crossing; two presses show apart from two pitches on)"
         )
+        yield from self.model.shared()
         if self.crosstalk is not None:
             finite = self.crosstalk[self.determined]
             yield (
@@ -146,6 +147,7 @@ class ArrayStudy:
             "column_ohm_per_square": self.model.column_ohm,
             "load_factor": self.model.load_factor,
             "pressure_kpa": self.pressure_kpa,
+            "shared_factor": self.model.shared_factor,
             "sigma_kpa": _map(np.where(self.determined, self.sigma_kpa, np.nan)),
             "sigma_n": _map(np.where(self.determined, self.sigma_n, np.nan)),
             "crosstalk": None if self.crosstalk is None else _map(self.crosstalk),
