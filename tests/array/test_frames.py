@@ -157,6 +157,9 @@ def test_files_of_both_kinds_say_the_same(tmp_path, model):
         ("f.csv", "r1c1,r1c2\n1\n", "line 2: 1 values; expected 2"),
         ("f.csv", "r1c1\nmany\n", "line 2: 'many' is no number"),
         ("f.csv", "r1c1\n", "no frames"),
+        ("f.csv", "r1c1,r01c1\n1,2\n", "columns r1c1, r01c1 repeat"),
+        ("f.csv", "rest,r1c1,rest\n1,2,0\n", "columns rest, rest repeat"),
+        ("f.csv", "r0c1\n1\n", "columns r0c1; expected r1c1 to r5c6"),
         ("f.csv", "r1c1\n1e-12\n", "no frequency of the readings"),
         ("f.npz", "text", "no NPZ file"),
         ("f.npz", {"siemens": np.ones((2, 6, 5))}, "siemens is 2 x 6 x 5; expected frames x 5 rows x 6 columns"),
@@ -174,6 +177,17 @@ def test_no_frames_are_an_error(tmp_path, name, content, words):
         path.write_text(content)
     with pytest.raises(BadInput, match=words):
         read(path, (5, 6), None)
+
+
+def test_a_file_at_rest_gives_what_it_marks_and_its_own_frequency(tmp_path):
+    path, values = tmp_path / "f.npz", np.arange(3.0)[:, None, None] * np.ones((3, 5, 6))
+    np.savez(path, siemens=values, rest=[0, 1, 1], frequency_hz=1e4, Rest=1)
+    assert read(path, (5, 6), 1e4).at_rest()[:, 0, 0].tolist() == [1, 2]
+    assert read(path, (5, 6), None).unused == ("Rest",)
+    with pytest.raises(BadInput, match="frequency_hz is 10 kHz; expected 20 kHz"):
+        read(path, (5, 6), 2e4)
+    np.savez(path, siemens=values)
+    assert len(read(path, (5, 6), 1e4).at_rest()) == 3
 
 
 def test_a_virtual_step_is_a_recording(tmp_path, model):

@@ -32,9 +32,9 @@ def invert(
     shape = (model.here.shape[0], model.here.shape[1])
     hertz = one("--frequency", frequency) if frequency else None
     frames = read(Path(measured), shape, hertz)
-    apart = read(Path(rest_file), shape, frames.frequency_hz).siemens if rest_file else None
+    apart = read(Path(rest_file), shape, frames.frequency_hz).at_rest() if rest_file else None
     how = ArrayReadout(readout, input_ohm, (frames.frequency_hz,), NOISE if noise is None else noise)  # type: ignore[arg-type]
-    found = inverted(model, how, frames.siemens, frames.rest, frames.time_s, scatter, apart)
+    found = inverted(model, how, frames.siemens, frames.rest, frames.time_s, scatter, apart, frames.unused)
     if output:
         _write(found, output)
     if plot is not None:

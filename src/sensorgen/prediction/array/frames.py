@@ -1,6 +1,6 @@
 """Frames of an array to pressure maps: by C/C0 where that suffices, else with the network of the tracks."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
@@ -108,7 +108,8 @@ class PressureMaps:
         low, high = (float(each) for each in (sigma.min(initial=np.inf), sigma.max(initial=0.0)))
         yield Facts((
             ("frames", f"{len(self.time_s)}, inverted by {self.by}"),
-            ("pressures", f"standard errors {low:.3g} to {high:.3g} kPa in the heaviest frame, of noise and scatter alone"),
+            ("pressures", f"standard errors {low:.3g} to {high:.3g} kPa in the heaviest frame, "
+                          "of noise and scatter alone"),
             *((("not determined", f"{dark} of {count} crossings: {self._names(k)}"),) if dark else ()),
         ))  # fmt: skip
         yield ""
@@ -296,7 +297,7 @@ class MapInverter:
 
 def inverted(
     model: ArrayModel, readout: ArrayReadout, siemens: Complex, rest: Mask, time_s: Real, scatter: float = SCATTER,
-    apart: "Complex | None" = None,
+    apart: "Complex | None" = None, unused: Sequence[str] = (),
 ) -> PressureMaps:  # fmt: skip
     """Pressure maps of a recording.
 
@@ -314,6 +315,8 @@ def inverted(
         Standard deviation of the gain from cell to cell [-].
     apart : (r, m, n) array, optional
         Readings at rest of another file, in place of those of this one [S].
+    unused : sequence of str
+        Columns that were not read, named where no frame is at rest.
 
     Raises
     ------
@@ -326,6 +329,7 @@ def inverted(
         raise BadInput(
             "no frame at rest; expected 'rest' with 1 where nothing was on the array, or --rest FILE: what counts is "
             "the ratio to it, and a standing load is never taken for rest"
+            + (f"; not read: {', '.join(unused[:_SHOWN])}" if unused else "")
         )
     loaded = ~rest
     if not loaded.any():

@@ -120,7 +120,7 @@ class ArrayModel:
 
     @cached_property
     def shared_factor(self) -> tuple[float, float]:
-        """Least and largest true pressure per stated one, of all crossings at once, by the sources of the moduli [-]."""
+        """Least and largest true pressure per stated one, of all crossings at once, by the moduli's sources [-]."""
         return modulus_range(self.crossing)[:2]
 
     def shared(self) -> Iterator[str]:

@@ -122,8 +122,8 @@ class ArrayStudy:
         )  # fmt: skip
         yield Table("resolution", "", columns, tuple(rows))
         yield (
-            f"(standard errors of one frame at {self.pressure_kpa:g} kPa, of noise alone; smallest press: {DETECTED:g} sigma on one "
-            "crossing; two presses show apart from two pitches on)"
+            f"(standard errors of one frame at {self.pressure_kpa:g} kPa, of noise alone; smallest press: "
+            f"{DETECTED:g} sigma on one crossing; two presses show apart from two pitches on)"
         )
         yield from self.model.shared()
         if self.crosstalk is not None:
