@@ -13,6 +13,7 @@ from sensorgen.measure.array_frames import read
 from sensorgen.prediction.array.frames import inverted
 from sensorgen.prediction.array.model import array_model
 from sensorgen.prediction.array.readout import ArrayReadout
+from sensorgen.prediction.array.study import study
 from sensorgen.prediction.array.virtual import foot, simulated, step
 
 TRI = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
@@ -116,6 +117,45 @@ def test_what_is_not_read_is_not_no_pressure(model):
     assert np.isnan(broken.pressure_kpa[:, 1, 3:]).all()
     assert np.isnan(broken.pressure_kpa).sum() == 2 * 3
     assert plots.maps(broken, PRESSURE)[:4] == b"\x89PNG"
+
+
+def test_readings_of_no_capacitance_are_no_numbers(model):
+    """The other sign of i, one frame or all; pF typed as F; real parts alone; nothing."""
+    readout = ArrayReadout(frequency_hz=(10e3,))
+    frames = frames_of(model, readout)
+    frames[4] = frames[4].conj()
+    found = maps(model, readout, frames)
+    assert np.isfinite(found.pressure_kpa[0]).all()
+    assert np.isnan(found.pressure_kpa[1]).all()
+    assert [found.table().cells[1][k] for k in (1, 2, 6)] == [None] * 3
+    assert found.heaviest() == 0
+    farad = model.capacitance.value
+    for wrong, words in (
+        (frames.conj(), "median imaginary part is -"),
+        (frames * 1e12, f"predicted .*{farad * 1e12:.2g}.* pF"),
+        (frames.real + 0j, "0 S"),
+        (frames * np.nan, "is none, predicted"),
+    ):
+        with pytest.raises(BadInput, match=words):
+            maps(model, readout, wrong)
+
+
+def test_what_does_not_settle_is_counted(model, monkeypatch):
+    readout = ArrayReadout("two-terminal", frequency_hz=(10e3,), noise=1e-6)
+    monkeypatch.setattr("sensorgen.prediction.array.frames._STEPS", 1)
+    found = maps(model, readout, frames_of(model, readout))
+    dark = int(np.isnan(found.pressure_kpa).sum())
+    assert dark > 0
+    assert f"{dark} values left out that 1 steps" in found.by
+
+
+@pytest.mark.parametrize("noise_s", [1e-9, 2e-7])
+def test_not_determined_is_one_thing_here_and_in_a_study(model, noise_s):
+    readout, flat = ArrayReadout(noise=0.0, noise_s=noise_s), np.full((1, 5, 6), 1e3)
+    known = study(model, readout, 1.0).determined
+    found = maps(model, readout, frames_of(model, readout, pressures_pa=flat))
+    assert np.isfinite(found.pressure_kpa[0]).tolist() == known.tolist()
+    assert known.all() == (noise_s < 1e-8)
 
 
 def test_a_standing_load_is_never_taken_for_rest(model):

@@ -153,20 +153,25 @@ def _of_csv(path: Path, shape: tuple[int, int]) -> tuple[dict[str, np.ndarray], 
         found["time_s"] = _numbers(columns["time_s"], path)
     if "rest" in columns:
         found["rest"] = np.array([word.strip().lower() in _TRUE for word in columns["rest"]])
-    return found, [name for name in columns if name and name not in {*crossings, "time_s", "rest"}]
+    return found, sorted({*columns} - {*crossings, "time_s", "rest", ""})
 
 
 def _crossings(names: Sequence[str], shape: tuple[int, int], path: Path) -> dict[str, tuple[int, int]]:
     """Row and column of each name of a crossing."""
     found = {name: (int(m[1]) - 1, int(m[2]) - 1) for name in names if (m := _CROSSING.fullmatch(name))}
-    times = Counter(found.get(name, name) for name in names if name)
-    if repeated := [name for name in names if times[found.get(name, name)] > 1]:
-        raise BadInput(f"{path}: columns {', '.join(repeated[:3])} repeat; expected each once")
+    _refuse_repeated(names, found, path)
     wrong = [name for name, (i, j) in found.items() if not (0 <= i < shape[0] and 0 <= j < shape[1])]
     if wrong or not found:
         words = ", ".join(wrong[:3]) or "without any crossing"
         raise BadInput(f"{path}: columns {words}; expected r1c1 to r{shape[0]}c{shape[1]} of this array")
     return found
+
+
+def _refuse_repeated(names: Sequence[str], found: dict[str, tuple[int, int]], path: Path) -> None:
+    """Refuse names that repeat, and two of one crossing."""
+    times = Counter(found.get(name, name) for name in names if name)
+    if repeated := [name for name in names if times[found.get(name, name)] > 1]:
+        raise BadInput(f"{path}: columns {', '.join(repeated[:3])} repeat; expected each once")
 
 
 def _numbers(words: Sequence[str], path: Path) -> Real:
