@@ -119,6 +119,10 @@ def test_an_outline_leaves_its_corner_out():
     found = study(corner, ArrayReadout())
     assert np.isnan(found.sigma_kpa).tolist() == [[False] * 4, [False] * 4, [False] * 3 + [True]]
     assert plots.png(found)[:4] == b"\x89PNG"
+    for fault in ("r3c4", "r3:3", "c4:2"):
+        with pytest.raises(BadInput, match=f"fault {fault}: the outline leaves this place out"):
+            study(corner, ArrayReadout(), faults=[fault])
+    assert study(corner, ArrayReadout(), faults=["r3:2", "c4:1", "r3:2"]).determined.sum() == 12 - 1 - 2
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,9 @@ from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.document import Column, Facts, Part, Table, comma_separated, to_json
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
-from sensorgen.prediction.array.model import ArrayModel
+from sensorgen.prediction.array.model import PA_PER_KPA, ArrayModel
 from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayReadout, own_slopes
-from sensorgen.prediction.array.study import DETECTED, DETERMINED, PA_PER_KPA
+from sensorgen.prediction.array.study import DETECTED, DETERMINED
 from sensorgen.solvers.tracks import Readings, readings
 
 SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration of each
@@ -123,6 +123,7 @@ class PressureMaps:
         shown = tuple(float(f"{v:.4g}") if isinstance(v, float) else v for v in table.cells[k])
         yield Table("heaviest", "the heaviest frame", table.columns, (shown,))
         yield from self.model.shared()
+        yield from self.model.beyond(self.peak_kpa)
         yield from (f"doubtful: {doubt}" for doubt in self.model.crossing.doubts)
 
     def _names(self, k: int) -> str:

@@ -21,6 +21,7 @@ from sensorgen.prediction.query import Query
 from sensorgen.prediction.sensor_model import SensorModel
 from sensorgen.solvers.tracks import Tracks
 
+PA_PER_KPA = 1e3
 USUAL_KPA = 90.0  # of 6 N on 8 x 8 mm
 _N_PER_KPA_MM2 = 1e-3
 _NEWTON = 12  # steps: the law is smooth and nearly straight
@@ -131,6 +132,12 @@ class ArrayModel:
                 f"all pressures and forces share a factor {low:.2g} to {high:.2g}: stiffness by its sources ({words}); "
                 "press with a known weight"
             )
+
+    def beyond(self, kpa: Real) -> Iterator[str]:
+        """A line where pressures lie beyond the law of the cell."""
+        if count := int((kpa * PA_PER_KPA > self.known_pa).sum()):
+            of = f"the peak of {count} of {kpa.size} frames" if kpa.size > 1 else f"{kpa[0]:.4g} kPa"
+            yield f"extrapolated: {of} exceeds {self.known_pa / PA_PER_KPA:.0f} kPa, where the law of the cell ends"
 
     def under(self, pressure_pa: Real) -> tuple[Real, Real]:
         """Capacitance over that at rest [-] and its derivative by the pressure on the surface [1/Pa].
