@@ -13,6 +13,7 @@ from sensorgen.measure.array_frames import read
 from sensorgen.prediction.array.frames import inverted
 from sensorgen.prediction.array.model import array_model
 from sensorgen.prediction.array.readout import ArrayReadout
+from sensorgen.prediction.array.study import study
 from sensorgen.prediction.array.virtual import foot, simulated, step
 
 TRI = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
@@ -118,6 +119,45 @@ def test_what_is_not_read_is_not_no_pressure(model):
     assert plots.maps(broken, PRESSURE)[:4] == b"\x89PNG"
 
 
+def test_readings_of_no_capacitance_are_no_numbers(model):
+    """The other sign of i, one frame or all; pF typed as F; real parts alone; nothing."""
+    readout = ArrayReadout(frequency_hz=(10e3,))
+    frames = frames_of(model, readout)
+    frames[4] = frames[4].conj()
+    found = maps(model, readout, frames)
+    assert np.isfinite(found.pressure_kpa[0]).all()
+    assert np.isnan(found.pressure_kpa[1]).all()
+    assert [found.table().cells[1][k] for k in (1, 2, 6)] == [None] * 3
+    assert found.heaviest() == 0
+    farad = model.capacitance.value
+    for wrong, words in (
+        (frames.conj(), "median imaginary part is -"),
+        (frames * 1e12, f"predicted .*{farad * 1e12:.2g}.* pF"),
+        (frames.real + 0j, "0 S"),
+        (frames * np.nan, "is none, predicted"),
+    ):
+        with pytest.raises(BadInput, match=words):
+            maps(model, readout, wrong)
+
+
+def test_what_does_not_settle_is_counted(model, monkeypatch):
+    readout = ArrayReadout("two-terminal", frequency_hz=(10e3,), noise=1e-6)
+    monkeypatch.setattr("sensorgen.prediction.array.frames._STEPS", 1)
+    found = maps(model, readout, frames_of(model, readout))
+    dark = int(np.isnan(found.pressure_kpa).sum())
+    assert dark > 0
+    assert f"{dark} values left out that 1 steps" in found.by
+
+
+@pytest.mark.parametrize("noise_s", [1e-9, 2e-7])
+def test_not_determined_is_one_thing_here_and_in_a_study(model, noise_s):
+    readout, flat = ArrayReadout(noise=0.0, noise_s=noise_s), np.full((1, 5, 6), 1e3)
+    known = study(model, readout, 1.0).determined
+    found = maps(model, readout, frames_of(model, readout, pressures_pa=flat))
+    assert np.isfinite(found.pressure_kpa[0]).tolist() == known.tolist()
+    assert known.all() == (noise_s < 1e-8)
+
+
 def test_a_standing_load_is_never_taken_for_rest(model):
     readout = ArrayReadout()
     frames = frames_of(model, readout)
@@ -157,6 +197,9 @@ def test_files_of_both_kinds_say_the_same(tmp_path, model):
         ("f.csv", "r1c1,r1c2\n1\n", "line 2: 1 values; expected 2"),
         ("f.csv", "r1c1\nmany\n", "line 2: 'many' is no number"),
         ("f.csv", "r1c1\n", "no frames"),
+        ("f.csv", "r1c1,r01c1\n1,2\n", "columns r1c1, r01c1 repeat"),
+        ("f.csv", "rest,r1c1,rest\n1,2,0\n", "columns rest, rest repeat"),
+        ("f.csv", "r0c1\n1\n", "columns r0c1; expected r1c1 to r5c6"),
         ("f.csv", "r1c1\n1e-12\n", "no frequency of the readings"),
         ("f.npz", "text", "no NPZ file"),
         ("f.npz", {"siemens": np.ones((2, 6, 5))}, "siemens is 2 x 6 x 5; expected frames x 5 rows x 6 columns"),
@@ -174,6 +217,17 @@ def test_no_frames_are_an_error(tmp_path, name, content, words):
         path.write_text(content)
     with pytest.raises(BadInput, match=words):
         read(path, (5, 6), None)
+
+
+def test_a_file_at_rest_gives_what_it_marks_and_its_own_frequency(tmp_path):
+    path, values = tmp_path / "f.npz", np.arange(3.0)[:, None, None] * np.ones((3, 5, 6))
+    np.savez(path, siemens=values, rest=[0, 1, 1], frequency_hz=1e4, Rest=1)
+    assert read(path, (5, 6), 1e4).at_rest()[:, 0, 0].tolist() == [1, 2]
+    assert read(path, (5, 6), None).unused == ("Rest",)
+    with pytest.raises(BadInput, match="frequency_hz is 10 kHz; expected 20 kHz"):
+        read(path, (5, 6), 2e4)
+    np.savez(path, siemens=values)
+    assert len(read(path, (5, 6), 1e4).at_rest()) == 3
 
 
 def test_a_virtual_step_is_a_recording(tmp_path, model):

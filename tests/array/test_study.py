@@ -41,6 +41,15 @@ def test_law_and_load_of_the_cell(model):
     assert per == pytest.approx(1 / model.under(pressure)[1])
 
 
+def test_stiffer_cells_bear_the_shared_factor_more(model):
+    """The true pressure is the factor times the stated one: at the same strain, a cell of that modulus."""
+    law, cell_pa = model.crossing.law.compression, np.array([20e3, 60e3])
+    for factor in model.shared_factor:
+        strain, _ = law.scaled_modulus(factor).capacitive_strain(cell_pa * factor)
+        assert strain == pytest.approx(law.capacitive_strain(cell_pa)[0], rel=1e-6)
+    assert "press with a known weight" in next(model.shared())
+
+
 def test_solid_between_the_tracks_carries_most_of_the_load():
     """Springs side by side: walls of X60, 36 % of the area, beside softer cells."""
     soft = model_of(between="dielectric")
@@ -110,6 +119,10 @@ def test_an_outline_leaves_its_corner_out():
     found = study(corner, ArrayReadout())
     assert np.isnan(found.sigma_kpa).tolist() == [[False] * 4, [False] * 4, [False] * 3 + [True]]
     assert plots.png(found)[:4] == b"\x89PNG"
+    for fault in ("r3c4", "r3:3", "c4:2"):
+        with pytest.raises(BadInput, match=f"fault {fault}: the outline leaves this place out"):
+            study(corner, ArrayReadout(), faults=[fault])
+    assert study(corner, ArrayReadout(), faults=["r3:2", "c4:1", "r3:2"]).determined.sum() == 12 - 1 - 2
 
 
 @pytest.mark.parametrize(

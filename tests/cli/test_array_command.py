@@ -23,9 +23,12 @@ def test_it_says_what_is_resolved(run, file):
     said = run("array", file, "--frequencies", "10kHz", "--fault", "c3:0")
     assert said.code == 0, said.err
     for words in ("3 rows x 4 columns, 12 crossings", "+11.2 % at 100 kPa", "guarded, through 50 ohm, 10 kHz",
-                  "3 of 12 crossings are not determined", "left out: fringe"):  # fmt: skip
+                  "3 of 12 crossings are not determined", "extrapolated: 100 kPa exceeds 64 kPa", "left out: fringe",
+                  "contact resistance"):  # fmt: skip
         assert words in said.words
+    assert "share a factor 0.15 to 1.6: stiffness by its sources" in said.words
     data = json.loads(run("array", file, "--json", "--pressure", "50").out)
+    assert data["shared_factor"] == pytest.approx([0.15, 1.632], rel=1e-2)
     assert data["pressure_kpa"] == 50
     assert np.shape(data["sigma_kpa"]) == (3, 4)
 
@@ -37,6 +40,9 @@ def test_a_virtual_step_is_inverted(run, file, tmp_path):
     said = run("invert", file, "step.npz", "-o", "maps.npz", "--plot", ".")
     assert said.code == 0, said.err
     assert "60, inverted by" in said.words
+    assert "of noise and scatter alone" in said.words
+    assert "of 60 frames exceeds 64 kPa" in said.words
+    assert "share a factor 0.15 to 1.6" in said.words
     assert (tmp_path / "a-map.png").is_file()
     with np.load(tmp_path / "maps.npz") as found, np.load(tmp_path / "step.npz") as true:
         off = (found["pressure_kpa"] - true["pressure_kpa"][5:]) / found["sigma_kpa"]
@@ -71,16 +77,18 @@ def test_the_shape_has_options_like_others(run):
         (("array", "a.yaml", "--fault", "r9:1"), "expected r3:5"),
         (("array", "a.yaml", "--pressure", "-3"), "--pressure"),
         (("array", "a.yaml", "--input", "0"), "--input"),
+        (("array", "a.yaml", "--readout", "two-terminal", "--input", "20"), "--input is of the guarded readout"),
+        (("invert", "a.yaml", "f.csv", "--readout", "two-terminal", "--input", "20"), "--input is of the guarded"),
         (("array", "array", "--rows", "1.5"), "rows is 1.5; expected a whole number"),
         (("check", "array", "--pitch-x", "4mm"), "leaves no space between columns"),
         (("invert", "a.yaml", "none.npz"), "none.npz"),
         (("invert", "a.yaml", "f.csv", "--perfect"), "--perfect is for lines"),
         (("invert", "a.yaml", "f.csv"), "no frequency of the readings"),
-        (("invert", "a.yaml", "f.csv", "--frequency", "10kHz"), "no frame at rest"),
+        (("invert", "a.yaml", "f.csv", "--frequency", "10kHz"), "taken for rest; not read: Rest"),
     ],
 )
 def test_wrong_words_are_one_line(run, file, tmp_path, words, answer):
-    (tmp_path / "f.csv").write_text("time_s,r1c1\n0,1e-12\n")
+    (tmp_path / "f.csv").write_text("time_s,Rest,r1c1\n0,1,1e-12\n")
     said = run(*words)
     assert said.code == 2
     assert answer in said.line

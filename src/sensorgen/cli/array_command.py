@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from sensorgen.cli import options, render
+from sensorgen.cli.array_frames import refuse_input
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.options import option
 from sensorgen.cli.words import Ratio, proper
@@ -41,6 +42,7 @@ def _work(
     from sensorgen.prediction.array.study import study
 
     proper("--noise", noise)
+    refuse_input(readout)
     how = ArrayReadout(readout, input_ohm, frequency_hz or (10e3,), noise, noise_s or 0.0)  # type: ignore[arg-type]
     model = array_model(design)
     found = study(model, how, pressure_kpa, faults)

@@ -3,6 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
+from click.core import ParameterSource
+
 from sensorgen.cli import render
 from sensorgen.cli.words import one
 from sensorgen.core.errors import BadInput
@@ -28,13 +31,14 @@ def invert(
     from sensorgen.prediction.query import NOISE
 
     _refuse(others)
+    refuse_input(readout)
     model = array_model(design)
     shape = (model.here.shape[0], model.here.shape[1])
     hertz = one("--frequency", frequency) if frequency else None
     frames = read(Path(measured), shape, hertz)
-    apart = read(Path(rest_file), shape, frames.frequency_hz).siemens if rest_file else None
+    apart = read(Path(rest_file), shape, frames.frequency_hz).at_rest() if rest_file else None
     how = ArrayReadout(readout, input_ohm, (frames.frequency_hz,), NOISE if noise is None else noise)  # type: ignore[arg-type]
-    found = inverted(model, how, frames.siemens, frames.rest, frames.time_s, scatter, apart)
+    found = inverted(model, how, frames.siemens, frames.rest, frames.time_s, scatter, apart, frames.unused)
     if output:
         _write(found, output)
     if plot is not None:
@@ -45,6 +49,13 @@ def invert(
     if not output:
         render.say("--output FILE.npz writes the maps, FILE.csv force and centre of pressure of every frame")
     return 0
+
+
+def refuse_input(readout: str) -> None:
+    """Refuse ``--input`` of a readout by two terminals."""
+    given = click.get_current_context().get_parameter_source("input_ohm")
+    if readout != "guarded" and given is ParameterSource.COMMANDLINE:
+        raise BadInput("--input is of the guarded readout; expected no --input with --readout two-terminal")
 
 
 def _refuse(others: dict[str, Any]) -> None:

@@ -1,10 +1,12 @@
 """Frames of an array: files NPZ and CSV with a reading of every crossing, and which of them are at rest."""
 
 import csv
+import math
 import re
 import zipfile
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +14,13 @@ import numpy as np
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
 from sensorgen.core.files import reading
+from sensorgen.core.units import si
 
 MOST_BYTES = 4_000_000_000
 _CROSSING = re.compile(r"r(\d+)c(\d+)")
 _TRUE = ("1", "1.0", "true")
 KEYS = ("siemens", "capacitance_f")
+_KNOWN = (*KEYS, "time_s", "rest", "frequency_hz", "pressure_kpa")
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +39,8 @@ class Frames:
         Of the readings [Hz].
     pressure_kpa : (k, m, n) array or None
         True pressures, where the array was virtual [kPa].
+    unused : tuple of str
+        Names in the file that are not read.
     """
 
     siemens: Complex
@@ -42,6 +48,11 @@ class Frames:
     rest: Mask
     frequency_hz: float
     pressure_kpa: "Real | None" = None
+    unused: tuple[str, ...] = ()
+
+    def at_rest(self) -> Complex:
+        """Readings of the frames marked at rest; of all where none is marked [S]."""
+        return self.siemens[self.rest] if self.rest.any() else self.siemens
 
 
 def read(path: Path, shape: tuple[int, int], frequency_hz: float | None) -> Frames:
@@ -55,19 +66,19 @@ def read(path: Path, shape: tuple[int, int], frequency_hz: float | None) -> Fram
     shape : (int, int)
         Rows and columns of the array.
     frequency_hz : float, optional
-        Of the readings, where the file does not have it [Hz].
+        Of the readings, where the file does not have it; else that which it has to be [Hz].
 
     Raises
     ------
     BadInput
-        A file that is neither, has frames of another size, or no frequency.
+        A file that is neither, has frames of another size, or no frequency or another.
     """
     with reading(path):
         if path.stat().st_size > MOST_BYTES:
             raise BadInput(f"{path}: {path.stat().st_size / 1e9:.1f} GB; expected at most {MOST_BYTES / 1e9:g} GB")
-        found = _of_npz(path) if path.suffix == ".npz" else _of_csv(path, shape)
+        found, unused = _of_npz(path) if path.suffix == ".npz" else _of_csv(path, shape)
     try:
-        return _checked(found, shape, frequency_hz)
+        return replace(_checked(found, shape, frequency_hz), unused=tuple(unused))
     except BadInput as error:
         raise error.within(str(path)) from None
 
@@ -94,7 +105,9 @@ def _checked(found: dict[str, np.ndarray], shape: tuple[int, int], frequency_hz:
 
 def _frequency(found: dict[str, np.ndarray], given: float | None) -> float:
     own = found.get("frequency_hz", np.zeros(1)).ravel()
-    hertz = given or (float(own[0]) if own.size == 1 else 0.0)
+    hertz = (float(own[0]) if own.size == 1 else 0.0) or given or 0.0
+    if given and not math.isclose(hertz, given, rel_tol=1e-6):
+        raise BadInput(f"frequency_hz is {si(hertz, 'Hz')}; expected {si(given, 'Hz')}, as given or of the readings")
     if not 0 < hertz < np.inf:
         raise BadInput("no frequency of the readings; expected frequency_hz in the file, or --frequency 10kHz")
     return hertz
@@ -108,15 +121,18 @@ def _each(found: dict[str, np.ndarray], name: str, default: Real) -> Real:
     return values
 
 
-def _of_npz(path: Path) -> dict[str, np.ndarray]:
+def _of_npz(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Numbers of a file by name, and the names that are not read."""
     try:
         with np.load(path, allow_pickle=False) as data:
-            return {key: data[key] for key in data.files if data[key].dtype.kind in "bifuc"}
+            found = {key: data[key] for key in data.files if data[key].dtype.kind in "bifuc"}
+            return found, [key for key in data.files if key not in found or key not in _KNOWN]
     except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
         raise BadInput(f"{path}: no NPZ file of numbers ({str(error)[:80]})") from None
 
 
-def _of_csv(path: Path, shape: tuple[int, int]) -> dict[str, np.ndarray]:
+def _of_csv(path: Path, shape: tuple[int, int]) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Numbers of a table by name, and the columns that are not read."""
     try:
         rows = list(csv.reader(path.read_text("utf-8").splitlines()))
     except (UnicodeDecodeError, csv.Error) as error:
@@ -126,26 +142,36 @@ def _of_csv(path: Path, shape: tuple[int, int]) -> dict[str, np.ndarray]:
     for line, row in enumerate(rows[1:], 2):
         if len(row) != len(rows[0]):
             raise BadInput(f"{path}, line {line}: {len(row)} values; expected {len(rows[0])} as in the head")
-    columns = dict(zip((name.strip() for name in rows[0]), zip(*rows[1:], strict=True), strict=True))
+    names = [name.strip() for name in rows[0]]
+    columns = dict(zip(names, zip(*rows[1:], strict=True), strict=True))
     values = np.full((len(rows) - 1, *shape), np.nan)
-    for name, (i, j) in _crossings(columns, shape, path).items():
+    crossings = _crossings(names, shape, path)
+    for name, (i, j) in crossings.items():
         values[:, i, j] = _numbers(columns[name], path)
     found = {"capacitance_f": values}
     if "time_s" in columns:
         found["time_s"] = _numbers(columns["time_s"], path)
     if "rest" in columns:
         found["rest"] = np.array([word.strip().lower() in _TRUE for word in columns["rest"]])
-    return found
+    return found, sorted({*columns} - {*crossings, "time_s", "rest", ""})
 
 
-def _crossings(names: Iterable[str], shape: tuple[int, int], path: Path) -> dict[str, tuple[int, int]]:
+def _crossings(names: Sequence[str], shape: tuple[int, int], path: Path) -> dict[str, tuple[int, int]]:
     """Row and column of each name of a crossing."""
     found = {name: (int(m[1]) - 1, int(m[2]) - 1) for name in names if (m := _CROSSING.fullmatch(name))}
-    wrong = [name for name, at in found.items() if at not in set(np.ndindex(shape))]
+    _refuse_repeated(names, found, path)
+    wrong = [name for name, (i, j) in found.items() if not (0 <= i < shape[0] and 0 <= j < shape[1])]
     if wrong or not found:
         words = ", ".join(wrong[:3]) or "without any crossing"
         raise BadInput(f"{path}: columns {words}; expected r1c1 to r{shape[0]}c{shape[1]} of this array")
     return found
+
+
+def _refuse_repeated(names: Sequence[str], found: dict[str, tuple[int, int]], path: Path) -> None:
+    """Refuse names that repeat, and two of one crossing."""
+    times = Counter(found.get(name, name) for name in names if name)
+    if repeated := [name for name in names if times[found.get(name, name)] > 1]:
+        raise BadInput(f"{path}: columns {', '.join(repeated[:3])} repeat; expected each once")
 
 
 def _numbers(words: Sequence[str], path: Path) -> Real:

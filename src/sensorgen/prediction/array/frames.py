@@ -1,6 +1,6 @@
 """Frames of an array to pressure maps: by C/C0 where that suffices, else with the network of the tracks."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
@@ -11,9 +11,10 @@ import numpy as np
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.document import Column, Facts, Part, Table, comma_separated, to_json
 from sensorgen.core.errors import BadInput
-from sensorgen.prediction.array.model import ArrayModel
+from sensorgen.core.units import si
+from sensorgen.prediction.array.model import PA_PER_KPA, ArrayModel
 from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayReadout, own_slopes
-from sensorgen.prediction.array.study import DETECTED, DETERMINED, PA_PER_KPA
+from sensorgen.prediction.array.study import DETECTED, DETERMINED
 from sensorgen.solvers.tracks import Readings, readings
 
 SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration of each
@@ -38,7 +39,7 @@ class PressureMaps:
     time_s : (k,) array
         Of each frame [s].
     pressure_kpa, sigma_kpa : (k, m, n) array
-        Pressure on the surface and its standard error; nan where it is not determined [kPa].
+        Pressure on the surface and its standard error of noise and scatter alone; nan where it is not determined [kPa].
     """
 
     model: ArrayModel
@@ -59,9 +60,10 @@ class PressureMaps:
 
     @cached_property
     def force_n(self) -> tuple[Real, Real]:
-        """Total force of each frame and its standard error: crossings that are not determined are left out [N]."""
-        sigma = self.sigma_kpa * PA_PER_KPA * self.model.pitch_area_m2
-        return np.nansum(self._newtons, (1, 2)), np.sqrt(np.nansum(sigma**2, (1, 2)))
+        """Total force of each frame and its standard error, of determined crossings; nan without any [N]."""
+        sigma, read = self.sigma_kpa * PA_PER_KPA * self.model.pitch_area_m2, np.isfinite(self.pressure_kpa).any((1, 2))
+        force, error = np.nansum(self._newtons, (1, 2)), np.sqrt(np.nansum(sigma**2, (1, 2)))
+        return np.where(read, force, np.nan), np.where(read, error, np.nan)
 
     @cached_property
     def touched(self) -> Mask:
@@ -82,10 +84,15 @@ class PressureMaps:
         """Area of contact of each frame [mm2]."""
         return np.asarray(self.touched.sum((1, 2)) * self.model.pitch_area_m2 * 1e6)
 
+    @cached_property
+    def peak_kpa(self) -> Real:
+        """Largest pressure of each frame; nan without any [kPa]."""
+        peak = np.where(np.isnan(self.pressure_kpa), -np.inf, self.pressure_kpa).max((1, 2))
+        return np.where(np.isfinite(peak), peak, np.nan)
+
     def table(self) -> Table:
         """Force, centre of pressure, area and peak of each frame."""
         (force, sigma), (x, y) = self.force_n, self.centre_mm
-        peak = np.nanmax(np.where(np.isnan(self.pressure_kpa), -np.inf, self.pressure_kpa), (1, 2))
         columns = (
             Column("time", "s", key="time_s"), Column("force", "N", key="force_n"),
             Column("sigma F", "N", key="sigma_force_n"), Column("x", "mm", key="x_mm"), Column("y", "mm", key="y_mm"),
@@ -93,12 +100,12 @@ class PressureMaps:
             Column("not determined", key="undetermined"),
         )  # fmt: skip
         dark = (np.isnan(self.pressure_kpa) & self.model.here).sum((1, 2))
-        values = np.stack([self.time_s, force, sigma, x, y, self.area_mm2, peak, dark], 1).tolist()
+        values = np.stack([self.time_s, force, sigma, x, y, self.area_mm2, self.peak_kpa, dark], 1).tolist()
         return Table("frames", "", columns, tuple(tuple(None if v != v else v for v in row) for row in values))
 
     def heaviest(self) -> int:
         """Number of the frame with the largest force."""
-        return int(self.force_n[0].argmax())
+        return int(np.nan_to_num(self.force_n[0], nan=-np.inf).argmax())
 
     def document(self) -> Iterator[Part]:
         """Summary and the heaviest frame; CSV has all frames."""
@@ -108,12 +115,15 @@ class PressureMaps:
         low, high = (float(each) for each in (sigma.min(initial=np.inf), sigma.max(initial=0.0)))
         yield Facts((
             ("frames", f"{len(self.time_s)}, inverted by {self.by}"),
-            ("pressures", f"standard errors {low:.3g} to {high:.3g} kPa in the heaviest frame"),
+            ("pressures", f"standard errors {low:.3g} to {high:.3g} kPa in the heaviest frame, "
+                          "of noise and scatter alone"),
             *((("not determined", f"{dark} of {count} crossings: {self._names(k)}"),) if dark else ()),
         ))  # fmt: skip
         yield ""
         shown = tuple(float(f"{v:.4g}") if isinstance(v, float) else v for v in table.cells[k])
         yield Table("heaviest", "the heaviest frame", table.columns, (shown,))
+        yield from self.model.shared()
+        yield from self.model.beyond(self.peak_kpa)
         yield from (f"doubtful: {doubt}" for doubt in self.model.crossing.doubts)
 
     def _names(self, k: int) -> str:
@@ -139,7 +149,12 @@ class PressureMaps:
         table = self.table()
         keys = [column.key for column in table.columns]
         frames = [dict(zip(keys, row, strict=True)) for row in table.cells]
-        found: dict[str, Any] = {"array": self.model.design.name, "by": self.by, "frames": frames}
+        found: dict[str, Any] = {
+            "array": self.model.design.name,
+            "by": self.by,
+            "shared_factor": self.model.shared_factor,
+            "frames": frames,
+        }
         return to_json(found)
 
 
@@ -191,13 +206,36 @@ class MapInverter:
 
     @cached_property
     def alive(self) -> Mask:
-        """Crossings that read at rest within a factor of what is predicted, (m, n): others are broken or shorted."""
+        """Crossings that read at rest within a factor of what is predicted, and of its sign, (m, n): no others."""
         real, imaginary = self.parts
         nominal = self.nominal.siemens
         with np.errstate(invalid="ignore", divide="ignore"):
             size = np.where(real, np.abs(self.rest_s), np.abs(self.rest_s.imag))
             ratio = size / np.where(real, np.abs(nominal), np.abs(nominal.imag))
-            return np.asarray(imaginary & (ratio > 1 / _ALIVE) & (ratio < _ALIVE))
+            return imaginary & (ratio > 1 / _ALIVE) & (ratio < _ALIVE) & self._same_sign(self.rest_s)
+
+    def _same_sign(self, siemens: Complex) -> Mask:
+        """Readings with an imaginary part of the predicted one's sign: others are of no capacitance."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(siemens.imag * self.nominal.siemens.imag > 0)
+
+    def refuse_dead(self) -> None:
+        """BadInput where no crossing is alive."""
+        if self.alive.any():
+            return
+        read, predicted = (self._median(each[self.model.here]) for each in (self.rest_s, self.nominal.siemens))
+        raise BadInput(
+            f"no crossing reads at rest within a factor of {_ALIVE:g} of what is predicted: the median imaginary part "
+            f"is {read}, predicted {predicted}; expected siemens, or capacitance_f in farad, of this array"
+        )
+
+    def _median(self, siemens: Complex) -> str:
+        """Median of the imaginary parts, and the capacitance that it is, in words."""
+        values = siemens.imag[np.isfinite(siemens.imag)]
+        if not values.size:
+            return "none"
+        middle, hertz = float(np.median(values)), self.readout.frequency_hz[0]
+        return f"{si(middle, 'S', 3)} ({si(middle / (2 * np.pi * hertz), 'F', 3)})"
 
     @cached_property
     def prior_f(self) -> Real:
@@ -225,8 +263,8 @@ class MapInverter:
         sigma = self.readout.sigma_s(self.nominal.siemens)
         return np.where(real, 1 / sigma, 0.0), np.where(imaginary, 1 / sigma, 0.0)
 
-    def capacitances(self, siemens: Complex, start: Real) -> Real:
-        """Capacitances behind one frame, with the network, (m, n) [F].
+    def capacitances(self, siemens: Complex, start: Real) -> tuple[Real, Mask]:
+        """Capacitances behind one frame, with the network, and which of them settled, (m, n) [F].
 
         Gauss-Newton with the slopes at rest; the prior, as wide as full scale, keeps what no reading tells.
         """
@@ -242,15 +280,19 @@ class MapInverter:
             c = np.maximum(c + step.reshape(m, n), 1e-3 * start)
             if (np.abs(step) < _DONE * np.sqrt(variance)).all():
                 break
-        return c
+        return c, (np.abs(step) < np.sqrt(variance)).reshape(m, n)
 
     @cached_property
-    def rest_f(self) -> Real:
-        """Capacitances at rest of this print, with the network, (m, n) [F]."""
+    def _rest(self) -> tuple[Real, Mask]:
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.nan_to_num(self.rest_s.imag / self.nominal.siemens.imag, nan=1.0, posinf=1.0, neginf=1.0)
         start = self.model.capacitances() * np.where(self.model.here, np.clip(ratio, 0.1, 10.0), 1.0)
         return self.capacitances(self.rest_s, start)
+
+    @property
+    def rest_f(self) -> Real:
+        """Capacitances at rest of this print, with the network, (m, n) [F]."""
+        return self._rest[0]
 
     def by_ratio(self, siemens: Complex) -> Real:
         """Capacitance over that at rest, of each crossing by its own reading alone [-]."""
@@ -258,12 +300,12 @@ class MapInverter:
             return np.asarray(siemens.imag / self.rest_s.imag)
 
     def by_network(self, siemens: Complex) -> Real:
-        """Capacitance over that at rest with the network, frame by frame [-]."""
+        """Capacitance over that at rest with the network, frame by frame; nan where Gauss-Newton did not settle [-]."""
         start = np.nan_to_num(self.by_ratio(siemens), nan=1.0, posinf=1.0, neginf=1.0)
-        return np.stack([
-            self.capacitances(one, self.rest_f * np.clip(own, 0.5, 5.0)) / self.rest_f
-            for one, own in zip(siemens, start, strict=True)
-        ])  # fmt: skip
+        rest, sure = self._rest
+        each = (self.capacitances(one, rest * np.clip(own, 0.5, 5.0)) for one, own in zip(siemens, start, strict=True))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.stack([np.where(sure & settled, c / rest, np.nan) for c, settled in each])
 
     def maps(self, siemens: Complex, time_s: Real) -> PressureMaps:
         """Pressure maps of frames; C/C0 where it agrees with the network in the heaviest frame."""
@@ -271,26 +313,33 @@ class MapInverter:
         heaviest = int(np.nansum(np.where(self.alive, ratio, 0), (1, 2)).argmax())
         network = self.by_network(siemens[heaviest : heaviest + 1])[0]
         variance = self.gain[1].reshape(self.model.here.shape)
-        known = np.sqrt(variance) < DETERMINED * self.prior_f
-        error = np.sqrt(variance) / np.where(known, self.rest_f, 1.0)
-        counted = known & self.alive & np.isfinite(ratio[heaviest])
-        worst = float((np.abs(network - ratio[heaviest]) / error)[counted].max(initial=0.0))
-        if worst < _SUFFICES:
+        error = np.sqrt(variance) / np.where(self.model.here, self.rest_f, 1.0)
+        counted = _known(error * self.model.pressures(np.ones(1))[1]) & self.alive & np.isfinite(ratio[heaviest])
+        off = (np.abs(network - ratio[heaviest]) / error)[counted]
+        worst = float(np.nan_to_num(off).max(initial=0.0))
+        if worst < _SUFFICES and not np.isnan(off).any():
             by = f"C/C0: the network differs by at most {worst:.2g} standard errors in the heaviest frame"
         else:
             by = f"the network of the tracks: C/C0 differs by {worst:.2g} standard errors in the heaviest frame"
-            ratio = self.by_network(siemens)
+            ratio = np.where(np.isfinite(siemens.imag), self.by_network(siemens), np.nan)
+            if lost := int((np.isnan(ratio) & np.isfinite(siemens.imag) & self.alive).sum()):
+                by += f"; {lost} values left out that {_STEPS} steps of Gauss-Newton did not settle"
         pressure, per = self.model.pressures(np.nan_to_num(ratio, nan=1.0, posinf=1.0, neginf=1.0))
         noise = error * per * np.sqrt(1 + 1 / self.rest_count)
         sigma = np.hypot(noise, self.scatter * pressure)
-        given = known & self.alive & np.isfinite(siemens.imag)
+        given = _known(sigma) & self.alive & np.isfinite(ratio) & self._same_sign(siemens)
         shown = (np.where(given, each / PA_PER_KPA, np.nan) for each in (pressure, sigma))
         return PressureMaps(self.model, by, time_s, *shown)
 
 
+def _known(sigma_pa: Real) -> Mask:
+    """Pressures that a standard error determines, as in a study [Pa]."""
+    return np.asarray(sigma_pa < DETERMINED * FULL_SCALE_PA)
+
+
 def inverted(
     model: ArrayModel, readout: ArrayReadout, siemens: Complex, rest: Mask, time_s: Real, scatter: float = SCATTER,
-    apart: "Complex | None" = None,
+    apart: "Complex | None" = None, unused: Sequence[str] = (),
 ) -> PressureMaps:  # fmt: skip
     """Pressure maps of a recording.
 
@@ -308,6 +357,8 @@ def inverted(
         Standard deviation of the gain from cell to cell [-].
     apart : (r, m, n) array, optional
         Readings at rest of another file, in place of those of this one [S].
+    unused : sequence of str
+        Columns that were not read, named where no frame is at rest.
 
     Raises
     ------
@@ -320,11 +371,13 @@ def inverted(
         raise BadInput(
             "no frame at rest; expected 'rest' with 1 where nothing was on the array, or --rest FILE: what counts is "
             "the ratio to it, and a standing load is never taken for rest"
+            + (f"; not read: {', '.join(unused[:_SHOWN])}" if unused else "")
         )
     loaded = ~rest
     if not loaded.any():
         raise BadInput("all frames are at rest; expected some under load")
     inverter = MapInverter(model, readout, _mean(at_rest), len(at_rest), scatter)
+    inverter.refuse_dead()
     return inverter.maps(siemens[loaded], time_s[loaded])
 
 

@@ -1,6 +1,6 @@
 """An array in numbers: the cell of every crossing as printed, and the resistance of every track to its pad."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated
@@ -16,10 +16,12 @@ from sensorgen.design.arrays import Layout, Track
 from sensorgen.design.design import Design
 from sensorgen.models.compression import Curve
 from sensorgen.prediction import bodies
+from sensorgen.prediction.error_budget import modulus_range
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.sensor_model import SensorModel
 from sensorgen.solvers.tracks import Tracks
 
+PA_PER_KPA = 1e3
 USUAL_KPA = 90.0  # of 6 N on 8 x 8 mm
 _N_PER_KPA_MM2 = 1e-3
 _NEWTON = 12  # steps: the law is smooth and nearly straight
@@ -116,6 +118,26 @@ class ArrayModel:
         """Pressure on the surface up to which the law of the cell is known, further straight; infinite of a plate."""
         law = self.crossing.law.compression
         return law.stress_pa[-1] / self.load_factor if isinstance(law, Curve) else float("inf")
+
+    @cached_property
+    def shared_factor(self) -> tuple[float, float]:
+        """Least and largest true pressure per stated one, of all crossings at once, by the moduli's sources [-]."""
+        return modulus_range(self.crossing)[:2]
+
+    def shared(self) -> Iterator[str]:
+        """A line of that factor; none where the law of the cell is measured."""
+        (low, high), words = self.shared_factor, modulus_range(self.crossing)[2]
+        if low < high:
+            yield (
+                f"all pressures and forces share a factor {low:.2g} to {high:.2g}: stiffness by its sources ({words}); "
+                "press with a known weight"
+            )
+
+    def beyond(self, kpa: Real) -> Iterator[str]:
+        """A line where pressures lie beyond the law of the cell."""
+        if count := int((kpa * PA_PER_KPA > self.known_pa).sum()):
+            of = f"the peak of {count} of {kpa.size} frames" if kpa.size > 1 else f"{kpa[0]:.4g} kPa"
+            yield f"extrapolated: {of} exceeds {self.known_pa / PA_PER_KPA:.0f} kPa, where the law of the cell ends"
 
     def under(self, pressure_pa: Real) -> tuple[Real, Real]:
         """Capacitance over that at rest [-] and its derivative by the pressure on the surface [1/Pa].

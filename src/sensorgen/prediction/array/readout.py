@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sensorgen.core.arrays import Complex, Real
+from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.prediction.array.model import SHORT_OHM, ArrayModel
 from sensorgen.solvers.tracks import Readings, Tracks, readings
@@ -121,31 +121,46 @@ def crosstalk(read: Readings) -> Real:
     return found
 
 
-def faulty(tracks: Tracks, faults: Iterable[str]) -> Tracks:
+def faulty(tracks: Tracks, faults: Iterable[str], here: Mask) -> Tracks:
     """A network with faults: ``r3:5`` breaks row 3 behind column 5 (0: its lead), ``r2c4`` shorts that crossing.
 
     Raises
     ------
     BadInput
-        A word that is none of these, or a track that the array has not.
+        A word that is none of these, a track that the array has not, or a place that its outline
+        leaves out, ``here`` being its crossings.
     """
-    for word in faults:
-        tracks = _with_fault(tracks, word)
+    for word in dict.fromkeys(faults):
+        tracks = _with_fault(tracks, word, here)
     return tracks
 
 
-def _with_fault(tracks: Tracks, word: str) -> Tracks:
+def _with_fault(tracks: Tracks, word: str, here: Mask) -> Tracks:
     m, n = tracks.capacitance_f.shape
     if short := _SHORT.fullmatch(word):
         i, j = (int(number) - 1 for number in short.groups())
         if 0 <= i < m and 0 <= j < n:
+            _refuse_outside(word, bool(here[i, j]))
             return tracks.shorted(i, j, SHORT_OHM)
     if cut := _BREAK.fullmatch(word):
         track, after = int(cut[2]) - 1, int(cut[3])
         count, length = (m, n) if cut[1] == "r" else (n, m)
         if 0 <= track < count and after < length:
-            return tracks.broken("row" if cut[1] == "r" else "column", track, after - 1)
+            broken = tracks.broken("row" if cut[1] == "r" else "column", track, after - 1)
+            _refuse_outside(word, _stretches(broken) < _stretches(tracks))
+            return broken
     raise BadInput(
         f"fault {word!r:.40}: expected r3:5 (row 3 broken behind column 5; :0 its lead), c2:1, or r2c4 (a short), of "
         f"{m} rows and {n} columns"
     )
+
+
+def _stretches(tracks: Tracks) -> int:
+    """Number of stretches and leads that conduct."""
+    ohm = (tracks.row_ohm, tracks.column_ohm, tracks.row_lead_ohm, tracks.column_lead_ohm)
+    return sum(int(np.isfinite(each).sum()) for each in ohm)
+
+
+def _refuse_outside(word: str, is_there: bool) -> None:
+    if not is_there:
+        raise BadInput(f"fault {word}: the outline leaves this place out; expected a crossing or stretch of the array")

@@ -10,7 +10,7 @@ from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.document import Cell, Column, Facts, Part, Table, to_json
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import si
-from sensorgen.prediction.array.model import ArrayModel
+from sensorgen.prediction.array.model import PA_PER_KPA, ArrayModel
 from sensorgen.prediction.array.readout import (
     FULL_SCALE_PA,
     MOST_DENSE,
@@ -21,7 +21,6 @@ from sensorgen.prediction.array.readout import (
     information,
 )
 
-PA_PER_KPA = 1e3
 DETECTED = 3.0  # standard errors
 DETERMINED = 0.5  # of the prior's standard deviation: a pressure known no better is not determined
 LOADS_KPA = (100.0, 200.0, 357.0)  # 357: the peak of a foot's map
@@ -122,9 +121,11 @@ class ArrayStudy:
         )  # fmt: skip
         yield Table("resolution", "", columns, tuple(rows))
         yield (
-            f"(standard errors of one frame at {self.pressure_kpa:g} kPa; smallest press: {DETECTED:g} sigma on one "
-            "crossing; two presses show apart from two pitches on)"
+            f"(standard errors of one frame at {self.pressure_kpa:g} kPa, of noise alone; smallest press: "
+            f"{DETECTED:g} sigma on one crossing; two presses show apart from two pitches on)"
         )
+        yield from self.model.shared()
+        yield from self.model.beyond(np.array([self.pressure_kpa]))
         if self.crosstalk is not None:
             finite = self.crosstalk[self.determined]
             yield (
@@ -134,7 +135,10 @@ class ArrayStudy:
         if self.model.here.size > MOST_DENSE:
             yield f"above {MOST_DENSE} crossings each standard error is as if all other capacitances were known"
         yield from (f"doubtful: {doubt}" for doubt in self.model.crossing.doubts)
-        yield ("left out: fringe between neighbouring tracks, spreading of the load by the cover, strays of the cable")
+        yield (
+            "left out: fringe between neighbouring tracks, spreading of the load by the cover, strays of the cable, "
+            "contact resistance"
+        )
 
     def record(self) -> dict[str, Any]:
         """Numbers by crossing, null outside the outline and where nothing is determined."""
@@ -146,6 +150,7 @@ class ArrayStudy:
             "column_ohm_per_square": self.model.column_ohm,
             "load_factor": self.model.load_factor,
             "pressure_kpa": self.pressure_kpa,
+            "shared_factor": self.model.shared_factor,
             "sigma_kpa": _map(np.where(self.determined, self.sigma_kpa, np.nan)),
             "sigma_n": _map(np.where(self.determined, self.sigma_n, np.nan)),
             "crosstalk": None if self.crosstalk is None else _map(self.crosstalk),
@@ -181,7 +186,7 @@ def study(
         raise OutOfRange(f"a pressure of {pressure_kpa:g} kPa; expected 0 or more")
     ratio, slope = model.under(np.array(pressure_kpa * PA_PER_KPA))
     per_pa = model.capacitance.value * float(slope)
-    tracks = faulty(model.tracks(model.capacitances(float(ratio))), faults)
+    tracks = faulty(model.tracks(model.capacitances(float(ratio))), faults, model.here)
     read = readout.read(tracks)
     prior = np.where(model.here, per_pa * FULL_SCALE_PA, 1e-6 * model.capacitance.value).ravel()
     spread = covariance(information(read, readout), prior)

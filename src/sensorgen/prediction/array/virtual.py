@@ -65,7 +65,7 @@ def simulated(
     found = np.empty(pressure_kpa.shape, complex)
     for k, pressure in enumerate(pressure_kpa):
         rise = (model.under(pressure * 1e3)[0] - 1) * gain
-        tracks = faulty(model.tracks(model.capacitances(rest * (1 + rise))), faults)
+        tracks = faulty(model.tracks(model.capacitances(rest * (1 + rise))), faults, model.here)
         found[k] = readings(tracks, readout.frequency_hz[0], readout=readout.kind, input_ohm=readout.input_ohm).siemens
     sigma = np.hypot(readout.noise * np.abs(found), readout.noise_s)
     return np.asarray(found + sigma * (draw.normal(size=found.shape) + 1j * draw.normal(size=found.shape)))
