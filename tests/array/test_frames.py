@@ -7,6 +7,7 @@ import pytest
 from array_network import by_currents
 
 from sensorgen.analysis.plots import array as plots
+from sensorgen.core import document
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
 from sensorgen.measure.array_frames import read
@@ -129,6 +130,9 @@ def test_readings_of_no_capacitance_are_no_numbers(model):
     assert np.isnan(found.pressure_kpa[1]).all()
     assert [found.table().cells[1][k] for k in (1, 2, 6)] == [None] * 3
     assert found.heaviest() == 0
+    frames[3] = np.nan
+    assert "none is determined" in "\n".join(document.text(maps(model, readout, frames).document()))
+    frames = frames_of(model, readout)
     farad = model.capacitance.value
     for wrong, words in (
         (frames.conj(), "median imaginary part is -"),

@@ -112,11 +112,13 @@ class PressureMaps:
         table, k, count = self.table(), self.heaviest(), int(self.model.here.sum())
         dark = int(np.isnan(self.pressure_kpa[k])[self.model.here].sum())
         sigma = self.sigma_kpa[k][np.isfinite(self.sigma_kpa[k])]
-        low, high = (float(each) for each in (sigma.min(initial=np.inf), sigma.max(initial=0.0)))
+        errors = "none is determined: readings are missing, of the other sign, or less than noise"
+        if sigma.size:
+            low, high = float(sigma.min()), float(sigma.max())
+            errors = f"standard errors {low:.3g} to {high:.3g} kPa in the heaviest frame, of noise and scatter alone"
         yield Facts((
             ("frames", f"{len(self.time_s)}, inverted by {self.by}"),
-            ("pressures", f"standard errors {low:.3g} to {high:.3g} kPa in the heaviest frame, "
-                          "of noise and scatter alone"),
+            ("pressures", errors),
             *((("not determined", f"{dark} of {count} crossings: {self._names(k)}"),) if dark else ()),
         ))  # fmt: skip
         yield ""
