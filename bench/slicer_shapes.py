@@ -21,7 +21,7 @@ the design too, has no error. Else the number of errors, and the first.
 
 
 def outcome(shape, slicer, program):
-    """What one slicer makes of a shape: its version, and "accepted" or why not."""
+    """Result of one slicer for a shape: its version, and "accepted" or why not."""
     made = design.make({"shape": shape})
     try:
         report = slice_now(made, slicer, program=program).file.report

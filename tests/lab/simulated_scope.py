@@ -40,7 +40,7 @@ class _Channel:
 
 
 class _Part:
-    """What oscilloscope and generator have in common."""
+    """Part that oscilloscope and generator share."""
 
     def __init__(self, owner: "SimulatedScope") -> None:
         self._owner = owner

@@ -239,7 +239,7 @@ def test_it_is_written_apart_from_what_analyses_it(name):
 
 
 def test_a_cell_is_solved_once_whatever_its_tracks_resist(monkeypatch):
-    """Its modulus, which the pressed cell has to do with, is solved anew."""
+    """The modulus, which the pressed cell depends on, is solved anew."""
     solved = []
     monkeypatch.setattr(tables, "_SOLVED", {})
     monkeypatch.setattr(tables, "_solved", lambda design: solved.append(design) or [[[[1.0]]], 0.0])

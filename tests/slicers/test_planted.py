@@ -53,7 +53,7 @@ def refused(fault, findings, lines):
 
 
 def disagreement(fault, lines):
-    """What the check makes of a fault against what is expected; "" where they agree.
+    """Outcome of the check of a fault, against what is expected; "" where they agree.
 
     What the check of commands and motions refuses is not compared with the design, too.
     """
