@@ -19,6 +19,7 @@ from sensorgen.design.design import Design
 from sensorgen.design.values import film, ln_spread, material_value
 from sensorgen.prediction.calibration.fitting import Posterior
 from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel
+from sensorgen.prediction.inference import standard
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import SensorModel
 
@@ -168,19 +169,17 @@ def estimate(model: SpecimenModel, posterior: Posterior, link: Link) -> Material
         Of the value to the parameter.
     """
     weights, slope = _weights(model, link)
-    told = weights @ posterior.covariance @ weights.T
-    mean, before = weights @ posterior.at, weights @ weights.T
-    precision = np.linalg.inv(told)
-    values, vectors = np.linalg.eigh(precision - np.linalg.inv(before))
+    difference, pull = posterior.of(weights).beyond(standard(len(model.names)).of(weights))
+    values, vectors = np.linalg.eigh(difference)
     information = (vectors * np.maximum(values, 0.0)) @ vectors.T
-    own = (
-        link.error**2 + link.shape**2 * model.law_likeness() if link.parameter == "rise" else np.eye(1) * link.error**2
-    )
+    of_rise = link.parameter == "rise"
+    own = np.eye(len(slope)) * (0.0 if of_rise else link.error**2)
+    if of_rise:
+        own += link.error**2 + link.shape**2 * model.law_likeness()
     inverse = np.linalg.inv(link.spread**2 * np.outer(slope, slope) + own)
     covariance = np.linalg.inv(information + inverse)
-    middle = model.spread.law_middle if link.parameter == "rise" else 0.0
-    prior_mean = link.middle * slope - middle  # of a print that is as estimated
-    at = covariance @ (precision @ mean + inverse @ prior_mean)
+    prior_mean = link.middle * slope - (model.spread.law_middle if of_rise else 0.0)  # of a print that is as estimated
+    at = covariance @ (pull + inverse @ prior_mean)
     by = link.spread**2 * slope @ inverse
     ln_value = link.middle + float(by @ (at - prior_mean))
     sd = sqrt(float(link.spread**2 - link.spread**2 * (by @ slope) + by @ covariance @ by))
