@@ -54,7 +54,7 @@ class Parameter:
         return self.value(self.centre + self.spread * deviations)
 
 
-class Columns:
+class Samples:
     """Record of arrays whose first axes count samples."""
 
     def rows(self, which: Index | Mask) -> Self:
@@ -136,7 +136,7 @@ def slopes(function: Callable[[Real], Real], at: Real) -> Real:
 
 
 @dataclass
-class Fit(Columns):
+class Fit(Samples):
     """Sum of squares near points, for n samples of p parameters.
 
     Attributes

@@ -18,7 +18,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.prediction.calibration.fitting import Data, Posterior, covariances
 from sensorgen.prediction.calibration.rest import STALE_S
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel
-from sensorgen.prediction.inference import Columns, Index, parts, whitening
+from sensorgen.prediction.inference import Index, Samples, parts, whitening
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
 from sensorgen.prediction.inverse.prior import Prior
 from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
@@ -77,7 +77,7 @@ _WORDS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Found(Columns):
+class Found(Samples):
     """Presses behind readings.
 
     Attributes

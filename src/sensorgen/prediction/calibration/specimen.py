@@ -15,7 +15,7 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
 from sensorgen.models import line
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.inference import Columns, Parameter, parts, slopes
+from sensorgen.prediction.inference import Parameter, Samples, parts, slopes
 from sensorgen.prediction.inverse.forward import Forward, tones
 
 FORCES_N = (0.2, 0.5, 1.0, 2.0, 4.0, 8.0)  # at which the law of compression may differ from the predicted one
@@ -95,7 +95,7 @@ def spread_at(sensor: Sensor) -> Spread:
 
 
 @dataclass(frozen=True, eq=False)
-class Presses(Columns):
+class Presses(Samples):
     """Known presses, and how they came about.
 
     Attributes

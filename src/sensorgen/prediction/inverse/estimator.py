@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.inference import Columns, Fit, Index, parts
+from sensorgen.prediction.inference import Fit, Index, Samples, parts
 from sensorgen.prediction.inverse.descent import LOOSE, TIGHT, Target, descend
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N, Forward
 from sensorgen.prediction.inverse.prior import Posterior, Prior, posterior
@@ -26,7 +26,7 @@ _RIVAL = 2 * PAIR**0.5  # distance of two presses up to which noise may exchange
 
 
 @dataclass(frozen=True)
-class Estimates(Columns):
+class Estimates(Samples):
     """Estimated presses, sample by sample.
 
     Attributes

@@ -6,7 +6,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
-from sensorgen.prediction.inference import Columns, Fit
+from sensorgen.prediction.inference import Fit, Samples
 from sensorgen.prediction.inverse.descent import Target
 from sensorgen.prediction.inverse.table import Table
 
@@ -51,7 +51,7 @@ class Prior:
 
 
 @dataclass(frozen=True)
-class Posterior(Columns):
+class Posterior(Samples):
     """Posterior of scaled presses; rows are samples."""
 
     mean: Real

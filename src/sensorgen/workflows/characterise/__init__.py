@@ -14,7 +14,6 @@ from sensorgen.analysis.characterise.catalogue import (
     Coupon,
     Meters,
     Target,
-    Unknown,
     catalogue,
     targets,
     unknowns,
@@ -30,6 +29,7 @@ from sensorgen.design.design import Design
 from sensorgen.design.materials import own
 from sensorgen.export import machine
 from sensorgen.export.slicers.loads import load, recipe
+from sensorgen.prediction.inference import Parameter
 from sensorgen.workflows.build import json_bytes, profiles, versions
 from sensorgen.workflows.characterise import form as forms
 from sensorgen.workflows.characterise import plate as plates
@@ -81,7 +81,7 @@ class Study:
         return cls(plates.carrier(conductor, dielectric, printer, quality, tools or {}, folder), conductor, dielectric)
 
     @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
+    def unknowns(self) -> tuple[Parameter, ...]:
         """With what the materials' sources say."""
         return unknowns(*self._pair(), self.design.machine.line_mm())
 
