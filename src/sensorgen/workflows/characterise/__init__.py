@@ -350,17 +350,11 @@ class Characterised:
             f"coupons of {self.conductor} and {self.dielectric}: {self.readings} readings of {self.coupons} coupons; "
             f"95 % intervals; sensorgen {__version__}"
         )
-        lines = [f"about: {json.dumps(about)}", "materials:"]
-        for material in (self.conductor, self.dielectric):
-            known = [row for row in self.rows if row.material == material and row.determined()]
-            lines += [f"  {material}:{'' if known else ' {}'}"]
-            lines += [
-                f"    {r.quantity}: {{value: {r.value:.6g}, low: {r.low:.6g}, high: {r.high:.6g}, note: "
-                f"{json.dumps(r.title)}}}"
-                for r in known
-            ]
-        lines += [f"# {finding}" for finding in self.findings]
-        return "\n".join(lines) + "\n"
+        known = [(r.material, own.SourceValue(r.quantity, r.value, r.low, r.high, r.title)) for r in self.rows
+                 if r.determined()]  # fmt: skip
+        names = (self.conductor, self.dielectric)
+        materials = {name: [value for of, value in known if of == name] for name in names}
+        return own.written(about, materials, self.findings)
 
 
 def read(path: Path, source: str = "", *, keep: bool = True, force: bool = False) -> Characterised:
