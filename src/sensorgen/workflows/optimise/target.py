@@ -67,8 +67,8 @@ class Number:
 NUMBERS = {
     "force_resolution_n": Number("force_resolution", "N"),
     "position_resolution_mm": Number("position_resolution", "mm", M_PER_MM),
-    "force_calibrated_n": Number("force_calibrated", "N", like="force_resolution"),
-    "position_calibrated_mm": Number("position_calibrated", "mm", M_PER_MM, like="position_resolution"),
+    "force_calibrated_n": Number("force_calibrated", "N"),
+    "position_calibrated_mm": Number("position_calibrated", "mm", M_PER_MM),
     "force_typical_n": Number("force_typical", "N", like="force_resolution"),
     "position_typical_mm": Number("position_typical", "mm", M_PER_MM, like="position_resolution"),
     "sensitivity_per_kpa": Number("sensitivity", "1/kPa"),
