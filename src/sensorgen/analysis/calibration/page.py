@@ -17,14 +17,12 @@ from sensorgen.prediction.inverse.verdict import NORMAL_90
 
 def html(made: Sequence[Made | Recheck]) -> str:
     """A page for the browser; raises MissingValue where Plotly is not installed."""
-    figures, words = [], []
+    sections = []
     for number, one in enumerate(made):
-        words += [part for part in one.document() if isinstance(part, str) and part]
-        if isinstance(one, Made):
-            figures += [*_presses(one, number), _left_over(one, number)]
-        figures.append(_parameters(one.calibration, number))
-    names = ", ".join(one.calibration.specimen for one in made)
-    return pages.page(f"Calibration of {document.visible(names)}", words, figures)
+        fit = (*_presses(one, number), _left_over(one, number)) if isinstance(one, Made) else ()
+        figures, specimen = (*fit, _parameters(one.calibration, number)), document.visible(one.calibration.specimen)
+        sections.append(pages.Section(f"specimen-{number}", specimen, figures, tuple(one.document())))
+    return pages.page(f"Calibration of {', '.join(section.title for section in sections)}", (), sections)
 
 
 def _presses(made: Made, number: int) -> list[Figure]:

@@ -1,17 +1,13 @@
 """One page that shows a design: bodies in 3D, section and layers as printed, numbers, identifiability and findings."""
 
-import base64
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from markupsafe import Markup
-
-from sensorgen.analysis.plots.pages import path, render
+from sensorgen.analysis.plots import pages
 from sensorgen.analysis.preview import geometry, shades
 from sensorgen.asprinted.printed import Printed
 from sensorgen.checks.review import Review, draw
-from sensorgen.core import document
 from sensorgen.core.document import Part
 from sensorgen.core.findings import SEVERITIES, Finding, headline
 from sensorgen.prediction.identifiability.results import metres, newtons
@@ -63,7 +59,7 @@ def page(
     shown = tuple(_bodies(printed))
     listed = [_placed(f, printed) for f in held.findings]
     names = [body.name for body in scene.bodies]
-    data = geometry.packed(
+    data = geometry.block(
         {
             "size": scene.size_mm,
             "layers": list(_layers(printed, names, listed)),
@@ -73,22 +69,17 @@ def page(
         names,
     )
     sheet = draw(design, held, printed.scene, printed.provenance)
-    return render(
+    return pages.render(
         "sensorgen.analysis.preview", "preview.html", headline=headline(design.name, held.findings, held.source),
         title=design.name, verdict=held.verdict, bodies=shown,
         provenance=printed.provenance, printer=f"{design.machine.name}, {design.layers.name}",
         size=" × ".join(f"{side:g}" for side in scene.size_mm), layers=len(printed.first),
         sections=geometry.figures(scene, printed.scene, names, design.layers.boundaries_mm(scene.size_mm[2])),
-        sheet=base64.b64encode(sheet.encode()).decode(), data=base64.b64encode(data).decode(),
-        numbers=_html(numbers), advice=_html(advice), listed=listed, severities=SEVERITIES,
+        sheet=sheet, data=pages.packed(data),
+        numbers=[*numbers], advice=[*advice], listed=listed, severities=SEVERITIES,
         known=predicted.identifiability, maps=shades.maps(predicted.identifiability),
         reason=predicted.reason, assumptions=predicted.assumptions, tornado=tuple(_tornado(predicted)),
     )  # fmt: skip
-
-
-def _html(parts: Iterable[Part]) -> Markup:
-    """Parts as HTML; :func:`sensorgen.core.document.html` escapes their text."""
-    return Markup(document.html(parts))  # noqa: S704 - escaped there
 
 
 @dataclass(frozen=True)
@@ -139,5 +130,5 @@ def _layers(printed: Printed, names: Sequence[str], listed: Sequence[Listed]) ->
             [*at.finding.place_mm[:2], f"{at.finding.severity}: {at.finding.message}"]
             for at in listed if at.layer == k and at.finding.place_mm
         ]  # fmt: skip
-        paths = {names.index(name): path(region, width) for name, region in layer.regions.items()}
+        paths = {names.index(name): pages.path(region, width) for name, region in layer.regions.items()}
         yield {"z": [round(layer.bottom_mm, 6), round(layer.top_mm, 6)], "paths": paths, "marks": marks}

@@ -4,7 +4,6 @@ The block is a JSON header, its length before it, then for every body the differ
 of triangles and of the ends of edges. Patterns that repeat become repeated bytes, which gzip stores once.
 """
 
-import gzip
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -88,7 +87,7 @@ def _paths(outlines: dict[str, list[Outline]], names: Sequence[str], height_mm: 
         )
 
 
-def packed(header: Mapping[str, Any], scenes: Mapping[str, Scene], names: Sequence[str]) -> bytes:
+def block(header: Mapping[str, Any], scenes: Mapping[str, Scene], names: Sequence[str]) -> bytes:
     """The block, with the number of vertices, triangles and edges of each body of each scene in its header."""
     counts: dict[str, list[list[int]]] = {}
     blocks: list[bytes] = []
@@ -104,7 +103,7 @@ def packed(header: Mapping[str, Any], scenes: Mapping[str, Scene], names: Sequen
             blocks += [step.astype("<i4").tobytes() for step in steps]
     head = json.dumps({**header, "counts": counts}, separators=(",", ":"), allow_nan=False).encode()
     head += b" " * (-len(head) % 4)
-    return gzip.compress(b"".join([len(head).to_bytes(4, "little"), head, *blocks]), 6, mtime=0)
+    return b"".join([len(head).to_bytes(4, "little"), head, *blocks])
 
 
 def _parts(shell: Mesh) -> tuple[Whole, Whole, Whole]:

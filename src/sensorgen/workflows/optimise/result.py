@@ -204,7 +204,7 @@ class Optimised(Displayed):
         names = list(dict.fromkeys((*self.objectives, *self.front[0].numbers)))[: len(self.objectives) + 2]
         columns = (
             Column("", key="number"), Column("", key="leads"), *(Column(k.removesuffix("_mm"), key=k) for k in keys),
-            *(Column(n, digits=3, key=n) for n in names), Column("verdict"),
+            *(Column(NUMBERS[n].words, NUMBERS[n].unit, digits=3, key=n) for n in names), Column("verdict"),
         )  # fmt: skip
         cells = (
             (c.number, ">" if c.leads else "=" if c.tied else "", *(c.values.get(k) for k in keys),

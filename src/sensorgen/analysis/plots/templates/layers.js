@@ -1,4 +1,3 @@
-"use strict";
 const stack = document.getElementById("stack"), slider = document.getElementById("layer");
 const groups = [...stack.querySelectorAll("g")], whole = stack.getAttribute("viewBox").split(" ").map(Number);
 let view = [...whole], held = null;
@@ -34,4 +33,4 @@ stack.addEventListener("pointermove", event => {
   look([view[0] + held.x - p.x, view[1] + held.y - p.y, view[2], view[3]]);
 });
 show(Number(slider.value));
-document.documentElement.dataset.drawn = "yes";
+drawn();

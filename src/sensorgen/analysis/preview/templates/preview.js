@@ -1,10 +1,8 @@
 const $ = name => document.getElementById(name), root = document.documentElement;
 const each = (words, what) => document.querySelectorAll(words).forEach(what);
 
-async function unpacked() {
-  const bytes = Uint8Array.from(atob($("data").textContent), c => c.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-  const block = await new Response(stream).arrayBuffer(), length = new DataView(block).getUint32(0, true);
+async function content() {
+  const block = await unpacked("data").arrayBuffer(), length = new DataView(block).getUint32(0, true);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(block, 4, length)));
   let at = 4 + length;
   function summed(count, step) { // differences to values
@@ -211,12 +209,12 @@ function theme(redraw) {
     button.textContent = `Theme: ${next}`;
     redraw();
   });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+  dark.addEventListener("change", redraw);
   for (const when of ["beforeprint", "afterprint"]) addEventListener(when, redraw);
 }
 
-unpacked().then(data => {
+content().then(data => {
   theme(model(data));
   plan(data);
-  root.dataset.drawn = "yes";
+  drawn();
 });
