@@ -98,13 +98,21 @@ def page(
     MissingValue
         Plotly is not installed, and there are figures.
     """
+    from sensorgen.analysis.plots.interactive import data, height_px
+    from sensorgen.analysis.plots.libraries import needed
+
+    figures = [figure for section in sections for figure in section.figures]
+    sheets = {drawing.design: drawing.svg for section in sections for drawing in section.drawings}
+    if figures:
+        needed("plotly")
     return render(
-        _OWN, "page.html", [figure for section in sections for figure in section.figures], title=title, words=words,
-        sections=sections, headline=headline, findings=findings, made_at=made_at,
+        _OWN, "page.html", title=title, words=words, sections=sections, headline=headline, findings=findings,
+        made_at=made_at, height_px=height_px, plotly=_plotly() if figures else "",
+        content=packed_json({"figures": [data(figure) for figure in figures], "drawings": sheets}),
     )  # fmt: skip
 
 
-def render(package: str, name: str, figures: "Sequence[Figure]" = (), **context: Any) -> str:
+def render(package: str, name: str, **context: Any) -> str:
     """A page from a template that extends ``base.html``; whatever text stands in it is escaped.
 
     Parameters
@@ -113,30 +121,20 @@ def render(package: str, name: str, figures: "Sequence[Figure]" = (), **context:
         In whose folder ``templates`` it is.
     name : str
         Of the template.
-    figures : sequence of Figure
-        Drawn by the page's script, where the template places them.
     **context
         What the template shows.
-
-    Raises
-    ------
-    MissingValue
-        Plotly is not installed, and there are figures.
     """
-    drawn: dict[str, Any] = {"figures": None}
-    if figures:
-        from sensorgen.analysis.plots.interactive import data, height_px
-        from sensorgen.analysis.plots.libraries import needed
-
-        needed("plotly")
-        text = json.dumps([data(figure) for figure in figures], allow_nan=False, separators=(",", ":"))
-        drawn = {"figures": packed(text.encode()), "plotly": _plotly(), "height_px": height_px}
-    return _environment(package).get_template(name).render(drawn | context) + "\n"
+    return _environment(package).get_template(name).render(context) + "\n"
 
 
 def packed(content: bytes) -> str:
     """Content for a page's script to unpack: gzip in base64, the same for the same content."""
     return encoded(gzip.compress(content, 6, mtime=0))
+
+
+def packed_json(content: Any) -> str:
+    """Data for a page's script to unpack."""
+    return packed(json.dumps(content, allow_nan=False, separators=(",", ":")).encode())
 
 
 def encoded(content: bytes) -> str:

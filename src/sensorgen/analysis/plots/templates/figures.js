@@ -46,8 +46,25 @@ function draw(figure, choice = 0) {
     const layout = coloured(parts[k]);
     place.style.minHeight = `${layout.height}px`;
     if (place.layout && place.layout.scene && layout.scene) layout.scene.camera = place.layout.scene.camera;
-    return Plotly.react(place, figure.choices[choice].data, layout, {responsive: true, displaylogo: false, displayModeBar: innerWidth < 600 ? false : "hover"});
+    const how = {responsive: true, displaylogo: false, displayModeBar: innerWidth < 600 ? false : "hover"};
+    return Plotly.react(place, figure.choices[choice].data, layout, how).then(() => {
+      if (!place.spaced) place.on("plotly_relayout", () => spaced(place));
+      place.spaced = true;
+      return spaced(place);
+    });
   }));
+}
+
+// Logarithmic axes: ticks at 1, 2 and 5 where their words have room, else at whole decades; anew after a zoom.
+function spaced(place) {
+  const changes = {};
+  for (const [name, axis] of Object.entries(place._fullLayout)) {
+    if (!/^[xy]axis/.test(name) || axis.type !== "log") continue;
+    const decades = Math.abs(axis.range[1] - axis.range[0]), room = axis._length / decades, word = name[0] === "x" ? 44 : 22;
+    const step = decades < 1 ? undefined : room * 0.3 > word ? "D2" : Math.ceil(word / room);
+    if (place.layout[name].dtick !== step) changes[`${name}.dtick`] = step ?? null;
+  }
+  return Object.keys(changes).length ? Plotly.relayout(place, changes) : null;
 }
 
 const chosen = (figure) => {
@@ -69,8 +86,13 @@ async function all() {
 }
 
 async function begin() {
+  const content = await unpacked("content").json();
+  for (const image of document.querySelectorAll("img[data-drawing]"))
+    image.src = URL.createObjectURL(new Blob([content.drawings[image.dataset.drawing]], {type: "image/svg+xml"}));
+  figures = content.figures;
+  if (!figures.length) return drawn();
   const library = document.createElement("script");
-  [library.textContent, figures] = await Promise.all([unpacked("plotly").text(), unpacked("figures").json()]);
+  library.textContent = await unpacked("plotly").text();
   document.head.append(library);
   dark.addEventListener("change", all);
   paper.addEventListener("change", all);
@@ -80,4 +102,4 @@ async function begin() {
   }
   return all();
 }
-document.getElementById("figures") ? begin() : drawn();
+begin();
