@@ -14,7 +14,7 @@ import numpy as np
 from sensorgen.core.arrays import Whole
 from sensorgen.scene.drawing.view import View, views
 from sensorgen.scene.geometry.meshes import Mesh, mesh
-from sensorgen.scene.scene import Outline, Scene, clipped
+from sensorgen.scene.scene import AXES, Outline, Scene, clipped
 
 UM_PER_MM = 1000
 _FLAT = 0.999  # cosine of the angle up to which two triangles are one face
@@ -37,8 +37,15 @@ class SectionFigure:
         Number of the body and SVG path, y downwards from the sensor's top [mm].
     boundaries : tuple of (float, str)
         Heights of the layers in the picture [mm], and a label for some of them.
+    across : int
+        Axis along the section, 0 for x [-].
+    end_mm, top_mm : float
+        How much of it is shown, and the height of its upper edge [mm].
     """
 
+    across: int
+    end_mm: float
+    top_mm: float
     caption: str
     box: tuple[float, float, float, float]
     drawn: tuple[tuple[int, str], ...]
@@ -69,6 +76,7 @@ def _figure(
     margin = _MARGIN * shown.end_mm
     label = max(1, round(len(boundaries_mm) * margin / height / 0.8))
     return SectionFigure(
+        AXES.index(shown.section.across), shown.end_mm, height,
         f"{axis} = {at:g} mm, {shown.section.across} from 0 to {shown.end_mm:g} of {view.extent_mm:g} mm, true scale",
         (-2.2 * margin, -margin / 2, shown.end_mm + 2.7 * margin, height + margin),
         tuple(_paths(of_drawing, names, height)), tuple(_paths(of_print, names, height)),

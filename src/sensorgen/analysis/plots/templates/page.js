@@ -20,7 +20,8 @@ function compare(a, b, sign) {
   if (typeof a === "number" && typeof b === "number") return sign * (a - b || 0);
   return sign * String(a).localeCompare(String(b), "en", {numeric: true});
 }
-for (const head of document.querySelectorAll("[data-table] thead th")) {
+for (const head of document.querySelectorAll("[data-table]:not(.fixed table) thead th")) {
+  if (!head.textContent.trim()) continue;
   const button = Object.assign(document.createElement("button"), {type: "button"});
   button.append(...head.childNodes);
   head.append(button);
