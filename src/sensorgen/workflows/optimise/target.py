@@ -46,6 +46,15 @@ class Number:
     of_path: bool = False
     like: str = ""
 
+    @property
+    def words(self) -> str:
+        """Name for people.
+
+        >>> NUMBERS["position_resolution_mm"].words, NUMBERS["exposure_mm"].words
+        ('position resolution', 'exposure')
+        """
+        return self.field.removesuffix("_mm").removesuffix("_s").replace("_", " ")
+
     def of(self, found: Numbers, path: Toolpath | None = None) -> Bounds | None:
         """Value with its range, in the unit of its name; None where unknown."""
         value = getattr(path, self.field, None) if self.of_path else getattr(found, self.field)
