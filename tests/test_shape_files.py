@@ -105,6 +105,7 @@ HOSTILE = [
     ("import sys\nsink = sys._getframe(3).f_locals['sink']\nwhile True:\n"
      "    sink.write(b'[' * (1 << 22) + b'\\n')",
      "ended without an answer"),
+    ("import sys\nsys._getframe(3).f_locals['sink'].write(b'{\"answer\": 1e999}\\n')", "number that is not finite"),
     ("1 / 0", "ZeroDivisionError: division by zero"),
     ("raise ValueError('a' * 10_000 + '\\x1b[2J\\n')", "ValueError: aaa"),
     ("return scene(p, fill)", "RecursionError"),
