@@ -184,7 +184,15 @@ class ImpedanceMeter(Protocol):
 
 
 class Meter(Protocol):
-    """Measures a resistance."""
+    """Measures a resistance.
+
+    Attributes
+    ----------
+    name : str
+        Model and full identity, once identified.
+    """
+
+    name: str
 
     def identify(self) -> Identity:
         """Ask what it is; :class:`WrongDevice` if it is another."""

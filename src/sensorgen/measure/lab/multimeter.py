@@ -1,6 +1,7 @@
 """Resistances from a bench multimeter: HP (Agilent, Keysight) 34401A and Keithley 2000.
 
-Both use SCPI: ``MEAS:RES?`` with two leads, ``MEAS:FRES?`` with four; both send 9.9E37 for an overload.
+Both use SCPI: ``MEAS:RES?`` with two leads, ``MEAS:FRES?`` with four; both send 9.9E37 for an overload. PyMeasure's
+classes send other commands, some before ``*IDN?``, and give numbers, not the meter's words, which the log keeps.
 """
 
 import re

@@ -3,13 +3,16 @@
 from collections import deque
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any
+from typing import Any, cast
 
 from sensorgen.core.errors import BadInput, within
 from sensorgen.design.design import Design
 from sensorgen.measure.lab import catalogue
-from sensorgen.measure.lab.clock import Clock
+from sensorgen.measure.lab.clock import Clock, RealClock
+from sensorgen.measure.lab.devices import Meter
 from sensorgen.measure.lab.experiment import Device, Devices, Experiment
+from sensorgen.measure.lab.multimeter import Multimeter
+from sensorgen.measure.lab.port import VisaPort
 from sensorgen.measure.lab.safety import Rig
 from sensorgen.measure.virtual import faults, mechanics, rig
 
@@ -100,6 +103,14 @@ def check(devices: Mapping[str, Device]) -> None:
 def opened(device: Device, clock: Clock) -> Any:
     """Driver of one real device; errors as :func:`real`."""
     return catalogue.opened(device.kind, device.address, device.settings, clock)
+
+
+def meter(kind: str | None, address: str) -> Meter:
+    """Driver of a multimeter at a VISA address, of a kind or of one that its answer names; errors as :func:`real`."""
+    if kind is None:
+        return Multimeter(VisaPort(address))
+    _has_role("meter", Device(kind=kind))
+    return cast(Meter, catalogue.opened(kind, address, {}, RealClock()))
 
 
 def _has_role(role: str, device: Device) -> None:
