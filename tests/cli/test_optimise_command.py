@@ -62,9 +62,7 @@ def test_the_front_is_that_of_a_plain_loop():
         k for k, (c, r) in values.items()
         if not any(c2 >= c and r2 >= r and (c2 > c * (1 + 1e-9) or r2 > r * (1 + 1e-9)) for c2, r2 in values.values())
     }  # fmt: skip
-    search_ = found(
-        parameters={"dielectric_mm": {"from": 0.1, "to": 0.3}, "electrode_mm": {"from": 0.2, "to": 0.3}}
-    )
+    search_ = found(parameters={"dielectric_mm": {"from": 0.1, "to": 0.3}, "electrode_mm": {"from": 0.2, "to": 0.3}})
     leads = {tuple(row.candidate.values.values()) for row in result.leads(search_)}
     assert leads == best == {(0.1, 0.2)}
     assert len(search_.rows) == 6
