@@ -13,7 +13,7 @@ thousand parameters are linear, and exchangeable between elements.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -76,19 +76,16 @@ class Session:
         free = self.rest
         if not free.any():
             free = _nothing(self.force_n)
-            if not free.any():
-                free = np.isfinite(self.pressure_kpa).all(1) & _nothing(np.nanmax(np.abs(self._filled), 1))
+        if not free.any():
+            known = np.isfinite(self.pressure_kpa).all(1)
+            free = known & _nothing(np.where(known, np.abs(np.nan_to_num(self.pressure_kpa)).max(1), np.nan))
         if not free.any():
             raise BadInput(
-                f"{self.name}: no unloaded second; expected 'rest' with 1 in some, or a reference of 0: a standing load "
-                "is never taken for rest"
+                f"{self.name}: no unloaded second; expected 'rest' with 1 in some, or a reference of 0: a standing "
+                "load is never taken for rest"
             )
         first = self.time_s[free.argmax()]
         return np.asarray(free & (self.time_s <= first + TARE_S))
-
-    @property
-    def _filled(self) -> Real:
-        return np.where(np.isfinite(self.pressure_kpa).any(1)[:, None], self.pressure_kpa, 0.0)
 
     @cached_property
     def tare(self) -> Real:
@@ -111,8 +108,9 @@ def _nothing(reference: Real) -> Mask:
     """Frames of which the reference is known, and nothing; none where it is known nowhere."""
     if not np.isfinite(reference).any():
         return np.zeros(len(reference), bool)
+    size = np.abs(reference)
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.abs(reference) <= UNLOADED * np.nanmax(np.abs(reference)))
+        return np.asarray(size <= UNLOADED * np.nanmax(size), bool)
 
 
 def _mean(values: Real) -> Real:
@@ -190,6 +188,7 @@ class Sums:
 
 
 def sums_of(session: Session, form: Form, scale: float) -> Sums:
+    """Sums of a session, its frames weighed as far as they are independent."""
     phi = features(session, form, scale)
     known = np.isfinite(session.pressure_kpa) & np.isfinite(session.reading)
     w, y = session.weight, np.where(known, session.pressure_kpa, 0.0)
@@ -199,9 +198,7 @@ def sums_of(session: Session, form: Form, scale: float) -> Sums:
     total = np.flatnonzero(np.isfinite(session.force_n))
     total = total[:: max(1, round(1 / w))]
     rows = phi[total] * session.area_mm2 * _N_PER_KPA_MM2
-    return Sums(
-        session.day, gram, cross, w * (y**2).sum(0), w * known.sum(0), rows, session.force_n[total]
-    )
+    return Sums(session.day, gram, cross, w * (y**2).sum(0), w * known.sum(0), rows, session.force_n[total])
 
 
 def features(session: Session, form: Form, scale: float, tare: "Real | None" = None) -> Real:

@@ -16,8 +16,17 @@ from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.core.files import reading
 from sensorgen.prediction.array.elements import (
-    TARE_S, Form, Law, Session, Sums, learnt, responding, scale_of, sums_of,
+    TARE_S,
+    Form,
+    Law,
+    Session,
+    Sums,
+    learnt,
+    responding,
+    scale_of,
+    sums_of,
 )  # fmt: skip
+from sensorgen.prediction.inverse.verdict import NORMAL_90
 
 LEVEL = 0.9
 TAUS_S = (10.0, 30.0, 100.0, 300.0)
@@ -25,7 +34,8 @@ _EARNED = 0.02  # share of the error by which a further term has to lower it
 _FRAMES = 4000  # of a session, at most, by which the interval is set
 _QUIET, _PATTERN = 4.0, 4.0  # standard deviations of noise, and of tares over sessions
 _ODD = 0.02  # share of the elements that may be beyond
-_WINDOW_S = 1.0
+_WINDOW_S, _FEWEST = 1.0, 5  # of a second that is unloaded, and its frames at least
+_SHOWN = 12  # dead elements that are named
 _SURE = 3  # sessions of which tares are known, to recognise another
 
 
@@ -41,6 +51,8 @@ class ArrayCalibration:
         Error besides that of the parameters: constant [kPa], and relative to the pressure [-].
     reach : float
         Half-width of the interval of ``LEVEL`` in that error [-].
+    common : float
+        Relative error of a session's gain, of all elements at once: of the total force [-].
     tares : (sessions, n) array
         Of the sessions that trained.
     quiet : (n,) array
@@ -51,6 +63,7 @@ class ArrayCalibration:
     floor_kpa: float
     share: float
     reach: float
+    common: float
     tares: Real
     quiet: Real
 
@@ -58,6 +71,16 @@ class ArrayCalibration:
         """Pressures, and half-widths of their intervals, (k, n); nan of dead elements and missing readings [kPa]."""
         mean, by_law = self.law.pressures(session, tare)
         return mean, self.reach * np.sqrt(by_law**2 + self.floor_kpa**2 + (self.share * mean) ** 2)
+
+    def of_ratio(self, ratio: Real, time_s: Real, day: float) -> tuple[Real, Real]:
+        """Pressures and half-widths by capacitance over that at rest of each crossing, (k, n) [kPa]."""
+        if ratio.shape[1] != len(self.law.alive):
+            raise BadInput(
+                f"a calibration of {len(self.law.alive)} elements; expected {ratio.shape[1]}, as of the array"
+            )
+        nothing = np.full(len(ratio), np.nan)
+        session = Session("", day, time_s, ratio - 1, np.zeros(len(ratio), bool), nothing[:, None], nothing)
+        return self.pressures(session, np.zeros(ratio.shape[1]))
 
     def recognised(self, session: Session) -> Mask:
         """Frames of the first unloaded second, by the readings alone.
@@ -72,28 +95,29 @@ class ArrayCalibration:
         """
         alive, expected = self.law.alive, "mark unloaded frames in 'rest'; a standing load is never taken for rest"
         if len(self.tares) < _SURE:
-            raise BadInput(f"{session.name}: tares of {len(self.tares)} sessions are known, {_SURE} recognise; {expected}")
+            raise BadInput(
+                f"{session.name}: tares of {len(self.tares)} sessions are known, {_SURE} recognise; {expected}"
+            )
         middle, shift, own = _spread_of_tares(self.tares[:, alive])
-        for at in np.arange(session.time_s[0], session.time_s[-1], _WINDOW_S):
-            window = (session.time_s >= at) & (session.time_s < at + _WINDOW_S)
-            values = session.reading[window][:, alive]
-            if len(values) < 2:
-                continue
+        second = max(_FEWEST, int(np.searchsorted(session.time_s - session.time_s[0], _WINDOW_S)))
+        for at in range(0, len(session.time_s) - second + 1, second):
+            values = session.reading[at : at + second][:, alive]
             off = values.mean(0) - middle
             common = float(np.nanmedian(off))
             still = values.std(0, ddof=1) < _QUIET * self.quiet[alive]
             near = np.abs(off - common) < _PATTERN * np.hypot(own, self.quiet[alive])
             if abs(common) < _PATTERN * shift and min(still.mean(), near.mean()) > 1 - _ODD:
-                return np.asarray(window)
+                return np.asarray(np.arange(len(session.time_s)) // second == at // second)
         raise BadInput(f"{session.name}: no unloaded second is recognised; {expected}")
 
     def npz(self) -> bytes:
         """The calibration as NPZ."""
         target, law = BytesIO(), self.law
         form = (law.form.powers, law.form.tau_s, law.form.drift, law.form.tared)
+        error = (self.floor_kpa, self.share, self.reach, self.common)
         np.savez_compressed(
             target, form=np.array(form, float), scale=law.scale, at=law.at, spread=law.spread, alive=law.alive,
-            numbers=np.array([law.day, law.drift, law.unsure, self.floor_kpa, self.share, self.reach]), tares=self.tares,
+            numbers=np.array([law.day, law.drift, law.unsure, *error]), tares=self.tares,
             quiet=self.quiet,
         )  # fmt: skip
         return target.getvalue()
@@ -110,12 +134,12 @@ def stored(path: Path) -> ArrayCalibration:
     try:
         with reading(path), np.load(path, allow_pickle=False) as data:
             powers, tau_s, drift, tared = data["form"].tolist()
-            day, rate, unsure, *error = data["numbers"].tolist()
+            day, rate, unsure, floor, share, reach, common = data["numbers"].tolist()
             law = Law(
                 Form(int(powers), tau_s, bool(drift), bool(tared)), float(data["scale"]), data["at"], data["spread"],
                 day, rate, unsure, data["alive"],
             )  # fmt: skip
-            return ArrayCalibration(law, *error, data["tares"], data["quiet"])
+            return ArrayCalibration(law, floor, share, reach, common, data["tares"], data["quiet"])
     except (KeyError, TypeError, ValueError, EOFError):
         raise BadInput(f"{path}: no calibration of an array; expected a file of 'sensorgen calibrate -o'") from None
 
@@ -210,12 +234,14 @@ def calibrated(sessions: Sequence[Session], form: "Form | None" = None) -> Array
         _residuals(session, law_of(training(sessions, k), form) if several else law)
         for k, session in enumerate(sessions)
     ]
+    gains = [float(off @ mean) / (float(mean @ mean) or 1.0) for off, mean, _ in errors]
+    common = float(np.sqrt(np.mean(np.square(gains))))
     off, mean, sigma = (np.concatenate(each) for each in zip(*errors, strict=True))
     if not off.size:  # total forces alone: the parameters' covariance is what is known
-        return ArrayCalibration(law, 0.0, 0.0, 1.645, tares, quiet)
+        return ArrayCalibration(law, 0.0, 0.0, NORMAL_90, common, tares, quiet)
     floor, share = _scale(off, mean)
     reach = np.quantile(np.abs(off) / np.sqrt(sigma**2 + floor**2 + (share * mean) ** 2), LEVEL)
-    return ArrayCalibration(law, floor, share, float(reach), tares, quiet)
+    return ArrayCalibration(law, floor, share, float(reach), common, tares, quiet)
 
 
 def _residuals(session: Session, law: Law) -> tuple[Real, Real, Real]:
@@ -276,29 +302,31 @@ class CalibrationStudy:
 
     def document(self) -> Iterator[Part]:
         """The law, and a row for each session."""
-        law = self.calibration.law
-        dead = np.flatnonzero(~law.alive)
-        gains = law.at[law.alive, -1 if law.form.powers + (not law.form.tared) == 0 else 0]
-        drift = f", gain {100 * law.drift:+.2g} % a day" if law.form.drift else ""
-        facts = [
-            ("sessions", f"{len(self.sessions)}, {law.at.shape[0]} elements; tare: {TARE_S:g} unloaded seconds of each"),
-            ("law", f"{law.form.words()}{drift}; gain differs between elements by "
-             f"{100 * gains.std() / abs(gains.mean()):.2g} %"),
-            ("error", f"{self.calibration.floor_kpa:.3g} kPa and {100 * self.calibration.share:.2g} % of the pressure, "
-             f"interval of {LEVEL:.0%}: {self.calibration.reach:.3g} times that"),
-        ]  # fmt: skip
-        if dead.size:
-            facts.append(("dead", f"{dead.size} elements, from 1: {', '.join(str(k + 1) for k in dead[:12])}"
-                                  + (", ..." if dead.size > 12 else "")))  # fmt: skip
-        yield Facts(tuple(facts))
-        if self.errors:
-            yield ""
-            yield Table.of("sessions", "calibrated by the first session" if self.by_first else
-                           "each session by the calibration of all others", self.errors)  # fmt: skip
-            yield (f"mean {np.mean([e.error_kpa for e in self.errors]):.3g} kPa, in the interval "
-                   f"{100 * np.mean([e.coverage for e in self.errors]):.0f} %")  # fmt: skip
-        else:
+        yield Facts(tuple(self._facts()))
+        if not self.errors:
             yield "one session: its errors in another are not known; expected more, of several days"
+            return
+        yield ""
+        how = "calibrated by the first session" if self.by_first else "each session by the calibration of all others"
+        yield Table.of("sessions", how, self.errors)
+        error, coverage = (float(np.mean([getattr(e, key) for e in self.errors])) for key in ("error_kpa", "coverage"))
+        yield f"mean {error:.3g} kPa, in the interval {100 * coverage:.0f} %"
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        known, law = self.calibration, self.calibration.law
+        yield "sessions", f"{len(self.sessions)}, {len(law.alive)} elements; tare: {TARE_S:g} unloaded seconds of each"
+        drift = f", gain {100 * law.drift:+.2g} % a day" if law.form.drift else ""
+        gains = law.at[law.alive, 0]
+        scatter = 100 * gains.std() / abs(gains.mean())
+        yield "law", f"{law.form.words()}{drift}; gain differs between elements by {scatter:.2g} %"
+        yield (
+            "error",
+            f"{known.floor_kpa:.3g} kPa and {100 * known.share:.2g} % of the pressure, interval of {LEVEL:.0%}: "
+            f"{known.reach:.3g} times that; all at once {100 * known.common:.2g} %",
+        )
+        if (dead := np.flatnonzero(~law.alive) + 1).size:
+            more = ", ..." if dead.size > _SHOWN else ""
+            yield "dead", f"{dead.size} elements, from 1: {', '.join(map(str, dead[:_SHOWN].tolist()))}{more}"
 
 
 def study(sessions: Sequence[Session], *, by_first: bool = False) -> CalibrationStudy:

@@ -50,11 +50,11 @@ class Insole:
         knots, values, t = [0.0, 22.0], [0.0, 0.0], 22.0
         while t < time_s[-1]:
             level = draw.uniform(60, 400)
-            for seconds, value in ((draw.uniform(4, 12), level), (draw.uniform(3, 60), level),
-                                   (draw.uniform(4, 12), draw.uniform(0, 60)), (draw.uniform(2, 20), None)):  # fmt: skip
-                t += seconds
+            low = draw.uniform(0, 60)
+            for shortest, longest, value in ((4, 12, level), (3, 60, level), (4, 12, low), (2, 20, low)):
+                t += draw.uniform(shortest, longest)
                 knots.append(t)
-                values.append(values[-1] if value is None else value)
+                values.append(value)
         return time_s, np.interp(time_s, knots, values)
 
     def strain(self, time_s, kpa, stiffening):
