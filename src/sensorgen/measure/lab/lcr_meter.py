@@ -150,20 +150,19 @@ class LcrMeter:
         count = len(self._tones_hz)
         k = self._next
         if not count or self._clock.now() < self._begin_s + self._duration(k):
-            return Readings(np.empty(0), np.empty((0, count), complex), np.empty(0, bool))
+            return Readings.joined((), count)
         said = self._query("FETC?")
-        found = _NUMBERS.fullmatch(said)
-        if not found:
+        numbers = _NUMBERS.fullmatch(said)
+        if not numbers:
             raise DeviceFault(f"{self.model.name} at {self._port.address} answers {said!r:.60}; expected R,X,STATUS")
         self._at(float(self._tones_hz[k]))
-        resistance, reactance, status = float(found[1]), float(found[2]), int(found[3])
-        row = np.full((1, count), complex(math.nan, math.nan))
-        if (status == _GOOD or status in _SIGNAL) and max(abs(resistance), abs(reactance)) < _OVERLOAD:
-            row[0, k] = complex(resistance, reactance)
-        time_s = self._begin_s + self._duration(k) / 2
+        resistance, reactance, status = float(numbers[1]), float(numbers[2]), int(numbers[3])
+        sound = (status == _GOOD or status in _SIGNAL) and max(abs(resistance), abs(reactance)) < _OVERLOAD
+        value = complex(resistance, reactance) if sound else None
+        found = Readings.of_tone(self._begin_s + self._duration(k) / 2, k, count, value, clipped=status != _GOOD)
         self._next = (k + 1) % count
         self._trigger()
-        return Readings(np.array([time_s]), row, np.array([status != _GOOD]))
+        return found
 
     def stop(self) -> None:
         """End the measurement, with the level at its lowest: it has no switch."""

@@ -9,6 +9,7 @@ import urllib.parse
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any, Protocol
 
 from sensorgen.core.errors import BadInput, NotInstalled
@@ -73,13 +74,14 @@ class Simulator(Protocol):
 
 
 @contextmanager
-def _faults(address: str) -> Iterator[None]:
+def _faults(address: str, what: str = "connection to {} failed", *also: type[Exception]) -> Iterator[None]:
     """Translate errors of a connection to DeviceFault."""
+    kinds: tuple[type[Exception], ...] = (OSError, ValueError, TypeError, http.client.HTTPException, *also)
     try:
         yield
-    except (OSError, ValueError, TypeError, http.client.HTTPException) as error:
+    except kinds as error:
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise DeviceFault(f"connection to {address} failed: {reason:.200}; check address, cable and power") from None
+        raise DeviceFault(f"{what.format(address)}: {reason:.200}; check address, cable and power") from None
 
 
 class SerialPort:
@@ -204,6 +206,7 @@ class VisaPort:
         except ImportError:
             raise NotInstalled("VISA needs PyVISA: pip install 'sensorgen[lab]'") from None
         self.address, self._visa = address, pyvisa
+        self._failures = partial(_faults, repr(address), "no answer from an instrument at {}", pyvisa.errors.Error)
         self._resources: list[Any] = []
         try:
             with self._failures():
@@ -236,17 +239,6 @@ class VisaPort:
             raise ValueError("not the address of an instrument that takes commands, as GPIB0::22::INSTR")
         resource.read_termination = resource.write_termination = "\n"
         return resource
-
-    @contextmanager
-    def _failures(self) -> Iterator[None]:
-        """Translate errors of PyVISA to DeviceFault."""
-        try:
-            yield
-        except (self._visa.errors.Error, OSError, ValueError) as error:
-            reason = " ".join(str(error).split())
-            raise DeviceFault(
-                f"no answer from an instrument at {self.address!r}: {reason:.200}; check address, cable and power"
-            ) from None
 
 
 class HttpPort:
