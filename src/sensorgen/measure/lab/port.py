@@ -93,8 +93,6 @@ class SerialPort:
         ``/dev/ttyUSB0``, ``COM3``.
     baud : int
         Bits per second.
-    shared : bool
-        Open it also if another program has it: to stop what that program has begun.
 
     Raises
     ------
@@ -104,7 +102,7 @@ class SerialPort:
         There is no such line, or another program has it.
     """
 
-    def __init__(self, address: str, baud: int, *, shared: bool = False) -> None:
+    def __init__(self, address: str, baud: int) -> None:
         try:
             import serial
         except ImportError:
@@ -112,7 +110,7 @@ class SerialPort:
         self.address = address
         self._received = bytearray()
         with _faults(address):
-            self._line = serial.Serial(address, baud, timeout=_POLL_S, write_timeout=1.0, exclusive=not shared)
+            self._line = serial.Serial(address, baud, timeout=_POLL_S, write_timeout=1.0, exclusive=True)
 
     def write(self, data: bytes) -> None:
         """Send; DeviceFault if the line is cut."""

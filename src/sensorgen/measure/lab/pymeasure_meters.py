@@ -20,6 +20,7 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import NotInstalled, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.records import Line, Strict
+from sensorgen.measure.lab import scpi
 from sensorgen.measure.lab.catalogue import PYMEASURE, Role
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings, WrongDevice
@@ -148,8 +149,7 @@ class _Meter:
             self._meter = type(model, (self._kind,), {"write": write})(self._address)
             if not self.name:
                 self._ask(self._meter)
-        serial, firmware = (*[field.strip() for field in self.name.rstrip(")").split(",")][2:4], "", "")[:2]
-        return Identity(model, serial, firmware)
+        return scpi.identity(model, self.name.rstrip(")"))
 
     def _ask(self, meter: Any) -> None:
         """Ask a meter that was sent nothing yet."""
