@@ -69,6 +69,15 @@ def unpressed(monkeypatch, _cache):
         mesher.check()
 
 
+@pytest.fixture
+def unpredicted(_cache):
+    """No design is predicted: for tests of files that hold no number of a prediction, or none that they look at."""
+    import no_numbers
+
+    with no_numbers.unpredicted():
+        yield
+
+
 @pytest.fixture(autouse=True, scope="module")
 def one_kernel():
     """build123d and NGSolve bring two versions of one CAD kernel, which crash together: tests load one or the other."""

@@ -259,11 +259,11 @@ def test_rows_come_once(view):
 
 def test_nobody_reads_and_nothing_grows(view):
     """Only the last minute is kept; an update costs the time of a hundred small arrays at most."""
-    feed(view, 0, 2000)
+    feed(view, 0, 1500)
     tracemalloc.start()
-    feed(view, 2000, 4000)
+    feed(view, 1500, 2500)
     before = tracemalloc.get_traced_memory()[0]
-    feed(view, 4000, 14_000)
+    feed(view, 2500, 6000)
     grown = tracemalloc.get_traced_memory()[0] - before
     tracemalloc.stop()
     assert grown < 100_000

@@ -213,6 +213,15 @@ class Layout:
         return shapely.set_precision(shapely.union_all(squares), 1e-6)
 
     @cached_property
+    def open_air(self) -> "shapely.Geometry":
+        """Grooves along the columns, closed at their ends: no roof spans more than the space between two [mm]."""
+        import shapely
+
+        half, ends = self.params.pitch[0] / 2, [(t.body, (t.body[0] + t.body[1]) / 2) for t in self.columns]
+        grooves = [shapely.box(x - half, body[2], x + half, body[3]) for body, x in ends]
+        return shapely.set_precision(shapely.union_all(grooves), 1e-6)
+
+    @cached_property
     def footprint(self) -> "shapely.Geometry":
         """The print [mm]: of an outline squares, tracks and leads with their edge, narrow notches filled."""
         import shapely
@@ -294,16 +303,20 @@ def _inside(p: Params, outline: str | None) -> list[list[bool]]:
     m, n = p.counts
     if outline is None:
         return [[True] * n for _ in range(m)]
+    import numpy as np
     import shapely
 
     from sensorgen.design import borders
 
     region, (px, py) = borders.region(outline).buffer(_WHOLE), p.pitch
     shapely.prepare(region)
-    return [
-        [bool(region.covers(shapely.box(j * px, i * py, (j + 1) * px, (i + 1) * py))) for j in range(n)]
-        for i in range(m)
-    ]
+    x, y = (  # in the middle of the outline, so that as much is left at either side
+        (high - count * step) / 2 + np.arange(count + 1) * step
+        for high, count, step in zip(borders.region(outline).bounds[2:], (n, m), (px, py), strict=True)
+    )
+    squares = shapely.box(x[None, :-1], y[:-1, None], x[None, 1:], y[1:, None])
+    found: list[list[bool]] = shapely.covers(region, squares).tolist()
+    return found
 
 
 def _row(of: Layout, i: int, order: int, x0: float) -> Track:
@@ -349,8 +362,8 @@ def _rounded(x0: float, x1: float, y0: float, y1: float) -> tuple[float, float, 
     return rounded(x0), rounded(x1), rounded(y0), rounded(y1)
 
 
-def cell_parameters(p: Params, given: Mapping[str, float | str]) -> dict[str, float | str]:
-    """Parameters of the cell's shape for one crossing.
+def cell_parameters(p: Params, shape: str, given: Mapping[str, float | str], layer_mm: float) -> dict[str, float | str]:
+    """Parameters of the cell's shape for one crossing; of ``tri`` alone those that print without an error.
 
     Raises
     ------
@@ -361,7 +374,12 @@ def cell_parameters(p: Params, given: Mapping[str, float | str]) -> dict[str, fl
         if key in given:
             raise BadInput(f"cell.parameters.{key}: the array gives it; set it, or the width of its tracks, there")
     own = {"length_mm": p.column_mm, "width_mm": p.row_mm, "electrode_mm": p.electrode_mm, "isolation_mm": 0.0}
-    return {**given, **own}
+    usual: dict[str, float | str] = {}
+    if shape == "tri" and not given:  # flat tips on layers, no part narrower than a line
+        lower_mm, hang_mm = (rounded(ceil(size / layer_mm - _WHOLE) * layer_mm) for size in (0.1, 0.3))
+        period_mm = p.column_mm / max(1, int(p.column_mm / 4 + _WHOLE))
+        usual = {"period_mm": period_mm, "tip_mm": 0.5, "lower_height_mm": lower_mm, "hang_height_mm": hang_mm}
+    return {**usual, **given, **own}
 
 
 def crossing_tip(p: Params, tip: TipData) -> dict[str, object]:
@@ -427,7 +445,7 @@ def scene(of: Layout, fill: Fill, strip: Any, params: Envelope) -> Scene:
             stack.add(*key, pieces)
     stack.plates(stack.top(), fill.top_electrode, columns - under, z.columns, z.cover)
     beside = whole - row_pads - under
-    high = beside - of.sensing if of.params.between == "air" else beside
+    high = beside - of.open_air if of.params.between == "air" else beside
     name = stack.solid(fill.dielectric)
     stack.plates(name, fill.dielectric, whole - rows, z.rows, z.film)
     stack.plates(name, fill.dielectric, beside, z.film, z.above_film)
@@ -480,14 +498,18 @@ class _GrowingBodies:
         return next(name for name, (_, _, terminal) in self.bodies.items() if terminal == "top")
 
     def solid(self, material: str) -> str:
-        """Name of a body of the cells that is of boxes of a material, else of a new one.
+        """Name of the first body of the cells of a material, else of a new one; the others of it join it.
 
-        What lies between the tracks joins it, so that no boundary is printed between both.
+        What lies between the tracks joins it, too: slicers print touching parts of one tool as one.
         """
-        for name, (own, pieces, terminal) in self.bodies.items():
-            if own == material and not terminal and name != "base" and all(piece.is_box() for piece in pieces):
-                return name
-        return "filler"
+        first, *others = [
+            name
+            for name, (own, _, terminal) in self.bodies.items()
+            if own == material and not terminal and name != "base"
+        ] or ["filler"]
+        for name in others:
+            self.add(first, material, "", self.bodies.pop(name)[1])
+        return first
 
     def made(self) -> tuple[Body, ...]:
         """The bodies, from bottom to top as they were added."""

@@ -17,7 +17,7 @@ COLOURS = (BLUE, ORANGE, GREEN, PINK, YELLOW, SKY, "#7a5195", "#8c564b", "#55555
 SYMBOLS = (
     "circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x", "triangle-left", "triangle-right",
 )  # fmt: skip
-MOST_POINTS = 3000  # of a drawn curve: more than a screen is wide
+MOST_POINTS = 1600  # of a drawn curve: more than a figure is wide
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 Values = Sequence[float] | Sequence[str] | Real

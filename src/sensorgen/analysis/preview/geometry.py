@@ -4,7 +4,6 @@ The block is a JSON header, its length before it, then for every body the differ
 of triangles and of the ends of edges. Patterns that repeat become repeated bytes, which gzip stores once.
 """
 
-import gzip
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +14,7 @@ import numpy as np
 from sensorgen.core.arrays import Whole
 from sensorgen.scene.drawing.view import View, views
 from sensorgen.scene.geometry.meshes import Mesh, mesh
-from sensorgen.scene.scene import Outline, Scene, clipped
+from sensorgen.scene.scene import AXES, Outline, Scene, clipped
 
 UM_PER_MM = 1000
 _FLAT = 0.999  # cosine of the angle up to which two triangles are one face
@@ -38,8 +37,15 @@ class SectionFigure:
         Number of the body and SVG path, y downwards from the sensor's top [mm].
     boundaries : tuple of (float, str)
         Heights of the layers in the picture [mm], and a label for some of them.
+    across : int
+        Axis along the section, 0 for x [-].
+    end_mm, top_mm : float
+        How much of it is shown, and the height of its upper edge [mm].
     """
 
+    across: int
+    end_mm: float
+    top_mm: float
     caption: str
     box: tuple[float, float, float, float]
     drawn: tuple[tuple[int, str], ...]
@@ -70,6 +76,7 @@ def _figure(
     margin = _MARGIN * shown.end_mm
     label = max(1, round(len(boundaries_mm) * margin / height / 0.8))
     return SectionFigure(
+        AXES.index(shown.section.across), shown.end_mm, height,
         f"{axis} = {at:g} mm, {shown.section.across} from 0 to {shown.end_mm:g} of {view.extent_mm:g} mm, true scale",
         (-2.2 * margin, -margin / 2, shown.end_mm + 2.7 * margin, height + margin),
         tuple(_paths(of_drawing, names, height)), tuple(_paths(of_print, names, height)),
@@ -88,7 +95,7 @@ def _paths(outlines: dict[str, list[Outline]], names: Sequence[str], height_mm: 
         )
 
 
-def packed(header: Mapping[str, Any], scenes: Mapping[str, Scene], names: Sequence[str]) -> bytes:
+def block(header: Mapping[str, Any], scenes: Mapping[str, Scene], names: Sequence[str]) -> bytes:
     """The block, with the number of vertices, triangles and edges of each body of each scene in its header."""
     counts: dict[str, list[list[int]]] = {}
     blocks: list[bytes] = []
@@ -104,7 +111,7 @@ def packed(header: Mapping[str, Any], scenes: Mapping[str, Scene], names: Sequen
             blocks += [step.astype("<i4").tobytes() for step in steps]
     head = json.dumps({**header, "counts": counts}, separators=(",", ":"), allow_nan=False).encode()
     head += b" " * (-len(head) % 4)
-    return gzip.compress(b"".join([len(head).to_bytes(4, "little"), head, *blocks]), 6, mtime=0)
+    return b"".join([len(head).to_bytes(4, "little"), head, *blocks])
 
 
 def _parts(shell: Mesh) -> tuple[Whole, Whole, Whole]:

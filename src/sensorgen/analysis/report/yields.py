@@ -6,14 +6,13 @@ from math import inf, isfinite
 from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison
-from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, Axis, Curve, Figure, Panel
+from sensorgen.analysis.plots.figure import BLUE, GREY, MOST_POINTS, ORANGE, Axis, Curve, Figure, Panel
 from sensorgen.analysis.report.electrodes import VERDICT_COLOURS
 from sensorgen.core.document import Cell, Column, Table
 from sensorgen.measure.signal.verdicts import ORDER, REACTANCES, WORDS, Evidence
 from sensorgen.measure.signal.yields import Group, Share, dependence, groups
 from sensorgen.prediction.query import TONES_HZ
 
-MOST_POINTS = 3000  # that a browser draws at once
 _SYMBOLS = {"tri": "circle", "rect": "square", "reference": "diamond", "double": "cross"}
 
 

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.prediction.calibration.fitting import Data, Posterior, covariances, memory
+from sensorgen.prediction.calibration.fitting import Data, Posterior, covariances
 from sensorgen.prediction.calibration.rest import STALE_S
-from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, parts
+from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel
+from sensorgen.prediction.inference import Index, Samples, parts, whitening
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
 from sensorgen.prediction.inverse.prior import Prior
 from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
@@ -76,7 +77,7 @@ _WORDS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Found(Samples):
     """Presses behind readings.
 
     Attributes
@@ -104,7 +105,7 @@ class Found:
     chi2: Real
     more: Real
     below: Real
-    tones: NDArray[np.intp]
+    tones: Index
     verdict: NDArray[np.uint8]
 
 
@@ -212,11 +213,11 @@ class Inverter:
         stale = np.zeros(len(ratio), bool) if rest_age_s is None else ~(rest_age_s <= STALE_S)
         return self._judged(found, stale, np.zeros(len(ratio), bool) if changed is None else changed)
 
-    def _put(self, found: Found, rows: NDArray[np.intp], ratio: Complex, tones: Mask) -> None:
+    def _put(self, found: Found, rows: Index, ratio: Complex, tones: Mask) -> None:
         kept = np.flatnonzero(np.tile(tones, 2))
         table = self._table(tones, kept)
 
-        def block(some: NDArray[np.intp]) -> None:
+        def block(some: Index) -> None:
             values = self._block(parts(ratio[some][:, tones]), table, kept)
             for name, value in zip(
                 ("force_n", "position_m", "force_90_n", "position_90_m", "chi2", "more"), values, strict=True
@@ -231,7 +232,7 @@ class Inverter:
         with ThreadPoolExecutor(2) as pool:
             list(pool.map(block, blocks))
 
-    def _without_one(self, found: Found, rows: NDArray[np.intp], ratio: Complex, measured: Mask) -> None:
+    def _without_one(self, found: Found, rows: Index, ratio: Complex, measured: Mask) -> None:
         """Of readings that no press explains, leave out the tone whose absence explains the most."""
         best = nothing(len(rows))
         for tone in range(ratio.shape[1]):
@@ -242,13 +243,11 @@ class Inverter:
                 if pattern.sum() >= max(_FEW_TONES, ratio.shape[1] // 2):
                     self._put(trial, np.flatnonzero((left == pattern).all(axis=1)), ratio[rows], pattern)
             better = (trial.chi2 <= chi2_limit(2 * trial.tones - 2)) & ~(best.chi2 <= trial.chi2)
-            for name, value in vars(trial).items():
-                getattr(best, name)[better] = value[better]
+            best.put(better, trial.rows(better))
         good = np.isfinite(best.chi2)
-        for name, value in vars(best).items():
-            getattr(found, name)[rows[good]] = value[good]
+        found.put(rows[good], best.rows(good))
 
-    def _block(self, reading: Real, table: _Table, kept: NDArray[np.intp]) -> tuple[Real, ...]:
+    def _block(self, reading: Real, table: _Table, kept: Index) -> tuple[Real, ...]:
         k = reading.shape[1]
         white = (table.root @ reading.T.astype(np.float32)).reshape(-1, k, len(reading))
         white -= table.mean[:, :, None]
@@ -278,7 +277,7 @@ class Inverter:
         mixed = (1 - self._otherwise) * force + self._otherwise * share @ force
         return _quantiles(self.force_n, mixed, (_BELOW * out, 1 - (1 - _BELOW) * out))
 
-    def _towards_more(self, root: NDArray[np.float32], points: Sequence[int], kept: NDArray[np.intp]) -> Real:
+    def _towards_more(self, root: NDArray[np.float32], points: Sequence[int], kept: Index) -> Real:
         """Unit vectors, whitened, in which another capacitance moves a reading the most, and no press (points, k)."""
         tangent = root @ self._tangents[points][:, kept]
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True) + 1e-300
@@ -287,11 +286,11 @@ class Inverter:
             other = other - tangent @ (np.linalg.pinv(tangent) @ other)
         return np.asarray(np.linalg.svd(other, full_matrices=False)[0][:, :, 0])
 
-    def _table(self, tones: Mask, kept: NDArray[np.intp]) -> _Table:
+    def _table(self, tones: Mask, kept: Index) -> _Table:
         key = tones.tobytes()
         if key not in self._tables:
             covariance = self._covariances[:, kept[:, None], kept]
-            root = np.linalg.inv(np.linalg.cholesky(covariance))
+            root = whitening(covariance)
             ln = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(1) + self._weight
             mean = np.einsum("gij,gj->gi", root, self._mean[:, kept])
             self._tables[key] = _Table(
@@ -357,21 +356,9 @@ def doubt_rest(found: Found, rest: Mask, left: int) -> int:
 
 def nothing(n: int) -> Found:
     """Results of readings in which nothing was found yet."""
-
-    def nan(*shape: int) -> Real:
-        return np.full(shape, np.nan)
-
-    return Found(
-        nan(n),
-        nan(n),
-        nan(n, 2),
-        nan(n, 2),
-        nan(n),
-        nan(n),
-        nan(n),
-        np.zeros(n, np.intp),
-        np.full(n, Verdict.MISSING, np.uint8),
-    )
+    (force, place, *others), ends = np.full((5, n), np.nan), np.full((2, n, 2), np.nan)
+    tones, verdict = np.zeros(n, np.intp), np.full(n, Verdict.MISSING, np.uint8)
+    return Found(force, place, ends[0], ends[1], others[0], others[1], others[2], tones, verdict)
 
 
 def _pairs(force_n: Real, position_m: Real) -> tuple[Real, Real]:
@@ -399,13 +386,11 @@ def readings(model: SpecimenModel, posterior: Posterior, force_n: Real, position
     presses = _of(posterior, force, position)
     slopes = model.slopes(posterior.at, presses)
     vectors = model.scatters(posterior.at, presses)
-    noise = np.tile(posterior.noise, (len(force), 1))
-    data = Data(presses, np.zeros_like(noise, complex), noise, np.zeros(noise.shape[1], complex), noise[0])
     components = posterior.components.copy()
     courses = (("hysteresis", posterior.unloading[1]), ("creep", posterior.decades[1]))
-    unknown_course = [memory(model, posterior.at, name) * sd for name, sd in courses]
+    unknown_course = [model.value(name, posterior.at) * sd for name, sd in courses]
     components[0] = np.sqrt(components[0] ** 2 + np.sum(np.square(unknown_course)))
-    own = covariances(model, posterior.at, data, components, vectors)
+    own = covariances(model, posterior.at, Data.unread(presses, posterior.noise), components, vectors)
     shared = slopes @ posterior.covariance @ slopes.transpose(0, 2, 1)
     return parts(model.ratio(posterior.at, presses)), own + shared
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.identifiability import changes, frequencies
 from sensorgen.prediction.identifiability.fisher import (
     Bounds,
-    Real,
     Setup,
     Slopes,
     bearable,

@@ -5,8 +5,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.prediction.inverse.descent import Fit
-from sensorgen.prediction.inverse.forward import Real
+from sensorgen.core.arrays import Mask, Real
+from sensorgen.prediction.inference import Fit
 
 NORMAL_90 = 1.6448536269514722  # normal deviate of 5 %
 PAIR = 9.21  # 99 % of chi-squared with two degrees of freedom: force and position
@@ -68,7 +68,7 @@ def covariance(fisher: Real) -> Real:
     return found
 
 
-def statuses(fit: Fit, variance: Real, tones: NDArray[np.intp], ambiguous: NDArray[np.bool_]) -> NDArray[np.uint8]:
+def statuses(fit: Fit, variance: Real, tones: NDArray[np.intp], ambiguous: Mask) -> NDArray[np.uint8]:
     """Verdicts on least-squares estimates.
 
     Parameters
@@ -85,7 +85,7 @@ def statuses(fit: Fit, variance: Real, tones: NDArray[np.intp], ambiguous: NDArr
     lost = variance > 1 / 12  # a uniform guess on the unit length has this variance
     rules = (
         (Status.AMBIGUOUS, ambiguous),
-        (Status.AT_THE_END, ((fit.press < _EDGE) | (fit.press > 1 - _EDGE)).any(1)),
+        (Status.AT_THE_END, ((fit.at < _EDGE) | (fit.at > 1 - _EDGE)).any(1)),
         (Status.FORCE_ONLY, lost[:, 1]),
         (Status.NOT_IDENTIFIABLE, lost[:, 0]),
         (Status.NO_FIT, fit.chi2 > chi2_limit(2 * tones - 2)),
