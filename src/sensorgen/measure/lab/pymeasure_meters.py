@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 
 from sensorgen.core.arrays import Real
-from sensorgen.core.errors import NotInstalled, OutOfRange, UnknownName
+from sensorgen.core.errors import NotInstalled, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.records import Line, Strict
+from sensorgen.measure.lab import scpi
 from sensorgen.measure.lab.catalogue import PYMEASURE, Role
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings, WrongDevice
@@ -53,20 +54,22 @@ def roles() -> dict[str, tuple[Role, Any]]:
     found: dict[str, tuple[Role, Any]] = {}
     for package in pkgutil.iter_modules(instruments.__path__, f"{instruments.__name__}."):
         with suppress(Exception), warnings.catch_warnings(action="ignore"):  # a maker whose own library is missing
-            for name, kind in vars(import_module(package.name)).items():
-                if isinstance(kind, type) and issubclass(kind, instruments.Instrument):
-                    if {"frequency", "ac_voltage", "trigger_source"} <= {*dir(kind)}:
-                        found[PYMEASURE + name] = "impedance", kind
-                    elif _is_multimeter(kind):
-                        found[PYMEASURE + name] = "meter", kind
+            kinds = vars(import_module(package.name)).items()
+            classes = ((name, kind) for name, kind in kinds if isinstance(kind, type))
+            found |= {
+                PYMEASURE + name: (as_what, kind)
+                for name, kind in classes
+                if issubclass(kind, instruments.Instrument) and (as_what := _role(dir(kind)))
+            }
     return dict(sorted(found.items()))
 
 
-def _is_multimeter(kind: Any) -> bool:
-    """Test whether a class reads a resistance without a source of its own that somebody has to switch on."""
-    names = dir(kind)
+def _role(names: list[str]) -> Role | None:
+    """Role of a class by the names in it; of none that somebody has to switch a source on for."""
+    if {"frequency", "ac_voltage", "trigger_source"} <= {*names}:
+        return "impedance"
     sources = any(name.startswith(("source", "enable_source")) for name in names)
-    return not sources and any(name in names for name in _READS[2])
+    return None if sources or not {*_READS[2]} & {*names} else "meter"
 
 
 def _way(kind: Any, wires: int) -> tuple[dict[str, str], str]:
@@ -146,8 +149,7 @@ class _Meter:
             self._meter = type(model, (self._kind,), {"write": write})(self._address)
             if not self.name:
                 self._ask(self._meter)
-        serial, firmware = (*[field.strip() for field in self.name.rstrip(")").split(",")][2:4], "", "")[:2]
-        return Identity(model, serial, firmware)
+        return scpi.identity(model, self.name.rstrip(")"))
 
     def _ask(self, meter: Any) -> None:
         """Ask a meter that was sent nothing yet."""
@@ -184,7 +186,7 @@ class _Meter:
         try:
             with warnings.catch_warnings(action="ignore"):
                 yield
-        except DeviceFault:
+        except SensorgenError:
             raise
         except Exception as error:  # of PyMeasure, PyVISA or the VISA library, each of many kinds
             reason = " ".join(str(error).split()) or type(error).__name__
@@ -248,10 +250,7 @@ class LcrMeter(_Meter):
                 for hz in self._tones_hz.tolist():
                     self._meter.frequency = hz
             except ValueError as error:
-                refused = str(error)
-            else:
-                return
-        raise OutOfRange(f"{self._kind.__name__} of PyMeasure: {refused}")
+                raise OutOfRange(f"{self._kind.__name__} of PyMeasure: {error}") from None
 
     def read(self) -> Readings:
         """One row, which is waited for, with nan at the other frequencies.
@@ -261,7 +260,6 @@ class LcrMeter(_Meter):
         DeviceFault
             No answer, or none with two numbers.
         """
-        row = np.full((1, len(self._tones_hz)), complex(math.nan, math.nan))
         begin, k = self._clock.now(), self._next
         with self._faults():
             self._meter.frequency = float(self._tones_hz[k])
@@ -271,10 +269,9 @@ class LcrMeter(_Meter):
                 self._meter.write("TRIG:IMM")
                 resistance, reactance, *status = self._meter.impedance
         good = not any(status[:1]) and max(abs(resistance), abs(reactance)) < _OVERLOAD_OHM
-        if good:
-            row[0, k] = complex(resistance, reactance)
+        value, middle = complex(resistance, reactance) if good else None, (begin + self._clock.now()) / 2
         self._next = (k + 1) % len(self._tones_hz)
-        return Readings(np.array([(begin + self._clock.now()) / 2]), row, np.array([not good]))
+        return Readings.of_tone(middle, k, len(self._tones_hz), value, clipped=not good)
 
     def stop(self) -> None:
         """End the measurement, with the level at its lowest: it has no switch."""

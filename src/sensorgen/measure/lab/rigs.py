@@ -1,7 +1,7 @@
 """The devices of a rig: real ones at their addresses, or simulators that share one virtual specimen."""
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any, cast
 
@@ -38,18 +38,7 @@ def real(devices: Devices, clock: Clock) -> Rig:
     DeviceFault
         There is no such line.
     """
-    found: dict[str, Any] = {}
-    try:
-        for role in ROLES:
-            device: Device = getattr(devices, role)
-            with within(f"devices.{role}"):
-                _has_role(role, device)
-                found[role] = catalogue.opened(device.kind, device.address, device.settings, clock)
-    except BaseException:
-        for driver in found.values():
-            driver.close()
-        raise
-    return Rig(**found)
+    return Rig(**_drivers(devices, lambda device: opened(device, clock)))
 
 
 def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Rig, mechanics.Rig]:
@@ -67,21 +56,34 @@ def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Rig
         _strike(virtual, devices)
         plant = rig.rig_of(virtual, design, experiment.pressing.length_mm * 1e-3)
         plant.specimen.blank  # noqa: B018 - solved now: one that cannot be is refused before the run begins
-    found: dict[str, Any] = {}
-    for role in ROLES:
-        device: Device = getattr(devices, role)
+
+    def made(device: Device) -> Any:
         settings = dict(device.settings)
         if device.kind == SIMULATED.actuator.kind:
             settings = {"weight_n": plant.mechanics.weight_n, "friction_n": plant.mechanics.friction_n} | settings
-        with within(f"devices.{role}"):
-            _has_role(role, device)
-            made = catalogue.simulated(device.kind, plant, settings, clock)
-        found[role] = made.driver
-        if hasattr(made.simulator, "heard"):  # every message so far: of an hour, tens of megabytes
-            made.simulator.heard = deque(maxlen=_HEARD)
+        of = catalogue.simulated(device.kind, plant, settings, clock)
+        if hasattr(of.simulator, "heard"):  # every message so far: of an hour, tens of megabytes
+            of.simulator.heard = deque(maxlen=_HEARD)
         if plant.planted and device.kind in _STRIKES:
-            plant.planted.attach(_STRIKES[device.kind], made.simulator)
-    return Rig(**found), plant
+            plant.planted.attach(_STRIKES[device.kind], of.simulator)
+        return of.driver
+
+    return Rig(**_drivers(devices, made)), plant
+
+
+def _drivers(devices: Devices, made: Callable[[Device], Any]) -> dict[str, Any]:
+    """Drivers by role; where one cannot be made, the others are closed."""
+    drivers: dict[str, Any] = {}
+    try:
+        for role in ROLES:
+            with within(f"devices.{role}"):
+                _has_role(role, getattr(devices, role))
+                drivers[role] = made(getattr(devices, role))
+    except BaseException:
+        for driver in drivers.values():
+            driver.close()
+        raise
+    return drivers
 
 
 def _strike(virtual: rig.VirtualSpecimen, devices: Devices) -> None:
