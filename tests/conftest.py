@@ -100,6 +100,27 @@ def program():
     return path
 
 
+@pytest.fixture(scope="session")
+def _started(tmp_path_factory):
+    """Browsers that run: one for all tests, and another where it has gone."""
+    pages = []
+    yield pages
+    for page in pages:
+        page.close()
+
+
+@pytest.fixture
+def browser(program, _started, tmp_path_factory):
+    """A page of Chromium that nobody has used."""
+    from browser import Page
+
+    chromium = program("chromium", "chromium", "chromium-browser", "google-chrome")
+    if not _started or _started[-1].process.poll() is not None:
+        _started.append(Page(chromium, tmp_path_factory.mktemp("chromium")))
+    _started[-1].renew()
+    return _started[-1]
+
+
 @pytest.fixture
 def newer_program():
     """Path of a slicer of Debian 13, newer than this machine's own; without it a test is skipped, but never on CI."""
