@@ -30,19 +30,19 @@ def png(study: "ArrayStudy") -> bytes:
                              columns=len(panels)))  # fmt: skip
 
 
-def maps(found: "PressureMaps", true: "Real | None" = None) -> bytes:
+def maps(pressures: "PressureMaps", true: "Real | None" = None) -> bytes:
     """The heaviest frame's pressures, and the true ones beside them where these are known, as PNG.
 
     What is not determined is left white, never drawn as no pressure.
     """
-    k, layout = found.heaviest(), found.model.layout
-    shown = {f"frame at {found.time_s[k]:g} s": found.pressure_kpa[k]}
+    k, layout = pressures.heaviest(), pressures.model.layout
+    shown = {f"frame at {pressures.time_s[k]:g} s": pressures.pressure_kpa[k]}
     if true is not None:
-        shown = {"true": np.where(found.model.here, true[k], np.nan)} | shown
+        shown = {"true": np.where(pressures.model.here, true[k], np.nan)} | shown
     most = max(float(np.nanmax(values, initial=1.0)) for values in shown.values())
     panels = [panel(layout, values, "pressure [kPa]", title, most) for title, values in shown.items()]
     alt = "Pressure at every crossing over the outline, the true one beside it where it is known."
-    return static.png(Figure("map", found.model.design.name, alt, {"": tuple(panels)}, columns=len(panels)))
+    return static.png(Figure("map", pressures.model.design.name, alt, {"": tuple(panels)}, columns=len(panels)))
 
 
 def panel(layout: "Layout", values: Real, label: str, title: str, most: float = nan) -> Panel:
