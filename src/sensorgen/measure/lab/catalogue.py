@@ -200,7 +200,7 @@ def _at_port(
     role: Role, settings: type[Strict], driver: Callable[[Any, Clock, Any], Device], port: Callable[[str, Any], Any],
     simulator: Callable[[Plant, Any], Any],
 ) -> Kind:  # fmt: skip
-    """A kind whose driver speaks through a port, to a device or to a simulator."""
+    """A kind whose driver has a port: of a device, or of a simulator."""
     from sensorgen.measure.lab.port import SimulatedPort
 
     def simulate(plant: Plant, given: Any, clock: Clock) -> Simulated:
