@@ -15,7 +15,6 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from browser import Page
 
 from sensorgen.measure.lab.live import LiveText, LiveView, Sample, line
 from sensorgen.measure.signal.multisine import TONES_HZ
@@ -44,11 +43,9 @@ def view():
 
 
 @pytest.fixture
-def page(program, tmp_path, view):
-    made = Page(program("chromium", "chromium", "chromium-browser", "google-chrome"), tmp_path)
-    made.call("Page.navigate", url=view.url)
-    yield made
-    made.close()
+def page(browser, view):
+    browser.call("Page.navigate", url=view.url)
+    return browser
 
 
 def request(view, path="", method="GET", body=None, **headers):

@@ -187,7 +187,7 @@ def test_the_packed_shells_are_the_meshes():
 
 def test_edges_of_a_box_are_twelve():
     scene = make({"shape": "reference"}).printed
-    ends = geometry.edges(mesh(scene.bodies[0]))
+    ends = mesh(scene.bodies[0]).sharp_edges()
     assert len({tuple(pair) for pair in ends.tolist()}) == len(ends) == 12
 
 

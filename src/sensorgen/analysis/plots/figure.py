@@ -13,7 +13,8 @@ from sensorgen.core.arrays import Complex, Mask, Real
 BLUE, ORANGE, GREEN, PINK, YELLOW, SKY, GREY = (
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a8f98",
 )  # fmt: skip
-COLOURS = (BLUE, ORANGE, GREEN, PINK, YELLOW, SKY, "#7a5195", "#8c564b", "#555555")
+PURPLE, BROWN, DARK = "#7a5195", "#8c564b", "#555555"
+COLOURS = (BLUE, ORANGE, GREEN, PINK, YELLOW, SKY, PURPLE, BROWN, DARK)
 SYMBOLS = (
     "circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x", "triangle-left", "triangle-right",
 )  # fmt: skip

@@ -17,7 +17,6 @@ from sensorgen.scene.geometry.meshes import Mesh, mesh
 from sensorgen.scene.scene import AXES, Outline, Scene, clipped
 
 UM_PER_MM = 1000
-_FLAT = 0.999  # cosine of the angle up to which two triangles are one face
 _PERIODS, _HEIGHTS = 2.5, 5.0  # how much is shown: periods of a pattern, or heights where nothing repeats
 _WIDEST = 12.0  # width of a figure, relative to its height [-]
 _MARGIN = 0.04  # share of the width around the section [-]
@@ -116,20 +115,5 @@ def block(header: Mapping[str, Any], scenes: Mapping[str, Scene], names: Sequenc
 
 def _parts(shell: Mesh) -> tuple[Whole, Whole, Whole]:
     """Vertices [um], triangles, and the edges between faces."""
-    return np.round(shell.vertices_mm * UM_PER_MM).astype(np.int64), shell.triangles.astype(np.int64), edges(shell)
-
-
-def edges(shell: Mesh) -> Whole:
-    """Pairs of vertices (n, 2) where two faces meet at an angle, sorted."""
-    a, b, c = (shell.vertices_mm[shell.triangles[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True).clip(1e-300)
-    sides = np.sort(shell.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
-    key = sides[:, 0] * len(shell.vertices_mm) + sides[:, 1]
-    order = np.argsort(key, kind="stable")
-    first, second = order[:-1], order[1:]
-    pair = key[first] == key[second]
-    first, second = first[pair], second[pair]
-    sharp = np.einsum("ij,ij->i", normal[first // 3], normal[second // 3]) < _FLAT
-    ends: Whole = sides[first[sharp]]
-    return ends
+    vertices = np.round(shell.vertices_mm * UM_PER_MM).astype(np.int64)
+    return vertices, shell.triangles.astype(np.int64), shell.sharp_edges()

@@ -6,8 +6,7 @@ at each of its points the expected ratio and the covariance of readings about it
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from enum import IntEnum
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,11 +17,11 @@ from sensorgen.core.errors import BadInput
 from sensorgen.prediction.calibration.fitting import Data, Posterior, covariances
 from sensorgen.prediction.calibration.rest import STALE_S
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel
-from sensorgen.prediction.inference import Index, Samples, parts, whitening
+from sensorgen.prediction.inference import Index, Samples, cramer_rao, parts, whitening
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
 from sensorgen.prediction.inverse.prior import Prior
+from sensorgen.prediction.inverse.statuses import Worded
 from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
-from sensorgen.prediction.inverse.verdict import covariance as inverted
 
 LEVEL = 0.9  # probability of the intervals
 _COARSE = 20, 16  # forces and positions at which covariances are worked out
@@ -41,39 +40,28 @@ WIDE = 0.8  # share of the sensor above which an interval does not tell the posi
 _LOCATES = 0.4  # share of the sensor below which an interval is expected to tell it
 
 
-class Verdict(IntEnum):
+class Verdict(Worded):
     """The verdict on a reading, the worst that applies."""
 
-    OK = 0
-    FORCE_ONLY = 1
+    OK = 0, "ok"
+    FORCE_ONLY = 1, "force only"
     """The position's interval is most of the sensor, which locates other presses of this force."""
-    AT_THE_END = 2
+    AT_THE_END = 2, "at the end"
     """The force's interval ends at the largest force that was looked for."""
-    NOT_CALIBRATED = 3
+    NOT_CALIBRATED = 3, "not calibrated"
     """The interval is what the prediction alone allows."""
-    STALE_REST = 4
+    STALE_REST = 4, "stale rest"
     """The reading at rest is too old."""
-    LOADED_REST = 5
+    LOADED_REST = 5, "rest under load"
     """This reading, or one of ``_DOUBTED`` beside it, lies below its reading at rest: that was read under a load."""
-    NO_FIT = 6
+    NO_FIT = 6, "no fit"
     """No press explains the reading."""
-    MORE = 7
+    MORE = 7, "more than one press"
     """Another capacitance besides one press explains it: a second press, or a hand."""
-    CHANGED = 8
+    CHANGED = 8, "changed since calibration"
     """At rest, the sensor is not the one that was calibrated."""
-    MISSING = 9
+    MISSING = 9, "missing"
     """Too little was measured."""
-
-    @property
-    def words(self) -> str:
-        """As files and people read it."""
-        return _WORDS[self]
-
-
-_WORDS = (
-    "ok", "force only", "at the end", "not calibrated", "stale rest", "rest under load", "no fit",
-    "more than one press", "changed since calibration", "missing",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,20 +205,16 @@ class Inverter:
         kept = np.flatnonzero(np.tile(tones, 2))
         table = self._table(tones, kept)
 
-        def block(some: Index) -> None:
-            values = self._block(parts(ratio[some][:, tones]), table, kept)
-            for name, value in zip(
-                ("force_n", "position_m", "force_90_n", "position_90_m", "chi2", "more"), values, strict=True
-            ):
-                getattr(found, name)[some] = value
-            found.tones[some] = tones.sum()
+        def put(some: Index) -> None:
+            block = self._block(parts(ratio[some][:, tones]), table, kept)
+            found.put(some, replace(block, tones=np.full(len(some), tones.sum())))
 
         blocks = [rows[start : start + _BLOCK] for start in range(0, len(rows), _BLOCK)]
         if len(blocks) == 1:
-            block(rows)
+            put(rows)
             return
         with ThreadPoolExecutor(2) as pool:
-            list(pool.map(block, blocks))
+            list(pool.map(put, blocks))
 
     def _without_one(self, found: Found, rows: Index, ratio: Complex, measured: Mask) -> None:
         """Of readings that no press explains, leave out the tone whose absence explains the most."""
@@ -247,7 +231,7 @@ class Inverter:
         good = np.isfinite(best.chi2)
         found.put(rows[good], best.rows(good))
 
-    def _block(self, reading: Real, table: _Table, kept: Index) -> tuple[Real, ...]:
+    def _block(self, reading: Real, table: _Table, kept: Index) -> Found:
         k = reading.shape[1]
         white = (table.root @ reading.T.astype(np.float32)).reshape(-1, k, len(reading))
         white -= table.mean[:, :, None]
@@ -261,9 +245,11 @@ class Inverter:
         ln -= ln.max(0)
         density = np.exp(ln).reshape(len(self.force_n), len(self.position_m), -1)
         force, position = density.sum(1), density.sum(0)
-        return (
-            _quantiles(self.force_n, force, (0.5,))[:, 0], _quantiles(self.position_m, position, (0.5,))[:, 0],
-            self._force_ends(force), _densest(self.position_m, position, self.level), chi2[best, each], more,
+        return replace(
+            nothing(len(each)),
+            force_n=_quantiles(self.force_n, force, (0.5,))[:, 0], force_90_n=self._force_ends(force),
+            position_m=_quantiles(self.position_m, position, (0.5,))[:, 0],
+            position_90_m=_densest(self.position_m, position, self.level), chi2=chi2[best, each], more=more,
         )  # fmt: skip
 
     def _force_ends(self, force: Real) -> Real:
@@ -311,10 +297,7 @@ class Inverter:
             (Verdict.CHANGED, changed),
             (Verdict.MISSING, found.tones < _FEW_TONES),
         )
-        found.verdict[:] = Verdict.OK
-        for verdict, applies in rules:
-            found.verdict[applies] = verdict
-        return found
+        return replace(found, verdict=Verdict.worst(len(wide), rules))
 
 
 def _one_press(found: Found) -> Mask:
@@ -399,9 +382,9 @@ def _position_errors(coarse: tuple[Real, Real], mean: Real, covariance: Real) ->
     """Standard error of the position at each force of a grid, the median over positions [m]."""
     shape = len(coarse[0]), len(coarse[1])
     slopes = [np.asarray(np.gradient(mean.reshape(*shape, -1), at, axis=k)) for k, at in enumerate(coarse)]
-    slope = np.stack(slopes, 2).reshape(len(mean), 2, -1)
-    fisher = slope @ np.linalg.solve(covariance, slope.transpose(0, 2, 1))
-    return np.asarray(np.median(np.sqrt(inverted(fisher)[:, 1, 1]).reshape(shape), axis=1))
+    white = whitening(covariance)
+    _, error, _ = cramer_rao(*(np.einsum("gij,gj->gi", white, slope.reshape(mean.shape)) for slope in slopes))
+    return np.asarray(np.median(np.nan_to_num(error, nan=np.inf).reshape(shape), axis=1))
 
 
 def _grid(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> tuple[Real, Real]:

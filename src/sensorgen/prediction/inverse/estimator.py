@@ -137,7 +137,10 @@ class Estimator:
                 return plain
         found = self._block(z)
         return Press(
-            float(found.force_n[0]), float(found.position_m[0]), found.covariance[0], Status(int(found.status[0]))
+            float(found.force_n[0]),
+            float(found.position_m[0]),
+            found.covariance[0],
+            Status(int(found.status[0])),  # type: ignore[call-arg]
         )
 
     def batch(self, impedance_ohm: ArrayLike) -> Estimates:
