@@ -82,9 +82,10 @@ sbom: $(READY) ## write out/sbom.json, what is installed beside sensorgen and it
 	mkdir -p out
 	out/tools/bin/cyclonedx-py environment --output-reproducible --of JSON -o out/sbom.json $(BIN)/python
 
-audit: ## look for advisories on every version in constraints.txt (pip-audit, answers cached in out/audit); what it cannot look up fails
+audit: $(READY) ## look for advisories on every version in constraints.txt (pip-audit); offline with ADVISORIES=PLACE, see scripts/audit.py
 	scripts/clean-environment --tools "$(PYTHON)"
-	out/tools/bin/pip-audit --strict --disable-pip --no-deps -r constraints.txt --cache-dir out/audit --progress-spinner off
+	$(if $(ADVISORIES),$(BIN)/python scripts/audit.py $(ADVISORIES),out/tools/bin/pip-audit --strict --disable-pip --no-deps \
+		-r constraints.txt --cache-dir out/audit --progress-spinner off)
 
 clean: ## remove everything that is derived
 	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -109,7 +109,7 @@ def test_posterior_against_importance_sampling(study, coupons, truth):
     root = np.linalg.cholesky(best.covariance * 1.3)
     normal = rng.normal(size=(count, len(centre)))
     scale = np.sqrt(freedom / rng.chisquare(freedom, count))
-    theta = best.mean + (normal * scale[:, None]) @ root.T
+    theta = best.at + (normal * scale[:, None]) @ root.T
     distance = (normal**2).sum(axis=1) * scale**2
     log_proposal = -(freedom + len(centre)) / 2 * np.log1p(distance / freedom)
     with np.errstate(all="ignore"):

@@ -348,7 +348,7 @@ def test_help_does_not_load_numpy(real):
 def test_options_are_what_the_planner_knows():
     from sensorgen.cli.predict_command import OWN
     from sensorgen.models.pressure import PROFILES
-    from sensorgen.prediction.compression_law import LAWS
+    from sensorgen.prediction.query import LAWS
 
     options = {option.name: option for option in OWN}
     assert tuple(options["compression"].type.choices) == LAWS

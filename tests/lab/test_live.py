@@ -200,7 +200,7 @@ def test_only_the_token_opens_it(view):
 
 def test_it_listens_to_this_computer_only(view):
     port = urlsplit(view.url).port
-    assert view._server._http.server_address[0] == "127.0.0.1"
+    assert view._server.server_address[0] == "127.0.0.1"
     for address in {info[4][0] for info in socket.getaddrinfo(socket.gethostname(), port, socket.AF_INET)}:
         if not address.startswith("127."):
             with pytest.raises(OSError, match=r"refused|unreachable|timed out"):
