@@ -287,7 +287,8 @@ class Layout:
         p, (rows, columns) = self.params, self.regions
         if all(map(all, self.here)):
             return shapely.box(0.0, 0.0, *self.size_mm)
-        field = shapely.box(0.0, 0.0, max(t.pad[1] for t in self.columns) + p.margin_mm, p.pad_mm)
+        beside = max(p.margin_mm, p.hole_mm + 2 * WALL_MM + DOT_MM if p.hole_mm else 0.0)
+        field = shapely.box(0.0, 0.0, max(t.pad[1] for t in self.columns) + beside, p.pad_mm)
         grown = shapely.union_all([self.sensing, rows, columns]).buffer(p.margin_mm, join_style="mitre") | field
         closed = grown.buffer(p.connector_mm, join_style="mitre").buffer(-p.connector_mm, join_style="mitre")
         whole = shapely.box(0.0, 0.0, *self.size_mm)
