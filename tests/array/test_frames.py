@@ -15,7 +15,7 @@ from sensorgen.prediction.array.frames import inverted
 from sensorgen.prediction.array.model import array_model
 from sensorgen.prediction.array.readout import ArrayReadout
 from sensorgen.prediction.array.study import study
-from sensorgen.prediction.array.virtual import foot, simulated, step
+from sensorgen.measure.virtual.array import foot, simulated, step
 
 TRI = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
 PRESSURE = np.random.default_rng(1).uniform(0, 300, (2, 5, 6)) * 1e3  # Pa

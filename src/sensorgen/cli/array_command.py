@@ -48,7 +48,7 @@ def _work(
     found = study(model, how, pressure_kpa, faults)
     if simulate is not None:
         from sensorgen.core import files
-        from sensorgen.prediction.array.virtual import step
+        from sensorgen.measure.virtual.array import step
 
         files.replace(simulate, step(model, how, faults))
         render.say(f"wrote {simulate}", err=bool(render.form()))

@@ -21,13 +21,15 @@ _NOT_HERE = {"perfect": "--perfect", "prior": "--prior", "force_limit_n": "--for
 
 def invert(
     design: "Design", measured: str, output: str | None, noise: float | None, rest_file: str | None, *, readout: str,
-    input_ohm: float, frequency: tuple[float, ...] | None, scatter: float, plot: Path | None, **others: Any,
+    input_ohm: float, frequency: tuple[float, ...] | None, scatter: float, plot: Path | None,
+    calibration: Path | None, **others: Any,
 ) -> int:  # fmt: skip
     """Pressure maps of an array's frames."""
     from sensorgen.measure.array_frames import read
     from sensorgen.prediction.array.frames import inverted
     from sensorgen.prediction.array.model import array_model
     from sensorgen.prediction.array.readout import ArrayReadout
+    from sensorgen.prediction.array.sessions import stored
     from sensorgen.prediction.query import NOISE
 
     _refuse(others)
@@ -38,7 +40,8 @@ def invert(
     frames = read(Path(measured), shape, hertz)
     apart = read(Path(rest_file), shape, frames.frequency_hz).at_rest() if rest_file else None
     how = ArrayReadout(readout, input_ohm, (frames.frequency_hz,), NOISE if noise is None else noise)  # type: ignore[arg-type]
-    found = inverted(model, how, frames.siemens, frames.rest, frames.time_s, scatter, apart, frames.unused)
+    known = None if calibration is None else stored(calibration)
+    found = inverted(model, how, frames.siemens, frames.rest, frames.time_s, scatter, apart, frames.unused, known)
     if output:
         _write(found, output)
     if plot is not None:

@@ -1,12 +1,12 @@
 """``sensorgen calibrate``: how one specimen differs from its prediction, by known presses."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
-from sensorgen.cli import FOUND_ERRORS, body_options, log_words, options, render, show
+from sensorgen.cli import FOUND_ERRORS, array_calibrate, body_options, log_words, options, render, show
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
@@ -15,21 +15,26 @@ if TYPE_CHECKING:
 
 def _work(
     specimens: tuple[str, ...], tip: dict[str, object] | None, force_offset: str, recordings: tuple[int, ...],
-    page: str | None, source: str | None, file: str | None, *, again: bool, dry_run: bool,
+    page: str | None, source: str | None, file: str | None, *, again: bool, dry_run: bool, **of_array: Any,
 ) -> int:  # fmt: skip
     """Calibrate specimens by recordings with known presses, and by readings of meters, that the log has of them.
+
+    Files in place of specimens are sessions of an array, each with time_s, its elements and a reference: pressure_kpa
+    of a bladder, force_n of a press on an 'element', or force_n of a person on a plate.
 
     Several specimens share the bench. Some 30 presses, half of them after a higher one and held for 0.3 to 30 s, are
     enough; with none, R, C and leak are calibrated by what was read at rest. 'sensorgen invert SPECIMEN' then uses the
     result, which the log keeps.
     """
+    if array_calibrate.are_files(specimens):
+        array, target = of_array["array"], of_array["calibration"]
+        return array_calibrate.calibrate(specimens, array, target, by_first=of_array["by_first"])
     from sensorgen.analysis import calibration
 
     bench = options.bench_of(tip, force_offset)
-    if again and len(specimens) > 1:
-        raise BadInput(f"--recheck of {len(specimens)} specimens; expected one")
-    if source and len(specimens) > 1:
-        raise BadInput(f"--source of {len(specimens)} specimens; expected one; 'sensorgen fit' takes several")
+    for option, is_given in (("--recheck", again), ("--source", source)):
+        if is_given and len(specimens) > 1:
+            raise BadInput(f"{option} of {len(specimens)} specimens; expected one; 'sensorgen fit' takes several")
     given = click.get_current_context().get_parameter_source
     if again and any(given(name) is ParameterSource.COMMANDLINE for name in ("tip", "force_offset")):
         raise BadInput("--recheck goes on with tip and offset of the calibration; expected no --tip, no --force-offset")
@@ -61,7 +66,7 @@ def _work(
 command = click.Command(
     "calibrate", callback=_work, help=_work.__doc__,
     params=[
-        click.Argument(["specimens"], nargs=-1, required=True, metavar="SPECIMEN..."),
+        click.Argument(["specimens"], nargs=-1, required=True, metavar="SPECIMEN...|FILE..."),
         *options.bench(),
         click.Option(
             ["--recording", "recordings"], type=click.IntRange(1), multiple=True, metavar="NUMBER",
@@ -76,7 +81,7 @@ command = click.Command(
             ["--source"], metavar="FILE.yaml",
             help="Write the material values of the specimen as a source that designs can name.",
         ),
-        log_words.where(),
+        *array_calibrate.options(), log_words.where(),
         *body_options.body_options(),
         click.Option(["--dry-run"], is_flag=True, help="Log nothing."),
         *render.options("json", "markdown"),

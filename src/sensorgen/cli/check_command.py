@@ -29,6 +29,8 @@ def _work(design: "Design", *, strict: bool, budget: float, apply_change: int | 
         held = reviewed(design, step)
         decided = decision.decision(design, held, budget, predict=budget > 0, step=step)
     render.deliver(decided)
+    if decided.findings and render.early():
+        render.say("each finding in its place, in 3D, drawing and layers: sensorgen show", err=True)
     settings.applied(design, decided.advice, apply_change)
     return 1 if held.errors(strict) or held.verdict == "CHANGE" else 0
 

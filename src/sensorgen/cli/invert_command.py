@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from sensorgen.cli import body_options, log_words, options, render, show
+from sensorgen.cli import array_calibrate, body_options, log_words, options, render, show
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.cli.words import OneOf, Share, Values, one
 from sensorgen.core import files as store
@@ -78,13 +78,15 @@ def _work(
     design: "Design", *, measured: str, output: str | None, perfect: bool, rest_file: str | None,
     compression: str | None, **how: Any,
 ) -> int:  # fmt: skip
-    of_array = {key: how.pop(key) for key in ("readout", "input_ohm", "frequency", "scatter", "plot")}
+    of_array = {key: how.pop(key) for key in ("readout", "input_ohm", "frequency", "scatter", "plot", "calibration")}
     if design.layout:
         from sensorgen.cli import array_frames
 
         others = {"perfect": perfect, "compression": compression, **how}
         noise = others.pop("noise")
         return array_frames.invert(design, measured, output, noise, rest_file, **of_array, **others)
+    if of_array["calibration"]:
+        raise BadInput(f"--calibration is of an array; {design.name} is {design.shape}: invert its specimen by name")
     from sensorgen.prediction.query import Query
 
     query = Query(law=compression or "")
@@ -302,7 +304,12 @@ class _Specimens(DesignGroup):
     """A word that is neither a shape nor a file is a specimen of the log."""
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command:
-        """The command for a shape, a design file, or a specimen."""
+        """The command for a shape, a design file, a calibration of an array, or a specimen."""
+        if name.endswith(".npz"):
+            return click.Command(
+                name, params=_COMMON, help=array_calibrate.invert.__doc__,
+                callback=lambda measured, output, **_: array_calibrate.invert(name, measured, output),
+            )  # fmt: skip
         try:
             return super().get_command(ctx, name)
         except UnknownName:
@@ -317,5 +324,6 @@ command = _Specimens(
     help="Force and position behind the impedances in MEASURED.csv ('-' reads the standard input): one row per sample, "
     "columns re_ohm_1.1kHz and im_ohm_1.1kHz for every tone, 'rest' with 1 where nothing was on the sensor, and time_s "
     "if known. The first word is a specimen that was calibrated, or a design. Of an array: pressure maps of frames, "
-    "CSV with columns r1c1, r1c2 ... [F], or NPZ.",
+    "CSV with columns r1c1, r1c2 ... [F], NPZ or HDF5. A calibration of an array, FILE.npz, in place of the design: "
+    "pressures of any array's elements.",
 )  # fmt: skip

@@ -130,6 +130,10 @@ def array_frames() -> list[click.Parameter]:
             metavar="HZ",
         ),
         option("--scatter", Share(), "Of an array: gain from cell to cell, 5 % before a calibration.", default="5%"),
+        option(
+            "--calibration", click.Path(path_type=Path, dir_okay=False), "Of an array: by 'sensorgen calibrate'.",
+            metavar="FILE.npz",
+        ),
         option("--plot", click.Path(path_type=Path), "Of an array: write its heaviest map there.", metavar="DIR"),
     ]  # fmt: skip
 
