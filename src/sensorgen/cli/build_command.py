@@ -1,7 +1,7 @@
 """``sensorgen build``: all files of a design."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -10,6 +10,8 @@ from sensorgen.cli.designs import DesignGroup
 from sensorgen.core.errors import Unprintable
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from sensorgen.design.design import Design
 
 OWN: list[click.Parameter] = [
@@ -94,7 +96,23 @@ def _verify(design: "Design", folder: Path) -> int:
     return FOUND_ERRORS if found else 0
 
 
+def _tiles(design: "Design", given: dict[str, Any]) -> "Sequence[Design]":
+    """Tiles of an array that the bed does not hold, with a table of their places; else the design."""
+    if not design.layout:
+        return (design,)
+    from sensorgen.core import document, files
+    from sensorgen.workflows import tiles
+
+    found = tiles.tiles(design)
+    if not found:
+        return (design,)
+    where = Path(given["out"]) / f"{design.name}-tiles.csv"
+    files.replace(where, document.comma_separated(tiles.table(found)).encode())
+    render.say(f"{len(found)} tiles, as it does not fit the bed: {where}", err=bool(render.form()))
+    return [tile for _, tile in found]
+
+
 command = DesignGroup(
-    _work, OWN, name="build",
+    _work, OWN, _tiles, name="build",
     help="Write everything that a design's print needs: 3MF, STEP, profiles, drawing, prediction.",
 )  # fmt: skip

@@ -1,7 +1,7 @@
 """Words on the command line to a design: a shape with options, or a file with changes to it."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, cast
@@ -22,13 +22,19 @@ if TYPE_CHECKING:
 
 Data = dict[str, Any]
 Work = Callable[..., int]
+Parts = Callable[["Design", Data], "Sequence[Design]"]
 
 
 class DesignGroup(click.Group):
     """A command whose first word is a shape or a design file; each shape brings its own options."""
 
-    def __init__(self, work: Work, own: list[click.Parameter], **attributes: Any) -> None:
-        """``work`` gets the design and the values of the command's ``own`` options; it returns the exit code."""
+    def __init__(
+        self, work: Work, own: list[click.Parameter], parts: Parts = lambda design, _: (design,), **attributes: Any
+    ) -> None:
+        """``work`` gets the design and the values of the command's ``own`` options; it returns the exit code.
+
+        ``parts`` names the designs that it is done with in turn, by the design and these values.
+        """
         super().__init__(
             options_metavar="",
             subcommand_metavar="{SHAPE|DESIGN.yaml} [OPTIONS]",
@@ -36,7 +42,7 @@ class DesignGroup(click.Group):
             context_settings={"ignore_unknown_options": True},
             **attributes,
         )
-        self.work, self.own = work, own
+        self.work, self.own, self.parts = work, own, parts
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         """Names of the shapes."""
@@ -86,7 +92,7 @@ class DesignGroup(click.Group):
         def run(**given: Any) -> int:
             own = {p.name: given.pop(p.name) for p in self.own if p.name in given}
             given["tip"] = own.pop("tip", None)
-            return self.work(_design(base, given, name), **own)
+            return max(self.work(part, **own) for part in self.parts(_design(base, given, name), own))
 
         others = [*_design_options(), *self.own]
         params = _parameter_options(module.Params, {word for other in others for word in other.opts}) if module else []

@@ -48,6 +48,7 @@ def _work(design: "Design", *, output: str | None) -> int:
     path = Path(output or f"{design.name}.svg")
     store.replace(path, text.encode())
     render.say(str(path))
+    render.say("findings in full: sensorgen check; in 3D and layers: sensorgen show", err=True)
     return 0
 
 

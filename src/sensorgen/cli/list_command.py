@@ -5,14 +5,14 @@ import click
 from sensorgen.cli import render
 from sensorgen.cli.words import OneOf
 
-KINDS = ("shapes", "materials", "printers", "qualities", "instruments", "packs", "models", "sources")
+KINDS = ("shapes", "materials", "printers", "qualities", "instruments", "devices", "packs", "models", "sources")
 
 
 def _list(kind: str) -> None:
     """List what goes by a name.
 
-    Shapes with their parameters, materials with every value and its source, printers, qualities, instruments, packs,
-    models, or what the sources stand for; with the pack that each comes from.
+    Shapes with their parameters, materials with every value and its source, printers, qualities, instruments, devices
+    of the laboratory, packs, models, or what the sources stand for; with the pack that each comes from.
     """
     from sensorgen.cli import catalogue
 

@@ -26,9 +26,9 @@ KINDS = ("reading", "recording", "prediction", "calibration", "print", "batch", 
 
 def _add(
     specimen: str, y_words: str, z_words: str, file: str | None, corrects: int | None, *, design: str | None,
-    predict: bool, visa: str | None, axis: str | None, wires: str | None, baked: bool | None, remark: str,
-    measured_at: str, instrument: str, temperature: float | None, humidity: float | None, photo: str | None,
-    defects: tuple[str, ...], **ac: tuple[str, ...],
+    predict: bool, visa: str | None, meter: str | None, axis: str | None, wires: str | None, baked: bool | None,
+    remark: str, measured_at: str, instrument: str, temperature: float | None, humidity: float | None,
+    photo: str | None, defects: tuple[str, ...], **ac: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Log what meters show of one specimen: DC resistances, and AC quantities between its electrodes.
 
@@ -42,6 +42,8 @@ def _add(
     from sensorgen.measure.immittance import parse
     from sensorgen.measure.log import Reading, binding, files, notes
 
+    if meter and not visa:
+        raise BadInput(f"--meter {meter} without --visa; expected the meter's address too")
     if visa and (y_words or z_words):
         raise BadInput("--visa beside --y or --z; expected the meter's readings or words, not both")
     typed = {name: texts for name, texts in ac.items() if texts and [parse(name, text) for text in texts]}
@@ -57,7 +59,7 @@ def _add(
         with opened(file, create=True) as log:
             _predict_ahead(log, specimen)
     if visa:
-        y_words, z_words, instrument = _measured(visa, axis, wires or "2")
+        y_words, z_words, instrument = _measured(visa, meter, axis, wires or "2")
     mega = _asked_mega(y=y_words, z=z_words)
     with opened(file, create=True) as log:
         row = notes.reading(
@@ -103,17 +105,16 @@ def _asked_mega(**typed: str) -> bool:
     return True
 
 
-def _measured(visa: str, axis: str | None, wires: str) -> tuple[str, str, str]:
+def _measured(visa: str, kind: str | None, axis: str | None, wires: str) -> tuple[str, str, str]:
     """Words of a meter for Y and Z, and what it calls itself; leads are moved between the two."""
     from contextlib import closing
 
-    from sensorgen.measure.lab.multimeter import Multimeter
-    from sensorgen.measure.lab.port import VisaPort
+    from sensorgen.measure.lab import rigs
 
     if axis is None and not (sys.stdin and sys.stdin.isatty()):
         raise BadInput("--visa without --axis needs somebody to move the leads; expected --axis y or --axis z")
     found = {"y": "", "z": ""}
-    with closing(Multimeter(VisaPort(visa))) as meter:
+    with closing(rigs.meter(kind, visa)) as meter:
         meter.identify()
         for which in [axis] if axis else ["y", "z"]:
             if axis is None:
@@ -239,6 +240,9 @@ add = made(
     click.Option(["--photo"], metavar="FILE", help="A photo of the specimen, kept with the log."),
     click.Option(["--defect", "defects"], type=OneOf(DEFECTS), multiple=True, help="A defect that can be seen."),
     click.Option(["--visa"], metavar="ADDRESS", help="Read the meter there, as GPIB0::22::INSTR: first Y, then Z."),
+    click.Option(
+        ["--meter"], metavar="KIND", help="That meter's kind, of 'list devices'; 34401A or Keithley 2000 if not given.",
+    ),
     click.Option(["--axis"], type=OneOf(("y", "z")), help="Let the meter read this one only."),
     click.Option(["--wires"], type=OneOf(("2", "4")), help="Leads of the meter; 2 with --visa if not given."),
     *_OF_READINGS,

@@ -431,7 +431,7 @@ def inverted(
     apart : (r, m, n) array, optional
         Readings at rest of another file, in place of those of this one [S].
     unused : sequence of str
-        Columns that were not read, named where no frame is at rest.
+        Samples that were not read, named where no frame is at rest.
     calibration : ArrayCalibration, optional
         Of each element.
 
