@@ -2,16 +2,12 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from sensorgen.cli import render
 from sensorgen.cli.options import flag, option
 from sensorgen.core.errors import BadInput
-
-if TYPE_CHECKING:
-    from sensorgen.prediction.array.elements import Session
 
 SUFFIXES = (".csv", ".npz", ".h5", ".hdf5", ".hdf")
 
@@ -41,41 +37,23 @@ def are_files(words: Sequence[str]) -> bool:
 def calibrate(files: Sequence[str], array: Path | None, target: Path | None, *, by_first: bool) -> int:
     """Calibrate the elements of an array by sessions."""
     from sensorgen.core import files as store
+    from sensorgen.measure.array_sessions import of_frames, session
     from sensorgen.prediction.array.sessions import study
 
-    found = study(sessions_of(files, array), by_first=by_first)
+    if array is None:
+        sessions = [session(Path(file), k) for k, file in enumerate(files)]
+    else:
+        from sensorgen.design.design import load
+        from sensorgen.prediction.array.model import array_model
+
+        sessions = of_frames([Path(file) for file in files], array_model(load(array)))
+    found = study(sessions, by_first=by_first)
     if target is not None:
         store.replace(target, found.calibration.npz())
     render.deliver(found)
     if target is not None:
         render.say(target, err=bool(render.form()))
     return 0
-
-
-def sessions_of(files: Sequence[str], array: Path | None) -> "list[Session]":
-    """Sessions of files; with a design C/C0 - 1 of its crossings, by the network where that counts."""
-    from sensorgen.measure.array_sessions import session
-
-    if array is None:
-        return [session(Path(file), k) for k, file in enumerate(files)]
-    import numpy as np
-
-    from sensorgen.design.design import load
-    from sensorgen.measure.array_frames import read
-    from sensorgen.prediction.array.frames import at_rest, missing
-    from sensorgen.prediction.array.model import array_model
-    from sensorgen.prediction.array.readout import ArrayReadout
-
-    model, found = array_model(load(array)), []
-    m, n = model.here.shape
-    names = [f"r{i + 1}c{j + 1}" for i, j in np.ndindex(m, n)]
-    for k, file in enumerate(files):
-        frames = read(Path(file), (m, n), None)
-        inverter = at_rest(model, ArrayReadout(frequency_hz=(frames.frequency_hz,)), frames.siemens[frames.rest])
-        ratio, _, _ = inverter.planned(missing(frames.siemens))
-        ratio = np.where(inverter.alive, ratio, np.nan).reshape(len(ratio), -1)
-        found.append(session(Path(file), k, area_mm2=model.pitch_area_m2 * 1e6, values=ratio - 1, names=names))
-    return found
 
 
 def invert(calibration: str, measured: str, output: str | None) -> int:
