@@ -2,36 +2,24 @@
 
 from typing import TYPE_CHECKING
 
-import click
-
-from sensorgen.cli import options, render, settings, show
-from sensorgen.cli.designs import DesignGroup
+from sensorgen.cli import render, show
+from sensorgen.cli.designs import of_design
+from sensorgen.cli.options import Advising, Strict
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
 
-OWN: list[click.Parameter] = [
-    click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
-    options.of_design_tip(),
-    *settings.advice_options(),
-    *render.options(),
-]
 
-
-def _work(design: "Design", *, strict: bool, budget: float, apply_change: int | None) -> int:
+@of_design("check", *render.options(), tip=True)
+def command(design: "Design", advising: Advising, *, strict: Strict = False) -> int:
+    """Decide whether to print a design: check it against nozzle, layers and bed, predict it, and try changes."""
     from sensorgen.checks.review import STEPS
     from sensorgen.prediction.slices import reviewed
     from sensorgen.workflows import decision
 
     with show.progress((*STEPS, *decision.STEPS)) as step:
-        held = reviewed(design, step)
-        decided = decision.decision(design, held, budget, predict=budget > 0, step=step)
+        review = reviewed(design, step)
+        decided = decision.decision(design, review, advising.budget, predict=advising.budget > 0, step=step)
     render.deliver(decided)
-    settings.applied(design, decided.advice, apply_change)
-    return 1 if held.errors(strict) or held.verdict == "CHANGE" else 0
-
-
-command = DesignGroup(
-    _work, OWN, name="check",
-    help="Decide whether to print a design: check it against nozzle, layers and bed, predict it, and try changes.",
-)  # fmt: skip
+    advising.write(design, decided.advice)
+    return 1 if review.errors(strict) or review.verdict == "CHANGE" else 0

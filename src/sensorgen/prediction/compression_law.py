@@ -36,7 +36,7 @@ from sensorgen.prediction.mesh_ladder import (
     model_of,
     pressed,
 )
-from sensorgen.prediction.query import FLAT
+from sensorgen.prediction.query import FLAT, LAWS
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.scene.sections import sections
 
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from sensorgen.models.press2d import BoundaryConditions, Elastic
 
 CLOSED_FORM = ("unconfined", "bonded", "symmetric", "infill")
-LAWS = (*CLOSED_FORM, "free", "solved")
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)), 1.2e5)  # 6 N on a tip of 5 x 10 mm are 120 kPa
 _FURTHER = 1.25  # ratio of stresses beyond those
 _PAST = 1.25  # pressure over the last one of a stored curve up to which it is extended [-]

@@ -2,14 +2,16 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import click
 
-from sensorgen.cli import body_options, escaped, render, show
+from sensorgen.cli import escaped, render, show
+from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.words import OneOf, Ratio
+from sensorgen.cli.words import Ratio
 from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.core.options import Option
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
@@ -19,39 +21,40 @@ QUANTITIES = ("capacitance", "compression", "line", "prediction")
 _BUDGET_S = 60.0
 
 
-def _output() -> click.Option:
-    return click.Option(
-        ["--output", "-o"], default="out/chart", show_default=True, metavar="DIR", help="Folder of the files."
-    )
-
-
 _SCENES: list[click.Parameter] = [
     click.Option(
         ["--scene"], multiple=True, metavar="NAME",
         help="Without a design: a standard scene, as 'tri, 0.1 mm'; all if not given.",
     ),
     click.Option(["--budget"], type=Ratio(), metavar="SECONDS", help="Leave out what takes longer.  [default: 60]"),
-    _output(),
+    click.Option(
+        ["--output", "-o"], default="out/chart", show_default=True, metavar="DIR", help="Folder of the files."
+    ),
     click.Option(["--json", "as_json"], is_flag=True, help="Print what was measured as JSON, too."),
 ]  # fmt: skip
 
-OWN: list[click.Parameter] = [
-    click.Option(
-        ["--quantity"], type=OneOf(QUANTITIES), multiple=True, help="Of these alone; may be given several times."
-    ),
-    click.Option(
-        ["--force", "force_n"], type=Ratio(), default="5", show_default=True, metavar="N",
-        help="Force in the middle, on a tip of 10 mm.",
-    ),
-    click.Option(
-        ["--budget"], type=Ratio(), default="5", show_default=True, metavar="SECONDS",
-        help="Leave out each step that should take longer.",
-    ),
-    *body_options.body_options(), _output(), *render.options(file=False),
-]  # fmt: skip
+Quantities = Annotated[tuple[str, ...], Option(kind=QUANTITIES)]
+Force = Annotated[float, Option(kind="ratio", typed="5")]
+Budget = Annotated[float, Option(kind="ratio", typed="5")]
 
 
-def _of_design(design: "Design", *, quantity: tuple[str, ...], force_n: float, budget: float, output: str) -> int:
+def _of_design(
+    design: "Design", *, quantity: Quantities = (), force_n: Force, budget: Budget, body: BodyChoice,
+    output: Path = Path("out/chart"),
+) -> int:  # fmt: skip
+    """Measure the models that apply to a design.
+
+    Parameters
+    ----------
+    quantity
+        Of these alone; may be given several times.
+    force_n : N
+        Force in the middle, on a tip of 10 mm.
+    budget : SECONDS
+        Leave out each step that should take longer.
+    output, --output, -o : DIR
+        Folder of the files.
+    """
     from sensorgen.analysis.plots.libraries import needed
     from sensorgen.core import files as store
     from sensorgen.core.document import to_json
@@ -60,7 +63,6 @@ def _of_design(design: "Design", *, quantity: tuple[str, ...], force_n: float, b
     from sensorgen.verification.design_chart.results import chart
 
     needed("matplotlib", "plotly")
-    body = body_options.body_of()(design)
     keys = quantity or QUANTITIES
     with show.progress(keys) as step:
 
@@ -68,7 +70,7 @@ def _of_design(design: "Design", *, quantity: tuple[str, ...], force_n: float, b
             step(words.partition(":")[0])
             step(words)
 
-        found = chart(body, Query(force_n=force_n), keys, budget_s=budget, step=on)
+        found = chart(body(design), Query(force_n=force_n), keys, budget_s=budget, step=on)
     contents = {"chart.json": to_json(found).encode(), "chart.csv": "".join(found.csv()).encode()}
     if found.points:
         contents |= {"chart.png": plot.png(found)}
@@ -126,7 +128,7 @@ def _begin(**given: Any) -> None:
 
 
 command = DesignGroup(
-    _of_design, OWN, name="chart", params=_SCENES, callback=_begin, invoke_without_command=True,
+    "chart", _of_design, *render.options(file=False), params=_SCENES, callback=_begin, invoke_without_command=True,
     help="""Measure speed against accuracy of every model.
 
     With a design: every model that applies to it, and scikit-fem, NGSolve, FastCap, scikit-rf and ngspice where they
