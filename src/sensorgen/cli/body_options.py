@@ -110,7 +110,7 @@ def compensated(
 def sliced(slicer: str, design: "Design", program: str = "") -> "Body":
     """The print of a design by a slicer."""
     from sensorgen.export import slicing
-    from sensorgen.prediction import bodies, slices
+    from sensorgen.prediction import bodies, print_files
 
     with show.progress(slicing.STEPS) as step:
-        return bodies.of_file(design, slices.at_hand(design, None, slicer, step, program)[0])
+        return bodies.of_file(design, print_files.at_hand(design, None, slicer, step, program)[0])
