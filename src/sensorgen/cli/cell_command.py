@@ -26,7 +26,7 @@ Press = Annotated[tuple[float, ...], Option(zero=True)]  # fmt: skip
 )  # fmt: skip
 def command(
     design: "Design", *, accuracy: Annotated[float | None, Option(kind="ratio")] = None, model: str = "",
-    frequency: Frequency = None, press_mm: Press = (), explain: Explain = False, no_cache: NoCache = False,
+    frequency_hz: Frequency = None, press_mm: Press = (), explain: Explain = False, no_cache: NoCache = False,
     body: BodyChoice, sweeping: Sweeping,
 ) -> int:  # fmt: skip
     """Bounds of one design, or of each of a sweep.
@@ -37,7 +37,7 @@ def command(
         Relative width of the bounds; 1e-3 for a cross-section and 1e-2 in 3D if not given, as in all commands.
     model : NAME
         Ask this model only: columns, thesis-3.35.
-    frequency
+    frequency_hz
         Of the field, where a dielectric leaks: --set resistivity_x60=1e8; a loss_x60=0.02 needs none.
     press_mm
         Displacement of the top, as 20um or 0:0.05:0.01, for formulas of it; solved: compress.
@@ -45,7 +45,7 @@ def command(
     from sensorgen.prediction import capacitance_answer as cell
 
     options.refuse_explain(explain, many=bool(sweeping.sweep))
-    asked = cell.Asked(accuracy, model, not no_cache, frequency)
+    asked = cell.Asked(accuracy, model, not no_cache, frequency_hz)
     if model.startswith(FORMULA):
         if explain:
             raise BadInput(f"--explain: {model} is asked alone, there is no plan; leave out --model")

@@ -24,7 +24,7 @@ from click.shell_completion import CompletionItem
 from sensorgen.cli import render
 from sensorgen.cli.words import KINDS, OneOf, Value, Values
 from sensorgen.core import units
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.core.options import Argument, Option, Without
 
 if TYPE_CHECKING:
@@ -220,11 +220,16 @@ class FirstWord(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str],
     ) -> tuple[str | None, click.Command | None, list[str]]:  # fmt: skip
-        """Take the first word; an option in its place is the user's slip."""
-        if args[0].startswith("-") and not ctx.resilient_parsing:
-            words = self.form.format(option=args[0])
-            raise BadInput(f"{args[0]} stands before the {self.thing}; write {ctx.command_path} {words}")
-        return args[0], self.get_command(ctx, args[0]), args[1:]
+        """Take the first word; an option in its place is the user's slip, but while the shell completes words."""
+        try:
+            if args[0].startswith("-"):
+                words = self.form.format(option=args[0])
+                raise BadInput(f"{args[0]} stands before the {self.thing}; write {ctx.command_path} {words}")
+            return args[0], self.get_command(ctx, args[0]), args[1:]
+        except SensorgenError:
+            if ctx.resilient_parsing:
+                return None, None, []
+            raise
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Files, and the commands."""

@@ -13,7 +13,7 @@ from sensorgen.cli.options import DesignTip
 from sensorgen.cli.words import Length, OneOf, completed, pairs
 from sensorgen.core import plugins as registry
 from sensorgen.core import units
-from sensorgen.core.errors import BadInput, SensorgenError, within
+from sensorgen.core.errors import BadInput, within
 from sensorgen.core.options import Option
 from sensorgen.design import shapes
 
@@ -64,17 +64,6 @@ class DesignGroup(FirstWord):
         with within(name):
             base = _of_packs(base, Path(name).parent)
             return self._command(name, _shape_of(base), base)
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str],
-    ) -> tuple[str | None, click.Command | None, list[str]]:  # fmt: skip
-        """Take the first word; no error while the shell completes words."""
-        try:
-            return super().resolve_command(ctx, args)
-        except SensorgenError:
-            if ctx.resilient_parsing:
-                return None, None, []
-            raise
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the command's options, then the shapes."""

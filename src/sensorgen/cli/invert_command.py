@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from sensorgen.measure.readings import Block, Readings
     from sensorgen.prediction.calibration.baseline import Baseline
     from sensorgen.prediction.calibration.inversion import Inverter
-    from sensorgen.prediction.inverse import Prior
+    from sensorgen.prediction.inverse.prior import Prior
     from sensorgen.prediction.query import Query
 
 _NORMAL = re.compile(r"(force|position)=(.+?)(?:\+-|±)(.+)")
@@ -81,7 +81,7 @@ class Task:
     @cached_property
     def distribution(self) -> "Prior | None":
         """The prior as typed."""
-        from sensorgen.prediction.inverse import Prior
+        from sensorgen.prediction.inverse.prior import Prior
 
         if not self.prior or self.prior.strip() == "uniform":
             return Prior() if self.prior else None
@@ -215,7 +215,9 @@ class _Perfect:
     """Inversion as if the sensor were as predicted."""
 
     def __init__(self, task: Task, body: Any, query: "Query", source: "Readings") -> None:
-        from sensorgen.prediction.inverse import FORCE_LIMIT_N, Estimator, answers
+        from sensorgen.prediction.inverse import answers
+        from sensorgen.prediction.inverse.estimator import Estimator
+        from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
         from sensorgen.prediction.planning import sensor_model
         from sensorgen.prediction.query import NOISE
 
@@ -293,7 +295,7 @@ def _of_design(
         from sensorgen.prediction.calibration import fitting
         from sensorgen.prediction.calibration.inversion import Inverter
         from sensorgen.prediction.calibration.specimen import SpecimenModel
-        from sensorgen.prediction.inverse import FORCE_LIMIT_N
+        from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
         from sensorgen.prediction.planning import sensor_model
 
         predicted, _ = sensor_model(printed, query)

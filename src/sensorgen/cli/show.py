@@ -45,21 +45,18 @@ def at_once(jobs: int | None) -> int:
 
 
 @contextmanager
-def bar(length: int) -> Iterator[Callable[[], None]]:
-    """A progress bar on the terminal, only for a person."""
-    with click.progressbar(length=length, file=sys.stderr, hidden=not sys.stderr.isatty(), label="solving") as shown:
+def bar(length: int, label: str = "solving") -> Iterator[Callable[..., None]]:
+    """A progress bar on the terminal, only for a person; each call moves it by one, or up to the number given."""
+    with click.progressbar(length=length, file=sys.stderr, hidden=not sys.stderr.isatty(), label=label) as shown:
         shown.render_progress()
-        yield lambda: shown.update(1)
+        yield lambda upto=None: shown.update(1 if upto is None else max(upto - shown.pos, 0))
 
 
 @contextmanager
 def pressing(stress_kpa: Sequence[float]) -> Iterator[Callable[[float], None]]:
     """A progress bar that stands at the highest stress reached so far, only for a person."""
-    with click.progressbar(
-        length=len(stress_kpa), file=sys.stderr, hidden=not sys.stderr.isatty(), label="pressing"
-    ) as shown:
-        shown.render_progress()
-        yield lambda reached_pa: shown.update(max(sum(1e3 * kpa <= reached_pa for kpa in stress_kpa) - shown.pos, 0))
+    with bar(len(stress_kpa), "pressing") as step:
+        yield lambda reached_pa: step(sum(1e3 * kpa <= reached_pa for kpa in stress_kpa))
 
 
 @contextmanager
@@ -82,4 +79,4 @@ def counted() -> Iterator[Callable[[str, int, int], None]]:
     try:
         yield step
     finally:
-        click.echo("\r" + " " * 50 + "\r", nl=False, err=True)
+        clear()

@@ -8,8 +8,8 @@ import click
 
 from sensorgen.cli import escaped, render, show
 from sensorgen.cli.body_options import BodyChoice
+from sensorgen.cli.commands import arguments, options_of
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.words import Ratio
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.core.options import Option
 
@@ -18,20 +18,7 @@ if TYPE_CHECKING:
 
 FILES = ("chart.csv", "chart.png", "chart.html")
 QUANTITIES = ("capacitance", "compression", "line", "prediction")
-_BUDGET_S = 60.0
 
-
-_SCENES: list[click.Parameter] = [
-    click.Option(
-        ["--scene"], multiple=True, metavar="NAME",
-        help="Without a design: a standard scene, as 'tri, 0.1 mm'; all if not given.",
-    ),
-    click.Option(["--budget"], type=Ratio(), metavar="SECONDS", help="Leave out what takes longer.  [default: 60]"),
-    click.Option(
-        ["--output", "-o"], default="out/chart", show_default=True, metavar="DIR", help="Folder of the files."
-    ),
-    click.Option(["--json", "as_json"], is_flag=True, help="Print what was measured as JSON, too."),
-]  # fmt: skip
 
 Quantities = Annotated[tuple[str, ...], Option(kind=QUANTITIES)]
 Force = Annotated[float, Option(kind="ratio", typed="5")]
@@ -76,14 +63,30 @@ def _of_design(
         contents |= {"chart.png": plot.png(found)}
     contents["chart.html"] = plot.html(found).encode()
     for name, content in contents.items():
-        store.replace(Path(output) / name, content)
+        store.replace(output / name, content)
     render.deliver(found)
     if not render.form():
-        render.say("\n".join(str(Path(output) / name) for name in contents))
+        render.say("\n".join(str(output / name) for name in contents))
     return render.verdict(*found.problems())
 
 
-def _of_scenes(scene: tuple[str, ...], budget: float | None, output: str, as_json: bool) -> None:
+def _of_scenes(
+    *, scene: tuple[str, ...] = (), budget: Annotated[float, Option(kind="ratio", typed="60")] = 60.0,
+    output: Path = Path("out/chart"), as_json: bool = False,
+) -> None:  # fmt: skip
+    """Measure the models on standard scenes.
+
+    Parameters
+    ----------
+    scene : NAME
+        Without a design: a standard scene, as 'tri, 0.1 mm'; all if not given.
+    budget : SECONDS
+        Leave out what takes longer.
+    output, --output, -o : DIR
+        Folder of the files.
+    as_json, --json
+        Print what was measured as JSON, too.
+    """
     import csv
     import io
 
@@ -98,7 +101,7 @@ def _of_scenes(scene: tuple[str, ...], budget: float | None, output: str, as_jso
             raise UnknownName("standard scene", name, chart.SCENES)
     names = scene or chart.SCENES
     with show.progress(names) as step:
-        points = chart.points(names, _BUDGET_S if budget is None else budget, step)
+        points = chart.points(names, budget, step)
     rows = [vars(one) for one in (*points, *chart.silent(names, points))]
     text = io.StringIO()
     table = csv.DictWriter(text, list(dict.fromkeys(key for row in rows for key in row)), lineterminator="\n")
@@ -108,9 +111,9 @@ def _of_scenes(scene: tuple[str, ...], budget: float | None, output: str, as_jso
     if overview := plot.overview(points):
         contents["overview.png"] = overview
     for name, content in contents.items():
-        store.replace(Path(output) / name, content)
+        store.replace(output / name, content)
         if not as_json:
-            render.say(Path(output) / name)
+            render.say(output / name)
     if as_json:
         render.say(escaped(json.dumps(rows, indent=2, ensure_ascii=False)))
 
@@ -119,7 +122,7 @@ def _begin(**given: Any) -> None:
     """Without a design, the standard scenes; before one, no options."""
     context = click.get_current_context()
     if context.invoked_subcommand is None:
-        _of_scenes(given["scene"], given["budget"], given["output"], given["as_json"])
+        _of_scenes(**arguments(_of_scenes, given))
         return
     for option in context.command.params:
         if option.name and context.get_parameter_source(option.name) is not click.core.ParameterSource.DEFAULT:
@@ -128,7 +131,8 @@ def _begin(**given: Any) -> None:
 
 
 command = DesignGroup(
-    "chart", _of_design, *render.options(file=False), params=_SCENES, callback=_begin, invoke_without_command=True,
+    "chart", _of_design, *render.options(file=False), params=options_of(_of_scenes), callback=_begin,
+    invoke_without_command=True,
     help="""Measure speed against accuracy of every model.
 
     With a design: every model that applies to it, and scikit-fem, NGSolve, FastCap, scikit-rf and ngspice where they
