@@ -1,6 +1,7 @@
 """Pictures: what they are drawn from, the same bytes every time, and the page in a real browser."""
 
 import base64
+import gzip
 import html as entities
 import json
 import os
@@ -227,15 +228,18 @@ def decoded(values):
 
 
 def written(answer):
-    return pages.page("A <b>sensor</b> & more", ["some words"], list(figures(answer)))
+    return pages.page("A <b>sensor</b> & more", ["some words"], [pages.Section(figures=tuple(figures(answer)))])
 
 
 def test_the_page_holds_the_response_and_its_script_once(answer):
     text = written(answer)
     assert not re.search(r"<(script|link|img)[^>]+(src|href)=\"(?!data:)", text)
-    assert len(re.findall(r"plotly\.js v[0-9.]+", text)) == 1
+    packed = {name: re.search(f'id="{name}">(.*?)</script>', text)[1] for name in ("plotly", "content")}
+    script, content = (gzip.decompress(base64.b64decode(block)).decode() for block in packed.values())
+    assert len(re.findall(r"plotly\.js v[0-9.]+", script)) == 1
+    assert len(text) < 3_000_000
     assert "<h1>A &lt;b&gt;sensor&lt;/b&gt; &amp; more</h1>" in text
-    held = {f["key"]: f for f in json.loads(re.search(r'id="figures">(.*?)</script>', text)[1])}
+    held = {f["key"]: f for f in json.loads(content)["figures"]}
     assert list(held) == [*QUANTITIES, "inverse-position", "inverse-force"]
     for k, f in enumerate(("10.1 kHz", "99.7 kHz")):
         for name, about in QUANTITIES.items():

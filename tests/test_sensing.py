@@ -5,6 +5,7 @@ from drawn_sensor import sensor_of
 
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
 from sensorgen.design.design import make
+from sensorgen.prediction.query import Query
 
 
 def sensed(shape, law="", **rest):
@@ -64,6 +65,8 @@ def test_what_cannot_be_is_refused():
         sensed("tri", "bonded")
     with pytest.raises(UnknownName, match="law of compression 'bondet'; did you mean 'bonded'"):
         sensed("tri", "bondet")
+    with pytest.raises(UnknownName, match="law of compression 'foo'"):  # where nothing is pressed, too
+        Query(law="foo")
 
 
 def test_a_round_tip_on_the_film_and_on_the_cell_as_a_bed():

@@ -25,7 +25,7 @@ from sensorgen.workflows.optimise.result import Recommended, Spread
 from sensorgen.workflows.optimise.sample import _objectives, sample
 from sensorgen.workflows.optimise.search import Row, Searched, search
 from sensorgen.workflows.optimise.space import MOST, Candidate, candidates, space
-from sensorgen.workflows.optimise.target import AROUND, Target, load
+from sensorgen.workflows.optimise.target import Target, load
 from sensorgen.workflows.optimise.ties import settled
 from sensorgen.workflows.templates import new
 
@@ -53,8 +53,8 @@ def found(**changes):
 def test_the_front_is_that_of_a_plain_loop():
     """Every plate evaluated by itself, each pair of them compared."""
     values = {}
-    for film in (0.1, 0.2, 0.3, 0.4):
-        for electrode in (0.2, 0.3, 0.4):
+    for film in (0.1, 0.2, 0.3):
+        for electrode in (0.2, 0.3):
             plate = make({"shape": "reference", "parameters": {"dielectric_mm": film, "electrode_mm": electrode}})
             p = evaluate(bodies.estimated(plate), keep=False, beside=False)
             values[film, electrode] = p.capacitance.value, p.resistance["bottom"].value
@@ -62,11 +62,11 @@ def test_the_front_is_that_of_a_plain_loop():
         k for k, (c, r) in values.items()
         if not any(c2 >= c and r2 >= r and (c2 > c * (1 + 1e-9) or r2 > r * (1 + 1e-9)) for c2, r2 in values.values())
     }  # fmt: skip
-    search_ = found()
+    search_ = found(parameters={"dielectric_mm": {"from": 0.1, "to": 0.3}, "electrode_mm": {"from": 0.2, "to": 0.3}})
     leads = {tuple(row.candidate.values.values()) for row in result.leads(search_)}
     assert leads == best == {(0.1, 0.2)}
-    assert len(search_.rows) == 12
-    assert len(search_.evaluated) + sum(bool(row.discarded) for row in search_.rows) == 12
+    assert len(search_.rows) == 6
+    assert len(search_.evaluated) + sum(bool(row.discarded) for row in search_.rows) == 6
 
 
 def test_a_planted_optimum_is_found():
@@ -136,7 +136,7 @@ def test_of_the_nearest_design_the_numbers_are_told():
 
 
 def test_a_search_that_is_stopped_goes_on_where_it_was(monkeypatch):
-    wanted, tried = target(), []
+    wanted, tried = target(parameters={"dielectric_mm": {"from": 0.1, "to": 0.4}}), []
     trial = ladder.trial
 
     def counted(design, *given, **more):
@@ -160,7 +160,8 @@ def test_discards_on_a_coarse_mesh_hold_or_are_taken_back(monkeypatch):
         return {"force_resolution_n": ladder.Known(film if film != 0.4 else 9.0, film if film != 0.4 else 9.0, False)}
 
     monkeypatch.setattr(ladder, "known", lying)
-    search_ = found(objectives={"force_resolution_n": "minimise"})
+    films = {"dielectric_mm": {"from": 0.1, "to": 0.4}}
+    search_ = found(parameters=films, objectives={"force_resolution_n": "minimise"})
     assert search_.largest > 1.5
     assert search_.margin > search_.largest
     assert not any(row.discarded == "dominated" for row in search_.rows if row.candidate.values["dielectric_mm"] == 0.4)
@@ -310,7 +311,7 @@ def test_a_huge_space_is_refused_with_its_size():
         candidates(target(parameters=parameters))
 
 
-@pytest.mark.parametrize("counts", [(12, 8), pytest.param((72, 48), marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("counts", [(6, 4), pytest.param((72, 48), marks=pytest.mark.nightly)])
 def test_a_sample_of_a_huge_space_proves_nothing(counts):
     """Millions of plates; of those that were tried the one with the best C is the best, by the plate capacitor."""
     pytest.importorskip("optuna")
@@ -381,8 +382,9 @@ def test_a_shape_is_a_target(shape):
     """Designs like the best known of it, or like its defaults; every one can be made, or says why not."""
     wanted = load(shape)
     some = candidates(wanted)
-    assert 4 <= len(some) <= AROUND + len(wanted.also)
     base = make(wanted.design)
+    near = [one for one in some if one.design and len(set(one.values.items()) - set(some[0].values.items())) == 1]
+    assert 3 <= len(some) <= 16 and len(near) >= 2  # minutes: the design, and those that differ in one length
     assert base.id() in {one.design.id() for one in some if one.design}
     if shape == "tri":
         known = [load_design(DOCS / f"{name}-tri.yaml") for name in ("best", "locates")]
@@ -395,10 +397,11 @@ def test_a_design_file_is_a_target(tmp_path, run):
     file = tmp_path / "mine.yaml"
     file.write_text("shape: reference\nparameters: {length_mm: 30}\n")
     wanted = load(file)
-    assert wanted.parameters == {"electrode_mm": [0.3, 0.4], "dielectric_mm": [0.6, 0.7], "quality": ["fine"]}
+    assert wanted.parameters == {"electrode_mm": [0.3], "dielectric_mm": [0.6], "quality": ["fine"]}
+    assert [(one["electrode_mm"], one["dielectric_mm"]) for one in wanted.also] == [(0.4, 0.6), (0.3, 0.7)]
     said = run("optimise", str(file), "--no-build", "--out", str(tmp_path / "out"))
     assert said.code == 0
-    assert "mine: no design in this space of 4 is better than" in said.out
+    assert "mine: no design in this space of 3 is better than" in said.out
 
 
 def test_neither_a_shape_nor_a_file(run):

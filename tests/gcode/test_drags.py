@@ -159,6 +159,13 @@ def test_an_unretracted_crossing_gets_its_tools_usual_retraction():
     assert made[place + 1 : place + 4] == ["G1 Z0.1 F3000", "G1 E3 F2400", "G1 F7200"]
 
 
+@pytest.mark.parametrize(("y", "retractions"), [(6.4, 0), (4.4, 1)])
+def test_a_lifted_travel_of_up_to_2_mm_over_other_lines_draws_nothing_back(y, retractions):
+    """Three lines of 0.5 mm, and five: 640 tips of cones cost 143 s of retractions."""
+    _, lifting = assert_lifted([*COMB, *OVER, f"G1 Y{y} F7200", f"G1 X20 {e(5)}"])
+    assert (lifting.lifts, lifting.retractions) == (2, retractions)
+
+
 def test_heights_in_travels_move_to_the_way_down():
     """CuraEngine changes layers while it travels."""
     made, _ = assert_lifted(

@@ -47,7 +47,7 @@ def command(
     model = array_model(design)
     resolution = study(model, how, pressure_kpa, faults)
     if simulate is not None:
-        from sensorgen.prediction.array.virtual import step
+        from sensorgen.measure.virtual.array import step
 
         render.file(simulate, step(model, how, faults), "wrote ")
     if plot is not None:

@@ -19,6 +19,7 @@ def invert(design: "Design", task: "Task", frames: ArrayFrames, *, perfect: bool
     from sensorgen.prediction.array.frames import inverted
     from sensorgen.prediction.array.model import array_model
     from sensorgen.prediction.array.readout import ArrayReadout
+    from sensorgen.prediction.array.sessions import stored
     from sensorgen.prediction.query import NOISE
 
     _refuse(task, perfect=perfect, law=law)
@@ -29,7 +30,10 @@ def invert(design: "Design", task: "Task", frames: ArrayFrames, *, perfect: bool
     apart = read(Path(task.rest_file), shape, read_in.frequency_hz).at_rest() if task.rest_file else None
     noise = NOISE if task.noise is None else task.noise
     how = ArrayReadout(frames.readout, frames.input_ohm, (read_in.frequency_hz,), noise)  # type: ignore[arg-type]
-    maps = inverted(model, how, read_in.siemens, read_in.rest, read_in.time_s, frames.scatter, apart, read_in.unused)
+    known = None if frames.calibration is None else stored(frames.calibration)
+    maps = inverted(
+        model, how, read_in.siemens, read_in.rest, read_in.time_s, frames.scatter, apart, read_in.unused, known
+    )
     if task.output:
         _write(maps, task.output)
     if frames.plot is not None:

@@ -42,15 +42,16 @@ def _live(measured: str, *, rate_hz: Rate, cutoff_hz: Cutoff = None) -> None:
 
 
 def _header(source: "Readings") -> str:
-    from sensorgen.prediction.inverse.answers import csv_cell
-
     tones = (units.frequency_text(float(f)) for f in source.frequency_hz)
-    return ",".join([*map(csv_cell, source.kept), *(f"{part}_ohm_{f}" for f in tones for part in ("re", "im"))])
+    return ",".join([*map(_cell, source.kept), *(f"{part}_ohm_{f}" for f in tones for part in ("re", "im"))])
 
 
 def _rows(block: "Block", smooth: "Complex") -> Iterator[str]:
-    from sensorgen.prediction.inverse.answers import csv_cell, csv_row
-
     for kept, row in zip(block.kept, smooth.tolist(), strict=True):
         parts = (f"{part:.12g}" if isfinite(z.real) else "" for z in row for part in (z.real, z.imag))
-        yield csv_row([*map(csv_cell, kept), *parts])
+        yield ",".join([*map(_cell, kept), *parts]) + "\n"
+
+
+def _cell(text: str) -> str:
+    """A cell as CSV; quoted where it would come apart."""
+    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text

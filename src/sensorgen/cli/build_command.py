@@ -1,7 +1,7 @@
 """``sensorgen build``: all files of a design."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sensorgen.cli import FOUND_ERRORS, body_options, log_words, render, show
 from sensorgen.cli.body_options import Compensate
@@ -10,10 +10,28 @@ from sensorgen.cli.options import Advising, Strict
 from sensorgen.core.errors import Unprintable
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from sensorgen.design.design import Design
 
 
-@of_design("build", *render.options("json", "markdown", outputs=("--output",)))
+def _tiles(design: "Design", given: dict[str, Any]) -> "Sequence[Design]":
+    """Tiles of an array that the bed does not hold, with a table of their places; else the design."""
+    if not design.layout:
+        return (design,)
+    from sensorgen.core import document
+    from sensorgen.workflows import tiles
+
+    placed = tiles.tiles(design)
+    if not placed:
+        return (design,)
+    where = Path(given["out"]) / f"{design.name}-tiles.csv"
+    content = document.comma_separated(tiles.table(placed))
+    render.file(where, content, f"{len(placed)} tiles, as it does not fit the bed: ")
+    return [tile for _, tile in placed]
+
+
+@of_design("build", *render.options("json", "markdown", outputs=("--output",)), parts=_tiles)
 def command(
     design: "Design", *, out: Path = Path("out"), no_cad: bool = False, force: bool = False, strict: Strict = False,
     compensate: Compensate = "", verify: bool = False, details: bool = False, advise: bool = False, advising: Advising,

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, options, render, show
+from sensorgen.cli import FOUND_ERRORS, array_calibrate, options, render, show
+from sensorgen.cli.array_calibrate import ArrayCalibration
 from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import command as of_function
 from sensorgen.cli.log_words import LogFile
@@ -19,9 +20,13 @@ Recordings = Annotated[tuple[int, ...], Option(kind=click.IntRange(1))]
 @of_function("calibrate", *render.options("json", "markdown"))
 def command(
     specimens: tuple[str, ...], bench: BenchTip, *, recordings: Recordings = (), again: bool = False,
-    page: Path | None = None, source: Path | None = None, log: LogFile, body: BodyChoice, dry_run: bool = False,
+    page: Path | None = None, source: Path | None = None, of_array: ArrayCalibration, log: LogFile, body: BodyChoice,
+    dry_run: bool = False,
 ) -> int:  # fmt: skip
     """Calibrate specimens by recordings with known presses, and by readings of meters, that the log has of them.
+
+    Files in place of specimens are sessions of an array, each with time_s, its elements and a reference: pressure_kpa
+    of a bladder, force_n of a press on an 'element', or force_n of a person on a plate.
 
     Several specimens share the bench. Some 30 presses, half of them after a higher one and held for 0.3 to 30 s, are
     enough; with none, R, C and leak are calibrated by what was read at rest. 'sensorgen invert SPECIMEN' then uses the
@@ -29,7 +34,7 @@ def command(
 
     Parameters
     ----------
-    specimens : SPECIMEN...
+    specimens : SPECIMEN...|FILE...
     recordings, --recording : NUMBER
         Only this recording of the log.
     again, --recheck
@@ -41,6 +46,8 @@ def command(
     dry_run
         Log nothing.
     """
+    if array_calibrate.are_files(specimens):
+        return array_calibrate.calibrate(specimens, of_array)
     from sensorgen.analysis import calibration
 
     pressed = bench.bench()
@@ -66,9 +73,8 @@ def command(
 
 def _refuse(count: int, *, again: bool, source: bool) -> None:
     """Refuse what needs one specimen of several, and another bench for a calibration that goes on."""
-    if again and count > 1:
-        raise BadInput(f"--recheck of {count} specimens; expected one")
-    if source and count > 1:
-        raise BadInput(f"--source of {count} specimens; expected one; 'sensorgen fit' takes several")
+    for option, given in (("--recheck", again), ("--source", source)):
+        if given and count > 1:
+            raise BadInput(f"{option} of {count} specimens; expected one; 'sensorgen fit' takes several")
     if again and any(options.typed(name) for name in ("tip", "force_offset")):
         raise BadInput("--recheck goes on with tip and offset of the calibration; expected no --tip, no --force-offset")

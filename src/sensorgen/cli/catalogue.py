@@ -158,6 +158,13 @@ def instruments() -> Catalogue:
     return _of_packs("instruments", entry)
 
 
+def devices() -> Catalogue:
+    """Kinds of devices that a run drives, those of other packages and of PyMeasure included."""
+    from sensorgen.measure.lab import catalogue
+
+    return Catalogue({name: Entry(about) for name, about in catalogue.listed().items()})
+
+
 def all_packs() -> Catalogue:
     """Packs with the number of files of each kind."""
     entries: dict[str, Entry] = {}

@@ -1,7 +1,7 @@
 """Words on the command line to a design: a shape with options, or a file with changes to it."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any, cast
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from sensorgen.design.shape_files import Shape
 
 Data = dict[str, Any]
+Parts = Callable[["Design", Data], "Sequence[Design]"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,15 +37,21 @@ class DesignGroup(FirstWord):
 
     thing, form = "shape", "{{SHAPE|DESIGN.yaml}} {option} ..."
 
-    def __init__(self, name: str, work: Work, *more: click.Parameter, tip: bool = False, **attributes: Any) -> None:
-        """Command of a function, which gets the design and the values of its own options; ``more`` come after them."""
+    def __init__(
+        self, name: str, work: Work, *more: click.Parameter, tip: bool = False, parts: Parts | None = None,
+        **attributes: Any,
+    ) -> None:  # fmt: skip
+        """Command of a function, which gets the design and the values of its own options; ``more`` come after them.
+
+        ``parts`` names the designs that it is done with in turn, by the design and these values.
+        """
         super().__init__(
             name,
             subcommand_metavar="{SHAPE|DESIGN.yaml} [OPTIONS]",
             epilog="SHAPE --help lists the options of the shape and of its print, too.",
             **attributes,
         )
-        self.work = work
+        self.work, self.parts = work, parts or (lambda design, _: (design,))
         self.own = [*(options_of(_TipOption) if tip else []), *options_of(work), *more]
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
@@ -76,7 +83,8 @@ class DesignGroup(FirstWord):
         def run(**given: Any) -> int:
             own = {p.name: given.pop(p.name) for p in self.own if p.name in given}
             given["tip"] = own.pop("tip", None)
-            return ended(self.work(_design(base, given, name), **arguments(self.work, own)))
+            parts = self.parts(_design(base, given, name), own)
+            return max(ended(self.work(part, **arguments(self.work, own))) for part in parts)
 
         others = [*options_of(DesignOptions), *self.own]
         params = _parameter_options(module.Params, {word for other in others for word in other.opts}) if module else []

@@ -42,3 +42,4 @@ def command(design: "Design", *, output: str = "", body: BodyChoice) -> None:
         render.say(svg, nl=False)
     else:
         render.file(Path(output or f"{design.name}.svg"), svg)
+        render.say("findings in full: sensorgen check; in 3D and layers: sensorgen show", err=True)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import click
 import numpy as np
 
-from sensorgen.cli import render, show
+from sensorgen.cli import array_calibrate, render, show
 from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import command as of_function
 from sensorgen.cli.designs import DesignGroup
@@ -282,6 +282,8 @@ def _of_design(
         from sensorgen.cli import array_frames
 
         return array_frames.invert(design, task, frames, perfect=perfect, law=law)
+    if frames.calibration:
+        raise BadInput(f"--calibration is of an array; {design.name} is {design.shape}: invert its specimen by name")
     from sensorgen.prediction.query import Query
 
     query, printed = Query(law=law), body(design)
@@ -344,7 +346,14 @@ class _Specimens(DesignGroup):
     """A word that is neither a shape nor a file is a specimen of the log."""
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command:
-        """The command for a shape, a design file, or a specimen."""
+        """The command for a shape, a design file, a calibration of an array, or a specimen."""
+        if name.endswith(".npz"):
+
+            @of_function(name, about=array_calibrate.invert.__doc__ or "")
+            def calibrated(task: Task) -> int:
+                return array_calibrate.invert(name, task.measured, task.output)
+
+            return calibrated
         try:
             return super().get_command(ctx, name)
         except UnknownName:
@@ -361,5 +370,6 @@ command = _Specimens(
     help="Force and position behind the impedances in MEASURED.csv ('-' reads the standard input): one row per sample, "
     "columns re_ohm_1.1kHz and im_ohm_1.1kHz for every tone, 'rest' with 1 where nothing was on the sensor, and time_s "
     "if known. The first word is a specimen that was calibrated, or a design. Of an array: pressure maps of frames, "
-    "CSV with columns r1c1, r1c2 ... [F], or NPZ.",
+    "CSV with columns r1c1, r1c2 ... [F], NPZ or HDF5. A calibration of an array, FILE.npz, in place of the design: "
+    "pressures of any array's elements.",
 )  # fmt: skip

@@ -9,15 +9,15 @@ from sensorgen.core.options import Argument
 if TYPE_CHECKING:
     from sensorgen.cli.catalogue import Catalogue
 
-KINDS = ("shapes", "materials", "printers", "qualities", "instruments", "packs", "models", "sources")
+KINDS = ("shapes", "materials", "printers", "qualities", "instruments", "devices", "packs", "models", "sources")
 
 
 @of_function("list", *render.options("json", "markdown"))
 def command(kind: Annotated[str, Argument(kind=KINDS)]) -> "Catalogue":
     """List what goes by a name.
 
-    Shapes with their parameters, materials with every value and its source, printers, qualities, instruments, packs,
-    models, or what the sources stand for; with the pack that each comes from.
+    Shapes with their parameters, materials with every value and its source, printers, qualities, instruments, devices
+    of the laboratory, packs, models, or what the sources stand for; with the pack that each comes from.
 
     Parameters
     ----------

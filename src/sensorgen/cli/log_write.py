@@ -100,6 +100,8 @@ class Meter:
     ----------
     visa : ADDRESS
         Read the meter there, as GPIB0::22::INSTR: first Y, then Z.
+    meter : KIND
+        That meter's kind, of 'list devices'; 34401A or Keithley 2000 if not given.
     axis
         Let the meter read this one only.
     wires
@@ -107,20 +109,25 @@ class Meter:
     """
 
     visa: str = ""
+    meter: str = ""
     axis: Annotated[str, Option(kind=("y", "z"))] = ""
     wires: Annotated[str, Option(kind=("2", "4"))] = ""
+
+    def __post_init__(self) -> None:
+        """Refuse a kind without an address."""
+        if self.meter and not self.visa:
+            raise BadInput(f"--meter {self.meter} without --visa; expected the meter's address too")
 
     def words(self) -> tuple[str, str, str]:
         """Words of the meter for Y and Z, and what it calls itself; leads are moved between the two."""
         from contextlib import closing
 
-        from sensorgen.measure.lab.multimeter import Multimeter
-        from sensorgen.measure.lab.port import VisaPort
+        from sensorgen.measure.lab import rigs
 
         if not self.axis and not (sys.stdin and sys.stdin.isatty()):
             raise BadInput("--visa without --axis needs somebody to move the leads; expected --axis y or --axis z")
         words = {"y": "", "z": ""}
-        with closing(Multimeter(VisaPort(self.visa))) as meter:
+        with closing(rigs.meter(self.meter or None, self.visa)) as meter:
             meter.identify()
             for axis in self.axis or "yz":
                 if not self.axis:

@@ -78,6 +78,8 @@ class ArrayFrames:
         Of an array's frames, where their file has none.
     scatter
         Of an array: gain from cell to cell, 5 % before a calibration.
+    calibration : FILE.npz
+        Of an array: by 'sensorgen calibrate'.
     plot : DIR
         Of an array: write its heaviest map there.
     """
@@ -86,6 +88,7 @@ class ArrayFrames:
     input_ohm: InputResistance = 50.0
     frequency_hz: float | None = None
     scatter: Annotated[float, Option(kind="share", typed="5%")] = 0.05
+    calibration: Path | None = None
     plot: Path | None = None
 
 

@@ -42,7 +42,7 @@ def setting(key: str, value: str, parameters: set[str]) -> Data:
     if len(path) == 1 and key not in Design.model_fields:
         path = _of_material(key) or path
     if path[0] not in Design.model_fields or len(path) > 3:
-        raise UnknownName("key of --set", key, parameters | set(Design.model_fields) | {"eps_x60"})
+        raise UnknownName("setting", key, parameters | set(Design.model_fields) | {"eps_x60"})
     end: Any = _parameter(value) if path[0] == "parameters" else _plain(value)
     if path == ["materials", "electrode"]:
         return {"materials": {"top_electrode": end, "bottom_electrode": end}}

@@ -43,7 +43,7 @@ from sensorgen.scene.sections import sections
 if TYPE_CHECKING:
     from sensorgen.models.press2d import BoundaryConditions, Elastic
 
-CLOSED_FORM = ("unconfined", "bonded", "symmetric", "infill")
+CLOSED_FORM = LAWS[:4]
 STRESS_PA = (0.0, 5e3, *(1e4 * k for k in range(1, 11)), 1.2e5)  # 6 N on a tip of 5 x 10 mm are 120 kPa
 _FURTHER = 1.25  # ratio of stresses beyond those
 _PAST = 1.25  # pressure over the last one of a stored curve up to which it is extended [-]

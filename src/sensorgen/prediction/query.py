@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from math import inf
 from typing import TYPE_CHECKING, Annotated
 
-from sensorgen.core.errors import OutOfRange
+from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.core.options import Option
 from sensorgen.core.units import FREQUENCY_HZ, M_PER_MM
 from sensorgen.design.tip import TIP_M, Tip
@@ -16,7 +16,7 @@ TONES_HZ = (1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3)  # thesis, Tabl
 FORCE_N = 6.0  # thesis 5.2: presses of 0 to 6 N
 NOISE = 1e-3  # of Re Z and of Im Z, each, relative to abs(Z)
 FLAT = Tip()  # the default
-LAWS = ("unconfined", "bonded", "symmetric", "infill", "free", "solved")  # of compression
+LAWS = ("unconfined", "bonded", "symmetric", "infill", "free", "solved")  # of compression, closed forms first
 
 Frequencies = Annotated[
     tuple[float, ...],
@@ -71,7 +71,9 @@ class Query:
     range_kpa: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse pressures that do not rise, and frequencies and noise that none can be."""
+        """Refuse pressures that do not rise, a law that is unknown, and frequencies and noise that none can be."""
+        if self.law not in ("", *LAWS):
+            raise UnknownName("law of compression", self.law, LAWS)
         if not self.frequency_hz or not all(0 < one < inf for one in self.frequency_hz):
             raise OutOfRange(f"frequencies {self.frequency_hz} Hz; expected some above 0")
         if not 0 < self.noise < 1:
@@ -95,4 +97,4 @@ class Query:
 
 
 DEFAULT = Query()
-__all__ = ["DEFAULT", "FLAT", "FORCE_N", "NOISE", "TIP_M", "TONES_HZ", "Load", "Query", "Tip"]
+__all__ = ["DEFAULT", "FLAT", "FORCE_N", "LAWS", "NOISE", "TIP_M", "TONES_HZ", "Load", "Query", "Tip"]

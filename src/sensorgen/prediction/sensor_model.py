@@ -81,7 +81,7 @@ def build_sensor(
     body : Body
         Drawn or printed.
     law : str or Law
-        Of compression: one of :data:`sensorgen.prediction.compression_law.LAWS`, or "" for the best that is known
+        Of compression: one of :data:`sensorgen.prediction.query.LAWS`, or "" for the best that is known
         without solving a field; or itself.
     tip : Tip
         What presses.

@@ -235,7 +235,7 @@ def _at_crossing(design: Design, finding: Finding) -> Finding:
     if not finding.place_mm or not design.layout:
         return finding
     x, y, _ = (at * (1 - design.shrinkage) for at in finding.place_mm)
-    name = design.layout.crossing(x, design.layout.size_mm[1] - y if design.orientation == "upside-down" else y)
+    name = design.layout.crossing(x, design.drawn.size_mm[1] - y if design.orientation == "upside-down" else y)
     return replace(finding, message=f"{finding.message} ({name})") if name else finding
 
 

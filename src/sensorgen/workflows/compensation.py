@@ -34,6 +34,7 @@ _STIFFNESS = "stiffness_kpa_per_mm"
 _ACCURACY = 1e-2  # of a capacitance, relative
 _HALVINGS = 12  # of a step between two widths
 _MOST_TRIED, _MOST_SOLVED = 250, 30  # designs whose gap, and whose capacitance is found, before it gives up
+_PERIODS = 4  # of a sensor by which prints are estimated
 _MOST_PRESSED = 12  # designs whose stiffness is found
 
 BodyOf = Callable[[Design], Body]
@@ -368,11 +369,11 @@ class _Search:
         """Gap with the margin; where that is the wanted one, the capacitance too."""
         now = self.wanted.design
         narrower = {k: float(v) / self.margin for k, v in changes.items() if k in self.widths}
-        design = moves.changed(now, changes)
-        for each in (design, moves.changed(now, changes | narrower)):
-            if abs((gap := _gap_mm(each, self.walls)) - self.wanted.gap_mm) > SLIVER_MM:
-                return Found(design, gap, None)
-        return replace(_estimate(design, self.walls), gap_mm=self.wanted.gap_mm)
+        for each in (changes, changes | narrower):
+            gap = _gap_mm(moves.short(now, each, _PERIODS), self.walls)
+            if abs(gap - self.wanted.gap_mm) > SLIVER_MM:
+                return Found(moves.changed(now, changes), gap, None)
+        return replace(_estimate(moves.changed(now, changes), self.walls), gap_mm=self.wanted.gap_mm)
 
 
 def _widths(design: Design, walls: str) -> list[Key]:
@@ -396,7 +397,7 @@ def _attainable_mm(design: Design, gap_mm: float) -> float:
 def _print(design: Design, body: BodyOf, *, stiffness: bool = False) -> Found:
     """Quantities of a body; of an array, of a few cells without rims, counted to all of its cells."""
     is_array = hasattr(design.params, "fitting")
-    few = moves.short(design) if is_array or isinstance(body, partial) else design
+    few = moves.short(design, periods=_PERIODS) if is_array or isinstance(body, partial) else design
     one = found(body(few), stiffness=stiffness)
     params = design.params, few.params
     sizes = [p.fitting() if hasattr(p, "fitting") else (p.length_mm, p.width_mm) for p in params]
@@ -415,7 +416,7 @@ def _gap_mm(design: Design, walls: str) -> float:
     """Electrode gap as estimated, of a few periods [mm]: by far sooner than their unit cell is found."""
     from sensorgen.asprinted import printed
 
-    return printed.gap_mm(printed.body(moves.short(design), walls=walls).scene.stretched(1.0 - design.shrinkage))
+    return printed.gap_mm(printed.body(design, walls=walls).scene.stretched(1.0 - design.shrinkage))
 
 
 def printable(

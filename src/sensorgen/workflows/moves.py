@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict
 from heapq import heappop, heappush
 from math import ceil, floor, inf, log
+from types import MappingProxyType
 from typing import Any
 
 from sensorgen.core.errors import SensorgenError
@@ -141,11 +142,17 @@ def is_choice(key: Key) -> bool:
     return key[0] != "parameters"
 
 
-def short(design: Design) -> Design:
-    """A sensor of a few periods, which is checked sooner; the design itself where it has no period."""
-    period = float(getattr(design.params, "period_mm", 0.0))
-    names = [name for name in ("length_mm", "width_mm") if getattr(design.params, name) > PERIODS * period > 0]
-    return changed(design, {("parameters", name): PERIODS * period for name in names}) if names else design
+def short(design: Design, changes: Changes = MappingProxyType({}), periods: int = PERIODS) -> Design:
+    """A changed sensor of a few periods, which is checked sooner; of all its length where it has no period.
+
+    Raises
+    ------
+    SensorgenError
+        As :func:`changed`.
+    """
+    few = periods * float(changes.get(("parameters", "period_mm"), getattr(design.params, "period_mm", 0.0)))
+    sides = {("parameters", side): few for side in ("length_mm", "width_mm") if getattr(design.params, side) > few > 0}
+    return changed(design, {**changes, **sides}) if changes or sides else design
 
 
 def steps(design: Design, wanted: Iterable[str]) -> Iterator[tuple[Key, Value]]:

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sensorgen.analysis.characterise.catalogue import LEVEL_SIGMA, Coupon, Meters, Target, Unknown, nominal
-from sensorgen.analysis.characterise.posterior import DEAD, Mode, Posterior, linearised, physical
+from sensorgen.analysis.characterise.catalogue import LEVEL_SIGMA, Coupon, Meters, Target, nominal
+from sensorgen.analysis.characterise.posterior import DEAD, Mode, Posterior, gradient, linearised, physical
 from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.errors import OutOfRange
+from sensorgen.prediction.inference import Parameter, whitening
 
 COPIES = 3  # of one coupon at most
 MISSED = 10.0  # lambda, as much as five halved intervals are worth for a goal missed by a factor of two
@@ -68,34 +69,31 @@ class Candidates:
         missed = np.log(np.maximum(1.0, over[0])).sum() + _SHARE * np.log(np.maximum(1.0, over[1:] / RESERVE)).sum()
         return float(-(1 - DEAD * len(pieces)) * log_det[0] - DEAD * log_det[1:].sum() - MISSED * missed)
 
-    def expected(self, chosen: Sequence[int], unknowns: Sequence[Unknown]) -> Posterior:
+    def expected(self, chosen: Sequence[int], unknowns: Sequence[Parameter]) -> Posterior:
         """Posterior that a set of coupons is expected to give, all of them sound."""
         covariance = np.linalg.inv(self.prior + self.information[list(chosen)].sum(axis=0))
         mean = np.array([u.centre for u in unknowns])
-        return Posterior(tuple(unknowns), (Mode((), mean, covariance, 0.0),), np.ones(1), ())
+        return Posterior(tuple(unknowns), (Mode(mean, covariance),), np.ones(1), ())
 
 
 def candidates(
-    coupons: Sequence[Coupon], unknowns: Sequence[Unknown], targets: Sequence[Target], meters: Meters
+    coupons: Sequence[Coupon], unknowns: Sequence[Parameter], targets: Sequence[Target], meters: Meters
 ) -> Candidates:
     """Fisher information of every coupon of a catalogue."""
     theta, spread = np.array([(u.centre, u.spread) for u in unknowns]).T
-    found = []
+    information = []
     for coupon in coupons:
-        sizes = nominal(coupon, meters)
         noise = noise_of(coupon, unknowns, theta, meters)
-        line = linearised(coupon, sizes, noise, unknowns, theta)
-        found.append(line.jacobian.T @ np.linalg.solve(line.covariance, line.jacobian))
-    points = np.vstack([theta, theta + np.diag(1e-4 * spread)])
-    values = [target.value(physical(unknowns, points)) for target in targets]
-    wanted = np.stack([v if t.linear else np.log(v) for t, v in zip(targets, values, strict=True)])
-    wanted = (wanted[:, 1:] - wanted[:, :1]) / (1e-4 * spread)
+        line = linearised(coupon, nominal(coupon, meters), noise, unknowns, theta)
+        white = whitening(line.covariance) @ line.jacobian
+        information.append(white.T @ white)
+    wanted = np.stack([gradient(unknowns, theta, 1e-4 * spread, target)[1] for target in targets])
     counted = np.array([not target.derived for target in targets])
     goals = np.array([target.goal or np.inf for target in targets])
-    return Candidates(tuple(coupons), np.array(found), np.diag(spread**-2.0), wanted, counted, goals)
+    return Candidates(tuple(coupons), np.array(information), np.diag(spread**-2.0), wanted, counted, goals)
 
 
-def noise_of(coupon: Coupon, unknowns: Sequence[Unknown], theta: Real, meters: Meters) -> Real:
+def noise_of(coupon: Coupon, unknowns: Sequence[Parameter], theta: Real, meters: Meters) -> Real:
     """Standard deviations of ln of a coupon's expected readings."""
     sizes = {size.key: np.asarray(size.drawn) for size in coupon.sizes}
     expected = coupon.expected(physical(unknowns, theta), sizes)

@@ -13,11 +13,12 @@ from sensorgen.core.arrays import Complex, Mask, Real
 BLUE, ORANGE, GREEN, PINK, YELLOW, SKY, GREY = (
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a8f98",
 )  # fmt: skip
-COLOURS = (BLUE, ORANGE, GREEN, PINK, YELLOW, SKY, "#7a5195", "#8c564b", "#555555")
+PURPLE, BROWN, DARK = "#7a5195", "#8c564b", "#555555"
+COLOURS = (BLUE, ORANGE, GREEN, PINK, YELLOW, SKY, PURPLE, BROWN, DARK)
 SYMBOLS = (
     "circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x", "triangle-left", "triangle-right",
 )  # fmt: skip
-MOST_POINTS = 3000  # of a drawn curve: more than a screen is wide
+MOST_POINTS = 1600  # of a drawn curve: more than a figure is wide
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 Values = Sequence[float] | Sequence[str] | Real

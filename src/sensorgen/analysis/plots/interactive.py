@@ -102,7 +102,8 @@ def _axis(axis: Axis) -> Data:
     found: Data = {"title": {"text": escape(axis.title)}, "automargin": True, "zeroline": False}
     if axis.log:
         found |= {"type": "log"}  # without a format, 20 is written as 2
-        found |= {"exponentformat": "power"} if "[-]" in axis.title else {"tickformat": "~g"}
+        prefixed = any(unit in axis.title for unit in ("[ohm]", "[Hz]"))
+        found |= {"exponentformat": "power"} if "[-]" in axis.title else {"tickformat": "~s" if prefixed else "~g"}
     if isfinite(axis.low) and isfinite(axis.high):
         found["range"] = [log10(end) if axis.log else end for end in (axis.low, axis.high)]
     elif isfinite(axis.low):

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from sensorgen.analysis.plots.figure import BLUE, COLOURS, ORANGE, Axis, Curve, Figure, Panel, look, scale
-from sensorgen.analysis.preview.geometry import edges
 from sensorgen.checks.review import Review
 from sensorgen.core.document import Cell, Table
 from sensorgen.prediction.sweep import Sweep
@@ -18,7 +17,7 @@ _SEVERITIES = {"info": BLUE, "warning": ORANGE, "error": "#d1242f"}  # the most 
 def findings(found: Review) -> Figure:
     """Edges of the bodies from the side, with the places of findings."""
     curves = [
-        Curve("line", name, *_from_side(mesh.vertices_mm, edges(mesh)), colour=COLOURS[2 + k % (len(COLOURS) - 2)])
+        Curve("line", name, *_from_side(mesh.vertices_mm[mesh.sharp_edges()]), colour=COLOURS[2:][k % len(COLOURS[2:])])
         for k, (name, mesh) in enumerate(found.meshes.items())
     ]
     panel = Panel((*curves, *_places(found)), Axis("x [mm]"), Axis("z [mm]"))
@@ -35,9 +34,9 @@ def _places(found: Review) -> Iterator[Curve]:
         yield Curve("points", severity, x, z, text=text, colour=colour)
 
 
-def _from_side(vertices_mm: Any, ends: Any) -> tuple[Any, Any]:
+def _from_side(ends_mm: Any) -> tuple[Any, Any]:
     """X and z of edges as one line with gaps."""
-    both = vertices_mm[ends][:, :, [0, 2]]
+    both = ends_mm[:, :, [0, 2]]
     gaps = np.full((len(both), 1, 2), np.nan)
     x, z = np.concatenate([both, gaps], axis=1).reshape(-1, 2).T
     return x, z

@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator
 
-from sensorgen.analysis.report.contents import Report, Section, report
+from sensorgen.analysis.plots.pages import Section
+from sensorgen.analysis.report.contents import Report, report
 
 FORMATS = ("html", "md", "csv", "json")
 

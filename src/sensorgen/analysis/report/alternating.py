@@ -7,7 +7,7 @@ from statistics import median
 from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison, Predicted
-from sensorgen.analysis.plots.figure import GREY, ORANGE, Axis, Curve, Figure, Panel
+from sensorgen.analysis.plots.figure import BLUE, GREY, Axis, Curve, Figure, Panel
 from sensorgen.core.document import Cell, Column, Table
 from sensorgen.core.units import frequency_text
 from sensorgen.measure import accuracy
@@ -211,7 +211,7 @@ def figures(made: Sequence[AcRow]) -> Iterator[Figure]:
     ends = [min(row.frequency_hz for row in known), max(row.frequency_hz for row in known)]
     curves = (
         Curve("points", "measured / predicted", [row.frequency_hz for row in known], [row.c_ratio for row in known],
-              text=[f"{row.specimen}, reading {row.number}" for row in known], colour=ORANGE),
+              text=[f"{row.specimen}, reading {row.number}" for row in known], colour=BLUE),
         Curve("line", "as predicted", ends, [1.0, 1.0], colour=GREY, dash="dash"),
     )  # fmt: skip
     yield Figure(

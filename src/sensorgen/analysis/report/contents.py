@@ -9,6 +9,7 @@ from sensorgen.analysis.comparison import Comparison, of_iteration
 from sensorgen.analysis.comparison.runs import Run, runs
 from sensorgen.analysis.comparison.specimens import UNTRUSTED, known_iterations
 from sensorgen.analysis.plots.figure import Figure
+from sensorgen.analysis.plots.pages import Section
 from sensorgen.analysis.report import (
     alternating,
     calibrations,
@@ -21,8 +22,7 @@ from sensorgen.analysis.report import (
     yields,
 )
 from sensorgen.analysis.report.provenance import origins
-from sensorgen.analysis.report.variants import Variant
-from sensorgen.core.document import Column, Table
+from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.notes import specimen as named
@@ -37,30 +37,6 @@ class LeftOut:
 
     what: Annotated[str, Column("what")]
     why: Annotated[str, Column("why")]
-
-
-@dataclass(frozen=True, eq=False)
-class Section:
-    """A part of a report.
-
-    Attributes
-    ----------
-    key, title : str
-        Anchor and heading.
-    figures, tables : tuple
-        In the order in which they stand.
-    notes : tuple of str
-        Paragraphs on how numbers come about.
-    variants : tuple of Variant
-        Drawings.
-    """
-
-    key: str
-    title: str
-    figures: tuple[Figure, ...] = ()
-    tables: tuple[Table, ...] = ()
-    notes: tuple[str, ...] = ()
-    variants: tuple[Variant, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +146,7 @@ def report(
     return Report(
         iteration, specimens, datetime.now(UTC).isoformat(timespec="seconds"),
         (*headline, *recordings.headline(impedances), *_basis(found, recorded)), findings,
-        tuple(s for s in sections if s.tables or s.figures or s.variants),
+        tuple(s for s in sections if s.tables or s.figures or s.drawings),
     )  # fmt: skip
 
 
@@ -199,33 +175,33 @@ def _sections(
     alone = len(found.rows) <= 1 and not recorded  # a short page
     figures = (*electrodes.figures(found), *(recordings.residuals(impedances) if impedances else ()))
     tables = (*([electrodes.readings(found)] if found.direct else ()), *([impedances] if impedances else ()))
+    parts: tuple[Part, ...]
     notes: tuple[str, ...] = electrodes.NOTES if found.direct and not alone else ()
-    yield Section("measured", "Measured and predicted", figures, tables, notes)
+    yield Section("measured", "Measured and predicted", figures, (*tables, *notes))
     if ac:
-        tables = (alternating.table(ac),)
-        yield Section("ac", "Capacitance and impedance by frequency", tuple(alternating.figures(ac)), tables,
-                      (alternating.NOTE,))  # fmt: skip
+        parts = (alternating.table(ac), alternating.NOTE)
+        yield Section("ac", "Capacitance and impedance by frequency", tuple(alternating.figures(ac)), parts)
     if found.direct:
         grouped = (yields.table(found) if len(found.last) > 1 else None, direction.table(found))
-        tables = (*filter(None, grouped), electrodes.reasons(found))
         notes = () if alone else yields.notes(found)
-        yield Section("verdicts", "Verdicts and yield", yields.figures(found), tables, notes)
+        parts = (*filter(None, grouped), electrodes.reasons(found), *notes)
+        yield Section("verdicts", "Verdicts and yield", yields.figures(found), parts)
     if changes:
-        tables = (history.table(changes),)
-        yield Section("changes", "Bake, shrinkage and defects", (), tables, () if alone else (history.NOTE,))
+        notes = () if alone else (history.NOTE,)
+        yield Section("changes", "Bake, shrinkage and defects", (), (history.table(changes), *notes))
     if explanations:
-        tables, title = (explained.table(explanations),), "Which parameter explains the residuals"
-        yield Section("explained-by", title, (), tables, (explained.NOTE,))
+        parts = (explained.table(explanations), explained.NOTE)
+        yield Section("explained-by", "Which parameter explains the residuals", (), parts)
     if calibrated:
-        tables, title = (calibrations.table(calibrated),), "Calibrated specimens"
-        yield Section("calibrated", title, (), tables, (calibrations.NOTE,))
+        parts = (calibrations.table(calibrated), calibrations.NOTE)
+        yield Section("calibrated", "Calibrated specimens", (), parts)
     if recorded:
-        tables = (recordings.facts(recorded),)
-        yield Section("recorded", "Recordings", tuple(recordings.figures(recorded)), tables)
-    drawings = () if alone else tuple(variants.figures(found))
-    yield Section("variants", "The variants", drawings, variants.identifiability(found), (), variants.variants(found))
+        figures = tuple(recordings.figures(recorded))
+        yield Section("recorded", "Recordings", figures, (recordings.facts(recorded),))
+    figures = () if alone else tuple(variants.figures(found))
+    yield Section("variants", "The variants", figures, variants.identifiability(found), variants.drawings(found))
     if left_out:
         caption = "What was left out, or taken with care, and why"
-        tables = (Table.of("left_out", caption, tuple(LeftOut(*row) for row in left_out)),)
-        yield Section("left-out", "What was left out, and why", tables=tables)
-    yield Section("provenance", "Provenance", tables=(origins(log, found, brief=alone),))
+        parts = (Table.of("left_out", caption, tuple(LeftOut(*row) for row in left_out)),)
+        yield Section("left-out", "What was left out, and why", parts=parts)
+    yield Section("provenance", "Provenance", parts=(origins(log, found, brief=alone),))

@@ -10,13 +10,13 @@ from typing import Annotated
 import numpy as np
 
 from sensorgen.analysis.comparison import Compared, Comparison
-from sensorgen.analysis.plots.figure import GREEN, GREY, ORANGE, PINK, SKY, YELLOW, Axis, Curve, Figure, Panel
+from sensorgen.analysis.plots.figure import DARK, GREEN, GREY, ORANGE, PINK, SKY, YELLOW, Axis, Curve, Figure, Panel
 from sensorgen.core.document import Column, Table
 from sensorgen.core.lazy import Lazy
 from sensorgen.measure import accuracy
 from sensorgen.measure.signal.verdicts import WORDS
 
-VERDICT_COLOURS = dict(zip(WORDS, (PINK, ORANGE, YELLOW, SKY, GREEN, GREY), strict=True))
+VERDICT_COLOURS = dict(zip(WORDS, (PINK, ORANGE, YELLOW, SKY, GREEN, DARK), strict=True))
 MOST_ROWS = 200  # of a figure: more cannot be read
 _ALIKE = 1.05  # ratio up to which two resistances are called alike
 NOTES = (

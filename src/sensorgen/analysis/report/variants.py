@@ -7,6 +7,7 @@ from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, Body, Curve, Figure, Panel
+from sensorgen.analysis.plots.pages import Drawing
 from sensorgen.checks.review import draw
 from sensorgen.core.document import Column, Table
 from sensorgen.core.units import M_PER_MM
@@ -17,27 +18,6 @@ from sensorgen.prediction.slices import reviewed
 from sensorgen.scene.geometry.meshes import mesh
 
 _STRETCH = (1.0, 1.0, 10.0)
-_F_PER_PF = 1e-12
-
-
-@dataclass(frozen=True)
-class Variant:
-    """A variant on the page.
-
-    Attributes
-    ----------
-    design, design_id : str
-        Name and identity.
-    svg : str
-        Its drawing.
-    words : str
-        Its prediction.
-    """
-
-    design: str
-    design_id: str
-    svg: str
-    words: str
 
 
 @dataclass(frozen=True)
@@ -51,19 +31,19 @@ class IdentifiabilityRow:
     verdict: Annotated[str, Column("verdict")]
 
 
-def variants(found: Comparison) -> tuple[Variant, ...]:
-    """Every variant that a specimen was printed of."""
-    made = []
+def drawings(found: Comparison) -> tuple[Drawing, ...]:
+    """Every variant of which a specimen was printed, with its prediction in words."""
+    sheets = []
     for name, body in found.bodies.items():
         of, design = found.predictions[name], body.design
-        r, c = of.ry_ohm, of.capacitance_f
+        r, c = of.ry_ohm, of.prediction.capacitance
         words = (
-            f"electrode resistance {r.lower:.4g} to {r.upper:.4g} ohm" if r else "electrode resistance unknown",
-            f"capacitance {c.lower / _F_PER_PF:.4g} to {c.upper / _F_PER_PF:.4g} pF" if c
-            else f"no capacitance: {of.reason}", of.provenance,
-        )  # fmt: skip
-        made.append(Variant(name, design.id(), draw(design, reviewed(design)), "; ".join(words)))
-    return tuple(made)
+            f"electrode resistance {r.words() if r else 'unknown'}",
+            f"capacitance {c.words()}" if c else f"no capacitance: {of.reason}",
+            of.provenance,
+        )
+        sheets.append(Drawing(name, design.id(), draw(design, reviewed(design)), "; ".join(words)))
+    return tuple(sheets)
 
 
 def identifiability(found: Comparison) -> tuple[Table, ...]:

@@ -6,15 +6,19 @@ from math import inf, isfinite
 from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison
-from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, Axis, Curve, Figure, Panel
+from sensorgen.analysis.plots.figure import BLUE, BROWN, GREY, MOST_POINTS, PURPLE, Axis, Curve, Figure, Panel
 from sensorgen.analysis.report.electrodes import VERDICT_COLOURS
 from sensorgen.core.document import Cell, Column, Table
 from sensorgen.measure.signal.verdicts import ORDER, REACTANCES, WORDS, Evidence
 from sensorgen.measure.signal.yields import Group, Share, dependence, groups
 from sensorgen.prediction.query import TONES_HZ
 
-MOST_POINTS = 3000  # that a browser draws at once
-_SYMBOLS = {"tri": "circle", "rect": "square", "reference": "diamond", "double": "cross"}
+_LOOKS = {  # none with the colour of a verdict
+    "tri": {"colour": BLUE, "symbol": "circle"}, "rect": {"colour": PURPLE, "symbol": "square"},
+    "reference": {"colour": BROWN, "symbol": "diamond"},
+}  # fmt: skip
+
+_OTHER = {"colour": BROWN, "symbol": "x"}
 
 
 def _film(of: Evidence) -> str:
@@ -218,7 +222,7 @@ def _ratios(found: Comparison) -> Iterator[Figure]:
         curves.append(
             Curve("points", shape, [r.verdict.ry_ohm for r in here], [r.verdict.rz_ohm for r in here],
                   text=[f"{r.reading.specimen}: {r.verdict.word}" for r in here],
-                  colour=BLUE if shape == "tri" else ORANGE, symbol=_SYMBOLS.get(shape, "x"))
+                  **_LOOKS.get(shape, _OTHER))
         )  # fmt: skip
     zero, overload = (sum(r.verdict.rz_ohm == value for r in found.rows) for value in (0, inf))
     x, y = Axis("electrode resistance [ohm]", log=True), Axis("film resistance [ohm]", log=True)

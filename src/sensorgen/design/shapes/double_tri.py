@@ -9,7 +9,7 @@ One period, seen along the prisms; each layer as the shape ``tri`` (e: conductor
     eeeeeeeeeeeeeeeeeeee   bottom electrode
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from sensorgen.scene.scene import Body, Fill, Scene, rounded
 from sensorgen.scene.triangles import Frame, TriangleParams, layer_bodies
@@ -21,6 +21,10 @@ _MIDDLE = "middle_electrode_with_cogs"
 @dataclass(frozen=True)
 class Params(TriangleParams):
     """Parameters of both layers."""
+
+    period_mm: float = field(  # of 2 mm, the tips of hanging triangles are too narrow for most slicers
+        default=3.0, metadata=TriangleParams.__dataclass_fields__["period_mm"].metadata
+    )
 
 
 def scene(p: Params, fill: Fill) -> Scene:

@@ -19,7 +19,7 @@ from sensorgen.scene.strips import StripParams
 class Params(StripParams):
     """Parameters of the plate with gaps."""
 
-    gap_width_mm: float = field(default=0.8, metadata={"help": "Width of an air gap.", "range": (0.02, 100.0)})
+    gap_width_mm: float = field(default=0.6, metadata={"help": "Width of an air gap.", "range": (0.02, 100.0)})
     dielectric_mm: float = field(
         default=0.6, metadata={"help": "Thickness of the dielectric plate.", "range": (0.01, 10.0)}
     )

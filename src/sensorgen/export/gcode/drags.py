@@ -26,6 +26,7 @@ from sensorgen.export.gcode.timing import seconds
 
 LIFT_MM = 0.2  # 0.4 mm took twice the time and left no less contact
 COUNTED_MM = 0.5  # a crossing is longer than this
+_DRAWN_MM = 2.0  # of a lifted travel over other materials, before which filament is drawn back: as profiles do [mm]
 _RETRACTED = 0.5  # of a tool's usual retraction
 _PLAIN = re.compile(rb"\s*G0*[01] [^;(]*", re.IGNORECASE)  # without a second command in brackets or behind
 _Z = re.compile(rb"\s*Z\s*[-+.0-9]+", re.IGNORECASE)
@@ -325,7 +326,7 @@ class _Lifts:
         z_feed, feed = 60 * self.machine.max_speed_mm_s.z, self.motion.feed_mm_min
         length, speed = self.habits.get(self.tools[first], (0.0, 0.0))
         draws = bool(length and not self.retracted[first] and self.relative_e[first])
-        draws &= bool(self.over_mm[first : last + 1].sum() > COUNTED_MM)
+        draws &= bool(self.over_mm[first : last + 1].sum() > _DRAWN_MM)
         up = [f"G1 E-{_short(length)} F{_short(speed)}"] if draws else []
         up.append(f"G1 Z{_short(high)} F{_short(z_feed)}")
         if not self._has_feed(numbers[0]):

@@ -14,7 +14,9 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
 from sensorgen.prediction.array.model import PA_PER_KPA, ArrayModel
 from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayReadout, own_slopes
+from sensorgen.prediction.array.sessions import ArrayCalibration
 from sensorgen.prediction.array.study import DETECTED, DETERMINED
+from sensorgen.prediction.inverse.verdict import NORMAL_90
 from sensorgen.solvers.tracks import Readings, readings
 
 SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration of each
@@ -40,6 +42,8 @@ class PressureMaps:
         Of each frame [s].
     pressure_kpa, sigma_kpa : (k, m, n) array
         Pressure on the surface and its standard error of noise and scatter alone; nan where it is not determined [kPa].
+    calibration : ArrayCalibration or None
+        That gave the pressures; its errors are in the standard errors.
     """
 
     model: ArrayModel
@@ -47,11 +51,12 @@ class PressureMaps:
     time_s: Real
     pressure_kpa: Real
     sigma_kpa: Real
+    calibration: "ArrayCalibration | None" = None
 
     @cached_property
     def interval_kpa(self) -> tuple[Real, Real]:
-        """Lower and upper end of 95 % [kPa]."""
-        half = _CI * self.sigma_kpa
+        """Lower and upper end of 95 %, of 90 % with a calibration [kPa]."""
+        half = (NORMAL_90 if self.calibration else _CI) * self.sigma_kpa
         return self.pressure_kpa - half, self.pressure_kpa + half
 
     @property
@@ -63,6 +68,8 @@ class PressureMaps:
         """Total force of each frame and its standard error, of determined crossings; nan without any [N]."""
         sigma, read = self.sigma_kpa * PA_PER_KPA * self.model.pitch_area_m2, np.isfinite(self.pressure_kpa).any((1, 2))
         force, error = np.nansum(self._newtons, (1, 2)), np.sqrt(np.nansum(sigma**2, (1, 2)))
+        if self.calibration:
+            error = np.hypot(error, self.calibration.common * force)
         return np.where(read, force, np.nan), np.where(read, error, np.nan)
 
     @cached_property
@@ -115,7 +122,8 @@ class PressureMaps:
         errors = "none is determined: readings are missing, of the other sign, or less than noise"
         if sigma.size:
             low, high = float(sigma.min()), float(sigma.max())
-            errors = f"standard errors {low:.3g} to {high:.3g} kPa in the heaviest frame, of noise and scatter alone"
+            of = "by the calibration" if self.calibration else "of noise and scatter alone"
+            errors = f"standard errors {low:.3g} to {high:.3g} kPa in the heaviest frame, {of}"
         yield Facts((
             ("frames", f"{len(self.time_s)}, inverted by {self.by}"),
             ("pressures", errors),
@@ -124,8 +132,9 @@ class PressureMaps:
         yield ""
         shown = tuple(float(f"{v:.4g}") if isinstance(v, float) else v for v in table.cells[k])
         yield Table("heaviest", "the heaviest frame", table.columns, (shown,))
-        yield from self.model.shared()
-        yield from self.model.beyond(self.peak_kpa)
+        if not self.calibration:
+            yield from self.model.shared()
+            yield from self.model.beyond(self.peak_kpa)
         yield from (f"doubtful: {doubt}" for doubt in self.model.crossing.doubts)
 
     def _names(self, k: int) -> str:
@@ -309,8 +318,11 @@ class MapInverter:
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.stack([np.where(sure & settled, c / rest, np.nan) for c, settled in each])
 
-    def maps(self, siemens: Complex, time_s: Real) -> PressureMaps:
-        """Pressure maps of frames; C/C0 where it agrees with the network in the heaviest frame."""
+    def planned(self, siemens: Complex) -> tuple[Real, Real, str]:
+        """Capacitance over that at rest (k, m, n), its error by noise (m, n), and by which model, and why.
+
+        C/C0 where it agrees with the network in the heaviest frame, else the network.
+        """
         ratio = self.by_ratio(siemens)
         heaviest = int(np.nansum(np.where(self.alive, ratio, 0), (1, 2)).argmax())
         network = self.by_network(siemens[heaviest : heaviest + 1])[0]
@@ -320,18 +332,33 @@ class MapInverter:
         off = (np.abs(network - ratio[heaviest]) / error)[counted]
         worst = float(np.nan_to_num(off).max(initial=0.0))
         if worst < _SUFFICES and not np.isnan(off).any():
-            by = f"C/C0: the network differs by at most {worst:.2g} standard errors in the heaviest frame"
-        else:
-            by = f"the network of the tracks: C/C0 differs by {worst:.2g} standard errors in the heaviest frame"
-            ratio = np.where(np.isfinite(siemens.imag), self.by_network(siemens), np.nan)
-            if lost := int((np.isnan(ratio) & np.isfinite(siemens.imag) & self.alive).sum()):
-                by += f"; {lost} values left out that {_STEPS} steps of Gauss-Newton did not settle"
+            return (
+                ratio,
+                error,
+                f"C/C0: the network differs by at most {worst:.2g} standard errors in the heaviest frame",
+            )
+        by = f"the network of the tracks: C/C0 differs by {worst:.2g} standard errors in the heaviest frame"
+        ratio = np.where(np.isfinite(siemens.imag), self.by_network(siemens), np.nan)
+        if lost := int((np.isnan(ratio) & np.isfinite(siemens.imag) & self.alive).sum()):
+            by += f"; {lost} values left out that {_STEPS} steps of Gauss-Newton did not settle"
+        return ratio, error, by
+
+    def maps(
+        self, siemens: Complex, time_s: Real, calibration: "ArrayCalibration | None" = None, *, day: float = 0.0
+    ) -> PressureMaps:  # fmt: skip
+        """Pressure maps of frames, by the law of the cell, or of each element where they are calibrated."""
+        ratio, error, by = self.planned(siemens)
         pressure, per = self.model.pressures(np.nan_to_num(ratio, nan=1.0, posinf=1.0, neginf=1.0))
         noise = error * per * np.sqrt(1 + 1 / self.rest_count)
         sigma = np.hypot(noise, self.scatter * pressure)
         given = _known(sigma) & self.alive & np.isfinite(ratio) & self._same_sign(siemens)
-        shown = (np.where(given, each / PA_PER_KPA, np.nan) for each in (pressure, sigma))
-        return PressureMaps(self.model, by, time_s, *shown)
+        if calibration:
+            by += f"; {calibration.law.form.words()} of each element, calibrated"
+            shape = ratio.shape
+            mean, half = calibration.of_ratio(ratio.reshape(shape[0], -1), time_s, day)
+            pressure, sigma = PA_PER_KPA * mean.reshape(shape), PA_PER_KPA / NORMAL_90 * half.reshape(shape)
+        shown, error_kpa = (np.where(given, each / PA_PER_KPA, np.nan) for each in (pressure, sigma))
+        return PressureMaps(self.model, by, time_s, shown, error_kpa, calibration)
 
 
 def _known(sigma_pa: Real) -> Mask:
@@ -339,9 +366,31 @@ def _known(sigma_pa: Real) -> Mask:
     return np.asarray(sigma_pa < DETERMINED * FULL_SCALE_PA)
 
 
+def at_rest(
+    model: ArrayModel, readout: ArrayReadout, frames: Complex, scatter: float = SCATTER, unused: Sequence[str] = ()
+) -> MapInverter:  # fmt: skip
+    """Inverter by frames at rest, (r, m, n) [S]; ``unused`` are columns that were not read.
+
+    Raises
+    ------
+    BadInput
+        No frame at rest, or no crossing that reads as predicted.
+    """
+    frames = missing(frames)
+    if not len(frames):
+        raise BadInput(
+            "no frame at rest; expected 'rest' with 1 where nothing was on the array, or --rest FILE: what counts is "
+            "the ratio to it, and a standing load is never taken for rest"
+            + (f"; not read: {', '.join(unused[:_SHOWN])}" if unused else "")
+        )
+    inverter = MapInverter(model, readout, _mean(frames), len(frames), scatter)
+    inverter.refuse_dead()
+    return inverter
+
+
 def inverted(
     model: ArrayModel, readout: ArrayReadout, siemens: Complex, rest: Mask, time_s: Real, scatter: float = SCATTER,
-    apart: "Complex | None" = None, unused: Sequence[str] = (),
+    apart: "Complex | None" = None, unused: Sequence[str] = (), calibration: "ArrayCalibration | None" = None,
 ) -> PressureMaps:  # fmt: skip
     """Pressure maps of a recording.
 
@@ -360,30 +409,23 @@ def inverted(
     apart : (r, m, n) array, optional
         Readings at rest of another file, in place of those of this one [S].
     unused : sequence of str
-        Columns that were not read, named where no frame is at rest.
+        Samples that were not read, named where no frame is at rest.
+    calibration : ArrayCalibration, optional
+        Of each element.
 
     Raises
     ------
     BadInput
         No frame at rest, or none under load.
     """
-    siemens, at_rest = _missing(siemens), siemens[rest] if apart is None else apart
-    at_rest = _missing(at_rest)
-    if not len(at_rest):
-        raise BadInput(
-            "no frame at rest; expected 'rest' with 1 where nothing was on the array, or --rest FILE: what counts is "
-            "the ratio to it, and a standing load is never taken for rest"
-            + (f"; not read: {', '.join(unused[:_SHOWN])}" if unused else "")
-        )
+    inverter = at_rest(model, readout, siemens[rest] if apart is None else apart, scatter, unused)
     loaded = ~rest
     if not loaded.any():
         raise BadInput("all frames are at rest; expected some under load")
-    inverter = MapInverter(model, readout, _mean(at_rest), len(at_rest), scatter)
-    inverter.refuse_dead()
-    return inverter.maps(siemens[loaded], time_s[loaded])
+    return inverter.maps(missing(siemens)[loaded], time_s[loaded], calibration)
 
 
-def _missing(siemens: Complex) -> Complex:
+def missing(siemens: Complex) -> Complex:
     """Readings with both parts nan where one is missing: a complex nan may have an imaginary part of 0."""
     lost = np.isnan(siemens.real) & (siemens.imag == 0) | ~np.isfinite(siemens.imag)
     return np.asarray(np.where(lost, complex(np.nan, np.nan), siemens))

@@ -286,9 +286,20 @@ class Identifiability(StandardErrors):
             known, unknown = self.calibrated.words(), self.uncalibrated.words()
             words = f"perfect model {self.words()}; after 30 known presses {known}; not calibrated {unknown}"
             yield "on a bench", words
+        yield "over all", self._over_all()
+        yield "best", self._best()
+        if not self.changes:
+            yield "to improve", "none of the changes that were tried"
+        for k, change in enumerate(self.changes):
+            yield "" if k else "to improve", f"{k + 1}. {change.change}: {change.words()}"
+        if self.changes_together and len(self.changes) > 1:
+            yield "", f"all together: {self.changes_together.words()}"
+
+    def _over_all(self) -> str:
+        """Errors over the map in words."""
         force, position = self.map.of_force, self.map.of_position
         most_n, length_m = max(self.map.force_n, key=abs), max(self.map.position_m)
-        yield "over all", "; ".join((
+        return "; ".join((
             f"median {_sensed(force.median, most_n)}, {_located(position.median, length_m)}",
             f"worst {_sensed(force.worst, most_n)}{force.where()}, "
             f"{_located(position.worst, length_m)}{position.where()}",
@@ -297,19 +308,15 @@ class Identifiability(StandardErrors):
             f"{100 * position.share_known:.0f} %",
             *([self.map.doubt] if self.map.doubt else ()),
         ))  # fmt: skip
+
+    def _best(self) -> str:
+        """Best frequencies in words."""
         better = self.advised_frequencies
-        if better.pair.frequency_hz:
-            given = [best.words() for best in self.best_frequencies if best.frequency_hz]
-            advised = f"of all up to {si(better.highest_hz, 'Hz')}: {better.single.words()}; {better.pair.words()}"
-            yield "best", "; ".join((*given, advised))
-        else:
-            yield "best", "no frequencies determine both force and position"
-        if not self.changes:
-            yield "to improve", "none of the changes that were tried"
-        for k, change in enumerate(self.changes):
-            yield "" if k else "to improve", f"{k + 1}. {change.change}: {change.words()}"
-        if self.changes_together and len(self.changes) > 1:
-            yield "", f"all together: {self.changes_together.words()}"
+        if not better.pair.frequency_hz:
+            return "no frequencies determine both force and position"
+        given = [best.words() for best in self.best_frequencies if best.frequency_hz]
+        advised = f"of all up to {si(better.highest_hz, 'Hz')}: {better.single.words()}; {better.pair.words()}"
+        return "; ".join((*given, advised))
 
 
 def _sensed(error_n: float | None, most_n: float) -> str:

@@ -23,6 +23,7 @@ from sensorgen.prediction.print_files import NONE
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.prediction.sensor_model import build_sensor, piece, pressure_pa
+from sensorgen.workflows.moves import short
 from sensorgen.workflows.optimise.target import NUMBERS
 from sensorgen.workflows.trial import Numbers, Trial, trial
 
@@ -53,22 +54,22 @@ class Known:
 
 
 def rules(design: Design) -> list[tuple[str, str]]:
-    """Rule and severity of the findings that the design does not waive."""
+    """Rule and severity of the findings that the design does not waive, of a few of its periods."""
 
     def work() -> list[list[str]]:
-        return [[f.rule, f.severity] for f in review(design).findings if not f.waiver]
+        return [[f.rule, f.severity] for f in review(short(design)).findings if not f.waiver]
 
     waived = [w.model_dump() for w in design.waivers]
-    return [(r, s) for r, s in cache.answer({"what": "rules", "design": design.id(), "waivers": waived}, work)]
+    return [(r, s) for r, s in cache.answer({"what": "rules", "short": design.id(), "waivers": waived}, work)]
 
 
-def known(design: Design, query: Query, solve: bool) -> dict[str, Known]:
+def known(design: Design, query: Query, solve: bool, rule: str = "") -> dict[str, Known]:
     """Numbers by the least expensive models: certified bounds at rest, and, if ``solve``, under load on a coarse mesh.
 
-    Empty where no model applies, as of a short.
+    Of the print by a rule for walls, the most likely one if not given. Empty where no model applies, as of a short.
     """
     query = query.of(design)
-    body = bodies.estimated(design, wall_rules(design.profile.walls)[0])  # the most likely way to print it alone
+    body = bodies.estimated(design, rule or wall_rules(design.profile.walls)[0])
     question = {"what": "known", "body": body.identity, "query": asdict(query), "solve": solve}
 
     def work() -> dict[str, list[float]]:

@@ -3,8 +3,8 @@
 from sensorgen.analysis.plots import pages
 from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, Axis, Curve, Figure, Panel
 from sensorgen.core.bounds import Bounds
-from sensorgen.core.document import html
 from sensorgen.workflows.optimise.result import Chosen, Optimised
+from sensorgen.workflows.optimise.target import NUMBERS
 
 
 def page(found: Optimised) -> str:
@@ -20,14 +20,13 @@ def page(found: Optimised) -> str:
     )
     blind = sum(not all(c.senses(k) for k in (across, up)) for c in found.designs)
     curves = tuple(_points(name, colour, some, across, up) for name, colour, some in groups if _known(some, across, up))
-    panel = Panel(curves, Axis(across, log=True), Axis(up, log=True))
-    alt = f"Evaluated designs by {across} and {up}, with what the models leave open of {across}."
-    figures = [Figure("front", f"{across} and {up} as printed", alt, {"": (panel,)})] if curves else []
-    return pages.render(
-        "sensorgen.workflows.optimise", "optimised.html", figures, title=f"Best designs: {found.name}",
-        words=(f"{blind} designs that cannot sense force or cannot locate are in the table alone",) * (blind > 0),
-        content=html(found.document()),
-    )  # fmt: skip
+    x, y = (NUMBERS[key].words for key in (across, up))
+    panel = Panel(curves, *(Axis(f"{NUMBERS[key].words} [{NUMBERS[key].unit}]", log=True) for key in (across, up)))
+    alt = f"Evaluated designs by {x} and {y}, with what the models leave open of {x}."
+    figures = (Figure("front", f"{x.capitalize()} and {y} as printed", alt, {"": (panel,)}),) if curves else ()
+    words = [f"{blind} designs that cannot sense force or cannot locate are in the table alone"] * (blind > 0)
+    section = pages.Section("", "", figures, tuple(found.document()))
+    return pages.page(f"Best designs: {found.name}", words, [section])
 
 
 def _known(some: list[Chosen], *keys: str) -> list[Chosen]:

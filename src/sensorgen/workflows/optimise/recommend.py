@@ -12,22 +12,19 @@ from sensorgen.core import files as store
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import SensorgenError, Unprintable
 from sensorgen.core.parallel import in_parallel
-from sensorgen.design.body import Body
 from sensorgen.design.design import Design, make
 from sensorgen.design.walls import rules
 from sensorgen.export.slicers import PROGRAMS
 from sensorgen.export.slicers.run import find
-from sensorgen.prediction import bodies
-from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.query import Query
 from sensorgen.workflows.build import build
+from sensorgen.workflows.optimise import ladder
 from sensorgen.workflows.optimise.result import Recommended, Spread, chosen, leads
 from sensorgen.workflows.optimise.search import HERE, Row, Searched, Workers
 from sensorgen.workflows.optimise.space import grid_mm
 from sensorgen.workflows.optimise.target import NUMBERS, Target
 from sensorgen.workflows.optimise.ties import settled, worth
 from sensorgen.workflows.slice import slice_design
-from sensorgen.workflows.trial import Numbers, trial
+from sensorgen.workflows.trial import trial
 
 Step = Callable[[str], None]
 
@@ -92,19 +89,17 @@ def _named(design: Design, name: str) -> Design:
 
 
 def _robust(target: Target, rows: Sequence[Row], workers: Workers, *, keep: bool) -> dict[int, dict[str, Spread]]:
-    """Of designs by number: objectives that an estimate has, over walls of slicers and lengths in the plane."""
-    keys, query = [key for key in target.objectives if not NUMBERS[key].of_path], target.query()
-    inputs: list[tuple[Any, ...]] = []
-    owners: list[Row] = []
+    """Of designs by number: objectives on the coarse mesh, over walls of slicers and lengths in the plane."""
+    keys, query = [key for key in target.objectives if key in ladder.COARSE], target.query()
+    inputs, owners = list[tuple[Any, ...]](), list[int]()
     for row in rows:
-        variants = [(row.design, rule, query) for rule in rules(None)]
-        variants += [(design, rules(None)[0], query) for design in within_tolerance(target, row.design)]
-        inputs += variants
-        owners += [row] * len(variants)
-    numbers: dict[int, list[Numbers]] = {row.number: [] for row in rows}
-    for k, one in workers.results(one_way, inputs, "lost", keep=keep):
-        if isinstance(one, Numbers):
-            numbers[owners[k].number].append(one)
+        designs = [(row.design, ""), *((row.design, rule) for rule in rules(None))]
+        designs += [(design, rules(None)[0]) for design in within_tolerance(target, row.design)]
+        inputs += [(design, query, bool(set(keys) - ladder.AT_REST), rule) for design, rule in designs]
+        owners += [row.number] * len(designs)
+    numbers: dict[int, list[dict[str, ladder.Known]]] = {row.number: [] for row in rows}
+    for k, one in sorted(workers.results(ladder.known, inputs, "lost", keep=keep)):  # first its own walls
+        numbers[owners[k]].append({} if isinstance(one, str) else one)
     return {row.number: dict(_spreads(target, keys, row, numbers[row.number])) for row in rows}
 
 
@@ -121,20 +116,17 @@ def within_tolerance(target: Target, design: Design) -> Iterator[Design]:
                     yield make(data | {"parameters": parameters})
 
 
-def _spreads(target: Target, keys: Sequence[str], row: Row, numbers: Sequence[Numbers]) -> Iterator[tuple[str, Spread]]:
+def _spreads(
+    target: Target, keys: Sequence[str], row: Row, numbers: Sequence[dict[str, ladder.Known]]
+) -> Iterator[tuple[str, Spread]]:
+    """The value of each objective, changed by the factor that the coarse mesh has from the first of ``numbers`` on."""
     for key in keys:
         own = NUMBERS[key].of(row.trial.printed) if row.trial else None
-        values = [b.value for n in numbers if (b := NUMBERS[key].of(n))]
-        if own and values:
-            worst = max((*values, own.value), key=partial(target.worth, key))
+        values = [(one[key].lower + one[key].upper) / 2 for one in numbers if key in one]
+        if own and key in numbers[0]:
+            varied = [own.value * value / values[0] for value in values]
             ends = max((own.lower, own.upper), key=partial(target.worth, key))
-            yield key, Spread(own.value, median(values), worst, ends)
-
-
-def one_way(design: Design, rule: str, query: Query) -> Numbers:
-    """Numbers of a design printed by one rule for walls."""
-    body: Body = bodies.estimated(design, rule)
-    return Numbers.of(evaluate(body, query, beside=False))
+            yield key, Spread(own.value, median(varied[1:] or varied), max(varied, key=partial(target.worth, key)), ends)
 
 
 def _built(one: Recommended, target: Target, design: Design, out: Path, sliced: bool) -> Recommended:

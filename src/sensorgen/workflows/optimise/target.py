@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from math import inf, prod
+from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -46,6 +46,15 @@ class Number:
     of_path: bool = False
     like: str = ""
 
+    @property
+    def words(self) -> str:
+        """Name for people.
+
+        >>> NUMBERS["position_resolution_mm"].words, NUMBERS["exposure_mm"].words
+        ('position resolution', 'exposure')
+        """
+        return self.field.removesuffix("_mm").removesuffix("_s").replace("_", " ")
+
     def of(self, found: Numbers, path: Toolpath | None = None) -> Bounds | None:
         """Value with its range, in the unit of its name; None where unknown."""
         value = getattr(path, self.field, None) if self.of_path else getattr(found, self.field)
@@ -67,8 +76,8 @@ class Number:
 NUMBERS = {
     "force_resolution_n": Number("force_resolution", "N"),
     "position_resolution_mm": Number("position_resolution", "mm", M_PER_MM),
-    "force_calibrated_n": Number("force_calibrated", "N", like="force_resolution"),
-    "position_calibrated_mm": Number("position_calibrated", "mm", M_PER_MM, like="position_resolution"),
+    "force_calibrated_n": Number("force_calibrated", "N"),
+    "position_calibrated_mm": Number("position_calibrated", "mm", M_PER_MM),
     "force_typical_n": Number("force_typical", "N", like="force_resolution"),
     "position_typical_mm": Number("position_typical", "mm", M_PER_MM, like="position_resolution"),
     "sensitivity_per_kpa": Number("sensitivity", "1/kPa"),
@@ -83,7 +92,6 @@ _NOT_PREDICTED = {
     "hysteresis": "cannot be predicted: no material file has the viscoelastic data (loss factor or relaxation times) "
     "that a model of it needs; leave it out, and measure the printed designs (sensorgen bench hysteresis)"
 }
-AROUND = 120  # designs around one, at most: two to ten minutes
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -270,28 +278,24 @@ def load(word: str | Path, tip: Mapping[str, Any] | None = None) -> Target:
 
 
 def around(design: Design) -> Target:
-    """The target of designs like one, and of the best known of its shape, with the best resolutions.
+    """The target of the nearest designs to one, and of the best known of its shape, with the best resolutions.
 
-    Heights change by a layer, films and electrodes have one more, lengths in the plane change by a quarter.
+    One length changes at a time: heights by a layer, those of films and electrodes upwards alone, and lengths in the
+    plane by a quarter.
     """
-    layer, values = design.layers.layer_mm, dict[str, list[float | str]]()
+    layer, own, near = design.layers.layer_mm, dict[str, float | str](), list[dict[str, float | str]]()
     for name, value, vertical in lengths(design):
-        whole = max(round(value / layer), 1)
-        if not vertical:
-            values[name] = [round(share * value, 3) for share in (0.8, 1.0, 1.25)]
-        elif name in asdict(Envelope()) or name.endswith("dielectric_mm"):
-            values[name] = [value, round((whole + 1) * layer, 6)]
-        else:
-            values[name] = [value if n == whole else round(n * layer, 6) for n in (whole - 1, whole, whole + 1) if n]
-    while prod(map(len, values.values())) > AROUND:
-        longest = max(values.values(), key=len)
-        longest.pop(0 if len(longest) > 2 else 1)
-    own = {name: getattr(design.params, name) for name in values}
+        own[name], whole = value, max(round(value / layer), 1)
+        least = whole + 1 if name in asdict(Envelope()) or name.endswith("dielectric_mm") else whole - 1
+        heights = sorted({round(n * layer, 6) for n in (least, whole + 1) if n})
+        near += [{name: to} for to in (heights if vertical else (round(0.8 * value, 3), round(1.25 * value, 3)))]
+    own["quality"] = design.quality
     return checked(Target, {
         "design": design.model_dump(mode="json", exclude_unset=True, exclude={"name"}),
-        "parameters": values | {"quality": [design.quality]}, "accept_doubts": ["plate bonded"],
+        "parameters": {name: [value] for name, value in own.items()}, "accept_doubts": ["plate bonded"],
         "objectives": dict.fromkeys(("force_resolution_n", "position_resolution_mm"), "minimise"),
-        "also": [own | one.parameters | {"quality": one.quality} for one in best.of(design.shape)],
+        "also": [own | one for one in near]
+        + [own | one.parameters | {"quality": one.quality} for one in best.of(design.shape)],
     })  # fmt: skip
 
 
