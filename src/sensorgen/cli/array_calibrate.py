@@ -1,29 +1,32 @@
 """``sensorgen calibrate`` and ``invert`` of arrays: sessions with references, and readings by a calibration."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-import click
-
 from sensorgen.cli import render
-from sensorgen.cli.options import flag, option
 from sensorgen.core.errors import BadInput
 
 SUFFIXES = (".csv", ".npz", ".h5", ".hdf5", ".hdf")
 
 
-def options() -> list[click.Parameter]:
-    """Options of a calibration of an array."""
-    return [
-        option(
-            "--array", click.Path(path_type=Path), "Of an array's frames: its design, so that C/C0 is calibrated.",
-            metavar="DESIGN.yaml",
-        ),
-        option(
-            "--calibration", click.Path(path_type=Path), "Of an array: write the calibration there.", metavar="FILE.npz"
-        ),
-        flag("--by-first", "Of an array: test each session by a calibration of the first alone."),
-    ]  # fmt: skip
+@dataclass(frozen=True)
+class ArrayCalibration:
+    """Calibration of an array.
+
+    Attributes
+    ----------
+    array : DESIGN.yaml
+        Of an array's frames: its design, so that C/C0 is calibrated.
+    calibration : FILE.npz
+        Of an array: write the calibration there.
+    by_first
+        Of an array: test each session by a calibration of the first alone.
+    """
+
+    array: Path | None = None
+    calibration: Path | None = None
+    by_first: bool = False
 
 
 def are_files(words: Sequence[str]) -> bool:
@@ -34,29 +37,29 @@ def are_files(words: Sequence[str]) -> bool:
     return count > 0
 
 
-def calibrate(files: Sequence[str], array: Path | None, target: Path | None, *, by_first: bool) -> int:
+def calibrate(files: Sequence[str], how: ArrayCalibration) -> int:
     """Calibrate the elements of an array by sessions."""
     from sensorgen.core import files as store
     from sensorgen.measure.array_sessions import of_frames, session
     from sensorgen.prediction.array.sessions import study
 
-    if array is None:
+    if how.array is None:
         sessions = [session(Path(file), k) for k, file in enumerate(files)]
     else:
         from sensorgen.design.design import load
         from sensorgen.prediction.array.model import array_model
 
-        sessions = of_frames([Path(file) for file in files], array_model(load(array)))
-    found = study(sessions, by_first=by_first)
-    if target is not None:
-        store.replace(target, found.calibration.npz())
-    render.deliver(found)
-    if target is not None:
-        render.say(target, err=bool(render.form()))
+        sessions = of_frames([Path(file) for file in files], array_model(load(how.array)))
+    studied = study(sessions, by_first=how.by_first)
+    if how.calibration is not None:
+        store.replace(how.calibration, studied.calibration.npz())
+    render.deliver(studied)
+    if how.calibration is not None:
+        render.say(how.calibration, err=bool(render.form()))
     return 0
 
 
-def invert(calibration: str, measured: str, output: str | None) -> int:
+def invert(calibration: str, measured: str, output: str) -> int:
     """Pressures of an array's elements by a calibration alone, a row for each frame, with half-widths of 90 %."""
     import numpy as np
 
@@ -76,7 +79,7 @@ def invert(calibration: str, measured: str, output: str | None) -> int:
     cells = [[None if v != v else v for v in row] for row in np.column_stack([of.time_s, both]).tolist()]
     columns = tuple(Column(name, key=name) for name in ("time_s", *names))
     text = comma_separated(Table("pressures", "", columns, tuple(map(tuple, cells))))
-    if output in (None, "-"):
+    if output in ("", "-"):
         print(text, end="")
         return 0
     files.replace(Path(output), text.encode())
