@@ -112,17 +112,18 @@ def demo(folder: Path, *, seed: int = 1, step: Callable[[str], None] = lambda _:
     advice = f"{change[2]}; noise was {first.noise_kpa:.2g} of {first.error_kpa:.2g} kPa"
     runs, page = (first, second), folder / "maps.html"
     shown = InsoleDemo(str(folder), str(page), runs, advice)
-    figures = [
+    figures = tuple(
         draw(maps, load.pressure_kpa, f"{kind}-{k}", f"{run.design}: {kind}")
         for k, (run, maps, load) in enumerate(zip(runs, (found, again), (true, true_again), strict=True))
         for kind, draw in (("heaviest frame", plots.figure), ("course", plots.course))
-    ]  # fmt: skip
+    )  # fmt: skip
     words = [
         f"{run.design}: {run.error_kpa:.3g} kPa, {100 * run.coverage:.0f} % in their intervals of 90 %, force "
         f"{run.force:.2g} %, centre {run.centre_mm:.2g} mm; {run.dead} dead crossings are left white"
         for run in runs
     ]
-    store.replace(page, pages.page("A step on two virtual insoles", [*words, shown.advice], figures).encode())
+    sections = [pages.Section(figures=figures)]
+    store.replace(page, pages.page("A step on two virtual insoles", [*words, shown.advice], sections).encode())
     return shown
 
 

@@ -60,7 +60,10 @@ def course(pressures: "PressureMaps", true: "Real", name: str, title: str) -> Fi
     force, (own_x, own_y) = pressures.force_n[0], pressures.centre_mm
     panels = [
         Panel(
-            (Curve("line", "true", *one, colour=GREY, dash="dash"), Curve("line", "recovered", *other)),
+            (
+                Curve("line", "true", one[0], one[1], colour=GREY, dash="dash"),
+                Curve("line", "recovered", other[0], other[1]),
+            ),
             Axis(across), Axis(up),
         )
         for one, other, across, up in (
