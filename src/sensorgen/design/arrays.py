@@ -19,7 +19,8 @@ from math import ceil
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput, OutOfRange
-from sensorgen.design.tip import EVEN, TipData
+from sensorgen.design.tip import EVEN
+from sensorgen.design.tip_data import TipData
 from sensorgen.scene.lettering import LINE_DOTS, runs
 from sensorgen.scene.scene import SLIVER_MM, Body, Envelope, Fill, Piece, Point, Prism, Scene, box, rounded
 from sensorgen.scene.shifting import shifted, transposed
@@ -108,7 +109,8 @@ class Params(Envelope):
     )
 
     def __post_init__(self) -> None:
-        """Refuse tracks that touch, and more crossings than can be solved."""
+        """Refuse tracks that touch, more crossings than can be solved, and what the cover or the base lacks."""
+        self._refuse_tracks()
         if self.labels == "engraved" and self.isolation_mm < LABEL_MM + SLIVER_MM:
             raise OutOfRange(
                 f"labels engraved {LABEL_MM:g} mm into an isolation of {self.isolation_mm:g} mm; expected a thicker "
@@ -116,6 +118,17 @@ class Params(Envelope):
             )
         if self.ledge_mm and not self.base_mm:
             raise OutOfRange("seam_mm: base_mm is 0, so that nothing reaches under the next tile; expected a base")
+        m, n = self.counts
+        if min(m, n) < 1:
+            raise OutOfRange(
+                f"{self.length_mm:g} x {self.width_mm:g} mm has room for {m} rows and {n} columns; expected at least "
+                "one of each: use a shorter pitch or a larger area"
+            )
+        if m * n > MOST_CROSSINGS:
+            raise OutOfRange(f"{m} x {n} crossings; expected at most {MOST_CROSSINGS}: use a longer pitch")
+
+    def _refuse_tracks(self) -> None:
+        """Refuse tracks and leads that touch, and numbers of them that are not whole."""
         for side, pitch, track in (("column", self.pitch[0], self.column_mm), ("row", self.pitch[1], self.row_mm)):
             if track >= pitch - SLIVER_MM:
                 raise OutOfRange(
@@ -129,14 +142,6 @@ class Params(Envelope):
         for key in ("rows", "columns"):
             if getattr(self, key) != round(getattr(self, key)):
                 raise OutOfRange(f"{key} is {getattr(self, key):g}; expected a whole number")
-        m, n = self.counts
-        if min(m, n) < 1:
-            raise OutOfRange(
-                f"{self.length_mm:g} x {self.width_mm:g} mm has room for {m} rows and {n} columns; expected at least "
-                "one of each: use a shorter pitch or a larger area"
-            )
-        if m * n > MOST_CROSSINGS:
-            raise OutOfRange(f"{m} x {n} crossings; expected at most {MOST_CROSSINGS}: use a longer pitch")
 
     @property
     def counts(self) -> tuple[int, int]:
@@ -283,7 +288,8 @@ class Layout:
         p, (rows, columns) = self.params, self.regions
         if all(map(all, self.here)):
             return shapely.box(0.0, 0.0, *self.size_mm)
-        field = shapely.box(0.0, 0.0, max(t.pad[1] for t in self.columns) + p.margin_mm, p.pad_mm)
+        beside = max(p.margin_mm, p.hole_mm + 2 * WALL_MM + DOT_MM if p.hole_mm else 0.0)
+        field = shapely.box(0.0, 0.0, max(t.pad[1] for t in self.columns) + beside, p.pad_mm)
         grown = shapely.union_all([self.sensing, rows, columns]).buffer(p.margin_mm, join_style="mitre") | field
         closed = grown.buffer(p.connector_mm, join_style="mitre").buffer(-p.connector_mm, join_style="mitre")
         whole = shapely.box(0.0, 0.0, *self.size_mm)
@@ -312,42 +318,51 @@ class Layout:
         side = self.params.hole_mm
         if not side:
             return shapely.MultiPolygon()
-        tracks = shapely.union_all(self.regions).buffer(WALL_MM, join_style="mitre")
-        room = self.footprint.buffer(-WALL_MM, join_style="mitre") - tracks
         first, last = min(t.pad[0] for t in self.columns), max(t.pad[1] for t in self.columns)
-        found: list[shapely.Polygon | None] = []
-        for low, high in ((max(t.pad[1] for t in self.rows), first), (last, self.size_mm[0])):
-            right, step = high - WALL_MM - side, DOT_MM
-            places = [low + WALL_MM + k * step for k in range(max(0, int((right - low - WALL_MM) / step) + 1))]
-            squares = [
-                shapely.box(x, WALL_MM, rounded(x + side), rounded(WALL_MM + side)) for x in map(rounded, places)
-            ]
-            found.append(next((square for square in squares[:: 1 if not found else -1] if room.covers(square)), None))
-        if None in found:
+        left = self._square(side, max(t.pad[1] for t in self.rows), first)
+        right = self._square(side, last, self.size_mm[0], -1)
+        if left is None or right is None:
             raise OutOfRange(
                 f"hole_mm {side:g}: no room beside the leads; expected a smaller hole, pad_mm above "
                 f"{side + 2 * WALL_MM:.3g}, or a wider margin_mm"
             )
-        return shapely.MultiPolygon(found)
+        return shapely.MultiPolygon([left, right])
+
+    def _square(self, side: float, low: float, high: float, order: int = 1) -> "shapely.Polygon | None":
+        """First square, or last, between two places along the pads with a wall around it beside all tracks [mm]."""
+        import shapely
+
+        tracks = shapely.union_all(self.regions).buffer(WALL_MM, join_style="mitre")
+        room = self.footprint.buffer(-WALL_MM, join_style="mitre") - tracks
+        count = max(0, int((high - low - 2 * WALL_MM - side) / DOT_MM + 1))
+        places = [rounded(low + WALL_MM + k * DOT_MM) for k in range(count)][::order]
+        squares = (shapely.box(x, WALL_MM, rounded(x + side), rounded(WALL_MM + side)) for x in places)
+        return next((square for square in squares if room.covers(square)), None)
 
     @cached_property
     def letters(self) -> "shapely.Geometry":
         """Names of the tracks along their leads, of every so many that letters have room, the last one's too [mm]."""
         import shapely
 
-        p = self.params
-        every, found = ceil((LINE_DOTS + 1) * DOT_MM / p.connector_mm - _WHOLE), []
+        p, found = self.params, list[shapely.Polygon]()
+        every = ceil((LINE_DOTS + 1) * DOT_MM / p.connector_mm - _WHOLE)
         for tracks in (self.rows, self.columns):
-            chosen = [k for k in range(len(tracks)) if k % every == 0 and k + every < len(tracks)] + [len(tracks) - 1]
-            for track in (tracks[k] for k in chosen):
-                name = f"{p.tile:g}.{track.name.upper()}" if p.tile else track.name.upper()
-                left = (track.pad[0] + track.pad[1]) / 2 - LINE_DOTS * DOT_MM / 2
-                for row in range(LINE_DOTS):  # turned by a quarter, to be read from the right
-                    x = rounded(left + (LINE_DOTS - 1 - row if p.pads == "left" else row) * DOT_MM)
-                    for start, end in runs(name, row):
-                        y0, y1 = (rounded(p.pad_mm + (1 + dots) * DOT_MM) for dots in (start, end))
-                        found.append(shapely.box(x, y0, rounded(x + DOT_MM), y1))
+            chosen = {*range(0, max(len(tracks) - every, 0), every), len(tracks) - 1}
+            found += [dots for k in sorted(chosen) for dots in self._name(tracks[k])]
         return shapely.set_precision(shapely.union_all(found), 1e-6)
+
+    def _name(self, track: Track) -> "Iterator[shapely.Polygon]":
+        """Rows of dots of a track's name, turned by a quarter, to be read from the right [mm]."""
+        import shapely
+
+        p = self.params
+        name = f"{p.tile:g}.{track.name.upper()}" if p.tile else track.name.upper()
+        left = (track.pad[0] + track.pad[1]) / 2 - LINE_DOTS * DOT_MM / 2
+        for row in range(LINE_DOTS):
+            x = rounded(left + (LINE_DOTS - 1 - row if p.pads == "left" else row) * DOT_MM)
+            for start, end in runs(name, row):
+                y0, y1 = (rounded(p.pad_mm + (1 + dots) * DOT_MM) for dots in (start, end))
+                yield shapely.box(x, y0, rounded(x + DOT_MM), y1)
 
     def crossing(self, x_mm: float, y_mm: float) -> str:
         """Name of the crossing at a place of the print, as ``r12c5``; "" beside all of them."""
@@ -567,15 +582,17 @@ def scene(of: Layout, fill: Fill, strip: Any, params: Envelope) -> Scene:
     stack.plates(name, fill.dielectric, beside, z.film, z.above_film)
     stack.plates(name, fill.dielectric, high, z.above_film, z.columns)
     stack.plates(name, fill.dielectric, high - columns, z.columns, z.cover)
-    cover, kind = whole - row_pads - column_pads, of.params.labels
-    stack.plates("isolation", fill.isolation, cover, z.cover, z.face)
-    if kind != "none":
-        stack.plates("isolation", fill.isolation, of.letters if kind == "raised" else cover - of.letters, z.face, z.top)
-    length, width = of.size_mm[0], rounded(of.size_mm[1] + of.params.ledge_mm)
-    if of.params.pads == "bottom":
-        return Scene(stack.made(), (length, width, z.top))
-    bodies = (replace(body, pieces=tuple(map(transposed, body.pieces))) for body in stack.made())
-    return Scene(tuple(bodies), (width, length, z.top))
+    stack.cover(of, fill.isolation, whole - row_pads - column_pads, z)
+    return _laid(of.params, stack.made(), (of.size_mm[0], rounded(of.size_mm[1] + of.params.ledge_mm), z.top))
+
+
+def _laid(p: Params, bodies: tuple[Body, ...], size_mm: tuple[float, float, float]) -> Scene:
+    """Scene with its pads at the edge that is asked for."""
+    if p.pads == "bottom":
+        return Scene(bodies, size_mm)
+    length, width, height = size_mm
+    exchanged = (replace(body, pieces=tuple(map(transposed, body.pieces))) for body in bodies)
+    return Scene(tuple(exchanged), (width, length, height))
 
 
 @dataclass(frozen=True)
@@ -617,6 +634,14 @@ class _GrowingBodies:
     ) -> None:
         """Add a region between two heights."""
         self.add(name, material, terminal, _plates(region, z0, z1))
+
+    def cover(self, of: Layout, material: str, region: "shapely.Geometry", z: _Levels) -> None:
+        """Add the cover with its letters."""
+        self.plates("isolation", material, region, z.cover, z.face)
+        if of.params.labels == "raised":
+            self.plates("isolation", material, of.letters, z.face, z.top)
+        if of.params.labels == "engraved":
+            self.plates("isolation", material, region - of.letters, z.face, z.top)
 
     def top(self) -> str:
         """Name of the columns."""

@@ -11,7 +11,8 @@ Leads of each tile lie under the next one, as shingles; seen from above (pads #,
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
+from math import prod
 from typing import Annotated, Any, cast
 
 from sensorgen.checks.slices import TOUCH_MM
@@ -65,8 +66,8 @@ def tiles(design: Design) -> tuple[tuple[Tile, Design], ...]:
         return ()
     if design.border:
         raise BadInput(f"{design.name}: the outline is larger than the bed; only rectangles are printed as tiles")
-    splits = ((across, up) for across in (1, 2) for up in range(1, min(p.counts[0], _MOST_UP) + 1))
-    for across, up in sorted(splits, key=lambda split: split[0] * split[1]):
+    splits = product((1, 2), range(1, min(p.counts[0], _MOST_UP) + 1))
+    for across, up in sorted(splits, key=prod):
         places = tuple(_places(design, across, up))
         if all(_fits(layout(Params(**own)), design) for _, own in places):
             return tuple((tile, _made(design, tile, own)) for tile, own in places)

@@ -43,6 +43,8 @@ class Numbers:
         Whether they rest on values that no source gives.
     by_top : str
         Standard errors after known presses under each top, in words; "" where the top makes no difference.
+    pressure_resolution, wires : float or None
+        Of an array: median standard error of a crossing's pressure, at 100 kPa [kPa], and number of wires [-].
     """
 
     gap: Bounds | None = None
@@ -58,6 +60,8 @@ class Numbers:
     position_typical: float | None = None
     conditional: bool = False
     by_top: str = ""
+    pressure_resolution: float | None = None
+    wires: float | None = None
 
     @classmethod
     def of(cls, found: Prediction) -> "Numbers":

@@ -95,20 +95,23 @@ def _quantity(at: accuracy.At, quantity: str, frequency_hz: float) -> _Measured 
     value, error = vars(at.value(quantity)).values()
     if not isfinite(value) or value == 0 or (value < 0 and quantity in NEVER_NEGATIVE):
         return None
-    if at.impedances and at.z_ohm is not None:
-        z = at.z_ohm
-        ends = quantity_of(quantity, [z, z + _R * z.real, z + 1j * _X * z.imag], frequency_hz)
-        by_r, by_x = (ends[1:] - ends[0]).tolist()
-        unknown = accuracy.uncertainty(_UNKNOWN, quantity, value, z)
-    else:
-        of_r = quantity in _OF_R
-        by_r, by_x = abs(value) * _R * of_r, abs(value) * _X * (not of_r)
-        unknown = abs(value) * _UNKNOWN
+    by_r, by_x, unknown = _changes(at, quantity, value, frequency_hz)
     if at.meter is None and not at.stated.get(quantity):  # repeats alone do not say what is common to them
         error = hypot(np.nan_to_num(error), unknown)
     error = max(error if isfinite(error) else unknown, _FINEST * abs(value))
     whole = np.isfinite([error, by_r, by_x]).all()
     return _Measured(quantity, frequency_hz, value, error, by_r, by_x) if whole else None
+
+
+def _changes(at: accuracy.At, quantity: str, value: float, frequency_hz: float) -> tuple[float, float, float]:
+    """Changes from session to session, by resistance and by reactance, and the uncertainty of an unknown meter."""
+    z = at.z_ohm
+    if not at.impedances or z is None:
+        of_r = quantity in _OF_R
+        return abs(value) * _R * of_r, abs(value) * _X * (not of_r), abs(value) * _UNKNOWN
+    ends = quantity_of(quantity, [z, z + _R * z.real, z + 1j * _X * z.imag], frequency_hz)
+    by_r, by_x = (ends[1:] - ends[0]).tolist()
+    return by_r, by_x, accuracy.uncertainty(_UNKNOWN, quantity, value, z)
 
 
 def _meter(measured: Sequence[_Measured], ln_resistance: tuple[float, float] | None) -> Meter | None:

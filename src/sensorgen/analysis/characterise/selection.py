@@ -10,7 +10,7 @@ Fisher information of a coupon, A the derivatives of the targets, w half of a ta
 last term keeps any value from resting on a single coupon.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations, combinations_with_replacement, product
 
@@ -162,16 +162,21 @@ def _one_step(found: Candidates, chosen: tuple[int, ...], count: int) -> set[tup
 def _two_steps(found: Candidates, chosen: tuple[int, ...], count: int) -> set[tuple[int, ...]]:
     """One coupon for two, and two for two others; these of the same kinds alone where there are too many pairs."""
     every = range(len(found.coupons))
-    steps: set[tuple[int, ...]] = set()
-    for left in _without_one(chosen) if len(chosen) < count else ():
-        steps |= {tuple(sorted((*left, *pair))) for pair in combinations_with_replacement(every, 2)}
     few = len(chosen) ** 2 * len(every) ** 2 <= _MOST_PAIRS
     kinds = [few or (coupon.kind, coupon.material) for coupon in found.coupons]
     alike = {k: [j for j, kind in enumerate(kinds) if kind == kinds[k]] for k in chosen}
+    steps: set[tuple[int, ...]] = set()
     for m, n in combinations(range(len(chosen)), 2):
         left = chosen[:m] + chosen[m + 1 : n] + chosen[n + 1 :]
-        steps |= {tuple(sorted((*left, *pair))) for pair in product(alike[chosen[m]], alike[chosen[n]])}
+        steps |= _with_pairs(left, product(alike[chosen[m]], alike[chosen[n]]))
+    if len(chosen) < count:
+        for left in _without_one(chosen):
+            steps |= _with_pairs(left, combinations_with_replacement(every, 2))
     return steps
+
+
+def _with_pairs(left: tuple[int, ...], pairs: Iterable[tuple[int, int]]) -> set[tuple[int, ...]]:
+    return {tuple(sorted((*left, *pair))) for pair in pairs}
 
 
 def _without_one(chosen: tuple[int, ...]) -> set[tuple[int, ...]]:
