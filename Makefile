@@ -18,8 +18,9 @@ demo: $(READY) ## set up (with the solver NGSolve), and build two triangular sen
 test: $(READY_DEV) ## set up, with slicers, ngspice and Chromium where apt may, and run all tests
 	scripts/system-packages --programs
 	scripts/debian13-slicers
-	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
-	$(BIN)/python -m pytest -m "kernel and not nightly" tests/geometry $(ARGS)
+	$(BIN)/python -m pytest -m "kernel and not nightly" tests/geometry $(ARGS) >$(VENV)/kernel.txt 2>&1 & kernel=$$!; \
+		$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS); code=$$?; \
+		wait $$kernel || code=1; cat $(VENV)/kernel.txt; exit $$code
 
 nightly: $(READY_DEV) ## the tests that guard more of the same, kills and attacks among them, then the coverage of intervals; hours
 	scripts/system-packages --programs
@@ -81,9 +82,10 @@ sbom: $(READY) ## write out/sbom.json, what is installed beside sensorgen and it
 	mkdir -p out
 	out/tools/bin/cyclonedx-py environment --output-reproducible --of JSON -o out/sbom.json $(BIN)/python
 
-audit: ## look for advisories on every version in constraints.txt (pip-audit, answers cached in out/audit); what it cannot look up fails
+audit: $(READY) ## look for advisories on every version in constraints.txt (pip-audit); offline with ADVISORIES=PLACE, see scripts/audit.py
 	scripts/clean-environment --tools "$(PYTHON)"
-	out/tools/bin/pip-audit --strict --disable-pip --no-deps -r constraints.txt --cache-dir out/audit --progress-spinner off
+	$(if $(ADVISORIES),$(BIN)/python scripts/audit.py $(ADVISORIES),out/tools/bin/pip-audit --strict --disable-pip --no-deps \
+		-r constraints.txt --cache-dir out/audit --progress-spinner off)
 
 clean: ## remove everything that is derived
 	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

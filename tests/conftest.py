@@ -1,5 +1,6 @@
 """What the tests have to say besides passing, a cache of its own for each, and the programs that some of them run."""
 
+import gc
 import os
 import shutil
 import signal
@@ -69,6 +70,15 @@ def unpressed(monkeypatch, _cache):
         mesher.check()
 
 
+@pytest.fixture
+def unpredicted(_cache):
+    """No design is predicted: for tests of files that hold no number of a prediction, or none that they look at."""
+    import no_numbers
+
+    with no_numbers.unpredicted():
+        yield
+
+
 @pytest.fixture(autouse=True, scope="module")
 def one_kernel():
     """build123d and NGSolve bring two versions of one CAD kernel, which crash together: tests load one or the other."""
@@ -89,6 +99,27 @@ def program():
         return found
 
     return path
+
+
+@pytest.fixture(scope="session")
+def _started(tmp_path_factory):
+    """Browsers that run: one for all tests, and another where it has gone."""
+    pages = []
+    yield pages
+    for page in pages:
+        page.close()
+
+
+@pytest.fixture
+def browser(program, _started, tmp_path_factory):
+    """A page of Chromium that nobody has used."""
+    from browser import Page
+
+    chromium = program("chromium", "chromium", "chromium-browser", "google-chrome")
+    if not _started or _started[-1].process.poll() is not None:
+        _started.append(Page(chromium, tmp_path_factory.mktemp("chromium")))
+    _started[-1].renew()
+    return _started[-1]
 
 
 @pytest.fixture
@@ -123,13 +154,14 @@ def pytest_terminal_summary(terminalreporter):
 
 
 FIRST = (  # ten seconds and more of work or waiting: a worker that began one of them last would be left alone with it
-    "test_one_answer", "test_docs", "thesis/test_faults", "lab/test_faults", "report/test_browser", "lab/test_kills",
-    "lab/test_live", "lab/test_run", "lab/test_truths", "lab/test_handyscope", "asprinted/test_real",
-    "asprinted/test_compensation", "slicers/test_batch_real", "cli/test_writing", "cli/test_import_command",
-    "cli/test_calibrate_command", "cli/test_characterise_command", "cli/test_optimise_command",
-    "cli/test_invert_command", "cli/test_compress_command", "models/test_press2d", "models/test_press3d",
-    "models/test_press_round", "attacks/test_inputs_fuzz", "test_build", "test_chart", "test_design_chart",
-    "test_calibration", "lab/test_day", "test_fit", "test_new_user", "test_invert", "test_drawing",
+    "test_one_answer", "test_docs", "thesis/test_faults", "asprinted/test_pressed", "lab/test_faults",
+    "report/test_browser", "lab/test_kills", "lab/test_live", "lab/test_run", "lab/test_truths",
+    "lab/test_handyscope", "asprinted/test_real", "asprinted/test_compensation", "slicers/test_batch_real",
+    "cli/test_writing", "cli/test_import_command", "cli/test_calibrate_command", "cli/test_characterise_command",
+    "cli/test_optimise_command", "cli/test_invert_command", "cli/test_compress_command", "models/test_press2d",
+    "models/test_press3d", "models/test_press_round", "attacks/test_inputs_fuzz", "test_build", "test_chart",
+    "test_design_chart", "test_calibration", "lab/test_day", "test_fit", "test_new_user", "test_invert",
+    "test_drawing",
 )  # fmt: skip
 
 
@@ -137,3 +169,8 @@ def pytest_collection_modifyitems(items):
     """Files that take long first; `make test` keeps that order with ``--no-loadscope-reorder``."""
     order = {f"tests/{name}.py": k for k, name in enumerate(FIRST)}
     items.sort(key=lambda item: order.get(item.nodeid.partition("::")[0], len(order)))
+
+
+def pytest_collection_finish():
+    """Ten thousand tests stay: the garbage collector need not look at them again and again."""
+    gc.freeze()

@@ -1,5 +1,12 @@
-"""A prediction that says nothing, for tests that look at what is printed alone."""
+"""Predictions that say nothing, or little, for tests that look at other things."""
 
+import os
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from sensorgen.prediction import quantities
 from sensorgen.prediction.results import SCHEMA, Prediction
 
 
@@ -8,3 +15,27 @@ def nothing(body, query):
     load = query.load(body.design)
     head = (SCHEMA, body.design.name, body.design.id(), body.provenance, "not predicted", load.force_n, load.position_m)
     return Prediction(*head, reason="by this test")
+
+
+@contextmanager
+def unpredicted():
+    """No design is predicted; what is kept meanwhile has a folder of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(quantities, "prediction", nothing)
+        patch.setenv("SENSORGEN_CACHE", str(Path(os.environ["SENSORGEN_CACHE"]) / "unpredicted"))
+        yield
+
+
+@contextmanager
+def roughly_at_rest():
+    """Resistance as ever, capacitance to a tenth, nothing under a load; for readings of a multimeter."""
+    from sensorgen.prediction import capacitance, planning, rest_state
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("PLANE", "SPATIAL", "OPEN"):
+            patch.setattr(capacitance, name, 0.1)
+        patch.setattr(rest_state, "PLANE", 0.1)
+        patch.setattr(planning, "ACCURACY", 0.1)
+        patch.setattr(quantities, "_at_load", lambda found, *_: found)
+        patch.setenv("SENSORGEN_CACHE", str(Path(os.environ["SENSORGEN_CACHE"]) / "rough"))
+        yield

@@ -191,7 +191,7 @@ def numbers(one, **changed):
     values = {"force_resolution": 0.4, "position_resolution": 0.02, "sensitivity": 1e-3} | changed
     units = {"force_resolution": "N", "position_resolution": "m", "sensitivity": "1/kPa"}
     bounds = {key: Bounds.of(value, units[key]) for key, value in values.items()}
-    rest = {"force_calibrated": values["force_resolution"], "position_calibrated": values["position_resolution"]}
+    rest = {"force_calibrated": bounds["force_resolution"], "position_calibrated": bounds["position_resolution"]}
     return replace(one, force_n=6.0, position_m=0.05, printed=replace(one.printed, **bounds, **rest))
 
 

@@ -199,7 +199,8 @@ def test_a_border_counts_the_cells_of_an_array_with_rims(tmp_path):
     [
         ({"parameters": {"length_mm": 100.0}}, "parameters.length_mm is 100.0, but the border is 56 mm"),
         ({"border": "nothing.svg"}, "cannot read '.*nothing.svg': No such file"),
-        ({"border": "POLYGON ((0 0, 9 9, 9 0, 0 9, 0 0))"}, "expected an SVG or DXF file, or one POLYGON"),
+        ({"border": "POLYGON ((0 0, 9 9, 9 0, 0 9, 0 0))"}, r"crosses itself: Self-intersection\[4.5 4.5\] mm"),
+        ({"border": "LINESTRING (0 0, 9 9)"}, "No such file"),
         ({"border": "POLYGON ((5 5, 9 5, 9 9, 5 5))"}, "it begins at 5, 5 mm"),
         ({"border": "POLYGON ((0 0"}, "border: "),
     ],

@@ -13,7 +13,8 @@ from sensorgen.prediction.calibration.fitting import by_rest, calibrated, gain, 
 from sensorgen.prediction.calibration.inversion import Inverter, Verdict
 from sensorgen.prediction.calibration.rest import Rest, checked
 from sensorgen.prediction.calibration.specimen import Spread, unknown
-from sensorgen.prediction.inverse import Estimator, Prior
+from sensorgen.prediction.inverse.estimator import Estimator
+from sensorgen.prediction.inverse.prior import Prior
 from virtual_specimen import TONES_HZ, drawn, session
 from virtual_specimen.adapter import ERRORS, LIMIT_N, data, specimen_model, split
 
@@ -166,7 +167,7 @@ def test_specimens_of_one_bench_share_what_is_its_own(model):
 def test_another_tip_alarms_and_few_presses_mend_it(model):
     """Over specimens: 5 presses with an 8 mm tip, after a calibration with one of 5 mm."""
     shares = []
-    for seed in range(5):
+    for seed in range(3):
         truth, other = drawn(seed), replace(drawn(seed), tip_m=8e-3)
         old = calibrated(model, data(session(truth, 30, seed), truth))
         known, unseen = (data(part, other) for part in split(other, 5, 200, seed))

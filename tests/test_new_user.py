@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 HERE = Path(__file__).parent
 DESIGN = """\
 shape: zig
-parameters: {length_mm: 40, width_mm: 10, electrode_mm: 0.3, period_mm: 4, height_mm: 0.4, film_mm: 0.2}
+parameters: {length_mm: 16, width_mm: 8, electrode_mm: 0.3, period_mm: 4, height_mm: 0.4, film_mm: 0.2}
 materials: {electrode: eel, film: x60, dielectric: x60}
 printer: mine
 tools: {eel: 0}

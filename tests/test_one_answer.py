@@ -59,7 +59,7 @@ DESIGNS = {
         "bvoh",
     ],
 }
-SLOW = ("own", "compensated")  # pressed for 20 s each; `values`, `partial` and `baked` go the same ways
+SLOW = ("own", "compensated", "triy")  # the first two are pressed for 20 s each; others go the same ways
 FAST = tuple(name for name in DESIGNS if name not in SLOW)
 SLICED_ONE_BY_ONE = ("trix", "baked", "upside-down")  # a clash, none, and support
 

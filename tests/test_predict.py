@@ -446,13 +446,13 @@ def test_csv_loses_no_row_between_blocks(plate, count):
 def test_csv_of_many_rows_needs_no_more_memory(plate):
     """A block of rows is what is held, however many there are."""
     peaks = []
-    for forces in (20, 80):
+    for forces in (10, 40):
         blocks = csv_blocks(plate[1].sensor, [1e3], np.linspace(0, 6, forces), np.linspace(0, 100, 1000))
         tracemalloc.start()
         rows = sum(text.count("\n") for text in blocks)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
-    assert rows == 80_001
+    assert rows == 40_001
     assert peaks[1] < 1.1 * peaks[0] < 10e6
 
 

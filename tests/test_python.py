@@ -32,7 +32,7 @@ def test_a_result_is_shown_in_a_few_lines(results, name):
     lines = repr(results[name]).splitlines()
     assert 1 < len(lines) <= LINES
     assert lines[:3] == results[name].text().splitlines()[:3]
-    assert "<table>" in results[name]._repr_html_()
+    assert "<table " in results[name]._repr_html_()
 
 
 @pytest.mark.parametrize("name", ["check", "predict", "loaded", "compress", "sweep", "list"])

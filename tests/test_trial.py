@@ -8,16 +8,19 @@ from pydantic import TypeAdapter
 
 from sensorgen.checks.review import review
 from sensorgen.core import cache
+from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.document import text, to_json
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.identifiability.results import StandardErrors
 from sensorgen.prediction.query import DEFAULT, Query, Tip
+from sensorgen.prediction.results import Prediction, UnderTop
 from sensorgen.prediction.slices import reviewed
 from sensorgen.workflows.build import build
 from sensorgen.workflows.decision import decision
-from sensorgen.workflows.trial import Trial, trial
+from sensorgen.workflows.trial import Numbers, Trial, trial
 
 
 @pytest.fixture(autouse=True)
@@ -38,9 +41,25 @@ def test_verdict_and_numbers_are_those_of_the_build(data, tmp_path):
     assert tried.printed.capacitance == built.prediction.capacitance
     of_tip = built.prediction.drawn.force_resolution  # the trial has that of the worst top
     assert of_tip.value <= tried.drawn.force_resolution.value < 1.02 * of_tip.value
-    assert tried.printed.force_calibrated == built.prediction.identifiability.calibrated.sigma_force_n
+    assert (tried.printed.force_calibrated.value, tried.printed.bench()) == (
+        built.prediction.identifiability.calibrated.sigma_force_n,
+        built.prediction.bench(),
+    )
     assert TypeAdapter(Trial).validate_json(to_json(tried)) == tried == pickle.loads(pickle.dumps(tried))
     assert next(iter(text(tried.document()))).startswith(tried.verdict)
+
+
+def test_on_a_bench_the_worst_top_gives_the_value_and_all_tops_the_range():
+    """A top of smaller value may have the wider range: check said <110 to 1500 mN, predict <59 to 1500."""
+    calibrated = StandardErrors(sigma_force_n=0.5, sigma_position_m=0.02)
+    tops = (
+        UnderTop("block", Bounds.of(0.4, "N", model=Interval(0.1, 0.9)), calibrated=calibrated),
+        UnderTop("stiff plate", Bounds.of(0.5, "N", model=Interval(0.3, 0.6)), calibrated=calibrated),
+    )
+    predicted = Prediction(1, "two tops", "id", "drawn", "predicted", 1.0, 0.05, tops=tops)
+    force, place = Numbers.of(predicted).bench()
+    assert (force, place) == predicted.bench()
+    assert (force.value, force.lower, force.upper) == pytest.approx((0.5, 0.125, 1.125))
 
 
 def test_without_electrical_numbers_no_design_is_plainly_printed(tmp_path):

@@ -49,11 +49,17 @@ def test_bodies_fill_the_print_and_do_not_overlap(cell):
 
 
 def test_the_cells_are_those_of_the_shape():
-    """A column of tri has as much of the cells' bodies as the shape alone on the column's size."""
+    """A column of tri has as much of the cells' bodies as the shape alone on the column's size.
+
+    All dielectric is one body: slicers print touching parts of one tool as one. Beside the columns it is plates.
+    """
     whole, alone = array(TRI).drawn, array(TRI).crossing
     strip = make({"shape": "tri", "parameters": alone.parameters | {"width_mm": 28}}).drawn
-    for name in ("film_and_lower", "hanging_dielectric"):
-        assert whole.body(name).volume_mm3() == pytest.approx(4 * strip.body(name).volume_mm3())
+    columns = [piece for piece in whole.body("film_and_lower").pieces if piece.axis == "y"]
+    own = [strip.body(name).volume_mm3() for name in ("film_and_lower", "hanging_dielectric")]
+    assert sum(piece.volume_mm3() for piece in columns) == pytest.approx(4 * sum(own))
+    materials = [body.material for body in whole.bodies if not body.terminal]
+    assert materials == ["x60"] * 3  # base, dielectric, isolation
 
 
 @pytest.mark.parametrize(
@@ -83,6 +89,19 @@ def test_an_outline_cuts_on_the_lines_of_crossings():
     assert not slivers
     assert layout.crossing(layout.x_mm[3], layout.y_mm[0]) == ""
     assert layout.crossing(layout.x_mm[2] + 4.9, layout.y_mm[1]) == "r2c3"
+
+
+def test_air_between_columns_is_closed_at_their_ends():
+    """No roof spans more than the space between two columns: grooves do not cross."""
+    design = array(TRI, between="air")
+    grooves = shapely.difference(
+        design.layout.open_air,
+        shapely.union_all([shapely.box(*np.array(t.body)[[0, 2, 1, 3]]) for t in design.layout.columns]),
+    )
+    widths = [min(np.ptp(np.array(part.exterior.coords), axis=0)) for part in shapely.get_parts(grooves)]
+    assert sorted(widths) == pytest.approx([1, 1, 2, 2, 2])
+    findings = [f for f in review(design).findings if f.rule == "9-bridge" and f.body == "isolation"]
+    assert [f.value_mm for f in findings] == pytest.approx([2.0])  # 28 mm where they crossed
 
 
 def test_leads_that_cross_tracks_outside_the_outline_count():

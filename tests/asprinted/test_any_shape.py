@@ -168,7 +168,9 @@ def test_ends_of_a_line_by_closed_form(turn, convention, width):
     assert region.area == pytest.approx(length * 0.4 + rim * (length + (pi / 2 - 1) * wide) + rim * rim, rel=0.01)
 
 
-@pytest.mark.parametrize(("pattern", "slicer"), [("posts", "cura"), ("slanted", "prusa")])
+@pytest.mark.parametrize(("pattern", "slicer"), [
+    ("slanted", "prusa"), pytest.param("posts", "cura", marks=pytest.mark.nightly)
+])  # fmt: skip
 def test_a_shape_of_ones_own_is_sliced_and_read(pattern, slicer, tmp_path):
     """The capacitance by the lines of a real slicer is that of the drawing but for a rounding, and has both bounds."""
     if shutil.which({"prusa": "prusa-slicer", "cura": "CuraEngine"}[slicer]) is None:

@@ -157,7 +157,7 @@ def test_what_cannot_be_had_is_refused_with_the_nearest(monkeypatch):
 
 
 def test_a_real_slicer_prints_gap_and_capacitance(printed, real):
-    asked = small(parameters={"dielectric_mm": 0.2})
+    asked = small(parameters=SHORT | {"dielectric_mm": 0.2})
     slices = []
 
     def by_slicer(design):

@@ -74,7 +74,9 @@ def answered(body, *kpa, tip=None):
 
 
 @needs_mesher
-@pytest.mark.parametrize(("walls", "fall_um"), [("arachne", 0.0), ("classic", 100.0)])
+@pytest.mark.parametrize(
+    ("walls", "fall_um"), [pytest.param("arachne", 0.0, marks=pytest.mark.nightly), ("classic", 100.0)]
+)
 def test_a_printed_cell_gives_way_like_one_built_by_hand(walls, fall_um):
     """Classic walls lose the foot's lowest layer too: it hangs free, and falls by what was lost."""
     design = small()
@@ -91,6 +93,7 @@ def test_a_printed_cell_gives_way_like_one_built_by_hand(walls, fall_um):
     assert found.body == f"printed, estimated ({WALLS[walls]})"
 
 
+@pytest.mark.nightly  # the drawing: tests/models/test_press2d.py; the print: the cell built by hand
 @needs_mesher
 def test_a_foot_of_a_lines_width_is_stiffer_than_a_sharp_one():
     """At 10 kPa as drawn 6.13 um, by other programs; on feet of 0.34 mm less than a third of it."""
@@ -198,6 +201,7 @@ def test_a_print_that_no_model_can_speak_of_is_refused():
         build_sensor(estimated(design))
 
 
+@pytest.mark.nightly  # a print's estimate: the cell built by hand; what PrusaSlicer prints: test_real.py
 @needs_mesher
 def test_what_prusaslicer_prints_is_pressed(real):
     """Against the estimate by the same walls, whose widths differ by 2 %."""

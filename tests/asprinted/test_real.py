@@ -238,7 +238,7 @@ def electrode_lines(design, lines, end):
     return Lines(start, stop, found.width_mm * 1e-3, found.height_mm * 1e-3, found.layer, meets)
 
 
-@pytest.mark.parametrize("degrees", ["0", "90"])
+@pytest.mark.parametrize("degrees", [pytest.param("0", marks=pytest.mark.nightly), "90"])
 def test_resistance_of_the_sliced_electrode(real, degrees):
     """PrusaSlicer's 100 x 10 x 0.3 mm electrode against another network of its lines."""
     variant, lines, _ = real(f"angle-{degrees}", PLATE)

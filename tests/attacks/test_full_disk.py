@@ -37,9 +37,10 @@ def full():
 
 
 def sensorgen(*words, **how):
-    # a pipe: the limit of files does not concern it
+    # a pipe: the limit of files does not concern it; it would truncate bytecode
+    env = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
     return subprocess.run(
-        [sys.executable, "-m", "sensorgen", *words], capture_output=True, encoding="utf-8", check=False, **how
+        [sys.executable, "-m", "sensorgen", *words], capture_output=True, encoding="utf-8", check=False, env=env, **how
     )
 
 

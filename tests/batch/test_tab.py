@@ -6,6 +6,7 @@ import pytest
 from sensorgen.core.errors import BadInput
 from sensorgen.design import design
 from sensorgen.design.specimen_name import Specimen, parse
+from sensorgen.scene import lettering
 from sensorgen.scene.geometry import meshes
 from sensorgen.workflows.batch import arranged, tab
 
@@ -108,14 +109,14 @@ def test_every_name_of_the_grammar_can_be_written():
 
 
 def test_letters_that_look_alike_never_change_a_name():
-    glyphs = tab._FONT
+    glyphs = lettering.FONT
     alike = {(a, b) for a in glyphs for b in glyphs if a < b and glyphs[a] == glyphs[b]}
     assert alike <= {("0", "O"), ("5", "S")}  # digits stand in numbers alone, O and S in words
 
 
-@pytest.mark.parametrize("letter", tab._FONT)
+@pytest.mark.parametrize("letter", lettering.FONT)
 def test_no_dot_of_a_letter_hangs_on_its_corners_alone(letter):
-    dots = np.pad(np.array([[dot == "#" for dot in row] for row in tab._FONT[letter].split()]), 1)
+    dots = np.pad(np.array([[dot == "#" for dot in row] for row in lettering.FONT[letter].split()]), 1)
     beside = np.roll(dots, 1, 0) | np.roll(dots, -1, 0) | np.roll(dots, 1, 1) | np.roll(dots, -1, 1)
     assert dots.any()
     assert (beside | ~dots).all()

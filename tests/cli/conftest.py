@@ -1,5 +1,6 @@
 """The command line, called in this process for speed or in one of its own."""
 
+import json
 import os
 import subprocess
 import sys
@@ -10,6 +11,18 @@ import pytest
 
 from sensorgen.cli import main
 
+EACH = """
+import contextlib, io, json, sys
+sys.argv[0] = "sensorgen"
+from sensorgen.cli import main
+for words in json.loads(sys.argv.pop()):
+    sys.argv[1:] = words
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            main()
+    except SystemExit as left:
+        print(json.dumps([left.code, list(sys.modules)]))
+"""
 TEMPLATE = "import sys; sys.argv[0] = 'sensorgen'; from sensorgen.cli import main; {before}; main()"
 
 
@@ -77,6 +90,21 @@ def real(start):
         process = start(*words, **more)
         out, err = process.communicate(timeout=60)
         return Said(process.returncode, out, err)
+
+    return call
+
+
+@pytest.fixture
+def loaded(tmp_path):
+    """Run commands one after another in one fresh interpreter; exit code of each, and all modules loaded by then."""
+
+    def call(*commands):
+        done = subprocess.run(
+            [sys.executable, "-c", EACH, json.dumps(commands)], cwd=tmp_path, stdout=subprocess.PIPE, check=True
+        )
+        found = [json.loads(line) for line in done.stdout.splitlines()]
+        assert len(found) == len(commands)
+        return found
 
     return call
 

@@ -92,3 +92,17 @@ def test_wrong_words_are_one_line(run, file, tmp_path, words, answer):
     said = run(*words)
     assert said.code == 2
     assert answer in said.line
+
+
+def test_build_writes_each_tile(run, tmp_path, monkeypatch):
+    monkeypatch.setenv("SENSORGEN_SLICER", "none")
+    parameters = {"length_mm": 100, "width_mm": 300, "pitch_x_mm": 50, "pitch_y_mm": 50, "column_mm": 40, "row_mm": 40}
+    (tmp_path / "strip.yaml").write_text(json.dumps({"shape": "array", "parameters": parameters}))
+    said = run("build", "strip.yaml", "--no-cad", "--force")
+    assert said.code == 0, said.err
+    assert "2 tiles, as it does not fit the bed" in said.out
+    rows = list(csv.DictReader((tmp_path / "out" / "strip-tiles.csv").read_text().splitlines()))
+    assert [row["design"] for row in rows] == ["strip-1", "strip-2"]
+    for row in rows:
+        files = {path.name for path in (tmp_path / "out" / row["design"]).iterdir()}
+        assert {"wires.csv", f"{row['design']}.prusa.3mf", f"{row['design']}.html"} <= files

@@ -104,19 +104,19 @@ def test_posterior_against_importance_sampling(study, coupons, truth):
             total = total + np.logaddexp(np.log(0.95) + alive, np.log(0.05) + dead)
         return total
 
-    count, freedom = 4000, 8.0
+    count, freedom = 2000, 8.0
     best = found.modes[0]
     root = np.linalg.cholesky(best.covariance * 1.3)
     normal = rng.normal(size=(count, len(centre)))
     scale = np.sqrt(freedom / rng.chisquare(freedom, count))
-    theta = best.mean + (normal * scale[:, None]) @ root.T
+    theta = best.at + (normal * scale[:, None]) @ root.T
     distance = (normal**2).sum(axis=1) * scale**2
     log_proposal = -(freedom + len(centre)) / 2 * np.log1p(distance / freedom)
     with np.errstate(all="ignore"):
         log_weight = log_density(theta) - log_proposal
     weight = np.exp(np.where(np.isfinite(log_weight), log_weight - np.nanmax(log_weight), -np.inf))
     weight /= weight.sum()
-    assert 1 / (weight**2).sum() > 400  # effective samples
+    assert 1 / (weight**2).sum() > 200  # effective samples
     assert found.dead()["bar-90-1.6"] > 0.99
     values = {u.key: theta[:, k] if u.linear else np.exp(theta[:, k]) for k, u in enumerate(study.unknowns)}
     for target in study.targets:
@@ -131,7 +131,7 @@ def test_posterior_against_importance_sampling(study, coupons, truth):
 def test_hidden_truth_of_a_few_labs(study, coupons):
     """A sample of bench/characterise.py, whose 400 labs cover more than 90 %."""
     rng, inside, found_dead = np.random.default_rng(23), [], 0
-    for _ in range(8):
+    for _ in range(5):
         truth = virtual_lab.hidden(rng, NAMES)
         found = posteriors.posterior([virtual_lab.measured(c, truth, METERS, rng) for c in coupons], study.unknowns)
         found_dead += truth.dead in found.dead()
@@ -141,7 +141,7 @@ def test_hidden_truth_of_a_few_labs(study, coupons):
             interval = found.interval(t)
             inside.append(interval.low <= value <= interval.high)
     assert np.mean(inside) >= 0.85
-    assert found_dead >= 6
+    assert found_dead >= 4
 
 
 def test_wrong_model_is_seen_in_the_coverage(study, coupons, truth):

@@ -53,8 +53,8 @@ def found(**changes):
 def test_the_front_is_that_of_a_plain_loop():
     """Every plate evaluated by itself, each pair of them compared."""
     values = {}
-    for film in (0.1, 0.2, 0.3, 0.4):
-        for electrode in (0.2, 0.3, 0.4):
+    for film in (0.1, 0.2, 0.3):
+        for electrode in (0.2, 0.3):
             plate = make({"shape": "reference", "parameters": {"dielectric_mm": film, "electrode_mm": electrode}})
             p = evaluate(bodies.estimated(plate), keep=False, beside=False)
             values[film, electrode] = p.capacitance.value, p.resistance["bottom"].value
@@ -62,11 +62,11 @@ def test_the_front_is_that_of_a_plain_loop():
         k for k, (c, r) in values.items()
         if not any(c2 >= c and r2 >= r and (c2 > c * (1 + 1e-9) or r2 > r * (1 + 1e-9)) for c2, r2 in values.values())
     }  # fmt: skip
-    search_ = found()
+    search_ = found(parameters={"dielectric_mm": {"from": 0.1, "to": 0.3}, "electrode_mm": {"from": 0.2, "to": 0.3}})
     leads = {tuple(row.candidate.values.values()) for row in result.leads(search_)}
     assert leads == best == {(0.1, 0.2)}
-    assert len(search_.rows) == 12
-    assert len(search_.evaluated) + sum(bool(row.discarded) for row in search_.rows) == 12
+    assert len(search_.rows) == 6
+    assert len(search_.evaluated) + sum(bool(row.discarded) for row in search_.rows) == 6
 
 
 def test_a_planted_optimum_is_found():
@@ -136,7 +136,7 @@ def test_of_the_nearest_design_the_numbers_are_told():
 
 
 def test_a_search_that_is_stopped_goes_on_where_it_was(monkeypatch):
-    wanted, tried = target(), []
+    wanted, tried = target(parameters={"dielectric_mm": {"from": 0.1, "to": 0.4}}), []
     trial = ladder.trial
 
     def counted(design, *given, **more):
@@ -160,7 +160,8 @@ def test_discards_on_a_coarse_mesh_hold_or_are_taken_back(monkeypatch):
         return {"force_resolution_n": ladder.Known(film if film != 0.4 else 9.0, film if film != 0.4 else 9.0, False)}
 
     monkeypatch.setattr(ladder, "known", lying)
-    search_ = found(objectives={"force_resolution_n": "minimise"})
+    films = {"dielectric_mm": {"from": 0.1, "to": 0.4}}
+    search_ = found(parameters=films, objectives={"force_resolution_n": "minimise"})
     assert search_.largest > 1.5
     assert search_.margin > search_.largest
     assert not any(row.discarded == "dominated" for row in search_.rows if row.candidate.values["dielectric_mm"] == 0.4)
@@ -310,7 +311,7 @@ def test_a_huge_space_is_refused_with_its_size():
         candidates(target(parameters=parameters))
 
 
-@pytest.mark.parametrize("counts", [(12, 8), pytest.param((72, 48), marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("counts", [(6, 4), pytest.param((72, 48), marks=pytest.mark.nightly)])
 def test_a_sample_of_a_huge_space_proves_nothing(counts):
     """Millions of plates; of those that were tried the one with the best C is the best, by the plate capacitor."""
     pytest.importorskip("optuna")

@@ -332,13 +332,12 @@ def test_json_is_plain(run):
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("words", [[], ["--force", "0:6:1"], ["--csv", "--force", "1"], ["--json", "--position", "5"]])
-def test_no_plot_library_is_loaded_without_a_plot(real, words):
-    said = real("predict", "tri", "--drawn", *words, before=LOADED)
-    assert said.code == 0
-    modules = set(said.out.rpartition("loaded: ")[2].split())
-    assert "numpy" in modules
-    assert not {"matplotlib", "plotly", "scipy", "sensorgen.analysis.plots", "build123d", "trimesh"} & modules
+def test_no_plot_library_is_loaded_without_a_plot(loaded):
+    ways = ([], ["--force", "0:6:1"], ["--csv", "--force", "1"], ["--json", "--position", "5"])
+    for (code, modules), way in zip(loaded(*(["predict", "tri", "--drawn", *way] for way in ways)), ways, strict=True):
+        assert code == 0, way
+        assert "numpy" in modules
+        assert not {"matplotlib", "plotly", "scipy", "sensorgen.analysis.plots", "build123d", "trimesh"} & set(modules)
 
 
 def test_help_does_not_load_numpy(real):
@@ -347,11 +346,11 @@ def test_help_does_not_load_numpy(real):
 
 
 def test_options_are_what_the_planner_knows():
-    from sensorgen.cli.predict_command import OWN
+    from sensorgen.cli.predict_command import command
     from sensorgen.models.pressure import PROFILES
     from sensorgen.prediction.query import LAWS
 
-    options = {option.name: option for option in OWN}
+    options = {option.name: option for option in command.own}
     assert tuple(options["compression"].type.choices) == LAWS
     assert tuple(options["profile"].type.choices) == PROFILES
 

@@ -86,10 +86,10 @@ def test_times_are_exact_and_each_window_sees_the_specimen_of_its_time():
 
 
 def test_the_clock_of_the_device_may_be_fast():
-    clock, _, meter = rig(analyser=Analyser(skew_ppm=2000))
+    clock, _, meter = rig(analyser=Analyser(skew_ppm=5000))
     meter.start(TONES, 1.0)
-    times, *_, lost = follow(clock, meter, 50, 0.05)
-    assert times[-1] == pytest.approx(50 * 1.002, abs=0.08)
+    times, *_, lost = follow(clock, meter, 25, 0.05)
+    assert times[-1] == pytest.approx(25 * 1.005, abs=0.08)
     assert lost == 0
 
 
@@ -97,9 +97,9 @@ def test_relative_noise_follows_from_the_weights():
     """White current noise and a capacitor: 1 / (weight x frequency)."""
     clock, _, meter = rig(Capacitor(ohm=0))
     meter.start(TONES, 1.0)
-    _, impedance, *_ = follow(clock, meter, 40)
+    _, impedance, *_ = follow(clock, meter, 20)
     noise = impedance.std(axis=0) / abs(impedance.mean(axis=0))
-    assert len(impedance) > 3900
+    assert len(impedance) > 1900
     assert noise / noise[-1] == pytest.approx([9.1, 6.2, 4.2, 3.3, 2.5, 1.3, 1], rel=0.06)
 
 
@@ -114,13 +114,13 @@ def test_phasors_have_the_statistics_of_samples():
         meter = meter_of(clock, Analyser(gain=gain))
         assert meter.identify().serial == str(SERIAL)
         meter.start(TONES, 1.0)
-        _, impedance, clipped, _ = follow(clock, meter, 40)
+        _, impedance, clipped, _ = follow(clock, meter, 20)
         assert not clipped.any()
         results.append((impedance.mean(axis=0), impedance.real.std(axis=0), impedance.imag.std(axis=0), len(impedance)))
     samples, phasors = results
     error = samples[1] * np.sqrt(2 / samples[3])
     assert np.all(abs(samples[0] - phasors[0]) < 5 * error + 2e-5 * abs(samples[0]))
-    for k in (1, 2):  # the deviation of 4000 values is known to 1.1 %
+    for k in (1, 2):  # the deviation of 2000 values is known to 1.6 %
         assert phasors[k] == pytest.approx(samples[k], rel=0.08)
 
 

@@ -15,7 +15,6 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from browser import Page
 
 from sensorgen.measure.lab.live import LiveText, LiveView, Sample, line
 from sensorgen.measure.signal.multisine import TONES_HZ
@@ -44,11 +43,9 @@ def view():
 
 
 @pytest.fixture
-def page(program, tmp_path, view):
-    made = Page(program("chromium", "chromium", "chromium-browser", "google-chrome"), tmp_path)
-    made.call("Page.navigate", url=view.url)
-    yield made
-    made.close()
+def page(browser, view):
+    browser.call("Page.navigate", url=view.url)
+    return browser
 
 
 def request(view, path="", method="GET", body=None, **headers):
@@ -203,7 +200,7 @@ def test_only_the_token_opens_it(view):
 
 def test_it_listens_to_this_computer_only(view):
     port = urlsplit(view.url).port
-    assert view._server._http.server_address[0] == "127.0.0.1"
+    assert view._server.server_address[0] == "127.0.0.1"
     for address in {info[4][0] for info in socket.getaddrinfo(socket.gethostname(), port, socket.AF_INET)}:
         if not address.startswith("127."):
             with pytest.raises(OSError, match=r"refused|unreachable|timed out"):
@@ -259,11 +256,11 @@ def test_rows_come_once(view):
 
 def test_nobody_reads_and_nothing_grows(view):
     """Only the last minute is kept; an update costs the time of a hundred small arrays at most."""
-    feed(view, 0, 2000)
+    feed(view, 0, 1500)
     tracemalloc.start()
-    feed(view, 2000, 4000)
+    feed(view, 1500, 2500)
     before = tracemalloc.get_traced_memory()[0]
-    feed(view, 4000, 14_000)
+    feed(view, 2500, 6000)
     grown = tracemalloc.get_traced_memory()[0] - before
     tracemalloc.stop()
     assert grown < 100_000

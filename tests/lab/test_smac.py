@@ -345,7 +345,6 @@ def test_the_same_bytes_over_a_pseudo_terminal():
         first = SerialPort(path, smac.BAUD)
         with pytest.raises(DeviceFault, match="lock"):
             SerialPort(path, smac.BAUD)
-        SerialPort(path, smac.BAUD, shared=True).close()
         first.close()
     with pytest.raises(DeviceFault, match="connection to /dev/nothing failed"):
         SerialPort("/dev/nothing", smac.BAUD)

@@ -137,7 +137,7 @@ def test_at_rest_rect_lies_between_certified_bounds(coarse):
     assert bounds.lower * 0.999 < found < bounds.upper * 1.001
 
 
-@pytest.mark.parametrize("shape", ["pillar", "pyramid"])
+@pytest.mark.parametrize("shape", ["pillar", pytest.param("pyramid", marks=pytest.mark.nightly)])
 def test_arrays_at_rest_lie_between_certified_bounds(shape):
     from sensorgen.models import fem3d
 

@@ -56,6 +56,7 @@ main()
 def command(path, *words, limit):
     return subprocess.run(
         [sys.executable, "-c", FULL, str(limit), "log", *map(str, words), "--log", path],
+        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},  # the limit would truncate bytecode
         capture_output=True,
         encoding="utf-8",
     )

@@ -143,3 +143,25 @@ def test_orders_come_in_the_order_that_the_manuals_ask_for(monkeypatch, address,
     with opened(address) as found:
         found.resistance(wires=2)
     assert orders == [*first, "*IDN?", "*CLS", "MEAS:RES?", "SYST:ERR?", "closed", "closed"]
+
+
+def test_a_meter_of_pymeasure_by_its_name(run, path):
+    pytest.importorskip("pymeasure", reason="PyMeasure is not installed: pip install 'sensorgen[pymeasure]'")
+    words = ["add", "23 triX 2", "--visa", "GPIB0::26::INSTR", "--axis", "y", "--wires", "4"]
+    said = run(*words, "--meter", "pymeasure:Keithley2000", "--baked")
+    assert (said.code, said.err) == (0, "")
+    assert "Y 1.298 kohm, written '+1.29800000E+03'" in said.words
+    with Log(path) as log:
+        (row,) = log.readings()
+    assert row.instrument == "Keithley2000 (KEITHLEY INSTRUMENTS INC.,MODEL 2000,1234567,A20  /A02)"
+    assert "did you mean 'pymeasure:Keithley2000'" in run(*words, "--meter", "pymeasure:Keithley200").line
+
+
+def test_a_meter_of_a_kind(run, path):
+    words = ["add", "23 triX 2", "--visa", KEITHLEY, "--axis", "y"]
+    assert "Y 1.3 kohm" in run(*words, "--meter", "keithley-2000").words
+    assert "expected HP 34401A" in run(*words, "--meter", "hp-34401a").line
+    assert (
+        "is of the role impedance; expected one of hp-34401a, keithley-2000" in run(*words, "--meter", "hp-4284a").line
+    )
+    assert "--meter hp-34401a without --visa" in run("add", "23 triX 2", "--y", "5", "--meter", "hp-34401a").line

@@ -32,7 +32,7 @@ def tri(film=0.1, **more):
     return press2d.cell(drawn.in_use, drawn.params.period_mm)
 
 
-@pytest.mark.parametrize("film", [0.1, 0.2])
+@pytest.mark.parametrize("film", [0.1, pytest.param(0.2, marks=pytest.mark.nightly)])
 def test_the_reference_curve_at_every_load(film):
     known = REFERENCE[f"tri_d{film}"]
     found = press2d.press(tri(film), solids(), STRESSES, EPS)
@@ -67,6 +67,7 @@ def test_choices_of_the_boundary(name, held, nu):
     assert found.displacement_m[1:] * 1e6 == pytest.approx(known[1:], rel=0.02)
 
 
+@pytest.mark.nightly  # friction that sticks: choices of the boundary
 def test_sticking_depends_little_on_the_loads_asked_for():
     few, many = (
         press2d.press(tri(), solids(), s, boundary=BoundaryConditions(contact="stick"))
@@ -100,6 +101,7 @@ def test_soft_x60_reaches_100_kpa():
     assert found.displacement_m[1:] == pytest.approx(finer.displacement_m[1:], rel=0.01)
 
 
+@pytest.mark.nightly  # tests/test_compression_error.py: meshes converge by the order that is assumed
 def test_a_finer_mesh_agrees():
     coarse, fine = (
         press2d.press(tri(), solids(), STRESSES[:6:5], fineness=f) for f in (Fineness(), Fineness().finer())

@@ -249,7 +249,7 @@ def test_a_foot_that_has_landed_and_widened_is_one_drawn_so(slid_mm):
     assert drawn.lower < found.upper * (1 + 1e-4)
 
 
-@pytest.mark.parametrize("lift", [0.0, 0.02])
+@pytest.mark.parametrize("lift", [pytest.param(0.0, marks=pytest.mark.nightly), 0.02])
 def test_stairs_as_boxes_are_stairs_as_a_cross_section(lift):
     """Bars along y are pressed alike by both models, bonded or falling onto the film and slipping on it."""
     scene, stress = stairs(0.2, 0.3, lift=lift), [0.0, 1e4, 2e4]

@@ -124,7 +124,7 @@ def forces(run, state):
     return force.reshape(-1, 2), run.problem.places(state.u_m)
 
 
-@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("turned", [False, pytest.param(True, marks=pytest.mark.nightly)])
 def test_a_dovetail_is_held_on_its_undercut_flank(turned):
     """Two trapezia that hook under each other: forces and moments of the contact cancel, also drawn the other way."""
     foot = [(0, 0), (0.45, 0), (0.25, 0.5), (0, 0.5)]

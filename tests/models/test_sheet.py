@@ -305,7 +305,7 @@ def test_an_array_of_capacitances_is_what_a_patch_on_its_steps_makes():
     assert z == pytest.approx(impedance(SQUARE, MIXED, 1e5, patch, cells=23), rel=1e-12)
     lumpy = replace(SQUARE, capacitance_f_per_m2=np.outer(np.arange(1, 8), np.arange(2, 7)) * 1e-8)
     pressed = impedance(replace(lumpy, sheet_resistance_ohm=(0.0, 0.0)), MIXED[:1], 1e5, TIP, cells=17)[0, 0, 0]
-    x, y = np.linspace(0, 0.1, 7001), np.linspace(0, 0.08, 5001)
+    x, y = np.linspace(0, 0.1, 2801), np.linspace(0, 0.08, 2001)
     mid_x, mid_y = (x[1:] + x[:-1]) / 2, (y[1:] + y[:-1]) / 2
     under = ((mid_x > 0.0213) & (mid_x < 0.0363))[:, None] & ((mid_y > 0.0371) & (mid_y < 0.0591))
     c = lumpy.capacitances()[(mid_x / 0.1 * 7).astype(int)][:, (mid_y / 0.08 * 5).astype(int)] * (1 + 0.3 * under)

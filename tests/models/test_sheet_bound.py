@@ -59,7 +59,7 @@ def test_one_reading_does_not_locate_and_several_do_better():
     assert medians["opposite"][1] > 1.0
 
 
-@pytest.mark.parametrize("name", ["two-edges", "corners"])
+@pytest.mark.parametrize("name", ["corners", pytest.param("two-edges", marks=pytest.mark.nightly)])
 def test_resistive_sheets_and_higher_tones_do_better(name):
     base = np.median(found(name).sigma()[..., 1])
     resistive = Sheet(0.1, 0.1, (2800.0, 2800.0), C)
@@ -146,7 +146,7 @@ ROWS = [
 SETTINGS = ((0.135, 1), (0.135, 10), (0.83, 1), (5.0, 1))  # resistivity, and times the thesis's tones
 
 
-FAST = ("one-edge", "corner")
+FAST = ("corner",)
 
 
 def metres(cell):

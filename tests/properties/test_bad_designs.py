@@ -178,7 +178,7 @@ def command(monkeypatch, capsys, tmp_path):
     return run
 
 
-@counts(40, 400)
+@counts(25, 400)
 def test_random_command_lines(count, command, request):
     """The few are not pressed: that takes seconds for each design that is valid."""
     if count < 100:

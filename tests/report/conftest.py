@@ -4,7 +4,6 @@ import os
 
 import bench_files
 import pytest
-from browser import Page
 
 from sensorgen.analysis.report import report
 from sensorgen.design.specimen_name import design_of, parse
@@ -19,25 +18,6 @@ def _materials(tmp_path_factory):
     os.environ["SENSORGEN_MATERIALS"] = str(tmp_path_factory.mktemp("materials"))
     yield
     os.environ.pop("SENSORGEN_MATERIALS") if before is None else os.environ.update(SENSORGEN_MATERIALS=before)
-
-
-@pytest.fixture(scope="session")
-def _started(tmp_path_factory):
-    """Browsers that run: one for all tests, and another where it has gone."""
-    pages = []
-    yield pages
-    for page in pages:
-        page.close()
-
-
-@pytest.fixture
-def browser(program, _started, tmp_path_factory):
-    """A page that nobody has used."""
-    chromium = program("chromium", "chromium", "chromium-browser", "google-chrome")
-    if not _started or _started[-1].process.poll() is not None:
-        _started.append(Page(chromium, tmp_path_factory.mktemp("chromium")))
-    _started[-1].renew()
-    return _started[-1]
 
 
 @pytest.fixture(scope="session")

@@ -13,11 +13,11 @@ OUT = Path(__file__).parents[2] / "out" / "report"  # CI keeps it
 FIGURES = """[...document.querySelectorAll('.plot')].map(p => [p.dataset.key, p.getBoundingClientRect().width,
     p.querySelectorAll('.trace, .trace.bars, canvas').length > 0])"""
 SORTED = """(() => {
-  const table = document.getElementById('table-readings'), rows = [...table.tBodies[0].rows];
+  const table = document.querySelector('[data-table=readings]'), rows = [...table.tBodies[0].rows];
   const at = [...table.tHead.rows[0].cells].findIndex(c => c.textContent.startsWith('film resistance measured'));
   return [table.tHead.rows[0].cells[at].getAttribute('aria-sort'), rows.map(r => r.cells[at].dataset.value)];
 })()"""
-BUTTONS = "[...document.querySelectorAll('#table-readings thead button')]"
+BUTTONS = "[...document.querySelectorAll('[data-table=readings] thead button')]"
 HEAD = f"{BUTTONS}.find(b => b.textContent.startsWith('film resistance measured'))"
 PIECES = """[...document.getElementById('figure-residuals').querySelectorAll('.plot')].map(p => ({
     x: p._fullLayout.xaxis.range, y: p._fullLayout.yaxis.range, height: p.getBoundingClientRect().height}))"""

@@ -17,9 +17,11 @@ import pytest
 from bench_files import FORMULA, HOSTILE, ladder
 from scipy import stats
 
+from no_numbers import roughly_at_rest
 from sensorgen.analysis.comparison import of_iteration
 from sensorgen.analysis.plots.static import files
-from sensorgen.analysis.report import FORMATS, electrodes, formats, report, written, yields
+from sensorgen.analysis.report import FORMATS, electrodes, report, written, yields
+from sensorgen.core import document
 from sensorgen.core.document import shown as shown_as
 from sensorgen.core.errors import BadInput
 from sensorgen.design import materials
@@ -43,7 +45,7 @@ def by_hand():
 
 @pytest.fixture(scope="module")
 def of_thesis(thesis):
-    with Log(thesis) as log:
+    with Log(thesis) as log, roughly_at_rest():
         return report(log, 23)
 
 
@@ -176,7 +178,7 @@ def test_a_specimen_counts_once_and_with_its_last_reading(tmp_path):
 
 def test_more_readings_than_are_drawn_and_listed(tmp_path, monkeypatch, shared_cache):
     """Of so many only what a browser can bear is drawn and listed, and it says so; the files for programs hold all."""
-    monkeypatch.setattr(formats, "MOST_ROWS", 50)
+    monkeypatch.setattr(document, "MOST_ROWS", 50)
     monkeypatch.setattr(electrodes, "MOST_ROWS", 40)
     with Log(tmp_path / "log.db", create=True) as log:
         names = [f"40 {shape} .1mm {k + 1}" for k in range(60) for shape in ("triX", "triY")]
@@ -324,7 +326,7 @@ class Page(HTMLParser):
         self.tags.append((tag, attrs))
         self.script = tag in ("script", "style")
         if tag == "table":
-            self.table = attrs["id"].removeprefix("table-")
+            self.table = attrs["data-table"]
             self.cells[self.table] = []
         if tag == "tr":
             self.cells[self.table].append([])
@@ -350,11 +352,10 @@ def page(of_recorded):
 
 
 def cell_of(page, found, k, j):
-    """A cell of a table on the page: a table of one row stands as a list, without what is empty."""
-    if len(found.rows) > 1:
-        return page.cells[found.key][k + 1][j]
-    by_name = {row[0][1]: row[1] for row in page.cells[found.key]}
-    return by_name.get(found.columns[j].head, (None, ""))
+    """A cell of a table on the page, without columns that are empty throughout; a table of one row stands as a list."""
+    heads, *rows = page.cells[found.key]
+    pairs = zip(heads, rows[k], strict=True) if len(found.rows) > 1 else page.cells[found.key]
+    return {head[1]: cell for head, cell in pairs}.get(found.columns[j].head, ("", ""))
 
 
 def test_all_formats_have_the_same_numbers(of_recorded, page):

@@ -8,11 +8,21 @@ import shapely
 
 from sensorgen.analysis.plots import layers, pages
 from sensorgen.asprinted.printed import body
+from sensorgen.core.findings import Finding
 from sensorgen.design.design import make
 from sensorgen.export.gcode.crossings import Stretches
 from sensorgen.scene.layers import LayerRegions
 
-SHOWN = "[...document.querySelectorAll('#stack g')].map(g => g.getAttribute('class'))"
+SHOWN = "[...document.querySelectorAll('#plan g')].map(g => g.getAttribute('class'))"
+AT = "document.getElementById('layer-at').textContent"
+WAYS = "[...document.querySelectorAll('#plan .way')]"
+
+
+def turn_to(browser, layer):
+    browser.run(
+        "(() => { const s = document.getElementById('layer');"
+        f"s.value = {layer}; s.dispatchEvent(new Event('input')); }})()"
+    )
 
 
 def test_a_path_is_the_region():
@@ -29,14 +39,24 @@ def test_a_path_is_the_region():
 
 
 def test_marks_open_their_layer_and_names_stay_text(browser, tmp_path):
-    stack = [LayerRegions(0.1 * k, 0.1 * (k + 1), {"one": shapely.box(0, 0, 10, 5)}) for k in range(4)]
-    text = layers.page("<b>x</b>", stack, {"one": ("<i>one</i>", "#336699")}, marks=[layers.Mark(2, (3.0, 1.0), "<s>")])
+    regions = [LayerRegions(0.1 * k, 0.1 * (k + 1), {"one": shapely.box(0, 0, 10, 5)}) for k in range(4)]
+    finding = Finding("7-printed", "error", "one", "<s>", "<u>", layer=3, place_mm=(3.0, 1.0, 0.25))
+    found = layers.placed([finding, Finding("5-width", "info", "one", "thin", "widen it")], regions)
+    shown = [layers.BodyShown("<i>one</i>", "<em>m</em>", 1, "#336699", "#336699")]
+    text = layers.page("<b>x</b>", (), shown, layers.stack(regions, ["one"], (10.0, 5.0), found), found)
     (tmp_path / "page.html").write_text(text, "utf-8")
     browser.size(1200)
     browser.open(tmp_path / "page.html")
-    assert browser.run(SHOWN) == ["", "below", "now", ""]
-    assert browser.run("document.querySelectorAll('header b, #main i + i, s').length") == 0
-    assert browser.run("document.querySelector('#stack .mark').getAttribute('cy')") == "4.0"
+    assert browser.run(SHOWN) == ["below", "now"]
+    assert browser.run(AT) == "3 of 4: 0.2 to 0.3 mm"
+    assert browser.run("document.querySelectorAll('header b, main em, main s, main u, span i').length") == 0
+    assert browser.run("document.querySelector('#plan .mark').getAttribute('cy')") == "4"
+    turn_to(browser, 0)
+    assert browser.run("document.querySelectorAll('#plan .mark').length") == 0
+    assert browser.run("document.querySelectorAll('[data-finding]').length") == 1
+    browser.run("document.querySelector('[data-finding]').click()")
+    assert browser.run(AT) == "3 of 4: 0.2 to 0.3 mm"
+    assert browser.run("document.querySelectorAll('#plan .mark.now, .listed .now').length") == 2
 
 
 def test_travel_is_drawn_at_its_layer_and_toggled(browser, tmp_path):
@@ -50,22 +70,23 @@ def test_travel_is_drawn_at_its_layer_and_toggled(browser, tmp_path):
     text = layers.of_print(printed, (), {"as sliced": sliced, "as written": written})
     (tmp_path / "page.html").write_text(text, "utf-8")
     browser.open(tmp_path / "page.html")
-    ways = "[...document.querySelectorAll('#stack g')].map(g => [...g.querySelectorAll('.way')].map(w => "
-    lengths = browser.run(f"{ways}w.getTotalLength()))")
+    browser.run("document.querySelectorAll('.travel').forEach(box => { if (!box.checked) box.click(); })")
+    lengths = []
+    for layer in range(len(printed.first)):
+        turn_to(browser, layer)
+        lengths.append(browser.run(f"{WAYS}.map(way => way.getTotalLength())"))
     assert [len(each) for each in lengths] == [1, 0, 0, 0, 0, 1, *[0] * (len(lengths) - 6)]
     assert (lengths[0], lengths[5]) == ([2.0], [pytest.approx(0.75, abs=1e-4)])
-    words = browser.run("[...document.querySelectorAll('[value^=t]')].map(b => b.parentNode.textContent.trim())")
+    words = browser.run("[...document.querySelectorAll('.travel')].map(b => b.parentNode.textContent.trim())")
     assert words[0].endswith("in contact with another tool's material, as sliced: 0.5 mm by tool 3, 0.2 mm by tool 4")
     assert words[3].endswith("as written: 0.0 mm")
-    shown = "document.querySelectorAll('#stack .way')[1].checkVisibility()"
-    browser.run("show(5)")
-    assert browser.run(shown) is False
-    browser.run("document.querySelector('[value=t0]').click()")
-    assert browser.run(shown) is True
-    assert browser.run("document.querySelector('[value=t2]').disabled") is True
-    corner = browser.run("document.querySelectorAll('#stack .way')[1].getAttribute('d')")
+    turn_to(browser, 5)
+    corner = browser.run(f"{WAYS}[0].getAttribute('d')")
     width, depth = printed.design.printed.size_mm[:2]
     assert corner.startswith(f"M{width / 2 - 3:g} {depth / 2 - 1:g}L")
+    browser.run("document.querySelector('.travel').click()")
+    assert browser.run(f"{WAYS}.length") == 0
+    assert browser.run("document.querySelector('.travel[value=\"2\"]').disabled") is True
 
 
 def test_a_print_layer_by_layer(browser, tmp_path):
@@ -73,11 +94,12 @@ def test_a_print_layer_by_layer(browser, tmp_path):
     (tmp_path / "page.html").write_text(layers.of_print(printed), "utf-8")
     browser.size(1200)
     browser.open(tmp_path / "page.html")
-    assert browser.run(SHOWN) == ["now", *[""] * (len(printed.first) - 1)]
-    browser.run(
-        "(() => { const s = document.getElementById('layer'); s.value = 5; s.dispatchEvent(new Event('input')); })()"
-    )
-    assert browser.run(SHOWN)[4:6] == ["below", "now"]
-    assert browser.run("document.getElementById('said').textContent").startswith("layer 6 of 13, 0.5 to 0.6 mm")
+    assert browser.run(SHOWN) == ["now"]
+    turn_to(browser, 5)
+    assert browser.run(SHOWN) == ["below", "now"]
+    assert browser.run(AT) == "6 of 13: 0.5 to 0.6 mm"
+    whole = browser.run("document.querySelectorAll('#plan .now path').length")
+    browser.run("document.querySelector('.body').click()")
+    assert browser.run("document.querySelectorAll('#plan .now path').length") <= whole
     assert browser.complaints() == []
     assert browser.asked() == []

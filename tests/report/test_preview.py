@@ -1,14 +1,13 @@
 """The page of a design in a real browser: content, keys, themes, widths, a section plane, and without WebGL."""
 
-import base64
-import gzip
 import json
 import re
 
 import numpy as np
 import pytest
 
-from sensorgen.analysis.preview import geometry, shades
+from sensorgen.analysis.plots import pages, shades
+from sensorgen.analysis.preview import geometry
 from sensorgen.design.design import make
 from sensorgen.scene.geometry.meshes import mesh
 from sensorgen.workflows.preview import page_of
@@ -88,7 +87,7 @@ def test_the_section_plane_removes_what_is_before_it(browser, made):
 
 def test_keys_choose_layers_and_turn_the_model(browser, made):
     browser.open(made)
-    shapes = "[...document.querySelectorAll('#plan g:not(.below) path')].map(p => p.getAttribute('d')).join()"
+    shapes = "[...document.querySelectorAll('#plan .now path')].map(p => p.getAttribute('d')).join()"
     browser.run("document.getElementById('layer').focus()")
     browser.key("Home", 36)
     first, said = browser.run(shapes), browser.run("document.getElementById('layer-at').textContent")
@@ -114,6 +113,28 @@ def test_everything_that_can_be_used_has_a_name_and_is_reached_by_tab(browser, m
     assert nameless == []
 
 
+def test_a_finding_is_shown_in_model_drawing_and_layers(browser, made):
+    browser.open(made)
+    button = "document.querySelector('[data-finding][data-to=sheet]')"
+    browser.run(f"{button}.click()")
+    browser.run(FRAME)
+    number = browser.run(f"{button}.closest('li').querySelector('strong').textContent").split()[-1]
+    chosen = "[...document.getElementById('sheet').shadowRoot.querySelectorAll('.now')].map(m => m.dataset.number)"
+    assert set(browser.run(chosen)) == {number}
+    assert browser.run("document.getElementById('sheet').parentNode.open") is True
+    assert browser.run("document.querySelectorAll('#plan .mark.now').length") == 1
+    spot, model = (
+        browser.run(f"(b => [b.x + b.width / 2, b.y + b.height / 2, b.width, b.height])"
+                    f"(document.getElementById('{name}').getBoundingClientRect())") for name in ("spot", "model")
+    )  # fmt: skip
+    assert spot[:2] == pytest.approx(model[:2], abs=2)  # the place is in the middle of the view
+    cut = browser.run("document.getElementById('cut').getAttribute('aria-valuetext')")
+    words = browser.run(f"{button}.closest('li').textContent")
+    cut_mm, y_mm = (float(re.search(r"\by (?:= )?([\d.]+)", text)[1]) for text in (cut, words))
+    assert cut_mm == pytest.approx(y_mm, abs=0.02)
+    assert browser.complaints() == []
+
+
 def test_text_of_strangers_stays_text(browser, made):
     browser.open(made)
     assert browser.run("document.querySelectorAll('img[src=x]').length") == 0
@@ -132,7 +153,7 @@ def test_without_webgl_there_is_a_plain_picture(browser, made):
       seen.add(p[k] << 16 | p[k + 1] << 8 | p[k + 2]); return seen.size; })()""")
     assert colours_ > 3
     assert "WebGL is not available" in browser.run("document.getElementById('flat').textContent")
-    browser.run("document.querySelector('[data-layer]').click()")
+    browser.run("document.querySelector('[data-finding]').click()")
     assert browser.complaints() == []
 
 
@@ -147,7 +168,7 @@ def test_the_packed_shells_are_the_meshes():
     """Unpacked by the format's description: every vertex to a micrometre, every triangle, volumes to the rounding."""
     scene = make(TRI).printed
     names = [body.name for body in scene.bodies]
-    block = gzip.decompress(geometry.packed({}, {"drawn": scene}, names))
+    block = geometry.block({}, {"drawn": scene}, names)
     size = int.from_bytes(block[:4], "little")
     counts = json.loads(block[4 : 4 + size])["counts"]["drawn"]
     rest = np.frombuffer(block[4 + size :], "<i4")
@@ -166,7 +187,7 @@ def test_the_packed_shells_are_the_meshes():
 
 def test_edges_of_a_box_are_twelve():
     scene = make({"shape": "reference"}).printed
-    ends = geometry.edges(mesh(scene.bodies[0]))
+    ends = mesh(scene.bodies[0]).sharp_edges()
     assert len({tuple(pair) for pair in ends.tolist()}) == len(ends) == 12
 
 
@@ -200,6 +221,6 @@ def test_no_body_is_lost_on_its_ground(colour, number):
 def test_a_design_of_thousands_of_boxes_stays_small():
     scene = make({"shape": "rect", "parameters": {"length_mm": 200.0, "width_mm": 60.0}}).printed
     names = [body.name for body in scene.bodies]
-    data = geometry.packed({}, {"drawn": scene, "printed": scene}, names)
+    data = pages.packed(geometry.block({}, {"drawn": scene, "printed": scene}, names))
     assert sum(len(mesh(b).triangles) for b in scene.bodies) > 90_000
-    assert len(base64.b64encode(data)) < 200_000
+    assert len(data) < 200_000

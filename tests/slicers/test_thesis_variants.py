@@ -51,7 +51,7 @@ def test_all_printable_variants_are_here():
 
 
 @variants
-def test_prusaslicer_prints_every_body_on_its_tool(name, tmp_path, prusa_slicer, record_property):
+def test_prusaslicer_prints_every_body_on_its_tool(name, tmp_path, prusa_slicer, record_property, unpredicted):
     variant = design.load(DESIGNS / name)
     folder = build(variant, tmp_path, cad=False).folder
     out = tmp_path / "print.gcode"

@@ -22,6 +22,7 @@ CONVENTIONS = ("vol", "deposit", "stadium")
 FULL = 0.95  # a plate of which this share is filled has no holes but between rounded lines
 _CUTS = (-0.37, -0.2, 0.0, 0.17, 0.41)  # places of the cuts, in shares of a tenth of the sensor, from its middle
 _OF_AREA, _STEPS = 1e-3, 8  # to which an area is met, and steps that it may take
+_MITRE = 5.0  # widths, at which a mitre is cut
 _LEVEL_MM = 0.01  # a line belongs to a layer whose top it is this near
 
 
@@ -234,14 +235,25 @@ def _merged(runs: Real) -> Real:
 def _union(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], convention: str) -> Region:
     """All lines with round ends, slits between touching ones closed, each part as large as its lines' deposit."""
     ways = shapely.linestrings(np.stack([lines.start_mm, lines.end_mm], axis=1))
-    region = shapely.union_all(shapely.buffer(ways, lines.width_mm / 2, quad_segs=4))
     slit = ROUND * layer.height_mm
-    closed = region.buffer(slit, join_style="mitre").buffer(-slit, join_style="mitre")
-    pieces = np.array(parts(closed), dtype=object)
+    pieces = np.array(parts(_closed(shapely.buffer(ways, lines.width_mm / 2, quad_segs=4), slit)), dtype=object)
     owner = shapely.STRtree(pieces).nearest(shapely.points((lines.start_mm + lines.end_mm) / 2))
     deposit: Real = np.bincount(owner, lines.volume_mm3 / lines.height_mm, len(pieces)).astype(float)
     grown = shapely.union_all(_offset(pieces, deposit, slit / 2 if convention == "stadium" else 0.0))
     return shapely.clip_by_rect(grown, 0.0, 0.0, size_mm[0], size_mm[1])
+
+
+def _closed(plans: NDArray[np.object_], slit_mm: float) -> Region:
+    """Union of plans without holes, with slits closed: by Clipper, in a tenth of the time of GEOS [mm]."""
+    from manifold3d import CrossSection, FillRule, JoinType
+
+    ends = np.cumsum(shapely.get_num_coordinates(plans))[:-1]
+    rings = np.split(shapely.get_coordinates(shapely.reverse(plans)), ends)
+    region = CrossSection([ring[:-1] for ring in rings if len(ring)], FillRule.NonZero)
+    for way in (slit_mm, -slit_mm):
+        region = region.offset(way, JoinType.Miter, _MITRE)
+    found = (part.to_polygons() for part in region.decompose())
+    return shapely.multipolygons([shapely.Polygon(outer, holes) for outer, *holes in found])
 
 
 def _offset(pieces: NDArray[np.object_], area_mm2: Real, more_mm: float) -> NDArray[np.object_]:

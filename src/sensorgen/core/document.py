@@ -6,11 +6,12 @@ A result that a command prints or a notebook displays has a method ``document()`
 import csv
 import io
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from html import escape
 from math import isfinite, isinf, isnan
+from types import MappingProxyType
 from typing import Any, Protocol, Self, get_type_hints
 
 from sensorgen.core.lazy import Lazy
@@ -20,7 +21,9 @@ Cell = str | float | int | None
 DIGITS = 4  # for people; files for programs hold all
 WIDTH = 80  # columns of a terminal
 _LEAST = 20  # columns into which words are wrapped
+MOST_ROWS = 2000  # of a table in HTML: a browser has to lay out all of them
 _MARKDOWN = str.maketrans({c: f"\\{c}" for c in "\\`*_{}[]<>#|!~$&"})
+_NAMES = ("specimen", "name")  # of the column that names a row, else the first
 _wrapped = partial(textwrap.wrap, width=WIDTH, break_on_hyphens=False, break_long_words=False)  # names stay whole
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "'", "＝", "＋", "－", "＠")
 
@@ -271,29 +274,68 @@ def safe(words: str) -> str:
 
 
 def html(parts: Iterable[Part]) -> str:
-    """A fragment of a page."""
+    """A fragment of a page, whose script lets the heads of a table sort it."""
     return "".join(_html(part) for part in parts if part)
 
 
 def _html(part: Part) -> str:
     if isinstance(part, str):
-        return f"<p>{escape(part)}</p>"
+        return _tag("p", part)
     if isinstance(part, Facts):
-        return _scrolled("".join(_html_row(row, "td") for row in part.rows))
-    table = part.filled()
-    rows = [[c.words(v) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
-    head = _html_row([c.head for c in table.columns], "th")
-    caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
-    return _scrolled(f"{caption}{head}{''.join(_html_row(row, 'td') for row in rows)}")
+        return _scrolled(_row(_tag("td", name), _tag("td", words)) for name, words in part.rows)
+    table, caption, count = replace(part, cells=part.cells[:MOST_ROWS]).filled(), part.caption, len(part.cells)
+    if count > MOST_ROWS:
+        caption += f" (the first {MOST_ROWS} of {count} rows; CSV has all)"
+    return _scrolled(_html_list(table) if count == 1 else _html_rows(table), caption, part.key)
 
 
-def _scrolled(rows: str) -> str:
+def _html_list(table: Table) -> Iterator[str]:
+    """A table of one row, a line for each column."""
+    for column, cell in zip(table.columns, table.cells[0], strict=True):
+        yield _row(_html_head(column, "row"), _html_cell(column, cell))
+
+
+def _html_rows(table: Table) -> Iterator[str]:
+    names = [c.name for c in table.columns]
+    named = next((names.index(name) for name in _NAMES if name in names), 0)
+    heads = (_html_head(c, "col", words) for c, words in zip(table.columns, _worded(table), strict=True))
+    yield f"<thead>{_row(*heads)}</thead><tbody>"
+    for row in table.cells:
+        cells = enumerate(zip(table.columns, row, strict=True))
+        yield _row(*(_html_cell(c, v, k == named) for k, (c, v) in cells))
+    yield "</tbody>"
+
+
+def _html_head(column: Column, scope: str, worded: bool = True) -> str:
+    kind = None if worded else "n"
+    return _tag("th", column.head, {"scope": scope, "class": kind, "title": column.about or None})
+
+
+def _html_cell(column: Column, cell: Cell, head: bool = False) -> str:
+    """A cell, with all digits of a number to sort by."""
+    worded = isinstance(cell, str)
+    attributes = {
+        "scope": "row" if head else None, "class": "n" if column.right or not worded else None,
+        "data-value": None if worded else exact(cell),
+    }  # fmt: skip
+    return _tag("th" if head else "td", column.words(cell), attributes)
+
+
+def _scrolled(rows: Iterable[str], caption: str = "", key: str = "") -> str:
     """A table that moves within the page where it is wider."""
-    return f'<div class="scroll" tabindex="0"><table>{rows}</table></div>'
+    label = f' role="region" aria-label="{escape(caption)}"' if caption else ""
+    inside = _tag("caption", caption) + "".join(rows) if caption else "".join(rows)
+    return f'<div class="scroll" tabindex="0"{label}><table data-table="{escape(key)}">{inside}</table></div>'
 
 
-def _html_row(cells: Iterable[str], tag: str) -> str:
-    return f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in cells)}</tr>"
+def _row(*cells: str) -> str:
+    return f"<tr>{''.join(cells)}</tr>"
+
+
+def _tag(name: str, words: str, attributes: Mapping[str, str | None] = MappingProxyType({})) -> str:
+    """An element with text and those attributes that have a value."""
+    named = "".join(f' {key}="{escape(value)}"' for key, value in attributes.items() if value is not None)
+    return f"<{name}{named}>{escape(words)}</{name}>"
 
 
 def to_json(result: Any) -> str:

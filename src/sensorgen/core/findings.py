@@ -167,10 +167,19 @@ def grouped(found: Sequence[Finding]) -> list[Finding]:
     >>> [(f.message, f.layer, f.last_layer, f.count) for f in grouped(wide)]
     [('0.2 mm wide', 5, 7, 27)]
     """
+    return [_joined(alike) for alike in _by_sentence(found)]
+
+
+def numbered(found: Sequence[Finding]) -> dict[Finding, int]:
+    """Number of each finding among the sentences of :func:`grouped`, from 1: its number on the drawing."""
+    return {f: number for number, alike in enumerate(_by_sentence(found), 1) for f in alike}
+
+
+def _by_sentence(found: Sequence[Finding]) -> Iterable[list[Finding]]:
     merged: dict[tuple[str, str, str, str], list[Finding]] = {}
     for f in sorted(found, key=lambda f: (bool(f.waiver), SEVERITIES.index(f.severity))):
         merged.setdefault((f.severity, f.waiver, f.rule, _NUMBER.sub("0", f.message)), []).append(f)
-    return [_joined(alike) for alike in merged.values()]
+    return merged.values()
 
 
 def _joined(alike: Sequence[Finding]) -> Finding:

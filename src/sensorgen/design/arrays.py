@@ -8,6 +8,8 @@ names. Seen from above (3 rows, 4 columns; leads of rows turn down beside the co
     | | +------ r1  |  |  |  |
     | | |           c1 c2 c3 c4
     # # #           #  #  #  #    pads, open from above
+
+With ``pads: left`` the print is exchanged in x and y.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -17,14 +19,20 @@ from math import ceil
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput, OutOfRange
-from sensorgen.design.tip import EVEN, TipData
+from sensorgen.design.tip import EVEN
+from sensorgen.design.tip_data import TipData
+from sensorgen.scene.lettering import LINE_DOTS, runs
 from sensorgen.scene.scene import SLIVER_MM, Body, Envelope, Fill, Piece, Point, Prism, Scene, box, rounded
+from sensorgen.scene.shifting import shifted, transposed
 
 if TYPE_CHECKING:
     import shapely
 
 
 MOST_CROSSINGS = 10_000  # the mat of Tekscan has 8448
+LABEL_MM = 0.2  # by which letters are raised or engraved
+DOT_MM = 0.5  # side of the dots of letters: wider than a line of a 0.4 mm nozzle
+WALL_MM = 0.9  # two lines: least material around a hole
 ENVELOPE = ("length_mm", "width_mm", "electrode_mm", "isolation_mm")  # that the array gives to its cell
 _WHOLE = 1e-6
 
@@ -68,9 +76,59 @@ class Params(Envelope):
         metadata={"help": "Between columns above the film: solid dielectric, or air that carries no load.",
                   "choices": ("dielectric", "air")},
     )  # fmt: skip
+    labels: str = field(
+        default="none",
+        metadata={"help": "Names of the tracks on their leads: raised, engraved into the cover, or none.",
+                  "choices": ("none", "raised", "engraved")},
+    )  # fmt: skip
+    hole_mm: float = field(
+        default=0.0,
+        metadata={
+            "help": "Side of two square holes for pins beside the pads; 0 leaves them out.",
+            "range": (0.0, 20.0),
+        },
+    )
+    pads: str = field(
+        default="bottom",
+        metadata={"help": "Edge of the pads; at the left the print is exchanged in x and y, so that rows run along y.",
+                  "choices": ("bottom", "left")},
+    )  # fmt: skip
+    seams: str = field(
+        default="none",
+        metadata={"help": "Ends without a margin, where the next tile follows: of the rows, of the columns, or both.",
+                  "choices": ("none", "rows", "columns", "both")},
+    )  # fmt: skip
+    seam_mm: float = field(
+        default=0.0,
+        metadata={"help": "Width of the base that reaches under the next tile, at the end of the columns.",
+                  "range": (0.0, 50.0)},
+    )  # fmt: skip
+    tile: float = field(
+        default=0.0,
+        metadata={"help": "Number of a tile, before the names on its leads.", "range": (0.0, 999.0), "count": True},
+    )
 
     def __post_init__(self) -> None:
-        """Refuse tracks that touch, and more crossings than can be solved."""
+        """Refuse tracks that touch, more crossings than can be solved, and what the cover or the base lacks."""
+        self._refuse_tracks()
+        if self.labels == "engraved" and self.isolation_mm < LABEL_MM + SLIVER_MM:
+            raise OutOfRange(
+                f"labels engraved {LABEL_MM:g} mm into an isolation of {self.isolation_mm:g} mm; expected a thicker "
+                "one, or labels: raised"
+            )
+        if self.ledge_mm and not self.base_mm:
+            raise OutOfRange("seam_mm: base_mm is 0, so that nothing reaches under the next tile; expected a base")
+        m, n = self.counts
+        if min(m, n) < 1:
+            raise OutOfRange(
+                f"{self.length_mm:g} x {self.width_mm:g} mm has room for {m} rows and {n} columns; expected at least "
+                "one of each: use a shorter pitch or a larger area"
+            )
+        if m * n > MOST_CROSSINGS:
+            raise OutOfRange(f"{m} x {n} crossings; expected at most {MOST_CROSSINGS}: use a longer pitch")
+
+    def _refuse_tracks(self) -> None:
+        """Refuse tracks and leads that touch, and numbers of them that are not whole."""
         for side, pitch, track in (("column", self.pitch[0], self.column_mm), ("row", self.pitch[1], self.row_mm)):
             if track >= pitch - SLIVER_MM:
                 raise OutOfRange(
@@ -84,14 +142,6 @@ class Params(Envelope):
         for key in ("rows", "columns"):
             if getattr(self, key) != round(getattr(self, key)):
                 raise OutOfRange(f"{key} is {getattr(self, key):g}; expected a whole number")
-        m, n = self.counts
-        if min(m, n) < 1:
-            raise OutOfRange(
-                f"{self.length_mm:g} x {self.width_mm:g} mm has room for {m} rows and {n} columns; expected at least "
-                "one of each: use a shorter pitch or a larger area"
-            )
-        if m * n > MOST_CROSSINGS:
-            raise OutOfRange(f"{m} x {n} crossings; expected at most {MOST_CROSSINGS}: use a longer pitch")
 
     @property
     def counts(self) -> tuple[int, int]:
@@ -107,6 +157,15 @@ class Params(Envelope):
             self.length_mm / self.columns if self.columns else self.pitch_x_mm,
             self.width_mm / self.rows if self.rows else self.pitch_y_mm,
         )
+
+    def edge(self, ends: str) -> float:
+        """Margin at the ends of the rows or of the columns: none where the next tile follows [mm]."""
+        return 0.0 if self.seams in (ends, "both") else self.margin_mm
+
+    @property
+    def ledge_mm(self) -> float:
+        """Width of the base that reaches under the next tile [mm]."""
+        return 0.0 if self.edge("columns") else self.seam_mm
 
     def cells(self) -> float:
         """Number of crossings [-]."""
@@ -213,6 +272,15 @@ class Layout:
         return shapely.set_precision(shapely.union_all(squares), 1e-6)
 
     @cached_property
+    def open_air(self) -> "shapely.Geometry":
+        """Grooves along the columns, closed at their ends: no roof spans more than the space between two [mm]."""
+        import shapely
+
+        half, ends = self.params.pitch[0] / 2, [(t.body, (t.body[0] + t.body[1]) / 2) for t in self.columns]
+        grooves = [shapely.box(x - half, body[2], x + half, body[3]) for body, x in ends]
+        return shapely.set_precision(shapely.union_all(grooves), 1e-6)
+
+    @cached_property
     def footprint(self) -> "shapely.Geometry":
         """The print [mm]: of an outline squares, tracks and leads with their edge, narrow notches filled."""
         import shapely
@@ -220,14 +288,86 @@ class Layout:
         p, (rows, columns) = self.params, self.regions
         if all(map(all, self.here)):
             return shapely.box(0.0, 0.0, *self.size_mm)
-        field = shapely.box(0.0, 0.0, max(t.pad[1] for t in self.columns) + p.margin_mm, p.pad_mm)
+        beside = max(p.margin_mm, p.hole_mm + 2 * WALL_MM + DOT_MM if p.hole_mm else 0.0)
+        field = shapely.box(0.0, 0.0, max(t.pad[1] for t in self.columns) + beside, p.pad_mm)
         grown = shapely.union_all([self.sensing, rows, columns]).buffer(p.margin_mm, join_style="mitre") | field
         closed = grown.buffer(p.connector_mm, join_style="mitre").buffer(-p.connector_mm, join_style="mitre")
         whole = shapely.box(0.0, 0.0, *self.size_mm)
         return shapely.set_precision(shapely.intersection(closed, whole), 1e-6)
 
+    @cached_property
+    def ledge(self) -> "shapely.Geometry":
+        """Part of the base that reaches under the next tile [mm]."""
+        import shapely
+
+        right, top = self.size_mm
+        left = self.x_mm[0] - self.params.pitch[0] / 2
+        return shapely.box(left, top, right, rounded(top + self.params.ledge_mm))
+
+    @cached_property
+    def holes(self) -> "shapely.Geometry":
+        """Square holes for pins: between the pads of rows and columns, and right of all pads [mm].
+
+        Raises
+        ------
+        OutOfRange
+            No room beside the leads.
+        """
+        import shapely
+
+        side = self.params.hole_mm
+        if not side:
+            return shapely.MultiPolygon()
+        first, last = min(t.pad[0] for t in self.columns), max(t.pad[1] for t in self.columns)
+        left = self._square(side, max(t.pad[1] for t in self.rows), first)
+        right = self._square(side, last, self.size_mm[0], -1)
+        if left is None or right is None:
+            raise OutOfRange(
+                f"hole_mm {side:g}: no room beside the leads; expected a smaller hole, pad_mm above "
+                f"{side + 2 * WALL_MM:.3g}, or a wider margin_mm"
+            )
+        return shapely.MultiPolygon([left, right])
+
+    def _square(self, side: float, low: float, high: float, order: int = 1) -> "shapely.Polygon | None":
+        """First square, or last, between two places along the pads with a wall around it beside all tracks [mm]."""
+        import shapely
+
+        tracks = shapely.union_all(self.regions).buffer(WALL_MM, join_style="mitre")
+        room = self.footprint.buffer(-WALL_MM, join_style="mitre") - tracks
+        count = max(0, int((high - low - 2 * WALL_MM - side) / DOT_MM + 1))
+        places = [rounded(low + WALL_MM + k * DOT_MM) for k in range(count)][::order]
+        squares = (shapely.box(x, WALL_MM, rounded(x + side), rounded(WALL_MM + side)) for x in places)
+        return next((square for square in squares if room.covers(square)), None)
+
+    @cached_property
+    def letters(self) -> "shapely.Geometry":
+        """Names of the tracks along their leads, of every so many that letters have room, the last one's too [mm]."""
+        import shapely
+
+        p, found = self.params, list[shapely.Polygon]()
+        every = ceil((LINE_DOTS + 1) * DOT_MM / p.connector_mm - _WHOLE)
+        for tracks in (self.rows, self.columns):
+            chosen = {*range(0, max(len(tracks) - every, 0), every), len(tracks) - 1}
+            found += [dots for k in sorted(chosen) for dots in self._name(tracks[k])]
+        return shapely.set_precision(shapely.union_all(found), 1e-6)
+
+    def _name(self, track: Track) -> "Iterator[shapely.Polygon]":
+        """Rows of dots of a track's name, turned by a quarter, to be read from the right [mm]."""
+        import shapely
+
+        p = self.params
+        name = f"{p.tile:g}.{track.name.upper()}" if p.tile else track.name.upper()
+        left = (track.pad[0] + track.pad[1]) / 2 - LINE_DOTS * DOT_MM / 2
+        for row in range(LINE_DOTS):
+            x = rounded(left + (LINE_DOTS - 1 - row if p.pads == "left" else row) * DOT_MM)
+            for start, end in runs(name, row):
+                y0, y1 = (rounded(p.pad_mm + (1 + dots) * DOT_MM) for dots in (start, end))
+                yield shapely.box(x, y0, rounded(x + DOT_MM), y1)
+
     def crossing(self, x_mm: float, y_mm: float) -> str:
-        """Name of the crossing at a place, as ``r12c5``; "" beside all of them."""
+        """Name of the crossing at a place of the print, as ``r12c5``; "" beside all of them."""
+        if self.params.pads == "left":
+            x_mm, y_mm = y_mm, x_mm
         px, py = (side / 2 for side in self.params.pitch)
         column = next((j for j, x in enumerate(self.x_mm) if abs(x - x_mm) <= px), None)
         row = next((i for i, y in enumerate(self.y_mm) if abs(y - y_mm) <= py), None)
@@ -276,7 +416,7 @@ def layout(p: Params, outline: str | None = None) -> Layout:
     x0, y0 = rounded(len(rows) * q + 2 * edge), rounded(p.pad_mm + fan + edge)
     x, y = _middles(x0, px, n), _middles(y0, py, m)
     made = Layout(p, (), (), x, y, (0.0, 0.0), tuple(map(tuple, here)))
-    size = rounded(x[columns[-1]] + px / 2 + edge), rounded(y[rows[-1]] + py / 2 + edge)
+    size = rounded(x[columns[-1]] + px / 2 + p.edge("rows")), rounded(y[rows[-1]] + py / 2 + p.edge("columns"))
     return replace(
         made,
         rows=tuple(_row(made, i, order, x0) for order, i in enumerate(rows)),
@@ -294,16 +434,20 @@ def _inside(p: Params, outline: str | None) -> list[list[bool]]:
     m, n = p.counts
     if outline is None:
         return [[True] * n for _ in range(m)]
+    import numpy as np
     import shapely
 
     from sensorgen.design import borders
 
     region, (px, py) = borders.region(outline).buffer(_WHOLE), p.pitch
     shapely.prepare(region)
-    return [
-        [bool(region.covers(shapely.box(j * px, i * py, (j + 1) * px, (i + 1) * py))) for j in range(n)]
-        for i in range(m)
-    ]
+    x, y = (  # in the middle of the outline, so that as much is left at either side
+        (high - count * step) / 2 + np.arange(count + 1) * step
+        for high, count, step in zip(borders.region(outline).bounds[2:], (n, m), (px, py), strict=True)
+    )
+    squares = shapely.box(x[None, :-1], y[:-1, None], x[None, 1:], y[1:, None])
+    found: list[list[bool]] = shapely.covers(region, squares).tolist()
+    return found
 
 
 def _row(of: Layout, i: int, order: int, x0: float) -> Track:
@@ -349,8 +493,8 @@ def _rounded(x0: float, x1: float, y0: float, y1: float) -> tuple[float, float, 
     return rounded(x0), rounded(x1), rounded(y0), rounded(y1)
 
 
-def cell_parameters(p: Params, given: Mapping[str, float | str]) -> dict[str, float | str]:
-    """Parameters of the cell's shape for one crossing.
+def cell_parameters(p: Params, shape: str, given: Mapping[str, float | str], layer_mm: float) -> dict[str, float | str]:
+    """Parameters of the cell's shape for one crossing; of ``tri`` alone those that print without an error.
 
     Raises
     ------
@@ -361,7 +505,12 @@ def cell_parameters(p: Params, given: Mapping[str, float | str]) -> dict[str, fl
         if key in given:
             raise BadInput(f"cell.parameters.{key}: the array gives it; set it, or the width of its tracks, there")
     own = {"length_mm": p.column_mm, "width_mm": p.row_mm, "electrode_mm": p.electrode_mm, "isolation_mm": 0.0}
-    return {**given, **own}
+    usual: dict[str, float | str] = {}
+    if shape == "tri" and not given:  # flat tips on layers, no part narrower than a line
+        lower_mm, hang_mm = (rounded(ceil(size / layer_mm - _WHOLE) * layer_mm) for size in (0.1, 0.3))
+        period_mm = p.column_mm / max(1, int(p.column_mm / 4 + _WHOLE))
+        usual = {"period_mm": period_mm, "tip_mm": 0.5, "lower_height_mm": lower_mm, "hang_height_mm": hang_mm}
+    return {**usual, **given, **own}
 
 
 def crossing_tip(p: Params, tip: TipData) -> dict[str, object]:
@@ -419,33 +568,43 @@ def scene(of: Layout, fill: Fill, strip: Any, params: Envelope) -> Scene:
     roof = max(piece.span("z")[1] for own in strips for pieces in own.values() for piece in pieces)
     z = _Levels.of(of.params, roof, getattr(params, "dielectric_mm", 0.0))
     (rows, columns), (row_pads, column_pads) = of.regions, of.pads
-    whole, under = of.footprint, _united(of.columns)
-    stack.plates("base", fill.isolation, whole, 0.0, z.rows)
+    whole, under = of.footprint - of.holes, _united(of.columns)
+    stack.plates("base", fill.isolation, whole | of.ledge if of.params.ledge_mm else whole, 0.0, z.rows)
     stack.plates("row_tracks", fill.bottom_electrode, rows, z.rows, z.film, "bottom")
     for own in strips:
         for key, pieces in own.items():
             stack.add(*key, pieces)
     stack.plates(stack.top(), fill.top_electrode, columns - under, z.columns, z.cover)
     beside = whole - row_pads - under
-    high = beside - of.sensing if of.params.between == "air" else beside
+    high = beside - of.open_air if of.params.between == "air" else beside
     name = stack.solid(fill.dielectric)
     stack.plates(name, fill.dielectric, whole - rows, z.rows, z.film)
     stack.plates(name, fill.dielectric, beside, z.film, z.above_film)
     stack.plates(name, fill.dielectric, high, z.above_film, z.columns)
     stack.plates(name, fill.dielectric, high - columns, z.columns, z.cover)
-    stack.plates("isolation", fill.isolation, whole - row_pads - column_pads, z.cover, z.top)
-    return Scene(stack.made(), (*of.size_mm, z.top))
+    stack.cover(of, fill.isolation, whole - row_pads - column_pads, z)
+    return _laid(of.params, stack.made(), (of.size_mm[0], rounded(of.size_mm[1] + of.params.ledge_mm), z.top))
+
+
+def _laid(p: Params, bodies: tuple[Body, ...], size_mm: tuple[float, float, float]) -> Scene:
+    """Scene with its pads at the edge that is asked for."""
+    if p.pads == "bottom":
+        return Scene(bodies, size_mm)
+    length, width, height = size_mm
+    exchanged = (replace(body, pieces=tuple(map(transposed, body.pieces))) for body in bodies)
+    return Scene(tuple(exchanged), (width, length, height))
 
 
 @dataclass(frozen=True)
 class _Levels:
-    """Heights at which rows, film, what is above it, columns and cover begin, and the top [mm]."""
+    """Heights at which rows, film, what is above it, columns, cover and letters begin, and the top [mm]."""
 
     rows: float
     film: float
     above_film: float
     columns: float
     cover: float
+    face: float
     top: float
 
     @classmethod
@@ -455,7 +614,8 @@ class _Levels:
         columns = rounded(roof - p.electrode_mm)
         return cls(
             rounded(p.base_mm), low, min(rounded(low + film_mm), columns), columns, rounded(roof),
-            rounded(roof + p.isolation_mm),
+            rounded(roof + p.isolation_mm - (LABEL_MM if p.labels == "engraved" else 0)),
+            rounded(roof + p.isolation_mm + (LABEL_MM if p.labels == "raised" else 0)),
         )  # fmt: skip
 
 
@@ -475,19 +635,31 @@ class _GrowingBodies:
         """Add a region between two heights."""
         self.add(name, material, terminal, _plates(region, z0, z1))
 
+    def cover(self, of: Layout, material: str, region: "shapely.Geometry", z: _Levels) -> None:
+        """Add the cover with its letters."""
+        self.plates("isolation", material, region, z.cover, z.face)
+        if of.params.labels == "raised":
+            self.plates("isolation", material, of.letters, z.face, z.top)
+        if of.params.labels == "engraved":
+            self.plates("isolation", material, region - of.letters, z.face, z.top)
+
     def top(self) -> str:
         """Name of the columns."""
         return next(name for name, (_, _, terminal) in self.bodies.items() if terminal == "top")
 
     def solid(self, material: str) -> str:
-        """Name of a body of the cells that is of boxes of a material, else of a new one.
+        """Name of the first body of the cells of a material, else of a new one; the others of it join it.
 
-        What lies between the tracks joins it, so that no boundary is printed between both.
+        What lies between the tracks joins it, too: slicers print touching parts of one tool as one.
         """
-        for name, (own, pieces, terminal) in self.bodies.items():
-            if own == material and not terminal and name != "base" and all(piece.is_box() for piece in pieces):
-                return name
-        return "filler"
+        first, *others = [
+            name
+            for name, (own, _, terminal) in self.bodies.items()
+            if own == material and not terminal and name != "base"
+        ] or ["filler"]
+        for name in others:
+            self.add(first, material, "", self.bodies.pop(name)[1])
+        return first
 
     def made(self) -> tuple[Body, ...]:
         """The bodies, from bottom to top as they were added."""
@@ -506,8 +678,6 @@ def _strip(
     of: Layout, track: Track, shape_scene: Any, fill: Fill, params: Envelope
 ) -> Mapping[tuple[str, str, str], list[Piece]]:
     """Pieces of one column above the rows, by name, material and terminal of their body."""
-    from sensorgen.scene.shifting import shifted
-
     p, (x0, _, y0, y1) = of.params, track.body
     made: Scene = shape_scene(replace(params, width_mm=rounded(y1 - y0)), fill)
     found: dict[tuple[str, str, str], list[Piece]] = {}

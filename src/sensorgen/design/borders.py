@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput
+from sensorgen.design import feet
 
 if TYPE_CHECKING:
     import shapely
@@ -35,6 +36,10 @@ def with_border(data: dict[str, Any], folder: Path) -> dict[str, Any]:
         raise BadInput("border: an imported sensor has its own; cut it in CAD")
     if given.startswith(_START):
         text = given
+    elif (corners := feet.outline(given)) is not None:
+        import shapely
+
+        text = str(shapely.Polygon(corners).wkt)
     else:
         from sensorgen.scene.geometry import outline_files
 
@@ -59,8 +64,10 @@ def region(text: str) -> "shapely.Polygon":
         found = shapely.from_wkt(text)
     except shapely.errors.GEOSException as error:
         raise BadInput(f"border: {error}") from None
-    if not (isinstance(found, shapely.Polygon) and found.is_valid and found.area > 0):
-        raise BadInput("border: expected an SVG or DXF file, or one POLYGON around an area")
+    if isinstance(found, shapely.Polygon) and not found.is_valid:
+        raise BadInput(f"border: the outline crosses itself: {shapely.is_valid_reason(found)} mm; draw it anew there")
+    if not (isinstance(found, shapely.Polygon) and found.area > 0):
+        raise BadInput("border: expected an SVG or DXF file, a foot as 'foot 42 left', or one POLYGON around an area")
     if found.bounds[:2] != (0.0, 0.0):
         raise BadInput(f"border: it begins at {found.bounds[0]:g}, {found.bounds[1]:g} mm; expected its corner at 0, 0")
     return found

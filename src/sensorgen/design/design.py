@@ -24,7 +24,8 @@ from sensorgen.design.effects import Effects
 from sensorgen.design.packs import Kind
 from sensorgen.design.printer import Pattern, Printer, Quality, load_printer, load_quality
 from sensorgen.design.profile import Profile, with_own
-from sensorgen.design.tip import EVEN, STIFF, TipData
+from sensorgen.design.tip import EVEN, STIFF
+from sensorgen.design.tip_data import TipData
 from sensorgen.scene.scene import Envelope, Fill, Scene
 
 if TYPE_CHECKING:
@@ -154,7 +155,9 @@ class Design(Strict):
     bodies: dict[str, imported.Filled] = Field(default={}, description="Imported body to material and terminal.")
     cell: Cell | None = Field(default=None, description="Of an array: what lies between crossing tracks.")
     border: str | None = Field(
-        default=None, description="SVG or DXF file of the sensor's outline in plan, relative to the design's own file."
+        default=None,
+        description="SVG or DXF file of the sensor's outline in plan, relative to the design's own file; or a foot by "
+        "its EU size, as: foot 42 left.",
     )
 
     @field_validator("name")
@@ -265,7 +268,7 @@ class Design(Strict):
             mode="json",
         )  # fmt: skip
         others["tip"] = arrays.crossing_tip(params, self.tip)
-        own = arrays.cell_parameters(params, cell.parameters)
+        own = arrays.cell_parameters(params, cell.shape, cell.parameters, self.layers.layer_mm)
         made = make({**others, "name": f"{self.name[:80] or 'array'}-crossing", "shape": cell.shape, "parameters": own})
         arrays.check_cell(made.params, params)
         return made

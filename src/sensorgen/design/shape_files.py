@@ -175,7 +175,10 @@ class _Foreign:
         known = answers.known(key)
         if known is None:
             known = _process(self._name, self._text).ask(question)
-            answers.keep(key, known)
+            try:
+                answers.keep(key, known)
+            except ValueError:
+                raise BadInput(f"{self._name}.py: a number that is not finite; expected finite ones") from None
         return known
 
 

@@ -3,7 +3,7 @@
 import re
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -264,6 +264,9 @@ def _run(
         not_known = prusa.settings(text).keys() - known.keys() if known else set()
     else:
         settings = curaengine.engine_settings(design.machine, design.layers, all_loads, version)
+        # The engine primes in the first layer only the tool that prints the skirt: that of what lies on the bed
+        lowest = min(bodies, key=lambda part: (part.mesh.vertices_mm[:, 2].min(initial=np.inf), part.extruder))
+        settings = replace(settings, common=settings.common | {"adhesion_extruder_nr": str(lowest.extruder)})
         shift_mm = np.array([-c for c in design.machine.bed_centre_mm()] + [0.0])
         files = [(folder / f"{part.name}.stl", part) for part in bodies]
         for path, part in files:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from sensorgen.core.arrays import Complex, Mask, Real
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, within
 from sensorgen.core.files import reading
 from sensorgen.core.units import si
 
@@ -20,7 +20,10 @@ MOST_BYTES = 4_000_000_000
 _CROSSING = re.compile(r"r(\d+)c(\d+)")
 _TRUE = ("1", "1.0", "true")
 KEYS = ("siemens", "capacitance_f")
-_KNOWN = (*KEYS, "time_s", "rest", "frequency_hz", "pressure_kpa")
+REFERENCES = ("pressure_kpa", "force_n", "element", "day", "area_mm2")
+_KNOWN = (*KEYS, "reading", "time_s", "rest", "frequency_hz", *REFERENCES)
+_HDF = (".h5", ".hdf5", ".hdf")
+BINARY = (".npz", *_HDF)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +64,9 @@ def read(path: Path, shape: tuple[int, int], frequency_hz: float | None) -> Fram
     Parameters
     ----------
     path : Path
-        NPZ with ``siemens`` (frames, rows, columns), complex, or ``capacitance_f``, and perhaps ``time_s``, ``rest``,
-        ``frequency_hz``; or CSV with a row per frame, columns ``r1c1`` ... [F], and perhaps ``time_s`` and ``rest``.
+        NPZ or HDF5 with ``siemens`` (frames, rows, columns), complex, or ``capacitance_f``, and perhaps ``time_s``,
+        ``rest``, ``frequency_hz``; or CSV with a row per frame, columns ``r1c1`` ... [F], and perhaps ``time_s`` and
+        ``rest``.
     shape : (int, int)
         Rows and columns of the array.
     frequency_hz : float, optional
@@ -76,7 +80,7 @@ def read(path: Path, shape: tuple[int, int], frequency_hz: float | None) -> Fram
     with reading(path):
         if path.stat().st_size > MOST_BYTES:
             raise BadInput(f"{path}: {path.stat().st_size / 1e9:.1f} GB; expected at most {MOST_BYTES / 1e9:g} GB")
-        found, unused = _of_npz(path) if path.suffix == ".npz" else _of_csv(path, shape)
+        found, unused = numbers(path) if path.suffix in BINARY else _of_csv(path, shape)
     try:
         return replace(_checked(found, shape, frequency_hz), unused=tuple(unused))
     except BadInput as error:
@@ -121,8 +125,10 @@ def _each(found: dict[str, np.ndarray], name: str, default: Real) -> Real:
     return values
 
 
-def _of_npz(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
-    """Numbers of a file by name, and the names that are not read."""
+def numbers(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Numbers of an NPZ or HDF5 file by name, and the names that are not read."""
+    if path.suffix in _HDF:
+        return _of_hdf(path)
     try:
         with np.load(path, allow_pickle=False) as data:
             found = {key: data[key] for key in data.files if data[key].dtype.kind in "bifuc"}
@@ -131,8 +137,23 @@ def _of_npz(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
         raise BadInput(f"{path}: no NPZ file of numbers ({str(error)[:80]})") from None
 
 
-def _of_csv(path: Path, shape: tuple[int, int]) -> tuple[dict[str, np.ndarray], list[str]]:
-    """Numbers of a table by name, and the columns that are not read."""
+def _of_hdf(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
+    from sensorgen.measure.recording import hdf
+    from sensorgen.measure.recording.matfive import Split
+    from sensorgen.measure.recording.spool import Spool
+
+    with within(str(path)):
+        found = hdf.variables(path, _KNOWN, Spool())
+    for key, value in found.items():
+        values = value.real + 1j * value.imag if isinstance(value, Split) else np.asarray(value)
+        if values.dtype.kind not in "bifuc":
+            raise BadInput(f"{path}: {key} is {values.dtype}; expected numbers")
+        found[key] = values.ravel() if key not in (*KEYS, "reading", "pressure_kpa") else values
+    return found, []
+
+
+def table(path: Path) -> dict[str, tuple[str, ...]]:
+    """Words of a table by the names of its columns."""
     try:
         rows = list(csv.reader(path.read_text("utf-8").splitlines()))
     except (UnicodeDecodeError, csv.Error) as error:
@@ -143,23 +164,32 @@ def _of_csv(path: Path, shape: tuple[int, int]) -> tuple[dict[str, np.ndarray], 
         if len(row) != len(rows[0]):
             raise BadInput(f"{path}, line {line}: {len(row)} values; expected {len(rows[0])} as in the head")
     names = [name.strip() for name in rows[0]]
-    columns = dict(zip(names, zip(*rows[1:], strict=True), strict=True))
-    values = np.full((len(rows) - 1, *shape), np.nan)
-    crossings = _crossings(names, shape, path)
+    refuse_repeated(names, {}, path)
+    return dict(zip(names, zip(*rows[1:], strict=True), strict=True))
+
+
+def _of_csv(path: Path, shape: tuple[int, int]) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Numbers of a table by name, and the columns that are not read."""
+    columns = table(path)
+    crossings = _crossings(list(columns), shape, path)
+    values = np.full((len(next(iter(columns.values()))), *shape), np.nan)
     for name, (i, j) in crossings.items():
-        values[:, i, j] = _numbers(columns[name], path)
-    found = {"capacitance_f": values}
-    if "time_s" in columns:
-        found["time_s"] = _numbers(columns["time_s"], path)
+        values[:, i, j] = column(columns[name], path)
+    found = {"capacitance_f": values} | {key: column(columns[key], path) for key in ("time_s",) if key in columns}
     if "rest" in columns:
-        found["rest"] = np.array([word.strip().lower() in _TRUE for word in columns["rest"]])
+        found["rest"] = marked(columns["rest"])
     return found, sorted({*columns} - {*crossings, "time_s", "rest", ""})
+
+
+def marked(words: Sequence[str]) -> Mask:
+    """Frames with a mark of 1 or true."""
+    return np.array([word.strip().lower() in _TRUE for word in words])
 
 
 def _crossings(names: Sequence[str], shape: tuple[int, int], path: Path) -> dict[str, tuple[int, int]]:
     """Row and column of each name of a crossing."""
     found = {name: (int(m[1]) - 1, int(m[2]) - 1) for name in names if (m := _CROSSING.fullmatch(name))}
-    _refuse_repeated(names, found, path)
+    refuse_repeated(names, found, path)
     wrong = [name for name, (i, j) in found.items() if not (0 <= i < shape[0] and 0 <= j < shape[1])]
     if wrong or not found:
         words = ", ".join(wrong[:3]) or "without any crossing"
@@ -167,14 +197,14 @@ def _crossings(names: Sequence[str], shape: tuple[int, int], path: Path) -> dict
     return found
 
 
-def _refuse_repeated(names: Sequence[str], found: dict[str, tuple[int, int]], path: Path) -> None:
+def refuse_repeated(names: Sequence[str], found: dict[str, tuple[int, int]], path: Path) -> None:
     """Refuse names that repeat, and two of one crossing."""
     times = Counter(found.get(name, name) for name in names if name)
     if repeated := [name for name in names if times[found.get(name, name)] > 1]:
         raise BadInput(f"{path}: columns {', '.join(repeated[:3])} repeat; expected each once")
 
 
-def _numbers(words: Sequence[str], path: Path) -> Real:
+def column(words: Sequence[str], path: Path) -> Real:
     """Numbers of a column; nan where a word is empty."""
     return np.array([_number(word, path, line) for line, word in enumerate(words, 2)])
 

@@ -40,7 +40,7 @@ class ClosedForm:
 
 
 def _springs(design: Design, piece: Piece, stress_pa: Sequence[float]) -> ClosedForm:
-    """Columns as springs side by side, for any scene."""
+    """Samples as springs side by side, for any scene."""
     scene, why = piece.scene, press2d.why_not_applicable(piece.scene)
     solids = elastic(design, scene)
     moduli = {n: s.youngs_modulus_pa / (1.0 if why else 1 - s.poisson_ratio**2) for n, s in solids.items()}

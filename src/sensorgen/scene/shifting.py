@@ -1,4 +1,4 @@
-"""Pieces moved to another place."""
+"""Pieces moved to another place, or with x and y exchanged."""
 
 from dataclasses import replace
 
@@ -31,6 +31,25 @@ def shifted(piece: Piece, by_mm: Place) -> Piece:
     whole = surface(piece)
     corners = tuple((rounded(a + x), rounded(b + y), rounded(c + z)) for a, b, c in whole.vertices)
     return Polyhedron(corners, whole.triangles)
+
+
+def transposed(piece: Piece) -> Piece:
+    """Piece with x and y exchanged: its mirror image about the line x = y.
+
+    >>> transposed(Prism("y", ((0, 5), (1, 5), (1, 6)), 2, 3))
+    Prism(axis='x', outline=((0, 5), (1, 5), (1, 6)), start_mm=2, end_mm=3)
+    """
+    if isinstance(piece, Prism):
+        if piece.axis == "z":
+            return replace(piece, outline=tuple((y, x) for x, y in piece.outline))
+        return replace(piece, axis={"x": "y", "y": "x"}[piece.axis])
+    if isinstance(piece, Revolved):
+        return replace(piece, x_mm=piece.y_mm, y_mm=piece.x_mm)
+    if isinstance(piece, Loft):
+        lower, upper = (tuple((y, x) for x, y in outline) for outline in (piece.lower, piece.upper))
+        return Loft(lower, upper, piece.bottom_mm, piece.top_mm)
+    whole = surface(piece)
+    return Polyhedron(tuple((y, x, z) for x, y, z in whole.vertices), tuple((a, c, b) for a, b, c in whole.triangles))
 
 
 def _moved(outline: Outline, u_mm: float, v_mm: float) -> Outline:

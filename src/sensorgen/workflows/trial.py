@@ -15,7 +15,7 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE, FORCE_SHARE, GUESS
 from sensorgen.prediction.query import DEFAULT, Query
-from sensorgen.prediction.results import Prediction, caption_of, on_bench, resolved
+from sensorgen.prediction.results import Prediction, caption_of, resolved
 from sensorgen.prediction.slices import PrintReview, SliceReport, reviewed
 
 
@@ -35,14 +35,16 @@ class Numbers:
         Relative change of capacitance per pressure, over the range of the query [1/kPa].
     force_resolution, position_resolution : Bounds or None
         Standard errors from one reading at the reference load, of a sensor that is exactly as predicted [N], [m].
-    force_calibrated, position_calibrated : float or None
-        The same after 30 known presses of a specimen, the best value alone [N], [m].
+    force_calibrated, position_calibrated : Bounds or None
+        The same on a bench, after 30 known presses of a specimen [N], [m].
     force_typical, position_typical : float or None
         Median of the standard errors over all forces and positions [N], [m].
     conditional : bool
         Whether they rest on values that no source gives.
     by_top : str
         Standard errors after known presses under each top, in words; "" where the top makes no difference.
+    pressure_resolution, wires : float or None
+        Of an array: median standard error of a crossing's pressure, at 100 kPa [kPa], and number of wires [-].
     """
 
     gap: Bounds | None = None
@@ -52,42 +54,40 @@ class Numbers:
     sensitivity: Bounds | None = None
     force_resolution: Bounds | None = None
     position_resolution: Bounds | None = None
-    force_calibrated: float | None = None
-    position_calibrated: float | None = None
+    force_calibrated: Bounds | None = None
+    position_calibrated: Bounds | None = None
     force_typical: float | None = None
     position_typical: float | None = None
     conditional: bool = False
     by_top: str = ""
+    pressure_resolution: float | None = None
+    wires: float | None = None
 
     @classmethod
     def of(cls, found: Prediction) -> "Numbers":
         """The numbers of a prediction, under the worst top where they depend on it."""
         tops = found.under()
+        on_bench = found.bench() if any(top.calibrated for top in tops) else (None, None)
 
         def worst(key: str) -> Bounds | None:
             values: list[Bounds] = [b for top in tops if (b := getattr(top, key))]
             sign = 1 if key == "sensitivity" else -1
             return min(values, key=lambda b: sign * b.value, default=None)
 
-        def largest(key: str, part: str) -> float | None:
-            values = [getattr(errors, part) for top in tops if (errors := getattr(top, key))]
+        def typical(part: str) -> float | None:
+            values = [getattr(top.typical, part) for top in tops if top.typical]
             return max((v for v in values if v is not None), default=None)
 
-        force, place = "sigma_force_n", "sigma_position_m"
         return cls(
             found.gap, found.capacitance, found.resistance.get("top"), found.resistance.get("bottom"),
             worst("sensitivity"), worst("force_resolution"), worst("position_resolution"),
-            largest("calibrated", force), largest("calibrated", place),
-            largest("typical", force), largest("typical", place),
+            *on_bench, typical("sigma_force_n"), typical("sigma_position_m"),
             found.conditional, "; ".join(top.words() for top in found.tops),
         )  # fmt: skip
 
     def bench(self) -> tuple[Bounds | None, Bounds | None]:
         """Standard errors of force and position on a bench, after known presses [N], [m]."""
-        return (
-            on_bench(self.force_resolution, self.force_calibrated),
-            on_bench(self.position_resolution, self.position_calibrated),
-        )
+        return self.force_calibrated or self.force_resolution, self.position_calibrated or self.position_resolution
 
 
 @dataclass(frozen=True)

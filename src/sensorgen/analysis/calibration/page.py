@@ -14,17 +14,17 @@ from sensorgen.prediction.calibration.coverage import inside
 from sensorgen.prediction.calibration.inversion import LEVEL
 from sensorgen.prediction.inverse.verdict import NORMAL_90
 
+_RESIDUALS = ("residual of the magnitude [%]", "residual of the phase [0.01 rad]")  # measured less fitted
+
 
 def html(made: Sequence[Made | Recheck]) -> str:
     """A page for the browser; raises MissingValue where Plotly is not installed."""
-    figures, words = [], []
+    sections = []
     for number, one in enumerate(made):
-        words += [part for part in one.document() if isinstance(part, str) and part]
-        if isinstance(one, Made):
-            figures += [*_presses(one, number), _left_over(one, number)]
-        figures.append(_parameters(one.calibration, number))
-    names = ", ".join(one.calibration.specimen for one in made)
-    return pages.page(f"Calibration of {document.visible(names)}", words, figures)
+        fit = (*_presses(one, number), *_left_over(one, number)) if isinstance(one, Made) else ()
+        figures, specimen = (*fit, _parameters(one.calibration, number)), document.visible(one.calibration.specimen)
+        sections.append(pages.Section(f"specimen-{number}", specimen, figures, tuple(one.document())))
+    return pages.page(f"Calibration of {', '.join(section.title for section in sections)}", (), sections)
 
 
 def _presses(made: Made, number: int) -> list[Figure]:
@@ -52,37 +52,33 @@ def _presses(made: Made, number: int) -> list[Figure]:
     return [Figure(f"presses-{number}", title, alt, {"": tuple(panels)}, columns=2)]
 
 
-def _left_over(made: Made, number: int) -> Figure:
-    """Residuals of the ratios at each tone, over force."""
+def _left_over(made: Made, number: int) -> list[Figure]:
+    """Residuals of the ratios of presses at each tone over force, and of the reading at rest over frequency."""
     model, data = made.calibration.model, made.data
-    panels = []
-    if len(data.presses.force_n):
-        left = data.ratio - model.ratio(made.calibration.posterior.at, data.presses)
-        for part, of in (("magnitude", left.real), ("phase", left.imag)):
-            content = tuple(
-                Curve(
-                    "points", f"{f / 1e3:g} kHz", data.presses.force_n, 100 * of[:, k], colour=COLOURS[k % len(COLOURS)]
-                )
-                for k, f in enumerate(model.frequency_hz.tolist())
-            )
-            unit = "%" if part == "magnitude" else "0.01 rad"
-            title = f"{part} of pressed over rest: measured less fitted"
-            panels.append(Panel(content, Axis("force [N]"), Axis(f"residual [{unit}]"), title=title))
-    rest = 100 * (data.rest - model.rest(made.calibration.posterior.at))
+    specimen, at = made.calibration.specimen, made.calibration.posterior.at
     khz = model.frequency_hz / 1e3
-    panels.append(Panel(
-        (Curve("points", "magnitude [%]", khz, rest.real, colour=BLUE),
-         Curve("points", "phase [0.01 rad]", khz, rest.imag, colour=ORANGE)),
-        Axis("frequency [kHz]", log=True), Axis("residual"), title="at rest: measured less fitted",
-    ))  # fmt: skip
-    alt = "Residuals of the calibration: of presses over force, of the reading at rest over frequency."
-    return Figure(
-        f"residuals-{number}",
-        f"{made.calibration.specimen}: what the fit leaves over",
-        alt,
-        {"": tuple(panels)},
-        columns=2,
+    rest = 100 * (data.rest - model.rest(at))
+    panels = tuple(
+        Panel((Curve("points", "", khz, values, colour=BLUE),), Axis("frequency [kHz]", log=True), Axis(words))
+        for words, values in zip(_RESIDUALS, (rest.real, rest.imag), strict=True)
     )
+    alt = "Residuals of the reading at rest over frequency: of its magnitude and of its phase."
+    figures = [Figure(f"rest-{number}", f"{specimen}: residuals at rest", alt, {"": panels}, columns=2)]
+    if len(data.presses.force_n):
+        left = 100 * (data.ratio - model.ratio(at, data.presses))
+        panels = tuple(
+            Panel(
+                tuple(
+                    Curve("points", f"{f:g} kHz", data.presses.force_n, values[:, k], colour=COLOURS[k % len(COLOURS)])
+                    for k, f in enumerate(khz.tolist())
+                ),
+                Axis("force [N]"), Axis(words),
+            )
+            for words, values in zip(_RESIDUALS, (left.real, left.imag), strict=True)
+        )  # fmt: skip
+        alt = "Residuals of the ratio of pressed over rest, over force: of its magnitude and of its phase."
+        figures.append(Figure(f"residuals-{number}", f"{specimen}: residuals under load", alt, {"": panels}, columns=2))
+    return figures
 
 
 def _parameters(calibration: Calibration, number: int) -> Figure:

@@ -15,6 +15,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.materials import INTERFACE_GAP, Material
 from sensorgen.models import coupons as closed
+from sensorgen.prediction.inference import Parameter
 
 LEVEL_SIGMA = 1.959964  # half of a 95 % interval in standard deviations
 LADDER_MM = (3.0, 6.0, 12.0, 24.0)  # between neighbouring strips
@@ -34,26 +35,6 @@ _FILL = 0.015  # coupons of one plate differ in how well they are filled [-]
 _TAPS_MM, _WIDTH_MM, _SENSOR_MM = 40.0, 6.0, 10.0  # between taps; width of ladders, and of bars, wide as sensors
 
 Values = Mapping[str, Real]  # of unknowns in SI, or of sizes [mm]
-
-
-@dataclass(frozen=True)
-class Unknown:
-    """Quantity that the readings depend on, with its prior: a normal distribution, of ln unless linear.
-
-    Attributes
-    ----------
-    key : str
-        Its name here.
-    centre, spread : float
-        Mean and standard deviation of ln of the value in SI units, or of the value.
-    linear : bool
-        Of the value itself.
-    """
-
-    key: str
-    centre: float
-    spread: float
-    linear: bool = False
 
 
 @dataclass(frozen=True)
@@ -199,7 +180,7 @@ def _range(material: Material, quantity: str, low: float, high: float) -> tuple[
     return (log(low) + log(high)) / 2, (log(high) - log(low)) / 2
 
 
-def unknowns(conductor: Material, dielectric: Material, line_mm: float) -> tuple[Unknown, ...]:
+def unknowns(conductor: Material, dielectric: Material, line_mm: float) -> tuple[Parameter, ...]:
     """All unknowns of a pair of materials, with what their sources say.
 
     Parameters
@@ -211,18 +192,18 @@ def unknowns(conductor: Material, dielectric: Material, line_mm: float) -> tuple
     """
     along = _range(conductor, "resistivity_ohm_m", 1e-3, 10.0)
     return (
-        Unknown("along_ohm_m", *along),
-        Unknown("line_contact_ohm_m2", along[0] + log(line_mm * M_PER_MM), 2.0),
-        Unknown("crossed", 0.4, 0.3, linear=True),  # share of the way from along to across of a print's own lines
-        Unknown("through_ohm_m", along[0] + log(2.0), 1.0),
-        Unknown("terminal_ohm_m2", log(1e-4), 2.0),
-        Unknown("permittivity", *_range(dielectric, "relative_permittivity", 2.0, 12.0)),
-        Unknown("gap_m", 0.0, 3e-5, linear=True),
-        Unknown("conductor_pa", *_range(conductor, "youngs_modulus_pa", 1e6, 1e8)),
-        Unknown("dielectric_pa", *_range(dielectric, "youngs_modulus_pa", 5e5, 5e7)),
-        Unknown("conductor_1_2nu", log(0.01), 1.5),
-        Unknown("dielectric_1_2nu", log(0.01), 1.5),
-        Unknown("friction", 0.05, 0.04, linear=True),  # coefficient of lubricated plates
+        Parameter("along_ohm_m", *along),
+        Parameter("line_contact_ohm_m2", along[0] + log(line_mm * M_PER_MM), 2.0),
+        Parameter("crossed", 0.4, 0.3, linear=True),  # share of the way from along to across of a print's own lines
+        Parameter("through_ohm_m", along[0] + log(2.0), 1.0),
+        Parameter("terminal_ohm_m2", log(1e-4), 2.0),
+        Parameter("permittivity", *_range(dielectric, "relative_permittivity", 2.0, 12.0)),
+        Parameter("gap_m", 0.0, 3e-5, linear=True),
+        Parameter("conductor_pa", *_range(conductor, "youngs_modulus_pa", 1e6, 1e8)),
+        Parameter("dielectric_pa", *_range(dielectric, "youngs_modulus_pa", 5e5, 5e7)),
+        Parameter("conductor_1_2nu", log(0.01), 1.5),
+        Parameter("dielectric_1_2nu", log(0.01), 1.5),
+        Parameter("friction", 0.05, 0.04, linear=True),  # coefficient of lubricated plates
     )
 
 

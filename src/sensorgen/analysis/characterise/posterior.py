@@ -4,21 +4,22 @@ Each set of dead coupons is a model of its own: its evidence (Laplace) weighs it
 A dead coupon's readings may be anything within some decades.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import log
 
 import numpy as np
 
-from sensorgen.analysis.characterise.catalogue import Coupon, Size, Target, Unknown
+from sensorgen.analysis.characterise.catalogue import Coupon, Size, Target
 from sensorgen.core.arrays import Mask, Real
+from sensorgen.prediction.inference import Fit, Index, LeastSquares, Normal, Parameter, descend, whitening
 
 DEAD = 0.05  # of coupons, before anything is read
 _DECADES = 6.0  # within which the reading of a dead coupon lies
 _MOST_DEAD, _REFINED = 3, 4  # coupons at once; sets of dead ones that are solved, of those that are sketched
-_STEP, _STEPS = 1e-4, 40
-_STILL = 0.02  # in standard deviations: the last step
+_STEP = 1e-4
+_STILL = 1e-3  # in standard deviations: the last step
 
 
 @dataclass(frozen=True)
@@ -48,11 +49,9 @@ class Observation:
         return np.isfinite(self.log_values)
 
 
-def physical(unknowns: Sequence[Unknown], theta: Real) -> dict[str, Real]:
+def physical(unknowns: Sequence[Parameter], theta: Real) -> dict[str, Real]:
     """Values in SI units, by name, of coordinates in which the prior is normal; the last axis counts the unknowns."""
-    return {
-        u.key: theta[..., k] if u.linear else np.exp(np.clip(theta[..., k], -80, 80)) for k, u in enumerate(unknowns)
-    }
+    return {u.key: u.value(theta[..., k]) for k, u in enumerate(unknowns)}
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ class Line:
 
 
 def linearised(
-    coupon: Coupon, sizes: Sequence[Size], noise: Real, unknowns: Sequence[Unknown], theta: Real
+    coupon: Coupon, sizes: Sequence[Size], noise: Real, unknowns: Sequence[Parameter], theta: Real
 ) -> Line:  # fmt: skip
     """Expected readings, their derivatives by the unknowns, and the errors of meters and sizes together."""
     p, s = len(theta), len(sizes)
@@ -82,92 +81,84 @@ def linearised(
     return Line(found[0], ((found[1 : 1 + p] - found[0]) / steps[:, None]).T, np.diag(noise**2) + by_size.T @ by_size)
 
 
-@dataclass(frozen=True)
-class Mode:
-    """One set of dead coupons.
+@dataclass(frozen=True, eq=False)
+class Mode(Normal):
+    """Distribution of the unknowns given which coupons are dead.
 
     Attributes
     ----------
     dead : tuple of int
         Numbers of the observations.
-    mean, covariance : (p,) array, (p, p) array
-        Of the unknowns.
     log_evidence : float
         ln of the probability of all readings and of this set.
     """
 
-    dead: tuple[int, ...]
-    mean: Real
-    covariance: Real
-    log_evidence: float
+    dead: tuple[int, ...] = ()
+    log_evidence: float = 0.0
 
 
-class _Problem:
-    """Observations and unknowns: the posterior density near a point, and its peaks."""
+@dataclass(frozen=True, eq=False)
+class _Coupons(LeastSquares):
+    """Observations and unknowns, and which coupons are dead."""
 
-    def __init__(self, observations: Sequence[Observation], unknowns: Sequence[Unknown]) -> None:
-        self.observations, self.unknowns = observations, unknowns
-        self.centre, self.spread = np.array([(u.centre, u.spread) for u in unknowns]).T
+    observations: Sequence[Observation]
+    unknowns: Sequence[Parameter]
+    dead: tuple[int, ...] = ()
+    damping = 1e-3
 
-    def lines(self, theta: Real, dead: Sequence[int] = ()) -> dict[int, Line]:
-        """Every coupon's readings near a point, but those of the dead."""
-        return {
-            k: linearised(o.coupon, o.sizes, o.noise, self.unknowns, theta)
-            for k, o in enumerate(self.observations) if k not in dead
-        }  # fmt: skip
+    @cached_property
+    def before(self) -> Mode:
+        """Unknowns before any reading."""
+        return _before(self.unknowns)
 
-    def density(self, theta: Real, lines: Mapping[int, Line]) -> tuple[float, Real, Real]:
-        """Minus ln of the posterior density, its gradient, and its curvature."""
-        off = (theta - self.centre) / self.spread
-        cost, gradient = float(0.5 * off @ off + np.log(self.spread).sum()), off / self.spread
-        curvature: Real = np.diag(self.spread**-2.0)
-        for k, line in lines.items():
-            o = self.observations[k]
-            residual = (o.log_values - line.log_values)[o.read]
-            covariance = line.covariance[np.ix_(o.read, o.read)]
-            if not all(np.isfinite(part).all() for part in (residual, covariance, line.jacobian)):
-                return np.inf, gradient, curvature
-            root = np.linalg.inv(np.linalg.cholesky(covariance))
-            white, jacobian = root @ residual, root @ line.jacobian[o.read]
-            cost += float(0.5 * white @ white - np.log(np.diag(root)).sum()) + 0.5 * len(white) * log(2 * np.pi)
-            gradient = gradient - jacobian.T @ white
-            curvature = curvature + jacobian.T @ jacobian
-        return cost, gradient, curvature
+    def fit(self, at: Real, rows: Index) -> Fit:  # noqa: ARG002
+        """Minus twice ln of the density of all readings but those of the dead, at unknowns (1, p)."""
+        alive = (o for k, o in enumerate(self.observations) if k not in self.dead)
+        return self.together(at, (self.one(o, at) for o in alive))
 
-    def peak(self, start: Real, dead: tuple[int, ...]) -> Mode:
-        """Most likely unknowns given which coupons are dead, by Gauss and Newton with halved steps."""
-        theta, (cost, gradient, curvature) = start, self.density(start, self.lines(start, dead))
-        if not np.isfinite(cost):  # a gap that is wider than its film, as a step too far may have it
-            theta, (cost, gradient, curvature) = self.centre, self.density(self.centre, self.lines(self.centre, dead))
-        for _ in range(_STEPS):
-            step, share = -np.linalg.solve(curvature, gradient), 1.0
-            size = float(np.sqrt(step @ curvature @ step))
-            new = self.density(theta + step, self.lines(theta + step, dead))
-            while not new[0] <= cost + 1e-9 and share > 1e-3:
-                share /= 2
-                new = self.density(theta + share * step, self.lines(theta + share * step, dead))
-            if not new[0] <= cost + 1e-9:
-                break
-            theta, (cost, gradient, curvature) = theta + share * step, new
-            if size * share < _STILL:
-                break
-        return self.mode(theta, dead, cost, curvature)
+    def together(self, at: Real, fits: Iterable[Fit]) -> Fit:
+        """Fit of several coupons and of what was known before."""
+        zero = Fit.of(at, np.zeros((1, 0)), np.zeros((1, at.shape[1], 0)))
+        return sum(fits, zero).with_prior(self.before.at, self.before.information)
 
-    def sketch(self, mode: Mode, lines: Mapping[int, Line], also: int) -> Mode:
-        """The peak with one more coupon dead, from readings that are linear around another peak."""
-        dead = tuple(sorted((*mode.dead, also)))
-        cost, gradient, curvature = self.density(mode.mean, {k: line for k, line in lines.items() if k not in dead})
-        step = -np.linalg.solve(curvature, gradient)
-        return self.mode(mode.mean + step, dead, cost + 0.5 * float(gradient @ step), curvature)
+    def one(self, o: Observation, at: Real) -> Fit:
+        """Fit of a coupon; infinite where its readings are undefined, as of a gap that is wider than its film."""
+        line = linearised(o.coupon, o.sizes, o.noise, self.unknowns, at[0])
+        residual, slope = (o.log_values - line.log_values)[o.read], line.jacobian[o.read]
+        covariance = line.covariance[np.ix_(o.read, o.read)]
+        if not all(np.isfinite(part).all() for part in (residual, covariance, slope)):
+            nothing = np.zeros((1, at.shape[1]))
+            return Fit(at, np.array([np.inf]), nothing[:, None] * nothing.T, nothing)
+        root = whitening(covariance)
+        fit = Fit.of(at, (root @ residual)[None], (root @ slope).T[None])
+        fit.chi2 += len(residual) * log(2 * np.pi) - 2 * np.log(np.diag(root)).sum()
+        return fit
 
-    def mode(self, theta: Real, dead: tuple[int, ...], cost: float, curvature: Real) -> Mode:
-        """A peak with its evidence by Laplace's approximation."""
-        covariance = np.asarray(np.linalg.inv(curvature), np.float64)
-        _, log_det = np.linalg.slogdet(covariance)
-        count = sum(int(self.observations[k].read.sum()) for k in dead)
-        evidence = -cost + 0.5 * float(log_det) - count * log(_DECADES * log(10.0))
-        evidence += len(dead) * log(DEAD) + (len(self.observations) - len(dead)) * log(1 - DEAD)
-        return Mode(dead, theta, covariance, evidence)
+    def done(self, fit: Fit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
+        """Small steps, in standard deviations."""
+        return np.asarray(gain < _STILL**2)
+
+    def peak(self, start: Real) -> Mode:
+        """Most likely unknowns."""
+        first, fresh = start[None], np.zeros(1, np.intp)
+        first = first if np.isfinite(self.fit(first, fresh).chi2).all() else self.before.at[None]
+        return self.mode(self.fit(descend(self, first).at, fresh))
+
+    def mode(self, fit: Fit) -> Mode:
+        """Distribution by a fit that is linear up to its peak, with its evidence by Laplace's approximation."""
+        count = sum(int(self.observations[k].read.sum()) for k in self.dead)
+        evidence = float(fit.log_evidence()[0]) - count * log(_DECADES * log(10.0))
+        evidence += len(self.dead) * log(DEAD) + (len(self.observations) - len(self.dead)) * log(1 - DEAD)
+        covariance = np.asarray(np.linalg.inv(fit.information[0]))
+        return Mode((fit.at + fit.step())[0], covariance, self.dead, evidence)
+
+    def one_more(self, mode: Mode) -> Iterator[Mode]:
+        """Distributions with one more coupon dead, of readings that are linear about this one's peak."""
+        at = mode.at[None]
+        fits = {k: self.one(o, at) for k, o in enumerate(self.observations) if k not in mode.dead}
+        for also in fits:
+            dead = replace(self, dead=tuple(sorted((*mode.dead, also))))
+            yield dead.mode(self.together(at, (fit for k, fit in fits.items() if k != also)))
 
 
 @dataclass(frozen=True)
@@ -189,7 +180,7 @@ class Posterior:
 
     Attributes
     ----------
-    unknowns : tuple of Unknown
+    unknowns : tuple of Parameter
         In the order of the modes' columns.
     modes : tuple of Mode
         Sets of dead coupons, the most likely first.
@@ -199,7 +190,7 @@ class Posterior:
         Of the observations.
     """
 
-    unknowns: tuple[Unknown, ...]
+    unknowns: tuple[Parameter, ...]
     modes: tuple[Mode, ...]
     weights: Real
     names: tuple[str, ...]
@@ -214,19 +205,19 @@ class Posterior:
 
     def interval(self, target: Target) -> Interval95:
         """Median and 95 % interval of a target: quantiles of the sum of normal distributions."""
-        means, sigmas = zip(*(_normal(self.unknowns, m.mean, m.covariance, target) for m in self.modes), strict=True)
+        means, sigmas = [], []
+        for mode in self.modes:
+            mean, by = gradient(self.unknowns, mode.at, 0.01 * np.sqrt(np.diag(mode.covariance)), target)
+            means.append(mean)
+            sigmas.append(float(np.sqrt(by @ mode.covariance @ by)))
         return _quantiles(np.array(means), np.array(sigmas), self.weights, linear=target.linear)
 
 
-def _normal(unknowns: Sequence[Unknown], mean: Real, covariance: Real, target: Target) -> tuple[float, float]:
-    """Mean and standard deviation of a target, of its ln unless it is linear."""
-    spreads = np.sqrt(np.diag(covariance))
-    points = np.vstack([mean, mean + np.diag(0.01 * spreads)])
-    found = target.value(physical(unknowns, points))
-    if not target.linear:
-        found = np.log(np.maximum(found, 1e-300))
-    by = (found[1:] - found[0]) / (0.01 * spreads)
-    return float(found[0]), float(np.sqrt(by @ covariance @ by))
+def gradient(unknowns: Sequence[Parameter], at: Real, steps: Real, target: Target) -> tuple[float, Real]:
+    """A target, or its ln unless it is linear, and its derivatives by the unknowns (p,), by differences of steps."""
+    values = target.value(physical(unknowns, np.vstack([at, at + np.diag(steps)])))
+    values = values if target.linear else np.log(np.maximum(values, 1e-300))
+    return float(values[0]), (values[1:] - values[0]) / steps
 
 
 def _quantiles(means: Real, sigmas: Real, weights: Real, *, linear: bool) -> Interval95:
@@ -244,38 +235,40 @@ def _quantiles(means: Real, sigmas: Real, weights: Real, *, linear: bool) -> Int
     return Interval95(*found)
 
 
-def prior(unknowns: Sequence[Unknown]) -> Posterior:
-    """The unknowns before any reading."""
+def _before(unknowns: Sequence[Parameter]) -> Mode:
     mean, spread = np.array([(u.centre, u.spread) for u in unknowns]).T
-    return Posterior(tuple(unknowns), (Mode((), mean, np.diag(spread**2), 0.0),), np.ones(1), ())
+    return Mode(mean, np.diag(spread**2))
 
 
-def posterior(observations: Sequence[Observation], unknowns: Sequence[Unknown]) -> Posterior:
+def prior(unknowns: Sequence[Parameter]) -> Posterior:
+    """The unknowns before any reading."""
+    return Posterior(tuple(unknowns), (_before(unknowns),), np.ones(1), ())
+
+
+def posterior(observations: Sequence[Observation], unknowns: Sequence[Parameter]) -> Posterior:
     """The unknowns after readings of coupons, of which up to three may be dead.
 
     Parameters
     ----------
     observations : sequence of Observation
         Those with at least one reading count.
-    unknowns : sequence of Unknown
+    unknowns : sequence of Parameter
         With what was known before.
     """
-    problem = _Problem([o for o in observations if o.read.any()], unknowns)
-    best = problem.peak(problem.centre, ())
-    modes: dict[tuple[int, ...], Mode] = {(): best}
+    problem = _Coupons([o for o in observations if o.read.any()], unknowns)
+    best = problem.peak(problem.before.at)
+    modes = {best.dead: best}
     for _ in range(_MOST_DEAD):
-        lines = problem.lines(best.mean, best.dead)
-        around = sorted((problem.sketch(best, lines, k) for k in lines), key=lambda mode: -mode.log_evidence)
-        modes |= {m.dead: problem.peak(m.mean, m.dead) for m in around[:_REFINED] if m.dead not in modes}
+        around = sorted(problem.one_more(best), key=lambda mode: -mode.log_evidence)[:_REFINED]
+        modes |= {m.dead: replace(problem, dead=m.dead).peak(m.at) for m in around if m.dead not in modes}
         top = max(modes.values(), key=lambda mode: mode.log_evidence)
         if top is best:
             break
         best = top
     ranked = sorted(modes.values(), key=lambda mode: -mode.log_evidence)
     weights = np.exp([mode.log_evidence - best.log_evidence for mode in ranked])
-    kept = weights > 1e-6 * weights.sum()
-    weights = np.where(kept, weights, 0.0)
+    count = int((weights > 1e-6 * weights.sum()).sum())
+    weights = weights[:count] / weights[:count].sum()
     return Posterior(
-        tuple(unknowns), tuple(m for m, k in zip(ranked, kept, strict=True) if k), weights[kept] / weights.sum(),
-        tuple(o.coupon.name for o in problem.observations),
-    )  # fmt: skip
+        tuple(unknowns), tuple(ranked[:count]), weights, tuple(o.coupon.name for o in problem.observations)
+    )

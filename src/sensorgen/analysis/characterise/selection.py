@@ -12,13 +12,15 @@ last term keeps any value from resting on a single coupon.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import combinations, combinations_with_replacement, product
 
 import numpy as np
 
-from sensorgen.analysis.characterise.catalogue import LEVEL_SIGMA, Coupon, Meters, Target, Unknown, nominal
-from sensorgen.analysis.characterise.posterior import DEAD, Mode, Posterior, linearised, physical
+from sensorgen.analysis.characterise.catalogue import LEVEL_SIGMA, Coupon, Meters, Target, nominal
+from sensorgen.analysis.characterise.posterior import DEAD, Mode, Posterior, gradient, linearised, physical
 from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.errors import OutOfRange
+from sensorgen.prediction.inference import Parameter, whitening
 
 COPIES = 3  # of one coupon at most
 MISSED = 10.0  # lambda, as much as five halved intervals are worth for a goal missed by a factor of two
@@ -68,34 +70,31 @@ class Candidates:
         missed = np.log(np.maximum(1.0, over[0])).sum() + _SHARE * np.log(np.maximum(1.0, over[1:] / RESERVE)).sum()
         return float(-(1 - DEAD * len(pieces)) * log_det[0] - DEAD * log_det[1:].sum() - MISSED * missed)
 
-    def expected(self, chosen: Sequence[int], unknowns: Sequence[Unknown]) -> Posterior:
+    def expected(self, chosen: Sequence[int], unknowns: Sequence[Parameter]) -> Posterior:
         """Posterior that a set of coupons is expected to give, all of them sound."""
         covariance = np.linalg.inv(self.prior + self.information[list(chosen)].sum(axis=0))
         mean = np.array([u.centre for u in unknowns])
-        return Posterior(tuple(unknowns), (Mode((), mean, covariance, 0.0),), np.ones(1), ())
+        return Posterior(tuple(unknowns), (Mode(mean, covariance),), np.ones(1), ())
 
 
 def candidates(
-    coupons: Sequence[Coupon], unknowns: Sequence[Unknown], targets: Sequence[Target], meters: Meters
+    coupons: Sequence[Coupon], unknowns: Sequence[Parameter], targets: Sequence[Target], meters: Meters
 ) -> Candidates:
     """Fisher information of every coupon of a catalogue."""
     theta, spread = np.array([(u.centre, u.spread) for u in unknowns]).T
-    found = []
+    information = []
     for coupon in coupons:
-        sizes = nominal(coupon, meters)
         noise = noise_of(coupon, unknowns, theta, meters)
-        line = linearised(coupon, sizes, noise, unknowns, theta)
-        found.append(line.jacobian.T @ np.linalg.solve(line.covariance, line.jacobian))
-    points = np.vstack([theta, theta + np.diag(1e-4 * spread)])
-    values = [target.value(physical(unknowns, points)) for target in targets]
-    wanted = np.stack([v if t.linear else np.log(v) for t, v in zip(targets, values, strict=True)])
-    wanted = (wanted[:, 1:] - wanted[:, :1]) / (1e-4 * spread)
+        line = linearised(coupon, nominal(coupon, meters), noise, unknowns, theta)
+        white = whitening(line.covariance) @ line.jacobian
+        information.append(white.T @ white)
+    wanted = np.stack([gradient(unknowns, theta, 1e-4 * spread, target)[1] for target in targets])
     counted = np.array([not target.derived for target in targets])
     goals = np.array([target.goal or np.inf for target in targets])
-    return Candidates(tuple(coupons), np.array(found), np.diag(spread**-2.0), wanted, counted, goals)
+    return Candidates(tuple(coupons), np.array(information), np.diag(spread**-2.0), wanted, counted, goals)
 
 
-def noise_of(coupon: Coupon, unknowns: Sequence[Unknown], theta: Real, meters: Meters) -> Real:
+def noise_of(coupon: Coupon, unknowns: Sequence[Parameter], theta: Real, meters: Meters) -> Real:
     """Standard deviations of ln of a coupon's expected readings."""
     sizes = {size.key: np.asarray(size.drawn) for size in coupon.sizes}
     expected = coupon.expected(physical(unknowns, theta), sizes)
@@ -165,14 +164,13 @@ def _two_steps(found: Candidates, chosen: tuple[int, ...], count: int) -> set[tu
     every = range(len(found.coupons))
     steps: set[tuple[int, ...]] = set()
     for left in _without_one(chosen) if len(chosen) < count else ():
-        steps |= {tuple(sorted((*left, a, b))) for a in every for b in range(a, len(every))}
+        steps |= {tuple(sorted((*left, *pair))) for pair in combinations_with_replacement(every, 2)}
     few = len(chosen) ** 2 * len(every) ** 2 <= _MOST_PAIRS
     kinds = [few or (coupon.kind, coupon.material) for coupon in found.coupons]
     alike = {k: [j for j, kind in enumerate(kinds) if kind == kinds[k]] for k in chosen}
-    for m, i in enumerate(chosen):
-        for n, j in enumerate(chosen[m + 1 :], m + 1):
-            left = chosen[:m] + chosen[m + 1 : n] + chosen[n + 1 :]
-            steps |= {tuple(sorted((*left, a, b))) for a in alike[i] for b in alike[j]}
+    for m, n in combinations(range(len(chosen)), 2):
+        left = chosen[:m] + chosen[m + 1 : n] + chosen[n + 1 :]
+        steps |= {tuple(sorted((*left, *pair))) for pair in product(alike[chosen[m]], alike[chosen[n]])}
     return steps
 
 

@@ -89,12 +89,6 @@ class Predicted:
 
         return lru_cache(maxsize=_MOST_FILMS)(law)
 
-    @property
-    def capacitance_f(self) -> Interval | None:
-        """Between the electrodes, with the errors of models, print and materials [F]; None where none is predicted."""
-        c = self.prediction.capacitance
-        return Interval(c.lower, c.upper) if c else None
-
     @cached_property
     def touches(self) -> bool:
         """True if the electrodes touch as printed, so that the film is a short by design."""

@@ -1,11 +1,10 @@
 """The fit of an iteration: specimens held back, values from the others, errors before and after on those held back."""
 
-from array import array
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 from hashlib import sha256
 from itertools import chain
-from math import isfinite, log, nan, sqrt
+from math import log, nan, sqrt
 
 import numpy as np
 
@@ -65,11 +64,11 @@ def fit(
     """
     step("readings")
     specimens = tuple(dict.fromkeys(named(name, log).specimen for name in specimens))
-    found = of_iteration(log, iteration, step, body_of, specimens=specimens)
-    left_out = list(found.left_out)
+    comparison = of_iteration(log, iteration, step, body_of, specimens=specimens)
+    left_out = list(comparison.left_out)
     step("recordings")
-    measured = list(_measured(log, (iteration, specimens), found, bench or Bench(), body_of, left_out))
-    allowing = list(_allowing(found))
+    measured = list(_measured(log, (iteration, specimens), comparison, bench or Bench(), body_of, left_out))
+    allowing = list(_allowing(comparison))
     readings = [(row.reading.specimen, reading) for row, reading in allowing if usable(row)]
     names = sorted({specimen for specimen, _ in readings} | {one.specimen for one, _ in measured})
     if not names:
@@ -78,42 +77,43 @@ def fit(
             f"no readings of sound electrodes and no recordings of {of} in {str(log.path)!r}; "
             "expected some to fit to: sensorgen log list shows what there is"
         )
-    kept_back, design = held_back(names, seed, held_share), next(iter(found.bodies.values())).design
+    apart, design = held_back(names, seed, held_share), next(iter(comparison.bodies.values())).design
     step("values")
-    values, untold = _fitted(
-        [reading for specimen, reading in readings if specimen not in kept_back],
-        [
-            tones.of_specimen(one, print_, Movable(found.bodies[found.names[one.specimen]]))
-            for one, print_ in measured if one.specimen not in kept_back
-        ],
-        design, seed,
-    )  # fmt: skip
+    fits = [
+        tones.of_specimen(one, print_, Movable(comparison.bodies[comparison.names[one.specimen]]))
+        for one, print_ in measured if one.specimen not in apart
+    ]  # fmt: skip
+    values, untold = _fitted([reading for name, reading in readings if name not in apart], fits, design, seed)
     step("errors")
+    errors = (
+        *_reading_errors({specimen for specimen, _ in readings} & apart, comparison, values),
+        *_rest_errors([one for one, _ in measured if one.recorded and one.specimen in apart], comparison, values),
+    )
+    groups = tuple(resistance.by_group(_groups(allowing), design.slot("top_electrode")[0].name))
+    return Fit(
+        iteration, specimens, seed, tuple(values), tuple(untold), errors, len(names) - len(apart),
+        tuple(sorted(apart)), tuple(left_out), _fingerprint(log, (iteration, specimens)), groups=groups,
+    )  # fmt: skip
+
+
+def _groups(allowing: Sequence[tuple[Compared, Allowed]]) -> dict[str, list[tuple[Allowed, bool]]]:
+    """Readings by shape and direction, each with whether its electrode is sound."""
     groups: dict[str, list[tuple[Allowed, bool]]] = {}
     for row, reading in allowing:
         groups.setdefault(f"{row.evidence.shape} {row.evidence.axes}".strip(), []).append((reading, usable(row)))
-
-    errors = [
-        *_reading_errors({specimen for specimen, _ in readings} & kept_back, found, values),
-        *_rest_errors([one for one, _ in measured if one.recorded and one.specimen in kept_back], found, values),
-    ]
-    return Fit(
-        iteration, specimens, seed, tuple(values), tuple(untold), tuple(errors), len(names) - len(kept_back),
-        tuple(sorted(kept_back)), tuple(left_out), _fingerprint(log, (iteration, specimens)),
-        groups=tuple(resistance.by_group(groups, design.slot("top_electrode")[0].name)),
-    )  # fmt: skip
+    return groups
 
 
 def _measured(
-    log: Log, which: _Which, found: Comparison, bench: Bench, body_of: BodyOf, left_out: list[tuple[str, str]]
+    log: Log, which: _Which, comparison: Comparison, bench: Bench, body_of: BodyOf, left_out: list[tuple[str, str]]
 ) -> Iterator[tuple[Known, str]]:
     """Specimens that the bench or an LCR meter has measured, each with the name of its print."""
     prints: dict[str, str] = {}
-    for row in (*log.about(BenchRun, *which), *found.alternating):
+    for row in (*log.about(BenchRun, *which), *comparison.alternating):
         prints[row.specimen] = row.batch or prints.get(row.specimen, "")
     for specimen, print_ in prints.items():
         try:
-            if specimen not in found.names:
+            if specimen not in comparison.names:
                 raise BadInput(f"no design is known of {specimen}")
             one = known(log, specimen, bench, body_of=body_of)
         except SensorgenError as error:
@@ -123,10 +123,10 @@ def _measured(
         yield one, print_ or specimen
 
 
-def _allowing(found: Comparison) -> Iterator[tuple[Compared, Allowed]]:
+def _allowing(comparison: Comparison) -> Iterator[tuple[Compared, Allowed]]:
     """Readings along electrodes, and what each of them allows."""
-    for row in found.rows:
-        if row.predicted and (reading := allowed(row, found.bodies[row.predicted.design])):
+    for row in comparison.rows:
+        if row.predicted and (reading := allowed(row, comparison.bodies[row.predicted.design])):
             yield row, reading
 
 
@@ -146,21 +146,17 @@ def _fitted(
 ) -> tuple[list[Fitted], list[Untold]]:
     """All values and all that stays open; of two values of one quantity the one that is known better."""
     electrode, film = design.slot("top_electrode")[0].name, design.slot("film")[0].name
-    found = [
-        resistance.resistivity(readings, electrode),
-        *tones.values(fits),
-        resistance.leak(readings, film, seed),
-    ]
-    best: dict[tuple[str, str], Fitted] = {}
-    for value in found:
-        if isinstance(value, Fitted):
-            key = value.material, value.quantity
-            if key not in best or value.high / value.low < best[key].high / best[key].low:
-                best[key] = value
-    known = {quantity for _, quantity in best}
-    open_ = [u for u in found if isinstance(u, Untold)]
-    untold = [u for u in open_ if not any(quantity.startswith(u.parameter.split()[0]) for quantity in known)]
-    return list(best.values()), [_ACROSS, *{u.parameter: u for u in reversed(untold)}.values()]
+    results = [resistance.resistivity(readings, electrode), *tones.values(fits), resistance.leak(readings, film, seed)]
+    values = sorted((one for one in results if isinstance(one, Fitted)), key=lambda one: -one.high / one.low)
+    best = {(one.material, one.quantity): one for one in values}  # the narrowest
+    ordered = {key: best[key] for key in ((r.material, r.quantity) for r in results if isinstance(r, Fitted))}
+    open_ = {u.parameter: u for u in reversed(results) if isinstance(u, Untold) and not _is_told(u, ordered)}
+    return list(ordered.values()), [_ACROSS, *open_.values()]
+
+
+def _is_told(untold: Untold, values: Iterable[tuple[str, str]]) -> bool:
+    """Test whether a value of this quantity was found by other data."""
+    return any(quantity.startswith(untold.parameter.split()[0]) for _, quantity in values)
 
 
 def with_values(body: Body, values: Sequence[Fitted]) -> Body:
@@ -171,36 +167,41 @@ def with_values(body: Body, values: Sequence[Fitted]) -> Body:
     return body.with_values(own)
 
 
-def _reading_errors(specimens: Container[str], found: Comparison, values: Sequence[Fitted]) -> list[Error]:
+def _reading_errors(
+    specimens: Container[str], comparison: Comparison, values: Sequence[Fitted]
+) -> Iterator[Error]:  # fmt: skip
     """Residuals of what a fit could have used of some specimens, before and after it."""
-    before, residuals, after = array("d"), array("d"), dict[str, Predicted]()
-    for row in found.rows:
+    residuals, after = list[tuple[float, float]](), dict[str, Predicted]()
+    for row in comparison.rows:
         of = row.predicted
         if of is None or row.reading.specimen not in specimens or not usable(row):
             continue
         if of.design not in after:  # of all quantities its resistance alone is compared
-            fitted = electrode_resistance(with_values(found.bodies[of.design], values), list(of.prediction.resistance))
+            body = with_values(comparison.bodies[of.design], values)
+            fitted = electrode_resistance(body, list(of.prediction.resistance))
             after[of.design] = replace(of, prediction=replace(of.prediction, resistance=fitted))
         expected = after[of.design].along_ohm(row.across_ohm)
-        before.append(row.residual)
-        residuals.append(log(row.verdict.ry_ohm / expected.value) if expected else nan)
-    return [Error("R_Y", len(before), _rms(before), _rms(residuals))] if before else []
+        residuals.append((row.residual, log(row.verdict.ry_ohm / expected.value) if expected else nan))
+    yield from _error("R_Y", residuals)
 
 
-def _rms(values: Sequence[float]) -> float:
-    known = [v for v in values if isfinite(v)]
-    return sqrt(sum(v * v for v in known) / len(known)) if known else nan
-
-
-def _rest_errors(specimens: Sequence[Known], found: Comparison, values: Sequence[Fitted]) -> list[Error]:
-    before: list[float] = []
-    after: list[float] = []
+def _rest_errors(specimens: Sequence[Known], comparison: Comparison, values: Sequence[Fitted]) -> Iterator[Error]:
+    residuals = list[tuple[float, float]]()
     for one in specimens:
-        body = found.bodies[found.names[one.specimen]]
-        for of, into in ((body, before), (with_values(body, values), after)):
-            sensor = Movable(of).model.sensor
-            into.extend(np.abs(one.data.rest - at_rest(sensor, one.model.frequency_hz)).tolist())
-    return [Error("Z at rest", len(before), _rms(before), _rms(after))] if before else []
+        body = comparison.bodies[comparison.names[one.specimen]]
+        sensors = [Movable(of).model.sensor for of in (body, with_values(body, values))]
+        both = [np.abs(one.data.rest - at_rest(sensor, one.model.frequency_hz)) for sensor in sensors]
+        residuals += np.stack(both, 1).tolist()
+    yield from _error("Z at rest", residuals)
+
+
+def _error(observable: str, residuals: Sequence[tuple[float, float]]) -> Iterator[Error]:
+    """Root mean squares before and after a fit, of residuals that are known; nothing without any."""
+    if residuals:
+        with np.errstate(invalid="ignore"):
+            squares = np.where(np.isfinite(residuals), residuals, nan) ** 2
+        before, after = (sqrt(np.nanmean(column)) if np.isfinite(column).any() else nan for column in squares.T)
+        yield Error(observable, len(residuals), before, after)
 
 
 def _fingerprint(log: Log, which: _Which) -> str:

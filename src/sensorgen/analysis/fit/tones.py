@@ -16,6 +16,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.design.materials import FILM_LEAK
 from sensorgen.prediction.calibration.fitting import Posterior, calibrated
 from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel
+from sensorgen.prediction.inference import standard
 
 MODULUS = "youngs_modulus_pa"
 _SURE = 2.0  # standard errors on either side of a value
@@ -25,6 +26,8 @@ _OPEN = 0.95  # of the prior's standard deviation, from which on nothing was lea
 _LEAST = 1e-3  # of a parameter's variance that readings must have taken away: with less they say nothing
 _SOFTER = 1.05  # factor on a force, to see how the rise depends on it
 
+Estimate = tuple[float, float]  # with its standard error
+
 
 @dataclass(frozen=True, eq=False)
 class OfSpecimen:
@@ -33,10 +36,10 @@ class OfSpecimen:
     name: str
     print_: str
     of: Movable
-    resistivity: tuple[float, float]
-    capacitance: tuple[float, float]
-    leak_s: tuple[float, float] | None
-    stiffness: tuple[float, float] | None
+    resistivity: Estimate
+    capacitance: Estimate
+    leak_s: Estimate | None
+    stiffness: Estimate | None
 
 
 def of_specimen(known: Known, print_: str, of: Movable) -> OfSpecimen:
@@ -51,41 +54,37 @@ def of_specimen(known: Known, print_: str, of: Movable) -> OfSpecimen:
     of : Movable
         Its body.
     """
-    model, found = known.model, calibrated(known.model, known.data)
-    c = model.sensor.capacitance_f() * exp(model.spread.capacitance * _at(model, found, "capacitance")[0])
-    leak, sd = _at(model, found, "leak")
-    at, ln = model.spread.leak * exp(model.spread.leak_spread * leak), model.spread.leak_spread * sd
-    siemens = at * 2 * pi * float(model.frequency_hz.min()) * c
-    stiffness = _stiffness(known, found) if len(known.data.presses.force_n) >= 3 else None
+    model, posterior = known.model, calibrated(known.model, known.data)
+    k = model.names.index("leak")
+    sd = sqrt(posterior.covariance[k, k])
+    leak, c = (float(model.value(name, posterior.at)) for name in ("leak", "capacitance"))
+    siemens = leak * 2 * pi * float(model.frequency_hz.min()) * c * model.sensor.capacitance_f()
+    error = siemens * (exp(_SURE * model.spread.leak_spread * sd) - 1) / _SURE
+    stiffness = _stiffness(known, posterior) if len(known.data.presses.force_n) >= 3 else None
     return OfSpecimen(
-        known.specimen, print_, of, _alone(model, found, "resistance", model.spread.resistance),
-        _alone(model, found, "capacitance", model.spread.capacitance),
-        (siemens, siemens * (exp(_SURE * ln) - 1) / _SURE) if sd < _OPEN else None, stiffness,
+        known.specimen, print_, of, _alone(model, posterior, "resistance"), _alone(model, posterior, "capacitance"),
+        (siemens, error) if sd < _OPEN else None, stiffness,
     )  # fmt: skip
 
 
-def _at(model: SpecimenModel, found: Posterior, name: str) -> tuple[float, float]:
-    k = model.names.index(name)
-    return float(found.at[k]), sqrt(found.covariance[k, k])
+def _alone(model: SpecimenModel, posterior: Posterior, name: str) -> Estimate:
+    """Ln of a factor by the readings without the prior."""
+    k, scale = model.names.index(name), getattr(model.spread, name)
+    (information,), (pull,) = posterior.part([k]).beyond(standard(1))
+    if information[0] / (1 + information[0]) <= _LEAST:
+        return 0.0, inf
+    return float(scale * pull / information[0]), float(scale / sqrt(information[0]))
 
 
-def _alone(model: SpecimenModel, found: Posterior, name: str, scale: float) -> tuple[float, float]:
-    """Estimate of a parameter by the readings without the prior, which is standard normal."""
-    at, sd = _at(model, found, name)
-    known = 1 - sd**2
-    return (scale * at / known, scale * sd / sqrt(known)) if known > _LEAST else (0.0, inf)
-
-
-def _stiffness(known: Known, found: Posterior) -> tuple[float, float]:
+def _stiffness(known: Known, posterior: Posterior) -> Estimate:
     """Ln of one factor on all moduli by the rise at each force, whose own deviations from the law are marginalised."""
     model, sensor = known.model, known.model.sensor
     weights = model.law_weights()
-    prior = np.linalg.inv(weights @ weights.T)
-    posterior = np.linalg.inv(weights @ found.covariance @ weights.T)
-    by_readings = posterior - prior  # of the readings alone, over the predicted rise
-    pull = posterior @ (weights @ found.at) + by_readings.sum(1) * model.spread.law_middle
+    before = standard(len(model.names)).of(weights)
+    by_readings, pull = posterior.of(weights).beyond(before)
+    pull += by_readings.sum(1) * model.spread.law_middle  # over the predicted rise
     common = weights[:, model.names.index("rise")]
-    shape = np.linalg.inv(weights @ weights.T - np.outer(common, common))
+    shape = np.linalg.inv(before.covariance - np.outer(common, common))
     through = shape @ np.linalg.inv(by_readings + shape)
     slope = -_slopes(model)  # a film that is stiffer by a factor answers as to a weaker press
     in_range = np.array(FORCES_N) <= sensor.width_m * sensor.tip_m * model.most_pa
@@ -111,33 +110,17 @@ def values(fits: Sequence[OfSpecimen]) -> list[Fitted | Untold]:
     if not fits:
         none = "no recording of the bench: resistances at direct current do not depend on it"
         return [Untold(PERMITTIVITY, none), Untold(MODULUS, none)]
-    sensor, film = fits[0].of.model.sensor, fits[0].of.film
-    electrode = fits[0].of.body.design.slot("top_electrode")[0].name
-    of_r, of_c, of_e = (
-        [fit for fit in fits if (found := getattr(fit, name)) and found[1] < _UNSURE]
-        for name in ("resistivity", "capacitance", "stiffness")
-    )
-    along = [
-        (fit.resistivity[0] + log(fit.of.model.sensor.common_resistivity_ohm_m()), fit.resistivity[1]) for fit in of_r
-    ]
-    pressed = [
-        (fit, (fit.stiffness[0] + log(t.value), fit.stiffness[1])) for fit in of_e if fit.stiffness
-        for t in fit.of.model.values if t.material == film and t.quantity == MODULUS
-    ]  # fmt: skip
-    rho: Fitted | Untold = Untold("resistivity_ohm_m along", "no reading of a specimen depends on it")
-    if along:
-        note = f"Re Z of {_specimens(len(along))}: one value for both electrodes, along them"
-        rho = _value(electrode, "resistivity_ohm_m", _together(along, _prints(of_r)), note, len(along))
-    modulus: Fitted | Untold = Untold(MODULUS, "no recording with presses whose force and position are known")
-    if pressed:
-        moduli = [pair for _, pair in pressed]
-        together = _together(moduli, _prints([fit for fit, _ in pressed]))
-        law = f"by the law of compression {sensor.compression.name}; all moduli move together"
-        modulus = _value(film, MODULUS, together, f"presses of {_specimens(len(moduli))}, {law}", len(moduli))
-    return [rho, _permittivity(of_c, film), modulus, _leak(fits, film)]
+    film = fits[0].of.film
+    return [_resistivity(fits), _permittivity(fits, film), _modulus(fits, film), _leak(fits, film)]
 
 
-def _value(material: str, quantity: str, ln: tuple[float, float], note: str, count: int) -> Fitted | Untold:
+def _sure(fits: Sequence[OfSpecimen], name: str) -> list[tuple[OfSpecimen, float, float]]:
+    """Specimens whose readings determine a factor, with its ln and the standard error of that."""
+    known = ((fit, getattr(fit, name)) for fit in fits)
+    return [(fit, *estimate) for fit, estimate in known if estimate and estimate[1] < _UNSURE]
+
+
+def _value(material: str, quantity: str, ln: Estimate, note: str, count: int) -> Fitted | Untold:
     """A value by the logarithm and its standard error, unless that leaves it open."""
     at, error = ln
     if error > _UNSURE:
@@ -149,13 +132,37 @@ def _specimens(count: int) -> str:
     return f"{count} specimen{'s' * (count != 1)}"
 
 
-def _prints(fits: Sequence[OfSpecimen]) -> list[str]:
-    return [fit.print_ for fit in fits]
+def _resistivity(fits: Sequence[OfSpecimen]) -> Fitted | Untold:
+    along = [
+        (fit, (at + log(fit.of.model.sensor.common_resistivity_ohm_m()), error))
+        for fit, at, error in _sure(fits, "resistivity")
+    ]
+    if not along:
+        return Untold("resistivity_ohm_m along", "no reading of a specimen depends on it")
+    note = f"Re Z of {_specimens(len(along))}: one value for both electrodes, along them"
+    electrode = fits[0].of.body.design.slot("top_electrode")[0].name
+    return _value(electrode, "resistivity_ohm_m", _of_prints(along), note, len(along))
 
 
-def _together(
-    found: Sequence[tuple[float, float]], prints: Sequence[str], usual: float = _BETWEEN
-) -> tuple[float, float]:
+def _modulus(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
+    pressed = [
+        (fit, (at + log(t.value), error)) for fit, at, error in _sure(fits, "stiffness")
+        for t in fit.of.model.values if t.material == film and t.quantity == MODULUS
+    ]  # fmt: skip
+    if not pressed:
+        return Untold(MODULUS, "no recording with presses whose force and position are known")
+    law = f"by the law of compression {fits[0].of.model.sensor.compression.name}; all moduli move together"
+    return _value(
+        film, MODULUS, _of_prints(pressed), f"presses of {_specimens(len(pressed))}, {law}", len(pressed)
+    )  # fmt: skip
+
+
+def _of_prints(pairs: Sequence[tuple[OfSpecimen, Estimate]], usual: float = _BETWEEN) -> Estimate:
+    """Mean of specimens' estimates over their prints."""
+    return _together([estimate for _, estimate in pairs], [fit.print_ for fit, _ in pairs], usual)
+
+
+def _together(estimates: Sequence[Estimate], prints: Sequence[str], usual: float = _BETWEEN) -> Estimate:
     """Mean over prints, and its standard error from the errors or from the scatter between prints, whichever is more.
 
     Specimens of one plate count as one print: they share its conditions. Few
@@ -164,7 +171,7 @@ def _together(
     """
     from scipy.special import stdtrit
 
-    of = {name: [pair for pair, print_ in zip(found, prints, strict=True) if print_ == name] for name in prints}
+    of = {name: [pair for pair, print_ in zip(estimates, prints, strict=True) if print_ == name] for name in prints}
     means = np.array([np.mean(pairs, axis=0) for pairs in of.values()])
     at, errors = means.T
     own, count = sqrt(float((errors**2).sum())) / len(at), len(at)
@@ -175,40 +182,40 @@ def _together(
 
 
 def _permittivity(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
-    if not fits:
-        return Untold(PERMITTIVITY, "no reading of a specimen depends on it")
-    found, open_ = [], 0.0
-    for fit in fits:
+    pairs, open_ = list[tuple[OfSpecimen, Estimate]](), 0.0
+    for fit, ln_c, error in _sure(fits, "capacitance"):
         factor, curve = fit.of.by_permittivity
-        if not curve[0] <= fit.capacitance[0] <= curve[-1]:
+        if not curve[0] <= ln_c <= curve[-1]:
+            low, high = (fit.of.permittivity * exp(end) for end in (factor[0], factor[-1]))
             return Untold(
                 PERMITTIVITY,
-                f"{fit.name} has {exp(fit.capacitance[0]):.3g} times the predicted capacitance; a permittivity of "
-                f"{fit.of.permittivity * exp(factor[0]):.3g} to {fit.of.permittivity * exp(factor[-1]):.3g} makes none",
+                f"{fit.name} has {exp(ln_c):.3g} times the predicted capacitance; a permittivity of {low:.3g} to "
+                f"{high:.3g} makes none",
             )
-        slope = float(np.interp(fit.capacitance[0], curve, np.gradient(curve, factor)))
-        at = float(np.interp(fit.capacitance[0], curve, factor))
+        slope, at = (float(np.interp(ln_c, curve, of)) for of in (np.gradient(curve, factor), factor))
         c = fit.of.model.rest.capacitance  # what model and print leave open
         open_ = max(open_, log(c.model.upper / c.model.lower * c.print.upper / c.print.lower) / 2 / _SURE / slope)
-        found.append((log(fit.of.permittivity) + at, fit.capacitance[1] / slope))
-    at, between = _together(found, _prints(fits))
+        pairs.append((fit, (log(fit.of.permittivity) + at, error / slope)))
+    if not pairs:
+        return Untold(PERMITTIVITY, "no reading of a specimen depends on it")
+    at, between = _of_prints(pairs)
     error = between + open_  # bounds of a model do not average out, and prints scatter about their ends too
-    note = f"Im Z of {_specimens(len(fits))}; the interval holds the bounds of the cell's model"
-    return _value(film, PERMITTIVITY, (at, error), note, len(fits))
+    note = f"Im Z of {_specimens(len(pairs))}; the interval holds the bounds of the cell's model"
+    return _value(film, PERMITTIVITY, (at, error), note, len(pairs))
 
 
 def _leak(fits: Sequence[OfSpecimen], film: str) -> Fitted | Untold:
     """Per area, where it stands out of its error in every recording."""
-    known = [(fit, fit.leak_s, fit.of.model.sensor) for fit in fits if fit.leak_s]
-    if not known:
+    areas = [fit.of.model.sensor.length_m * fit.of.model.sensor.width_m for fit in fits]
+    pairs = [(fit, (fit.leak_s[0] / a, fit.leak_s[1] / a)) for fit, a in zip(fits, areas, strict=True) if fit.leak_s]
+    if not pairs:
         return Untold("leak", "no reading of a specimen depends on it")
-    found = [(at / (s.length_m * s.width_m), error / (s.length_m * s.width_m)) for _, (at, error), s in known]
-    if any(at < _SURE * error for at, error in found):
-        most = max(at + _SURE * error for at, error in found)
-        return Untold("leak", f"in {_specimens(len(found))} no more than {most:.2g} S/m2, and none of it certain")
-    typical = sum(at for at, _ in found) / len(found)
-    at, error = _together(found, _prints([fit for fit, _, _ in known]), _BETWEEN * typical)
+    count = _specimens(len(pairs))
+    if any(at < _SURE * error for _, (at, error) in pairs):
+        most = max(at + _SURE * error for _, (at, error) in pairs)
+        return Untold("leak", f"in {count} no more than {most:.2g} S/m2, and none of it certain")
+    at, error = _of_prints(pairs, _BETWEEN * float(np.mean([at for _, (at, _) in pairs])))
     if at <= _SURE * error:
-        return Untold("leak", f"{_specimens(len(found))} differ too much: {at:.2g} S/m2, give or take {error:.2g}")
-    return Fitted(film, FILM_LEAK, at, at - _SURE * error, at + _SURE * error,
-                  f"Z of {_specimens(len(found))} at their lowest tones")  # fmt: skip
+        return Untold("leak", f"{count} differ too much: {at:.2g} S/m2, give or take {error:.2g}")
+    note = f"Z of {count} at their lowest tones"
+    return Fitted(film, FILM_LEAK, at, at - _SURE * error, at + _SURE * error, note)

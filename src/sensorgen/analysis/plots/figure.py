@@ -13,11 +13,12 @@ from sensorgen.core.arrays import Complex, Mask, Real
 BLUE, ORANGE, GREEN, PINK, YELLOW, SKY, GREY = (
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a8f98",
 )  # fmt: skip
-COLOURS = (BLUE, ORANGE, GREEN, PINK, YELLOW, SKY, "#7a5195", "#8c564b", "#555555")
+PURPLE, BROWN, DARK = "#7a5195", "#8c564b", "#555555"
+COLOURS = (BLUE, ORANGE, GREEN, PINK, YELLOW, SKY, PURPLE, BROWN, DARK)
 SYMBOLS = (
     "circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x", "triangle-left", "triangle-right",
 )  # fmt: skip
-MOST_POINTS = 3000  # of a drawn curve: more than a screen is wide
+MOST_POINTS = 1600  # of a drawn curve: more than a figure is wide
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 Values = Sequence[float] | Sequence[str] | Real
@@ -255,12 +256,12 @@ def thinned(values: Real, most: int = MOST_POINTS) -> NDArray[np.intp]:
     starts = np.arange(len(rows)) * width
     low = np.argmin(np.where(np.isnan(rows), np.inf, rows), axis=1) + starts
     high = np.argmax(np.where(np.isnan(rows), -np.inf, rows), axis=1) + starts
-    found = np.unique(np.concatenate([low, high, [len(values) - 1]]))
-    return np.asarray(found[found < len(values)])
+    samples = np.unique(np.concatenate([low, high, [len(values) - 1]]))
+    return np.asarray(samples[samples < len(values)])
 
 
 def thinned_together(z: Complex, which: Mask | None = None) -> NDArray[np.intp]:
     """Samples of which the curves of both parts of each column are :func:`thinned`, among those of ``which``."""
     columns = (column if which is None else column[which] for column in z.T)
-    found = [thinned(part) for column in columns for part in (column.real, column.imag)]
-    return np.unique(np.concatenate(found))
+    samples = [thinned(part) for column in columns for part in (column.real, column.imag)]
+    return np.unique(np.concatenate(samples))

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, Axis, Curve, Figure, Map, Panel
+from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.identifiability.fisher import Bounds, Real, Setup, bounds, slopes
+from sensorgen.prediction.identifiability.fisher import Bounds, Setup, bounds, slopes
 from sensorgen.prediction.identifiability.identify import HIGHEST_HZ, surface
 from sensorgen.prediction.identifiability.verdict import required
 from sensorgen.prediction.query import FORCE_N, NOISE
@@ -83,5 +84,5 @@ def _by_frequency(setup: Setup) -> tuple[Panel, Panel]:
 
 
 def _single(setup: Setup, frequency_hz: Real) -> Bounds:
-    found = slopes(setup.sensor, frequency_hz, setup.force_n, setup.position_m)
-    return bounds(type(found)(*(slope[:, None] for slope in found)), setup.noise)
+    by_press = slopes(setup.sensor, frequency_hz, setup.force_n, setup.position_m)
+    return bounds(type(by_press)(*(slope[:, None] for slope in by_press)), setup.noise)

@@ -1,21 +1,22 @@
-"""A page that shows a print layer by layer: what each body covers, with the layer below it faint, and marked places."""
+"""A print layer by layer: what each body covers, places of findings, travel of the nozzle; and its page."""
 
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import shapely
 
-from sensorgen.analysis.plots.pages import path, render
+from sensorgen.analysis.plots import pages
+from sensorgen.analysis.plots.shades import shades
 from sensorgen.core.arrays import Real
-from sensorgen.core.findings import SEVERITIES, Finding
+from sensorgen.core.findings import Finding, numbered
 from sensorgen.scene.layers import LayerRegions
 from sensorgen.scene.scene import SLIVER_MM
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
+    from sensorgen.design.design import Design
     from sensorgen.export.gcode.crossings import Stretches
 
 _LEVEL_MM = 5e-3  # above the top of a layer, the nozzle still prints it
@@ -23,17 +24,28 @@ _GAPS = (("in contact with", True, "#d00000"), ("one layer or less above", False
 
 
 @dataclass(frozen=True)
-class Mark:
-    """A place on a layer, counted from 0, from the corner of the sensor [mm], and what is there."""
+class BodyShown:
+    """A body in the legend: its role, material and tool, and its colours on a light and on a dark ground."""
 
-    layer: int
-    place_mm: tuple[float, float]
-    text: str
+    name: str
+    material: str
+    tool: int
+    light: str
+    dark: str
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A finding in the list, its number on the drawing, and the layer at which it shows, counted from 0."""
+
+    finding: Finding
+    number: int
+    layer: int | None
 
 
 @dataclass(frozen=True)
 class Travel:
-    """A kind of travel: what the legend calls it, its colour, whether it is shown at first, and its ways by layer.
+    """A kind of travel: words of the legend, its colour, whether it is shown at first, and its ways by layer.
 
     ``ways`` are pairs of points, (n, 2, 2), from the corner of the sensor [mm].
     """
@@ -44,56 +56,75 @@ class Travel:
     ways: Mapping[int, Real]
 
 
-@dataclass(frozen=True)
-class Shown:
-    """One layer as the page draws it: its title, an SVG path per body, marks, and a path per kind of travel."""
+def bodies(design: "Design") -> tuple[BodyShown, ...]:
+    """The bodies from the bed upwards, each in a shade of its material's colour."""
+    rows: list[BodyShown] = []
+    for body in design.printed.bodies:
+        material = design.material(body.material)
+        pair = shades(material.colour, sum(row.material == material.title for row in rows))
+        rows.append(BodyShown(body.name.replace("_", " "), material.title, design.tool(body.material), *pair))
+    return tuple(rows)
 
-    title: str
-    paths: Mapping[str, str]
-    marks: Sequence[Mark]
-    ways: Sequence[str]
+
+def placed(findings: Sequence[Finding], layers: Sequence[LayerRegions]) -> list[Placed]:
+    """Findings with their numbers and layers."""
+    tops, number = [layer.top_mm for layer in layers], numbered(findings)
+    rows = []
+    for f in findings:
+        known = f.place_mm is not None and bool(tops)
+        at = (f.layer - 1 if f.layer else bisect_right(tops, f.place_mm[2] + SLIVER_MM)) if known and f.place_mm else 0
+        rows.append(Placed(f, number[f], min(at, len(tops) - 1) if known else None))
+    return rows
+
+
+def stack(
+    layers: Sequence[LayerRegions], names: Sequence[str], size_mm: Sequence[float], listed: Sequence[Placed],
+    travel: Sequence[Travel] = (),
+) -> dict[str, Any]:  # fmt: skip
+    """Data for the script: layers with their heights [mm], a path per body and per kind of travel, and findings."""
+    return {
+        "size": [*size_mm],
+        "layers": [
+            {
+                "z": [round(layer.bottom_mm, 6), round(layer.top_mm, 6)],
+                "paths": {names.index(name): pages.path(region, size_mm[1]) for name, region in layer.regions.items()},
+                "ways": [_ways(kind.ways[k], size_mm[1]) if k in kind.ways else "" for kind in travel],
+            }
+            for k, layer in enumerate(layers)
+        ],
+        "findings": [
+            None if at.layer is None
+            else [at.layer, *(at.finding.place_mm or ()), f"{at.finding.severity}: {at.finding.message}", at.number]
+            for at in listed
+        ],
+        "first": next((at.layer for at in listed if at.layer is not None), 0),
+    }  # fmt: skip
 
 
 def page(
-    title: str,
-    layers: Sequence[LayerRegions],
-    colours: Mapping[str, tuple[str, str]],
-    words: Sequence[str] = (),
-    marks: Sequence[Mark] = (),
-    travel: Sequence[Travel] = (),
-) -> str:
+    title: str, words: Sequence[str], shown: Sequence[BodyShown], data: Mapping[str, Any],
+    listed: Sequence[Placed] = (), travel: Sequence[Travel] = (),
+) -> str:  # fmt: skip
     """The page as HTML that needs nothing else.
 
     Parameters
     ----------
     title : str
         What is printed.
-    layers : sequence of LayerRegions
-        From the bed upwards.
-    colours : mapping of str to (str, str)
-        What the legend calls a body, and its colour (``#rrggbb``), by its name; bodies are drawn in this order.
     words : sequence of str
         Paragraphs above the picture.
-    marks : sequence of Mark
-        Places to be seen, as shorts; the page opens at the layer of the first.
+    shown : sequence of BodyShown
+        Bodies, in the order of their names in ``data``.
+    data : mapping
+        As of :func:`stack`.
+    found : sequence of Placed
+        Listed below the picture; it opens at the layer of the first that has one.
     travel : sequence of Travel
         Drawn over the bodies, each with a box to show or hide it.
     """
-    extent = shapely.total_bounds([region for layer in layers for region in layer.regions.values()])
-    shown = [
-        Shown(
-            f"layer {k + 1} of {len(layers)}, {layer.bottom_mm:.3g} to {layer.top_mm:.3g} mm",
-            {name: path(layer.regions[name], extent[3]) for name in colours if name in layer.regions},
-            [mark for mark in marks if mark.layer == k],
-            [_ways(kind.ways[k], extent[3]) if k in kind.ways else "" for kind in travel],
-        )
-        for k, layer in enumerate(layers)
-    ]
-    first = marks[0].layer if marks else 0
-    size = (float(extent[2]), float(extent[3]))
-    return render(
-        "sensorgen.analysis.plots", "layers.html", title=title, words=words, shown=shown, first=first, size=size,
-        colours=colours, marks=marks, travel=travel,
+    return pages.render(
+        "sensorgen.analysis.plots", "layers.html", title=title, words=words, bodies=shown,
+        data=pages.packed_json(data), layers=len(data["layers"]), listed=listed, travel=travel,
     )  # fmt: skip
 
 
@@ -107,39 +138,29 @@ def of_print(
     printed : Printed
         Estimated, or by G-code.
     findings : sequence of Finding
-        Marked where they have a place, the errors first.
+        Marked where they have a place.
     travel : mapping of str to Stretches, optional
         Travel over another tool's material in the file, on the printer's own bed, by what the file is ("as sliced"); of
         a piece in the middle of the bed. The last is shown at first.
     """
-    design, colours = printed.design, {}
-    for body in design.printed.bodies:
-        material = design.material(body.material)
-        words = f"{body.name.replace('_', ' ')}, {material.title}, tool {design.tool(body.material)}"
-        colours[body.name] = (words, material.colour)
-    placed = sorted((f for f in findings if f.place_mm), key=lambda f: SEVERITIES.index(f.severity))
-    tops = [layer.top_mm for layer in printed.first]
-    marks = []
-    for f in placed:
-        x, y, z = f.place_mm or (0.0, 0.0, 0.0)
-        number = f.layer - 1 if f.layer else min(bisect_right(tops, z + SLIVER_MM), len(tops) - 1)
-        marks.append(Mark(number, (x, y), f"{f.severity}: {f.message}"))
-    files = list((travel or {}).items())
+    scene, files = printed.design.printed, list((travel or {}).items())
     kinds = [kind for file in files for kind in _travel(printed, *file, shown=file is files[-1])]
-    return page(design.name, printed.first, colours, [printed.provenance], marks, kinds)
+    listed = placed(findings, printed.first)
+    data = stack(printed.first, [body.name for body in scene.bodies], scene.size_mm, listed, kinds)
+    return page(printed.design.name, [printed.provenance], bodies(printed.design), data, listed, kinds)
 
 
-def _travel(printed: "Printed", when: str, found: "Stretches", *, shown: bool) -> Iterator[Travel]:
+def _travel(printed: "Printed", when: str, stretches: "Stretches", *, shown: bool) -> Iterator[Travel]:
     """Travel in contact, and travel near, by the layer that is printed at its height."""
     scene, tops = printed.design.printed, np.array([layer.top_mm for layer in printed.first])
     corner = np.array(printed.design.machine.bed_centre_mm()) - np.array(scene.size_mm[:2]) / 2
-    ways = np.stack([found.start_mm[:, :2], found.end_mm[:, :2]], axis=1) - corner
-    layer = np.searchsorted(tops, found.start_mm[:, 2] - _LEVEL_MM).clip(0, len(tops) - 1)
+    ways = np.stack([stretches.start_mm[:, :2], stretches.end_mm[:, :2]], axis=1) - corner
+    layer = np.searchsorted(tops, stretches.start_mm[:, 2] - _LEVEL_MM).clip(0, len(tops) - 1)
     for gap, touches, colour in _GAPS:
-        mine = found.touches == touches
+        mine = stretches.touches == touches
         by_tool = ", ".join(
-            f"{found.length_mm[mine & (found.tool == tool)].sum():.1f} mm by tool {tool}"
-            for tool in np.unique(found.tool[mine]).tolist()
+            f"{stretches.length_mm[mine & (stretches.tool == tool)].sum():.1f} mm by tool {tool}"
+            for tool in np.unique(stretches.tool[mine]).tolist()
         )
         words = f"travel {gap} another tool's material, {when}: {by_tool or '0.0 mm'}"
         yield Travel(words, colour, shown, {k: ways[mine & (layer == k)] for k in np.unique(layer[mine]).tolist()})

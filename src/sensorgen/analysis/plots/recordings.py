@@ -26,7 +26,7 @@ from sensorgen.analysis.plots.figure import (
     scale,
     thinned,
 )  # fmt: skip
-from sensorgen.analysis.plots.pages import page
+from sensorgen.analysis.plots.pages import Section, page
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.recording.samples import Complex, Real
 from sensorgen.measure.signal.hysteresis import Hysteresis
@@ -225,4 +225,5 @@ def html(run: Run) -> str:
     """The run as a page: readings over time and differences over force and position, frequency by frequency."""
     figures = [differences(run, part) for part in PARTS] if run.pairs is not None else []
     loads = f"{len(run.pairs.time_s)} loads, " if run.pairs is not None else ""
-    return page(run.name, [f"{loads}{len(run.tones_hz)} frequencies, {run.time_s[-1]:.0f} s."], [*figures, series(run)])
+    section = Section(figures=(*figures, series(run)))
+    return page(run.name, [f"{loads}{len(run.tones_hz)} frequencies, {run.time_s[-1]:.0f} s."], [section])

@@ -4,7 +4,6 @@ The block is a JSON header, its length before it, then for every body the differ
 of triangles and of the ends of edges. Patterns that repeat become repeated bytes, which gzip stores once.
 """
 
-import gzip
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,10 +14,9 @@ import numpy as np
 from sensorgen.core.arrays import Whole
 from sensorgen.scene.drawing.view import View, views
 from sensorgen.scene.geometry.meshes import Mesh, mesh
-from sensorgen.scene.scene import Outline, Scene, clipped
+from sensorgen.scene.scene import AXES, Outline, Scene, clipped
 
 UM_PER_MM = 1000
-_FLAT = 0.999  # cosine of the angle up to which two triangles are one face
 _PERIODS, _HEIGHTS = 2.5, 5.0  # how much is shown: periods of a pattern, or heights where nothing repeats
 _WIDEST = 12.0  # width of a figure, relative to its height [-]
 _MARGIN = 0.04  # share of the width around the section [-]
@@ -38,8 +36,15 @@ class SectionFigure:
         Number of the body and SVG path, y downwards from the sensor's top [mm].
     boundaries : tuple of (float, str)
         Heights of the layers in the picture [mm], and a label for some of them.
+    across : int
+        Axis along the section, 0 for x [-].
+    end_mm, top_mm : float
+        How much of it is shown, and the height of its upper edge [mm].
     """
 
+    across: int
+    end_mm: float
+    top_mm: float
     caption: str
     box: tuple[float, float, float, float]
     drawn: tuple[tuple[int, str], ...]
@@ -70,6 +75,7 @@ def _figure(
     margin = _MARGIN * shown.end_mm
     label = max(1, round(len(boundaries_mm) * margin / height / 0.8))
     return SectionFigure(
+        AXES.index(shown.section.across), shown.end_mm, height,
         f"{axis} = {at:g} mm, {shown.section.across} from 0 to {shown.end_mm:g} of {view.extent_mm:g} mm, true scale",
         (-2.2 * margin, -margin / 2, shown.end_mm + 2.7 * margin, height + margin),
         tuple(_paths(of_drawing, names, height)), tuple(_paths(of_print, names, height)),
@@ -88,7 +94,7 @@ def _paths(outlines: dict[str, list[Outline]], names: Sequence[str], height_mm: 
         )
 
 
-def packed(header: Mapping[str, Any], scenes: Mapping[str, Scene], names: Sequence[str]) -> bytes:
+def block(header: Mapping[str, Any], scenes: Mapping[str, Scene], names: Sequence[str]) -> bytes:
     """The block, with the number of vertices, triangles and edges of each body of each scene in its header."""
     counts: dict[str, list[list[int]]] = {}
     blocks: list[bytes] = []
@@ -104,25 +110,10 @@ def packed(header: Mapping[str, Any], scenes: Mapping[str, Scene], names: Sequen
             blocks += [step.astype("<i4").tobytes() for step in steps]
     head = json.dumps({**header, "counts": counts}, separators=(",", ":"), allow_nan=False).encode()
     head += b" " * (-len(head) % 4)
-    return gzip.compress(b"".join([len(head).to_bytes(4, "little"), head, *blocks]), 6, mtime=0)
+    return b"".join([len(head).to_bytes(4, "little"), head, *blocks])
 
 
 def _parts(shell: Mesh) -> tuple[Whole, Whole, Whole]:
     """Vertices [um], triangles, and the edges between faces."""
-    return np.round(shell.vertices_mm * UM_PER_MM).astype(np.int64), shell.triangles.astype(np.int64), edges(shell)
-
-
-def edges(shell: Mesh) -> Whole:
-    """Pairs of vertices (n, 2) where two faces meet at an angle, sorted."""
-    a, b, c = (shell.vertices_mm[shell.triangles[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True).clip(1e-300)
-    sides = np.sort(shell.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
-    key = sides[:, 0] * len(shell.vertices_mm) + sides[:, 1]
-    order = np.argsort(key, kind="stable")
-    first, second = order[:-1], order[1:]
-    pair = key[first] == key[second]
-    first, second = first[pair], second[pair]
-    sharp = np.einsum("ij,ij->i", normal[first // 3], normal[second // 3]) < _FLAT
-    ends: Whole = sides[first[sharp]]
-    return ends
+    vertices = np.round(shell.vertices_mm * UM_PER_MM).astype(np.int64)
+    return vertices, shell.triangles.astype(np.int64), shell.sharp_edges()

@@ -2,19 +2,20 @@
 
 from collections.abc import Iterator
 
-from sensorgen.analysis.report.contents import Report, Section, report
+from sensorgen.analysis.plots.pages import Section
+from sensorgen.analysis.report.contents import Report, report
 
 FORMATS = ("html", "md", "csv", "json")
 
 __all__ = ["FORMATS", "Report", "Section", "pieces", "report", "written"]
 
 
-def written(made: Report, how: str) -> str:
+def written(content: Report, how: str) -> str:
     """A report as text; parameters as :func:`pieces`."""
-    return "".join(pieces(made, how))
+    return "".join(pieces(content, how))
 
 
-def pieces(made: Report, how: str) -> Iterator[str]:
+def pieces(content: Report, how: str) -> Iterator[str]:
     """A report as pieces of text, one after the other.
 
     Parameters
@@ -26,4 +27,4 @@ def pieces(made: Report, how: str) -> Iterator[str]:
     """
     from sensorgen.analysis.report.formats import WRITERS
 
-    yield from WRITERS[how](made)
+    yield from WRITERS[how](content)

@@ -1,27 +1,22 @@
 """A report as HTML, Markdown, CSV and JSON: the same numbers for people, spreadsheets and programs."""
 
-import base64
 import csv
 import io
 import json
 from collections.abc import Iterator
 from typing import Any
 
-from sensorgen.analysis.plots.pages import render
+from sensorgen.analysis.plots import pages
 from sensorgen.analysis.report.contents import Report
-from sensorgen.core.document import Table, exact, plain, safe, shown, spreadsheet
+from sensorgen.core.document import Table, plain, safe, spreadsheet
 from sensorgen.core.document import markdown as document
-
-MOST_ROWS = 2000  # of a table on the page: a browser has to lay out all of them
 
 
 def html(report: Report) -> Iterator[str]:
     """One page that needs nothing else."""
-    encoded = {v.design: base64.b64encode(v.svg.encode()).decode() for s in report.sections for v in s.variants}
-    yield render(
-        "sensorgen.analysis.report", "report.html", report.figures, title=report.title, report=report,
-        drawings=encoded, shown=shown, exact=exact, most_rows=MOST_ROWS,
-    )  # fmt: skip
+    yield pages.page(
+        report.title, (), report.sections, headline=report.headline, findings=report.findings, made_at=report.made_at
+    )
 
 
 def markdown(report: Report) -> Iterator[str]:
@@ -34,9 +29,8 @@ def _lines(report: Report) -> Iterator[str]:
     yield from (*lines, *(f"- {safe(text)}" for text in report.findings))
     for section in report.sections:
         yield from ("", f"## {safe(section.title)}", "")
-        yield from (f"- {safe(v.design)} (design {v.design_id}): {safe(v.words)}" for v in section.variants)
-        yield from document(section.tables)
-        yield from (line for note in section.notes for line in ("", safe(note)))
+        yield from (f"- {safe(v.design)} (design {v.design_id}): {safe(v.words)}" for v in section.drawings)
+        yield from document(section.parts)
     yield from ("", f"Made {report.made_at}.")
 
 
@@ -78,15 +72,15 @@ def as_json(report: Report) -> Iterator[str]:
     sections = [
         {
             "key": s.key, "title": s.title, "notes": s.notes, "tables": [*map(of_table, s.tables)],
-            "variants": [{"design": v.design, "design_id": v.design_id, "words": v.words} for v in s.variants],
+            "variants": [{"design": v.design, "design_id": v.design_id, "words": v.words} for v in s.drawings],
         }
         for s in report.sections
     ]  # fmt: skip
-    told = {
+    content = {
         "title": report.title, "iteration": report.iteration, "made_at": report.made_at, "headline": report.headline,
         "findings": report.findings, "sections": sections,
     }  # fmt: skip
-    yield from json.JSONEncoder(ensure_ascii=False, indent=1, allow_nan=False).iterencode(told)
+    yield from json.JSONEncoder(ensure_ascii=False, indent=1, allow_nan=False).iterencode(content)
     yield "\n"
 
 

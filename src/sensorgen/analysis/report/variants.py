@@ -7,6 +7,7 @@ from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, Body, Curve, Figure, Panel
+from sensorgen.analysis.plots.pages import Drawing
 from sensorgen.checks.review import draw
 from sensorgen.core.document import Column, Table
 from sensorgen.core.units import M_PER_MM
@@ -17,27 +18,6 @@ from sensorgen.prediction.slices import reviewed
 from sensorgen.scene.geometry.meshes import mesh
 
 _STRETCH = (1.0, 1.0, 10.0)
-_F_PER_PF = 1e-12
-
-
-@dataclass(frozen=True)
-class Variant:
-    """A variant on the page.
-
-    Attributes
-    ----------
-    design, design_id : str
-        Name and identity.
-    svg : str
-        Its drawing.
-    words : str
-        Its prediction.
-    """
-
-    design: str
-    design_id: str
-    svg: str
-    words: str
 
 
 @dataclass(frozen=True)
@@ -51,25 +31,25 @@ class IdentifiabilityRow:
     verdict: Annotated[str, Column("verdict")]
 
 
-def variants(found: Comparison) -> tuple[Variant, ...]:
-    """Every variant that a specimen was printed of."""
-    made = []
-    for name, body in found.bodies.items():
-        of, design = found.predictions[name], body.design
-        r, c = of.ry_ohm, of.capacitance_f
+def drawings(comparison: Comparison) -> tuple[Drawing, ...]:
+    """Every variant of which a specimen was printed, with its prediction in words."""
+    sheets = []
+    for name, body in comparison.bodies.items():
+        of, design = comparison.predictions[name], body.design
+        r, c = of.ry_ohm, of.prediction.capacitance
         words = (
-            f"electrode resistance {r.lower:.4g} to {r.upper:.4g} ohm" if r else "electrode resistance unknown",
-            f"capacitance {c.lower / _F_PER_PF:.4g} to {c.upper / _F_PER_PF:.4g} pF" if c
-            else f"no capacitance: {of.reason}", of.provenance,
-        )  # fmt: skip
-        made.append(Variant(name, design.id(), draw(design, reviewed(design)), "; ".join(words)))
-    return tuple(made)
+            f"electrode resistance {r.words() if r else 'unknown'}",
+            f"capacitance {c.words()}" if c else f"no capacitance: {of.reason}",
+            of.provenance,
+        )
+        sheets.append(Drawing(name, design.id(), draw(design, reviewed(design)), "; ".join(words)))
+    return tuple(sheets)
 
 
-def identifiability(found: Comparison) -> tuple[Table, ...]:
+def identifiability(comparison: Comparison) -> tuple[Table, ...]:
     """A row for each variant with a prediction."""
     rows = []
-    for name, of in found.predictions.items():
+    for name, of in comparison.predictions.items():
         card = of.prediction.identifiability
         known = (card.sigma_force_n, card.sigma_position_m, card.correlation) if card else (None, None, None)
         force, place, together = (nan if value is None else value for value in known)
@@ -79,9 +59,9 @@ def identifiability(found: Comparison) -> tuple[Table, ...]:
     return (Table.of("identifiability", caption, rows),) if rows else ()
 
 
-def figures(found: Comparison) -> Iterator[Figure]:
+def figures(comparison: Comparison) -> Iterator[Figure]:
     """Standard errors over position for three forces, and the bodies; of every variant, one at a time."""
-    cards = {name: of.prediction.identifiability for name, of in found.predictions.items()}
+    cards = {name: of.prediction.identifiability for name, of in comparison.predictions.items()}
     known = {name: errors(card) for name, card in cards.items() if card}
     if known:
         yield Figure(
@@ -89,20 +69,20 @@ def figures(found: Comparison) -> Iterator[Figure]:
             "Least standard error (Cramér-Rao) of force above, of position below, over the position of the load, for "
             "the frequencies and noise of the prediction. Dashed: required. Gaps: undefined.", known, "variant",
         )  # fmt: skip
-    if found.bodies:
+    if comparison.bodies:
         axes = Axis("x [mm]"), Axis("y [mm]"), Axis("z [mm]")
         yield Figure(
             "bodies", f"Bodies, height x {_STRETCH[2]:g}",
             "The bodies of the chosen variant, to be turned with the mouse, their height enlarged. The drawings show "
             "them in section.",
-            {name: (Panel(tuple(_bodies(body.design)), *axes),) for name, body in found.bodies.items()}, "variant",
+            {name: (Panel(tuple(_bodies(body.design)), *axes),) for name, body in comparison.bodies.items()}, "variant",
             stretch=_STRETCH,
         )  # fmt: skip
 
 
-def errors(found: Identifiability) -> tuple[Panel, Panel]:
+def errors(card: Identifiability) -> tuple[Panel, Panel]:
     """Standard errors over position [mm], for a weak, a middling and the greatest force."""
-    over, required = found.map, found.required
+    over, required = card.map, card.required
     place, panels = [x / M_PER_MM for x in over.position_m], []
     for quantity, unit, sigma, needed, per in (
         ("force", "N", over.sigma_force_n, required.sigma_force_n, 1.0),
@@ -123,5 +103,10 @@ def errors(found: Identifiability) -> tuple[Panel, Panel]:
 def _bodies(design: Design) -> Iterator[Body]:
     """The bodies of the sensor in use, as triangles."""
     for body in design.in_use.bodies:
-        made = mesh(body)
-        yield Body(body.name.replace("_", " "), made.vertices_mm, made.triangles, design.material(body.material).colour)
+        body_mesh = mesh(body)
+        yield Body(
+            body.name.replace("_", " "),
+            body_mesh.vertices_mm,
+            body_mesh.triangles,
+            design.material(body.material).colour,
+        )

@@ -1,12 +1,39 @@
 """Sources of the user's own: a YAML file each, named as the source, in a pack of the user's."""
 
+import json
 import os
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from sensorgen.core import paths as places
 from sensorgen.design import packs
 
 PLACE = packs.SOURCES  # environment variable with another folder
+
+
+class SourceValue(NamedTuple):
+    """Value of a quantity with its interval, in the unit of the quantity's name."""
+
+    quantity: str
+    value: float
+    low: float
+    high: float
+    note: str = ""
+
+    def row(self) -> str:
+        """Line of a source's file."""
+        numbers = f"value: {self.value:.6g}, low: {self.low:.6g}, high: {self.high:.6g}"
+        return f"    {self.quantity}: {{{numbers}{f', note: {json.dumps(self.note)}' if self.note else ''}}}"
+
+
+def written(about: str, materials: Mapping[str, Iterable[SourceValue]], comments: Iterable[str] = ()) -> str:
+    """File of a source: values of materials, and comments on what it has not."""
+    lines = [f"about: {json.dumps(about)}", "materials:"]
+    for material, values in materials.items():
+        rows = [value.row() for value in values]
+        lines += [f"  {material}:{'' if rows else ' {}'}", *rows]
+    return "\n".join((*lines, *(f"# {comment}" for comment in comments))) + "\n"
 
 
 def place() -> Path:

@@ -3,8 +3,6 @@
 import queue
 import threading
 
-import numpy as np
-
 from sensorgen.core.arrays import Real
 from sensorgen.measure.lab.devices import DeviceFault, Identity, ImpedanceMeter, Readings
 
@@ -45,11 +43,7 @@ class Background:
         parts = []
         while not self._found.empty():
             parts.append(self._found.get())
-        if not parts:
-            return Readings(np.empty(0), np.empty((0, self._tones), complex), np.empty(0, bool))
-        times, impedance, clipped = zip(*((p.time_s, p.impedance_ohm, p.clipped) for p in parts), strict=True)
-        lost = sum(part.lost for part in parts)
-        return Readings(np.concatenate(times), np.concatenate(impedance), np.concatenate(clipped), lost)
+        return Readings.joined(parts, self._tones)
 
     def stop(self) -> None:
         """End the reading, then the measurement.

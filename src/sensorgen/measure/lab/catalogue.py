@@ -10,18 +10,21 @@ No package is imported before one of its kinds is asked for.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.core.errors import BadInput, NotInstalled, UnknownName
 from sensorgen.core.records import Line, Strict, checked
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import Actuator, ImpedanceMeter, Meter, Stage
 from sensorgen.measure.virtual.plant import Plant
 
 GROUP = "sensorgen.devices"
+PYMEASURE = "pymeasure:"  # begin of the kinds that are classes of PyMeasure
 Device = Actuator | Stage | ImpedanceMeter | Meter
+Role = Literal["actuator", "stage", "impedance", "meter"]
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,7 @@ class Kind:
         Driver and simulator from plant, settings and clock.
     """
 
-    role: Literal["actuator", "stage", "impedance", "meter"]
+    role: Role
     settings: type[Strict]
     open: Callable[[str, Any, Clock], Device]
     simulate: Callable[[Plant, Any, Clock], Simulated] | None = None
@@ -86,6 +89,22 @@ def names() -> list[str]:
     return sorted([*_KINDS, *_installed()])
 
 
+def listed() -> dict[str, str]:
+    """Every kind with its role, those of PyMeasure included, or how to get them."""
+    from sensorgen.measure.lab import pymeasure_meters
+
+    roles = dict[str, str]()
+    for name in names():
+        try:
+            roles[name] = kind(name).role
+        except BadInput as error:
+            roles[name] = f"cannot be used: {error}"
+    try:
+        return roles | {name: role for name, (role, _) in pymeasure_meters.roles().items()}
+    except NotInstalled as error:
+        return roles | {f"{PYMEASURE}CLASS": str(error)}
+
+
 def kind(name: str) -> Kind:
     """A kind by its name.
 
@@ -98,6 +117,8 @@ def kind(name: str) -> Kind:
     """
     if name in _KINDS:
         return _KINDS[name]()
+    if name.startswith(PYMEASURE):
+        return _pymeasure(name)
     point = _installed().get(name)
     if point is None:
         raise UnknownName("kind of device", name, names())
@@ -177,39 +198,42 @@ def _installed() -> dict[str, Any]:
     return found
 
 
+def _at_port(
+    role: Role, settings: type[Strict], driver: Callable[[Any, Clock, Any], Device], port: Callable[[str, Any], Any],
+    simulator: Callable[[Plant, Any], Any],
+) -> Kind:  # fmt: skip
+    """A kind whose driver has a port: of a device, or of a simulator."""
+    from sensorgen.measure.lab.port import SimulatedPort
+
+    def simulate(plant: Plant, given: Any, clock: Clock) -> Simulated:
+        made = simulator(plant, given)
+        return Simulated(driver(SimulatedPort(made, clock), clock, given), made)
+
+    return Kind(role, settings, lambda address, given, clock: driver(port(address, given), clock, given), simulate)
+
+
 def _smac() -> Kind:
-    from sensorgen.measure.lab import smac
-    from sensorgen.measure.lab.port import SerialPort, SimulatedPort
+    from sensorgen.measure.lab import port, smac
     from sensorgen.measure.virtual.smac import SmacController
 
-    def simulate(plant: Plant, settings: smac.Settings, clock: Clock) -> Simulated:
-        made = SmacController(plant, newton_per_unit=settings.newton_per_unit, mm_per_count=settings.mm_per_count)
-        return Simulated(smac.Actuator(SimulatedPort(made, clock), clock, settings), made)
-
-    def real(address: str, settings: smac.Settings, clock: Clock) -> Device:
-        return smac.Actuator(SerialPort(address, smac.BAUD), clock, settings)
-
-    return Kind("actuator", smac.Settings, real, simulate)
+    return _at_port(
+        "actuator", smac.Settings, smac.Actuator, lambda address, _: port.SerialPort(address, smac.BAUD),
+        lambda plant, given: SmacController(
+            plant, newton_per_unit=given.newton_per_unit, mm_per_count=given.mm_per_count
+        ),
+    )  # fmt: skip
 
 
 def _reprap() -> Kind:
-    from sensorgen.measure.lab import reprap
-    from sensorgen.measure.lab.port import HttpPort, SerialPort, SimulatedPort
+    from sensorgen.measure.lab import port, reprap
     from sensorgen.measure.virtual.reprap import RepRapFirmware
 
-    def simulate(plant: Plant, settings: reprap.Settings, clock: Clock) -> Simulated:
-        made = RepRapFirmware(plant, password=settings.password)
-        return Simulated(reprap.Stage(reprap.SerialLink(SimulatedPort(made, clock), clock), clock, settings), made)
+    def at(address: str, given: reprap.Settings) -> port.HttpPort | port.SerialPort:
+        return port.HttpPort(address) if "://" in address else port.SerialPort(address, given.baud)
 
-    def real(address: str, settings: reprap.Settings, clock: Clock) -> Device:
-        link: reprap.Link
-        if "://" in address:
-            link = reprap.WebLink(HttpPort(address), clock, settings.password)
-        else:
-            link = reprap.SerialLink(SerialPort(address, settings.baud), clock)
-        return reprap.Stage(link, clock, settings)
-
-    return Kind("stage", reprap.Settings, real, simulate)
+    return _at_port(
+        "stage", reprap.Settings, reprap.stage, at, lambda plant, given: RepRapFirmware(plant, password=given.password)
+    )
 
 
 def _handyscope() -> Kind:
@@ -218,59 +242,48 @@ def _handyscope() -> Kind:
     from sensorgen.measure.lab import handyscope
     from sensorgen.measure.virtual.handyscope import Analyser, PhasorMeter
 
-    def simulate(plant: Plant, settings: HandyscopeSettings, clock: Clock) -> Simulated:
-        made = PhasorMeter(plant, clock, Analyser(settings.feedback_ohm, settings.feedback_f), range_v=settings.range_v)
+    def simulate(plant: Plant, given: HandyscopeSettings, clock: Clock) -> Simulated:
+        made = PhasorMeter(plant, clock, Analyser(given.feedback_ohm, given.feedback_f), range_v=given.range_v)
         return Simulated(made, made)
 
-    def real(address: str, settings: HandyscopeSettings, clock: Clock) -> Device:
-        gains = handyscope.gains(Path(settings.gains)) if settings.gains else ()
-        bridge = handyscope.Bridge(settings.feedback_ohm, settings.feedback_f, settings.range_v, gains)
+    def real(address: str, given: HandyscopeSettings, clock: Clock) -> Device:
+        gains = handyscope.gains(Path(given.gains)) if given.gains else ()
+        bridge = handyscope.Bridge(given.feedback_ohm, given.feedback_f, given.range_v, gains)
         return handyscope.Handyscope(address, clock, bridge=bridge)
 
     return Kind("impedance", HandyscopeSettings, real, simulate)
 
 
-def _lcr(name: str) -> Kind:
-    from sensorgen.measure.lab import lcr_meter
-    from sensorgen.measure.lab.port import SimulatedPort, VisaPort
+def _scpi(name: str) -> Kind:
+    from sensorgen.measure.lab import lcr_meter, multimeter, port
     from sensorgen.measure.virtual import scpi
 
-    model = {"hp-4284a": lcr_meter.HP_4284A, "keysight-e4980a": lcr_meter.E4980A}[name]
+    def at(address: str, _: Strict) -> port.VisaPort:
+        return port.VisaPort(address)
 
-    def simulate(plant: Plant, settings: lcr_meter.Settings, clock: Clock) -> Simulated:
-        made = scpi.LcrMeter(plant, name)
-        return Simulated(lcr_meter.LcrMeter(SimulatedPort(made, clock), clock, model, settings), made)
-
-    def real(address: str, settings: lcr_meter.Settings, clock: Clock) -> Device:
-        return lcr_meter.LcrMeter(VisaPort(address), clock, model, settings)
-
-    return Kind("impedance", lcr_meter.Settings, real, simulate)
-
-
-def _multimeter(name: str) -> Kind:
-    from sensorgen.measure.lab import multimeter
-    from sensorgen.measure.lab.port import SimulatedPort, VisaPort
-    from sensorgen.measure.virtual import scpi
-
+    model = {"hp-4284a": lcr_meter.HP_4284A, "keysight-e4980a": lcr_meter.E4980A}.get(name)
+    if model:
+        return _at_port(
+            "impedance", lcr_meter.Settings, lambda line, clock, given: lcr_meter.LcrMeter(line, clock, model, given),
+            at, lambda plant, _: scpi.LcrMeter(plant, name),
+        )  # fmt: skip
     key = {"hp-34401a": "34401A", "keithley-2000": "MODEL 2000"}[name]
-    models = {key: multimeter.KNOWN[key]}
+    return _at_port(
+        "meter", NoSettings, lambda line, *_: multimeter.Multimeter(line, {key: multimeter.KNOWN[key]}), at,
+        lambda plant, _: scpi.Multimeter(plant, name),
+    )  # fmt: skip
 
-    def simulate(plant: Plant, _: NoSettings, clock: Clock) -> Simulated:
-        made = scpi.Multimeter(plant, name)
-        return Simulated(multimeter.Multimeter(SimulatedPort(made, clock), models), made)
 
-    def real(address: str, _: NoSettings, _clock: Clock) -> Device:
-        return multimeter.Multimeter(VisaPort(address), models)
+def _pymeasure(name: str) -> Kind:
+    from sensorgen.measure.lab import pymeasure_meters
 
-    return Kind("meter", NoSettings, real, simulate)
+    role, driver = pymeasure_meters.meter(name)
+    return Kind(role, pymeasure_meters.Settings, driver)
 
 
 _KINDS: dict[str, Callable[[], Kind]] = {
     "smac-lcc10": _smac,
     "reprapfirmware": _reprap,
     "handyscope-hs5": _handyscope,
-    "hp-4284a": lambda: _lcr("hp-4284a"),
-    "keysight-e4980a": lambda: _lcr("keysight-e4980a"),
-    "hp-34401a": lambda: _multimeter("hp-34401a"),
-    "keithley-2000": lambda: _multimeter("keithley-2000"),
+    **{name: partial(_scpi, name) for name in ("hp-4284a", "keysight-e4980a", "hp-34401a", "keithley-2000")},
 }

@@ -5,8 +5,12 @@ by ``read``, once in every period of the control loop. Before a device has said 
 sends it nothing but that question. Any failure is a :class:`DeviceFault`.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
+
+import numpy as np
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import InstrumentFailed
@@ -163,6 +167,26 @@ class Readings:
     clipped: Mask
     lost: int = 0
 
+    @classmethod
+    def joined(cls, parts: "Sequence[Readings]", tones: int, lost: int = 0) -> "Readings":
+        """Several as one, or none, at a number of frequencies; ``lost`` beside those of the parts."""
+        times, clipped = [np.empty(0)], [np.empty(0, bool)]
+        impedance = [np.empty((0, tones), complex)]
+        for part in parts:
+            times.append(part.time_s)
+            impedance.append(part.impedance_ohm)
+            clipped.append(part.clipped)
+            lost += part.lost
+        return cls(np.concatenate(times), np.concatenate(impedance), np.concatenate(clipped), lost)
+
+    @classmethod
+    def of_tone(cls, time_s: float, k: int, tones: int, value_ohm: complex | None, *, clipped: bool) -> "Readings":
+        """One row of a meter that measures one frequency after the other: frequency ``k``, nan at the others."""
+        row = np.full((1, tones), complex(math.nan, math.nan))
+        if value_ohm is not None:
+            row[0, k] = value_ohm
+        return cls(np.array([time_s]), row, np.array([clipped]))
+
 
 class ImpedanceMeter(Protocol):
     """Measures the impedance at several frequencies, again and again."""
@@ -184,7 +208,15 @@ class ImpedanceMeter(Protocol):
 
 
 class Meter(Protocol):
-    """Measures a resistance."""
+    """Measures a resistance.
+
+    Attributes
+    ----------
+    name : str
+        Model and full identity, once identified.
+    """
+
+    name: str
 
     def identify(self) -> Identity:
         """Ask what it is; :class:`WrongDevice` if it is another."""

@@ -129,15 +129,20 @@ class Approach(Strict):
     place_mm: Number | None = None
 
 
-class Random(Strict):
-    """Presses of random force, place and hold, half of them after a higher force."""
+class Free(Strict):
+    """Presses whose force, place and hold are not given."""
 
     presses: Count
-    seed: Annotated[int, Field(ge=0)]
     force_n: Span = (0.4, 6.0)
     position_mm: Span | None = None
     hold_s: Span = (0.3, 30.0)
     rest_s: Positive = 4.0
+
+
+class Random(Free):
+    """Presses of random force, place and hold, half of them after a higher force."""
+
+    seed: Annotated[int, Field(ge=0)]
     repeats: Annotated[int, Field(ge=0, le=1000)] = 0
     from_above: Annotated[float, Field(ge=0, le=1)] = 0.5
 
@@ -182,15 +187,10 @@ class Sweep(Strict):
     rest_s: Positive = 4.0
 
 
-class Next(Strict):
+class Next(Free):
     """Presses that are chosen during the run, each by what it is expected to tell."""
 
-    presses: Count
     aim: Literal["values", "presses"] = "values"
-    force_n: Span = (0.4, 6.0)
-    position_mm: Span | None = None
-    hold_s: Span = (0.3, 30.0)
-    rest_s: Positive = 4.0
 
 
 Kind = Random | Ramp | Hold | Sine | Sweep | Next
@@ -380,7 +380,7 @@ def _check_part(key: str, part: Kind, limit_n: float, places_mm: tuple[float, fl
             f"{key}.{name}: {largest:g} N; expected up to {_ROOM * limit_n:.4g} N, {_ROOM:.0%} of limits.force_n, "
             "above which the tip is lifted"
         )
-    if isinstance(part, Random | Next):
+    if isinstance(part, Free):
         _rising(f"{key}.hold_s", part.hold_s)
     where = part.position_mm
     for place in () if where is None else where if isinstance(where, tuple) else (where,):

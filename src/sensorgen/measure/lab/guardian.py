@@ -18,11 +18,11 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Self, cast
 
 from sensorgen.core.errors import SensorgenError
+from sensorgen.core.records import Strict
 from sensorgen.measure.lab import rigs
 from sensorgen.measure.lab.clock import RealClock
 from sensorgen.measure.lab.devices import DeviceFault
@@ -37,8 +37,7 @@ _UP_S, _RAISE_S = 1.5, 20.0  # that the piston, and the stage after a move that 
 _STALL = 2.0  # of the guardian itself, in its own periods: a stalled judge judges nobody
 
 
-@dataclass(frozen=True)
-class Orders:
+class Orders(Strict):
     """Orders of a guardian.
 
     Attributes
@@ -47,25 +46,13 @@ class Orders:
         "actuator" and "stage", those that have a line that can be opened anew.
     dead_man_s : float
         Without a sign of life for this long the run counts as hung [s].
-    folder : Path
+    folder : str
         Of the run, for its report.
     """
 
     devices: dict[str, Device]
     dead_man_s: float
-    folder: Path
-
-    def to_json(self) -> str:
-        """One line."""
-        devices = {role: device.model_dump(mode="json") for role, device in self.devices.items()}
-        return json.dumps({"devices": devices, "dead_man_s": self.dead_man_s, "folder": str(self.folder)}) + "\n"
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """Read the text of :meth:`to_json`."""
-        data = json.loads(text)
-        devices = {role: Device.model_validate_json(json.dumps(each)) for role, each in data["devices"].items()}
-        return cls(devices, data["dead_man_s"], Path(data["folder"]))
+    folder: str
 
 
 class Guardian:
@@ -91,7 +78,7 @@ class Guardian:
         self._to, self._from = (pipe.fileno() for pipe in self._pipes)
         self._heard_s, self._armed = time.monotonic(), False
         try:
-            os.write(self._to, orders.to_json().encode())
+            os.write(self._to, orders.model_dump_json().encode() + b"\n")
             if not select.select([self._from], [], [], _BEGIN_S)[0] or not os.read(self._from, 1):
                 raise DeviceFault("guardian: it does not start")
         except BaseException as error:
@@ -277,7 +264,7 @@ def main() -> None:
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         if number := getattr(signal, name, None):
             signal.signal(number, signal.SIG_IGN)
-    orders = Orders.from_json(_line())
+    orders = Orders.model_validate_json(_line())
     rigs.check(orders.devices)  # imports the drivers, so that nothing has to be imported when it counts
     os.write(1, _ALIVE)
     os.set_blocking(1, False)
@@ -287,7 +274,7 @@ def main() -> None:
         rescue.run()
         took = round(time.monotonic() - begun, 3)
         done = {"at": round(time.time(), 3), "reason": reason, "devices": rescue.found, "took_s": took}
-        with suppress(OSError), (orders.folder / REPORT).open("a", encoding="utf-8") as file:
+        with suppress(OSError), (Path(orders.folder) / REPORT).open("a", encoding="utf-8") as file:
             file.write(json.dumps(done) + "\n")
 
 

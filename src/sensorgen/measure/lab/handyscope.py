@@ -20,7 +20,7 @@ import warnings
 from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -235,7 +235,8 @@ class Handyscope:
         lost = self._missing(heard=bool(parts))
         if parts and not self._settled:
             self._settled, parts = True, parts[1:]
-        return _joined(parts, len(self._tones), lost, lost * self._window / RATE_HZ)
+        found, gap_s = Readings.joined(parts, len(self._tones), lost), lost * self._window / RATE_HZ
+        return replace(found, time_s=found.time_s + gap_s)
 
     def stop(self) -> None:
         """End the measurement and switch the generator off."""
@@ -386,15 +387,3 @@ class Handyscope:
             gone = isinstance(error, self._library.exceptions.ObjectGoneError)
             cause = "was unplugged" if gone else f"reports: {error.args[-1]}"
             raise DeviceFault(f"Handyscope {self.address} {cause}") from None
-
-
-def _joined(parts: list[Readings], tones: int, lost: int, gap_s: float) -> Readings:
-    """Readings of several blocks as one, after a gap."""
-    if not parts:
-        return Readings(np.zeros(0), np.zeros((0, tones), complex), np.zeros(0, bool), lost)
-    return Readings(
-        np.concatenate([part.time_s for part in parts]) + gap_s,
-        np.concatenate([part.impedance_ohm for part in parts]),
-        np.concatenate([part.clipped for part in parts]),
-        lost,
-    )

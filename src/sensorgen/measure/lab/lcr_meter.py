@@ -68,7 +68,7 @@ class Settings(Strict):
     aperture: Literal["SHOR", "MED", "LONG"] = "MED"
 
 
-class LcrMeter:
+class LcrMeter(scpi.Instrument):
     """Driver of an analyser.
 
     Parameters
@@ -84,8 +84,8 @@ class LcrMeter:
     """
 
     def __init__(self, port: Port, clock: Clock, model: Model, settings: Settings | None = None) -> None:
-        self.model, self.settings = model, settings or Settings()
-        self._port, self._clock = port, clock
+        super().__init__(port, _ANSWER_S)
+        self.model, self.settings, self._clock = model, settings or Settings(), clock
         self._tones_hz: Real = np.empty(0)
         self._next = 0
         self._begin_s = math.nan
@@ -99,13 +99,12 @@ class LcrMeter:
         WrongDevice
             Another instrument answers.
         """
-        said = scpi.identity(self._port, _ANSWER_S)
+        said = self._asked()
         fields = [field.strip() for field in said.split(",")]
         if len(fields) < 2 or fields[1].upper() not in (self.model.name, f"{self.model.name}L"):
             raise WrongDevice(f"{self._port.address} is {said!r:.80}; expected {self.model.name}")
         self._known = True
-        serial, firmware = (*fields[2:4], "", "")[:2]
-        return Identity(f"{fields[0]} {fields[1]}", serial, firmware)
+        return scpi.identity(f"{fields[0]} {fields[1]}", said)
 
     def start(self, tones_hz: Real, voltage_v: float) -> None:
         """Begin to measure at (m,) frequencies with an amplitude, which is the rms level times the root of 2 [Hz], [V].
@@ -133,9 +132,7 @@ class LcrMeter:
             self._write(command)
         self._write("TRIG:SOUR BUS")
         self._write("INIT:CONT ON")
-        status = self._query("SYST:ERR?")
-        if not re.match(r"[-+]?0\b", status):
-            raise DeviceFault(f"{self.model.name} at {self._port.address} reports {status!r:.100}")
+        self._check(self.model.name)
         self._tones_hz, self._next = tones, 0
         self._trigger()
 
@@ -150,30 +147,25 @@ class LcrMeter:
         count = len(self._tones_hz)
         k = self._next
         if not count or self._clock.now() < self._begin_s + self._duration(k):
-            return Readings(np.empty(0), np.empty((0, count), complex), np.empty(0, bool))
+            return Readings.joined((), count)
         said = self._query("FETC?")
-        found = _NUMBERS.fullmatch(said)
-        if not found:
+        numbers = _NUMBERS.fullmatch(said)
+        if not numbers:
             raise DeviceFault(f"{self.model.name} at {self._port.address} answers {said!r:.60}; expected R,X,STATUS")
         self._at(float(self._tones_hz[k]))
-        resistance, reactance, status = float(found[1]), float(found[2]), int(found[3])
-        row = np.full((1, count), complex(math.nan, math.nan))
-        if (status == _GOOD or status in _SIGNAL) and max(abs(resistance), abs(reactance)) < _OVERLOAD:
-            row[0, k] = complex(resistance, reactance)
-        time_s = self._begin_s + self._duration(k) / 2
+        resistance, reactance, status = float(numbers[1]), float(numbers[2]), int(numbers[3])
+        sound = (status == _GOOD or status in _SIGNAL) and max(abs(resistance), abs(reactance)) < _OVERLOAD
+        value = complex(resistance, reactance) if sound else None
+        found = Readings.of_tone(self._begin_s + self._duration(k) / 2, k, count, value, clipped=status != _GOOD)
         self._next = (k + 1) % count
         self._trigger()
-        return Readings(np.array([time_s]), row, np.array([status != _GOOD]))
+        return found
 
     def stop(self) -> None:
         """End the measurement, with the level at its lowest: it has no switch."""
         self._tones_hz = np.empty(0)
         self._write("ABOR")
         self._write("VOLT MIN")
-
-    def close(self) -> None:
-        """Give the connection back."""
-        self._port.close()
 
     def _at(self, tone_hz: float) -> None:
         """Refuse a value of another frequency."""
@@ -196,9 +188,3 @@ class LcrMeter:
         """Time of a measurement [s]."""
         constant, periods = self.model.times[self.settings.aperture]
         return constant + periods / float(self._tones_hz[k])
-
-    def _write(self, command: str) -> None:
-        scpi.write(self._port, command)
-
-    def _query(self, command: str) -> str:
-        return scpi.query(self._port, command, _ANSWER_S)

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.units import si
-from sensorgen.measure.lab.live_server import Served, Server
+from sensorgen.measure.lab.live_server import Server
 
 COMMANDS = ("pause", "resume", "abort")
 _WAITING = 16  # commands that may wait; further ones are dropped, except an abort
@@ -99,7 +99,7 @@ class LiveView:
         self._commands: list[str] = []
         self._last = ""
         token = secrets.token_urlsafe(24)
-        self._server = Server(token, self._served())
+        self._server = Server(token, self)
         self.url = f"http://127.0.0.1:{self._server.port}/{token}/"
 
     def __enter__(self) -> Self:
@@ -128,11 +128,11 @@ class LiveView:
         """End the page; never raises."""
         self._server.close()
 
-    def _served(self) -> Served:
-        tones = [si(float(f), "Hz") for f in self.tones_hz]
-        return Served(self._data, self._command, json.dumps({"title": self.title, "tones": tones}).encode())
+    def about(self) -> bytes:
+        """Title and tones, in JSON."""
+        return json.dumps({"title": self.title, "tones": [si(float(f), "Hz") for f in self.tones_hz]}).encode()
 
-    def _data(self, after: int) -> bytes:
+    def data(self, after: int) -> bytes:
         """Rows after a number, as far as they are kept, and the state of the run, in JSON."""
         with self._lock:
             count, state, last = self._count, self._state, self._last
@@ -140,7 +140,7 @@ class LiveView:
             rows = list(self._rows)[first - count + len(self._rows) :]
         return f'{{"next": {count}, "state": {state}, "last": {json.dumps(last)}, "rows": [{",".join(rows)}]}}'.encode()
 
-    def _command(self, name: str) -> bool:
+    def command(self, name: str) -> bool:
         """Take a command from the page."""
         if name not in COMMANDS:
             return False

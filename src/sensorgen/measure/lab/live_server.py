@@ -2,12 +2,10 @@
 
 import hmac
 import threading
-from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
-from typing import Any
+from typing import Any, Protocol
 from urllib.parse import parse_qs, urlsplit
 
 _FILES = {
@@ -29,26 +27,20 @@ _TIMEOUT_S = 5.0
 _COMMAND_BYTES = 32
 
 
-@dataclass(frozen=True)
-class Served:
-    """Part of the view that the server asks for.
+class Served(Protocol):
+    """View that the server asks."""
 
-    Attributes
-    ----------
-    data : callable
-        Rows after a number, in JSON.
-    command : callable
-        Takes a command; whether it is known.
-    about : bytes
-        Title and tones, in JSON.
-    """
+    def data(self, after: int, /) -> bytes:
+        """Rows after a number, in JSON."""
 
-    data: Callable[[int], bytes]
-    command: Callable[[str], bool]
-    about: bytes
+    def command(self, name: str, /) -> bool:
+        """Take a command; True where it is known."""
+
+    def about(self) -> bytes:
+        """Title and tones, in JSON."""
 
 
-class Server:
+class Server(ThreadingHTTPServer):
     """A server in threads of its own.
 
     Parameters
@@ -64,21 +56,6 @@ class Server:
         Port on 127.0.0.1.
     """
 
-    def __init__(self, token: str, served: Served) -> None:
-        self._http = _Http(token, served)
-        self.port = int(self._http.server_address[1])
-        self._thread = threading.Thread(target=self._http.serve_forever, args=(0.05,), daemon=True, name="live page")
-        self._thread.start()
-
-    def close(self) -> None:
-        """End it; never raises."""
-        with suppress(Exception):
-            self._http.shutdown()
-            self._http.server_close()
-            self._thread.join(_TIMEOUT_S)
-
-
-class _Http(ThreadingHTTPServer):
     daemon_threads, block_on_close = True, False
 
     def __init__(self, token: str, served: Served) -> None:
@@ -87,7 +64,17 @@ class _Http(ThreadingHTTPServer):
         self.hosts = {f"{name}:{self.server_address[1]}" for name in ("127.0.0.1", "localhost")}
         self._free = threading.BoundedSemaphore(_REQUESTS)
         folder = resources.files("sensorgen.measure.lab") / "templates"
+        self.port = int(self.server_address[1])
+        self._thread = threading.Thread(target=self.serve_forever, args=(0.05,), daemon=True, name="live page")
         self.files = {name: ((folder / file).read_bytes(), kind) for name, (file, kind) in _FILES.items()}
+        self._thread.start()
+
+    def close(self) -> None:
+        """End it; never raises."""
+        with suppress(Exception):
+            self.shutdown()
+            self.server_close()
+            self._thread.join(_TIMEOUT_S)
 
     def process_request(self, request: Any, client_address: Any) -> None:
         """Answer in a thread, if not too many are busy."""
@@ -108,7 +95,7 @@ class _Http(ThreadingHTTPServer):
 
 
 class _Request(BaseHTTPRequestHandler):
-    server: _Http
+    server: Server
     timeout = _TIMEOUT_S
     server_version, sys_version = "sensorgen", ""
 
@@ -120,7 +107,7 @@ class _Request(BaseHTTPRequestHandler):
         if path in self.server.files:
             return self._send(200, *self.server.files[path])
         if path == "about":
-            return self._send(200, self.server.served.about, "application/json")
+            return self._send(200, self.server.served.about(), "application/json")
         if path == "data":
             after = parse_qs(urlsplit(self.path).query).get("after", ["0"])[0]
             number = int(after) if after.isdecimal() and len(after) < 16 else 0

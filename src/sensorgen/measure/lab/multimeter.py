@@ -1,6 +1,7 @@
 """Resistances from a bench multimeter: HP (Agilent, Keysight) 34401A and Keithley 2000.
 
-Both use SCPI: ``MEAS:RES?`` with two leads, ``MEAS:FRES?`` with four; both send 9.9E37 for an overload.
+Both use SCPI: ``MEAS:RES?`` with two leads, ``MEAS:FRES?`` with four; both send 9.9E37 for an overload. PyMeasure's
+classes send other commands, some before ``*IDN?``, and give numbers, not the meter's words, which the log keeps.
 """
 
 import re
@@ -16,7 +17,7 @@ _QUERY = {2: "MEAS:RES?", 4: "MEAS:FRES?"}
 _NUMBER = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?(E[-+]?[0-9]{1,3})?", re.IGNORECASE)
 
 
-class Multimeter:
+class Multimeter(scpi.Instrument):
     """Driver of a multimeter.
 
     Parameters
@@ -33,8 +34,8 @@ class Multimeter:
     """
 
     def __init__(self, port: Port, models: Mapping[str, str] = KNOWN) -> None:
-        self.name = ""
-        self._port, self._models = port, models
+        super().__init__(port, TIMEOUT_S)
+        self.name, self._models = "", models
 
     def identify(self) -> Identity:
         """Ask ``*IDN?``, and forget errors from before.
@@ -47,17 +48,16 @@ class Multimeter:
             Another instrument answers.
         """
         if self._port.address.upper().startswith("ASRL"):
-            scpi.write(self._port, "SYST:REM")
-        said = scpi.identity(self._port, TIMEOUT_S)
+            self._write("SYST:REM")
+        said = self._asked()
         fields = re.sub(r"\s*,\s*", ",", said)
         name = next((name for model, name in self._models.items() if f",{model}," in fields.upper()), "")
         if not name:
             expected = " or ".join(self._models.values())
             raise WrongDevice(f"{self._port.address} is {said!r:.80}; expected {expected}: or type it with --y, --z")
         self.name = f"{name} ({said})"
-        scpi.write(self._port, "*CLS")
-        serial, firmware = (*fields.split(",")[2:4], "", "")[:2]
-        return Identity(name, serial, firmware)
+        self._write("*CLS")
+        return scpi.identity(name, said)
 
     def resistance(self, *, wires: int) -> str:
         """One autoranged reading as the meter sends it, as ``+6.50000000E+02`` [ohm].
@@ -77,14 +77,5 @@ class Multimeter:
         reply = self._query(_QUERY[wires])
         if not _NUMBER.fullmatch(reply):
             raise DeviceFault(f"{self.name} at {self._port.address} answers {reply!r:.60}; expected a resistance")
-        status = self._query("SYST:ERR?")
-        if not re.match(r"[-+]?0\b", status):
-            raise DeviceFault(f"{self.name} at {self._port.address} reports {status!r:.100}")
+        self._check(self.name)
         return reply
-
-    def close(self) -> None:
-        """Give the connection back."""
-        self._port.close()
-
-    def _query(self, command: str) -> str:
-        return scpi.query(self._port, command, TIMEOUT_S)

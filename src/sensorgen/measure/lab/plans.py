@@ -18,34 +18,6 @@ _TRAVEL_S = 8.0  # to another place, about: a part of the rest
 
 
 @dataclass(frozen=True)
-class Line:
-    """Force that goes from one value to another [s], [N], [N]."""
-
-    seconds: float
-    begin_n: float
-    end_n: float
-
-    def force_n(self, time_s: float) -> float:
-        """At a time since its begin [N]."""
-        share = min(max(time_s / self.seconds, 0.0), 1.0) if self.seconds > 0 else 1.0
-        return self.begin_n + share * (self.end_n - self.begin_n)
-
-
-@dataclass(frozen=True)
-class Wave:
-    """Force that swings about a mean [s], [N], [N], [Hz]."""
-
-    seconds: float
-    mean_n: float
-    amplitude_n: float
-    frequency_hz: float
-
-    def force_n(self, time_s: float) -> float:
-        """At a time since its begin [N]."""
-        return self.mean_n + self.amplitude_n * sin(2 * pi * self.frequency_hz * time_s)
-
-
-@dataclass(frozen=True)
 class Step:
     """One press.
 
@@ -59,36 +31,38 @@ class Step:
         Of the part.
     place_mm : float
         Of the tip's centre [mm]; nan where it is chosen during the run.
-    course : tuple of Line or Wave
-        Force from the landing on; empty where it is chosen during the run.
+    course : tuple of (float, float)
+        Time since the landing and force, linear in between; empty where it is chosen during the run [s], [N].
     rest_s : float
         Rest before it, tip up [s].
     force_n, peak_n, hold_s : float
         Force at which it is read, largest force before, and time at the force before the average [N], [s].
+    wave : (float, float)
+        Amplitude and frequency of what is added to the last piece of the course [N], [Hz].
     """
 
     number: int
     part: int
     kind: str
     place_mm: float
-    course: tuple[Line | Wave, ...]
+    course: tuple[tuple[float, float], ...]
     rest_s: float
     force_n: float
     peak_n: float
     hold_s: float
+    wave: tuple[float, float] = (0.0, 0.0)
 
     @property
     def seconds(self) -> float:
         """From the landing to the lift [s]."""
-        return sum(piece.seconds for piece in self.course)
+        return self.course[-1][0] if self.course else 0.0
 
     def force_at(self, time_s: float) -> float:
         """Set force at a time since the landing [N]."""
-        for piece in self.course:
-            if time_s < piece.seconds:
-                return piece.force_n(time_s)
-            time_s -= piece.seconds
-        return self.course[-1].force_n(self.course[-1].seconds)
+        time_s = min(time_s, self.seconds)
+        (times_s, forces_n), (amplitude_n, frequency_hz) = np.array(self.course).T, self.wave
+        swing_n = amplitude_n * sin(2 * pi * frequency_hz * max(time_s - self.course[-2][0], 0.0))
+        return float(np.interp(time_s, times_s, forces_n)) + swing_n
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +142,7 @@ def _presses(
         case Ramp():
             low = min(approach.contact_n, part.force_n)
             took = (part.force_n - low) / part.rate_n_s
-            course = (Line(took, low, part.force_n), Line(took, part.force_n, low))
+            course = ((0.0, low), (took, part.force_n), (2 * took, low))
             for _ in range(part.repeats):
                 yield _step(part.position_mm, course, part.rest_s, part.force_n)
         case Hold():
@@ -198,23 +172,26 @@ def _random(part: Random, approach: Approach, places: tuple[float, float]) -> It
 
 def _press(approach: Approach, place_mm: float, force_n: float, peak_n: float, hold_s: float, rest_s: float) -> Step:
     """Up to a force, over a higher one if there is one, hold, average, and down."""
-    rate, at = approach.rate_n_s, approach.contact_n
-    course = []
+    course = [(0.0, approach.contact_n)]
     if peak_n > force_n:
-        course += [Line(abs(peak_n - at) / rate, at, peak_n), Line(_AT_PEAK_S, peak_n, peak_n)]
-        at = peak_n
-    course += [Line(abs(force_n - at) / rate, at, force_n), Line(hold_s + AVERAGED_S, force_n, force_n)]
+        _extend(course, approach, peak_n, _AT_PEAK_S)
+    _extend(course, approach, force_n, hold_s + AVERAGED_S)
     return replace(_step(place_mm, tuple(course), rest_s, force_n), peak_n=max(peak_n, force_n), hold_s=hold_s)
 
 
+def _extend(course: list[tuple[float, float]], approach: Approach, force_n: float, stay_s: float) -> None:
+    """Go to a force, and stay there."""
+    time_s, at_n = course[-1]
+    there_s = time_s + abs(force_n - at_n) / approach.rate_n_s
+    course += [(there_s, force_n), (there_s + stay_s, force_n)]
+
+
 def _swing(part: Sine, approach: Approach) -> Step:
-    rate, at = approach.rate_n_s, approach.contact_n
-    course = (
-        Line(abs(part.mean_n - at) / rate, at, part.mean_n),
-        Wave(part.cycles / part.frequency_hz, part.mean_n, part.amplitude_n, part.frequency_hz),
-    )
-    return _step(part.position_mm, course, part.rest_s, part.mean_n + part.amplitude_n)
+    course = [(0.0, approach.contact_n)]
+    _extend(course, approach, part.mean_n, part.cycles / part.frequency_hz)
+    step = _step(part.position_mm, tuple(course), part.rest_s, part.mean_n + part.amplitude_n)
+    return replace(step, wave=(part.amplitude_n, part.frequency_hz))
 
 
-def _step(place_mm: float, course: tuple[Line | Wave, ...], rest_s: float, force_n: float) -> Step:
+def _step(place_mm: float, course: tuple[tuple[float, float], ...], rest_s: float, force_n: float) -> Step:
     return Step(0, 0, "", place_mm, course, rest_s, force_n, force_n, 0.0)

@@ -9,11 +9,13 @@ import urllib.parse
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any, Protocol
 
 from sensorgen.core.errors import BadInput, NotInstalled
 from sensorgen.measure.lab.clock import Clock, RealClock
 from sensorgen.measure.lab.devices import DeviceFault
+from sensorgen.measure.virtual.plant import Simulator
 
 _POLL_S = 0.005  # of the serial driver; half a period of the fastest control loop
 
@@ -54,32 +56,15 @@ class Web(Protocol):
         """Status and content of one GET request; :class:`DeviceFault` if nothing answers."""
 
 
-class Simulator(Protocol):
-    """Simulator of a device at the other end of a line.
-
-    Attributes
-    ----------
-    fault : str
-        Planted fault, "" for none.
-    heard : list of bytes
-        Every message that has come.
-    """
-
-    fault: str
-    heard: list[bytes]
-
-    def exchange(self, data: bytes, time_s: float) -> bytes:
-        """Bytes sent by a time, after having received some; OSError where the cable is out."""
-
-
 @contextmanager
-def _faults(address: str) -> Iterator[None]:
+def _faults(address: str, what: str = "connection to {} failed", *also: type[Exception]) -> Iterator[None]:
     """Translate errors of a connection to DeviceFault."""
+    kinds: tuple[type[Exception], ...] = (OSError, ValueError, TypeError, http.client.HTTPException, *also)
     try:
         yield
-    except (OSError, ValueError, TypeError, http.client.HTTPException) as error:
+    except kinds as error:
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise DeviceFault(f"connection to {address} failed: {reason:.200}; check address, cable and power") from None
+        raise DeviceFault(f"{what.format(address)}: {reason:.200}; check address, cable and power") from None
 
 
 class SerialPort:
@@ -91,8 +76,6 @@ class SerialPort:
         ``/dev/ttyUSB0``, ``COM3``.
     baud : int
         Bits per second.
-    shared : bool
-        Open it also if another program has it: to stop what that program has begun.
 
     Raises
     ------
@@ -102,7 +85,7 @@ class SerialPort:
         There is no such line, or another program has it.
     """
 
-    def __init__(self, address: str, baud: int, *, shared: bool = False) -> None:
+    def __init__(self, address: str, baud: int) -> None:
         try:
             import serial
         except ImportError:
@@ -110,7 +93,7 @@ class SerialPort:
         self.address = address
         self._received = bytearray()
         with _faults(address):
-            self._line = serial.Serial(address, baud, timeout=_POLL_S, write_timeout=1.0, exclusive=not shared)
+            self._line = serial.Serial(address, baud, timeout=_POLL_S, write_timeout=1.0, exclusive=True)
 
     def write(self, data: bytes) -> None:
         """Send; DeviceFault if the line is cut."""
@@ -204,6 +187,7 @@ class VisaPort:
         except ImportError:
             raise NotInstalled("VISA needs PyVISA: pip install 'sensorgen[lab]'") from None
         self.address, self._visa = address, pyvisa
+        self._failures = partial(_faults, repr(address), "no answer from an instrument at {}", pyvisa.errors.Error)
         self._resources: list[Any] = []
         try:
             with self._failures():
@@ -236,17 +220,6 @@ class VisaPort:
             raise ValueError("not the address of an instrument that takes commands, as GPIB0::22::INSTR")
         resource.read_termination = resource.write_termination = "\n"
         return resource
-
-    @contextmanager
-    def _failures(self) -> Iterator[None]:
-        """Translate errors of PyVISA to DeviceFault."""
-        try:
-            yield
-        except (self._visa.errors.Error, OSError, ValueError) as error:
-            reason = " ".join(str(error).split())
-            raise DeviceFault(
-                f"no answer from an instrument at {self.address!r}: {reason:.200}; check address, cable and power"
-            ) from None
 
 
 class HttpPort:

@@ -24,7 +24,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.core.records import Line, Strict
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import DeviceFault, Identity, Place, WrongDevice
-from sensorgen.measure.lab.port import Port, Web
+from sensorgen.measure.lab.port import HttpPort, Port, Web
 
 BAUD = 57_600
 _ANSWER_S, _HOMING_S, _HTTP_S = 2.0, 120.0, 1.0
@@ -430,6 +430,13 @@ class Stage:
     def _begin(self, axis: str, position_mm: float, speed_mm_s: float) -> None:
         self._goal_mm[axis] = position_mm
         self._link.send("G90", f"G1 {axis}{position_mm:.3f} F{60 * speed_mm_s:.1f}")
+
+
+def stage(port: Any, clock: Clock, settings: Settings) -> Stage:
+    """Driver at a serial line or an address of HTTP."""
+    web = isinstance(port, HttpPort)
+    link: Link = WebLink(port, clock, settings.password) if web else SerialLink(port, clock)
+    return Stage(link, clock, settings)
 
 
 def _result(text: str, address: str) -> object:

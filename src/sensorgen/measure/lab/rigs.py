@@ -1,15 +1,18 @@
 """The devices of a rig: real ones at their addresses, or simulators that share one virtual specimen."""
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import Any
+from typing import Any, cast
 
 from sensorgen.core.errors import BadInput, within
 from sensorgen.design.design import Design
 from sensorgen.measure.lab import catalogue
-from sensorgen.measure.lab.clock import Clock
+from sensorgen.measure.lab.clock import Clock, RealClock
+from sensorgen.measure.lab.devices import Meter
 from sensorgen.measure.lab.experiment import Device, Devices, Experiment
+from sensorgen.measure.lab.multimeter import Multimeter
+from sensorgen.measure.lab.port import VisaPort
 from sensorgen.measure.lab.safety import Rig
 from sensorgen.measure.virtual import faults, mechanics, rig
 
@@ -35,18 +38,7 @@ def real(devices: Devices, clock: Clock) -> Rig:
     DeviceFault
         There is no such line.
     """
-    found: dict[str, Any] = {}
-    try:
-        for role in ROLES:
-            device: Device = getattr(devices, role)
-            with within(f"devices.{role}"):
-                _has_role(role, device)
-                found[role] = catalogue.opened(device.kind, device.address, device.settings, clock)
-    except BaseException:
-        for driver in found.values():
-            driver.close()
-        raise
-    return Rig(**found)
+    return Rig(**_drivers(devices, lambda device: opened(device, clock)))
 
 
 def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Rig, mechanics.Rig]:
@@ -64,21 +56,34 @@ def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Rig
         _strike(virtual, devices)
         plant = rig.rig_of(virtual, design, experiment.pressing.length_mm * 1e-3)
         plant.specimen.blank  # noqa: B018 - solved now: one that cannot be is refused before the run begins
-    found: dict[str, Any] = {}
-    for role in ROLES:
-        device: Device = getattr(devices, role)
+
+    def made(device: Device) -> Any:
         settings = dict(device.settings)
         if device.kind == SIMULATED.actuator.kind:
             settings = {"weight_n": plant.mechanics.weight_n, "friction_n": plant.mechanics.friction_n} | settings
-        with within(f"devices.{role}"):
-            _has_role(role, device)
-            made = catalogue.simulated(device.kind, plant, settings, clock)
-        found[role] = made.driver
-        if hasattr(made.simulator, "heard"):  # every message so far: of an hour, tens of megabytes
-            made.simulator.heard = deque(maxlen=_HEARD)
+        of = catalogue.simulated(device.kind, plant, settings, clock)
+        if hasattr(of.simulator, "heard"):  # every message so far: of an hour, tens of megabytes
+            of.simulator.heard = deque(maxlen=_HEARD)
         if plant.planted and device.kind in _STRIKES:
-            plant.planted.attach(_STRIKES[device.kind], made.simulator)
-    return Rig(**found), plant
+            plant.planted.attach(_STRIKES[device.kind], of.simulator)
+        return of.driver
+
+    return Rig(**_drivers(devices, made)), plant
+
+
+def _drivers(devices: Devices, made: Callable[[Device], Any]) -> dict[str, Any]:
+    """Drivers by role; where one cannot be made, the others are closed."""
+    drivers: dict[str, Any] = {}
+    try:
+        for role in ROLES:
+            with within(f"devices.{role}"):
+                _has_role(role, getattr(devices, role))
+                drivers[role] = made(getattr(devices, role))
+    except BaseException:
+        for driver in drivers.values():
+            driver.close()
+        raise
+    return drivers
 
 
 def _strike(virtual: rig.VirtualSpecimen, devices: Devices) -> None:
@@ -100,6 +105,14 @@ def check(devices: Mapping[str, Device]) -> None:
 def opened(device: Device, clock: Clock) -> Any:
     """Driver of one real device; errors as :func:`real`."""
     return catalogue.opened(device.kind, device.address, device.settings, clock)
+
+
+def meter(kind: str | None, address: str) -> Meter:
+    """Driver of a multimeter at a VISA address, of a kind or of one that its answer names; errors as :func:`real`."""
+    if kind is None:
+        return Multimeter(VisaPort(address))
+    _has_role("meter", Device(kind=kind))
+    return cast(Meter, catalogue.opened(kind, address, {}, RealClock()))
 
 
 def _has_role(role: str, device: Device) -> None:

@@ -178,7 +178,9 @@ class Session:
         guardian = None
         if not asked.simulated and experiment.devices:
             devices = {"actuator": experiment.devices.actuator, "stage": experiment.devices.stage}
-            guardian = self._stack.enter_context(Guardian(Orders(devices, experiment.limits.dead_man_s, folder)))
+            guardian = self._stack.enter_context(
+                Guardian(Orders(devices=devices, dead_man_s=experiment.limits.dead_man_s, folder=str(folder)))
+            )
         return run(
             experiment, clock=self._clock, log=self._log, rig=self._rig, simulated=asked.simulated, view=self._views,
             guardian=guardian, next_press=self._model, resume=folder, confirm=confirm,

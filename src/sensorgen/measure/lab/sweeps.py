@@ -1,5 +1,6 @@
 """Whole rows of impedances from an instrument that measures one frequency after the other."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,26 +25,18 @@ class Sweeps:
         known = np.isfinite(found.impedance_ohm)
         if (known.all(axis=1) | ~known.any(axis=1)).all():
             return found
-        rows = [
-            row
-            for each in zip(found.time_s.tolist(), found.impedance_ohm, found.clipped.tolist(), strict=True)
-            if (row := self._taken(*each))
-        ]
-        count = found.impedance_ohm.shape[1]
-        times, impedance, clipped = zip(*rows, strict=True) if rows else ((), (), ())
-        return Readings(
-            np.array(times, float), np.array(impedance, complex).reshape(-1, count), np.array(clipped, bool), found.lost
-        )
+        rows = zip(found.time_s.tolist(), found.impedance_ohm, found.clipped.tolist(), strict=True)
+        whole = [row for each in rows for row in self._taken(*each)]
+        return Readings.joined(whole, found.impedance_ohm.shape[1], found.lost)
 
-    def _taken(self, time_s: float, row: Complex, clipped: bool) -> tuple[float, Complex, bool] | None:
+    def _taken(self, time_s: float, row: Complex, clipped: bool) -> Iterator[Readings]:
         known = np.isfinite(row)
-        if known.all() or not known.any():
-            return time_s, row, clipped
-        self._row = row if self._row is None else np.where(known, row, self._row)
-        self._times.append(time_s)
-        self._clipped |= clipped
-        if not np.isfinite(self._row).all():
-            return None
-        whole = float(np.mean(self._times)), self._row, self._clipped
-        self._row, self._times, self._clipped = None, [], False
-        return whole
+        if not known.all() and known.any():
+            self._row = row if self._row is None else np.where(known, row, self._row)
+            self._times.append(time_s)
+            self._clipped |= clipped
+            if not np.isfinite(self._row).all():
+                return
+            time_s, row, clipped = float(np.mean(self._times)), self._row, self._clipped
+            self._row, self._times, self._clipped = None, [], False
+        yield Readings(np.array([time_s]), row[None], np.array([clipped]))

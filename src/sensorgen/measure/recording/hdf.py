@@ -143,8 +143,8 @@ class _Reader:
 
     def _numbers(self, item: Any) -> NDArray[Any]:
         """Numbers of a dataset, read block by block."""
-        if item.ndim > 2:
-            raise BadInput(f"{item.name}: an array of {item.ndim} axes; expected up to 2")
+        if item.ndim > 3 or (item.ndim == 3 and item.dtype.itemsize * prod(item.shape[1:]) > _BLOCK):
+            raise BadInput(f"{item.name}: an array of {item.ndim} axes; expected up to 2, or frames of up to 1 MB")
         if not item.size:
             return np.empty(item.shape, item.dtype)
         content = self._spool.held(np.ascontiguousarray(item[at]).tobytes() for at in _places(item))

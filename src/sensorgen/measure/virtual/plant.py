@@ -49,9 +49,50 @@ class Plant(Protocol):
         """Reading of an ideal multimeter across the bottom electrode [ohm]."""
 
 
-def lines(received: bytearray, data: bytes, end: bytes) -> list[bytes]:
-    """Lines that are complete with some more bytes; what is left stays in ``received``."""
-    received += data
-    *found, rest = bytes(received).split(end)
-    received[:] = rest
-    return found
+class Simulator:
+    """A device on a plant at the end of a line, asked in turns.
+
+    Parameters
+    ----------
+    plant : Plant
+        What it moves or measures.
+
+    Attributes
+    ----------
+    fault : str
+        Planted fault, or "": of all devices "cut", the cable is out; "silent", no answers; "hung", no action either.
+    heard : list of bytes
+        Every line that has come.
+    """
+
+    END = b"\n"
+
+    def __init__(self, plant: Plant) -> None:
+        self.fault = ""
+        self.heard: list[bytes] = []
+        self._plant, self._now_s = plant, 0.0
+        self._received, self._out = bytearray(), bytearray()
+
+    def exchange(self, data: bytes, time_s: float) -> bytes:
+        """Bytes sent by a time, after having received some; OSError where the cable is out."""
+        if self.fault == "cut":
+            raise OSError("cable out")
+        self._now_s = time_s
+        self._plant.advance(time_s)
+        self._step()
+        *lines, rest = bytes(self._received + data).split(self.END)
+        self._received[:] = rest
+        for line in lines:
+            self.heard.append(line)
+            if self.fault != "hung":
+                self._take(line)
+        self._step()
+        sent, self._out = bytes(self._out), bytearray()
+        return b"" if self.fault in ("silent", "hung") else sent
+
+    def _step(self) -> None:
+        """Step of the device by itself, whether anything has come or not."""
+
+    def _take(self, line: bytes) -> None:
+        """One line that has come."""
+        raise NotImplementedError

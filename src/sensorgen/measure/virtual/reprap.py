@@ -8,7 +8,7 @@ import re
 import urllib.parse
 from collections import deque
 
-from sensorgen.measure.virtual.plant import Plant, lines
+from sensorgen.measure.virtual.plant import Plant, Simulator
 
 FAULTS = ("silent", "hung", "garbage", "identity", "truncated", "cut", "error", "stuck")
 _SESSION_S, _QUEUE, _BUFFER = 8.0, 40, 1024
@@ -17,7 +17,7 @@ _WORDS = re.compile(r"([A-Z])(-?[0-9.]*)")
 _KEY = re.compile(r'K"([^"]*)"')
 
 
-class RepRapFirmware:
+class RepRapFirmware(Simulator):
     """A Duet board with RepRapFirmware 3, asked by :meth:`exchange` over USB or by :meth:`get` over HTTP.
 
     Parameters
@@ -37,11 +37,8 @@ class RepRapFirmware:
     """
 
     def __init__(self, plant: Plant, *, password: str = "reprap") -> None:  # noqa: S107
-        self.fault = ""
-        self.heard: list[bytes] = []
-        self._plant, self._password = plant, password
-        self._received = bytearray()
-        self._out = bytearray()
+        super().__init__(plant)
+        self._password = password
         self._lines: deque[tuple[str, str]] = deque()  # channel and code
         self._moves: deque[dict[str, tuple[float, float]]] = deque()
         self._replies: list[str] = []
@@ -50,17 +47,6 @@ class RepRapFirmware:
         self._absolute, self._homed, self._homing, self._halted = True, False, False, False
         self._goal = {"x": plant.axis("x")[0], "z": plant.axis("z")[0]}
         self._feed_mm_s = 50.0
-
-    def exchange(self, data: bytes, time_s: float) -> bytes:
-        """Lines sent over USB by a time, after having received some bytes; OSError where the cable is out."""
-        if self.fault == "cut":
-            raise OSError("cable out")
-        self._plant.advance(time_s)
-        for line in lines(self._received, data, b"\n"):
-            self._accept(line, "usb")
-        self._step()
-        sent, self._out = bytes(self._out), bytearray()
-        return b"" if self.fault in ("silent", "hung") else sent
 
     def get(self, path: str, time_s: float) -> tuple[int, bytes]:
         """Status and content of one request; TimeoutError where nothing answers."""
@@ -106,7 +92,7 @@ class RepRapFirmware:
         if used + len(code) > _BUFFER:
             return '{"err":1}'
         for line in code.split("\n"):
-            self._accept(line.encode(), "http", heard=False)
+            self._accept(line.encode(), "http")
         return json.dumps({"buff": _BUFFER - used - len(code)})
 
     def _reply(self, _: dict[str, str]) -> str:
@@ -118,13 +104,12 @@ class RepRapFirmware:
         live = {"move": {"axes": axes}, "seqs": {"reply": self._sequence}, "state": {"status": self._status()}}
         return json.dumps({"key": "", "flags": query.get("flags", ""), "result": live})
 
-    def _accept(self, line: bytes, channel: str, *, heard: bool = True) -> None:
+    def _take(self, line: bytes) -> None:
+        self._accept(line, "usb")
+
+    def _accept(self, line: bytes, channel: str) -> None:
         """One line into the queue of its channel; M112 acts before anything else."""
-        if heard:
-            self.heard.append(line)
         code = line.decode("ascii", "replace").partition(";")[0].strip()
-        if self.fault == "hung":
-            return
         if code == "M112":
             self._emergency()
         else:

@@ -5,7 +5,7 @@ Written from their manuals, but without the drivers.
 
 import numpy as np
 
-from sensorgen.measure.virtual.plant import Plant, lines
+from sensorgen.measure.virtual.plant import Plant, Simulator
 
 FAULTS = ("silent", "hung", "garbage", "identity", "truncated", "cut", "error", "stuck", "overload")
 IDENTITIES = {
@@ -18,7 +18,7 @@ _HIGHEST_HZ = {"hp-4284a": 1e6, "keysight-e4980a": 2e6}
 _TIMES = {"SHOR": (0.03, 24), "MED": (0.18, 22), "LONG": (0.82, 22)}  # constant [s] and periods: manual of the 4284A
 
 
-class _Instrument:
+class _Instrument(Simulator):
     """Part that all instruments share.
 
     Attributes
@@ -31,31 +31,19 @@ class _Instrument:
     """
 
     def __init__(self, plant: Plant, model: str) -> None:
-        self.fault = ""
-        self.heard: list[bytes] = []
-        self._plant, self._model = plant, model
-        self._received = bytearray()
+        super().__init__(plant)
+        self._model = model
         self._later: list[tuple[float, str]] = []
         self._errors: list[str] = []
 
-    def exchange(self, data: bytes, time_s: float) -> bytes:
-        """Lines sent by a time, after having received some bytes; OSError where the cable is out."""
-        if self.fault == "cut":
-            raise OSError("cable out")
-        self._plant.advance(time_s)
-        for line in lines(self._received, data, b"\n"):
-            self.heard.append(line)
-            if self.fault != "hung":
-                self._take(line.decode("ascii", "replace").strip(), time_s)
-        due = []
-        while self._later and self._later[0][0] <= time_s:  # in the order of the questions
-            due.append(self._later.pop(0)[1])
-        return b"" if self.fault in ("silent", "hung") else b"".join(map(self._spoilt, due))
+    def _step(self) -> None:
+        while self._later and self._later[0][0] <= self._now_s:  # in the order of the questions
+            self._out += self._spoilt(self._later.pop(0)[1])
 
-    def _take(self, line: str, time_s: float) -> None:
+    def _take(self, line: bytes) -> None:
         """One line: a common command, or one of this instrument."""
-        command, _, value = line.partition(" ")
-        command = command.upper()
+        command, _, value = line.decode("ascii", "replace").strip().partition(" ")
+        command, time_s = command.upper(), self._now_s
         if command == "*IDN?":
             said = "TEKTRONIX,TDS 2000,0,1.0" if self.fault == "identity" else IDENTITIES[self._model]
             self._later.append((time_s, said))

@@ -5,7 +5,7 @@ Written from the public notes that the driver names, but without the driver.
 
 from math import inf
 
-from sensorgen.measure.virtual.plant import Plant, lines
+from sensorgen.measure.virtual.plant import Plant, Simulator
 
 FAULTS = ("silent", "hung", "garbage", "identity", "truncated", "echo", "cut", "error", "stuck", "runaway")
 _SIGNED = {
@@ -17,7 +17,7 @@ _FROM = {7: (0x21, 0x23, 0x27), 15: (0x23, 0x27)}  # states from which a control
 _HOMED_MM, _REACHED_MM = 0.02, 0.02
 
 
-class SmacController:
+class SmacController(Simulator):
     """An LCC-10, asked by :meth:`exchange`.
 
     Parameters
@@ -37,16 +37,14 @@ class SmacController:
         Every line that has come.
     """
 
+    END = b"\r"
+
     def __init__(self, plant: Plant, *, newton_per_unit: float = 0.0167, mm_per_count: float = 0.005) -> None:
-        self.fault = ""
-        self.heard: list[bytes] = []
-        self._plant, self._newton, self._mm = plant, newton_per_unit, mm_per_count
+        super().__init__(plant)
+        self._newton, self._mm = newton_per_unit, mm_per_count
         self._zero_mm = 0.0
-        self._received = bytearray()
-        self._out = bytearray()
         self._failed = False
         self._homing_s: float | None = None
-        self._now_s = 0.0
         self._told = 0
         self._macros: dict[tuple[int, int], int] = {}  # by number and command
         self._timer_s = inf  # when timer 3 reaches 0
@@ -57,21 +55,6 @@ class SmacController:
             0x60E0: 1000, 0x60E1: -1000, 0x607A: 0, 0x6081: 30_000, 0x6083: 30_000, 0x6084: 30_000, 0x6087: 10_000,
             0x6098: -2, 0x16099: 50_000, 0x26099: 5000, 0x609A: 100_000, 0x12102: 8000, 0x22102: 200, 0x607C: 0,
         }  # fmt: skip
-
-    def exchange(self, data: bytes, time_s: float) -> bytes:
-        """Lines sent by a time, after having received some bytes; OSError where the cable is out."""
-        if self.fault == "cut":
-            raise OSError("cable out")
-        self._now_s = time_s
-        self._plant.advance(time_s)
-        self._step()
-        for line in lines(self._received, data, b"\r"):
-            self.heard.append(line)
-            if self.fault != "hung":
-                self._obey(line)
-        self._step()
-        sent, self._out = bytes(self._out), bytearray()
-        return b"" if self.fault in ("silent", "hung") else sent
 
     def _step(self) -> None:
         """Step of the controller by itself."""
@@ -134,7 +117,7 @@ class SmacController:
             word |= 0x0400 if abs(off_mm) <= _REACHED_MM else 0
         return word
 
-    def _obey(self, line: bytes) -> None:
+    def _take(self, line: bytes) -> None:
         """Carry out one line; what is no command is passed over."""
         words = line.split()
         try:

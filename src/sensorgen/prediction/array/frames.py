@@ -1,7 +1,7 @@
 """Frames of an array to pressure maps: by C/C0 where that suffices, else with the network of the tracks."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from io import BytesIO
 from typing import Any
@@ -14,7 +14,9 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
 from sensorgen.prediction.array.model import PA_PER_KPA, ArrayModel
 from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayReadout, own_slopes
+from sensorgen.prediction.array.sessions import ArrayCalibration
 from sensorgen.prediction.array.study import DETECTED, DETERMINED
+from sensorgen.prediction.inverse.verdict import NORMAL_90
 from sensorgen.solvers.tracks import Readings, readings
 
 SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration of each
@@ -22,6 +24,8 @@ _STEPS = 25  # of Gauss-Newton with the slopes at rest
 _DONE = 0.02  # of a standard error: a smaller step ends it
 _SUFFICES = 1.0  # standard error by which C/C0 may differ from the network
 _ALIVE = 3.0  # factor of a reading at rest to the predicted one; prints differ by less
+_SHORTED = 10.0  # real part at rest over the predicted magnitude
+_LEAKS = 6  # steps to the conductance of shorts
 _SHOWN = 6  # crossings that are named
 _CI = 1.96  # standard errors of 95 %
 
@@ -40,6 +44,8 @@ class PressureMaps:
         Of each frame [s].
     pressure_kpa, sigma_kpa : (k, m, n) array
         Pressure on the surface and its standard error of noise and scatter alone; nan where it is not determined [kPa].
+    calibration : ArrayCalibration or None
+        That gave the pressures; its errors are in the standard errors.
     """
 
     model: ArrayModel
@@ -47,11 +53,12 @@ class PressureMaps:
     time_s: Real
     pressure_kpa: Real
     sigma_kpa: Real
+    calibration: "ArrayCalibration | None" = None
 
     @cached_property
     def interval_kpa(self) -> tuple[Real, Real]:
-        """Lower and upper end of 95 % [kPa]."""
-        half = _CI * self.sigma_kpa
+        """Lower and upper end of 95 %, of 90 % with a calibration [kPa]."""
+        half = (NORMAL_90 if self.calibration else _CI) * self.sigma_kpa
         return self.pressure_kpa - half, self.pressure_kpa + half
 
     @property
@@ -63,6 +70,8 @@ class PressureMaps:
         """Total force of each frame and its standard error, of determined crossings; nan without any [N]."""
         sigma, read = self.sigma_kpa * PA_PER_KPA * self.model.pitch_area_m2, np.isfinite(self.pressure_kpa).any((1, 2))
         force, error = np.nansum(self._newtons, (1, 2)), np.sqrt(np.nansum(sigma**2, (1, 2)))
+        if self.calibration:
+            error = np.hypot(error, self.calibration.common * force)
         return np.where(read, force, np.nan), np.where(read, error, np.nan)
 
     @cached_property
@@ -72,9 +81,12 @@ class PressureMaps:
 
     @cached_property
     def centre_mm(self) -> tuple[Real, Real]:
-        """Centre of pressure of the touched crossings, from the print's corner; nan where nothing is [mm]."""
-        weight = np.where(self.touched, self._newtons, 0.0)
-        total = weight.sum((1, 2))
+        """Centre of pressure of all determined crossings, from the print's corner; nan where nothing is touched [mm].
+
+        A threshold would leave light loads with a long arm out; noise of many unloaded crossings has a mean of 0.
+        """
+        weight = np.nan_to_num(self._newtons)
+        total = np.where(self.touched.any((1, 2)), weight.sum((1, 2)), np.nan)
         layout = self.model.layout
         with np.errstate(invalid="ignore", divide="ignore"):
             return (weight.sum(1) @ layout.x_mm) / total, (weight.sum(2) @ layout.y_mm) / total
@@ -115,7 +127,8 @@ class PressureMaps:
         errors = "none is determined: readings are missing, of the other sign, or less than noise"
         if sigma.size:
             low, high = float(sigma.min()), float(sigma.max())
-            errors = f"standard errors {low:.3g} to {high:.3g} kPa in the heaviest frame, of noise and scatter alone"
+            of = "by the calibration" if self.calibration else "of noise and scatter alone"
+            errors = f"standard errors {low:.3g} to {high:.3g} kPa in the heaviest frame, {of}"
         yield Facts((
             ("frames", f"{len(self.time_s)}, inverted by {self.by}"),
             ("pressures", errors),
@@ -124,8 +137,9 @@ class PressureMaps:
         yield ""
         shown = tuple(float(f"{v:.4g}") if isinstance(v, float) else v for v in table.cells[k])
         yield Table("heaviest", "the heaviest frame", table.columns, (shown,))
-        yield from self.model.shared()
-        yield from self.model.beyond(self.peak_kpa)
+        if not self.calibration:
+            yield from self.model.shared()
+            yield from self.model.beyond(self.peak_kpa)
         yield from (f"doubtful: {doubt}" for doubt in self.model.crossing.doubts)
 
     def _names(self, k: int) -> str:
@@ -190,31 +204,47 @@ class MapInverter:
             )
 
     def read(self, capacitance_f: Real) -> Readings:
-        """Readings of the network."""
+        """Readings of the network, with the shorts that the readings at rest show."""
+        return self._network(capacitance_f, self.leaks_s)
+
+    def _network(self, capacitance_f: Real, leaks_s: Real) -> Readings:
         return readings(
-            self.model.tracks(capacitance_f), self.readout.frequency_hz[0], readout=self.readout.kind,
-            input_ohm=self.readout.input_ohm,
+            replace(self.model.tracks(capacitance_f), leak_s=leaks_s), self.readout.frequency_hz[0],
+            readout=self.readout.kind, input_ohm=self.readout.input_ohm,
         )  # fmt: skip
 
     @cached_property
+    def leaks_s(self) -> Real:
+        """Conductance of shorted crossings, (m, n): those whose real part at rest is beyond what a crossing has [S]."""
+        leaks: Real = np.zeros(self.model.here.shape)
+        with np.errstate(invalid="ignore"):
+            shorted = self.model.here & (self.rest_s.real > _SHORTED * np.abs(self.nominal.siemens))
+        leaks[shorted] = self.rest_s.real[shorted]
+        for _ in range(_LEAKS if shorted.any() else 0):
+            read = self._network(self.model.capacitances(), leaks).siemens.real[shorted]
+            ohm = 1 / leaks[shorted] + 1 / self.rest_s.real[shorted] - 1 / read
+            leaks[shorted] = 1 / np.maximum(ohm, 1e-3 / leaks[shorted])
+        return leaks
+
+    @cached_property
     def parts(self) -> tuple[Mask, Mask]:
-        """Parts of the readings that count, real and imaginary, (m, n) each."""
-        return np.isfinite(self.rest_s.real), np.isfinite(self.rest_s.imag) & self.model.here
+        """Parts of the readings that count, real and imaginary, (m, n) each: of crossings that are alive."""
+        return np.isfinite(self.rest_s.real) & self.alive, self.alive
 
     @cached_property
     def nominal(self) -> Readings:
         """Readings of the array as predicted, at rest."""
-        return self.read(self.model.capacitances())
+        return self._network(self.model.capacitances(), np.zeros(self.model.here.shape))
 
     @cached_property
     def alive(self) -> Mask:
         """Crossings that read at rest within a factor of what is predicted, and of its sign, (m, n): no others."""
-        real, imaginary = self.parts
+        real, imaginary = np.isfinite(self.rest_s.real), np.isfinite(self.rest_s.imag) & self.model.here
         nominal = self.nominal.siemens
         with np.errstate(invalid="ignore", divide="ignore"):
             size = np.where(real, np.abs(self.rest_s), np.abs(self.rest_s.imag))
             ratio = size / np.where(real, np.abs(nominal), np.abs(nominal.imag))
-            return imaginary & (ratio > 1 / _ALIVE) & (ratio < _ALIVE) & self._same_sign(self.rest_s)
+            return np.asarray(imaginary & (ratio > 1 / _ALIVE) & (ratio < _ALIVE) & self._same_sign(self.rest_s))
 
     def _same_sign(self, siemens: Complex) -> Mask:
         """Readings with an imaginary part of the predicted one's sign: others are of no capacitance."""
@@ -251,12 +281,13 @@ class MapInverter:
         """Capacitances by weighed readings, (m n, 2 m n) or of each crossing alone, and their variances [F2]."""
         real, imaginary = self.parts
         weight = np.concatenate([part.ravel() for part in self._weights(real, imaginary)])
+        working = self.read(self.model.capacitances())
         if self.model.here.size > MOST_DENSE:
-            slopes = own_slopes(self.nominal)
+            slopes = own_slopes(working)
             by = np.stack([slopes.real.ravel(), slopes.imag.ravel()]) * weight.reshape(2, -1)
             variance = 1 / ((by**2).sum(0) + 1 / self.prior_f.ravel() ** 2)
             return by * variance, variance
-        matrix = self.nominal.matrix()
+        matrix = working.matrix()
         slopes_all = np.vstack([matrix.real, matrix.imag]) * weight[:, None]
         spread = np.linalg.inv(slopes_all.T @ slopes_all + np.diag(1 / self.prior_f.ravel() ** 2))
         return spread @ slopes_all.T, np.diag(spread)
@@ -309,8 +340,11 @@ class MapInverter:
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.stack([np.where(sure & settled, c / rest, np.nan) for c, settled in each])
 
-    def maps(self, siemens: Complex, time_s: Real) -> PressureMaps:
-        """Pressure maps of frames; C/C0 where it agrees with the network in the heaviest frame."""
+    def planned(self, siemens: Complex) -> tuple[Real, Real, str]:
+        """Capacitance over that at rest (k, m, n), its error by noise (m, n), and by which model, and why.
+
+        C/C0 where it agrees with the network in the heaviest frame, else the network.
+        """
         ratio = self.by_ratio(siemens)
         heaviest = int(np.nansum(np.where(self.alive, ratio, 0), (1, 2)).argmax())
         network = self.by_network(siemens[heaviest : heaviest + 1])[0]
@@ -320,18 +354,33 @@ class MapInverter:
         off = (np.abs(network - ratio[heaviest]) / error)[counted]
         worst = float(np.nan_to_num(off).max(initial=0.0))
         if worst < _SUFFICES and not np.isnan(off).any():
-            by = f"C/C0: the network differs by at most {worst:.2g} standard errors in the heaviest frame"
-        else:
-            by = f"the network of the tracks: C/C0 differs by {worst:.2g} standard errors in the heaviest frame"
-            ratio = np.where(np.isfinite(siemens.imag), self.by_network(siemens), np.nan)
-            if lost := int((np.isnan(ratio) & np.isfinite(siemens.imag) & self.alive).sum()):
-                by += f"; {lost} values left out that {_STEPS} steps of Gauss-Newton did not settle"
+            return (
+                ratio,
+                error,
+                f"C/C0: the network differs by at most {worst:.2g} standard errors in the heaviest frame",
+            )
+        by = f"the network of the tracks: C/C0 differs by {worst:.2g} standard errors in the heaviest frame"
+        ratio = np.where(np.isfinite(siemens.imag), self.by_network(siemens), np.nan)
+        if lost := int((np.isnan(ratio) & np.isfinite(siemens.imag) & self.alive).sum()):
+            by += f"; {lost} values left out that {_STEPS} steps of Gauss-Newton did not settle"
+        return ratio, error, by
+
+    def maps(
+        self, siemens: Complex, time_s: Real, calibration: "ArrayCalibration | None" = None, *, day: float = 0.0
+    ) -> PressureMaps:  # fmt: skip
+        """Pressure maps of frames, by the law of the cell, or of each element where they are calibrated."""
+        ratio, error, by = self.planned(siemens)
         pressure, per = self.model.pressures(np.nan_to_num(ratio, nan=1.0, posinf=1.0, neginf=1.0))
         noise = error * per * np.sqrt(1 + 1 / self.rest_count)
         sigma = np.hypot(noise, self.scatter * pressure)
         given = _known(sigma) & self.alive & np.isfinite(ratio) & self._same_sign(siemens)
-        shown = (np.where(given, each / PA_PER_KPA, np.nan) for each in (pressure, sigma))
-        return PressureMaps(self.model, by, time_s, *shown)
+        if calibration:
+            by += f"; {calibration.law.form.words()} of each element, calibrated"
+            shape = ratio.shape
+            mean, half = calibration.of_ratio(ratio.reshape(shape[0], -1), time_s, day)
+            pressure, sigma = PA_PER_KPA * mean.reshape(shape), PA_PER_KPA / NORMAL_90 * half.reshape(shape)
+        shown, error_kpa = (np.where(given, each / PA_PER_KPA, np.nan) for each in (pressure, sigma))
+        return PressureMaps(self.model, by, time_s, shown, error_kpa, calibration)
 
 
 def _known(sigma_pa: Real) -> Mask:
@@ -339,9 +388,31 @@ def _known(sigma_pa: Real) -> Mask:
     return np.asarray(sigma_pa < DETERMINED * FULL_SCALE_PA)
 
 
+def at_rest(
+    model: ArrayModel, readout: ArrayReadout, frames: Complex, scatter: float = SCATTER, unused: Sequence[str] = ()
+) -> MapInverter:  # fmt: skip
+    """Inverter by frames at rest, (r, m, n) [S]; ``unused`` are columns that were not read.
+
+    Raises
+    ------
+    BadInput
+        No frame at rest, or no crossing that reads as predicted.
+    """
+    frames = missing(frames)
+    if not len(frames):
+        raise BadInput(
+            "no frame at rest; expected 'rest' with 1 where nothing was on the array, or --rest FILE: what counts is "
+            "the ratio to it, and a standing load is never taken for rest"
+            + (f"; not read: {', '.join(unused[:_SHOWN])}" if unused else "")
+        )
+    inverter = MapInverter(model, readout, _mean(frames), len(frames), scatter)
+    inverter.refuse_dead()
+    return inverter
+
+
 def inverted(
     model: ArrayModel, readout: ArrayReadout, siemens: Complex, rest: Mask, time_s: Real, scatter: float = SCATTER,
-    apart: "Complex | None" = None, unused: Sequence[str] = (),
+    apart: "Complex | None" = None, unused: Sequence[str] = (), calibration: "ArrayCalibration | None" = None,
 ) -> PressureMaps:  # fmt: skip
     """Pressure maps of a recording.
 
@@ -360,30 +431,23 @@ def inverted(
     apart : (r, m, n) array, optional
         Readings at rest of another file, in place of those of this one [S].
     unused : sequence of str
-        Columns that were not read, named where no frame is at rest.
+        Samples that were not read, named where no frame is at rest.
+    calibration : ArrayCalibration, optional
+        Of each element.
 
     Raises
     ------
     BadInput
         No frame at rest, or none under load.
     """
-    siemens, at_rest = _missing(siemens), siemens[rest] if apart is None else apart
-    at_rest = _missing(at_rest)
-    if not len(at_rest):
-        raise BadInput(
-            "no frame at rest; expected 'rest' with 1 where nothing was on the array, or --rest FILE: what counts is "
-            "the ratio to it, and a standing load is never taken for rest"
-            + (f"; not read: {', '.join(unused[:_SHOWN])}" if unused else "")
-        )
+    inverter = at_rest(model, readout, siemens[rest] if apart is None else apart, scatter, unused)
     loaded = ~rest
     if not loaded.any():
         raise BadInput("all frames are at rest; expected some under load")
-    inverter = MapInverter(model, readout, _mean(at_rest), len(at_rest), scatter)
-    inverter.refuse_dead()
-    return inverter.maps(siemens[loaded], time_s[loaded])
+    return inverter.maps(missing(siemens)[loaded], time_s[loaded], calibration)
 
 
-def _missing(siemens: Complex) -> Complex:
+def missing(siemens: Complex) -> Complex:
     """Readings with both parts nan where one is missing: a complex nan may have an imaginary part of 0."""
     lost = np.isnan(siemens.real) & (siemens.imag == 0) | ~np.isfinite(siemens.imag)
     return np.asarray(np.where(lost, complex(np.nan, np.nan), siemens))

@@ -1,6 +1,5 @@
 """Answers of an inversion, as rows of a CSV file, and its summary with advice."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -11,7 +10,7 @@ from sensorgen.core.document import Part
 from sensorgen.core.units import M_PER_MM
 from sensorgen.prediction.calibration.inversion import WIDE, Found, Verdict
 from sensorgen.prediction.calibration.rest import STALE_S
-from sensorgen.prediction.inverse.answers import csv_cell, csv_row, number
+from sensorgen.prediction.inverse import statuses
 
 COLUMNS = (
     "force_n", "force_low_n", "force_high_n", "position_mm", "position_low_mm", "position_high_mm", "chi2", "tones",
@@ -20,17 +19,17 @@ COLUMNS = (
 REST = "rest"
 
 
-def header(kept: Sequence[str]) -> str:
-    """Names of the columns, those of the input before; one that has the name of a result is ``..._given``."""
-    return csv_row([*(csv_cell(f"{name}_given" if name in COLUMNS else name) for name in kept), *COLUMNS])
+def header(given: Sequence[str]) -> str:
+    """Names of the columns, those of the input before."""
+    return statuses.header(given, COLUMNS)
 
 
-def rows(kept: Sequence[Sequence[str]], found: Found, rest: Mask) -> str:
+def rows(given: Sequence[Sequence[str]], found: Found, rest: Mask) -> str:
     """Rows of a CSV file, blank where nothing was found.
 
     Parameters
     ----------
-    kept : sequence of sequence of str
+    given : sequence of sequence of str
         The input's other cells, row by row.
     found : Found
         The results.
@@ -38,12 +37,9 @@ def rows(kept: Sequence[Sequence[str]], found: Found, rest: Mask) -> str:
         Readings at rest.
     """
     force, place = found.force_90_n, found.position_90_m / M_PER_MM
-    numbers = np.column_stack([
-        found.force_n, force, found.position_m / M_PER_MM, place, found.chi2,
-    ])  # fmt: skip
+    numbers = np.column_stack([found.force_n, force, found.position_m / M_PER_MM, place, found.chi2])
     words = np.where(rest, REST, np.array([v.words for v in Verdict])[found.verdict])
-    ends = zip(kept, numbers.tolist(), found.tones.tolist(), words.tolist(), strict=True)
-    return "".join(csv_row([*map(csv_cell, own), *map(number, row), str(n), word]) for own, row, n, word in ends)
+    return statuses.rows(given, numbers, found.tones, words)
 
 
 @dataclass(frozen=True)
@@ -124,19 +120,19 @@ class Summary:
     """Counts blocks of results; of widths each block's median is kept."""
 
     def __init__(self) -> None:
-        self._statuses: Counter[int] = Counter()
+        self._statuses = statuses.Counts(Verdict)
         self._widths: list[tuple[float, float]] = []
         self.at_rest = 0
 
     @property
     def samples(self) -> int:
         """Readings under load so far."""
-        return self._statuses.total()
+        return self._statuses.samples
 
     def add(self, found: Found, rest: Mask) -> None:
         """Count a block."""
         self.at_rest += int(rest.sum())
-        self._statuses.update(found.verdict[~rest].tolist())
+        self._statuses.add(found.verdict[~rest])
         good = ~rest & np.isfinite(found.force_n)
         if good.any():
             self._widths.append((
@@ -149,7 +145,7 @@ class Summary:
     ) -> CalibratedInversion:  # fmt: skip
         """The summary so far."""
         newtons, mm = np.median(self._widths, axis=0).tolist() if self._widths else (None, None)
-        statuses = {v.words: self._statuses[v] for v in Verdict if self._statuses[v]}
         return CalibratedInversion(
-            of, by, self.samples, self.at_rest, statuses, limit_n, length_m / M_PER_MM, newtons, mm, noise, tuple(notes)
-        )
+            of, by, self.samples, self.at_rest, self._statuses.by_words(), limit_n, length_m / M_PER_MM, newtons, mm,
+            noise, tuple(notes),
+        )  # fmt: skip

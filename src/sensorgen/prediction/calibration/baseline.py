@@ -11,11 +11,12 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.prediction.calibration.fitting import Posterior, rest_gain
-from sensorgen.prediction.calibration.specimen import SpecimenModel, parts
+from sensorgen.prediction.calibration.specimen import SpecimenModel
+from sensorgen.prediction.inference import parts
 from sensorgen.prediction.inverse.verdict import chi2_limit
 
 SESSION_C, SESSION_R = 0.01, 0.03  # standard deviations of ln C and ln R from one session to another: guesses, some K
-_LEAD_OHM, _STRAY_F = 10.0, 2e-13  # by which leads that are connected anew differ: guesses
+_LEADS = {"lead": 10.0, "stray": 2e-13}  # ohm and farad by which leads that are connected anew differ: guesses
 _METER = 1e-3  # of abs(Z): the bench reads the same from one session to another
 _SURE = 3.0  # standard deviations
 
@@ -75,20 +76,14 @@ class Baseline:
     def __init__(self, model: SpecimenModel, posterior: Posterior, gain: Complex | None = None) -> None:
         at, m = posterior.at, len(model.frequency_hz)
         self._ln_z = model.rest(at) + (0.0 if gain is None else gain)
-        slopes, spread = model.rest_slopes(at), model.spread
+        slopes = model.rest_slopes(at)
 
-        def by(name: str) -> tuple[Real, float]:
-            return slopes[:, model.names.index(name)], float(np.exp(at[model.names.index(name)] - 0.5))
+        def by(name: str) -> Real:
+            return slopes[:, model.names.index(name)]
 
-        (lead, lead_share), (stray, stray_share) = by("lead"), by("stray")
-        lead, stray = (
-            lead * _LEAD_OHM / (spread.lead_ohm * lead_share),
-            stray * _STRAY_F / (spread.stray_f * stray_share),
-        )
-        self._weights = np.stack(
-            [by("capacitance")[0] / spread.capacitance, by("resistance")[0] / spread.resistance], 1
-        )
-        self._covariance = np.outer(lead, lead) + np.outer(stray, stray) + _METER**2 * np.eye(2 * m)
+        leads = np.stack([by(name) * change / model.value(name, at) for name, change in _LEADS.items()], 1)
+        self._weights = np.stack([by(name) / getattr(model.spread, name) for name in ("capacitance", "resistance")], 1)
+        self._covariance = leads @ leads.T + _METER**2 * np.eye(2 * m)
         if gain is None:
             self._covariance += slopes @ posterior.covariance @ slopes.T + rest_gain(model)
 

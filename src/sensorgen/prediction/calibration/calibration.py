@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
-from math import exp, sqrt
+from math import sqrt
 from typing import Annotated, Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from sensorgen.prediction.calibration.fitting import Posterior
 from sensorgen.prediction.calibration.inversion import OTHERWISE, Inverter
 from sensorgen.prediction.calibration.materials import Link, MaterialEstimate, estimate, source_text
 from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, Spread
+from sensorgen.prediction.inference import Parameter
 from sensorgen.prediction.inverse.prior import Prior
 from sensorgen.prediction.inverse.verdict import NORMAL_90
 
@@ -145,48 +146,21 @@ class Calibration:
 
     def values(self) -> list[Value]:
         """Parameters in their units."""
-        found, m, spread, sensor = [], self.model, self.model.spread, self.model.sensor
-        scales = {  # unit, what multiplies the exponential, standard deviation of the logarithm
-            "resistance": ("ohm", sensor.resistance_ohm(), spread.resistance),
-            "capacitance": ("pF", sensor.capacitance_f() * 1e12, spread.capacitance),
-            "rise": ("predicted", exp(spread.law_middle), spread.law),
-            "leak": ("", spread.leak, spread.leak_spread),
-            "dispersion": ("", spread.dispersion * exp(-0.5), 1.0),
-            "lead": ("ohm", spread.lead_ohm * exp(-0.5), 1.0),
-            "hysteresis": ("%", spread.hysteresis * 100 * exp(-0.5), 1.0),
-            "creep": ("%/decade", spread.creep * 100 * exp(-0.5), 1.0),
-            "stray": ("pF", spread.stray_f * 1e12 * exp(-0.5), 1.0),
-        }
-        straight = {  # unit, mean, standard deviation
-            "force offset": ("N", spread.force_offset_n, spread.force_n),
-            "position offset": ("mm", 0.0, spread.position_m * 1e3),
-        }
-        straight |= {n: ("", 0.0, spread.profile / int(n[-1])) for n in m.names if n.startswith("profile")}
-        for k, name in enumerate(m.names):
-            at, sd = float(self.posterior.at[k]), sqrt(self.posterior.covariance[k, k])
-            ends = np.array([at, at - NORMAL_90 * sd, at + NORMAL_90 * sd, -NORMAL_90, NORMAL_90])
-            if name in scales:
-                unit, scale, of = scales[name]
-                values = scale * np.exp(of * ends)
-            elif name in straight:
-                unit, mean, of = straight[name]
-                values = mean + of * ends
-            else:
-                unit, values = "predicted", np.exp(self._rise(k - m.names.index(f"rise at {FORCES_N[0]:g} N")))
-            left = np.log(values[2] / values[1]) / np.log(values[4] / values[3]) if name.startswith("rise at") else sd
-            by = "presses and rest" if left < _TOLD else "prediction"
-            median, lower, upper, *before = map(float, values)
-            found.append(Value(name, unit, median, lower, upper, before[0], before[1], by))
-        return found
+        parameters = {one.key: (one, np.eye(len(self.model.names))[k]) for k, one in enumerate(self.model.parameters)}
+        rise, _ = parameters["rise"]
+        for force, weights in zip(FORCES_N, self.model.law_weights() / rise.spread, strict=True):
+            name = f"rise at {force:g} N"  # the rise as a whole, and its deviation at this force
+            parameters[name] = replace(rise, key=name), weights
+        return [self._value(one, weights) for one, weights in parameters.values()]
 
-    def _rise(self, knot: int) -> Real:
-        """Of ln of the rise at a force: median, 5 % and 95 %, and the same ends before."""
-        weights = self.model.law_weights()[knot]
-        at, sd = float(weights @ self.posterior.at), sqrt(weights @ self.posterior.covariance @ weights)
-        before = sqrt(weights @ weights)
-        return self.model.spread.law_middle + np.array(
-            [at, at - NORMAL_90 * sd, at + NORMAL_90 * sd, -NORMAL_90 * before, NORMAL_90 * before]
-        )
+    def _value(self, parameter: Parameter, weights: Real) -> Value:
+        """A parameter by the weights of all in its deviation from the prior's mean."""
+        at, before = float(weights @ self.posterior.at), sqrt(weights @ weights)
+        sd = sqrt(weights @ self.posterior.covariance @ weights)
+        ends = np.array([at, at - NORMAL_90 * sd, at + NORMAL_90 * sd, -NORMAL_90 * before, NORMAL_90 * before])
+        middle, lower, upper, *prior = (parameter.shown * parameter.at(ends)).tolist()
+        by = "presses and rest" if sd / before < _TOLD else "prediction"
+        return Value(parameter.key, parameter.unit, middle, lower, upper, prior[0], prior[1], by)
 
     @property
     def unidentified(self) -> tuple[str, ...]:

@@ -86,5 +86,5 @@ def held_out(
         known = replace(known, noise=np.median(data.noise, axis=0))
         parts.append(Inverter(model, known, force_limit_n=limit_n).batch(data.ratio[fold == k]))
     order = np.argsort(np.concatenate([np.flatnonzero(fold == k) for k in range(FOLDS)]), kind="stable")
-    found = Found(*(np.concatenate([getattr(p, name) for p in parts])[order] for name in vars(parts[0])))
+    found = Found.joined(parts).rows(order)
     return coverage_of(found, data.presses), found

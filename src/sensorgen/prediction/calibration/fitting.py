@@ -2,17 +2,24 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
-from sensorgen.prediction.calibration.specimen import STEP, Presses, SpecimenModel, parts
+from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, no_presses
+from sensorgen.prediction.inference import (
+    Fit,
+    Index,
+    LeastSquares,
+    Normal,
+    descend,
+    parts,
+    slopes,
+    standard,
+    whitening,
+)
 
 ROUNDS = 3  # Gauss-Newton and variance components in turn
-_STEPS = 12
-_SETTLED = 1e-3  # of a standard deviation
 _FARTHEST = 8.0  # standard deviations: beyond, readings that no specimen gives lead to numbers that no line takes
 NOISE = 1e-3  # of the parts of a ratio, where no press tells
 _FEWEST_COURSES = 10  # presses from which on their usual course is known
@@ -51,14 +58,8 @@ class Meter:
         """Readings less what the parameters make of them, in standard deviations, (..., k + 1)."""
         expected = self.observed(np.exp(model.rest(at, self.frequency_hz)))
         ln_r, sd = self.ln_resistance or (0.0, np.inf)
-        resistance = (ln_r - model.spread.resistance * at[..., model.names.index("resistance")]) / sd
+        resistance = (ln_r - np.log(model.value("resistance", at))) / sd
         return np.concatenate([(self.value - expected) @ self.root.T, resistance[..., None]], -1)
-
-    def slopes(self, model: SpecimenModel, at: Real) -> Real:
-        """Derivatives of what is made of them by the parameters, (k + 1, p)."""
-        step = np.eye(len(at)) * STEP
-        more, less = np.split(self.off(model, np.concatenate([at + step, at - step])), 2)
-        return (less - more).T / (2 * STEP)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,13 +92,22 @@ class Data:
     single: Real | None = None
     meter: Meter | None = None
 
-    def rows(self, which: NDArray[np.intp] | Mask) -> "Data":
+    def rows(self, which: Index | Mask) -> "Data":
         """Some of the presses."""
         return replace(self, presses=self.presses.rows(which), ratio=self.ratio[which], noise=self.noise[which])
 
+    @classmethod
+    def unread(
+        cls, presses: Presses, noise: Real, rest: Complex | None = None, rest_noise: Real | None = None
+    ) -> "Data":
+        """Data of n presses that were not read, at a noise of the parts (m,)."""
+        nothing = np.zeros((len(presses.force_n), len(noise)))
+        rest = np.zeros(len(noise), complex) if rest is None else rest
+        return cls(presses, nothing.astype(complex), nothing + noise, rest, noise if rest_noise is None else rest_noise)
+
 
 @dataclass(frozen=True, eq=False)
-class Posterior:
+class Posterior(Normal):
     """Normal distribution of the parameters, and what changes from press to press.
 
     Attributes
@@ -116,8 +126,6 @@ class Posterior:
         Known ones that it rests on.
     """
 
-    at: Real
-    covariance: Real
     scatter: float
     wander_c: float
     wander_r: float
@@ -142,11 +150,10 @@ def prior(model: SpecimenModel, noise: Real) -> Posterior:
     noise : (m,) array
         Standard deviation of a ratio's real and imaginary part [-].
     """
-    p, spread = len(model.names), model.spread
+    before, spread = standard(len(model.names)), model.spread
     mean = float(np.exp(_LN_SPREAD**2 / 2))  # of a logarithmic normal, over its median
-    return Posterior(
-        np.zeros(p), np.eye(p), spread.scatter * mean, spread.wander * mean, spread.wander * mean, *_USUAL, noise, 0
-    )
+    scatter, wander = spread.scatter * mean, spread.wander * mean
+    return Posterior(before.at, before.covariance, scatter, wander, wander, *_USUAL, noise, 0)
 
 
 def calibrated(model: SpecimenModel, data: Data, start: Posterior | None = None) -> Posterior:
@@ -165,20 +172,25 @@ def calibrated(model: SpecimenModel, data: Data, start: Posterior | None = None)
     if single is None:
         single = np.median(data.noise, axis=0) if len(data.noise) else np.full(len(data.rest), NOISE)
     known = start or prior(model, single)
-    inverse: Real = np.asarray(np.linalg.inv(known.covariance))
-    at, components = known.at.copy(), known.components
-    presses, spread = data.presses, model.spread
-    usual = known.components if start else np.array([spread.scatter, spread.wander, spread.wander])
+    at, components = known.at, known.components
+    presses = data.presses
+    usual = known.components if start else usual_components(model)
     for _ in range(ROUNDS if len(presses.force_n) else 1):
-        at, information = _descended(model, data, at, components, (known.at, inverse))
+        at = _descended(model, data, at, components, known).at[0]
         if len(presses.force_n):
-            components = _components(model, data, at, (known.at, inverse), usual)
-    at, information = _descended(model, data, at, components, (known.at, inverse))
+            components = _components(model, data, at, known, usual)
+    fit = _descended(model, data, at, components, known)
+    scatter, wander_c, wander_r = components.tolist()
     return Posterior(
-        at, np.asarray(np.linalg.inv(information)), float(components[0]), float(components[1]), float(components[2]),
+        fit.at[0], np.asarray(np.linalg.inv(fit.information[0])), scatter, wander_c, wander_r,
         _mean(presses.unloading, known.unloading), _mean(presses.decades, known.decades), known.noise,
         known.presses + len(presses.force_n),
     )  # fmt: skip
+
+
+def usual_components(model: SpecimenModel) -> Real:
+    """Medians of the standard deviations from press to press, before calibration."""
+    return np.array([model.spread.scatter, model.spread.wander, model.spread.wander])
 
 
 def by_rest(model: SpecimenModel, rest: Complex, rest_noise: Real | float, noise: Real | float) -> Posterior:
@@ -193,12 +205,9 @@ def by_rest(model: SpecimenModel, rest: Complex, rest_noise: Real | float, noise
     rest_noise, noise : (m,) array or float
         Standard deviations of its parts, and of those of a ratio [-].
     """
-    m, none = len(rest), np.empty(0)
-    nothing = np.empty((0, m))
-    data = Data(
-        Presses(none, none, none, none), nothing.astype(complex), nothing, rest, np.broadcast_to(rest_noise, (m,))
-    )
-    return calibrated(model, data, prior(model, np.array(np.broadcast_to(noise, (m,)))))
+    m = len(rest)
+    none = Data.unread(no_presses(), np.zeros(m), rest, np.broadcast_to(rest_noise, (m,)))
+    return calibrated(model, none, prior(model, np.array(np.broadcast_to(noise, (m,)))))
 
 
 def _mean(values: Real, otherwise: tuple[float, float]) -> tuple[float, float]:
@@ -216,141 +225,95 @@ def _rest_covariance(model: SpecimenModel, data: Data) -> Real:
     return np.diag(np.tile(np.maximum(data.rest_noise, _FLOOR), 2) ** 2) + rest_gain(model)
 
 
-@dataclass(frozen=True, eq=False)
-class _Resting:
-    """All that was read with nothing on the sensor, in standard deviations."""
-
-    model: SpecimenModel
-    data: Data
-
-    @cached_property
-    def _root(self) -> Real:
-        return np.asarray(np.linalg.inv(np.linalg.cholesky(_rest_covariance(self.model, self.data))))
-
-    def off(self, at: Real) -> Real:
-        """Readings less what the parameters make of them, (q,)."""
-        bench = self._root @ parts(self.data.rest - self.model.rest(at))
-        meter = self.data.meter
-        return np.concatenate([bench, meter.off(self.model, at)]) if meter else bench
-
-    def slopes(self, at: Real) -> Real:
-        """Derivatives of what the parameters make of them, (q, p)."""
-        bench = self._root @ self.model.rest_slopes(at)
-        meter = self.data.meter
-        return np.concatenate([bench, meter.slopes(self.model, at)]) if meter else bench
-
-
 def covariances(model: SpecimenModel, at: Real, data: Data, components: Real, vectors: Real | None = None) -> Real:
     """Of the ratios given the parameters, (n, 2 m, 2 m): noise, and what changes from press to press."""
     presses = data.presses
-    found = np.zeros((len(presses.force_n), 2 * data.noise.shape[1], 2 * data.noise.shape[1]))
-    k = np.arange(found.shape[1])
-    found[:, k, k] = np.tile(np.maximum(data.noise, _FLOOR), 2) ** 2
+    own = (np.tile(np.maximum(data.noise, _FLOOR), 2) ** 2)[:, None] * np.eye(2 * data.noise.shape[1])
     vectors = model.scatters(at, presses) if vectors is None else vectors
     variance = np.tile(components**2, (len(presses.force_n), 1))
     courses = (("hysteresis", presses.unloading), ("creep", presses.decades))
     for (name, course), (_, sd) in zip(courses, _USUAL, strict=True):
-        variance[:, 0] += np.where(np.isnan(course), (memory(model, at, name) * sd) ** 2, 0.0)
-    return np.asarray(found + np.einsum("nik,nk,njk->nij", vectors, variance, vectors))
+        variance[:, 0] += np.where(np.isnan(course), (model.value(name, at) * sd) ** 2, 0.0)
+    return np.asarray(own + np.einsum("nik,nk,njk->nij", vectors, variance, vectors))
 
 
-def information(model: SpecimenModel, data: Data, at: Real, weight: Real) -> Real:
-    """Information of presses and rest on the parameters (p, p), the prior's left out.
+@dataclass(frozen=True, eq=False)
+class _Specimen(LeastSquares):
+    """Known presses and readings at rest, of parameters with what was known before."""
 
-    Parameters
-    ----------
-    model, data, at
-        As of :func:`covariances`.
-    weight : (n, 2 m, 2 m) array
-        Inverse of those.
-    """
-    return _information(model.slopes(at, data.presses), weight, _Resting(model, data).slopes(at))
+    model: SpecimenModel
+    data: Data
+    before: Normal
+    root: Real
+    """(n, 2 m, 2 m): whitens the ratios."""
+    reach = 3.0
+    bound = 8.0  # beyond, readings that no specimen gives lead to numbers that no line takes
 
+    def fit(self, at: Real, rows: Index) -> Fit:  # noqa: ARG002
+        """Sum of squares at parameters (1, p)."""
+        fit = _pressed(at, *self.ratios(at[0]), self.root) + self.resting(at)
+        return fit.with_prior(self.before.at, self.before.information)
 
-def _information(slopes: Real, weight: Real, resting: Real) -> Real:
-    of_presses = np.einsum("nia,nij,njb->ab", slopes, weight, slopes, optimize=True)
-    return np.asarray(of_presses + resting.T @ resting)
+    def ratios(self, at: Real) -> tuple[Real, Real]:
+        """Ratios less the model's (n, 2 m), and derivatives of these (n, 2 m, p)."""
+        presses = self.data.presses
+        return parts(self.data.ratio - self.model.ratio(at, presses)), self.model.slopes(at, presses)
 
+    def resting(self, at: Real) -> Fit:
+        """Sum of squares of all that was read with nothing on the sensor, at parameters (1, p)."""
+        data, root = self.data, whitening(_rest_covariance(self.model, self.data))
 
-def memory(model: SpecimenModel, at: Real, name: str) -> float:
-    """Change of the rise by hysteresis or creep [-]."""
-    return float(getattr(model.spread, name) * np.exp(at[model.names.index(name)] - 0.5))
+        def off(near: Real) -> Real:
+            bench = parts(data.rest - self.model.rest(near)) @ root.T
+            return np.concatenate([bench, data.meter.off(self.model, near)], -1) if data.meter else bench
 
-
-def _descended(
-    model: SpecimenModel, data: Data, at: Real, components: Real, before: tuple[Real, Real]
-) -> tuple[Real, Real]:
-    """Gauss-Newton with damping: the most probable parameters, and the information on them."""
-    middle, inverse = before
-    resting = _Resting(model, data)
-    weight = np.asarray(np.linalg.inv(covariances(model, at, data, components)))
-
-    def off(x: Real) -> tuple[Real, Real, float]:
-        ratio = parts(data.ratio - model.ratio(x, data.presses))
-        rest = resting.off(x)
-        cost = np.einsum("ni,nij,nj->", ratio, weight, ratio) + rest @ rest
-        return ratio, rest, float(cost + (x - middle) @ inverse @ (x - middle))
-
-    ratio, rest, cost = off(at)
-    damping, found = 0.0, inverse
-    for _ in range(_STEPS):
-        slopes, rest_slopes = model.slopes(at, data.presses), resting.slopes(at)
-        found = inverse + _information(slopes, weight, rest_slopes)
-        gradient = np.einsum("nia,nij,nj->a", slopes, weight, ratio, optimize=True)
-        gradient = gradient + rest_slopes.T @ rest - inverse @ (at - middle)
-        step = np.linalg.solve(found + damping * np.eye(len(at)), gradient)
-        step *= 3.0 / max(3.0, np.abs(step).max())
-        further = np.clip(at + step, -_FARTHEST, _FARTHEST)
-        tried = off(further)
-        if tried[2] <= cost:
-            at, (ratio, rest, cost), damping = further, tried, damping / 10
-            if np.abs(step).max() < _SETTLED:
-                break
-        else:
-            damping = max(10 * damping, 1.0)
-    return at, found
+        return Fit.of(at, off(at), -slopes(off, at[0]).T[None])
 
 
-def _components(model: SpecimenModel, data: Data, at: Real, before: tuple[Real, Real], usual: Real) -> Real:
+def _pressed(at: Real, residual: Real, slope: Real, root: Real) -> Fit:
+    """Sum of squares at parameters (1, p) of n ratios (n, k), their slopes (n, k, p) and whitening (n, k, k)."""
+    white, by = np.einsum("nij,nj->ni", root, residual), root @ slope
+    return Fit.of(at, white.reshape(1, -1), by.reshape(1, -1, at.shape[1]).transpose(0, 2, 1))
+
+
+def _descended(model: SpecimenModel, data: Data, at: Real, components: Real, before: Normal) -> Fit:
+    """Most probable parameters (1, p), and the information on them."""
+    return descend(_Specimen(model, data, before, whitening(covariances(model, at, data, components))), at[None])
+
+
+def information(model: SpecimenModel, data: Data, at: Real, components: Real) -> Real:
+    """Information of presses and rest on the parameters (p, p), the prior's left out; parameters as covariances."""
+    root = whitening(covariances(model, at, data, components))
+    specimen = _Specimen(model, data, standard(len(at)), root)
+    fit = _pressed(at[None], *specimen.ratios(at), root) + specimen.resting(at[None])
+    return np.asarray(fit.information[0])
+
+
+def _components(model: SpecimenModel, data: Data, at: Real, before: Normal, usual: Real) -> Real:
     """Most probable standard deviations from press to press, the parameters integrated out as if they were linear."""
     from scipy.optimize import minimize
 
-    middle, inverse = before
-    resting = _Resting(model, data)
-    slopes, rest_slopes = model.slopes(at, data.presses), resting.slopes(at)
-    left = parts(data.ratio - model.ratio(at, data.presses)) + slopes @ (at - middle)
-    rest = resting.off(at) + rest_slopes @ (at - middle)
-    fixed = inverse + rest_slopes.T @ rest_slopes
-    pull = rest_slopes.T @ rest
-
-    vectors = model.scatters(at, data.presses)
+    specimen, vectors = _Specimen(model, data, before, np.empty(0)), model.scatters(at, data.presses)
+    ratios, fixed = specimen.ratios(at), specimen.resting(at[None]).with_prior(before.at, before.information)
 
     def cost(ln: Real) -> float:
         if (usual * np.exp(ln)).max() > 1:  # no press explains these readings, and the covariance would be singular
             return np.inf
-        covariance = covariances(model, at, data, usual * np.exp(ln), vectors)
-        root = np.linalg.inv(np.linalg.cholesky(covariance))
-        white, by = np.einsum("nij,nj->ni", root, left), root @ slopes
-        information = fixed + np.einsum("nia,nib->ab", by, by)
-        gradient = pull + np.einsum("nia,ni->a", by, white)
-        logs = -2 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum() + np.linalg.slogdet(information)[1]
-        return float(
-            logs + (white**2).sum() - gradient @ np.linalg.solve(information, gradient) + ln @ ln / _LN_LOOSE**2
-        )
+        root = whitening(covariances(model, at, data, usual * np.exp(ln), vectors))
+        evidence = (_pressed(at[None], *ratios, root) + fixed).log_evidence()[0]
+        evidence += np.log(np.diagonal(root, axis1=1, axis2=2)).sum()
+        return float(ln @ ln / _LN_LOOSE**2 - 2 * evidence)
 
-    count = len(usual)
-    simplex = np.vstack([np.zeros(count), np.eye(count)])
-    found = minimize(
-        cost, simplex[0], method="Nelder-Mead", options={"xatol": 0.05, "fatol": 0.02, "initial_simplex": simplex}
-    )
-    return np.asarray(usual * np.exp(found.x))
+    simplex = np.vstack([np.zeros(len(usual)), np.eye(len(usual))])
+    options = {"xatol": 0.05, "fatol": 0.02, "initial_simplex": simplex}
+    return np.asarray(usual * np.exp(minimize(cost, simplex[0], method="Nelder-Mead", options=options).x))
 
 
 def gain(model: SpecimenModel, data: Data, at: Real) -> Complex:
     """Most probable ln of each tone's gain (m,), phase as imaginary part, given the other parameters."""
-    m, left = len(data.rest), parts(data.rest - model.rest(at))
-    found = rest_gain(model) @ np.linalg.solve(_rest_covariance(model, data), left)
-    return np.asarray(found[:m] + 1j * found[m:])
+    off = parts(data.rest - model.rest(at))
+    real, imaginary = np.split(rest_gain(model) @ np.linalg.solve(_rest_covariance(model, data), off), 2)
+    return np.asarray(real + 1j * imaginary)
 
 
 def shared(models: Sequence[SpecimenModel], posteriors: Sequence[Posterior], names: Sequence[str]) -> list[Posterior]:
@@ -368,18 +331,10 @@ def shared(models: Sequence[SpecimenModel], posteriors: Sequence[Posterior], nam
         Parameters in common.
     """
     which = [models[0].names.index(name) for name in names]
-    information, pull = np.eye(len(which)), np.zeros(len(which))
-    for p in posteriors:
-        own = np.linalg.inv(p.covariance[np.ix_(which, which)])
-        information, pull = information + own - np.eye(len(which)), pull + own @ p.at[which]
-    covariance = np.linalg.inv(information)
-    mean = covariance @ pull
-    found = []
-    for p in posteriors:
-        by = p.covariance[:, which] @ np.linalg.inv(p.covariance[np.ix_(which, which)])
-        spread = p.covariance + by @ (covariance - p.covariance[np.ix_(which, which)]) @ by.T
-        found.append(replace(p, at=p.at + by @ (mean - p.at[which]), covariance=spread))
-    return found
+    told = [p.part(which).beyond(standard(len(which))) for p in posteriors]
+    covariance = np.asarray(np.linalg.inv(np.eye(len(which)) + sum(information for information, _ in told)), float)
+    common = Normal(covariance @ sum(pull for _, pull in told), covariance)
+    return [p.given(which, common) for p in posteriors]
 
 
 def widened(model: SpecimenModel, posterior: Posterior) -> Posterior:

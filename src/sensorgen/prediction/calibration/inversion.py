@@ -6,8 +6,7 @@ at each of its points the expected ratio and the covariance of readings about it
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from enum import IntEnum
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,13 +14,14 @@ from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.prediction.calibration.fitting import Data, Posterior, covariances, memory
+from sensorgen.prediction.calibration.fitting import Data, Posterior, covariances
 from sensorgen.prediction.calibration.rest import STALE_S
-from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, parts
+from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel
+from sensorgen.prediction.inference import Index, Samples, cramer_rao, parts, whitening
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
 from sensorgen.prediction.inverse.prior import Prior
+from sensorgen.prediction.inverse.statuses import Worded
 from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
-from sensorgen.prediction.inverse.verdict import covariance as inverted
 
 LEVEL = 0.9  # probability of the intervals
 _COARSE = 20, 16  # forces and positions at which covariances are worked out
@@ -40,43 +40,32 @@ WIDE = 0.8  # share of the sensor above which an interval does not tell the posi
 _LOCATES = 0.4  # share of the sensor below which an interval is expected to tell it
 
 
-class Verdict(IntEnum):
+class Verdict(Worded):
     """The verdict on a reading, the worst that applies."""
 
-    OK = 0
-    FORCE_ONLY = 1
+    OK = 0, "ok"
+    FORCE_ONLY = 1, "force only"
     """The position's interval is most of the sensor, which locates other presses of this force."""
-    AT_THE_END = 2
+    AT_THE_END = 2, "at the end"
     """The force's interval ends at the largest force that was looked for."""
-    NOT_CALIBRATED = 3
+    NOT_CALIBRATED = 3, "not calibrated"
     """The interval is what the prediction alone allows."""
-    STALE_REST = 4
+    STALE_REST = 4, "stale rest"
     """The reading at rest is too old."""
-    LOADED_REST = 5
+    LOADED_REST = 5, "rest under load"
     """This reading, or one of ``_DOUBTED`` beside it, lies below its reading at rest: that was read under a load."""
-    NO_FIT = 6
+    NO_FIT = 6, "no fit"
     """No press explains the reading."""
-    MORE = 7
+    MORE = 7, "more than one press"
     """Another capacitance besides one press explains it: a second press, or a hand."""
-    CHANGED = 8
+    CHANGED = 8, "changed since calibration"
     """At rest, the sensor is not the one that was calibrated."""
-    MISSING = 9
+    MISSING = 9, "missing"
     """Too little was measured."""
-
-    @property
-    def words(self) -> str:
-        """As files and people read it."""
-        return _WORDS[self]
-
-
-_WORDS = (
-    "ok", "force only", "at the end", "not calibrated", "stale rest", "rest under load", "no fit",
-    "more than one press", "changed since calibration", "missing",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Found(Samples):
     """Presses behind readings.
 
     Attributes
@@ -104,7 +93,7 @@ class Found:
     chi2: Real
     more: Real
     below: Real
-    tones: NDArray[np.intp]
+    tones: Index
     verdict: NDArray[np.uint8]
 
 
@@ -212,26 +201,22 @@ class Inverter:
         stale = np.zeros(len(ratio), bool) if rest_age_s is None else ~(rest_age_s <= STALE_S)
         return self._judged(found, stale, np.zeros(len(ratio), bool) if changed is None else changed)
 
-    def _put(self, found: Found, rows: NDArray[np.intp], ratio: Complex, tones: Mask) -> None:
+    def _put(self, found: Found, rows: Index, ratio: Complex, tones: Mask) -> None:
         kept = np.flatnonzero(np.tile(tones, 2))
         table = self._table(tones, kept)
 
-        def block(some: NDArray[np.intp]) -> None:
-            values = self._block(parts(ratio[some][:, tones]), table, kept)
-            for name, value in zip(
-                ("force_n", "position_m", "force_90_n", "position_90_m", "chi2", "more"), values, strict=True
-            ):
-                getattr(found, name)[some] = value
-            found.tones[some] = tones.sum()
+        def put(some: Index) -> None:
+            block = self._block(parts(ratio[some][:, tones]), table, kept)
+            found.put(some, replace(block, tones=np.full(len(some), tones.sum())))
 
         blocks = [rows[start : start + _BLOCK] for start in range(0, len(rows), _BLOCK)]
         if len(blocks) == 1:
-            block(rows)
+            put(rows)
             return
         with ThreadPoolExecutor(2) as pool:
-            list(pool.map(block, blocks))
+            list(pool.map(put, blocks))
 
-    def _without_one(self, found: Found, rows: NDArray[np.intp], ratio: Complex, measured: Mask) -> None:
+    def _without_one(self, found: Found, rows: Index, ratio: Complex, measured: Mask) -> None:
         """Of readings that no press explains, leave out the tone whose absence explains the most."""
         best = nothing(len(rows))
         for tone in range(ratio.shape[1]):
@@ -242,13 +227,11 @@ class Inverter:
                 if pattern.sum() >= max(_FEW_TONES, ratio.shape[1] // 2):
                     self._put(trial, np.flatnonzero((left == pattern).all(axis=1)), ratio[rows], pattern)
             better = (trial.chi2 <= chi2_limit(2 * trial.tones - 2)) & ~(best.chi2 <= trial.chi2)
-            for name, value in vars(trial).items():
-                getattr(best, name)[better] = value[better]
+            best.put(better, trial.rows(better))
         good = np.isfinite(best.chi2)
-        for name, value in vars(best).items():
-            getattr(found, name)[rows[good]] = value[good]
+        found.put(rows[good], best.rows(good))
 
-    def _block(self, reading: Real, table: _Table, kept: NDArray[np.intp]) -> tuple[Real, ...]:
+    def _block(self, reading: Real, table: _Table, kept: Index) -> Found:
         k = reading.shape[1]
         white = (table.root @ reading.T.astype(np.float32)).reshape(-1, k, len(reading))
         white -= table.mean[:, :, None]
@@ -262,9 +245,11 @@ class Inverter:
         ln -= ln.max(0)
         density = np.exp(ln).reshape(len(self.force_n), len(self.position_m), -1)
         force, position = density.sum(1), density.sum(0)
-        return (
-            _quantiles(self.force_n, force, (0.5,))[:, 0], _quantiles(self.position_m, position, (0.5,))[:, 0],
-            self._force_ends(force), _densest(self.position_m, position, self.level), chi2[best, each], more,
+        return replace(
+            nothing(len(each)),
+            force_n=_quantiles(self.force_n, force, (0.5,))[:, 0], force_90_n=self._force_ends(force),
+            position_m=_quantiles(self.position_m, position, (0.5,))[:, 0],
+            position_90_m=_densest(self.position_m, position, self.level), chi2=chi2[best, each], more=more,
         )  # fmt: skip
 
     def _force_ends(self, force: Real) -> Real:
@@ -278,7 +263,7 @@ class Inverter:
         mixed = (1 - self._otherwise) * force + self._otherwise * share @ force
         return _quantiles(self.force_n, mixed, (_BELOW * out, 1 - (1 - _BELOW) * out))
 
-    def _towards_more(self, root: NDArray[np.float32], points: Sequence[int], kept: NDArray[np.intp]) -> Real:
+    def _towards_more(self, root: NDArray[np.float32], points: Sequence[int], kept: Index) -> Real:
         """Unit vectors, whitened, in which another capacitance moves a reading the most, and no press (points, k)."""
         tangent = root @ self._tangents[points][:, kept]
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True) + 1e-300
@@ -287,11 +272,11 @@ class Inverter:
             other = other - tangent @ (np.linalg.pinv(tangent) @ other)
         return np.asarray(np.linalg.svd(other, full_matrices=False)[0][:, :, 0])
 
-    def _table(self, tones: Mask, kept: NDArray[np.intp]) -> _Table:
+    def _table(self, tones: Mask, kept: Index) -> _Table:
         key = tones.tobytes()
         if key not in self._tables:
             covariance = self._covariances[:, kept[:, None], kept]
-            root = np.linalg.inv(np.linalg.cholesky(covariance))
+            root = whitening(covariance)
             ln = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(1) + self._weight
             mean = np.einsum("gij,gj->gi", root, self._mean[:, kept])
             self._tables[key] = _Table(
@@ -312,10 +297,7 @@ class Inverter:
             (Verdict.CHANGED, changed),
             (Verdict.MISSING, found.tones < _FEW_TONES),
         )
-        found.verdict[:] = Verdict.OK
-        for verdict, applies in rules:
-            found.verdict[applies] = verdict
-        return found
+        return replace(found, verdict=Verdict.worst(len(wide), rules))
 
 
 def _one_press(found: Found) -> Mask:
@@ -357,21 +339,9 @@ def doubt_rest(found: Found, rest: Mask, left: int) -> int:
 
 def nothing(n: int) -> Found:
     """Results of readings in which nothing was found yet."""
-
-    def nan(*shape: int) -> Real:
-        return np.full(shape, np.nan)
-
-    return Found(
-        nan(n),
-        nan(n),
-        nan(n, 2),
-        nan(n, 2),
-        nan(n),
-        nan(n),
-        nan(n),
-        np.zeros(n, np.intp),
-        np.full(n, Verdict.MISSING, np.uint8),
-    )
+    (force, place, *others), ends = np.full((5, n), np.nan), np.full((2, n, 2), np.nan)
+    tones, verdict = np.zeros(n, np.intp), np.full(n, Verdict.MISSING, np.uint8)
+    return Found(force, place, ends[0], ends[1], others[0], others[1], others[2], tones, verdict)
 
 
 def _pairs(force_n: Real, position_m: Real) -> tuple[Real, Real]:
@@ -399,13 +369,11 @@ def readings(model: SpecimenModel, posterior: Posterior, force_n: Real, position
     presses = _of(posterior, force, position)
     slopes = model.slopes(posterior.at, presses)
     vectors = model.scatters(posterior.at, presses)
-    noise = np.tile(posterior.noise, (len(force), 1))
-    data = Data(presses, np.zeros_like(noise, complex), noise, np.zeros(noise.shape[1], complex), noise[0])
     components = posterior.components.copy()
     courses = (("hysteresis", posterior.unloading[1]), ("creep", posterior.decades[1]))
-    unknown_course = [memory(model, posterior.at, name) * sd for name, sd in courses]
+    unknown_course = [model.value(name, posterior.at) * sd for name, sd in courses]
     components[0] = np.sqrt(components[0] ** 2 + np.sum(np.square(unknown_course)))
-    own = covariances(model, posterior.at, data, components, vectors)
+    own = covariances(model, posterior.at, Data.unread(presses, posterior.noise), components, vectors)
     shared = slopes @ posterior.covariance @ slopes.transpose(0, 2, 1)
     return parts(model.ratio(posterior.at, presses)), own + shared
 
@@ -414,9 +382,9 @@ def _position_errors(coarse: tuple[Real, Real], mean: Real, covariance: Real) ->
     """Standard error of the position at each force of a grid, the median over positions [m]."""
     shape = len(coarse[0]), len(coarse[1])
     slopes = [np.asarray(np.gradient(mean.reshape(*shape, -1), at, axis=k)) for k, at in enumerate(coarse)]
-    slope = np.stack(slopes, 2).reshape(len(mean), 2, -1)
-    fisher = slope @ np.linalg.solve(covariance, slope.transpose(0, 2, 1))
-    return np.asarray(np.median(np.sqrt(inverted(fisher)[:, 1, 1]).reshape(shape), axis=1))
+    white = whitening(covariance)
+    _, error, _ = cramer_rao(*(np.einsum("gij,gj->gi", white, slope.reshape(mean.shape)) for slope in slopes))
+    return np.asarray(np.median(np.nan_to_num(error, nan=np.inf).reshape(shape), axis=1))
 
 
 def _grid(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> tuple[Real, Real]:

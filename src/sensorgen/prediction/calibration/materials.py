@@ -4,7 +4,6 @@ A parameter of the specimen differs from the prediction by the material's value,
 and of the models. Both are normal in the logarithm.
 """
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, log, sqrt
@@ -16,9 +15,11 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import Design
+from sensorgen.design.materials import own
 from sensorgen.design.values import film, ln_spread, material_value
 from sensorgen.prediction.calibration.fitting import Posterior
 from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel
+from sensorgen.prediction.inference import standard
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import SensorModel
 
@@ -100,15 +101,11 @@ def source_text(about: str, estimates: Sequence[MaterialEstimate]) -> str:
     told = [one for one in estimates if one.told]
     if not told:
         raise BadInput(f"{about}: the readings tell no material value; known presses tell them")
-    rows = [f"about: {json.dumps(about)}", "materials:"]
-    for material in dict.fromkeys(one.material for one in told):
-        rows.append(f"  {material}:")
-        rows += [
-            f"    {one.quantity}: {{value: {one.value:.6g}, low: {one.lower:.6g}, high: {one.upper:.6g}}}"
-            for one in told
-            if one.material == material
-        ]
-    return "\n".join(rows) + "\n"
+    materials: dict[str, list[own.SourceValue]] = {}
+    for one in told:
+        value = own.SourceValue(one.quantity, one.value, one.lower, one.upper)
+        materials.setdefault(one.material, []).append(value)
+    return own.written(about, materials)
 
 
 def links(predicted: SensorModel) -> tuple[Link, ...]:
@@ -139,8 +136,8 @@ def _link(
 ) -> Link:  # fmt: skip
     material, source = design.material(name), design.used()[name]
     middle, spread = ln_spread(material, source, quantity)
-    own = value or material_value(material, source, quantity).value
-    return Link(name, quantity, parameter, own, middle, spread, slope, error, shape)
+    value = value or material_value(material, source, quantity).value
+    return Link(name, quantity, parameter, value, middle, spread, slope, error, shape)
 
 
 def _capacitance(predicted: SensorModel, dielectric: str) -> tuple[float, float]:
@@ -168,19 +165,17 @@ def estimate(model: SpecimenModel, posterior: Posterior, link: Link) -> Material
         Of the value to the parameter.
     """
     weights, slope = _weights(model, link)
-    told = weights @ posterior.covariance @ weights.T
-    mean, before = weights @ posterior.at, weights @ weights.T
-    precision = np.linalg.inv(told)
-    values, vectors = np.linalg.eigh(precision - np.linalg.inv(before))
+    difference, pull = posterior.of(weights).beyond(standard(len(model.names)).of(weights))
+    values, vectors = np.linalg.eigh(difference)
     information = (vectors * np.maximum(values, 0.0)) @ vectors.T
-    own = (
-        link.error**2 + link.shape**2 * model.law_likeness() if link.parameter == "rise" else np.eye(1) * link.error**2
-    )
-    inverse = np.linalg.inv(link.spread**2 * np.outer(slope, slope) + own)
+    of_rise = link.parameter == "rise"
+    errors = np.eye(len(slope)) * (0.0 if of_rise else link.error**2)
+    if of_rise:
+        errors += link.error**2 + link.shape**2 * model.law_likeness()
+    inverse = np.linalg.inv(link.spread**2 * np.outer(slope, slope) + errors)
     covariance = np.linalg.inv(information + inverse)
-    middle = model.spread.law_middle if link.parameter == "rise" else 0.0
-    prior_mean = link.middle * slope - middle  # of a print that is as estimated
-    at = covariance @ (precision @ mean + inverse @ prior_mean)
+    prior_mean = link.middle * slope - (model.spread.law_middle if of_rise else 0.0)  # of a print that is as estimated
+    at = covariance @ (pull + inverse @ prior_mean)
     by = link.spread**2 * slope @ inverse
     ln_value = link.middle + float(by @ (at - prior_mean))
     sd = sqrt(float(link.spread**2 - link.spread**2 * (by @ slope) + by @ covariance @ by))

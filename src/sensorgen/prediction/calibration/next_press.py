@@ -146,6 +146,4 @@ class NextPress:
         return np.asarray(np.einsum("nia,nij,njb->ab", slopes, own, slopes, optimize=True) / len(slopes))
 
     def _noise(self, known: Posterior, presses: Presses) -> Real:
-        nothing = np.zeros((len(presses.force_n), len(self.noise)))
-        data = Data(presses, nothing.astype(complex), nothing + self.noise, nothing[0].astype(complex), self.noise)
-        return covariances(self.model, known.at, data, known.components)
+        return covariances(self.model, known.at, Data.unread(presses, self.noise), known.components)

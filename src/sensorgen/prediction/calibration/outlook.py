@@ -7,13 +7,14 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import SensorgenError
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.calibration.fitting import Data, Posterior, covariances, information, prior
+from sensorgen.prediction.calibration.fitting import Data, Posterior, information, prior, usual_components
 from sensorgen.prediction.calibration.inversion import readings
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, spread_at
+from sensorgen.prediction.inference import cramer_rao, whitening
 
 PRESSES = 30
 _STEP = 1e-3  # of the force and of the length, for differences
-_SINGULAR = 1e-12  # of the information, below which force and position are not told apart
+_PARALLEL = 1e-6  # sine of the angle between their slopes, below which force and position are not told apart
 _GOLDEN, _SILVER = 0.6180339887498949, 0.7548776662466927  # spread presses evenly over force, place and course
 
 
@@ -60,15 +61,13 @@ def _planned(model: SpecimenModel, before: Posterior, force_n: float) -> Posteri
         force_n * (0.05 + 0.95 * k / PRESSES), half + (length - 2 * half) * (k * _GOLDEN % 1),
         np.where(k % 2 == 0, 0.3, 0.0), -0.5 + 2 * (k * _SILVER % 1),
     )  # fmt: skip
-    noise = np.tile(before.noise, (PRESSES, 1))
-    ratio = np.zeros(noise.shape, complex)
-    data = Data(presses, ratio, noise, ratio[0], before.noise / PRESSES**0.5)
-    usual = np.array([model.spread.scatter, model.spread.wander, model.spread.wander])
-    weight = np.asarray(np.linalg.inv(covariances(model, before.at, data, usual)))
-    known = information(model, data, before.at, weight) + np.eye(len(before.at))
+    data = Data.unread(presses, before.noise, rest_noise=before.noise / PRESSES**0.5)
+    usual = usual_components(model)
+    known = information(model, data, before.at, usual) + before.information
+    scatter, wander, _ = usual.tolist()
     return replace(
-        before, covariance=np.asarray(np.linalg.inv(known)), scatter=model.spread.scatter, wander_c=model.spread.wander,
-        wander_r=model.spread.wander, presses=PRESSES,
+        before, covariance=np.asarray(np.linalg.inv(known)), scatter=scatter, wander_c=wander, wander_r=wander,
+        presses=PRESSES,
     )  # fmt: skip
 
 
@@ -78,9 +77,5 @@ def _errors(model: SpecimenModel, known: Posterior, force_n: float, position_m: 
     mean, covariance = readings(model, known, force, place)
     at = mean.reshape(3, 3, -1)
     slopes = np.stack([(at[2, 1] - at[0, 1]) / (force[2] - force[0]), (at[1, 2] - at[1, 0]) / (place[2] - place[0])])
-    fisher = slopes @ np.linalg.solve(covariance[4], slopes.T)
-    (ff, fx), (_, xx) = fisher.tolist()
-    left = ff * xx - fx * fx
-    if not left > _SINGULAR * ff * xx:
-        return np.array([ff**-0.5 if ff > 0 else np.inf, np.inf])
-    return np.asarray(np.sqrt(np.array([xx, ff]) / left))
+    by_force, by_position = slopes @ whitening(covariance[4]).T
+    return np.asarray(np.nan_to_num(cramer_rao(by_force, by_position, _PARALLEL)[:2], nan=np.inf))

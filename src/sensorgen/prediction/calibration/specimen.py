@@ -7,20 +7,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import pairwise
+from math import log
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sensorgen.core.arrays import Complex, Mask, Real
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
 from sensorgen.models import line
 from sensorgen.models.sensor import Sensor
+from sensorgen.prediction.inference import Parameter, Samples, parts, slopes
 from sensorgen.prediction.inverse.forward import Forward, tones
 
 FORCES_N = (0.2, 0.5, 1.0, 2.0, 4.0, 8.0)  # at which the law of compression may differ from the predicted one
 _BENDS = 4  # modes of the resistivity's profile, half waves along the strip
 _PIECES = 3  # on either side of the tip
-STEP = 1e-3  # of finite differences [standard deviations]
 _FAR_N = 1e4  # more than any press
 _NOTHING_N = 1e-6  # least force, as its logarithm counts
 
@@ -95,7 +95,7 @@ def spread_at(sensor: Sensor) -> Spread:
 
 
 @dataclass(frozen=True, eq=False)
-class Presses:
+class Presses(Samples):
     """Known presses, and how they came about.
 
     Attributes
@@ -113,15 +113,16 @@ class Presses:
     unloading: Real
     decades: Real
 
-    def rows(self, which: NDArray[np.intp] | Mask) -> "Presses":
-        """Some of them."""
-        return Presses(*(value[which] for value in vars(self).values()))
-
 
 def unknown(force_n: Real, position_m: Real) -> Presses:
     """Presses whose course is unknown."""
     nan = np.full(len(force_n), np.nan)
     return Presses(force_n, position_m, nan, nan)
+
+
+def no_presses() -> Presses:
+    """Presses of a specimen that was never pressed."""
+    return unknown(np.empty(0), np.empty(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,18 +148,38 @@ class SpecimenModel:
         object.__setattr__(self, "frequency_hz", tones(self.frequency_hz))
 
     @cached_property
-    def names(self) -> tuple[str, ...]:
-        """Of the parameters."""
-        bends = (f"profile {k + 1}" for k in range(_BENDS))
-        law = (f"rise at {force:g} N" for force in FORCES_N)
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Parameters with their priors: resistance, capacitance and rise as factors on the predicted ones."""
+        s, sensor = self.spread, self.sensor
         return (
-            "resistance", *bends, "capacitance", "rise", *law, "leak", "dispersion", "lead", "stray", "force offset",
-            "position offset", "hysteresis", "creep",
-        )  # fmt: skip
+            Parameter("resistance", 0.0, s.resistance, unit="ohm", shown=sensor.resistance_ohm()),
+            *(Parameter(f"profile {k}", 0.0, s.profile / k, linear=True) for k in range(1, _BENDS + 1)),
+            Parameter("capacitance", 0.0, s.capacitance, unit="pF", shown=sensor.capacitance_f() * 1e12),
+            Parameter("rise", s.law_middle, s.law, unit="predicted"),
+            *(Parameter(f"rise at {force:g} N", 0.0, s.law_shape, unit="predicted") for force in FORCES_N),
+            Parameter("leak", log(s.leak), s.leak_spread),
+            Parameter("dispersion", log(s.dispersion) - 0.5, 1.0),
+            Parameter("lead", log(s.lead_ohm) - 0.5, 1.0, unit="ohm"),
+            Parameter("stray", log(s.stray_f) - 0.5, 1.0, unit="pF", shown=1e12),
+            Parameter("force offset", s.force_offset_n, s.force_n, linear=True, unit="N"),
+            Parameter("position offset", 0.0, s.position_m, linear=True, unit="mm", shown=1e3),
+            Parameter("hysteresis", log(s.hysteresis) - 0.5, 1.0, unit="%", shown=100.0),
+            Parameter("creep", log(s.creep) - 0.5, 1.0, unit="%/decade", shown=100.0),
+        )
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(one.key for one in self.parameters)
 
     @cached_property
     def _at(self) -> dict[str, int]:
         return {name: k for k, name in enumerate(self.names)}
+
+    def value(self, name: str, at: Real) -> Real:
+        """Value of a parameter (...) at parameters in standard deviations (..., p)."""
+        k = self._at[name]
+        return self.parameters[k].at(at[..., k])
 
     @cached_property
     def most_pa(self) -> float:
@@ -232,43 +253,39 @@ class SpecimenModel:
         self, at: Real, value: Mapping[str, Real], presses: Presses, length_m: Real, rise: Real
     ) -> tuple[Real, Real]:  # fmt: skip
         """Capacitance under the tip over that at rest [-], and the pressure [Pa]."""
-        sensor, spread = self.sensor, self.spread
-        force = np.maximum(presses.force_n + spread.force_offset_n + spread.force_n * value["force offset"], _NOTHING_N)
+        sensor = self.sensor
+        force = np.maximum(presses.force_n + value["force offset"], _NOTHING_N)
         stress = force / (sensor.width_m * length_m)
         share, _ = sensor.compression.capacitive_strain(np.minimum(stress, self.most_pa))
         first = self._at[f"rise at {FORCES_N[0]:g} N"]
-        knots = spread.law_shape * (at[..., first : first + len(FORCES_N)] @ self._shapes.T)
-        ln_rise = (
-            rise
-            + spread.law_middle
-            + spread.law * value["rise"]
-            + _interpolated(np.log(np.maximum(force, _NOTHING_N)), knots)
-        )
+        knots = self.spread.law_shape * (at[..., first : first + len(FORCES_N)] @ self._shapes.T)
+        ln_rise = rise + _interpolated(np.log(force), knots)
         for name, course in (("hysteresis", presses.unloading), ("creep", presses.decades)):
-            ln_rise = ln_rise + getattr(spread, name) * np.exp(value[name] - 0.5) * np.nan_to_num(course)
-        return 1 + share / (1 - share) * np.maximum(stress / self.most_pa, 1.0) * np.exp(ln_rise), stress
+            ln_rise = ln_rise + value[name] * np.nan_to_num(course)
+        beyond = np.maximum(stress / self.most_pa, 1.0)
+        return 1 + share / (1 - share) * beyond * value["rise"] * np.exp(ln_rise), stress
 
     def _read(
         self, at: Real, presses: Presses, loads: Sequence[bool], changes: Real | None = None,
         frequency_hz: Real | None = None,
     ) -> Iterator[Complex]:  # fmt: skip
         """Ln of the impedance that the bench reads, with the tip down or not."""
-        sensor, spread = self.sensor, self.spread
-        value = {name: at[..., k, None] for name, k in self._at.items()}
+        sensor = self.sensor
+        value = {name: self.value(name, at)[..., None] for name in self.names}
         rise, c, r = np.moveaxis(np.zeros(3) if changes is None else changes, -1, 0)[..., None]
-        position = np.clip(presses.position_m + spread.position_m * value["position offset"], 0, sensor.length_m)
+        position = np.clip(presses.position_m + value["position offset"], 0, sensor.length_m)
         patch = sensor.patch(position)
         length = np.broadcast_to(patch.length_m, position.shape)
         omega = 2 * np.pi * (self.frequency_hz if frequency_hz is None else frequency_hz)
         leak, stored = self._film(value, c, omega)
         track, by_pressure = sensor.track_ohm_per_m()
-        whole = track * np.exp(spread.resistance * value["resistance"] + r)
+        whole = track * value["resistance"] * np.exp(r)
         left, right = patch.left_m, np.maximum(sensor.length_m - patch.left_m - length, 0.0)
         shares = np.arange(_PIECES + 1) / _PIECES
         ends = np.stack([*(left * k for k in shares), *(left + length + right * k for k in shares)])
-        tracks = [(whole * np.exp(self._bent(at, start, end)))[..., None] for start, end in pairwise(ends)]
+        tracks = [(whole * np.exp(self._bent(value, start, end)))[..., None] for start, end in pairwise(ends)]
         films, lengths = [leak + stored] * len(tracks), [one[..., None] for one in np.diff(ends, axis=0)]
-        stray, lead = (np.exp(value[name] - 0.5)[..., None] for name in ("stray", "lead"))
+        stray, lead = (value[name][..., None] for name in ("stray", "lead"))
         for loaded in loads:
             own, film = list(tracks), list(films)
             if loaded:
@@ -276,46 +293,36 @@ class SpecimenModel:
                 film[_PIECES] = leak + stored * lifted[..., None]
                 own[_PIECES] = own[_PIECES] + (stress * by_pressure)[..., None]
             z = line.cascade(own, film, lengths, sensor.far_end)
-            yield np.asarray(np.log(spread.lead_ohm * lead + 1 / (1 / z + 1j * omega * spread.stray_f * stray)))
+            yield np.asarray(np.log(lead + 1 / (1 / z + 1j * omega * stray)))
 
     def _film(self, value: Mapping[str, Real], c: Real, omega: Real) -> tuple[Complex, Complex]:
         """Admittance of the film with nothing on it [S/m]: of its leak, and of what rises with C."""
-        sensor, spread, lowest = self.sensor, self.spread, 2 * np.pi * self.frequency_hz.min()
-        per_m = (sensor.capacitance_f_per_m * np.exp(spread.capacitance * value["capacitance"] + c))[..., None]
-        leak = spread.leak * np.exp(spread.leak_spread * value["leak"])[..., None] * lowest * per_m
-        exponent = np.minimum(spread.dispersion * np.exp(value["dispersion"] - 0.5), 1.0)[..., None]
+        sensor, lowest = self.sensor, 2 * np.pi * self.frequency_hz.min()
+        per_m = (sensor.capacitance_f_per_m * value["capacitance"] * np.exp(c))[..., None]
+        leak = value["leak"][..., None] * lowest * per_m
+        exponent = np.minimum(value["dispersion"], 1.0)[..., None]
         stored = 1j * omega * (omega / lowest) ** -exponent * np.exp(-0.5j * np.pi * exponent)
         return sensor.leak_s_per_m + leak, (stored + sensor.tan_delta * omega) * per_m
 
-    def _bent(self, at: Real, start_m: Real, end_m: Real) -> Real:
+    def _bent(self, value: Mapping[str, Real], start_m: Real, end_m: Real) -> Real:
         """Mean of ln resistivity over parts of the strip, less that of the whole."""
-        first, found = self._at["profile 1"], np.zeros(1)
+        ln = np.zeros(1)
         for k in range(1, _BENDS + 1):
             start, end = (k * np.pi / self.sensor.length_m * x for x in (start_m, end_m))
-            turn = (end - start) / 2
-            found = found + at[..., first + k - 1, None] / k * np.cos((start + end) / 2) * np.sinc(turn / np.pi)
-        return np.asarray(self.spread.profile * found)
+            ln = ln + value[f"profile {k}"] * np.cos((start + end) / 2) * np.sinc((end - start) / (2 * np.pi))
+        return ln
 
     def slopes(self, at: Real, presses: Presses) -> Real:
         """Derivatives of the ratio's real and imaginary parts by the parameters, (n, 2 m, p)."""
-        step = np.eye(len(at)) * STEP
-        return _slopes(self.ratio(np.concatenate([at + step, at - step]), presses))
+        return slopes(lambda near: parts(self.ratio(near, presses)), at)
 
     def rest_slopes(self, at: Real) -> Real:
         """Derivatives of the rest reading's parts by the parameters, (2 m, p)."""
-        step = np.eye(len(at)) * STEP
-        return _slopes(self.rest(np.concatenate([at + step, at - step])))
+        return slopes(lambda near: parts(self.rest(near)), at)
 
     def scatters(self, at: Real, presses: Presses) -> Real:
         """Derivatives of the ratio's parts by ln of the rise, of C and of R since the rest reading, (n, 2 m, 3)."""
-        step = np.eye(3) * STEP
-        return _slopes(self.ratio(at, presses, np.concatenate([step, -step])))
-
-
-def _slopes(ends: Complex) -> Real:
-    """Central differences of parts, from values at all steps forward, then backward."""
-    more, less = np.split(parts(ends), 2)
-    return np.moveaxis(more - less, 0, -1) / (2 * STEP)
+        return slopes(lambda changes: parts(self.ratio(at, presses, changes)), np.zeros(3))
 
 
 def _interpolated(ln_force: Real, knots: Real) -> Real:
@@ -326,8 +333,3 @@ def _interpolated(ln_force: Real, knots: Real) -> Real:
     share = (inside - ln[k]) / (ln[k + 1] - ln[k])
     low, high = (np.take_along_axis(np.broadcast_to(knots, (*k.shape[:-1], len(ln))), at, -1) for at in (k, k + 1))
     return np.asarray(low + share * (high - low))
-
-
-def parts(value: Complex) -> Real:
-    """Real parts, then imaginary parts, along the last axis."""
-    return np.concatenate([value.real, value.imag], -1)

@@ -8,16 +8,13 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.identifiability.results import StandardErrors, finite
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-
-PARALLEL = 1e-9  # sine of the angle between two directions below which they are one: slopes are right to 1e-11
+from sensorgen.prediction.inference import cramer_rao, orthogonal
 
 
 class Slopes(NamedTuple):
@@ -97,21 +94,16 @@ def slopes(sensor: Sensor, frequency_hz: ArrayLike, force_n: ArrayLike, position
 
 
 def bounds(found: Slopes, noise: float) -> Bounds:
-    r"""Cramer-Rao bounds of force and position, both unknown.
+    """Cramer-Rao bounds of force and position, both unknown: see :func:`sensorgen.prediction.inference.cramer_rao`.
 
-    .. math:: \sigma_F = \frac{n}{\lVert a - (a \cdot b / b \cdot b)\, b \rVert}, \quad
-              \sigma_x = \frac{n}{\lVert b - (a \cdot b / a \cdot a)\, a \rVert}, \quad
-              a = \frac{\partial \ln Z}{\partial F}, \quad b = \frac{\partial \ln Z}{\partial x}
-
-    with the real and imaginary parts of all frequencies as components: the inverse of the Fisher matrix
-    [a.a, a.b; a.b, b.b]/n^2, by what is left of each slope beside the other so that no determinant cancels.
+    Slopes are those of ln Z; real and imaginary parts of all frequencies count alike.
 
     Parameters
     ----------
     found : Slopes
         Frequencies on the last axis.
     noise : float
-        n, of each part of Z, relative to abs(Z) [-].
+        Of each part of Z, relative to abs(Z) [-].
 
     Returns
     -------
@@ -127,15 +119,8 @@ def bounds(found: Slopes, noise: float) -> Bounds:
     >>> float(b.force_n), float(b.position_m)
     (0.005, 0.002)
     """
-    a, b = found
-    with np.errstate(all="ignore"):
-        force = _error(noise, _norm(_beside(a, b)), _norm(a))
-        position = _error(noise, _norm(_beside(b, a)), _norm(b))
-        return Bounds(force, position, np.where(np.isnan(position), np.nan, -_dot(a, b) / (_norm(a) * _norm(b))))
-
-
-def _error(noise: float, left: Real, whole: Real) -> Real:
-    return np.where(left > PARALLEL * whole, noise / left, np.nan)
+    force, position, correlation = cramer_rao(*found)
+    return Bounds(noise * force, noise * position, correlation)
 
 
 def shares(found: Slopes) -> tuple[Real, Real]:
@@ -145,7 +130,7 @@ def shares(found: Slopes) -> tuple[Real, Real]:
     """
     a, b = found
     with np.errstate(all="ignore"):
-        force, position = (np.abs(_beside(u, v)) ** 2 for u, v in ((a, b), (b, a)))
+        force, position = (np.abs(orthogonal(u, v)) ** 2 for u, v in ((a, b), (b, a)))
         return force / force.sum(-1, keepdims=True), position / position.sum(-1, keepdims=True)
 
 
@@ -160,7 +145,7 @@ def undefined(setup: Setup, found: Slopes) -> str:
     return ""
 
 
-def bearable(sensor: Sensor, force_n: Real, position_m: Real) -> NDArray[np.bool_]:
+def bearable(sensor: Sensor, force_n: Real, position_m: Real) -> Mask:
     """Where the law of compression is defined, in the broadcast shape of forces [N] and positions [m]."""
 
     def defined(stress_pa: Real) -> bool:
@@ -174,20 +159,6 @@ def bearable(sensor: Sensor, force_n: Real, position_m: Real) -> NDArray[np.bool
     if defined(stress):
         return np.ones(stress.shape, bool)
     return np.array([defined(np.asarray(one)) for one in stress.ravel()]).reshape(stress.shape)
-
-
-def _dot(a: Complex, b: Complex) -> Real:
-    return np.asarray((a.conj() * b).real.sum(-1))
-
-
-def _norm(a: Complex) -> Real:
-    return np.sqrt(_dot(a, a))
-
-
-def _beside(a: Complex, b: Complex) -> Complex:
-    """Component of a orthogonal to b; a itself where b is 0."""
-    length = _dot(b, b)
-    return np.asarray(a - (_dot(a, b) / np.where(length == 0, 1.0, length))[..., None] * b)
 
 
 def standard_errors(limits: Bounds) -> StandardErrors:

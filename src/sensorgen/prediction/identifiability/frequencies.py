@@ -4,7 +4,8 @@ from itertools import combinations
 
 import numpy as np
 
-from sensorgen.prediction.identifiability.fisher import Real, Setup, Slopes, bounds, slopes
+from sensorgen.core.arrays import Real
+from sensorgen.prediction.identifiability.fisher import Setup, Slopes, bounds, slopes
 from sensorgen.prediction.identifiability.results import AdvisedFrequencies, FrequencyChoice
 from sensorgen.prediction.identifiability.verdict import Required
 

@@ -5,33 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.identifiability import changes, frequencies
-from sensorgen.prediction.identifiability.fisher import (
-    Bounds,
-    Real,
-    Setup,
-    Slopes,
-    bearable,
-    bounds,
-    shares,
-    slopes,
-    standard_errors,
-    undefined,
-)
-from sensorgen.prediction.identifiability.results import (
-    ErrorMap,
-    ErrorSummary,
-    FrequencyInformation,
-    Identifiability,
-    ReferencePress,
-    StandardErrors,
-    Stiffest,
-    cartesian,
-    finite,
-)
-from sensorgen.prediction.identifiability.verdict import Required, bracket, required, verdict
+from sensorgen.prediction.identifiability import changes, fisher, frequencies, results, verdict
+from sensorgen.prediction.identifiability.fisher import Bounds, Setup
+from sensorgen.prediction.identifiability.results import Identifiability, StandardErrors, cartesian, finite
 from sensorgen.prediction.query import FORCE_N, NOISE
 
 HIGHEST_HZ = 1e6  # assumed of the bridge; its oscilloscope (TiePie HS5-540) reaches far more
@@ -83,51 +62,52 @@ def identify(
     that of a uniform distribution (range over the root of 12), and "roughly" in between.
     """
     setup = replace(_setup(sensor, frequency_hz, noise, force_n, position_m, highest_hz), assumed=assumed)
-    found = slopes(sensor, setup.frequency_hz, force_n, setup.position_m)
-    limits, need, reason = bounds(found, noise), required(setup), undefined(setup, found)
-    tried = changes.most_helpful(setup, need)
-    together = changes.together(setup, tried) if tried else None
+    slopes = fisher.slopes(sensor, setup.frequency_hz, force_n, setup.position_m)
+    limits, need, reason = fisher.bounds(slopes, noise), verdict.required(setup), fisher.undefined(setup, slopes)
+    helpful = changes.most_helpful(setup, need)
+    together = changes.together(setup, helpful) if helpful else None
     stiff = setup.on(stiffest).bounds() if stiffest else None
-    stress = sensor.stress_pa(force_n, setup.position_m)
-    strain = float(sensor.compression.capacitive_strain(stress)[0])
     calibrated, uncalibrated = _on_a_bench(setup)
     return Identifiability(
-        **vars(standard_errors(limits)),
-        noise=noise,
-        press=ReferencePress(force_n, setup.position_m, sensor.tip_m, float(stress), strain),
+        **vars(fisher.standard_errors(limits)), noise=noise, press=_press(setup),
         corner_frequency_hz=sensor.corner_frequency_hz() if sensor.resistance_ohm() else None,
-        required=need.errors(),
-        reason=reason,
-        assumed=assumed or None,
+        required=need.errors(), reason=reason, assumed=assumed or None,
         senses_force=None if assumed else need.force(float(limits.force_n)),
         locates=None if assumed else need.position(float(limits.position_m)),
-        verdict=verdict(setup, limits, need, reason),
-        stiffest=Stiffest(**vars(standard_errors(stiff)), verdict=bracket(limits, stiff, need)) if stiff else None,
-        frequencies=_frequencies(setup, found),
-        map=_map(setup, need),
-        best_frequencies=frequencies.best(setup, found, need),
-        advised_frequencies=frequencies.advised(setup, need),
-        changes=tuple(one.result() for one in tried),
-        changes_together=standard_errors(together) if together else None,
-        calibrated=calibrated,
-        uncalibrated=uncalibrated,
-    )
+        verdict=verdict.verdict(setup, limits, need, reason),
+        stiffest=results.Stiffest(
+            **vars(fisher.standard_errors(stiff)), verdict=verdict.bracket(limits, stiff, need)
+        ) if stiff else None,
+        frequencies=_frequencies(setup, slopes), map=_map(setup, need),
+        best_frequencies=frequencies.best(setup, slopes, need), advised_frequencies=frequencies.advised(setup, need),
+        changes=tuple(one.result() for one in helpful),
+        changes_together=fisher.standard_errors(together) if together else None,
+        calibrated=calibrated, uncalibrated=uncalibrated,
+    )  # fmt: skip
+
+
+def _press(setup: Setup) -> results.ReferencePress:
+    sensor = setup.sensor
+    stress = sensor.stress_pa(setup.force_n, setup.position_m)
+    strain = float(sensor.compression.capacitive_strain(stress)[0])
+    return results.ReferencePress(setup.force_n, setup.position_m, sensor.tip_m, float(stress), strain)
 
 
 def _on_a_bench(setup: Setup) -> tuple[StandardErrors, StandardErrors] | tuple[None, None]:
     """Errors of a specimen, with a calibration and without."""
     from sensorgen.prediction.calibration.outlook import outlook
 
-    found = outlook(setup.sensor, np.array(setup.frequency_hz), setup.noise, setup.force_n, setup.position_m)
-    if found is None:
+    errors = outlook(setup.sensor, np.array(setup.frequency_hz), setup.noise, setup.force_n, setup.position_m)
+    if errors is None:
         return None, None
-    with_, without = (
-        StandardErrors(sigma_force_n=_told(f), sigma_position_m=_told(x)) for f, x in (ends.tolist() for ends in found)
+    calibrated, uncalibrated = (
+        StandardErrors(sigma_force_n=_rounded(force), sigma_position_m=_rounded(position))
+        for force, position in np.array(errors).tolist()
     )
-    return with_, without
+    return calibrated, uncalibrated
 
 
-def _told(error: float) -> float | None:
+def _rounded(error: float) -> float | None:
     """A standard error to four digits, the same on every machine; None of an infinite one."""
     return float(f"{error:.4g}") if np.isfinite(error) else None
 
@@ -145,33 +125,27 @@ def _setup(
     return Setup(sensor, frequency_hz, noise, force_n, centre, max(highest_hz, *frequency_hz))
 
 
-def _frequencies(setup: Setup, found: Slopes) -> tuple[FrequencyInformation, ...]:
+def _frequencies(setup: Setup, slopes: fisher.Slopes) -> tuple[results.FrequencyInformation, ...]:
     z = setup.sensor.impedance(np.array(setup.frequency_hz), setup.force_n, setup.position_m)
-    of_force, of_position = shares(found)
+    columns = (setup.frequency_hz, z, *slopes, *fisher.shares(slopes))
     return tuple(
-        FrequencyInformation(
-            frequency_hz=f,
-            magnitude_ohm=float(abs(z[k])),
-            by_force_ohm_per_n=cartesian(by_force * z[k]),
-            by_position_ohm_per_m=cartesian(by_position * z[k]),
-            relative_by_force_per_n=cartesian(by_force),
-            relative_by_position_per_m=cartesian(by_position),
-            share_of_force_information=finite(of_force[k]),
-            share_of_position_information=finite(of_position[k]),
+        results.FrequencyInformation(
+            f, float(abs(ohm)), cartesian(a * ohm), cartesian(b * ohm), cartesian(a), cartesian(b), finite(of_force),
+            finite(of_position),
         )
-        for k, (f, by_force, by_position) in enumerate(zip(setup.frequency_hz, *found, strict=True))
-    )
+        for f, ohm, a, b, of_force, of_position in zip(*columns, strict=True)
+    )  # fmt: skip
 
 
 def surface(setup: Setup, force_n: Real, position_m: Real) -> Bounds:
     """Bounds over forces (rows, [N]) and positions (columns, [m]); nan where undefined or the electrodes touch."""
     force, place = np.broadcast_arrays(force_n[:, None], position_m)
-    valid = bearable(setup.sensor, force, place)
-    found = slopes(setup.sensor, setup.frequency_hz, np.where(valid, force, 0.0), place)
-    return Bounds(*(np.where(valid, value, np.nan) for value in bounds(found, setup.noise)))
+    valid = fisher.bearable(setup.sensor, force, place)
+    slopes = fisher.slopes(setup.sensor, setup.frequency_hz, np.where(valid, force, 0.0), place)
+    return Bounds(*(np.where(valid, value, np.nan) for value in fisher.bounds(slopes, setup.noise)))
 
 
-def _map(setup: Setup, need: Required) -> ErrorMap:
+def _map(setup: Setup, need: verdict.Required) -> results.ErrorMap:
     force = np.linspace(0.0, setup.force_n, MAP_FORCES)
     place = np.linspace(0.0, setup.sensor.length_m, MAP_POSITIONS)
     limits = surface(setup, force, place)
@@ -179,27 +153,20 @@ def _map(setup: Setup, need: Required) -> ErrorMap:
     rows_n, rows_m = (
         tuple(tuple(finite(value) for value in row) for row in sigma) for sigma in (limits.force_n, limits.position_m)
     )
-    return ErrorMap(
-        force_n=tuple(force.tolist()),
-        position_m=tuple(place.tolist()),
-        sigma_force_n=rows_n,
-        sigma_position_m=rows_m,
-        doubt=setup.sensor.compression.doubt(float(setup.sensor.stress_pa(force[:, None], place).max())),
-        of_force=_summary(limits.force_n[pressed], need.force_n, force[pressed], place),
-        of_position=_summary(limits.position_m[pressed], need.position_m, force[pressed], place),
+    doubt = setup.sensor.compression.doubt(float(setup.sensor.stress_pa(force[:, None], place).max()))
+    summaries = (
+        _summary(sigma[pressed], serves, force[pressed], place)
+        for sigma, serves in ((limits.force_n, need.force_n), (limits.position_m, need.position_m))
     )
+    return results.ErrorMap(tuple(force.tolist()), tuple(place.tolist()), rows_n, rows_m, doubt, *summaries)
 
 
-def _summary(sigma: Real, serves: float, force_n: Real, position_m: Real) -> ErrorSummary:
+def _summary(sigma: Real, serves: float, force_n: Real, position_m: Real) -> results.ErrorSummary:
     if np.isnan(sigma).all():
-        return ErrorSummary(None, None, None, None, LIGHT_N, 0.0)
+        return results.ErrorSummary(None, None, None, None, LIGHT_N, 0.0)
     row, column = np.unravel_index(np.nanargmax(sigma), sigma.shape)
     counted = np.abs(force_n) >= min(LIGHT_N, np.abs(force_n).max())
-    return ErrorSummary(
-        median=float(np.nanmedian(sigma)),
-        worst=float(sigma[row, column]),
-        worst_force_n=float(force_n[row]),
-        worst_position_m=float(position_m[column]),
-        from_force_n=float(np.abs(force_n[counted]).min()),
-        share_known=float(np.mean(sigma[counted] <= serves)),
-    )
+    return results.ErrorSummary(
+        float(np.nanmedian(sigma)), float(sigma[row, column]), float(force_n[row]), float(position_m[column]),
+        from_force_n=float(np.abs(force_n[counted]).min()), share_known=float(np.mean(sigma[counted] <= serves)),
+    )  # fmt: skip

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sensorgen.prediction.identifiability.fisher import Bounds, Real, Setup
+from sensorgen.core.arrays import Real
+from sensorgen.prediction.identifiability.fisher import Bounds, Setup
 from sensorgen.prediction.identifiability.results import FORCE_SHARE, GUESS, StandardErrors, metres, newtons
 
 _FORCE = {"yes": "senses force", "roughly": "senses force only roughly", "no": "cannot sense force"}

@@ -1,6 +1,5 @@
 """Estimates as rows of a CSV file, and their summary with advice."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from statistics import median
@@ -10,6 +9,7 @@ import numpy as np
 
 from sensorgen.core.document import Part
 from sensorgen.core.units import M_PER_MM
+from sensorgen.prediction.inverse import statuses
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
 from sensorgen.prediction.inverse.verdict import Status
 
@@ -21,32 +21,25 @@ _MM = 1 / M_PER_MM
 _DIAGONAL = np.arange(2)
 
 
-def header(kept: Sequence[str]) -> str:
-    """Names of the columns, those of the input before; one that has the name of a result is ``..._given``.
-
-    >>> header(["time_s", "force_n"])[:32]
-    'time_s,force_n_given,force_n,pos'
-    """
-    return csv_row([*(csv_cell(f"{name}_given" if name in COLUMNS else name) for name in kept), *COLUMNS])
+def header(given: Sequence[str]) -> str:
+    """Names of the columns, those of the input before."""
+    return statuses.header(given, COLUMNS)
 
 
-def rows(kept: Sequence[Sequence[str]], found: Estimates, *, prior: bool = False) -> str:
+def rows(given: Sequence[Sequence[str]], estimates: Estimates, *, prior: bool = False) -> str:
     """Rows of a CSV file, blank where a quantity is not identifiable.
 
     Parameters
     ----------
-    kept : sequence of sequence of str
+    given : sequence of sequence of str
         The input's other cells, row by row.
-    found : Estimates
+    estimates : Estimates
         The results.
     prior : bool
-        Whether a prior was stated: results then count even where the reading has little information.
+        A prior was stated: results then count even where the reading has little information.
     """
-    words = [status.words for status in Status]
-    ends = zip(kept, _numbers(found, prior).tolist(), found.tones.tolist(), found.status.tolist(), strict=True)
-    return "".join(
-        csv_row([*map(csv_cell, own), *map(number, row), str(n), words[status]]) for own, row, n, status in ends
-    )
+    words = np.array([status.words for status in Status])[estimates.status]
+    return statuses.rows(given, _numbers(estimates, prior), estimates.tones, words)
 
 
 def _numbers(found: Estimates, prior: bool) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -124,18 +117,18 @@ class Summary:
 
     def __init__(self, estimator: Estimator, doubts: Sequence[str] = ()) -> None:
         self._estimator, self._doubts = estimator, (*doubts, *estimator.doubts)
-        self._statuses: Counter[int] = Counter()
+        self._statuses = statuses.Counts(Status)
         self._errors: list[tuple[float, float]] = []
         self._excess: list[float] = []
 
     @property
     def samples(self) -> int:
         """Number of samples so far."""
-        return self._statuses.total()
+        return self._statuses.samples
 
     def add(self, found: Estimates) -> None:
         """Count a block."""
-        self._statuses.update(found.status.tolist())
+        self._statuses.add(found.status)
         measured, free = found.tones > 0, found.tones > 1
         if measured.any():
             force, position = np.median(np.sqrt(found.covariance[measured][:, _DIAGONAL, _DIAGONAL]), 0).tolist()
@@ -147,7 +140,7 @@ class Summary:
         """The summary so far."""
         return InversionSummary(
             samples=self.samples,
-            statuses={s.words: self._statuses[s] for s in Status if self._statuses[s]},
+            statuses=self._statuses.by_words(),
             frequency_hz=tuple(self._estimator.frequency_hz.tolist()),
             force_limit_n=float(self._estimator.scale[0]),
             median_force_error_n=_middle([force for force, _ in self._errors]),
@@ -160,39 +153,21 @@ class Summary:
     def _advice(self) -> Iterator[str]:
         """Advice where most samples have the same problem."""
         excess = _middle(self._excess)
-        if self._most(Status.NO_FIT) and excess is not None:
+        if self._statuses.most(Status.NO_FIT) and excess is not None:
             yield (
                 f"most readings fit no press: residuals are {excess:.3g} times the noise; set a larger --noise if it "
                 "is noise, or another design or material source if it is not"
             )
-        if self._most(Status.NOT_IDENTIFIABLE, Status.FORCE_ONLY):
+        if self._statuses.most(Status.NOT_IDENTIFIABLE, Status.FORCE_ONLY):
             yield (
                 "most readings have too little information: average them, choose frequencies nearer to the "
                 "corner frequency, more resistive electrodes or a softer cell (see sensorgen predict), or set --prior"
             )
-        if self._most(Status.AT_THE_END):
+        if self._statuses.most(Status.AT_THE_END):
             yield "most presses lie at the limits of the search: check --force-limit, and which end is connected"
-
-    def _most(self, *statuses: Status) -> bool:
-        return sum(self._statuses[s] for s in statuses) > self.samples / 2
 
 
 def _middle(values: Sequence[float]) -> float | None:
     """Median, None where there is none or it is infinite."""
     found = median(values) if values else np.inf
     return found if found < np.inf else None
-
-
-def number(value: float) -> str:
-    """A number as CSV; blank where there is none."""
-    return f"{value:.9g}" if abs(value) < np.inf else ""
-
-
-def csv_cell(text: str) -> str:
-    """A cell as CSV; quoted where it would come apart."""
-    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
-
-
-def csv_row(cells: Sequence[str]) -> str:
-    """A row of a CSV file."""
-    return ",".join(cells) + "\n"

@@ -7,13 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.inverse.descent import LOOSE, TIGHT, Fit, Target, descend
-from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N, Forward, Real
+from sensorgen.prediction.inference import Fit, Index, Samples, parts
+from sensorgen.prediction.inverse.descent import LOOSE, TIGHT, Target, descend
+from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N, Forward
 from sensorgen.prediction.inverse.prior import Posterior, Prior, posterior
 from sensorgen.prediction.inverse.single import Press, Single
-from sensorgen.prediction.inverse.table import Index, Local, Table, parts
+from sensorgen.prediction.inverse.table import Local, Table
 from sensorgen.prediction.inverse.verdict import NORMAL_90, PAIR, Status, covariance, statuses
 
 NOISE = 1e-3
@@ -24,7 +26,7 @@ _RIVAL = 2 * PAIR**0.5  # distance of two presses up to which noise may exchange
 
 
 @dataclass(frozen=True)
-class Estimates:
+class Estimates(Samples):
     """Estimated presses, sample by sample.
 
     Attributes
@@ -135,7 +137,10 @@ class Estimator:
                 return plain
         found = self._block(z)
         return Press(
-            float(found.force_n[0]), float(found.position_m[0]), found.covariance[0], Status(int(found.status[0]))
+            float(found.force_n[0]),
+            float(found.position_m[0]),
+            found.covariance[0],
+            Status(int(found.status[0])),  # type: ignore[call-arg]
         )
 
     def batch(self, impedance_ohm: ArrayLike) -> Estimates:
@@ -153,9 +158,9 @@ class Estimator:
             return self._block(z)
         with ThreadPoolExecutor() as pool:
             blocks = list(pool.map(self._block, (z[start : start + _BLOCK] for start in range(0, len(z), _BLOCK))))
-        return Estimates(**{name: np.concatenate([getattr(b, name) for b in blocks]) for name in vars(blocks[0])})
+        return Estimates.joined(blocks)
 
-    def _readings(self, impedance_ohm: ArrayLike) -> NDArray[np.complex128]:
+    def _readings(self, impedance_ohm: ArrayLike) -> Complex:
         try:
             z = np.asarray(impedance_ohm, np.complex128)
         except (TypeError, ValueError):
@@ -166,13 +171,13 @@ class Estimator:
             )
         return z
 
-    def _block(self, z: NDArray[np.complex128]) -> Estimates:
+    def _block(self, z: Complex) -> Estimates:
         measured = np.isfinite(z) & (z != 0)
         response = parts(np.log(np.where(measured, z, 1.0)))
         weight = np.tile(measured, 2) / self._sigma
         target = Target(response, weight, self._expected, self._information)
         found = self._least_squares(target)
-        own = covariance(found.best.fisher - np.diag(self._information))
+        own = covariance(found.best.information - self._information)
         tones = measured.sum(1)
         ambiguous = np.zeros(len(z), bool)
         ambiguous[found.rows] = True
@@ -184,22 +189,22 @@ class Estimator:
         """Means, covariances and intervals of scaled presses."""
         if self.prior is not None:
             return posterior(target, self._table, fit)
-        spread = covariance(fit.fisher)
+        spread = covariance(fit.information)
         reach = NORMAL_90 * np.sqrt(spread[:, _DIAGONAL, _DIAGONAL])
-        return Posterior(fit.press, spread, fit.press - reach, fit.press + reach)
+        return Posterior(fit.at, spread, fit.at - reach, fit.at + reach)
 
     def _least_squares(self, target: Target) -> _Pair:
         table = self._table
         start = table.nearest(target.response, target.weight)
-        best = descend(target, self._exact, descend(target, table.at, start, LOOSE).press, TIGHT)
-        rival = self._rival[table.cell(best.press)]
+        best = descend(target, self._exact, descend(target, table.at, start, LOOSE).at, TIGHT)
+        rival = self._rival[table.cell(best.at)]
         rows = np.flatnonzero(rival >= 0)
         if not rows.size:
             return _Pair(best, rows, np.empty((0, 2)))
         second = descend(target.rows(rows), table.at, table.middles[rival[rows]], LOOSE)
         close = np.flatnonzero(second.chi2 < best.chi2[rows] + 2 * PAIR)
         rows = rows[close]
-        second = descend(target.rows(rows), self._exact, second.press[close], TIGHT)
+        second = descend(target.rows(rows), self._exact, second.at[close], TIGHT)
         won = np.flatnonzero(second.chi2 < best.chi2[rows])
         first = best.rows(rows[won])
         best.put(rows[won], second.rows(won))
@@ -247,10 +252,10 @@ def estimate(
 def _within_noise(best: Fit, rows: Index, second: Fit) -> _Pair:
     """Those second presses that are presses of their own and explain the reading as well."""
     first = best.rows(rows)
-    apart = second.press - first.press
-    distance = np.einsum("ni,nij,nj->n", apart, first.fisher, apart)
+    apart = second.at - first.at
+    distance = np.einsum("ni,nij,nj->n", apart, first.information, apart)
     real = (second.chi2 < first.chi2 + PAIR) & (distance > PAIR)
-    return _Pair(best, rows[real], second.press[real])
+    return _Pair(best, rows[real], second.at[real])
 
 
 def _noise(noise: ArrayLike, n_tones: int) -> Real:

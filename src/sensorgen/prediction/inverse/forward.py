@@ -3,14 +3,12 @@
 import cmath
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models import line
 from sensorgen.models.sensor import UNIFORM, Sensor
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 FORCE_LIMIT_N = 13.0  # the rig's largest force, thesis chapter 6
 _HALVINGS = 40

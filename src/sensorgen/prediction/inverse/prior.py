@@ -1,14 +1,13 @@
 """Prior of a press, and its posterior: means and intervals by quadrature."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
-from sensorgen.prediction.inverse.descent import Fit, Target
-from sensorgen.prediction.inverse.forward import Real
+from sensorgen.prediction.inference import Fit, Samples
+from sensorgen.prediction.inverse.descent import Target
 from sensorgen.prediction.inverse.table import Table
 
 GUESS_INFORMATION = 12.0  # 1/variance of a uniform guess on a unit length
@@ -45,13 +44,14 @@ class Prior:
                 raise OutOfRange(f"prior on {name}: expected a mean and a standard deviation above 0, not {normal}")
 
     def scaled(self, scale: Real) -> tuple[Real, Real]:
-        """Means and 1/variances on the unit square; 0 where it is uniform."""
+        """Means (2,) and information (2, 2) on the unit square; 0 where it is uniform."""
         both = [normal or (0.0, np.inf) for normal in (self.force_n, self.position_m)]
         mean, deviation = np.array(both).T
-        return mean / scale, (scale / deviation) ** 2
+        return mean / scale, np.diag((scale / deviation) ** 2)
 
 
-class Posterior(NamedTuple):
+@dataclass(frozen=True)
+class Posterior(Samples):
     """Posterior of scaled presses; rows are samples."""
 
     mean: Real
@@ -77,20 +77,17 @@ def posterior(target: Target, table: Table, fit: Fit) -> Posterior:
     fit : Fit
         Its least squares.
     """
-    n = len(fit.press)
-    found = [
-        _posterior(target.rows(rows), table, fit.rows(rows))
-        for rows in np.split(np.arange(n), range(_BLOCK, n, _BLOCK))
-    ]
-    return Posterior(*(np.concatenate(column) for column in zip(*found, strict=True)))
+    n = len(fit.at)
+    blocks = np.split(np.arange(n), range(_BLOCK, n, _BLOCK))
+    return Posterior.joined([_posterior(target.rows(rows), table, fit.rows(rows)) for rows in blocks])
 
 
 def _posterior(target: Target, table: Table, fit: Fit) -> Posterior:
-    information = fit.fisher + np.eye(2) * GUESS_INFORMATION
+    information = fit.information + np.eye(2) * GUESS_INFORMATION
     deviation = np.sqrt(np.linalg.inv(information)[:, 1, 1])
-    x, dx = _spread(fit.press[:, 1], deviation, _POSITIONS)
+    x, dx = _spread(fit.at[:, 1], deviation, _POSITIONS)
     repeated = np.repeat(np.arange(len(x)), _POSITIONS)
-    ridge, width = _ridge(target.rows(repeated), table, np.repeat(fit.press[:, 0], _POSITIONS), x.ravel())
+    ridge, width = _ridge(target.rows(repeated), table, np.repeat(fit.at[:, 0], _POSITIONS), x.ravel())
     force, df = _spread(ridge, width, _FORCES)
     every = np.repeat(repeated, _FORCES)
     press = np.stack([force.ravel(), np.repeat(x.ravel(), _FORCES)], -1)
@@ -111,7 +108,7 @@ def _ridge(target: Target, table: Table, force: Real, position: Real) -> tuple[R
     for _ in range(_STEPS):
         press = np.stack([force, position], -1)
         fit = target.fit(press, table.at(press))
-        information = fit.fisher[:, 0, 0] + GUESS_INFORMATION
+        information = fit.information[:, 0, 0] + GUESS_INFORMATION
         force = np.clip(force + fit.gradient[:, 0] / information, 0.0, 1.0)
     return force, 1 / np.sqrt(information)
 
@@ -124,7 +121,7 @@ def _moments(press: Real, weight: Real) -> Posterior:
     return Posterior(mean, covariance, low, high)
 
 
-def _quantile(value: Real, weight: Real, share: float) -> NDArray[np.float64]:
+def _quantile(value: Real, weight: Real, share: float) -> Real:
     """Value below which a share of the weight lies, each weight counted half on either side of its value."""
     order = np.argsort(value, 1)
     value, weight = np.take_along_axis(value, order, 1), np.take_along_axis(weight, order, 1)

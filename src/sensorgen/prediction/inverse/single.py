@@ -6,9 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sensorgen.core.arrays import Real
+from sensorgen.prediction.inference import Index, parts
 from sensorgen.prediction.inverse.descent import LOOSE, REACH, ROUNDING, TIGHT
-from sensorgen.prediction.inverse.forward import Forward, Real, Scalar
-from sensorgen.prediction.inverse.table import Index, Table, parts
+from sensorgen.prediction.inverse.forward import Forward, Scalar
+from sensorgen.prediction.inverse.table import Table
 from sensorgen.prediction.inverse.verdict import PAIR, Status, chi2_limit
 
 _ROUGH = 2  # steps on the table before the exact model is used

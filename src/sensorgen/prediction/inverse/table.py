@@ -9,7 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.prediction.inverse.forward import Complex, Forward, Real
+from sensorgen.core.arrays import Mask, Real
+from sensorgen.prediction.inference import Index, parts
+from sensorgen.prediction.inverse.forward import Forward
 
 FORCE_CELLS = 24
 POSITION_CELLS = 40  # where the whole tip is on the sensor
@@ -24,7 +26,6 @@ _FIRST_ORDER = [2, 1]  # by force, by position; the others are the value and the
 _TINY = np.float32(1e-30)
 _SMALL_PRODUCT = 1 << 18  # multiplications up to which BLAS keeps to one thread: more only wait for each other here
 
-Index = NDArray[np.intp]
 Single = NDArray[np.float32]
 
 
@@ -198,11 +199,6 @@ def _thirds(edges: Real) -> Real:
     return np.append(thirds.ravel(), edges[-1])
 
 
-def parts(logarithm: Complex) -> Real:
-    """Real parts, then imaginary parts, along the last axis."""
-    return np.concatenate([logarithm.real, logarithm.imag], -1)
-
-
 def _cubics(values: Real) -> Real:
     """Coefficients of the cubic in both directions of every cell, (cells, 4, 4 * 2 n_tones)."""
     step = _DEGREE - 1
@@ -214,7 +210,7 @@ def _cubics(values: Real) -> Real:
     return np.ascontiguousarray(powers.reshape(forces * positions, _DEGREE, -1))
 
 
-def _minima(distance: Real) -> NDArray[np.bool_]:
+def _minima(distance: Real) -> Mask:
     """Cells that are below all their neighbours, those at the border among the ones that they have."""
     around = np.pad(distance, 1, constant_values=np.inf)
     rows, columns = distance.shape
@@ -224,7 +220,7 @@ def _minima(distance: Real) -> NDArray[np.bool_]:
     return found
 
 
-def _around(shape: tuple[int, int], seed: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _around(shape: tuple[int, int], seed: int) -> tuple[Mask, Mask]:
     """Cells that touch the seed's, and those among them at the same force."""
     row, column = divmod(seed, shape[1])
     rows, columns = abs(np.arange(shape[0]) - row)[:, None], abs(np.arange(shape[1]) - column)

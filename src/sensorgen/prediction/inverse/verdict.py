@@ -1,12 +1,11 @@
 """Status of an estimate: one word per sample."""
 
-from enum import IntEnum
-
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.prediction.inverse.descent import Fit
-from sensorgen.prediction.inverse.forward import Real
+from sensorgen.core.arrays import Mask, Real
+from sensorgen.prediction.inference import Fit
+from sensorgen.prediction.inverse.statuses import Worded
 
 NORMAL_90 = 1.6448536269514722  # normal deviate of 5 %
 PAIR = 9.21  # 99 % of chi-squared with two degrees of freedom: force and position
@@ -15,27 +14,22 @@ _ROUNDING = np.finfo(float).eps
 _EDGE = 1e-9  # of the square
 
 
-class Status(IntEnum):
+class Status(Worded):
     """The verdict on a sample, the worst that applies."""
 
-    OK = 0
-    AMBIGUOUS = 1
+    OK = 0, "ok"
+    AMBIGUOUS = 1, "two presses"
     """Another press fits the reading as well."""
-    AT_THE_END = 2
+    AT_THE_END = 2, "at the end"
     """The best press lies on the border: no force, the force limit, or an end of the sensor."""
-    FORCE_ONLY = 3
+    FORCE_ONLY = 3, "force only"
     """Less information on position than a uniform prior."""
-    NOT_IDENTIFIABLE = 4
+    NOT_IDENTIFIABLE = 4, "not identifiable"
     """Less information on force than a uniform prior, too."""
-    NO_FIT = 5
+    NO_FIT = 5, "no fit"
     """No press fits: the residual is far above the noise."""
-    MISSING = 6
+    MISSING = 6, "missing"
     """Nothing was measured."""
-
-    @property
-    def words(self) -> str:
-        """As files and people read it."""
-        return _WORDS[self]
 
     @property
     def force_counts(self) -> bool:
@@ -48,27 +42,21 @@ class Status(IntEnum):
         return self <= Status.AT_THE_END
 
 
-_WORDS = (
-    "ok", "two presses", "at the end", "force only", "not identifiable", "no fit", "missing",
-)  # fmt: skip
-
-
 def covariance(fisher: Real) -> Real:
     """Inverse of the information (n, 2, 2); infinite variances where it is singular."""
     (ff, fx), (_, xx) = fisher.transpose(1, 2, 0)
     determinant = ff * xx - fx * fx
     singular = determinant <= _ROUNDING * ff * xx
-    found = np.empty_like(fisher)
+    inverse = np.empty_like(fisher)
     with np.errstate(divide="ignore", invalid="ignore"):
-        found[:, 0, 0], found[:, 1, 1] = xx / determinant, ff / determinant
-        found[:, 0, 1] = found[:, 1, 0] = -fx / determinant
-        if singular.any():
-            found[singular] = np.array([[0.0, 0.0], [0.0, np.inf]])
-            found[singular, 0, 0] = np.where(ff > 0, 1 / ff, np.inf)[singular]
-    return found
+        inverse[:, 0, 0], inverse[:, 1, 1] = xx / determinant, ff / determinant
+        inverse[:, 0, 1] = inverse[:, 1, 0] = -fx / determinant
+        inverse[singular] = np.array([[0.0, 0.0], [0.0, np.inf]])
+        inverse[singular, 0, 0] = np.where(ff > 0, 1 / ff, np.inf)[singular]
+    return inverse
 
 
-def statuses(fit: Fit, variance: Real, tones: NDArray[np.intp], ambiguous: NDArray[np.bool_]) -> NDArray[np.uint8]:
+def statuses(fit: Fit, variance: Real, tones: NDArray[np.intp], ambiguous: Mask) -> NDArray[np.uint8]:
     """Verdicts on least-squares estimates.
 
     Parameters
@@ -85,16 +73,13 @@ def statuses(fit: Fit, variance: Real, tones: NDArray[np.intp], ambiguous: NDArr
     lost = variance > 1 / 12  # a uniform guess on the unit length has this variance
     rules = (
         (Status.AMBIGUOUS, ambiguous),
-        (Status.AT_THE_END, ((fit.press < _EDGE) | (fit.press > 1 - _EDGE)).any(1)),
+        (Status.AT_THE_END, ((fit.at < _EDGE) | (fit.at > 1 - _EDGE)).any(1)),
         (Status.FORCE_ONLY, lost[:, 1]),
         (Status.NOT_IDENTIFIABLE, lost[:, 0]),
         (Status.NO_FIT, fit.chi2 > chi2_limit(2 * tones - 2)),
         (Status.MISSING, tones == 0),
     )
-    found = np.zeros(len(tones), np.uint8)
-    for status, applies in rules:
-        found[applies] = status
-    return found
+    return Status.worst(len(tones), rules)
 
 
 def chi2_limit(degrees: NDArray[np.intp]) -> Real:

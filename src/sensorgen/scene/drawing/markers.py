@@ -91,9 +91,9 @@ def on_detail(
         elif place := _free(spot, panels[k], taken):
             taken += [spot, place]
             yield _marker(mark, spot, place)
-    for k, found in sorted(edges.items()):
+    for k, edge in sorted(edges.items()):
         frame = panels[k].frame
-        fitting = sorted(found[: int((frame.bed - frame.top + 14) // CLEAR)], key=lambda at: (at[0][1], at[1].number))
+        fitting = sorted(edge[: int((frame.bed - frame.top + 14) // CLEAR)], key=lambda at: (at[0][1], at[1].number))
         heights = spread([spot[1] for spot, _ in fitting], [CLEAR] * len(fitting), frame.top - 8, frame.bed + 6)
         for (spot, mark), y in zip(fitting, heights, strict=True):
             yield _marker(mark, spot, (frame.right + GUTTER / 2 + 0.6, y))
@@ -170,12 +170,12 @@ def placed(marked: Sequence[Marked], letters: Mapping[str, str], room: Room) -> 
 def listed(entries: Sequence[Entry], marked: Sequence[Marked], left: float, top: float, room: float) -> Iterator[str]:
     """The list of findings under its heading [mm on the page]."""
     words = counted(counts([mark.finding for mark in marked]))
-    rest = f"; {len(marked) - len(entries)} not shown, see check.json" if len(entries) < len(marked) else ""
+    rest = f"; {len(marked) - len(entries)} not shown: sensorgen check lists all" if len(entries) < len(marked) else ""
     yield text("heading", left, top, fitted(f"Findings: {words}{rest}", room, 3.2))
     for entry in entries:
-        yield _balloon(entry.mark, entry.x + RADIUS, entry.y + 0.6)
-        for k, (kind, words) in enumerate(entry.rows):
-            yield text(kind, entry.x + INDENT, entry.y + k * LINE, words)
+        rows = (text(kind, entry.x + INDENT, entry.y + k * LINE, row) for k, (kind, row) in enumerate(entry.rows))
+        inside = _balloon(entry.mark, entry.x + RADIUS, entry.y + 0.6) + "".join(rows)
+        yield element("g", "entry", inside, data_number=str(entry.mark.number))
 
 
 def _rows(mark: Marked, letters: Mapping[str, str], room: float, most: int) -> list[tuple[str, str]]:

@@ -28,7 +28,7 @@ def svg(meshes: Mapping[str, Mesh], places: Sequence[tuple[tuple[float, float, f
     places : sequence of (place, text)
         Where circles are drawn [mm], and what the list below the views says of each.
     """
-    edges = [_sharp(mesh) for mesh in meshes.values()]
+    edges = [mesh.vertices_mm[mesh.sharp_edges(_SHARP)] for mesh in meshes.values()]
     lines = np.concatenate([*edges, np.zeros((0, 2, 3))])
     low, high = (lines.reshape(-1, 3).min(0), lines.reshape(-1, 3).max(0)) if len(lines) else (np.zeros(3), np.ones(3))
     scale = _SIDE / max(float((high - low).max()), 1e-9)
@@ -59,16 +59,3 @@ def svg(meshes: Mapping[str, Mesh], places: Sequence[tuple[tuple[float, float, f
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{number(wide)}mm" height="{number(down)}mm" '
         f'viewBox="0 0 {number(wide)} {number(down)}"><style>{_STYLE}</style>{"".join(parts)}</svg>\n'
     )
-
-
-def _sharp(mesh: Mesh) -> Real:
-    """Edges of a mesh between faces of different directions, or of one face alone (n, 2, 3)."""
-    normal = mesh.normals_mm2()
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    sides = np.sort(mesh.edges(), axis=1)
-    order = np.lexsort(sides.T)
-    first = np.flatnonzero(np.append(True, (sides[order][1:] != sides[order][:-1]).any(1)))
-    count = np.diff(np.append(first, len(order)))
-    one, other = order[first] // 3, order[(first + 1).clip(max=len(order) - 1)] // 3
-    smooth = (count == 2) & (np.einsum("ij,ij->i", normal[one], normal[other]) > _SHARP)
-    return np.asarray(mesh.vertices_mm[sides[order[first[~smooth]]]])

@@ -49,6 +49,18 @@ class Mesh:
         """Directed edges of the triangles (3 m, 2), those of the first triangle first."""
         return self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
 
+    def sharp_edges(self, cosine: float = 0.999) -> Whole:
+        """Edges (n, 2), sorted: of one face alone, or between faces whose normals have at most this cosine."""
+        normal = self.normals_mm2()
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True).clip(1e-300)
+        sides = np.sort(self.edges(), axis=1)
+        order = np.lexsort((sides[:, 1], sides[:, 0]))
+        first = np.flatnonzero(np.append(True, (sides[order][1:] != sides[order][:-1]).any(1)))
+        count = np.diff(np.append(first, len(order)))
+        one, other = order[first] // 3, order[(first + 1).clip(max=len(order) - 1)] // 3
+        smooth = (count == 2) & (np.einsum("ij,ij->i", normal[one], normal[other]) > cosine)
+        return np.asarray(sides[order[first[~smooth]]])
+
     def turned(self) -> "Mesh":
         """Mesh with inside and outside exchanged."""
         return Mesh(self.vertices_mm, self.triangles[:, ::-1].copy())

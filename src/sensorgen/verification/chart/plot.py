@@ -7,7 +7,7 @@ from textwrap import wrap
 
 from sensorgen.analysis.plots import static
 from sensorgen.analysis.plots.figure import GREY, Axis, Curve, Figure, Panel, look
-from sensorgen.analysis.plots.pages import page
+from sensorgen.analysis.plots.pages import Section, page
 from sensorgen.verification.chart import kind_of
 from sensorgen.verification.chart.measured import Point
 
@@ -37,7 +37,7 @@ def overview(points: Sequence[Point]) -> bytes | None:
 
 def html(points: Sequence[Point]) -> str:
     """A page with a figure per scene."""
-    return page(TITLE, [ALT], list(figures(points)))
+    return page(TITLE, [ALT], [Section(figures=tuple(figures(points)))])
 
 
 def figures(points: Sequence[Point]) -> Iterator[Figure]:

@@ -2,11 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
-from markupsafe import Markup
-
 from sensorgen.analysis.plots import pages
 from sensorgen.analysis.plots.figure import GREY, Curve, Figure, Panel
-from sensorgen.core import document
 from sensorgen.verification.chart.plot import marks, panel, picture
 from sensorgen.verification.design_chart.results import DesignChart, Point
 
@@ -33,18 +30,14 @@ def png(found: DesignChart) -> bytes:
 
 def html(found: DesignChart) -> str:
     """A page: each quantity with its figure, whose axis can be chosen, and its table."""
-    drawn = list(figures(found))
-    tables = {key: _table(found, key) for key in found.titles}
-    bare = {key: table for key, table in tables.items() if key not in {figure.key for figure in drawn}}
-    return pages.render(
-        "sensorgen.verification.design_chart", "chart.html", drawn, title=_title(found),
-        words=[f"{found.body}; {found.force_n:g} N at {found.position_m * 1e3:g} mm.", ALT], tables=tables, bare=bare,
-    )  # fmt: skip
-
-
-def _table(found: DesignChart, key: str) -> Markup:
-    """The table of one quantity, and the words below it."""
-    return Markup(document.html(found.parts(key)))  # noqa: S704 - escaped by the document
+    shown = {figure.key: figure for figure in figures(found)}
+    sections = [
+        pages.Section(key, title, (shown[key],) if key in shown else (), tuple(found.parts(key)))
+        for key, title in found.titles.items()
+    ]
+    return pages.page(
+        _title(found), [f"{found.body}; {found.force_n:g} N at {found.position_m * 1e3:g} mm.", ALT], sections
+    )
 
 
 def _title(found: DesignChart) -> str:

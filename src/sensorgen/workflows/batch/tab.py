@@ -16,24 +16,12 @@ from collections.abc import Iterator, Sequence
 
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import Design
+from sensorgen.scene.lettering import FONT, LINE_DOTS, dots, runs
 from sensorgen.scene.scene import Body, Prism, box
 
 PLATE_MM = 0.6
 RAISED_MM = 0.3
 MARGIN_DOTS = 1
-LINE_DOTS = 5  # height of a letter; one more between lines
-
-# Each letter in rows from top to bottom. No dot hangs on corners alone: slicers leave such a dot out.
-_FONT = {
-    "0": "### #.# #.# #.# ###", "1": ".#. ##. .#. .#. ###", "2": "### ..# ### #.. ###", "3": "### ..# .## ..# ###",
-    "4": "#.# #.# ### ..# ..#", "5": "### #.. ### ..# ###", "6": "### #.. ### #.# ###", "7": "### ..# ..# ..# ..#",
-    "8": "### #.# ### #.# ###", "9": "### #.# ### ..# ###", ".": ".. .. .. ## ##",
-    "B": "###. #.#. #### #..# ####", "D": "##. #.# #.# #.# ##.", "E": "### #.. ##. #.. ###", "F": "### #.. ##. #.. #..",
-    "I": "### .#. .#. .#. ###", "L": "#.. #.. #.. #.. ###", "M": "##### #.#.# #.#.# #.#.# #.#.#",
-    "N": "#..# ##.# #### #.## #..#", "O": "### #.# #.# #.# ###", "Q": "#### #..# #..# #.## ####",
-    "R": "#### #..# #### #.#. #.##", "S": "### #.. ### ..# ###", "T": "### .#. .#. .#. .#.", "U": "#.# #.# #.# #.# ###",
-    "A": "### #.# ### #.# #.#", "X": "#...# ##.## .###. ##.## #...#", "Y": "#.# #.# ### .#. .#.",
-}  # fmt: skip
 
 
 def dot_mm(design: Design) -> float:
@@ -56,7 +44,7 @@ def size_mm(design: Design, name: str) -> tuple[float, float]:
             f"{design.name} is {width_mm:g} mm wide, too little for a tab with {name!r}: "
             "set 'labels: {tab: false}' in the plan, the sheet has the names too"
         )
-    length = max(map(_dots, lines)) + 2 * MARGIN_DOTS
+    length = max(map(dots, lines)) + 2 * MARGIN_DOTS
     return length * dot, width_mm
 
 
@@ -90,39 +78,19 @@ def _letters(lines: Sequence[str], x0: float, width_mm: float, dot: float) -> It
     for number, line in enumerate(lines):
         for row in range(LINE_DOTS):
             y = top - (number * (LINE_DOTS + 1) + row + 1) * dot
-            for start, end in _runs(line, row):
+            for start, end in runs(line, row):
                 x = x0 + MARGIN_DOTS * dot
                 yield box(x + start * dot, x + end * dot, y, y + dot, PLATE_MM, PLATE_MM + RAISED_MM)
-
-
-def _runs(line: str, row: int) -> Iterator[tuple[int, int]]:
-    """Where one row of dots of a line of letters starts and ends [dots]."""
-    dots = "".join(_glyph(letter)[row] + "." for letter in line)
-    start = None
-    for place, dot in enumerate(dots):
-        if dot == "#" and start is None:
-            start = place
-        elif dot == "." and start is not None:
-            yield start, place
-            start = None
-
-
-def _glyph(letter: str) -> list[str]:
-    return [".."] * LINE_DOTS if letter == " " else _FONT[letter].split()
-
-
-def _dots(line: str) -> int:
-    return sum(len(_glyph(letter)[0]) + 1 for letter in line) - 1
 
 
 def _lines(name: str, width_dots: float) -> list[str]:
     """The name on as many lines as the width has room for, the longest as short as can be; none if there is no room."""
     words = name.upper().split()
-    lacking = sorted(set(name.upper()) - set(_FONT) - {" "})
+    lacking = sorted(set(name.upper()) - set(FONT) - {" "})
     if lacking:
-        raise BadInput(f"no letter {lacking[0]!r} for the tab of {name!r}; expected {''.join(sorted(_FONT))}")
+        raise BadInput(f"no letter {lacking[0]!r} for the tab of {name!r}; expected {''.join(sorted(FONT))}")
     most = int((width_dots - 2 * MARGIN_DOTS + 1 + 1e-9) // (LINE_DOTS + 1))
-    choices = [_broken(words, limit) for limit in sorted({_dots(" ".join(words[a:b])) for a, b in _spans(len(words))})]
+    choices = [_broken(words, limit) for limit in sorted({dots(" ".join(words[a:b])) for a, b in _spans(len(words))})]
     return next((lines for lines in choices if lines and len(lines) <= most), [])
 
 
@@ -134,9 +102,9 @@ def _broken(words: Sequence[str], limit: int) -> list[str]:
     """Words on lines of at most ``limit`` dots; none where a word is longer."""
     lines: list[str] = []
     for word in words:
-        if lines and _dots(f"{lines[-1]} {word}") <= limit:
+        if lines and dots(f"{lines[-1]} {word}") <= limit:
             lines[-1] += f" {word}"
-        elif _dots(word) <= limit:
+        elif dots(word) <= limit:
             lines.append(word)
         else:
             return []

@@ -14,7 +14,6 @@ from sensorgen.analysis.characterise.catalogue import (
     Coupon,
     Meters,
     Target,
-    Unknown,
     catalogue,
     targets,
     unknowns,
@@ -30,6 +29,7 @@ from sensorgen.design.design import Design
 from sensorgen.design.materials import own
 from sensorgen.export import machine
 from sensorgen.export.slicers.loads import load, recipe
+from sensorgen.prediction.inference import Parameter
 from sensorgen.workflows.build import json_bytes, profiles, versions
 from sensorgen.workflows.characterise import form as forms
 from sensorgen.workflows.characterise import plate as plates
@@ -81,7 +81,7 @@ class Study:
         return cls(plates.carrier(conductor, dielectric, printer, quality, tools or {}, folder), conductor, dielectric)
 
     @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
+    def unknowns(self) -> tuple[Parameter, ...]:
         """With what the materials' sources say."""
         return unknowns(*self._pair(), self.design.machine.line_mm())
 
@@ -350,17 +350,11 @@ class Characterised:
             f"coupons of {self.conductor} and {self.dielectric}: {self.readings} readings of {self.coupons} coupons; "
             f"95 % intervals; sensorgen {__version__}"
         )
-        lines = [f"about: {json.dumps(about)}", "materials:"]
-        for material in (self.conductor, self.dielectric):
-            known = [row for row in self.rows if row.material == material and row.determined()]
-            lines += [f"  {material}:{'' if known else ' {}'}"]
-            lines += [
-                f"    {r.quantity}: {{value: {r.value:.6g}, low: {r.low:.6g}, high: {r.high:.6g}, note: "
-                f"{json.dumps(r.title)}}}"
-                for r in known
-            ]
-        lines += [f"# {finding}" for finding in self.findings]
-        return "\n".join(lines) + "\n"
+        known = [(r.material, own.SourceValue(r.quantity, r.value, r.low, r.high, r.title)) for r in self.rows
+                 if r.determined()]  # fmt: skip
+        names = (self.conductor, self.dielectric)
+        materials = {name: [value for of, value in known if of == name] for name in names}
+        return own.written(about, materials, self.findings)
 
 
 def read(path: Path, source: str = "", *, keep: bool = True, force: bool = False) -> Characterised:

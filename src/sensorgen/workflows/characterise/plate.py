@@ -3,7 +3,6 @@
 The lines of bars and ladders run along x of the bed, without walls, in every layer; bars at an angle are turned.
 """
 
-import html
 from collections.abc import Iterator, Mapping, Sequence
 from math import cos, pi, radians, sin, sqrt
 from pathlib import Path
@@ -32,9 +31,11 @@ from sensorgen.export import threemf
 from sensorgen.export.slicers import prusa
 from sensorgen.export.slicers.loads import loads
 from sensorgen.export.threemf.part import part_of
+from sensorgen.scene.drawing import paper
 from sensorgen.scene.geometry import meshes
 from sensorgen.scene.scene import Body, Prism, box
-from sensorgen.workflows.batch.layout import Plate, Rect, packed, room
+from sensorgen.workflows.batch.layout import Plate, packed, room
+from sensorgen.workflows.batch.picture import bed_of, bed_svg, middle
 
 if TYPE_CHECKING:
     from shapely import Polygon
@@ -53,6 +54,7 @@ _NOTES = (
     "small numbers: films and pads as in the form",
 )
 _OTHER_COLOUR = "#f2c14e"  # of the dielectric where both materials have the same
+_OUTLINE = {"fill_opacity": ".55", "stroke": "#222", "stroke_width": ".15"}
 _TAB_MM = (2.0, 4.0)  # of a bar for a voltage probe
 _CORNERS = 96
 
@@ -208,64 +210,40 @@ def threemfs(
         yield f"{name}.{family}.3mf", content
 
 
-def _marks(coupon: Coupon, pieces: Sequence[Body], shift: tuple[float, float]) -> list[str]:
+def _marks(coupon: Coupon, pieces: Sequence[Body], shift: tuple[float, float]) -> Iterator[str]:
     """Where terminals of a ladder are to be made, and the numbers of films and pads."""
     if coupon.kind == "ladder":
-        starts = [sum(LADDER_MM[:k]) + STRIP_MM * k for k in range(len(LADDER_MM) + 1)]
         high = coupon.drawn("width_mm")
-        return [
-            f'<rect x="{u + shift[0]:.4g}" y="{shift[1] - high:.4g}" width="{STRIP_MM}" height="{high:g}" '
-            'fill="none" stroke="#b00" stroke-dasharray="1 .5"/>'
-            for u in starts
-        ]
-    if coupon.kind not in ("plate", "pads"):
-        return []
-    middles = [[sum(piece.span(axis)) / 2 for axis in "xy"] for piece in pieces[-1].pieces]
-    return [
-        f'<text x="{u + shift[0]:.4g}" y="{shift[1] - v + 4:.4g}" font-size="3" text-anchor="middle">{k}</text>'
-        for k, (u, v) in enumerate(middles, 1)
-    ]
+        dashed = {"fill": "none", "stroke": "#b00", "stroke_dasharray": "1 .5"}
+        for k in range(len(LADDER_MM) + 1):
+            start = sum(LADDER_MM[:k]) + STRIP_MM * k
+            yield paper.box("", start + shift[0], shift[1] - high, STRIP_MM, high, **dashed)
+    elif coupon.kind in ("plate", "pads"):
+        for k, piece in enumerate(pieces[-1].pieces, 1):
+            u, v = (sum(piece.span(axis)) / 2 for axis in "xy")
+            yield middle(u + shift[0], shift[1] - v + 3, 3.0, str(k), "halo")
 
 
 def picture(
     name: str, coupons: Sequence[Coupon], design: Design, plate: Plate, names: tuple[str, str]
 ) -> str:  # fmt: skip
     """The plate from above with every coupon's outlines and name, as SVG in millimetres."""
-    (x, y), (wide, deep) = design.machine.bed_centre_mm(), design.machine.bed_mm
-    bed = Rect(x - wide / 2, y - deep / 2, x + wide / 2, y + deep / 2)
-    colour = {material: design.material(material).colour for material in names}
-    if len(set(colour.values())) < len(names):
-        colour[names[1]] = _OTHER_COLOUR
-    shown, legend = [], []
+    bed, fills = bed_of(design.machine), {material: design.material(material).colour for material in names}
+    if len(set(fills.values())) < len(names):
+        fills[names[1]] = _OTHER_COLOUR
+    shapes, listed = [], []
     for order, (number, place) in enumerate(sorted(plate.items()), 1):
-        own = number < len(coupons)
-        pieces = bodies(coupons[number], *names) if own else lines_bodies(design, *names)
+        coupon = coupons[number] if number < len(coupons) else None
+        pieces = bodies(coupon, *names) if coupon else lines_bodies(design, *names)
         spans = [[p.span(axis) for body in pieces for p in body.pieces] for axis in "xy"]
-        middle = [(min(a for a, _ in span) + max(b for _, b in span)) / 2 for span in spans]
-        shift = place.centre_mm[0] - middle[0] - bed.x0, bed.y1 - place.centre_mm[1] + middle[1]
-        outlines = [(piece.cut("z", piece.span("z")[0])[0], body.material) for body in pieces for piece in body.pieces]
-        for outline, material in outlines:
-            points = " ".join(f"{u + shift[0]:.4g},{shift[1] - v:.4g}" for u, v in outline)
-            shown.append(f'<polygon points="{points}" fill="{colour[material]}" fill-opacity=".55"/>')
-        shown += _marks(coupons[number], pieces, shift) if own else []
-        x_label, y_label = place.centre_mm[0] - bed.x0, bed.y1 - place.centre_mm[1] + 1.6
-        shown.append(f'<text x="{x_label:.4g}" y="{y_label:.4g}" font-size="4.6" text-anchor="middle">{order}</text>')
-        column, row = divmod(order - 1, 4)
-        label = html.escape(coupons[number].name if own else "lines and shorts")
-        legend.append(f'<text x="{column * 60 + 2}" y="{deep + 6 + 6 * row:g}" font-size="4">{order}: {label}</text>')
-    shown += [
-        *legend,
-        *(f'<text x="2" y="{deep + 32 + 6 * k:g}" font-size="4">{note}</text>' for k, note in enumerate(_NOTES)),
-    ]
-    title = html.escape(f"{name}: {len(plate)} coupons on {design.machine.title}")
-    size = f'width="{wide + 8:g}mm" height="{deep + 60:g}mm"'
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-4 -12 {wide + 8:g} {deep + 60:g}" {size}>\n'
-        "<style>text { font-family: sans-serif; fill: #111; stroke: #fff; stroke-width: .8; paint-order: stroke } "
-        "polygon { stroke: #222; stroke-width: .15 }</style>\n"
-        f'<rect x="-4" y="-12" width="{wide + 8:g}" height="{deep + 60:g}" fill="#fff"/>\n'
-        f'<rect x="0" y="0" width="{wide:g}" height="{deep:g}" fill="none" stroke="#555" stroke-width=".3"/>\n'
-        f'<text x="0" y="-4" font-size="5">{title}: x to the right, y up; lines of bars run along x</text>\n'
-        + "\n".join(shown)
-        + "\n</svg>\n"
-    )
+        centre = [(min(a for a, _ in span) + max(b for _, b in span)) / 2 for span in spans]
+        x, y = place.centre_mm[0] - bed.x0, bed.y1 - place.centre_mm[1]
+        shift = x - centre[0], y + centre[1]
+        frame = paper.Frame(*shift, 0.0, 0.0, 1.0, 1.0)
+        for body in pieces:
+            path = "".join(frame.outline(piece.cut("z", piece.span("z")[0])[0]) for piece in body.pieces)
+            shapes.append(paper.element("path", d=path, fill=fills[body.material], **_OUTLINE))
+        shapes += [*(_marks(coupon, pieces, shift) if coupon else ()), middle(x, y, 4.6, str(order), "halo")]
+        listed.append(f"{order}: {coupon.name if coupon else 'lines and shorts'}")
+    heading = f"{name}: {len(plate)} coupons on {design.machine.title}"
+    return bed_svg(bed, heading, "x to the right, y up; lines of bars run along x", shapes, listed, _NOTES)

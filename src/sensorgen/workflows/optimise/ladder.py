@@ -19,10 +19,10 @@ from sensorgen.design.walls import rules as wall_rules
 from sensorgen.prediction import bodies
 from sensorgen.prediction.compression_law import at_a_few_pressures
 from sensorgen.prediction.identifiability.fisher import bounds, slopes
-from sensorgen.prediction.query import Query
+from sensorgen.prediction.print_files import NONE
+from sensorgen.prediction.query import DEFAULT, Query
 from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.prediction.sensor_model import build_sensor, piece, pressure_pa
-from sensorgen.prediction.slices import NONE
 from sensorgen.workflows.moves import short
 from sensorgen.workflows.optimise.target import NUMBERS
 from sensorgen.workflows.trial import Numbers, Trial, trial
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 AT_REST = frozenset({"gap_mm", "capacitance_pf", "top_electrode_ohm", "bottom_electrode_ohm"})
 COARSE = AT_REST | {"force_resolution_n", "position_resolution_mm", "sensitivity_per_kpa"}
 _PA_PER_KPA = 1e3
-_TRIAL = 3  # version of the stored trials
+_TRIAL = 4  # version of the stored trials
 
 
 @dataclass(frozen=True)
@@ -141,9 +141,24 @@ def everything(design: Design, query: Query, slicer: str) -> Trial:
 
     def work() -> object:
         found = trial(design, query, slicer=slicer or NONE, drawn=False)
+        if design.layout and found.status == "predicted":
+            found = replace(found, printed=_of_array(design, query, found.printed))
         return json.loads(_adapter().dump_json(found))
 
     return _adapter().validate_json(json.dumps(cache.answer(question, work)))
+
+
+def _of_array(design: Design, query: Query, numbers: Numbers) -> Numbers:
+    """Numbers of a crossing with the resolution of the array, guarded, and its wires."""
+    from sensorgen.prediction.array.model import array_model
+    from sensorgen.prediction.array.readout import ArrayReadout
+    from sensorgen.prediction.array.study import study
+
+    tones = ArrayReadout().frequency_hz if query.frequency_hz == DEFAULT.frequency_hz else query.frequency_hz
+    found = study(array_model(design), ArrayReadout(frequency_hz=tones, noise=query.noise))
+    sigma = found.sigma_kpa[found.model.here & found.determined]
+    resolution = float(np.median(sigma)) if sigma.size else float("inf")
+    return replace(numbers, pressure_resolution=resolution, wires=float(len(found.model.wires())))
 
 
 @once

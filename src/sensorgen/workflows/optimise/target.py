@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from sensorgen.checks import RULES
+from sensorgen.checks.rules import RULES
 from sensorgen.core import yamlfile
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import BadInput, UnknownName, within
@@ -46,6 +46,15 @@ class Number:
     of_path: bool = False
     like: str = ""
 
+    @property
+    def words(self) -> str:
+        """Name for people.
+
+        >>> NUMBERS["position_resolution_mm"].words, NUMBERS["exposure_mm"].words
+        ('position resolution', 'exposure')
+        """
+        return self.field.removesuffix("_mm").removesuffix("_s").replace("_", " ")
+
     def of(self, found: Numbers, path: Toolpath | None = None) -> Bounds | None:
         """Value with its range, in the unit of its name; None where unknown."""
         value = getattr(path, self.field, None) if self.of_path else getattr(found, self.field)
@@ -67,11 +76,13 @@ class Number:
 NUMBERS = {
     "force_resolution_n": Number("force_resolution", "N"),
     "position_resolution_mm": Number("position_resolution", "mm", M_PER_MM),
-    "force_calibrated_n": Number("force_calibrated", "N", like="force_resolution"),
-    "position_calibrated_mm": Number("position_calibrated", "mm", M_PER_MM, like="position_resolution"),
+    "force_calibrated_n": Number("force_calibrated", "N"),
+    "position_calibrated_mm": Number("position_calibrated", "mm", M_PER_MM),
     "force_typical_n": Number("force_typical", "N", like="force_resolution"),
     "position_typical_mm": Number("position_typical", "mm", M_PER_MM, like="position_resolution"),
     "sensitivity_per_kpa": Number("sensitivity", "1/kPa"),
+    "pressure_resolution_kpa": Number("pressure_resolution", "kPa"),
+    "wires": Number("wires", ""),
     "capacitance_pf": Number("capacitance", "pF", 1e-12),
     "gap_mm": Number("gap", "mm", M_PER_MM),
     "top_electrode_ohm": Number("top_electrode", "ohm"),
@@ -137,6 +148,9 @@ class Loading(Strict):
         default=None, description="Of the tip along the sensor; the design's own if not given [mm]."
     )
     noise: Annotated[float, Field(gt=0, lt=1)] = NOISE
+    frequency_hz: Annotated[tuple[float, ...], Field(min_length=1, strict=False)] | None = Field(
+        default=None, description="Of a reading; those of predict if not given, 10 kHz of an array [Hz]."
+    )
     pressures_kpa: Annotated[tuple[float, ...], Field(min_length=2, max_length=2, strict=False)] | None = Field(
         default=None, description="Of the sensitivity; from rest to the load if not given [kPa]."
     )
@@ -195,7 +209,7 @@ class Target(Strict):
         load = self.load
         at = None if load.position_mm is None else load.position_mm * M_PER_MM
         pressures = None if load.pressures_kpa is None else (load.pressures_kpa[0], load.pressures_kpa[1])
-        return Query(DEFAULT.frequency_hz, load.force_n, at, noise=load.noise, range_kpa=pressures)
+        return Query(load.frequency_hz or DEFAULT.frequency_hz, load.force_n, at, noise=load.noise, range_kpa=pressures)
 
     def badness(self, key: str, value: Interval) -> Interval:
         """An objective's interval, the lower the better."""

@@ -1,4 +1,3 @@
-"use strict";
 // Orthographic view of closed shells: WebGL 2, or triangles sorted by depth on a plain canvas.
 
 const VERTEX = `#version 300 es

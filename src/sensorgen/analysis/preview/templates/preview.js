@@ -1,10 +1,5 @@
-const $ = name => document.getElementById(name), root = document.documentElement;
-const each = (words, what) => document.querySelectorAll(words).forEach(what);
-
-async function unpacked() {
-  const bytes = Uint8Array.from(atob($("data").textContent), c => c.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-  const block = await new Response(stream).arrayBuffer(), length = new DataView(block).getUint32(0, true);
+async function content() {
+  const block = await unpacked("data").arrayBuffer(), length = new DataView(block).getUint32(0, true);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(block, 4, length)));
   let at = 4 + length;
   function summed(count, step) { // differences to values
@@ -30,7 +25,7 @@ function rgb(name) {
 
 function model(data) {
   const canvas = $("model"), size = data.size, view = { turn: 0, tilt: 0, scale: 1, centre: [0, 0, 0], pixels: 1 };
-  let paint = solidPainter(canvas), asked = false, last = "detail";
+  let paint = solidPainter(canvas), asked = false, last = "detail", spot = null;
   if (!paint) {
     paint = flatPainter(canvas);
     $("flat").hidden = false;
@@ -55,6 +50,23 @@ function model(data) {
     const deep = 2 * Math.hypot(size[0], size[1], size[2] * (1 + 3 * colours.length)) + 1;
     const ink = rgb("--ink")[0] > 0.5 ? rgb("--ground") : rgb("--ink");
     paint(shells, view, plane(), colours, rgb("--band"), ink, deep);
+    $("spot").hidden = !spot;
+    if (!spot) return;
+    const [right, up] = axes(view), off = spot.map((v, k) => v - view.centre[k]);
+    $("spot").style.left = `${canvas.clientWidth / 2 + dot(right, off) * view.scale / view.pixels}px`;
+    $("spot").style.top = `${canvas.clientHeight / 2 - dot(up, off) * view.scale / view.pixels}px`;
+  }
+  // A place with a circle around it, the bodies cut there
+  function mark(place) {
+    spot = place;
+    $("axis").value = "1";
+    $("cut").value = place[1] / size[1] * 1000;
+    $("lift").value = 0;
+    [view.turn, view.tilt] = VIEWS.detail;
+    view.centre = place;
+    view.scale = fitting(view, [0, 0, 0], size.map(side => Math.min(side, 5 * size[2])), canvas.width, canvas.height);
+    last = "";
+    ask();
   }
   function ask() {
     if (!asked) requestAnimationFrame(draw);
@@ -126,80 +138,7 @@ function model(data) {
     else view.scale *= grown;
     draw();
   }).observe(canvas);
-  return ask;
-}
-
-function plan(data) {
-  const svg = $("plan"), slider = $("layer"), [length, width] = data.size;
-  const node = (kind, has, title, inside) => {
-    const made = document.createElementNS("http://www.w3.org/2000/svg", kind);
-    for (const [name, value] of Object.entries(has)) made.setAttribute(name, value);
-    if (title) made.append(node("title", {}, "", title));
-    if (inside) made.textContent = inside;
-    return made;
-  };
-  const bodies = [...document.querySelectorAll(".key span")].map(span => span.textContent);
-  let box = [0, 0, 1, 1];
-  function look(to) {
-    box = to;
-    svg.setAttribute("viewBox", box.join(" "));
-  }
-  function aspect() { return svg.clientWidth / Math.max(svg.clientHeight, 1); }
-  function start(x) {
-    const tall = 1.12 * width, wide = Math.min(tall * aspect(), 1.04 * length);
-    look([Math.min(Math.max((x || 0) - wide / 2, -0.02 * wide), Math.max(1.02 * length - wide, -0.02 * wide)),
-      -0.06 * width, wide, tall]);
-  }
-  function layer(k, group) {
-    const made = node("g", group ? { class: group } : {});
-    for (const [body, d] of Object.entries(data.layers[k].paths)) made.append(node("path", { class: `b${body}`, d }, bodies[body]));
-    return made;
-  }
-  function show(k) {
-    const at = data.layers[k];
-    if (!at) return;
-    slider.value = k;
-    svg.replaceChildren(...(k ? [layer(k - 1, "below")] : []), layer(k, ""),
-      ...at.marks.map(([x, y, words]) => node("circle", { cx: x, cy: width - y, r: width / 16 }, words)));
-    $("layer-at").textContent = `${k + 1} of ${data.layers.length}: ${at.z[0]} to ${at.z[1]} mm`;
-    slider.setAttribute("aria-valuetext", $("layer-at").textContent);
-  }
-  function zoom(f) {
-    const [x, y, w, h] = box, c = [x + w / 2, y + h / 2];
-    if (w * f < 0.05 * width || w * f > 4 * length) return;
-    look([c[0] - w * f / 2, c[1] - h * f / 2, w * f, h * f]);
-  }
-  slider.addEventListener("input", () => show(Number(slider.value)));
-  each("[data-plan]", b => b.addEventListener("click", () => {
-    if (b.dataset.plan === "whole") look([-0.02 * length, -0.06 * width, 1.04 * length, 1.12 * width]);
-    else zoom(b.dataset.plan === "in" ? 0.6 : 1 / 0.6);
-  }));
-  each("[data-layer]", b => b.addEventListener("click", () => {
-    show(Number(b.dataset.layer));
-    start(Number(b.dataset.x));
-    svg.scrollIntoView({ block: "center" });
-    slider.focus({ preventScroll: true });
-  }));
-  svg.addEventListener("keydown", e => {
-    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[e.key];
-    if (step) look([box[0] + step[0] * box[2] / 10, box[1] + step[1] * box[3] / 10, box[2], box[3]]);
-    else if (e.key === "+" || e.key === "=") zoom(0.8);
-    else if (e.key === "-") zoom(1.25);
-    else if (e.key === "Home") start(0);
-    else return;
-    e.preventDefault();
-  });
-  let held = null;
-  svg.addEventListener("pointerdown", e => { held = [e.clientX, e.clientY]; svg.setPointerCapture(e.pointerId); });
-  for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => { held = null; });
-  svg.addEventListener("pointermove", e => {
-    if (!held) return;
-    const per = svg.getScreenCTM().a;
-    look([box[0] - (e.clientX - held[0]) / per, box[1] - (e.clientY - held[1]) / per, box[2], box[3]]);
-    held = [e.clientX, e.clientY];
-  });
-  show(data.first);
-  start(data.layers[data.first]?.marks[0]?.[0] || 0);
+  return { ask, mark };
 }
 
 function theme(redraw) {
@@ -211,12 +150,36 @@ function theme(redraw) {
     button.textContent = `Theme: ${next}`;
     redraw();
   });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+  dark.addEventListener("change", redraw);
   for (const when of ["beforeprint", "afterprint"]) addEventListener(when, redraw);
 }
 
-unpacked().then(data => {
-  theme(model(data));
-  plan(data);
-  root.dataset.drawn = "yes";
+// A finding in its three views: the model, the section with the drawing, and the layers.
+function views(data, go, model) {
+  marked(data, (number, to) => {
+    const [, x, y, z, words, balloon] = data.findings[number], place = [x, y, z];
+    go(number, to);
+    model.mark(place);
+    each(".section", svg => {
+      const { across, end, top } = svg.dataset, spot = svg.querySelector(".spot"), along = place[across];
+      spot.toggleAttribute("hidden", along > end);
+      spot.setAttribute("cx", along);
+      spot.setAttribute("cy", top - z);
+      spot.firstElementChild.textContent = words;
+    });
+    $("sheet").shadowRoot.querySelectorAll(".marker, .entry").forEach(marker =>
+      marker.classList.toggle("now", marker.dataset.number === String(balloon)));
+    if (to === "model") $("model").scrollIntoView({ block: "center" });
+    if (to === "sheet") {
+      $("sheet").parentNode.open = true;
+      $("sheet").scrollIntoView({ block: "center" });
+    }
+  });
+}
+
+content().then(data => {
+  const solid = model(data);
+  theme(solid.ask);
+  views(data, plan(data), solid);
+  drawn();
 });

@@ -1,0 +1,88 @@
+"""``sensorgen calibrate`` and ``invert`` of arrays: sessions with references, and readings by a calibration."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sensorgen.cli import render
+from sensorgen.core.errors import BadInput
+
+SUFFIXES = (".csv", ".npz", ".h5", ".hdf5", ".hdf")
+
+
+@dataclass(frozen=True)
+class ArrayCalibration:
+    """Calibration of an array.
+
+    Attributes
+    ----------
+    array : DESIGN.yaml
+        Of an array's frames: its design, so that C/C0 is calibrated.
+    calibration : FILE.npz
+        Of an array: write the calibration there.
+    by_first
+        Of an array: test each session by a calibration of the first alone.
+    """
+
+    array: Path | None = None
+    calibration: Path | None = None
+    by_first: bool = False
+
+
+def are_files(words: Sequence[str]) -> bool:
+    """Test whether words are recordings, not specimens; BadInput of both."""
+    count = sum(Path(word).suffix in SUFFIXES for word in words)
+    if 0 < count < len(words):
+        raise BadInput(f"{count} recordings beside {len(words) - count} specimens; expected files of one array alone")
+    return count > 0
+
+
+def calibrate(files: Sequence[str], how: ArrayCalibration) -> int:
+    """Calibrate the elements of an array by sessions."""
+    from sensorgen.core import files as store
+    from sensorgen.measure.array_sessions import of_frames, session
+    from sensorgen.prediction.array.sessions import study
+
+    if how.array is None:
+        sessions = [session(Path(file), k) for k, file in enumerate(files)]
+    else:
+        from sensorgen.design.design import load
+        from sensorgen.prediction.array.model import array_model
+
+        sessions = of_frames([Path(file) for file in files], array_model(load(how.array)))
+    studied = study(sessions, by_first=how.by_first)
+    if how.calibration is not None:
+        store.replace(how.calibration, studied.calibration.npz())
+    render.deliver(studied)
+    if how.calibration is not None:
+        render.say(how.calibration, err=bool(render.form()))
+    return 0
+
+
+def invert(calibration: str, measured: str, output: str) -> int:
+    """Pressures of an array's elements by a calibration alone, a row for each frame, with half-widths of 90 %."""
+    import numpy as np
+
+    from sensorgen.core import files
+    from sensorgen.core.document import Column, Table, comma_separated
+    from sensorgen.measure.array_sessions import session
+    from sensorgen.prediction.array.sessions import stored
+
+    known, of = stored(Path(calibration)), session(Path(measured), 0)
+    if of.reading.shape[1] != len(known.law.alive):
+        raise BadInput(f"{measured}: {of.reading.shape[1]} elements; expected {len(known.law.alive)}, as calibrated")
+    free = of.unloaded if of.rest.any() else known.recognised(of)
+    tare = np.nanmean(of.reading[free], 0)
+    mean, half = known.pressures(of, tare)
+    names = [f"{part}_{k + 1}_kpa" for k in range(mean.shape[1]) for part in ("p", "half")]
+    both = np.stack([mean, half], -1).reshape(len(mean), -1)
+    cells = [[None if v != v else v for v in row] for row in np.column_stack([of.time_s, both]).tolist()]
+    columns = tuple(Column(name, key=name) for name in ("time_s", *names))
+    text = comma_separated(Table("pressures", "", columns, tuple(map(tuple, cells))))
+    if output in ("", "-"):
+        print(text, end="")
+        return 0
+    files.replace(Path(output), text.encode())
+    first = of.time_s[free.argmax()]
+    render.say(f"{output}: {len(mean)} frames, unloaded from {first:g} s, {int(known.law.alive.sum())} elements")
+    return 0

@@ -1,0 +1,160 @@
+"""Sessions that calibrate an array: readings of its elements, and references by bladder, press or force plate.
+
+CSV: ``time_s``, a column for each element, and what is known of the load: ``pressure_kpa`` of all elements (a bladder);
+``element`` with ``force_n`` or ``pressure_kpa`` of a press on it alone; else ``force_n`` of all (a person on a plate).
+``rest`` is 1 without load, ``day`` counts days. NPZ and HDF5: ``reading`` (frames, elements), or of an array with a
+design its frames, and the same names; ``element`` by number from 1, ``area_mm2`` of one.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from sensorgen.core.arrays import Real
+from sensorgen.core.errors import BadInput, within
+from sensorgen.core.files import reading
+from sensorgen.measure.array_frames import BINARY, REFERENCES, column, marked, numbers, read, table
+from sensorgen.prediction.array.elements import Session
+from sensorgen.prediction.array.frames import at_rest, missing
+from sensorgen.prediction.array.model import ArrayModel
+from sensorgen.prediction.array.readout import ArrayReadout
+
+_OTHER = ("time_s", "rest", *REFERENCES)
+_WORDS: Mapping[str, Callable[[Sequence[str]], np.ndarray]] = {"rest": marked, "element": np.array}
+_AREA_MM2 = 100.0
+_MOST = 0.5  # of the presses on a track
+_N_PER_KPA_MM2 = 1e-3
+
+
+def session(
+    path: Path, number: int, *, area_mm2: float = _AREA_MM2, values: "Real | None" = None, names: Sequence[str] = ()
+) -> Session:  # fmt: skip
+    """A session of a file.
+
+    Parameters
+    ----------
+    path : Path
+        CSV, NPZ or HDF5.
+    number : int
+        Of the session: its day where the file has none.
+    area_mm2 : float
+        Of an element, where the file has none [mm2].
+    values : (k, n) array, optional
+        In place of the file's readings, as C/C0 - 1 of frames; ``names`` are those of its elements.
+
+    Raises
+    ------
+    BadInput
+        No readings, or a reference that does not fit them.
+    """
+    with reading(path), within(str(path)):
+        if path.suffix in BINARY:
+            data = numbers(path)[0]
+        else:
+            data, own = _of_csv(path)
+            names = names or own
+        if values is None:
+            if "reading" not in data:
+                raise BadInput("no readings; expected a column for each element, or 'reading' (frames, elements)")
+            values = np.asarray(data["reading"], float)
+        values = values.reshape(len(values), -1)
+        return _session(path.stem, data, values, names, (number, area_mm2))
+
+
+def of_frames(paths: Sequence[Path], model: ArrayModel) -> list[Session]:
+    """Sessions of frames of an array with a design: C/C0 - 1 of its crossings, by the network where that counts.
+
+    Raises
+    ------
+    BadInput
+        As :func:`session`; no frame at rest.
+    """
+    m, n = model.here.shape
+    names, found = [f"r{i + 1}c{j + 1}" for i, j in np.ndindex(m, n)], []
+    for k, path in enumerate(paths):
+        frames = read(path, (m, n), None)
+        inverter = at_rest(model, ArrayReadout(frequency_hz=(frames.frequency_hz,)), frames.siemens[frames.rest])
+        ratio, _, _ = inverter.planned(missing(frames.siemens))
+        ratio = np.where(inverter.alive, ratio, np.nan).reshape(len(ratio), -1)
+        found.append(session(path, k, area_mm2=model.pitch_area_m2 * 1e6, values=ratio - 1, names=names))
+        refuse_swapped(found[-1], (m, n))
+    return found
+
+
+def refuse_swapped(of: Session, shape: tuple[int, int]) -> None:
+    """Refuse presses that most of the time are read by another row, or column, than the pressed one.
+
+    Raises
+    ------
+    BadInput
+        Wires are swapped; they are named.
+    """
+    pressed = (np.isfinite(of.pressure_kpa).sum(1) == 1) & np.isfinite(of.reading).any(1)
+    if not pressed.any():
+        return
+    true, largest = (
+        np.stack(np.unravel_index(np.nan_to_num(each[pressed], nan=-np.inf).argmax(1), shape))
+        for each in (of.pressure_kpa, of.reading)
+    )
+    for letter, own, read_at in zip("rc", true, largest, strict=True):
+        for track in np.unique(own[own != read_at]).tolist():
+            at = read_at[own == track]
+            other = int(np.bincount(at).argmax())
+            if other != track and np.mean(at == other) > _MOST:
+                raise BadInput(
+                    f"{of.name}: presses on {letter}{track + 1} are read at {letter}{other + 1}: wires swapped; "
+                    "exchange them, or name the press right"
+                )
+
+
+def _session(
+    name: str, data: Mapping[str, np.ndarray], values: Real, names: Sequence[str], default: tuple[int, float]
+) -> Session:  # fmt: skip
+    count = len(values)
+
+    def each(key: str, otherwise: Real) -> Real:
+        found = np.asarray(data.get(key, otherwise))
+        if found.shape[:1] != (count,):
+            raise BadInput(f"{key} has {len(np.atleast_1d(found))} values; expected one for each of {count} frames")
+        return found
+
+    time_s = each("time_s", np.arange(float(count))).astype(float)
+    if not (np.diff(time_s) > 0).all():
+        raise BadInput("time_s does not rise from each frame to the next; expected seconds of one session")
+    area = float(np.ravel(data.get("area_mm2", default[1]))[0])
+    nothing = np.full(count, np.nan)
+    force, pressure = each("force_n", nothing).astype(float), each("pressure_kpa", nothing).astype(float)
+    if "element" in data:
+        of = _numbers_of(each("element", nothing), names, values.shape[1])
+        known = np.where(np.isfinite(force), force / (area * _N_PER_KPA_MM2), pressure)
+        free = np.where((of < 0) & (known == 0), 0.0, np.nan)  # a cover spreads a press: others are not known
+        pressure = np.where(np.arange(values.shape[1]) == of[:, None], known[:, None], free[:, None])
+        force = nothing
+    pressure = np.broadcast_to(pressure.reshape(count, -1), values.shape)
+    day = float(np.ravel(data.get("day", default[0]))[0])
+    return Session(
+        name, day, time_s, values, each("rest", np.zeros(count)).astype(bool), np.array(pressure), force, area
+    )
+
+
+def _numbers_of(words: np.ndarray, names: Sequence[str], count: int) -> np.ndarray:
+    """Number of the pressed element of each frame, from 0 on; -1 of none."""
+    known = {name: k for k, name in enumerate(names)} | {str(k + 1): k for k in range(count)} | {"": -1, "0": -1}
+    found = [f"{word:g}" if isinstance(word, float) else str(word).strip() for word in words.tolist()]
+    unknown = next((word for word in found if word not in known and word != "nan"), None)
+    if unknown is not None:
+        raise BadInput(f"element {unknown!r:.40}; expected a name of a column, or 1 to {count}")
+    return np.array([known.get(word, -1) for word in found])
+
+
+def _of_csv(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Columns of a table, and the names of its elements."""
+    words = table(path)
+    names = [name for name in words if name and name not in _OTHER]
+    if not names:
+        raise BadInput("no readings; expected a column for each element")
+    data: dict[str, np.ndarray] = {"reading": np.stack([column(words[name], path) for name in names], 1)}
+    for key in words.keys() & set(_OTHER):
+        data[key] = _WORDS[key](words[key]) if key in _WORDS else column(words[key], path)
+    return data, names

@@ -1,0 +1,338 @@
+r"""Calibration of an array's elements over sessions: pressure by reading, with one prior over the print.
+
+With x the reading of element e less that of its unloaded seconds (tare of the session), and z its exponentially
+weighted past:
+
+.. math:: p_e = e^{d t} (\theta_{e1} x + \theta_{e2} x^2 + \theta_{e3} x^3 + \theta_{e4} z), \quad
+          \theta_e \sim N(\mu, \Sigma)
+
+d is a slow drift of the gain, t the day. mu, Sigma and the noise follow by EM (empirical Bayes), so that elements with
+few data take the print's law. A total force is a sum over elements, and so linear in the same parameters. Presses of
+a line's specimen are nonlinear in a few parameters of one body (:mod:`sensorgen.prediction.calibration`); here some
+thousand parameters are linear, and exchangeable between elements.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sensorgen.core.arrays import Mask, Real
+from sensorgen.core.errors import BadInput
+
+TARE_S = 20.0  # unloaded seconds of a session that are its tare
+UNLOADED = 0.01  # of the largest reference: less is no load
+_SHAPES = 3  # powers of x
+_EM = 25
+_RATE, _GAIN = 0.005, 0.01  # standard deviation of drifts before any data [1/d], least of gains between sessions
+_ROUNDS = 2  # of laws and drift in turn
+_EFFECTIVE = 20.0  # at least, samples of a session
+_RESPONDS = 0.5  # share of the variance of a reference that a live element's reading explains
+_N_PER_KPA_MM2 = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """Recording of one session.
+
+    Attributes
+    ----------
+    name : str
+        For messages.
+    day : float
+        Since any day on [d].
+    time_s : (k,) array
+        Of each frame [s].
+    reading : (k, n) array
+        Of each element, in any unit; nan where one is missing or saturated.
+    rest : (k,) array of bool
+        Frames with nothing on the array, as marked.
+    pressure_kpa : (k, n) array
+        Reference of each element; nan where none is known [kPa].
+    force_n : (k,) array
+        Reference of the total force; nan where none is known [N].
+    area_mm2 : float
+        Of an element [mm2].
+    """
+
+    name: str
+    day: float
+    time_s: Real
+    reading: Real
+    rest: Mask
+    pressure_kpa: Real
+    force_n: Real
+    area_mm2: float = 100.0
+
+    @cached_property
+    def unloaded(self) -> Mask:
+        """First unloaded seconds: as marked, else where the reference is nothing.
+
+        Raises
+        ------
+        BadInput
+            Neither is known.
+        """
+        free = self.rest
+        if not free.any():
+            free = _nothing(self.force_n)
+        if not free.any():
+            known = np.isfinite(self.pressure_kpa).all(1)
+            free = known & _nothing(np.where(known, np.abs(np.nan_to_num(self.pressure_kpa)).max(1), np.nan))
+        if not free.any():
+            raise BadInput(
+                f"{self.name}: no unloaded second; expected 'rest' with 1 in some, or a reference of 0: a standing "
+                "load is never taken for rest"
+            )
+        first = self.time_s[free.argmax()]
+        return np.asarray(free & (self.time_s <= first + TARE_S))
+
+    @cached_property
+    def tare(self) -> Real:
+        """Mean unloaded reading of each element, (n,); nan of one without any."""
+        return _mean(self.reading[self.unloaded])
+
+    @cached_property
+    def weight(self) -> float:
+        """Share of the frames that are independent, by the correlation of one reference with the next [-]."""
+        known = self.force_n if np.isfinite(self.force_n).any() else _mean(self.pressure_kpa.T)
+        known = known[np.isfinite(known)]
+        if len(known) < 3 or not known.std():
+            return 1.0
+        off = known - known.mean()
+        rho = float(np.clip((off[1:] @ off[:-1]) / (off @ off), 0.0, 1.0))
+        return min(max((1 - rho) / (1 + rho), _EFFECTIVE / len(known)), 1.0)
+
+
+def _nothing(reference: Real) -> Mask:
+    """Frames of which the reference is known, and nothing; none where it is known nowhere."""
+    if not np.isfinite(reference).any():
+        return np.zeros(len(reference), bool)
+    size = np.abs(reference)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(size <= UNLOADED * np.nanmax(size), bool)
+
+
+def _mean(values: Real) -> Real:
+    """Mean of each column's finite values; nan of none."""
+    finite = np.isfinite(values)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.where(finite, values, 0.0).sum(0) / finite.sum(0))
+
+
+def lagged(x: Real, time_s: Real, tau_s: float, start: "Real | None" = None) -> Real:
+    """Exponentially weighted past of each column: dz/dt = (x - z) / tau, by steps over which x is even.
+
+    >>> z = lagged(np.ones((3, 1)), np.array([0.0, 1.0, 3.0]), 2.0)
+    >>> np.round(z[:, 0], 4).tolist()
+    [0.0, 0.3935, 0.7769]
+    """
+    found = np.empty_like(x)
+    z = np.zeros(x.shape[1]) if start is None else start
+    kept = -np.expm1(-np.diff(time_s, prepend=time_s[:1]) / tau_s)
+    for k, (row, share) in enumerate(zip(x, kept.tolist(), strict=True)):
+        z = z + share * (row - z)
+        found[k] = z
+    return found
+
+
+@dataclass(frozen=True)
+class Form:
+    """Form of the law.
+
+    Attributes
+    ----------
+    powers : int
+        Of the reading, 1 to 3.
+    tau_s : float
+        Time constant of the memory; 0 without one [s].
+    drift : bool
+        With a slow drift of the gain.
+    tared : bool
+        With a tare of each session; without one a constant takes its place.
+    """
+
+    powers: int = _SHAPES
+    tau_s: float = 0.0
+    drift: bool = False
+    tared: bool = True
+
+    def basis(self, x: Real, time_s: Real) -> Real:
+        """Terms of the law, (k, n, terms); 0 where a reading is missing."""
+        x = np.nan_to_num(x)
+        terms = [x**power for power in range(0 if not self.tared else 1, self.powers + 1)]
+        return np.stack([*terms, *([lagged(x, time_s, self.tau_s)] if self.tau_s else [])], -1)
+
+    def words(self) -> str:
+        """The form in words."""
+        parts = [f"{('', 'straight', 'square', 'cubic')[self.powers]}", *(["tare"] if self.tared else [])]
+        return ", ".join([*parts, *([f"state of {self.tau_s:g} s"] if self.tau_s else []),
+                          *(["gain drift"] if self.drift else [])])  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Sums of one session over its frames, for one form."""
+
+    day: float
+    gram: Real  # (n, q, q)
+    cross: Real  # (n, q)
+    square: Real  # (n,)
+    count: Real  # (n,)
+    rows: Real  # (r, n, q), of total forces [N]
+    force: Real  # (r,)
+
+    def total(self, at: Real) -> Real:
+        """Total forces by parameters, (r,) [N]."""
+        return np.asarray(np.einsum("rnq,nq->r", self.rows, at))
+
+
+def sums_of(session: Session, form: Form, scale: float) -> Sums:
+    """Sums of a session, its frames weighed as far as they are independent."""
+    phi = features(session, form, scale)
+    known = np.isfinite(session.pressure_kpa) & np.isfinite(session.reading)
+    w, y = session.weight, np.where(known, session.pressure_kpa, 0.0)
+    some = known[:, :, None] * phi
+    by_element = some.transpose(1, 2, 0)
+    gram, cross = w * by_element @ some.transpose(1, 0, 2), w * (by_element @ y.T[:, :, None])[:, :, 0]
+    total = np.flatnonzero(np.isfinite(session.force_n))
+    total = total[:: max(1, round(1 / w))]
+    rows = phi[total] * session.area_mm2 * _N_PER_KPA_MM2
+    return Sums(session.day, gram, cross, w * (y**2).sum(0), w * known.sum(0), rows, session.force_n[total])
+
+
+def features(session: Session, form: Form, scale: float, tare: "Real | None" = None) -> Real:
+    """Terms of the law of every frame and element, (k, n, terms)."""
+    zero = session.tare if tare is None else tare
+    x = session.reading - zero if form.tared else session.reading
+    return form.basis(x / scale, session.time_s)
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """Law of every element, by the sessions that it was learnt of.
+
+    Attributes
+    ----------
+    form : Form
+        Its form.
+    scale : float
+        Unit of the readings.
+    at, spread : (n, q), (n, q, q) array
+        Mean and covariance of each element's parameters.
+    day, drift, unsure : float
+        Middle of the sessions [d], rate of the gain, and standard error of that rate [1/d].
+    alive : (n,) array of bool
+        Elements that respond.
+    """
+
+    form: Form
+    scale: float
+    at: Real
+    spread: Real
+    day: float
+    drift: float
+    unsure: float
+    alive: Mask
+
+    def pressures(self, session: Session, tare: "Real | None" = None) -> tuple[Real, Real]:
+        """Pressures of a session and their standard errors by the parameters alone, (k, n); nan of no reading [kPa]."""
+        phi = features(session, self.form, self.scale, tare)
+        gain = np.exp(self.drift * (session.day - self.day))
+        mean = gain * np.einsum("knq,nq->kn", phi, self.at)
+        variance = gain**2 * np.einsum("knq,nqr,knr->kn", phi, self.spread, phi, optimize=True)
+        variance += (self.unsure * (session.day - self.day) * mean) ** 2
+        known = np.isfinite(session.reading) & self.alive
+        return np.where(known, mean, np.nan), np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan)
+
+
+def scale_of(sessions: Sequence[Session], form: Form) -> float:
+    """Median over elements of the span of their readings, so that the terms are near 1."""
+    spans = [_span(s.reading - s.tare if form.tared else s.reading) for s in sessions]
+    found = float(np.nanmedian(np.nanmax(spans, 0)))
+    return found if found > 0 else 1.0
+
+
+def _span(x: Real) -> Real:
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.nanmax(np.where(np.isfinite(x), np.abs(x), 0.0), 0))
+
+
+def responding(sums: Sequence[Sums]) -> Mask:
+    """Elements whose readings explain half of their reference or more; all of those without a reference."""
+    gram, cross, square, count = (sum(getattr(s, name) for s in sums) for name in ("gram", "cross", "square", "count"))
+    ridge = 1e-9 * np.einsum("nqq->n", gram)[:, None, None] * np.eye(gram.shape[1]) + 1e-12 * np.eye(gram.shape[1])
+    explained = np.einsum("nq,nq->n", cross, np.linalg.solve(gram + ridge, cross[:, :, None])[:, :, 0])
+    return np.asarray((count == 0) | (explained > _RESPONDS * square))
+
+
+def learnt(sums: Sequence[Sums], form: Form, scale: float, alive: Mask) -> Law:
+    """Law of every element by empirical Bayes: EM over the print's mean, covariance and noise; dead ones left out."""
+    day = float(np.mean([s.day for s in sums]))
+    days = np.array([s.day for s in sums]) - day
+    at, spread = _expected(sums, np.ones(len(days)), alive)
+    if not np.ptp(days):
+        return Law(form, scale, at, spread, day, 0.0, 0.0, alive)
+    rate, error = _drift(sums, days, at)
+    if not form.drift:
+        return Law(form, scale, at, spread, day, 0.0, float(np.hypot(rate, error)), alive)
+    for _ in range(_ROUNDS):
+        at, spread = _expected(sums, np.exp(rate * days), alive)
+        rate, error = _drift(sums, days, at)
+    return Law(form, scale, at, spread, day, rate, error, alive)
+
+
+def _drift(sums: Sequence[Sums], days: Real, at: Real) -> tuple[float, float]:
+    """Rate of ln of the gain by days, of the gains of each session, and its standard error [1/d]."""
+    size = np.array([np.einsum("nq,nqr,nr->", at, s.gram, at) + s.total(at) @ s.total(at) for s in sums])
+    along = np.array([np.einsum("nq,nq->", at, s.cross) + s.total(at) @ s.force for s in sums])
+    ln = np.log(np.maximum(along / np.maximum(size, 1e-30), 0.1))
+    off, away = ln - ln.mean(), days - days.mean()
+    scatter = max(float(off.std()), _GAIN)
+    information = float(away @ away) / scatter**2 + 1 / _RATE**2
+    return float(away @ off) / scatter**2 / information, float(information**-0.5)
+
+
+def _expected(sums: Sequence[Sums], gains: Real, alive: Mask) -> tuple[Real, Real]:
+    """Means and covariances of the parameters of each element."""
+    gram = sum(g**2 * s.gram for g, s in zip(gains, sums, strict=True))
+    cross = sum(g * s.cross for g, s in zip(gains, sums, strict=True))
+    square, count = (sum(getattr(s, name) for s in sums) for name in ("square", "count"))
+    rows = np.concatenate([g * s.rows for g, s in zip(gains, sums, strict=True)]) * alive[None, :, None]
+    force = np.concatenate([s.force for s in sums])
+    (n, q), use = cross.shape, alive & (count > 0)
+    gram, cross = gram * use[:, None, None], cross * use[:, None]
+    even = rows.sum(1)
+    start = np.linalg.lstsq(gram.sum(0) + even.T @ even, cross.sum(0) + even.T @ force, rcond=None)[0]
+    mean, prior = start, np.diag(start**2 + 1e-12) + 1e-9 * float(start @ start) * np.eye(q)
+    samples, total = float((count * use).sum()), len(force)
+    noise = max(float((square * use).sum()) / max(samples, 1.0), 1e-12) * 0.1
+    noise_n = max(float(force @ force) / max(total, 1), 1e-12) * 0.1
+    at, spread = np.tile(mean, (n, 1)), np.tile(prior, (n, 1, 1))
+    for _ in range(_EM):
+        inverse = np.linalg.inv(prior)
+        spread = np.linalg.inv(inverse + gram / noise)
+        at = np.einsum("nqr,nr->nq", spread, inverse @ mean + cross / noise)
+        if total:
+            at, spread, noise_n = _with_totals(at, spread, rows, force, noise_n)
+        off = at[alive] - mean
+        mean = at[alive].mean(0)
+        prior = (spread[alive] + off[:, :, None] * off[:, None, :]).mean(0) + 1e-12 * np.eye(q)
+        left = square - 2 * np.einsum("nq,nq->n", at, cross) + np.einsum("nq,nqr,nr->n", at, gram, at)
+        left = (left + np.einsum("nqr,nrq->n", gram, spread)) * use
+        noise = max(float(left.sum()) / max(samples, 1.0), 1e-12)
+    return at, spread
+
+
+def _with_totals(at: Real, spread: Real, rows: Real, force: Real, noise_n: float) -> tuple[Real, Real, float]:
+    """Parameters after total forces too: by the matrix of the forces, not of all parameters."""
+    by = np.einsum("nqr,tnr->tnq", spread, rows)
+    flat, gain = rows.reshape(len(rows), -1), by.reshape(len(rows), -1)
+    inverse = np.linalg.inv(flat @ gain.T + noise_n * np.eye(len(rows)))
+    left = force - flat @ at.ravel()
+    at = at + (gain.T @ (inverse @ left)).reshape(at.shape)
+    spread = spread - np.einsum("tnq,tu,unr->nqr", by, inverse, by, optimize=True)
+    left = force - flat @ at.ravel()
+    explained = float(np.trace(inverse @ (flat @ gain.T)))
+    return at, spread, max(float(left @ left) / max(len(rows) - explained, 1.0), 1e-12)

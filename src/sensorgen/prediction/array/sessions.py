@@ -1,0 +1,374 @@
+"""Calibration of an array over sessions: form by cross-validation, intervals that hold in a session to come.
+
+All constants, the form of the law and the width of the intervals among them, are chosen inside the sessions that train.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from io import BytesIO
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+
+from sensorgen.core.arrays import Mask, Real
+from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.errors import BadInput
+from sensorgen.core.files import reading
+from sensorgen.prediction.array.elements import (
+    TARE_S,
+    UNLOADED,
+    Form,
+    Law,
+    Session,
+    Sums,
+    learnt,
+    responding,
+    scale_of,
+    sums_of,
+)  # fmt: skip
+from sensorgen.prediction.inverse.verdict import NORMAL_90
+
+LEVEL = 0.9
+TAUS_S = (10.0, 30.0, 100.0, 300.0)
+_EARNED = 0.02  # share of the error by which a further term has to lower it
+_FRAMES = 4000  # of a session, at most, by which the interval is set
+_QUIET, _PATTERN = 4.0, 4.0  # standard deviations of noise, and of tares over sessions
+_ODD = 0.02  # share of the elements that may be beyond
+_WINDOW_S, _FEWEST = 1.0, 5  # of a second that is unloaded, and its frames at least
+_SHOWN = 12  # dead elements that are named
+_SURE = 3  # sessions of which tares are known, to recognise another
+
+
+@dataclass(frozen=True, eq=False)
+class ArrayCalibration:
+    """Calibration of the elements of one array.
+
+    Attributes
+    ----------
+    law : Law
+        Of every element.
+    floor_kpa, share : float
+        Error besides that of the parameters: constant [kPa], and relative to the pressure [-].
+    reach : float
+        Half-width of the interval of ``LEVEL`` in that error [-].
+    common : float
+        Relative error of a session's gain, of all elements at once: of the total force [-].
+    tares : (sessions, n) array
+        Of the sessions that trained.
+    quiet : (n,) array
+        Standard deviation of an unloaded reading.
+    """
+
+    law: Law
+    floor_kpa: float
+    share: float
+    reach: float
+    common: float
+    tares: Real
+    quiet: Real
+
+    def pressures(self, session: Session, tare: "Real | None" = None) -> tuple[Real, Real]:
+        """Pressures, and half-widths of their intervals, (k, n); nan of dead elements and missing readings [kPa]."""
+        mean, by_law = self.law.pressures(session, tare)
+        return mean, self.reach * np.sqrt(by_law**2 + self.floor_kpa**2 + (self.share * mean) ** 2)
+
+    def of_ratio(self, ratio: Real, time_s: Real, day: float) -> tuple[Real, Real]:
+        """Pressures and half-widths by capacitance over that at rest of each crossing, (k, n) [kPa]."""
+        if ratio.shape[1] != len(self.law.alive):
+            raise BadInput(
+                f"a calibration of {len(self.law.alive)} elements; expected {ratio.shape[1]}, as of the array"
+            )
+        nothing = np.full(len(ratio), np.nan)
+        session = Session("", day, time_s, ratio - 1, np.zeros(len(ratio), bool), nothing[:, None], nothing)
+        return self.pressures(session, np.zeros(ratio.shape[1]))
+
+    def recognised(self, session: Session) -> Mask:
+        """Frames of the first unloaded second, by the readings alone.
+
+        A second is unloaded where no element moves by more than noise, and all readings differ from the tares of the
+        sessions that trained by what those differ by among each other, one part for all elements and one of each.
+
+        Raises
+        ------
+        BadInput
+            No such second, or fewer than three sessions: a standing load is never taken for rest.
+        """
+        alive, expected = self.law.alive, "mark unloaded frames in 'rest'; a standing load is never taken for rest"
+        if len(self.tares) < _SURE:
+            raise BadInput(
+                f"{session.name}: tares of {len(self.tares)} sessions are known, {_SURE} recognise; {expected}"
+            )
+        middle, shift, own = _spread_of_tares(self.tares[:, alive])
+        second = max(_FEWEST, int(np.searchsorted(session.time_s - session.time_s[0], _WINDOW_S)))
+        for at in range(0, len(session.time_s) - second + 1, second):
+            values = session.reading[at : at + second][:, alive]
+            off = values.mean(0) - middle
+            common = float(np.nanmedian(off))
+            still = values.std(0, ddof=1) < _QUIET * self.quiet[alive]
+            near = np.abs(off - common) < _PATTERN * np.hypot(own, self.quiet[alive])
+            if abs(common) < _PATTERN * shift and min(still.mean(), near.mean()) > 1 - _ODD:
+                return np.asarray(np.arange(len(session.time_s)) // second == at // second)
+        raise BadInput(f"{session.name}: no unloaded second is recognised; {expected}")
+
+    def npz(self) -> bytes:
+        """The calibration as NPZ."""
+        target, law = BytesIO(), self.law
+        form = (law.form.powers, law.form.tau_s, law.form.drift, law.form.tared)
+        error = (self.floor_kpa, self.share, self.reach, self.common)
+        np.savez_compressed(
+            target, form=np.array(form, float), scale=law.scale, at=law.at, spread=law.spread, alive=law.alive,
+            numbers=np.array([law.day, law.drift, law.unsure, *error]), tares=self.tares,
+            quiet=self.quiet,
+        )  # fmt: skip
+        return target.getvalue()
+
+
+def stored(path: Path) -> ArrayCalibration:
+    """Calibration of a file that ``sensorgen calibrate`` wrote.
+
+    Raises
+    ------
+    BadInput
+        It is none.
+    """
+    try:
+        with reading(path), np.load(path, allow_pickle=False) as data:
+            powers, tau_s, drift, tared = data["form"].tolist()
+            day, rate, unsure, floor, share, reach, common = data["numbers"].tolist()
+            law = Law(
+                Form(int(powers), tau_s, bool(drift), bool(tared)), float(data["scale"]), data["at"], data["spread"],
+                day, rate, unsure, data["alive"],
+            )  # fmt: skip
+            return ArrayCalibration(law, floor, share, reach, common, data["tares"], data["quiet"])
+    except (KeyError, TypeError, ValueError, EOFError):
+        raise BadInput(f"{path}: no calibration of an array; expected a file of 'sensorgen calibrate -o'") from None
+
+
+def _spread_of_tares(tares: Real) -> tuple[Real, float, Real]:
+    """Mean of each element's tares, and standard deviations of their common part and of each own."""
+    middle = tares.mean(0)
+    common = np.median(tares - middle, 1)
+    own = (tares - middle - common[:, None]).std(0, ddof=1)
+    return middle, float(common.std(ddof=1)), np.hypot(own, np.median(own)) / np.sqrt(2)
+
+
+def training(sessions: Sequence[Session], held_out: int) -> list[Session]:
+    """All sessions but one."""
+    return [session for k, session in enumerate(sessions) if k != held_out]
+
+
+def law_of(sessions: Sequence[Session], form: Form) -> Law:
+    """Law of every element by sessions, of a given form."""
+    scale = scale_of(sessions, form)
+    return _law([sums_of(session, form, scale) for session in sessions], form, scale)
+
+
+def _law(sums: Sequence[Sums], form: Form, scale: float) -> Law:
+    alive = responding(sums)
+    if not alive.any():
+        raise BadInput("no element's reading follows its reference; expected half of its variance or more of one")
+    return learnt(sums, form, scale, alive)
+
+
+def chosen(sessions: Sequence[Session]) -> Form:
+    """Form of the law that leaves the least error in sessions left out; a further term has to lower it by 2 %.
+
+    Powers first, then one memory state, then a drift of the gain; of one session a cubic.
+    """
+    best, error = Form(), _left_out(sessions, Form())
+    if len(sessions) < 2:
+        return best
+    for options in (
+        [replace(best, powers=power) for power in (1, 2)],
+        [replace(best, tau_s=tau) for tau in TAUS_S], [replace(best, drift=True)],
+    ):  # fmt: skip
+        base, errors = best, [(_left_out(sessions, _joined(best, option)), option) for option in options]
+        least, option = min(errors, key=lambda pair: pair[0])
+        candidate = _joined(base, option)
+        gain = _EARNED if candidate.powers == base.powers else -_EARNED  # fewer powers are the simpler law
+        if least < error * (1 - gain):
+            best, error = candidate, least
+    return best
+
+
+def _joined(base: Form, option: Form) -> Form:
+    """The base with what an option has beyond the usual form."""
+    return replace(
+        base, powers=min(base.powers, option.powers), tau_s=option.tau_s or base.tau_s, drift=option.drift or base.drift
+    )
+
+
+def _left_out(sessions: Sequence[Session], form: Form) -> float:
+    """Mean over sessions of the median error of an element in a session left out [kPa]; by totals where alone [N]."""
+    if len(sessions) < 2:
+        return float("inf")
+    scale = scale_of(sessions, form)
+    sums = [sums_of(session, form, scale) for session in sessions]
+    found = []
+    for k, own in enumerate(sums):
+        law = _law(sums[:k] + sums[k + 1 :], form, scale)
+        found.append(_error(own, law))
+    return float(np.mean(found))
+
+
+def _error(own: Sums, law: Law) -> float:
+    at = np.exp(law.drift * (own.day - law.day)) * law.at
+    if own.count.any():
+        left = own.square - 2 * np.einsum("nq,nq->n", at, own.cross) + np.einsum("nq,nqr,nr->n", at, own.gram, at)
+        use = law.alive & (own.count > 0)
+        return float(np.median(np.sqrt(np.maximum(left[use], 0.0) / own.count[use])))
+    return float(np.sqrt(np.mean((own.force - own.total(at * law.alive[:, None])) ** 2)))
+
+
+def calibrated(sessions: Sequence[Session], form: "Form | None" = None) -> ArrayCalibration:
+    """Calibration by sessions, its form chosen among them if none is given.
+
+    The intervals' width is set by errors in each of them left out in turn; of one session by its own residuals.
+    """
+    form = form or chosen(sessions)
+    tares = np.stack([session.tare for session in sessions])
+    quiet = np.median([np.nan_to_num(session.reading[session.unloaded]).std(0) for session in sessions], 0)
+    law = law_of(sessions, form)
+    several = len(sessions) > 1
+    errors = [
+        _residuals(session, law_of(training(sessions, k), form) if several else law)
+        for k, session in enumerate(sessions)
+    ]
+    gains = [float(off @ mean) / (float(mean @ mean) or 1.0) for off, mean, _ in errors]
+    common = float(np.sqrt(np.mean(np.square(gains))))
+    off, mean, sigma = (np.concatenate(each) for each in zip(*errors, strict=True))
+    if not off.size:  # total forces alone: the parameters' covariance is what is known
+        return ArrayCalibration(law, 0.0, 0.0, NORMAL_90, common, tares, quiet)
+    floor, share = _scale(np.maximum(off**2 - sigma**2, 0.1 * off**2), mean)
+    reach = float(np.quantile(np.abs(off) / np.sqrt(sigma**2 + floor**2 + (share * mean) ** 2), LEVEL))
+    reach *= float(np.sqrt(1 + 1 / len(sessions)))  # one more session, by a scatter that so few tell
+    return ArrayCalibration(law, floor, share, reach, common, tares, quiet)
+
+
+def _residuals(session: Session, law: Law) -> tuple[Real, Real, Real]:
+    """Errors, pressures and standard errors by the parameters, of loaded frames evenly taken [kPa]."""
+    mean, sigma = law.pressures(session)
+    size = np.abs(session.pressure_kpa)
+    with np.errstate(invalid="ignore"):
+        known = (size > UNLOADED * np.nanmax(size, initial=0.0)) & np.isfinite(mean)
+    step = max(1, len(mean) // _FRAMES)
+    off = np.where(known, mean - session.pressure_kpa, 0.0)[::step][known[::step]]
+    return off, mean[::step][known[::step]], sigma[::step][known[::step]]
+
+
+def _scale(squares: Real, mean: Real) -> tuple[float, float]:
+    """Constant and relative part of errors, by their squares over the pressure."""
+    from scipy.optimize import nnls
+
+    order = np.argsort(np.abs(mean))
+    parts = [part for part in np.array_split(order, 20) if part.size]
+    y = np.array([np.mean(squares[part]) for part in parts])
+    by = np.array([[1.0, np.mean(mean[part] ** 2)] for part in parts])
+    size = np.maximum(by.max(0), 1e-30)
+    floor, share = nnls(by / size, y)[0] / size
+    return float(np.sqrt(max(floor, 1e-12))), float(np.sqrt(share))
+
+
+@dataclass(frozen=True)
+class SessionError:
+    """Errors in one session that did not train."""
+
+    session: Annotated[str, Column("session")]
+    form: Annotated[str, Column("form chosen by the others")]
+    static_kpa: Annotated[float, Column("cubic, no tare", "kPa", digits=3)]
+    tared_kpa: Annotated[float, Column("cubic, tare", "kPa", digits=3)]
+    error_kpa: Annotated[float, Column("chosen", "kPa", about="median over elements of the rms error", digits=3)]
+    coverage: Annotated[float, Column("in the interval", about="of 90 %", digits=3)]
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationStudy:
+    """A calibration, and its errors in sessions left out.
+
+    Attributes
+    ----------
+    calibration : ArrayCalibration
+        By all sessions.
+    sessions : tuple of Session
+        That trained.
+    errors : tuple of SessionError
+        Of each session left out, or of each after the first.
+    by_first : bool
+        Errors of a calibration by the first session alone.
+    """
+
+    calibration: ArrayCalibration
+    sessions: tuple[Session, ...]
+    errors: tuple[SessionError, ...]
+    by_first: bool = False
+
+    def document(self) -> Iterator[Part]:
+        """The law, and a row for each session."""
+        yield Facts(tuple(self._facts()))
+        if not self.errors:
+            yield "one session: its errors in another are not known; expected more, of several days"
+            return
+        yield ""
+        how = "calibrated by the first session" if self.by_first else "each session by the calibration of all others"
+        yield Table.of("sessions", how, self.errors)
+        error, coverage = (float(np.mean([getattr(e, key) for e in self.errors])) for key in ("error_kpa", "coverage"))
+        yield f"mean {error:.3g} kPa, in the interval {100 * coverage:.0f} %"
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        known, law = self.calibration, self.calibration.law
+        yield "sessions", f"{len(self.sessions)}, {len(law.alive)} elements; tare: {TARE_S:g} unloaded seconds of each"
+        drift = f", gain {100 * law.drift:+.2g} % a day" if law.form.drift else ""
+        gains = law.at[law.alive, 0]
+        scatter = 100 * gains.std() / abs(gains.mean())
+        yield "law", f"{law.form.words()}{drift}; gain differs between elements by {scatter:.2g} %"
+        yield (
+            "error",
+            f"{known.floor_kpa:.3g} kPa and {100 * known.share:.2g} % of the pressure, interval of {LEVEL:.0%}: "
+            f"{known.reach:.3g} times that; all at once {100 * known.common:.2g} %",
+        )
+        if (dead := np.flatnonzero(~law.alive) + 1).size:
+            more = ", ..." if dead.size > _SHOWN else ""
+            yield "dead", f"{dead.size} elements, from 1: {', '.join(map(str, dead[:_SHOWN].tolist()))}{more}"
+
+
+def study(sessions: Sequence[Session], *, by_first: bool = False) -> CalibrationStudy:
+    """Calibrate by all sessions, and test on each by all others, or by the first alone.
+
+    Raises
+    ------
+    BadInput
+        Sessions of different elements, or without any reference.
+    """
+    _refuse(sessions)
+    pressed = [k for k, session in enumerate(sessions) if np.isfinite(session.pressure_kpa).any()]
+    tested = [k for k in pressed if len(sessions) > 1 and not (by_first and k == 0)]
+    errors = [_tested(sessions, k, list(sessions[:1]) if by_first else training(sessions, k)) for k in tested]
+    return CalibrationStudy(calibrated(sessions), tuple(sessions), tuple(errors), by_first)
+
+
+def _refuse(sessions: Sequence[Session]) -> None:
+    count = sessions[0].reading.shape[1]
+    for session in sessions:
+        if session.reading.shape[1] != count:
+            raise BadInput(f"{session.name}: {session.reading.shape[1]} elements; expected {count}, as of the first")
+        if not (np.isfinite(session.pressure_kpa).any() or np.isfinite(session.force_n).any()):
+            raise BadInput(f"{session.name}: no reference; expected pressure_kpa, or force_n of a press or a plate")
+
+
+def _tested(sessions: Sequence[Session], k: int, others: Sequence[Session]) -> SessionError:
+    """Errors in one session of calibrations by others."""
+    session, found = sessions[k], calibrated(others)
+    mean, half = found.pressures(session)
+    known = np.isfinite(session.pressure_kpa) & np.isfinite(mean)
+    inside = (np.abs(mean - session.pressure_kpa) < half)[known]
+    plain = (law_of(others, Form(tared=tared)).pressures(session)[0] for tared in (False, True))
+    static, tared, own = (median_error(each, session) for each in (*plain, mean))
+    return SessionError(session.name, found.law.form.words(), static, tared, own, float(inside.mean()))
+
+
+def median_error(mean: Real, session: Session) -> float:
+    """Median over elements of the rms error in a session [kPa]."""
+    off = mean - session.pressure_kpa
+    with np.errstate(invalid="ignore"):
+        return float(np.nanmedian(np.sqrt(np.nanmean(off[:, np.isfinite(off).any(0)] ** 2, 0))))
