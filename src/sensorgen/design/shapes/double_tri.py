@@ -20,11 +20,9 @@ _MIDDLE = "middle_electrode_with_cogs"
 
 @dataclass(frozen=True)
 class Params(TriangleParams):
-    """Parameters of both layers."""
+    """Parameters of both layers; of 2 mm, the tips of hanging triangles are too narrow for most slicers."""
 
-    period_mm: float = field(  # of 2 mm, the tips of hanging triangles are too narrow for most slicers
-        default=3.0, metadata=TriangleParams.__dataclass_fields__["period_mm"].metadata
-    )
+    period_mm: float = field(default=3.0, metadata=TriangleParams.__dataclass_fields__["period_mm"].metadata)
 
 
 def scene(p: Params, fill: Fill) -> Scene:

@@ -126,7 +126,10 @@ def _spreads(
         if own and key in numbers[0]:
             varied = [own.value * value / values[0] for value in values]
             ends = max((own.lower, own.upper), key=partial(target.worth, key))
-            yield key, Spread(own.value, median(varied[1:] or varied), max(varied, key=partial(target.worth, key)), ends)
+            yield (
+                key,
+                Spread(own.value, median(varied[1:] or varied), max(varied, key=partial(target.worth, key)), ends),
+            )
 
 
 def _built(one: Recommended, target: Target, design: Design, out: Path, sliced: bool) -> Recommended:

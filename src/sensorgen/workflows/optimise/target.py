@@ -288,20 +288,25 @@ def around(design: Design) -> Target:
     One length changes at a time: heights by a layer, those of films and electrodes upwards alone, and lengths in the
     plane by a quarter.
     """
-    layer, own, near = design.layers.layer_mm, dict[str, float | str](), list[dict[str, float | str]]()
-    for name, value, vertical in lengths(design):
-        own[name], whole = value, max(round(value / layer), 1)
-        least = whole + 1 if name in asdict(Envelope()) or name.endswith("dielectric_mm") else whole - 1
-        heights = sorted({round(n * layer, 6) for n in (least, whole + 1) if n})
-        near += [{name: to} for to in (heights if vertical else (round(0.8 * value, 3), round(1.25 * value, 3)))]
-    own["quality"] = design.quality
+    several = list(lengths(design))
+    own = {name: value for name, value, _ in several} | {"quality": design.quality}
+    near = [{name: to} for name, value, vertical in several for to in _beside(design, name, value, vertical)]
     return checked(Target, {
         "design": design.model_dump(mode="json", exclude_unset=True, exclude={"name"}),
-        "parameters": {name: [value] for name, value in own.items()}, "accept_doubts": ["plate bonded"],
+        "parameters": {key: [value] for key, value in own.items()}, "accept_doubts": ["plate bonded"],
         "objectives": dict.fromkeys(("force_resolution_n", "position_resolution_mm"), "minimise"),
         "also": [own | one for one in near]
         + [own | one.parameters | {"quality": one.quality} for one in best.of(design.shape)],
     })  # fmt: skip
+
+
+def _beside(design: Design, name: str, value: float, vertical: bool) -> list[float]:
+    """The values next to a length's own."""
+    if not vertical:
+        return [round(share * value, 3) for share in (0.8, 1.25)]
+    layer, grows = design.layers.layer_mm, name in asdict(Envelope()) or name.endswith("dielectric_mm")
+    whole = max(round(value / layer), 1)
+    return [round(n * layer, 6) for n in ((whole + 1,) if grows else (whole - 1, whole + 1)) if n]
 
 
 def _with_tip(target: Target, tip: Mapping[str, Any]) -> Target:
