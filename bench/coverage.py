@@ -21,7 +21,7 @@ from sensorgen.prediction.calibration.baseline import Baseline
 from sensorgen.prediction.calibration.coverage import inside
 from sensorgen.prediction.calibration.fitting import by_rest, calibrated, gain, prior
 from sensorgen.prediction.calibration.inversion import OTHERWISE, Inverter, Verdict, doubt_rest
-from sensorgen.prediction.inverse import Estimator
+from sensorgen.prediction.inverse.estimator import Estimator
 from virtual_specimen import TONES_HZ
 from virtual_specimen.adapter import ERRORS, LIMIT_N, data, specimen_model, split
 

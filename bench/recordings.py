@@ -27,7 +27,7 @@ from sensorgen.measure.signal import drift, hysteresis, lowpass, presses, wavefo
 from sensorgen.measure.signal.run import processed  # noqa: E402
 from sensorgen.models.sensor import Sensor  # noqa: E402
 from sensorgen.prediction.identifiability.fisher import bounds, slopes  # noqa: E402
-from sensorgen.prediction.inverse import Estimator  # noqa: E402
+from sensorgen.prediction.inverse.estimator import Estimator  # noqa: E402
 
 SAMPLES = 1_000_000
 THESIS_RATE_HZ = 66.6666

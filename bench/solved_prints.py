@@ -22,8 +22,8 @@ from sensorgen.design.tip import EVEN, STIFF, Tip
 from sensorgen.prediction.bodies import WALLS, estimated, of_file
 from sensorgen.prediction.compression_law import case_of, content, solved
 from sensorgen.prediction.mesh_ladder import COARSEST, USUAL, Piece, drawn, model_of, pressed
+from sensorgen.prediction.print_files import at_hand
 from sensorgen.prediction.sensor_model import piece
-from sensorgen.prediction.slices import at_hand
 
 MODELS = Path(__file__).parents[1] / "src" / "sensorgen" / "models"
 FILE, CELLS = MODELS / "solved_prints.yaml", MODELS / "solved_cells.yaml"

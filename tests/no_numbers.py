@@ -1,4 +1,4 @@
-"""A prediction that says nothing, for tests that look at what is printed alone."""
+"""Predictions that say nothing, or little, for tests that look at other things."""
 
 import os
 from contextlib import contextmanager
@@ -23,4 +23,19 @@ def unpredicted():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(quantities, "prediction", nothing)
         patch.setenv("SENSORGEN_CACHE", str(Path(os.environ["SENSORGEN_CACHE"]) / "unpredicted"))
+        yield
+
+
+@contextmanager
+def roughly_at_rest():
+    """Resistance as ever, capacitance to a tenth, nothing under a load; for readings of a multimeter."""
+    from sensorgen.prediction import capacitance, planning, rest_state
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("PLANE", "SPATIAL", "OPEN"):
+            patch.setattr(capacitance, name, 0.1)
+        patch.setattr(rest_state, "PLANE", 0.1)
+        patch.setattr(planning, "ACCURACY", 0.1)
+        patch.setattr(quantities, "_at_load", lambda found, *_: found)
+        patch.setenv("SENSORGEN_CACHE", str(Path(os.environ["SENSORGEN_CACHE"]) / "rough"))
         yield

@@ -13,7 +13,8 @@ from sensorgen.prediction.calibration.fitting import by_rest, calibrated, gain, 
 from sensorgen.prediction.calibration.inversion import Inverter, Verdict
 from sensorgen.prediction.calibration.rest import Rest, checked
 from sensorgen.prediction.calibration.specimen import Spread, unknown
-from sensorgen.prediction.inverse import Estimator, Prior
+from sensorgen.prediction.inverse.estimator import Estimator
+from sensorgen.prediction.inverse.prior import Prior
 from virtual_specimen import TONES_HZ, drawn, session
 from virtual_specimen.adapter import ERRORS, LIMIT_N, data, specimen_model, split
 

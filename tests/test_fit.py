@@ -12,6 +12,7 @@ import yaml
 from drawn_sensor import sensor_of
 from scipy import stats
 
+from no_numbers import roughly_at_rest
 from sensorgen.analysis.comparison.allowed import Allowed
 from sensorgen.analysis.comparison.moved import Movable
 from sensorgen.analysis.fit import Fit, Fitted, Untold, fit, text
@@ -49,7 +50,7 @@ def value(made, quantity):
 def of_thesis(tmp_path_factory):
     from sensorgen.measure.log import importing
 
-    with Log(tmp_path_factory.mktemp("fit") / "log.db", create=True) as log:
+    with Log(tmp_path_factory.mktemp("fit") / "log.db", create=True) as log, roughly_at_rest():
         importing.thesis(log)
         return fit(log, 23)
 
@@ -116,7 +117,8 @@ def test_groups_are_predicted_by_the_others(of_thesis):
 
 
 def test_the_default_of_the_electrodes_is_what_the_command_makes_of_the_thesis(capsys):
-    cli.main(["fit", "--thesis", "--dry-run", "--json"], standalone_mode=False)
+    with roughly_at_rest():
+        cli.main(["fit", "--thesis", "--dry-run", "--json"], standalone_mode=False)
     (row,) = next(part for part in [json.loads(capsys.readouterr().out)["values"]])
     default = materials.load("etpu").value("resistivity_ohm_m")
     assert default.source == "thesis-d.1"

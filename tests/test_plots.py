@@ -8,6 +8,7 @@ import os
 import re
 import struct
 import subprocess
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -149,12 +150,13 @@ def size_of(png):
     return struct.unpack(">II", png[16:24])
 
 
-def test_all_files_and_the_same_bytes_every_time(sensor):
-    first, second = (dict(plots.files(sensor, TONES[:1], FORCES, AT)) for _ in range(2))
+@pytest.mark.parametrize("again", [3, pytest.param(None, marks=pytest.mark.nightly)])
+def test_all_files_and_the_same_bytes_every_time(sensor, again):
+    first, second = (dict(islice(plots.files(sensor, TONES[:1], FORCES, AT), most)) for most in (None, again))
     assert tuple(first) == plots.STEPS
     assert len(plots.STEPS) == 10
     for name, content in first.items():
-        assert content == second[name], name
+        assert content == second.get(name, content), name
         if name.endswith(".png"):
             assert b"Software" not in content
             assert b"tIME" not in content

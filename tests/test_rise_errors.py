@@ -7,7 +7,7 @@ from rise_reference import compared, of_another_program, scenes
 
 
 @pytest.mark.parametrize("entry", [
-    scenes()[2], pytest.param(of_another_program()[0], marks=pytest.mark.nightly)
+    pytest.param(scenes()[2], marks=pytest.mark.nightly), of_another_program()[0]
 ], ids=["drawn", "printed"])  # fmt: skip
 def test_the_stated_error_holds(entry):
     """The drawn film of 0.2 mm, and the printed one of 0.1 mm by NGSolve."""

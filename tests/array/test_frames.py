@@ -11,11 +11,11 @@ from sensorgen.core import document
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
 from sensorgen.measure.array_frames import read
+from sensorgen.measure.virtual.array import foot, simulated, step
 from sensorgen.prediction.array.frames import inverted
 from sensorgen.prediction.array.model import array_model
 from sensorgen.prediction.array.readout import ArrayReadout
 from sensorgen.prediction.array.study import study
-from sensorgen.measure.virtual.array import foot, simulated, step
 
 TRI = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
 PRESSURE = np.random.default_rng(1).uniform(0, 300, (2, 5, 6)) * 1e3  # Pa

@@ -8,7 +8,7 @@ from insole_sessions import Insole
 
 from sensorgen.core import document
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.array_sessions import session
+from sensorgen.measure.array_sessions import refuse_swapped, session
 from sensorgen.prediction.array import sessions as calibration
 from sensorgen.prediction.array.elements import Form, Session, lagged
 from sensorgen.prediction.array.sessions import calibrated, law_of, stored, study
@@ -184,7 +184,7 @@ def test_files_of_every_reference(tmp_path):
     press = session(table(tmp_path / "p.csv", ["time_s", "heel", "toe", "element", "force_n"],
                           [(0, 1, 2, "", 0), (1, 1, 3, "toe", 5), (2, 1, 2, "", "")]), 1, area_mm2=50.0)  # fmt: skip
     assert press.day == 1
-    assert np.nan_to_num(press.pressure_kpa, nan=-1).tolist() == [[0, 0], [0, 100], [-1, -1]]
+    assert np.nan_to_num(press.pressure_kpa, nan=-1).tolist() == [[0, 0], [-1, 100], [-1, -1]]
     assert np.isnan(press.force_n).all()
     plate = session(table(tmp_path / "f.csv", ["time_s", "heel", "toe", "force_n"], [(0, 1, 2, 0), (1, 1, 3, 5)]), 1)
     assert np.isnan(plate.pressure_kpa).all()
@@ -192,7 +192,7 @@ def test_files_of_every_reference(tmp_path):
     np.savez(tmp_path / "n.npz", reading=np.ones((2, 3, 4)), pressure_kpa=[0.0, 5.0], element=[0, 12], area_mm2=20.0)
     packed = session(tmp_path / "n.npz", 2)
     assert packed.reading.shape == (2, 12)
-    assert packed.pressure_kpa[1].tolist() == [0] * 11 + [5]
+    assert np.nan_to_num(packed.pressure_kpa[1]).tolist() == [0] * 11 + [5]
 
 
 @pytest.mark.parametrize(
@@ -217,3 +217,18 @@ def test_no_study_is_an_error(days):
     deaf = replace(days[0], reading=np.random.default_rng(0).normal(size=days[0].reading.shape))
     with pytest.raises(BadInput, match="no element's reading follows"):
         calibrated([deaf])
+
+
+def test_swapped_wires_are_named():
+    shape, kpa = (2, 3), np.full((3, 6), np.nan)
+    kpa[[0, 1, 2], [0, 1, 5]] = 100.0
+    reading = np.zeros((3, 6))
+    none = np.full(3, np.nan)
+
+    def pressed(order):
+        reads = np.where(np.isfinite(kpa), 0.1, 0.0).reshape(3, *shape)[:, :, order].reshape(3, 6)
+        return Session("p", 0.0, np.arange(3.0), reading + reads, none < 0, kpa, none)
+
+    refuse_swapped(pressed([0, 1, 2]), shape)
+    with pytest.raises(BadInput, match="presses on c1 are read at c2: wires swapped"):
+        refuse_swapped(pressed([1, 0, 2]), shape)

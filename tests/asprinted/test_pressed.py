@@ -201,6 +201,7 @@ def test_a_print_that_no_model_can_speak_of_is_refused():
         build_sensor(estimated(design))
 
 
+@pytest.mark.nightly  # a print's estimate: the cell built by hand; what PrusaSlicer prints: test_real.py
 @needs_mesher
 def test_what_prusaslicer_prints_is_pressed(real):
     """Against the estimate by the same walls, whose widths differ by 2 %."""

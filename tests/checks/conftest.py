@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from sensorgen import checks
+from sensorgen.checks import rules as checks
 from sensorgen.core.findings import Finding
 from sensorgen.design.printer import Printer, Quality, load_printer, load_quality
 from sensorgen.scene.geometry import meshes, validity

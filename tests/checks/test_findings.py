@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen import checks
+from sensorgen.checks import rules as checks
 from sensorgen.checks.review import report, review
 from sensorgen.core.document import to_json
 from sensorgen.core.findings import SEVERITIES, Finding

@@ -14,7 +14,7 @@ import yaml
 
 from sensorgen import models
 from sensorgen.cli import COMMANDS, cli
-from sensorgen.cli.designs import option_of
+from sensorgen.cli.commands import flag_of as option_of
 from sensorgen.core import plugins as registry
 from sensorgen.design import materials, printer, shapes
 

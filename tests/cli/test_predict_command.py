@@ -346,11 +346,11 @@ def test_help_does_not_load_numpy(real):
 
 
 def test_options_are_what_the_planner_knows():
-    from sensorgen.cli.predict_command import OWN
+    from sensorgen.cli.predict_command import command
     from sensorgen.models.pressure import PROFILES
     from sensorgen.prediction.query import LAWS
 
-    options = {option.name: option for option in OWN}
+    options = {option.name: option for option in command.own}
     assert tuple(options["compression"].type.choices) == LAWS
     assert tuple(options["profile"].type.choices) == PROFILES
 

@@ -133,6 +133,14 @@ def test_damaged_packages_are_named(installed, pairs, message):
         catalogue.opened("acme", "", {}, SimulatedClock())
 
 
+def test_all_kinds_are_listed_with_their_roles(installed):
+    installed(("acme", "math:pi"))
+    listed = catalogue.listed()
+    assert listed["acme"].startswith("cannot be used: kind of device 'acme': 'math:pi' is no ")
+    assert ROLES.items() <= listed.items()
+    assert any(name.startswith("pymeasure:") for name in listed)  # its meters, or how to get them
+
+
 def test_a_simulated_analyser_measures_the_plant():
     clock, plant = SimulatedClock(), SpringPlant()
     made = catalogue.simulated("keysight-e4980a", plant, {"aperture": "SHOR"}, clock)

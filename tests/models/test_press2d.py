@@ -67,6 +67,7 @@ def test_choices_of_the_boundary(name, held, nu):
     assert found.displacement_m[1:] * 1e6 == pytest.approx(known[1:], rel=0.02)
 
 
+@pytest.mark.nightly  # friction that sticks: choices of the boundary
 def test_sticking_depends_little_on_the_loads_asked_for():
     few, many = (
         press2d.press(tri(), solids(), s, boundary=BoundaryConditions(contact="stick"))

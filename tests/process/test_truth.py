@@ -9,7 +9,7 @@ from sensorgen.measure.recording import joined, read, rig
 from sensorgen.measure.signal import drift, presses
 from sensorgen.measure.signal.presses import GUARD_S, WINDOW_S
 from sensorgen.prediction.identifiability.fisher import bounds, slopes
-from sensorgen.prediction.inverse import Estimator
+from sensorgen.prediction.inverse.estimator import Estimator
 
 NOISE, RATE = 1e-3, 140.0
 MADE = made.presses(60, dwell_s=3.0, rest_s=3.0, seed=11)

@@ -211,5 +211,5 @@ def test_stored_predictions_are_plain_data(tmp_path):
     with Log(tmp_path / "log.db", create=True) as book:
         (logged,) = book.add([row])
         kept = stored_or_made(default_body(design), book, [logged], [], [])
-    assert json.loads(row.data)["capacitance"]["lower"] == kept.capacitance_f.lower
+    assert json.loads(row.data)["capacitance"]["lower"] == kept.prediction.capacitance.lower
     assert kept.prediction == dataclasses.replace(found, plan=without_times(found.plan))  # stored without run times

@@ -17,6 +17,7 @@ import pytest
 from bench_files import FORMULA, HOSTILE, ladder
 from scipy import stats
 
+from no_numbers import roughly_at_rest
 from sensorgen.analysis.comparison import of_iteration
 from sensorgen.analysis.plots.static import files
 from sensorgen.analysis.report import FORMATS, electrodes, report, written, yields
@@ -44,7 +45,7 @@ def by_hand():
 
 @pytest.fixture(scope="module")
 def of_thesis(thesis):
-    with Log(thesis) as log:
+    with Log(thesis) as log, roughly_at_rest():
         return report(log, 23)
 
 

@@ -4,7 +4,7 @@ import pytest
 from mutants import base, mutant, outcome
 
 
-@pytest.mark.parametrize("numbers", [range(80), pytest.param(range(80, 300), marks=pytest.mark.nightly)], ids=len)
+@pytest.mark.parametrize("numbers", [range(50), pytest.param(range(50, 300), marks=pytest.mark.nightly)], ids=len)
 def test_mutants_are_read_or_refused_in_a_sentence(numbers, tmp_path):
     text, path = base(), tmp_path / "mutant.gcode"
     assert outcome(text, path) == "passed"

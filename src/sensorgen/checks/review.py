@@ -4,8 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
 from typing import Self
 
-from sensorgen import checks
-from sensorgen.checks import estimate
+from sensorgen.checks import bed, estimate, rules
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Part, Table, comma_separated
 from sensorgen.core.findings import Finding, Verdict, counted, counts, headline, listed, table, verdict
@@ -82,7 +81,7 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "") -> Revi
     SensorgenError
         A name or value of the design is missing.
     """
-    misfit = design.waived(list(checks.bed.check(design.printed, design.machine)))
+    misfit = design.waived(list(bed.check(design.printed, design.machine)))
     if any(not f.waiver for f in misfit):  # a sensor that no bed holds may be too large to mesh, too
         step("checks")
         return Review({}, misfit)
@@ -91,7 +90,7 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "") -> Revi
     made = _meshes(design)
     step("checks")
     gap_mm = validity.electrode_gap_mm(scene, made)
-    found = checks.findings(
+    found = rules.findings(
         scene, design.machine, design.layers, gap_mm, walls or rule("prusa", design.walls), estimate.lines(design)
     ) + _crowding(design)
     found = [advised(f, [p.name for p in fields(design.params)]) for f in found]

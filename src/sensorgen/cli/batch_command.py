@@ -1,101 +1,65 @@
 """``sensorgen batch``: a plan of several sensors to the files of one plate; and whether they are still the same."""
 
 from pathlib import Path
+from typing import Annotated
 
 import click
-from click.shell_completion import CompletionItem
 
-from sensorgen.cli import FOUND_ERRORS, log_words, render, show, sweeps
-from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.cli import FOUND_ERRORS, render, show
+from sensorgen.cli.commands import FirstWord
+from sensorgen.cli.commands import command as of_function
+from sensorgen.cli.log_words import LogFile
+from sensorgen.cli.options import Cluster, Strict, TimeLimit
+from sensorgen.core.options import Option
 from sensorgen.export.slicers import TIME_LIMIT_S
 
+Jobs = Annotated[int, Option(kind=click.IntRange(1, 64), typed="")]
 
-class _PlanGroup(click.Group):
+
+class _PlanGroup(FirstWord):
     """A command whose first word is a plan's file, or ``verify``."""
 
-    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
-        """``verify``, or the command for a plan."""
-        return super().get_command(ctx, name) or _plan_command(name)
+    thing, form = "plan", "PLAN.yaml {option} ..."
 
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Take the first word; an option in its place is the user's slip."""
-        if args[0].startswith("-") and not ctx.resilient_parsing:
-            raise BadInput(f"{args[0]} stands before the plan; write {ctx.command_path} PLAN.yaml {args[0]} ...")
-        return args[0], self.get_command(ctx, args[0]), args[1:]
+    def of(self, name: str) -> click.Command:
+        """The command for a plan."""
 
-    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Files, and ``verify``."""
-        return [CompletionItem(incomplete, type="file"), *super().shell_complete(ctx, incomplete)]
+        @of_function(name, *render.options())
+        def plan(
+            *, out: Path = Path("out"), no_gcode: bool = False, time_limit_s: TimeLimit = TIME_LIMIT_S,
+            force: bool = False, strict: Strict = False, jobs: Jobs = 1, cluster: Cluster = "",
+        ) -> int:  # fmt: skip
+            """Write all files of a plan's plate.
 
+            Parameters
+            ----------
+            out : DIR
+                Folder for batches' folders.
+            no_gcode
+                Leave out slicing, which takes most of the time.
+            force
+                Write the files even if checks report errors.
+            jobs : N
+                Processes at once; one if not given.
+            """
+            from sensorgen.workflows.batch import STEPS, make
 
-def _plan_command(name: str) -> click.Command:
-    return click.Command(
-        name, callback=lambda **given: _make(name, **given), help="Write all files of a plan's plate.",
-        params=[
-            click.Option(
-                ["--out"], default="out", show_default=True, metavar="DIR", help="Folder for batches' folders."
-            ),
-            click.Option(["--no-gcode"], is_flag=True, help="Leave out slicing, which takes most of the time."),
-            click.Option(
-                ["--time-limit", "time_limit_s"], type=float, default=TIME_LIMIT_S, show_default=True,
-                metavar="SECONDS", help="End a slicer after this time.",
-            ),
-            click.Option(["--force"], is_flag=True, help="Write the files even if checks report errors."),
-            click.Option(["--strict"], is_flag=True, help="Treat warnings as errors."),
-            *sweeps.workers("one"), *render.options(),
-        ],
-    )  # fmt: skip
+            with LogFile().existing() as log:
+                head = log.head()[1] if log else ""
+            with render.refused(Path(name).stem), show.progress(STEPS) as step:
+                batch = make(
+                    Path(name), out, gcode=not no_gcode, time_limit_s=time_limit_s, force=force, strict=strict,
+                    log_head=head, jobs=jobs, cluster=cluster, step=step,
+                )  # fmt: skip
+            render.deliver(batch)
+            return FOUND_ERRORS if batch.errors(force=force) else 0
 
-
-def _make(
-    plan: str, *, out: str, no_gcode: bool, time_limit_s: float, force: bool, strict: bool, jobs: int | None,
-    cluster: str,
-) -> int:  # fmt: skip
-    from sensorgen.workflows.batch import STEPS, make
-
-    if not 0 < time_limit_s < float("inf"):
-        raise OutOfRange(f"--time-limit {time_limit_s:g}; expected seconds above 0")
-    with log_words.existing(None) as log:
-        head = log.head()[1] if log else ""
-    with render.refused(Path(plan).stem), show.progress(STEPS) as step:
-        made = make(
-            Path(plan), Path(out), gcode=not no_gcode, time_limit_s=time_limit_s, force=force, strict=strict,
-            log_head=head, jobs=jobs or 1, cluster=cluster, step=step,
-        )  # fmt: skip
-    render.deliver(made)
-    return FOUND_ERRORS if made.errors(force=force) else 0
-
-
-def _verify(folder: str, file: str | None) -> int:
-    """Hash every file of a batch's folder again, and say what differs from its record; exit code 1 if anything does.
-
-    The record itself is compared with the log, if that has the batch.
-    """
-    from sensorgen.workflows.batch.record import RECORD
-    from sensorgen.workflows.sealed import batch_differences
-
-    with log_words.existing(file) as log:
-        found = batch_differences(Path(folder), RECORD, log)
-    render.deliver(found)
-    return FOUND_ERRORS if found else 0
+        return plan
 
 
 command = _PlanGroup(
     "batch",
-    commands=[
-        click.Command(
-            "verify",
-            callback=_verify,
-            help=_verify.__doc__,
-            short_help="Hash every file again and say what differs.",
-            params=[click.Argument(["folder"]), log_words.where(), *render.options("json", "markdown")],
-        )
-    ],
-    options_metavar="",
     subcommand_metavar="{PLAN.yaml|verify} [OPTIONS]",
-    context_settings={"ignore_unknown_options": True},
     help="""Put several sensors on one plate: 3MF, G-code, labels, and a record of what lies where.
 
     \b
@@ -106,3 +70,24 @@ command = _PlanGroup(
     """,
     epilog="PLAN.yaml --help lists the options.",
 )
+
+
+@of_function(
+    "verify", *render.options("json", "markdown"), group=command, short="Hash every file again and say what differs."
+)
+def _verify(folder: Path, log: LogFile) -> int:
+    """Hash every file of a batch's folder again, and say what differs from its record; exit code 1 if anything does.
+
+    The record itself is compared with the log, if that has the batch.
+
+    Parameters
+    ----------
+    folder
+    """
+    from sensorgen.workflows.batch.record import RECORD
+    from sensorgen.workflows.sealed import batch_differences
+
+    with log.existing() as rows:
+        differences = batch_differences(folder, RECORD, rows)
+    render.deliver(differences)
+    return FOUND_ERRORS if differences else 0

@@ -1,59 +1,58 @@
-"""``sensorgen bench hysteresis``: how far the way down of each press lies from its way up."""
+"""``sensorgen bench hysteresis``: distance of the way down of each press from its way up."""
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import click
+from typing import TYPE_CHECKING, Annotated
 
 from sensorgen.cli import bench_opened, render
-from sensorgen.cli.log_words import made
-from sensorgen.cli.words import NumberRange, Png
+from sensorgen.cli.bench_opened import Opening, Rig, bench
+from sensorgen.cli.commands import command
+from sensorgen.cli.words import NumberRange
 from sensorgen.core.errors import BadInput
+from sensorgen.core.options import Option
 
 if TYPE_CHECKING:
-    from sensorgen.measure.signal.hysteresis import Hysteresis
-    from sensorgen.measure.signal.run import Processed
+    from sensorgen.core.document import Documented
 
 _LAW = "smooth"
+Threshold = Annotated[float, Option(kind=NumberRange(0, min_open=True))]
 
 
-def _hysteresis(what: str, rig_file: str | None, threshold_n: float, plot: str | None, **how: Any) -> None:
+@command(
+    "hysteresis", *render.options("json", "markdown"), group=bench,
+    short="Show how far ways up and down of presses lie apart.",
+)  # fmt: skip
+def _hysteresis(
+    what: str, *, rig_file: Rig = None, opening: Opening, threshold_n: Threshold = 0.2,
+    plot: Annotated[Path | None, Option(kind="png")] = None,
+) -> "Documented":  # fmt: skip
     """Show how far readings on the way down of each press lie from those on its way up, at the same force.
 
     For presses that go up and down again over some seconds, with the rig's log that measured the force. The distance is
     the largest one, over the span of the readings, with the standard error that noise gives it.
     Drift is taken out by a law of time alone: what the film remembers of presses is what is looked for.
+
+    Parameters
+    ----------
+    what : RECORDING_FILE|NUMBER
+    threshold_n : N
+        Force from which on the tip presses.
+    plot : FILE.png
+        Draw the ways up and down over the force.
     """
     from sensorgen.measure.signal.hysteresis import of_presses
     from sensorgen.measure.signal.results import of_ways
 
-    if not how["keep_drift"]:
-        how["law"] = how["law"] or _LAW
-    worked, rig = bench_opened.worked_up(what, rig_file, **how)
+    if not opening.keep_drift:
+        opening = replace(opening, law=opening.law or _LAW)
+    run, rig = opening.processed(what, rig_file)
     if rig is None:
         raise BadInput(f"{what}: no log of a rig; expected one with the force, with --rig FILE")
-    found = of_presses(worked, threshold_n)
-    files = [_drawn(worked, found.ways, bench_opened.name_of(what), plot)] if plot else []
-    render.deliver(of_ways(worked.recording.tones_hz, found, files))
+    presses = of_presses(run, threshold_n)
+    if plot:
+        from sensorgen.analysis.plots import recordings, static
+        from sensorgen.core import files
 
-
-def _drawn(worked: "Processed", ways: "dict[float, Hysteresis]", name: str, plot: str) -> str:
-    from sensorgen.analysis.plots import recordings, static
-    from sensorgen.core import files as store
-
-    store.replace(Path(plot), static.png(recordings.hysteresis(ways, worked.recording.tones_hz, name)))
-    return plot
-
-
-command = made(
-    _hysteresis, "hysteresis", "Show how far ways up and down of presses lie apart.",
-    click.Argument(["what"], metavar="RECORDING_FILE|NUMBER"),
-    click.Option(["--rig", "rig_file"], metavar="FILE", help="The rig's log that belongs to RECORDING_FILE."),
-    *bench_opened.options(),
-    click.Option(
-        ["--threshold", "threshold_n"], type=NumberRange(0, min_open=True), default=0.2, show_default=True,
-        metavar="N", help="Force from which on the tip presses.",
-    ),
-    click.Option(["--plot"], type=Png(), metavar="FILE.png", help="Draw the ways up and down over the force."),
-    *render.options("json", "markdown"),
-)  # fmt: skip
+        figure = recordings.hysteresis(presses.ways, run.recording.tones_hz, bench_opened.name_of(what))
+        files.replace(plot, static.png(figure))
+    return of_ways(run.recording.tones_hz, presses, [str(plot)] if plot else [])

@@ -2,31 +2,39 @@
 
 from collections.abc import Iterator
 from math import isfinite
-from typing import TYPE_CHECKING
-
-import click
+from typing import TYPE_CHECKING, Annotated
 
 from sensorgen.cli import render
-from sensorgen.cli.log_words import made
-from sensorgen.cli.words import Values, one
+from sensorgen.cli.bench_opened import Cutoff, bench
+from sensorgen.cli.commands import command
 from sensorgen.core import units
+from sensorgen.core.options import Option
 
 if TYPE_CHECKING:
     from sensorgen.measure.readings import Block, Readings
     from sensorgen.measure.recording.samples import Complex
 
+Rate = Annotated[float, Option(more={"required": True})]
 
-def _live(measured: str, rate_hz: tuple[float, ...], cutoff_hz: tuple[float, ...] | None) -> None:
+
+@command("live", group=bench, short="Low-pass readings as they come.")
+def _live(measured: str, *, rate_hz: Rate, cutoff_hz: Cutoff = None) -> None:
     """Low-pass readings as they come, row by row, onto the standard output.
 
     The filter begins in the steady state of the first reading and delays by 1.5 s at the thesis's cut-off. Where a
     reading is missing the one before is held, and its cells stay empty. Rows must come at an even --rate; columns
     that are no readings pass as they are.
+
+    Parameters
+    ----------
+    measured : MEASURED.csv|-
+    rate_hz : HZ
+        Rows per second.
     """
     from sensorgen.measure.readings import readings
     from sensorgen.measure.signal.lowpass import CUTOFF_HZ, Live
 
-    smooth = Live(one("--rate", rate_hz), one("--cutoff", cutoff_hz) if cutoff_hz else CUTOFF_HZ)
+    smooth = Live(rate_hz, cutoff_hz or CUTOFF_HZ)
     with readings(measured) as source:
         render.say(_header(source))
         for block in source.blocks():
@@ -47,17 +55,3 @@ def _rows(block: "Block", smooth: "Complex") -> Iterator[str]:
 def _cell(text: str) -> str:
     """A cell as CSV; quoted where it would come apart."""
     return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
-
-
-command = made(
-    _live, "live", "Low-pass readings as they come.",
-    click.Argument(["measured"], metavar="MEASURED.csv|-"),
-    click.Option(
-        ["--rate", "rate_hz"], type=Values(units.FREQUENCY_HZ, zero=False), metavar="HZ", required=True,
-        help="Rows per second.",
-    ),
-    click.Option(
-        ["--cutoff", "cutoff_hz"], type=Values(units.FREQUENCY_HZ, zero=False), metavar="HZ",
-        help="Of the low-pass; the thesis's 0.2727 Hz if not given.",
-    ),
-)  # fmt: skip

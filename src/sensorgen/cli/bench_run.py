@@ -2,13 +2,16 @@
 
 from collections.abc import Mapping
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, log_words, render
-from sensorgen.cli.log_words import made
+from sensorgen.cli import FOUND_ERRORS, render
+from sensorgen.cli.bench_opened import bench
+from sensorgen.cli.commands import command
+from sensorgen.cli.log_words import LogFile
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
@@ -19,10 +22,50 @@ if TYPE_CHECKING:
     from sensorgen.prediction.calibration.specimen import SpecimenModel
 
 
-def _run(
-    experiment: str | None, again: str | None, file: str | None, *, simulate: bool, real_time: bool, page: bool | None,
-    yes: bool, watchdog: bool,
-) -> int:  # fmt: skip
+@dataclass(frozen=True)
+class Rig:
+    """The rig: the real one, or a virtual one.
+
+    Attributes
+    ----------
+    simulate
+        A virtual specimen on a virtual rig, by its own clock.
+    real_time
+        With --simulate: by the real clock, to watch.
+    again, --resume : RUN
+        Go on with a run that ended early.
+    page, --page/--no-page
+        Show the run in the browser; with real devices by default.
+    watchdog, --watchdog/--no-watchdog
+        Load a program that lifts the tip into the actuator's controller; required above 1 N.
+    yes
+        Do not ask before the rig moves.
+    """
+
+    simulate: bool = False
+    real_time: bool = False
+    again: str = ""
+    page: bool | None = None
+    watchdog: bool = True
+    yes: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse the real clock twice."""
+        if self.real_time and not self.simulate:
+            raise BadInput("--real-time without --simulate; real devices know no other time")
+
+    def shows(self, *, simulated: bool) -> bool:
+        """True where the run is shown in the browser."""
+        return (self.page if self.page is not None else not simulated or self.real_time) and not render.form()
+
+
+@command(
+    "run",
+    *render.options("json", file=False),
+    group=bench,
+    short="Press a specimen by an experiment file, or a virtual one.",
+)
+def _run(experiment: Path | None = None, *, rig: Rig, log: LogFile) -> int:
     """Run an experiment: check, zero and find the contact gently, press, and record into the log.
 
     The tip goes up whatever happens: at the end, at an error of any device, at Ctrl-C, and when this process dies.
@@ -31,25 +74,28 @@ def _run(
 
     Exit code 1: a rule, a fault or somebody ended the run early; the reason is printed, what was recorded is in the
     log, and --resume goes on.
+
+    Parameters
+    ----------
+    experiment : EXPERIMENT.yaml
     """
     from sensorgen.measure.lab import sessions
 
-    if (experiment is None) == (again is None):
-        raise BadInput(f"{'neither' if again is None else 'both'} of an experiment and --resume; expected one of them")
-    if real_time and not simulate:
-        raise BadInput("--real-time without --simulate; real devices know no other time")
+    if bool(experiment) == bool(rig.again):
+        raise BadInput(f"{'both' if experiment else 'neither'} of an experiment and --resume; expected one of them")
     with ExitStack() as stack:
-        log = stack.enter_context(log_words.opened(file, create=simulate))
-        asked = sessions.again(log, again) if again else sessions.new(Path(experiment or ""), simulate=simulate)
+        rows = stack.enter_context(log.opened(create=rig.simulate))
+        asked = sessions.new(experiment, simulate=rig.simulate) if experiment else sessions.again(rows, rig.again)
         if asked.simulated:
             render.say("solving the virtual specimen, once for each design", err=True)
-        shown = (page if page is not None else not asked.simulated or real_time) and not render.form()
-        session = stack.enter_context(sessions.Session(asked, log, real_time=real_time, page=shown, model=_model))
+        page = rig.shows(simulated=asked.simulated)
+        session = stack.enter_context(sessions.Session(asked, rows, real_time=rig.real_time, page=page, model=_model))
         if session.url:
             render.say(f"live page: {session.url}", err=True)
-        found = session.run(lambda plan, who: _confirmed(plan, who, yes=yes or asked.simulated), watchdog=watchdog)
-    render.deliver(found)
-    return 0 if found.end == "done" else FOUND_ERRORS
+        sure = rig.yes or asked.simulated
+        result = session.run(lambda plan, who: _confirmed(plan, who, yes=sure), watchdog=rig.watchdog)
+    render.deliver(result)
+    return 0 if result.end == "done" else FOUND_ERRORS
 
 
 def _model(design: "Design", experiment: "Experiment") -> "SpecimenModel":
@@ -77,18 +123,3 @@ def _confirmed(plan: "Planned", identities: "Mapping[str, Identity]", *, yes: bo
         return yes or click.confirm("The rig moves now. Is it free, and the specimen in place?", err=True)
     except click.Abort:  # no terminal to ask
         return False
-
-
-command = made(
-    _run, "run", "Press a specimen by an experiment file, or a virtual one.",
-    click.Argument(["experiment"], metavar="EXPERIMENT.yaml", required=False),
-    click.Option(["--simulate"], is_flag=True, help="A virtual specimen on a virtual rig, by its own clock."),
-    click.Option(["--real-time"], is_flag=True, help="With --simulate: by the real clock, to watch."),
-    click.Option(["--resume", "again"], metavar="RUN", help="Go on with a run that ended early."),
-    click.Option(["--page/--no-page"], default=None, help="Show the run in the browser; with real devices by default."),
-    click.Option(["--watchdog/--no-watchdog"], default=True,
-                 help="Load a program that lifts the tip into the actuator's controller; required above 1 N."),
-    click.Option(["--yes"], is_flag=True, help="Do not ask before the rig moves."),
-    log_words.where(),
-    *render.options("json", file=False),
-)  # fmt: skip

@@ -2,68 +2,87 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import click
+from typing import TYPE_CHECKING, Annotated
 
 from sensorgen.cli import bench_opened, render
-from sensorgen.cli.log_words import made
-from sensorgen.cli.words import Png
+from sensorgen.cli.bench_opened import Opening, bench
+from sensorgen.cli.commands import command
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
+from sensorgen.core.options import Option
 
 if TYPE_CHECKING:
+    from sensorgen.core.document import Documented
     from sensorgen.measure.recording.samples import Real
     from sensorgen.measure.signal.presses import Pairs
 
 
+@command(
+    "sets", *render.options("json", "markdown", file=False), group=bench,
+    short="Compare what presses change of several recordings.",
+)  # fmt: skip
 def _sets(
-    what: tuple[str, ...], rig_files: tuple[str, ...], output: str | None, plot: str | None, *, together: bool,
-    **how: Any,
-) -> None:  # fmt: skip
+    what: tuple[str, ...], *, rig_files: tuple[Path, ...] = (), together: bool = False, opening: Opening,
+    output: Path | None = None, plot: Annotated[Path | None, Option(kind="png")] = None,
+) -> "Documented":  # fmt: skip
     """Bring what presses change of several recordings to a scale from 0 to 1, tone by tone, R and X apart.
 
     0 is the least difference and 1 the largest: of each recording by itself, so that their courses compare, or of all
     of them --together, so that their sizes do. Files need a --rig each, in the same order; recordings of the log have
     theirs.
+
+    Parameters
+    ----------
+    what : RECORDING_FILE|NUMBER ...
+    rig_files, --rig : FILE
+        A rig's log for each RECORDING_FILE.
+    together
+        One scale for all, so that sizes compare.
+    output, --output, -o : FILE.csv
+        Write a row per press, on its scale.
+    plot : FILE.png
+        Draw them over the force, tone by tone.
     """
+    from sensorgen.core import files
     from sensorgen.measure.signal.results import of_sets
 
     if rig_files and len(rig_files) != len(what):
         raise BadInput(f"{len(rig_files)} --rig for {len(what)} recordings; expected one each, in the same order")
-    tones, sets = _read(what, rig_files or (None,) * len(what), **how)
-    files = [*_table(sets, tones, output, together=together), *_drawn(sets, tones, plot, together=together)]
-    render.deliver(of_sets(tones, sets, files))
+    tones, sets = _read(what, rig_files or (None,) * len(what), opening)
+    if output:
+        files.replace(output, _table(sets, tones, together=together))
+    if plot:
+        from sensorgen.analysis.plots import recordings
+
+        files.replace(plot, recordings.normalised_differences(sets, tones, together=together))
+    return of_sets(tones, sets, [str(name) for name in (output, plot) if name])
 
 
-def _read(what: tuple[str, ...], rigs: tuple[str | None, ...], **how: Any) -> "tuple[Real, dict[str, Pairs]]":
+def _read(what: tuple[str, ...], rigs: tuple[Path | None, ...], opening: Opening) -> "tuple[Real, dict[str, Pairs]]":
     """Tones that all sets share, and presses by the names of the sets."""
     import numpy as np
 
-    tones, found = None, {}
+    tones, sets = None, {}
     for one, rig_file in zip(what, rigs, strict=True):
-        worked, rig = bench_opened.worked_up(one, rig_file, **how)
+        run, rig = opening.processed(one, rig_file)
         name = bench_opened.name_of(one)
-        if rig is None or worked.pairs is None:
-            raise BadInput(f"{one}: {worked.notes[-1] if rig else 'no log of a rig, so that its forces are not known'}")
-        if tones is not None and not np.array_equal(tones, worked.recording.tones_hz):
-            raise BadInput(f"{one} has tones of {worked.recording.tones_hz.tolist()} Hz; expected {tones.tolist()}")
-        if name in found:
+        if rig is None or run.pairs is None:
+            raise BadInput(f"{one}: {run.notes[-1] if rig else 'no log of a rig, so that its forces are not known'}")
+        if tones is not None and not np.array_equal(tones, run.recording.tones_hz):
+            raise BadInput(f"{one} has tones of {run.recording.tones_hz.tolist()} Hz; expected {tones.tolist()}")
+        if name in sets:
             raise BadInput(f"{name!r} twice; expected each recording once")
-        tones, found[name] = worked.recording.tones_hz, worked.pairs
-    return np.asarray(tones), found
+        tones, sets[name] = run.recording.tones_hz, run.pairs
+    return np.asarray(tones), sets
 
 
-def _table(sets: "Mapping[str, Pairs]", tones_hz: "Real", output: str | None, *, together: bool) -> list[str]:
-    """Write a row for each press of each set, on their scale."""
-    if output is None:
-        return []
+def _table(sets: "Mapping[str, Pairs]", tones_hz: "Real", *, together: bool) -> bytes:
+    """CSV with a row for each press of each set, on their scale."""
     import csv
     import io
 
     import numpy as np
 
-    from sensorgen.core import files as store
     from sensorgen.measure.signal.surfaces import normalised
 
     scaled = [
@@ -77,27 +96,4 @@ def _table(sets: "Mapping[str, Pairs]", tones_hz: "Real", output: str | None, *,
     for (name, pairs), re, im in zip(sets.items(), *scaled, strict=True):
         for row in np.column_stack([pairs.time_s, pairs.force_n, pairs.position_mm, re, im]).tolist():
             rows.writerow([name, *(f"{value:.9g}".replace("nan", "") for value in row)])
-    store.replace(Path(output), text.getvalue().encode())
-    return [output]
-
-
-def _drawn(sets: "Mapping[str, Pairs]", tones_hz: "Real", plot: str | None, *, together: bool) -> list[str]:
-    if plot is None:
-        return []
-    from sensorgen.analysis.plots import recordings
-    from sensorgen.core import files as store
-
-    store.replace(Path(plot), recordings.normalised_differences(sets, tones_hz, together=together))
-    return [plot]
-
-
-command = made(
-    _sets, "sets", "Compare what presses change of several recordings.",
-    click.Argument(["what"], metavar="RECORDING_FILE|NUMBER ...", nargs=-1, required=True),
-    click.Option(["--rig", "rig_files"], metavar="FILE", multiple=True, help="A rig's log for each RECORDING_FILE."),
-    click.Option(["--together"], is_flag=True, help="One scale for all, so that sizes compare."),
-    *bench_opened.options(),
-    click.Option(["--output", "-o"], metavar="FILE.csv", help="Write a row per press, on its scale."),
-    click.Option(["--plot"], type=Png(), metavar="FILE.png", help="Draw them over the force, tone by tone."),
-    *render.options("json", "markdown", file=False),
-)  # fmt: skip
+    return text.getvalue().encode()

@@ -1,126 +1,116 @@
-"""Options that say which body a command means: the print (by default), its G-code, slicer or walls, or the drawing."""
+"""Body that a command means: the print (by default), its G-code, slicer or walls, or the drawing."""
 
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import click
 
 from sensorgen.cli import render, show
-from sensorgen.cli.words import OneOf
 from sensorgen.core.errors import BadInput
+from sensorgen.core.options import Option
 from sensorgen.design.walls import WALLS
 from sensorgen.export.slicers import SLICERS
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
-    from sensorgen.design.body import Body, BodyOf
+    from sensorgen.design.body import Body
     from sensorgen.design.design import Design
     from sensorgen.prediction.slices import PrintReview
     from sensorgen.workflows.compensation import Change
 
-_BODY = "sensorgen.body"  # in the context's meta: the option that was given, and its value
+
+@dataclass(frozen=True)
+class BodyChoice:
+    """Body that is meant, by one option at most; the body of a design by a call.
+
+    Attributes
+    ----------
+    drawn
+        The drawing, in place of the print.
+    gcode : FILE
+        The print by this file, whoever has sliced it; if not given, the G-code in out/NAME, else by the slicer that is
+        installed (SENSORGEN_SLICER: prusa, cura or none), else an estimate.
+    slicer
+        Slice now for the print.
+    walls
+        Estimate the print for these walls alone; for all of them if not given, Arachne's as the best value.
+    """
+
+    drawn: bool = False
+    gcode: str = ""  # fmt: skip
+    slicer: Annotated[str, Option(kind=tuple(SLICERS))] = ""
+    walls: Annotated[str, Option(kind=tuple(WALLS))] = ""
+
+    def __post_init__(self) -> None:
+        """Refuse two bodies at once."""
+        given = [f"--{one.name}" for one in fields(self) if getattr(self, one.name)]
+        if len(given) > 1:
+            raise BadInput(f"{given[0]} and {given[1]} at once; expected one of them")
+
+    def __call__(self, design: "Design") -> "Body":
+        """The body of a design."""
+        from sensorgen.prediction import bodies
+
+        if self.drawn:
+            given = click.get_current_context().params
+            if given.get("infill") or given.get("infill_pattern"):  # which would do nothing
+                raise BadInput(
+                    "--drawn and --infill at once: a drawing is solid; leave out --drawn to predict the print"
+                )
+            return bodies.drawn(design)
+        if self.gcode:
+            return bodies.from_gcode(design, self.gcode)
+        if self.slicer:
+            return sliced(self.slicer, design)
+        return bodies.estimated(design, self.walls) if self.walls else bodies.default_body(design)
+
+    def printed(self, design: "Design") -> "tuple[Printed | None, PrintReview]":
+        """The print of a design, None for the drawing, and all findings about it."""
+        from sensorgen.checks.review import STEPS, review
+        from sensorgen.prediction import bodies, slices
+
+        with show.progress((*STEPS, "slicing")) as step:
+            if self.gcode:
+                printed = bodies.registered(design, Path(self.gcode))
+                return printed, slices.combined(design, review(design, step), printed.provenance, printed.findings())
+            findings = slices.reviewed(design, step, self.slicer, walls=self.walls)
+            return None if self.drawn else findings.printed(design, self.walls), findings
 
 
-def body_options() -> list[click.Parameter]:
-    """``--drawn``, ``--gcode``, ``--slicer`` and ``--walls``; :func:`body_of` obeys them."""
-    return [
-        click.Option(
-            ["--drawn"], is_flag=True, expose_value=False, callback=_choose, help="The drawing, in place of the print.",
-        ),
-        click.Option(
-            ["--gcode"], metavar="FILE", expose_value=False, callback=_choose,
-            help="The print by this file, whoever has sliced it; if not given, the G-code in out/NAME, else by the "
-            "slicer that is installed (SENSORGEN_SLICER: prusa, cura or none), else an estimate.",
-        ),
-        click.Option(
-            ["--slicer"], type=OneOf(SLICERS), expose_value=False, callback=_choose, help="Slice now for the print.",
-        ),
-        click.Option(
-            ["--walls"], type=OneOf(WALLS), expose_value=False, callback=_choose,
-            help="Estimate the print for these walls alone; for all of them if not given, Arachne's as the best value.",
-        ),
-    ]  # fmt: skip
-
-
-def _choose(ctx: click.Context, param: click.Parameter, value: str | bool | None) -> None:
-    if value:
-        option = param.opts[0]
-        if other := ctx.meta.get(_BODY):
-            raise BadInput(f"{other[0]} and {option} at once; expected one of them")
-        ctx.meta[_BODY] = option, value
-
-
-def body_of() -> "BodyOf":
-    """Makes the body of a design that the options ask for."""
-    from sensorgen.prediction import bodies
-
-    option, value = click.get_current_context().meta.get(_BODY, ("", ""))
-    ways: dict[str, BodyOf] = {
-        "": bodies.default_body,
-        "--drawn": _drawn,
-        "--gcode": partial(bodies.from_gcode, file=value),
-        "--slicer": partial(_sliced, value),
-        "--walls": partial(bodies.estimated, walls=value),
-    }
-    return ways[option]
-
-
-def _drawn(design: "Design") -> "Body":
-    """The drawing, which is solid: infill that was asked for on the command line would do nothing."""
-    from sensorgen.prediction import bodies
-
-    given = click.get_current_context().params
-    if given.get("infill") or given.get("infill_pattern"):
-        raise BadInput("--drawn and --infill at once: a drawing is solid; leave out --drawn to predict the print")
-    return bodies.drawn(design)
-
-
-def compensate_option() -> click.Option:
-    """``--compensate``, for commands that make files."""
-    return click.Option(
-        ["--compensate"], type=OneOf(("print", "bake", "stiffness")),
-        help="Change the design so that what is asked for comes out: whole layers, widths of a line, electrode gap and "
+Compensate = Annotated[
+    str,
+    Option(
+        "Change the design so that what is asked for comes out: whole layers, widths of a line, electrode gap and "
         "capacitance; with bake also larger by the 20 % that the bake takes off; with stiffness as stiff, too.",
-    )  # fmt: skip
+        kind=("print", "bake", "stiffness"),
+    ),
+]
 
 
 def compensated(
-    design: "Design", word: str | None, walls: str, slicer: str = "", program: str = ""
-) -> "tuple[Design, list[Change]]":
+    design: "Design", word: str, walls: str, slicer: str = "", program: str = "",
+) -> "tuple[Design, list[Change]]":  # fmt: skip
     """The design to print, and what was changed; by a real slicer's prints where one is named, else by the estimate."""
-    if word is None:
+    if not word:
         return design, []
     from sensorgen.workflows.compensation import compensated as changed
 
-    sliced = partial(_sliced, slicer, program=program) if slicer else None
     with show.progress(("designs",)) as step:
-        found, changes = changed(
-            design, walls, bake=word == "bake", stiffness=word == "stiffness", sliced=sliced, step=step
-        )
+        printable, changes = changed(
+            design, walls, bake=word == "bake", stiffness=word == "stiffness",
+            sliced=partial(sliced, slicer, program=program) if slicer else None, step=step,
+        )  # fmt: skip
     if not changes:
         render.say(f"--compensate {word}: nothing to change, by the estimate for {walls} walls", err=True)
-    return found, changes
+    return printable, changes
 
 
-def printed_of(design: "Design") -> "tuple[Printed | None, PrintReview]":
-    """The print of a design by the options, None for the drawing, and all findings about it."""
-    from sensorgen.checks.review import STEPS, review
-    from sensorgen.prediction import bodies, slices
-
-    option, value = click.get_current_context().meta.get(_BODY, ("", ""))
-    with show.progress((*STEPS, "slicing")) as step:
-        if option == "--gcode":
-            printed = bodies.registered(design, Path(value))
-            return printed, slices.combined(design, review(design, step), printed.provenance, printed.findings())
-        slicer, walls = (value if option == name else "" for name in ("--slicer", "--walls"))
-        held = slices.reviewed(design, step, slicer, walls=walls)
-        return None if option == "--drawn" else held.printed(design, walls), held
-
-
-def _sliced(slicer: str, design: "Design", program: str = "") -> "Body":
+def sliced(slicer: str, design: "Design", program: str = "") -> "Body":
+    """The print of a design by a slicer."""
     from sensorgen.export import slicing
-    from sensorgen.prediction import bodies, slices
+    from sensorgen.prediction import bodies, print_files
 
     with show.progress(slicing.STEPS) as step:
-        return bodies.of_file(design, slices.at_hand(design, None, slicer, step, program)[0])
+        return bodies.of_file(design, print_files.at_hand(design, None, slicer, step, program)[0])

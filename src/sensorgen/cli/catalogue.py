@@ -170,16 +170,20 @@ def all_packs() -> Catalogue:
     entries: dict[str, Entry] = {}
     for pack in packs.everywhere():
         counts = {kind: len(pack.names(kind)) for kind in packs.SINGULAR}
-        holds = ", ".join(f"{n} {packs.SINGULAR[kind] if n == 1 else kind}" for kind, n in counts.items() if n)
-        if holds:
-            try:
-                about, version = pack.manifest.about, pack.version
-            except SensorgenError as error:
-                about, version = f"cannot be used: {error}", ""
+        files = ", ".join(f"{n} {packs.SINGULAR[kind] if n == 1 else kind}" for kind, n in counts.items() if n)
+        if files:
             name = pack.name if pack.name not in entries else f"{pack.name} ({pack.where})"
-            values = (holds,) if about else ()
-            entries[name] = Entry(about or holds, values, pack.name, version, pack.where, str(pack.folder))
+            entries[name] = _pack(pack, files)
     return Catalogue(entries)
+
+
+def _pack(pack: packs.Pack, files: str) -> Entry:
+    try:
+        about, version = pack.manifest.about, pack.version
+    except SensorgenError as error:
+        about, version = f"cannot be used: {error}", ""
+    values = (files,) if about else ()
+    return Entry(about or files, values, pack.name, version, pack.where, str(pack.folder))
 
 
 def models() -> Catalogue:

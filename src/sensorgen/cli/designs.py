@@ -4,16 +4,17 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import click
-from click.shell_completion import CompletionItem
 
-from sensorgen.cli.settings import pairs
-from sensorgen.cli.words import Length, OneOf, Share, completed
+from sensorgen.cli.commands import FirstWord, Work, arguments, described, ended, flag_of, options_of
+from sensorgen.cli.options import DesignTip
+from sensorgen.cli.words import Length, OneOf, completed, pairs
 from sensorgen.core import plugins as registry
 from sensorgen.core import units
-from sensorgen.core.errors import BadInput, SensorgenError, within
+from sensorgen.core.errors import BadInput, within
+from sensorgen.core.options import Option
 from sensorgen.design import shapes
 
 if TYPE_CHECKING:
@@ -21,28 +22,37 @@ if TYPE_CHECKING:
     from sensorgen.design.shape_files import Shape
 
 Data = dict[str, Any]
-Work = Callable[..., int]
 Parts = Callable[["Design", Data], "Sequence[Design]"]
 
 
-class DesignGroup(click.Group):
+@dataclasses.dataclass(frozen=True)
+class _TipOption:
+    """Tip in place of the design's own."""
+
+    tip: DesignTip = None
+
+
+class DesignGroup(FirstWord):
     """A command whose first word is a shape or a design file; each shape brings its own options."""
 
+    thing, form = "shape", "{{SHAPE|DESIGN.yaml}} {option} ..."
+
     def __init__(
-        self, work: Work, own: list[click.Parameter], parts: Parts = lambda design, _: (design,), **attributes: Any
-    ) -> None:
-        """``work`` gets the design and the values of the command's ``own`` options; it returns the exit code.
+        self, name: str, work: Work, *more: click.Parameter, tip: bool = False, parts: Parts | None = None,
+        **attributes: Any,
+    ) -> None:  # fmt: skip
+        """Command of a function, which gets the design and the values of its own options; ``more`` come after them.
 
         ``parts`` names the designs that it is done with in turn, by the design and these values.
         """
         super().__init__(
-            options_metavar="",
+            name,
             subcommand_metavar="{SHAPE|DESIGN.yaml} [OPTIONS]",
             epilog="SHAPE --help lists the options of the shape and of its print, too.",
-            context_settings={"ignore_unknown_options": True},
             **attributes,
         )
-        self.work, self.own, self.parts = work, own, parts
+        self.work, self.parts = work, parts or (lambda design, _: (design,))
+        self.own = [*(options_of(_TipOption) if tip else []), *options_of(work), *more]
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         """Names of the shapes."""
@@ -62,25 +72,6 @@ class DesignGroup(click.Group):
             base = _of_packs(base, Path(name).parent)
             return self._command(name, _shape_of(base), base)
 
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Take the first word; an option in its place is the user's slip."""
-        if ctx.resilient_parsing:  # the shell asks for words to complete
-            try:
-                return args[0], self.get_command(ctx, args[0]), args[1:]
-            except SensorgenError:
-                return None, None, []
-        if args[0].startswith("-"):
-            raise BadInput(
-                f"{args[0]} stands before the shape; write {ctx.command_path} {{SHAPE|DESIGN.yaml}} {args[0]} ..."
-            )
-        return args[0], self.get_command(ctx, args[0]), args[1:]
-
-    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Files, and the shapes."""
-        return [CompletionItem(incomplete, type="file"), *super().shell_complete(ctx, incomplete)]
-
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the command's options, then the shapes."""
         with formatter.section("Options"):
@@ -92,9 +83,10 @@ class DesignGroup(click.Group):
         def run(**given: Any) -> int:
             own = {p.name: given.pop(p.name) for p in self.own if p.name in given}
             given["tip"] = own.pop("tip", None)
-            return max(self.work(part, **own) for part in self.parts(_design(base, given, name), own))
+            parts = self.parts(_design(base, given, name), own)
+            return max(ended(self.work(part, **arguments(self.work, own))) for part in parts)
 
-        others = [*_design_options(), *self.own]
+        others = [*options_of(DesignOptions), *self.own]
         params = _parameter_options(module.Params, {word for other in others for word in other.opts}) if module else []
         about = _about(module)
         return click.Command(
@@ -104,6 +96,21 @@ class DesignGroup(click.Group):
             help=about,
             short_help=about.partition("\n")[0],
         )
+
+
+def of_design(
+    name: str, *more: click.Parameter, tip: bool = False, group: click.Group | None = None, about: str = "",
+    **attributes: Any,
+) -> Callable[[Work], DesignGroup]:  # fmt: skip
+    """Make a command on designs of a function; with ``tip``, its designs may be given another one that presses."""
+
+    def made(work: Work) -> DesignGroup:
+        one = DesignGroup(name, work, *more, tip=tip, help=about or described(work)[0], **attributes)
+        if group is not None:
+            group.add_command(one)
+        return one
+
+    return made
 
 
 def _of_packs(base: Data, folder: Path) -> Data:
@@ -150,16 +157,11 @@ ARRAY = "array"  # shape of crossing tracks, with cells of another one
 _OF_SHAPE = "of_shape_"  # before names of parameters, which a command's own may equal
 
 
-def option_of(field: str) -> str:
-    """Option for a parameter: ``hang_height_mm`` is ``--hang-height``."""
-    return "--" + field.removesuffix("_mm").removesuffix("_deg").replace("_", "-")
-
-
 def _parameter_options(params: type, taken: set[str]) -> list[click.Parameter]:
     """Options for a shape's parameters; one that the command has itself is led by "shape", as ``--shape-tip``."""
     options: list[click.Parameter] = []
     for field in dataclasses.fields(params):
-        choices, option = field.metadata.get("choices"), option_of(field.name)
+        choices, option = field.metadata.get("choices"), flag_of(field.name)
         option = f"--shape{option[1:]}" if option in taken else option
         options.append(
             click.Option(
@@ -179,101 +181,119 @@ def _plainly(default: Any) -> str:
     return f"{default:g}" if isinstance(default, float) else str(default)
 
 
-def _design_options() -> list[click.Parameter]:
-    def option(flag: str, metavar: str | None, about: str, **more: Any) -> click.Option:
-        return click.Option([*flag.split()], metavar=metavar, help=about, **more)
+@dataclasses.dataclass(frozen=True)
+class DesignOptions:
+    """Options that stand for keys of a design file.
 
-    return [
-        option("--size", "LxW", "Length and width at once, as in 100x10."),
-        option(
-            "--orientation", None, "How it lies on the bed; as-drawn if not given.",
-            type=OneOf(["as-drawn", "upside-down"]),
-        ),
-        option(
-            "--support", "MATERIAL", "Fill the air with a soluble support: bvoh, pla, none.",
-            shell_complete=completed(lambda: ["bvoh", "none", "pla"]),
-        ),
-        option(
-            "--material", "PART=NAME[@SOURCE]",
-            "Material of a part (electrode, top_electrode, film, dielectric ...) and the source of its values.",
-            multiple=True,
-        ),
-        option(
-            "--printer", "NAME", "A printer that is listed, or a YAML file; diabase-h5 if not given.",
-            shell_complete=completed(_printers),
-        ),
-        option(
-            "--quality", "NAME", "A quality that is listed, or a YAML file; fine if not given.",
-            shell_complete=completed(_qualities),
-        ),
-        option("--nozzle nozzle_mm", None, "Nozzle diameter, when not the printer's own.", type=Length()),
-        option("--tool", "MATERIAL=NUMBER", "Tool of a material, in the printer's numbers.", multiple=True),
-        option(
-            "--infill", "[MATERIAL=]PERCENT", "Infill of a material; of the dielectric if none is named.", multiple=True
-        ),
-        option("--infill-pattern", "[MATERIAL=]PATTERN", "Pattern of the infill: rectilinear, grid ...", multiple=True),
-        option("--border", "FILE", "Outline of the sensor in plan, an SVG or DXF file; its size is the sensor's."),
-        option("--shrinkage", "SHARE", "Shrinkage in the plane to print against, as in 0.2.", type=Share()),
-        option(
-            "--set settings", "KEY=VALUE",
-            "Any parameter, a material's value as eps_x60=3.0, or a key of the design file as infill.x60.percent=80.",
-            multiple=True,
-        ),
-        option("--name", None, "Name of folder and files; made from the parameters if not given."),
-    ]  # fmt: skip
+    Stated here and not in :class:`sensorgen.design.design.Design`, which loads pydantic: ``--help`` does without.
+
+    Attributes
+    ----------
+    size : LxW
+        Length and width at once, as in 100x10.
+    orientation
+        How it lies on the bed; as-drawn if not given.
+    support : MATERIAL
+        Fill the air with a soluble support: bvoh, pla, none.
+    material : PART=NAME[@SOURCE]
+        Material of a part (electrode, top_electrode, film, dielectric ...) and the source of its values.
+    printer : NAME
+        A printer that is listed, or a YAML file; diabase-h5 if not given.
+    quality : NAME
+        A quality that is listed, or a YAML file; fine if not given.
+    nozzle_mm
+        Nozzle diameter, when not the printer's own.
+    tool : MATERIAL=NUMBER
+        Tool of a material, in the printer's numbers.
+    infill : [MATERIAL=]PERCENT
+        Infill of a material; of the dielectric if none is named.
+    infill_pattern : [MATERIAL=]PATTERN
+        Pattern of the infill: rectilinear, grid ...
+    border : FILE
+        Outline of the sensor in plan, an SVG or DXF file; its size is the sensor's.
+    shrinkage
+        Shrinkage in the plane to print against, as in 0.2.
+    settings, --set : KEY=VALUE
+        Any parameter, a material's value as eps_x60=3.0, or a key of the design file as infill.x60.percent=80.
+    name
+        Name of folder and files; made from the parameters if not given.
+    """
+
+    size: str | None = None
+    orientation: Annotated[str | None, Option(kind=("as-drawn", "upside-down"))] = None
+    support: Annotated[str | None, Option(more={"shell_complete": completed(lambda: ["bvoh", "none", "pla"])})] = None
+    material: tuple[str, ...] = ()
+    printer: Annotated[str | None, Option(more={"shell_complete": completed(lambda: _listed("printers"))})] = None
+    quality: Annotated[str | None, Option(more={"shell_complete": completed(lambda: _listed("qualities"))})] = None
+    nozzle_mm: Annotated[float | None, Option(kind="length")] = None
+    tool: tuple[str, ...] = ()
+    infill: tuple[str, ...] = ()
+    infill_pattern: tuple[str, ...] = ()
+    border: str | None = None
+    shrinkage: Annotated[float | None, Option(kind="share")] = None
+    settings: tuple[str, ...] = ()
+    name: str | None = None
+
+    def changes(self, base: Data) -> Data:
+        """The part of a design file that the options stand for; None or {} of what was not given."""
+        slots: Data = {}
+        for part, value in pairs(self.material, "--material"):
+            slots |= {"top_electrode": value, "bottom_electrode": value} if part == "electrode" else {part: value}
+        if self.support is not None:
+            slots["support"] = None if self.support == "none" else self.support
+        return {
+            "parameters": {} if self.size is None else _size(self.size),
+            "materials": slots,
+            "tools": {key: _number(value, "--tool", int) for key, value in pairs(self.tool, "--tool")},
+            "infill": self._infill(_dielectric(base, slots)),
+            "border": None if self.border is None else str(Path(self.border).absolute()),
+            **{key: getattr(self, key) for key in ("orientation", "printer", "quality", "nozzle_mm", "shrinkage")},
+        }
+
+    def _infill(self, dielectric: str) -> Data:
+        infill: Data = {}
+        for words, key in ((self.infill, "percent"), (self.infill_pattern, "pattern")):
+            for word in words:
+                material, _, value = word.rpartition("=")
+                entry = _number(value.removesuffix("%"), "--infill", float) if key == "percent" else value
+                infill.setdefault(material or dielectric, {})[key] = entry
+        return infill
 
 
-def _printers() -> list[str]:
+def _listed(kind: Any) -> list[str]:
     from sensorgen.design import packs
 
-    return packs.names("printers")
-
-
-def _qualities() -> list[str]:
-    from sensorgen.design import packs
-
-    return packs.names("qualities")
+    return packs.names(kind)
 
 
 def _design(base: Data, given: Data, word: str) -> "Design":
+    """The design of a file or a shape with the options that were given."""
     from sensorgen.design import design, packs, settings
 
-    unnamed = {k: v for k, v in base.items() if k != "name"}
+    name, unnamed = base.get("name"), {k: v for k, v in base.items() if k != "name"}
     if isinstance(unnamed.get("materials"), dict):
         unnamed["materials"] = packs.slots(unnamed["materials"])
-    data = settings.merged(unnamed, _changes(base, given))
-    if given["name"] is not None:
-        data["name"] = given["name"]
-    elif data == unnamed and "name" in base:
-        data["name"] = base["name"]
+    chosen = DesignOptions(**arguments(DesignOptions, given))
+    parameters = _of_shape(given)
+    data = settings.merged(unnamed, _given(chosen.changes(base) | {"tip": given["tip"]}, parameters))
+    for key, value in pairs(chosen.settings, "--set"):
+        data = settings.merged(data, settings.setting(key, value, set(parameters)))
+    name = name if chosen.name is None and data == unnamed else chosen.name
+    if name is not None:
+        data["name"] = name
     return design.make(data, word if _is_file(word) else "")
 
 
-def _changes(base: Data, given: Data) -> Data:
-    """The options that were given, as the part of a design file that they stand for."""
-    from sensorgen.design.settings import merged, setting
+def _of_shape(given: Data) -> Data:
+    """Parameters of the shape, None where they were not given."""
+    return {key.removeprefix(_OF_SHAPE): value for key, value in given.items() if key.startswith(_OF_SHAPE)}
 
-    known = {f.name for f in dataclasses.fields(shape.Params)} if (shape := _shape_of(base)) else set()
-    parameters = {k: given[_OF_SHAPE + k] for k in known if given.get(_OF_SHAPE + k) is not None}
-    parameters |= _size(given["size"]) if given["size"] is not None else {}
-    slots = _slots(given["material"]) | _support(given["support"])
-    dielectric = _dielectric(base, slots)
-    changes = {
-        "parameters": parameters,
-        "materials": slots,
-        "tools": {key: _integer(value, "--tool") for key, value in pairs(given["tool"], "--tool")},
-        "infill": _infill(given, dielectric),
-        **{
-            k: given[k] for k in ("orientation", "printer", "quality", "nozzle_mm", "shrinkage") if given[k] is not None
-        },
-    }
-    if given["border"] is not None:
-        changes["border"] = str(Path(given["border"]).absolute())
-    if given["tip"]:
-        changes["tip"] = given["tip"]
-    for key, value in pairs(given["settings"], "--set"):
-        changes = merged(changes, setting(key, value, known))
-    return {k: v for k, v in changes.items() if v != {}}
+
+def _given(changes: Data, parameters: Data) -> Data:
+    """Changes of a design and of its shape's parameters, without those that were not given; a material may be none."""
+    given = {key: value for key, value in parameters.items() if value is not None}
+    changes["parameters"] = given | changes["parameters"]
+    return {key: value for key, value in changes.items() if value not in (None, {})}
 
 
 def _size(text: str) -> Data:
@@ -284,44 +304,15 @@ def _size(text: str) -> Data:
     return {"length_mm": length, "width_mm": width}
 
 
-def _slots(words: tuple[str, ...]) -> Data:
-    slots: Data = {}
-    for part, value in pairs(words, "--material"):
-        slots |= {"top_electrode": value, "bottom_electrode": value} if part == "electrode" else {part: value}
-    return slots
-
-
-def _support(word: str | None) -> Data:
-    if word is None:
-        return {}
-    return {"support": None if word == "none" else word}
-
-
 def _dielectric(base: Data, slots: Data) -> str:
-    own = base.get("materials")
-    named = slots.get("dielectric") or (own.get("dielectric") if isinstance(own, dict) else None) or "x60"
+    """Name of the dielectric's material."""
+    stated = base.get("materials")
+    named = slots.get("dielectric") or (stated.get("dielectric") if isinstance(stated, dict) else None) or "x60"
     return str(named).partition("@")[0]
 
 
-def _infill(given: Data, dielectric: str) -> Data:
-    found: Data = {}
-    for option, key in (("infill", "percent"), ("infill_pattern", "pattern")):
-        for word in given[option]:
-            material, _, value = word.rpartition("=")
-            entry = _number(value.removesuffix("%"), "--infill") if key == "percent" else value
-            found.setdefault(material or dielectric, {})[key] = entry
-    return found
-
-
-def _integer(value: str, option: str) -> int:
+def _number(value: str, option: str, kind: type[int] | type[float]) -> float:
     try:
-        return int(value)
+        return kind(value)
     except ValueError:
-        raise BadInput(f"{option}: {value!r} is not a whole number") from None
-
-
-def _number(value: str, option: str) -> float:
-    try:
-        return float(value)
-    except ValueError:
-        raise BadInput(f"{option}: {value!r} is not a number") from None
+        raise BadInput(f"{option}: {value!r} is not a {'whole ' if kind is int else ''}number") from None

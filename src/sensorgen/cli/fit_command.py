@@ -4,88 +4,85 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from sensorgen.cli import body_options, log_words, options, render, show
+from sensorgen.cli import render, show
+from sensorgen.cli.body_options import BodyChoice
+from sensorgen.cli.commands import command as of_function
+from sensorgen.cli.log_words import LogFile
+from sensorgen.cli.options import BenchTip, DryRun
 from sensorgen.core.errors import BadInput
+from sensorgen.core.options import Option
 
 if TYPE_CHECKING:
     from sensorgen.analysis.fit import Fit
     from sensorgen.measure.log import Log
 
+Iteration = Annotated[int | None, Option(kind=click.IntRange(0))]
+SERIES = 23  # of --thesis
 
-def _work(
-    specimens: tuple[str, ...], iteration: int | None, file: str | None, output: str | None, seed: int,
-    tip: dict[str, object] | None, force_offset: str, *, thesis: bool, dry_run: bool,
+
+@of_function("fit", *render.options(file=False))
+def command(
+    specimens: tuple[str, ...] = (), *, iteration: Iteration = None, thesis: bool = False, log: LogFile,
+    output: Path | None = None, seed: int = 23, bench: BenchTip, body: BodyChoice, dry_run: DryRun = False,
 ) -> None:  # fmt: skip
     """Fit material values to what was measured of specimens or of an iteration, and keep them as a source.
 
     Specimens that the bench or an LCR meter measured are calibrated, as by 'sensorgen calibrate'; the values hold for
     all prints, their intervals the scatter between them. A design takes them by the source's name, as etpu@fit-23. A
     quarter of the specimens is held back to test the values, and each shape and direction is left out in turn.
+
+    Parameters
+    ----------
+    specimens : [SPECIMEN...]
+    iteration
+        Of the design, in place of specimens.
+    thesis
+        Series 23 of the thesis's Table D.1, none held back, no log.
+    output, --output, -o : FILE
+        File to write instead of the source's own.
+    seed
+        Of the split.
     """
     from dataclasses import replace
 
     from sensorgen.analysis.fit import STEPS, fit, text
     from sensorgen.analysis.fit.fitting import HELD_BACK
-    from sensorgen.core import files as store
+    from sensorgen.core import files
     from sensorgen.design.materials import own
 
     if bool(specimens) + (iteration is not None) + thesis != 1:
         raise BadInput("expected either specimens, as in 'sensorgen fit S1 S2', --iteration or --thesis")
-    bench = options.bench_of(tip, force_offset)
-    which, share = _WHICH.get(thesis, (iteration, HELD_BACK))
-    with _opened(file, thesis=thesis) as log, show.progress(STEPS) as step:
-        made = fit(log, which, seed, body_options.body_of(), step, bench, specimens=specimens, held_share=share)
-    if made.values and not dry_run:
-        path = Path(output) if output else own.path(made.source)
-        store.replace(path, text(made).encode())
-        made = replace(made, file=str(path))
-    render.deliver(made)
-    if made.file and not output and not render.form():
-        render.say(f"take them with {_taken(made)}")
-
-
-_WHICH = {True: (23, 0.0)}  # iteration of --thesis, and the share that is held back
+    which, share = (SERIES, 0.0) if thesis else (iteration, HELD_BACK)
+    pressed = bench.bench()
+    with _thesis() if thesis else log.opened() as rows, show.progress(STEPS) as step:
+        values = fit(rows, which, seed, body, step, pressed, specimens=specimens, held_share=share)
+    if values.values and not dry_run:
+        path = output or own.path(values.source)
+        files.replace(path, text(values).encode())
+        values = replace(values, file=str(path))
+    render.deliver(values)
+    if values.file and not output and not render.form():
+        render.say(f"take them with {_options(values)}")
 
 
 @contextmanager
-def _opened(file: str | None, *, thesis: bool) -> "Iterator[Log]":
-    """The log, or one of Table D.1 alone that is not kept."""
+def _thesis() -> "Iterator[Log]":
+    """A log of Table D.1 alone that is not kept."""
     from sensorgen.measure.log import Log, importing
 
-    if not thesis:
-        with log_words.opened(file) as log:
-            yield log
-        return
     with TemporaryDirectory() as folder, Log(Path(folder) / "log.db", create=True) as log:
         importing.thesis(log)
         yield log
 
 
-def _taken(made: "Fit") -> str:
-    """Command by which the next design takes the values."""
+def _options(values: "Fit") -> str:
+    """Options by which the next design takes the values."""
     from sensorgen.design.design import material
 
-    named = dict.fromkeys(value.material for value in made.values)
+    named = dict.fromkeys(value.material for value in values.values)
     parts = {name: "electrode" if material(name).conductor else "dielectric" for name in named}
-    return " ".join(f"--material {part}={name}@{made.source}" for name, part in parts.items())
-
-
-command = click.Command(
-    "fit", callback=_work, help=_work.__doc__,
-    params=[
-        click.Argument(["specimens"], nargs=-1, metavar="[SPECIMEN...]"),
-        click.Option(["--iteration"], type=click.IntRange(0), help="Of the design, in place of specimens."),
-        click.Option(["--thesis"], is_flag=True, help="Series 23 of the thesis's Table D.1, none held back, no log."),
-        log_words.where(),
-        click.Option(["--output", "-o"], metavar="FILE", help="File to write instead of the source's own."),
-        click.Option(["--seed"], type=int, default=23, show_default=True, help="Of the split."),
-        *options.bench(),
-        *body_options.body_options(),
-        click.Option(["--dry-run"], is_flag=True, help="Write no file."),
-        *render.options(file=False),
-    ],
-)  # fmt: skip
+    return " ".join(f"--material {part}={name}@{values.source}" for name, part in parts.items())

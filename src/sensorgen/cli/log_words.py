@@ -1,60 +1,73 @@
-"""Options that the commands of ``sensorgen log`` and ``bench`` share, and the log that they name."""
+"""Log that commands read and write, and columns of files that are logged."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli.settings import pairs
+from sensorgen.cli.words import pairs
 
 if TYPE_CHECKING:
     from sensorgen.measure.log import Log
 
 
-def where() -> click.Option:
-    """Option of the log's place."""
-    about = "The log; what SENSORGEN_LOG says, or the one of this user, if not given."
-    return click.Option(["--log", "file"], metavar="FILE", help=about)
+@dataclass(frozen=True)
+class LogFile:
+    """The log that ``--log`` names, or the usual one.
+
+    Attributes
+    ----------
+    file, --log : FILE
+        The log; what SENSORGEN_LOG says, or the one of this user, if not given.
+    """
+
+    file: Path | None = None
+
+    def opened(self, *, create: bool = False) -> "Log":
+        """Open the log."""
+        from sensorgen.measure.log import Log, place
+
+        return Log(self.file or place(), create=create)
+
+    def of_command(self, *, create: bool = False) -> "Log":
+        """The log, open until the command has ended."""
+        log: Log = click.get_current_context().with_resource(self.opened(create=create))
+        return log
+
+    @contextmanager
+    def existing(self) -> Iterator["Log | None"]:
+        """The log, or None where ``--log`` names none and there is none yet."""
+        from sensorgen.measure.log import place
+
+        if self.file is None and not place().exists():
+            yield None
+            return
+        with self.opened() as log:
+            yield log
 
 
-def recorded_columns() -> list[click.Parameter]:
-    """Names of columns in an instrument's CSV, and in a rig's log."""
-    about = "Column of the readings' file, if it is CSV and calls it otherwise: time_s, stamp_s, re_ohm_1.1kHz ..."
-    return [
-        click.Option(["--column", "columns"], metavar="OURS=THEIRS", multiple=True, help=about),
-        click.Option(
-            ["--rig-column", "rig_columns"], metavar="OURS=THEIRS", multiple=True,
-            help="Column of the rig's log: time_s, set_force_n, set_position_mm, force_n, error.",
-        ),
-    ]  # fmt: skip
+@dataclass(frozen=True)
+class ColumnNames:
+    """Names of columns in an instrument's CSV, and in a rig's log.
 
+    Attributes
+    ----------
+    columns, --column : OURS=THEIRS
+        Column of the readings' file, if it is CSV and calls it otherwise: time_s, stamp_s, re_ohm_1.1kHz ...
+    rig_columns, --rig-column : OURS=THEIRS
+        Column of the rig's log: time_s, set_force_n, set_position_mm, force_n, error.
+    """
 
-def made(work: Callable[..., Any], name: str, about: str, *params: click.Parameter) -> click.Command:
-    """A command that does some work, its help being what the work's docstring says."""
-    return click.Command(name, params=list(params), callback=work, help=work.__doc__, short_help=about)
+    columns: tuple[str, ...] = ()  # fmt: skip
+    rig_columns: tuple[str, ...] = ()  # fmt: skip
 
+    def of_readings(self) -> dict[str, str]:
+        """Names in the readings' file to ours."""
+        return {theirs: ours for ours, theirs in pairs(self.columns, "--column")}
 
-def opened(file: str | None, *, create: bool = False) -> "Log":
-    """The log that ``--log`` names, or the usual one."""
-    from sensorgen.measure.log import Log, place
-
-    return Log(Path(file) if file else place(), create=create)
-
-
-@contextmanager
-def existing(file: str | None) -> Iterator["Log | None"]:
-    """The log, or None where ``--log`` names none and there is none yet."""
-    from sensorgen.measure.log import place
-
-    if file is None and not place().exists():
-        yield None
-        return
-    with opened(file) as log:
-        yield log
-
-
-def columns_of(words: tuple[str, ...], option: str) -> dict[str, str]:
-    """Columns given by OURS=THEIRS: names in the file, to ours."""
-    return {theirs: ours for ours, theirs in pairs(words, option)}
+    def of_rig(self) -> dict[str, str]:
+        """Names in the rig's log to ours."""
+        return {theirs: ours for ours, theirs in pairs(self.rig_columns, "--rig-column")}

@@ -1,154 +1,227 @@
-"""Options that several commands have."""
+"""Options that several commands have: each a type, to annotate a parameter with, or a record of several."""
 
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import click
+from click.core import ParameterSource
 
-from sensorgen.cli import render
-from sensorgen.cli.words import OneOf, Ratio, Share, TipWords, Values
+from sensorgen.cli import render, show
+from sensorgen.cli.words import NumberRange, pairs
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
+from sensorgen.core.options import Option
 
 if TYPE_CHECKING:
     from sensorgen.analysis.calibration import Bench
+    from sensorgen.design.body import BodyOf
+    from sensorgen.design.design import Design
+    from sensorgen.workflows.changes import Advice, Change
 
-
-def option(
-    flags: str, kind: "click.ParamType[Any] | None", about: str, *, default: str | None = None,
-    metavar: str | None = None, multiple: bool = False,
-) -> click.Option:  # fmt: skip
-    """An option; its flags with the parameter's name where that is another one: ``--tip tip_mm``."""
-    return click.Option(
-        flags.split(), type=kind, default=default, show_default=default is not None, metavar=metavar, multiple=multiple,
-        help=about,
-    )  # fmt: skip
-
-
-def flag(name: str, about: str) -> click.Option:
-    """An option without a value."""
-    return click.Option([name], is_flag=True, help=about)
-
-
-def accuracy(about: str) -> click.Option:
-    """``--accuracy``, a number above 0."""
-    return option("--accuracy", Ratio(), about)
-
-
-def compression(
-    *laws: str, about: str = "Compression law of a plate; the best of the cell if not given."
-) -> click.Option:
-    """``--compression``: a law of plates, or one of ``laws``."""
-    return option("--compression", OneOf(("unconfined", "bonded", *laws)), about)
-
-
-def sides() -> click.Option:
-    """``--sides``, one of the boundary conditions."""
-    about = (
-        "Sides of the sensor: bonded, its solids stick to electrodes and base, and a plate bulges at its edges; free, "
-        "it widens as it likes (B.49); symmetric, one of unlimited cells."
-    )
-    return option("--sides", OneOf(("bonded", "free", "symmetric")), about, default="bonded")
-
-
-def force() -> click.Option:
-    """``--force``, one [N]."""
-    return option("--force force_n", Values(units.FORCE_N, zero=False), "Force of the press.", default="6N")
-
-
-def of_design_tip() -> click.Option:
-    """``--tip`` of the design: :class:`sensorgen.cli.designs.DesignGroup` sets it."""
-    about = (
+Strict = Annotated[bool, Option("Treat warnings as errors.")]
+Explain = Annotated[bool, Option("Print which models were used, and their cost and error.")]
+NoCache = Annotated[bool, Option("Solve anew, and keep nothing.")]
+DryRun = Annotated[bool, Option("Write no file.")]
+Out = Annotated[Path, Option("Folder for the designs' folders.", metavar="DIR")]
+TimeLimit = Annotated[float, Option("End the slicer after this time.", ("--time-limit",), "seconds", metavar="SECONDS")]
+DesignTip = Annotated[
+    dict[str, Any] | None,
+    Option(
         "What presses: its width, then stiff, even or a block's material with its height, as 5mm,stiff or "
-        "ninjaflex,10mm; the design's if not given."
-    )
-    return option("--tip", TipWords(), about)
+        "ninjaflex,10mm; the design's if not given.", kind="tip",
+    ),
+]  # fmt: skip
+Law = Annotated[
+    str,
+    Option(
+        "Compression law of a plate; the best of the cell if not given.", ("--compression",), ("unconfined", "bonded")
+    ),
+]
+Sides = Annotated[
+    str,
+    Option(
+        "Sides of the sensor: bonded, its solids stick to electrodes and base, and a plate bulges at its edges; free, "
+        "it widens as it likes (B.49); symmetric, one of unlimited cells.", kind=("bonded", "free", "symmetric"),
+    ),
+]  # fmt: skip
+Force = Annotated[float, Option("Force of the press.", typed="6N")]
+Readout = Annotated[
+    str,
+    Option(
+        "Of an array: guarded, a row is driven and all other tracks are at 0 V; or two-terminal, a meter between two "
+        "and the rest open.", kind=("guarded", "two-terminal"),
+    ),
+]  # fmt: skip
+InputResistance = Annotated[
+    float, Option("Of an array, guarded: input resistance of a terminal.", kind="ratio", typed="50", metavar="OHM")
+]
+Jobs = Annotated[
+    int | None, Option("Processes at once; one for each core if not given.", kind=click.IntRange(1, 64), metavar="N")
+]
+Cluster = Annotated[
+    str,
+    Option(
+        "Work on a Dask cluster: its scheduler's address, as tls://10.0.0.5:8786, or its scheduler file.",
+        metavar="ADDRESS",
+    ),
+]
 
 
-def tip(flags: str, about: str) -> click.Option:
-    """Length of a tip, one [mm]."""
-    return option(flags, Values(units.LENGTH_MM, zero=False), about, default="10mm", metavar="MM")
+@dataclass(frozen=True)
+class ArrayFrames:
+    """Frames of an array, and how they are read.
+
+    Attributes
+    ----------
+    frequency_hz
+        Of an array's frames, where their file has none.
+    scatter
+        Of an array: gain from cell to cell, 5 % before a calibration.
+    calibration : FILE.npz
+        Of an array: by 'sensorgen calibrate'.
+    plot : DIR
+        Of an array: write its heaviest map there.
+    """
+
+    readout: Readout = "guarded"
+    input_ohm: InputResistance = 50.0
+    frequency_hz: float | None = None
+    scatter: Annotated[float, Option(kind="share", typed="5%")] = 0.05
+    calibration: Path | None = None
+    plot: Path | None = None
 
 
-def bench() -> list[click.Parameter]:
-    """``--tip`` and ``--force-offset`` of the bench that pressed; :func:`bench_of` reads them."""
-    return [
-        of_design_tip(),
-        option(
-            "--force-offset", None, "Force above what the rig says, as its piston's weight: 0.9+-0.1 for the thesis's.",
-            default="0+-0.1", metavar="N+-N",
-        ),
-    ]  # fmt: skip
+@dataclass(frozen=True)
+class Sweeping:
+    """Values of one setting, and where they are worked on.
+
+    Attributes
+    ----------
+    sweep : KEY=VALUES
+        Answer for each value of one setting: dielectric_mm=0.05:0.2:0.05, or eps_x60=3,4,5.
+    """
+
+    sweep: str = ""
+    jobs: Jobs = None
+    cluster: Cluster = ""
+
+    def designs(self, design: "Design") -> "tuple[str, list[tuple[float | str, Design]]]":
+        """The setting, and the design for each of its values.
+
+        Raises
+        ------
+        SensorgenError
+            A key or values that mean nothing, or a value that this design cannot have: before any work.
+        """
+        from sensorgen.design.settings import varied
+
+        ((key, typed),) = pairs((self.sweep,), "--sweep")
+        parameter = {field.name: field for field in fields(design.form.Params)}.get(key)
+        if parameter is not None and "choices" in parameter.metadata:
+            values: list[Any] = typed.split(",")
+        else:
+            values = list(units.values(typed, units.NUMBER if parameter is None else units.LENGTH_MM))
+        return key, [(value, one) for (value,), one in varied(design, {key: values})]
+
+    def over(self, design: "Design", body_of: "BodyOf", solve: Any, question: Any) -> Any:
+        """Answers of a solver for each value, with a progress bar."""
+        key, designs = self.designs(design)
+        points = [(value, body_of(one)) for value, one in designs]
+        with show.bar(len(points)) as done:
+            return solve(key, points, question, show.at_once(self.jobs), done, self.cluster)
 
 
-def bench_of(tip: dict[str, Any] | None, force_offset: str) -> "Bench":
-    """The bench that the options say."""
-    from sensorgen.analysis.calibration import Bench
+@dataclass(frozen=True)
+class BenchTip:
+    """Tip and force offset of the bench that pressed.
 
-    mean, mark, spread = force_offset.replace(" ", "").replace("±", "+-").partition("+-")
-    if not mark:
-        raise BadInput(f"--force-offset {force_offset!r:.40}: expected mean and standard deviation, as 0.9+-0.1 (N)")
-    try:
-        block = dict(tip or {})
-        width = block.pop("width_mm", None)
-        offset = units.force_n(mean), units.force_n(spread)
-        return Bench(None if width is None else width * units.M_PER_MM, offset, block)
-    except BadInput as error:
-        raise error.within("--force-offset") from None
+    Attributes
+    ----------
+    force_offset : N+-N
+        Force above what the rig says, as its piston's weight: 0.9+-0.1 for the thesis's.
+    """
 
+    tip: DesignTip = None
+    force_offset: str = "0+-0.1"
 
-def frequencies() -> click.Option:
-    """``--frequencies`` [Hz]."""
-    about = "Frequencies, as in 1.1kHz,2.3kHz; the thesis's seven if not given."
-    return option("--frequencies frequency_hz", Values(units.FREQUENCY_HZ, zero=False), about)
+    def bench(self) -> "Bench":
+        """The bench."""
+        from sensorgen.analysis.calibration import Bench
 
-
-def noise() -> click.Option:
-    """``--noise`` [-]."""
-    return option("--noise", Share(), "Standard error of R and of X of a reading, relative to |Z|.", default="0.1%")
-
-
-def array_readout() -> list[click.Parameter]:
-    """``--readout`` and ``--input`` of an array."""
-    return [
-        option(
-            "--readout", OneOf(("guarded", "two-terminal")),
-            "Of an array: guarded, a row is driven and all other tracks are at 0 V; or two-terminal, a meter between "
-            "two and the rest open.", default="guarded",
-        ),
-        option("--input input_ohm", Ratio(), "Of an array, guarded: input resistance of a terminal.", default="50",
-               metavar="OHM"),
-    ]  # fmt: skip
+        mean, mark, spread = self.force_offset.replace(" ", "").replace("±", "+-").partition("+-")
+        if not mark:
+            raise BadInput(
+                f"--force-offset {self.force_offset!r:.40}: expected mean and standard deviation, as 0.9+-0.1 (N)"
+            )
+        try:
+            block = dict(self.tip or {})
+            width = block.pop("width_mm", None)
+            offset = units.force_n(mean), units.force_n(spread)
+            return Bench(None if width is None else width * units.M_PER_MM, offset, block)
+        except BadInput as error:
+            raise error.within("--force-offset") from None
 
 
-def array_frames() -> list[click.Parameter]:
-    """Options of the frames of an array."""
-    return [
-        *array_readout(),
-        option(
-            "--frequency", Values(units.FREQUENCY_HZ, zero=False), "Of an array's frames, where their file has none.",
-            metavar="HZ",
-        ),
-        option("--scatter", Share(), "Of an array: gain from cell to cell, 5 % before a calibration.", default="5%"),
-        option(
-            "--calibration", click.Path(path_type=Path, dir_okay=False), "Of an array: by 'sensorgen calibrate'.",
-            metavar="FILE.npz",
-        ),
-        option("--plot", click.Path(path_type=Path), "Of an array: write its heaviest map there.", metavar="DIR"),
-    ]  # fmt: skip
+@dataclass(frozen=True)
+class Advising:
+    """Changes of a design that are tried, and written into its file.
+
+    Attributes
+    ----------
+    budget : SECONDS
+        Processor time for prediction and for changes to try; 0 tries none.
+    apply : [K]
+        Write the first, or the K-th, of these changes into the design's file.
+    """
+
+    budget: Annotated[float, Option(kind=NumberRange(0, 3600), more={"envvar": "SENSORGEN_BUDGET"})] = 60.0
+    apply: Annotated[int | None, Option(kind=click.IntRange(1, 9), more={"is_flag": False, "flag_value": 1})] = None
+
+    def write(self, design: "Design", advice: "Advice | None") -> None:
+        """Write the change that ``--apply`` asks for, and report it.
+
+        Raises
+        ------
+        BadInput
+            There is no such change, or no file to write it into.
+        """
+        if self.apply is None:
+            return
+        tried = advice.tried if advice else ()
+        if self.apply > len(tried):
+            above = f"expected the number of a change above, at most {len(tried)}"
+            raise BadInput(f"--apply {self.apply}: {above if tried else 'no change that was tried helps'}")
+        change = tried[self.apply - 1]
+        word = click.get_current_context().info_name or ""
+        if not (word.endswith((".yaml", ".yml")) or "/" in word):
+            settings = " ".join(_setting(one) for one in change.changes)
+            raise BadInput(f"--apply: {word} is no design file; use these options: {settings}")
+        from sensorgen.workflows.apply import apply
+
+        apply(Path(word), design, change)
+        changes = ", ".join(one.words() for one in change.changes)
+        render.say(f"{word} is changed: {changes}; all above is of the design before: run the command again", err=True)
 
 
-def explain() -> click.Option:
-    """``--explain``."""
-    return flag("--explain", "Print which models were used, and their cost and error.")
+def _setting(change: "Change") -> str:
+    """A change as an option of the command line."""
+    after = f"{change.after:g}" if isinstance(change.after, float) else change.after
+    return f"--set {change.key}={after}"
 
 
-def no_cache() -> click.Option:
-    """``--no-cache``."""
-    return flag("--no-cache", "Solve anew, and keep nothing.")
+def typed(name: str) -> bool:
+    """Test whether an option was given on the command line, by the name of its parameter."""
+    return click.get_current_context().get_parameter_source(name) is ParameterSource.COMMANDLINE
 
 
 def refuse_explain(given: bool, *, many: bool) -> None:
     """Raise BadInput for ``--explain`` with a form for programs, or of many designs."""
     if given and (many or render.form() in ("json", "csv")):
         raise BadInput("--explain is for people, and one design; --json holds the plan too")
+
+
+def refuse_input(readout: str) -> None:
+    """Refuse ``--input`` of a readout by two terminals."""
+    if readout != "guarded" and typed("input_ohm"):
+        raise BadInput("--input is of the guarded readout; expected no --input with --readout two-terminal")

@@ -20,7 +20,7 @@ _FORM, _FILE = "sensorgen.form", "sensorgen.output"  # in the context's meta
 
 
 def options(
-    *forms: str, file: bool = True, csv: str = _ABOUT["csv"], outputs: tuple[str, ...] = ("--output", "-o")
+    *forms: str, file: bool = True, csv: str = _ABOUT["csv"], outputs: tuple[str, ...] = ("--output", "-o"),
 ) -> list[click.Parameter]:  # fmt: skip
     """``--json``, ``--csv``, ``--markdown``, or those named, and ``--output``; :func:`deliver` obeys them."""
     flags = [
@@ -136,6 +136,14 @@ def verdict(*problems: str) -> int:
     for problem in problems:
         say(f"sensorgen: {problem}", err=True)
     return FOUND_ERRORS if problems else 0
+
+
+def file(path: Path, content: bytes | str, note: str = "") -> None:
+    """Write a file and print its name, behind ``note``; beside the result where that is for programs."""
+    from sensorgen.core import files
+
+    files.replace(path, content.encode() if isinstance(content, str) else content)
+    say(f"{note}{path}", err=bool(form()))
 
 
 def write(text: Iterable[str]) -> None:

@@ -1,5 +1,6 @@
 """Progress, for a person at a terminal."""
 
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -8,6 +9,7 @@ from contextlib import contextmanager
 import click
 
 from sensorgen.cli import harmless
+from sensorgen.core.units import si
 
 
 @contextmanager
@@ -35,3 +37,46 @@ def clear() -> None:
     """Clear the bar, for what is printed in its place."""
     if sys.stderr is not None and sys.stderr.isatty():
         click.echo("\r" + " " * 60 + "\r", nl=False, err=True)
+
+
+def at_once(jobs: int | None) -> int:
+    """Default number of processes."""
+    return jobs or os.cpu_count() or 1
+
+
+@contextmanager
+def bar(length: int, label: str = "solving") -> Iterator[Callable[..., None]]:
+    """A progress bar on the terminal, only for a person; each call moves it by one, or up to the number given."""
+    with click.progressbar(length=length, file=sys.stderr, hidden=not sys.stderr.isatty(), label=label) as shown:
+        shown.render_progress()
+        yield lambda upto=None: shown.update(1 if upto is None else max(upto - shown.pos, 0))
+
+
+@contextmanager
+def pressing(stress_kpa: Sequence[float]) -> Iterator[Callable[[float], None]]:
+    """A progress bar that stands at the highest stress reached so far, only for a person."""
+    with bar(len(stress_kpa), "pressing") as step:
+        yield lambda reached_pa: step(sum(1e3 * kpa <= reached_pa for kpa in stress_kpa))
+
+
+@contextmanager
+def counted() -> Iterator[Callable[[str, int, int], None]]:
+    """A line with the step, how far it is, and the time left; only for a person."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        yield lambda *_: None
+        return
+    begun: dict[str, tuple[float, int]] = {}
+
+    def step(name: str, done: int, count: int) -> None:
+        now = time.monotonic()
+        if done <= 1:  # of each round anew
+            begun[name] = now, done
+        start, first = begun.get(name, (now, done))
+        left = (now - start) / (done - first) * (count - done) if done > first else 0.0
+        words = f"{name} {done} of {count}" + (f", {si(left, 's', 2)} left" if left else "")
+        click.echo(f"\r{words:50.50}", nl=False, err=True)
+
+    try:
+        yield step
+    finally:
+        clear()

@@ -1,56 +1,41 @@
-"""``sensorgen stack``: what a second film tells that one does not, and what a touch does to a reading."""
+"""``sensorgen stack``: information of a second film, and effect of a touch on a reading."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-import click
-
-from sensorgen.cli import options, render
-from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.options import option
-from sensorgen.cli.words import Share, Values, one, proper
+from sensorgen.cli import render
+from sensorgen.cli.designs import of_design
+from sensorgen.cli.options import Force, Law
 from sensorgen.core import units
+from sensorgen.core.options import Option
+from sensorgen.prediction.query import TONES_HZ, Frequencies, Noise
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
+    from sensorgen.prediction.double_layer import StackStudy
 
-OWN: list[click.Parameter] = [
-    options.force(),
-    option(
-        "--position position_mm", Values(units.LENGTH_MM, zero=True),
-        "Position of the tip's middle [mm]; the sensor's middle if not given.",
-    ),
-    options.frequencies(),
-    options.tip("--touch tip_mm", "Length of the tip that presses, and of the body that touches."),
-    options.noise(),
-    option("--drift", Share(), "What the films' permittivity may have drifted by, both alike.", default="10%"),
-    option(
-        "--within within_n", Values(units.FORCE_N, zero=False), "Largest force that a touch may be mistaken for.",
-        default="0.1N",
-    ),
-    options.compression(), *render.options(),
-]  # fmt: skip
+Drift = Annotated[float, Option(kind="proper share", typed="10%")]
 
 
-def _work(
-    design: "Design", *, force_n: Sequence[float], position_mm: Sequence[float] | None,
-    frequency_hz: Sequence[float] | None, tip_mm: Sequence[float], noise: float, drift: float,
-    within_n: Sequence[float], compression: str | None,
-) -> int:  # fmt: skip
+@of_design("stack", *render.options())
+def command(
+    design: "Design", *, force_n: Force, position_mm: Annotated[float | None, Option(zero=True)] = None,
+    frequency_hz: Frequencies = TONES_HZ, tip_mm: Annotated[float, Option(typed="10mm")], noise: Noise, drift: Drift,
+    within_n: Annotated[float, Option(typed="0.1N")], law: Law = "",
+) -> "StackStudy":  # fmt: skip
+    """Compare a double sensor with a single one, and what a touch does to them, with isolation and without.
+
+    Parameters
+    ----------
+    position_mm
+        Position of the tip's middle [mm]; the sensor's middle if not given.
+    tip_mm, --touch : MM
+        Length of the tip that presses, and of the body that touches.
+    drift
+        What the films' permittivity may have drifted by, both alike.
+    within_n
+        Largest force that a touch may be mistaken for.
+    """
     from sensorgen.prediction.double_layer import study
-    from sensorgen.prediction.query import TONES_HZ
 
-    at_mm = None if position_mm is None else one("--position", position_mm)
-    found = study(
-        design, frequency_hz or TONES_HZ, one("--force", force_n), None if at_mm is None else at_mm * units.M_PER_MM,
-        proper("--noise", noise), proper("--drift", drift), one("--within", within_n), compression or "",
-        one("--touch", tip_mm) * units.M_PER_MM,
-    )  # fmt: skip
-    render.deliver(found)
-    return 0
-
-
-command = DesignGroup(
-    _work, OWN, name="stack",
-    help="What a double sensor tells that a single one does not, and what a touch does, with isolation and without.",
-)  # fmt: skip
+    position_m = None if position_mm is None else position_mm * units.M_PER_MM
+    return study(design, frequency_hz, force_n, position_m, noise, drift, within_n, law, tip_mm * units.M_PER_MM)

@@ -1,56 +1,57 @@
 """Kinds of words on the command line: lengths with their units, and names from a list."""
 
-from collections.abc import Callable, Iterable, Sequence
-from math import isnan
+from collections.abc import Callable, Iterable
+from math import inf, isnan
+from pathlib import Path
 from typing import Any
 
 import click
 
 from sensorgen.core import units
-from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
+from sensorgen.core.errors import BadInput, OutOfRange, UnknownName, within
 
 
-class Length(click.ParamType):  # type: ignore[type-arg]
-    """A length, in millimetres unless it names another unit."""
+class Word(click.ParamType):  # type: ignore[type-arg]
+    """A word as typed, read by :meth:`read`; errors name the option."""
 
-    name = "mm"
+    def read(self, text: str) -> Any:
+        """Read what was typed."""
+        raise NotImplementedError
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:  # noqa: ARG002
-        """Read a length as typed [mm]."""
-        if isinstance(value, float):
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
+        """Read a text; a value that is none was read before."""
+        if not isinstance(value, str):
             return value
         try:
-            return units.length_mm(value)
+            return self.read(value)
         except BadInput as error:
             raise error.within(_said(param)) from None
 
 
-class TipWords(click.ParamType):  # type: ignore[type-arg]
+class Length(Word):
+    """A length, in millimetres unless it names another unit."""
+
+    name = "mm"
+
+    def read(self, text: str) -> float:
+        """Read a length [mm]."""
+        return units.length_mm(text)
+
+
+class TipWords(Word):
     """A tip: lengths, and what it is made of, with commas."""
 
     name = "WIDTH,BLOCK,HEIGHT"
 
-    def convert(
-        self,
-        value: Any,
-        param: click.Parameter | None,
-        ctx: click.Context | None,  # noqa: ARG002
-    ) -> dict[str, Any]:
+    def read(self, text: str) -> dict[str, Any]:
         """Read ``5mm,stiff`` or ``10,ninjaflex,10`` as keys of a design file's tip."""
-        if isinstance(value, dict):
-            return value
-        found: dict[str, Any] = {}
-        for word in value.replace(" ", ",").split(","):
-            key = "block" if word[:1].isalpha() else "height_mm" if "block" in found else "width_mm"
-            if not word or key in found:
-                raise BadInput(
-                    f"{_said(param)} {value!r:.60}: expected as 10mm, 5mm,stiff, even or 10mm,ninjaflex,10mm"
-                )
-            try:
-                found[key] = word if key == "block" else units.length_mm(word)
-            except BadInput as error:
-                raise error.within(_said(param)) from None
-        return found
+        tip: dict[str, Any] = {}
+        for word in text.replace(" ", ",").split(","):
+            key = "block" if word[:1].isalpha() else "height_mm" if "block" in tip else "width_mm"
+            if not word or key in tip:
+                raise BadInput(f"{text!r:.60}: expected as 10mm, 5mm,stiff, even or 10mm,ninjaflex,10mm")
+            tip[key] = word if key == "block" else units.length_mm(word)
+        return tip
 
 
 class NumberRange(click.FloatRange):
@@ -62,105 +63,122 @@ class NumberRange(click.FloatRange):
         return self.fail("nan is not a number", param, ctx) if isnan(number) else number
 
 
-class Values(click.ParamType):  # type: ignore[type-arg]
+class Values(Word):
     """Several numbers of one quantity, none negative: ``0:6:0.1``, ``3``, ``1,2,5``, with or without units."""
 
     def __init__(self, quantity: units.Quantity, *, zero: bool) -> None:
-        """Numbers of ``quantity``; ``zero`` says whether 0 is one of them."""
+        """Numbers of ``quantity``, 0 with ``zero``."""
         self.quantity, self.zero, self.name = quantity, zero, f"START:STOP:STEP|{quantity.name.upper()},..."
 
-    def convert(
-        self,
-        value: Any,
-        param: click.Parameter | None,
-        ctx: click.Context | None,  # noqa: ARG002
-    ) -> tuple[float, ...]:
+    def read(self, text: str) -> Any:
         """Read the numbers, in the quantity's first unit, rising."""
-        if isinstance(value, tuple):
-            return value
-        try:
-            found = units.values(value, self.quantity)
-        except BadInput as error:
-            raise error.within(_said(param)) from None
-        if found[0] < 0 or (found[0] == 0 and not self.zero):
-            raise BadInput(f"{_said(param)}: {found[0]:g}; expected {'0 or more' if self.zero else 'above 0'}")
-        return found
+        numbers = units.values(text, self.quantity)
+        if numbers[0] < 0 or (numbers[0] == 0 and not self.zero):
+            raise BadInput(f"{numbers[0]:g}; expected {'0 or more' if self.zero else 'above 0'}")
+        return numbers
 
 
-class Share(click.ParamType):  # type: ignore[type-arg]
+class Value(Values):
+    """One number of a quantity."""
+
+    def __init__(self, quantity: units.Quantity, *, zero: bool, unit: str) -> None:
+        """Number of ``quantity`` in a unit, 0 with ``zero``."""
+        super().__init__(quantity, zero=zero)
+        self.name = unit.upper()
+
+    def read(self, text: str) -> float:
+        """Read the number, in the quantity's first unit."""
+        numbers = super().read(text)
+        if len(numbers) != 1:
+            raise BadInput(f"{len(numbers)} values; expected one")
+        return float(numbers[0])
+
+
+class Share(Word):
     """A share of one, also in percent."""
 
     name = "share"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:  # noqa: ARG002
+    def read(self, text: str) -> float:
         """Read ``0.2`` or ``20%`` [-]."""
-        if isinstance(value, float):
-            return value
         try:
-            return float(value[:-1]) / 100 if value.endswith("%") else float(value)
+            return float(text[:-1]) / 100 if text.endswith("%") else float(text)
         except ValueError:
-            raise BadInput(f"{_said(param)}: {value!r} is not a share; expected 0.2 or 20%") from None
+            raise BadInput(f"{text!r} is not a share; expected 0.2 or 20%") from None
 
 
-class Ratio(click.ParamType):  # type: ignore[type-arg]
-    """A relative width or error: a number above 0."""
+class ProperShare(Share):
+    """A share that is neither nothing nor all."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Read a share between 0 and 1 [-]."""
+        share = float(super().convert(value, param, ctx))
+        if not 0 < share < 1:
+            raise OutOfRange(f"{_said(param)} {share:g}; expected a share above 0 and below 1, as in 0.1%")
+        return share
+
+
+class Ratio(Word):
+    """A number above 0, as a relative width or error."""
 
     name = "number"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:  # noqa: ARG002
+    def __init__(self, expected: str = "a number above 0, as 1e-4") -> None:
+        """Number that is ``expected``."""
+        self.expected = expected
+
+    def read(self, text: str) -> float:
         """Read ``1e-4`` [-]."""
         try:
-            found = float(value)
+            number = float(text)
         except ValueError:
-            raise BadInput(f"{_said(param)}: {value!r} is not a number; expected one above 0, as 1e-4") from None
-        if not 0 < found < float("inf"):
-            raise BadInput(f"{_said(param)}: {found:g}; expected a number above 0, as 1e-4")
-        return found
+            raise BadInput(f"{text!r} is not a number; expected {self.expected}") from None
+        if not 0 < number < inf:
+            raise BadInput(f"{number:g}; expected {self.expected}")
+        return number
 
 
-class Pad(click.ParamType):  # type: ignore[type-arg]
+class Pad(Word):
     """A rectangle on the sheet, or a stretch of an edge where it has no width."""
 
     name = "X0-X1,Y0-Y1"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
+    def read(self, text: str) -> Any:
         """Read ``90-100,0-10``, or ``0,20-60`` for a stretch of an edge [mm]."""
-        spans = [span.split("-") for span in value.split(",")]
+        spans = [span.split("-") for span in text.split(",")]
         if len(spans) != 2 or any(len(span) > 2 for span in spans):
-            raise BadInput(f"--pad {value!r}; expected {self.name} in mm, as in 90-100,0-10, or 0,20-60 on an edge")
-        try:
+            raise BadInput(f"{text!r}; expected {self.name} in mm, as in 90-100,0-10, or 0,20-60 on an edge")
+        with within(repr(text)):
             return tuple((units.length_mm(span[0]), units.length_mm(span[-1])) for span in spans)
-        except BadInput as error:
-            raise error.within(f"--pad {value!r}") from None
 
 
-class Png(click.ParamType):  # type: ignore[type-arg]
-    """A picture to draw; where it could not be made, that is said before the work."""
+class Png(Word):
+    """A picture to draw; refused before the work where it cannot be made."""
 
     name = "FILE.png"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:  # noqa: ARG002
+    def read(self, text: str) -> Path:
         """Take a file that ends in .png; raise MissingValue where Matplotlib is not installed."""
-        if not value.lower().endswith(".png"):
-            raise BadInput(f"{_said(param)} {value}: expected a file that ends in .png")
+        if not text.lower().endswith(".png"):
+            raise BadInput(f"{text}: expected a file that ends in .png")
         from sensorgen.analysis.plots.libraries import needed
 
         needed("matplotlib")
-        return str(value)
+        return Path(text)
 
 
-def one(option: str, values: Sequence[float]) -> float:
-    """The only one of the numbers that an option was given."""
-    if len(values) != 1:
-        raise BadInput(f"{option}: {len(values)} values; expected one")
-    return values[0]
+KINDS: dict[str, Word] = {  # by the names that annotations have for them
+    "length": Length(), "share": Share(), "proper share": ProperShare(), "ratio": Ratio(),
+    "seconds": Ratio("seconds above 0"), "tip": TipWords(), "pad": Pad(), "png": Png(),
+}  # fmt: skip
 
 
-def proper(option: str, share: float) -> float:
-    """A share that is neither nothing nor all [-]."""
-    if not 0 < share < 1:
-        raise OutOfRange(f"{option} {share:g}; expected a share above 0 and below 1, as in 0.1%")
-    return share
+def pairs(words: tuple[str, ...], option: str) -> list[tuple[str, str]]:
+    """Words of the form KEY=VALUE, taken apart."""
+    for word in words:
+        if "=" not in word.strip("="):
+            raise BadInput(f"{option} {word!r}: expected KEY=VALUE")
+    return [(k.strip(), v.strip()) for k, _, v in (word.partition("=") for word in words)]
 
 
 def completed(names: Callable[[], Iterable[str]]) -> Callable[[click.Context, click.Parameter, str], list[Any]]:

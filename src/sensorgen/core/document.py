@@ -286,22 +286,29 @@ def _html(part: Part) -> str:
     table, caption, count = replace(part, cells=part.cells[:MOST_ROWS]).filled(), part.caption, len(part.cells)
     if count > MOST_ROWS:
         caption += f" (the first {MOST_ROWS} of {count} rows; CSV has all)"
-    worded = _worded(table)
-    scope = "row" if count == 1 else "col"
-    heads = [
-        _tag("th", c.head, {"scope": scope, "class": None if words else "n", "title": c.about or None})
-        for c, words in zip(table.columns, worded, strict=True)
-    ]
-    if count == 1:
-        cells = (_html_cell(c, v) for c, v in zip(table.columns, table.cells[0], strict=True))
-        return _scrolled(map(_row, heads, cells), caption, part.key)
+    return _scrolled(_html_list(table) if count == 1 else _html_rows(table), caption, part.key)
+
+
+def _html_list(table: Table) -> Iterator[str]:
+    """A table of one row, a line for each column."""
+    for column, cell in zip(table.columns, table.cells[0], strict=True):
+        yield _row(_html_head(column, "row"), _html_cell(column, cell))
+
+
+def _html_rows(table: Table) -> Iterator[str]:
     names = [c.name for c in table.columns]
     named = next((names.index(name) for name in _NAMES if name in names), 0)
-    rows = (
-        _row(*(_html_cell(c, v, k == named) for k, (c, v) in enumerate(zip(table.columns, row, strict=True))))
-        for row in table.cells
-    )
-    return _scrolled([f"<thead>{_row(*heads)}</thead><tbody>", *rows, "</tbody>"], caption, part.key)
+    heads = (_html_head(c, "col", words) for c, words in zip(table.columns, _worded(table), strict=True))
+    yield f"<thead>{_row(*heads)}</thead><tbody>"
+    for row in table.cells:
+        cells = enumerate(zip(table.columns, row, strict=True))
+        yield _row(*(_html_cell(c, v, k == named) for k, (c, v) in cells))
+    yield "</tbody>"
+
+
+def _html_head(column: Column, scope: str, worded: bool = True) -> str:
+    kind = None if worded else "n"
+    return _tag("th", column.head, {"scope": scope, "class": kind, "title": column.about or None})
 
 
 def _html_cell(column: Column, cell: Cell, head: bool = False) -> str:

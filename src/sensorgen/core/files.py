@@ -132,7 +132,7 @@ def publish(stage: Path, folder: Path, manifest: str = MANIFEST) -> None:
             raise Unwritable(
                 f"cannot write {str(target)!r}: a folder is in its place, or the folder around it is read-only"
             )
-    with _alone(folder), _undisturbed():
+    with alone(folder, wait=True), _undisturbed():
         stale = set(listed(folder, manifest)) - set(staged)
         for name in sorted(set(staged) - {manifest}):
             staged[name].replace(targets[name])
@@ -217,18 +217,30 @@ def _inside(folder: Path, file: Path) -> bool:
 
 
 @contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Wait until no other run publishes to a folder, where the system can tell."""
+def alone(path: Path, *, wait: bool) -> Iterator[bool]:
+    """Lock a folder or file, which is made if need be, until the process ends; False where another process has it.
+
+    Parameters
+    ----------
+    path : Path
+        The folder or file.
+    wait : bool
+        Until the other process lets it go; without a lock where the system has none, as in a network folder.
+    """
     try:
         import fcntl
     except ImportError:  # Windows
-        yield
+        yield True
         return
-    handle = os.open(folder, os.O_RDONLY)
+    handle, free = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR | os.O_CREAT, 0o644), True
     try:
-        with suppress(OSError):  # a network folder without locks
-            fcntl.flock(handle, fcntl.LOCK_EX)
-        yield
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except OSError as error:
+            free = wait
+            if not wait and not isinstance(error, BlockingIOError):
+                raise
+        yield free
     finally:
         os.close(handle)
 

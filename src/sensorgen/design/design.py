@@ -24,7 +24,8 @@ from sensorgen.design.effects import Effects
 from sensorgen.design.packs import Kind
 from sensorgen.design.printer import Pattern, Printer, Quality, load_printer, load_quality
 from sensorgen.design.profile import Profile, with_own
-from sensorgen.design.tip import EVEN, STIFF, TipData
+from sensorgen.design.tip import EVEN, STIFF
+from sensorgen.design.tip_data import TipData
 from sensorgen.scene.scene import Envelope, Fill, Scene
 
 if TYPE_CHECKING:

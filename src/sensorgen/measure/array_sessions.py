@@ -14,12 +14,16 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.files import reading
-from sensorgen.measure.array_frames import BINARY, REFERENCES, column, marked, numbers, table
+from sensorgen.measure.array_frames import BINARY, REFERENCES, column, marked, numbers, read, table
 from sensorgen.prediction.array.elements import Session
+from sensorgen.prediction.array.frames import at_rest, missing
+from sensorgen.prediction.array.model import ArrayModel
+from sensorgen.prediction.array.readout import ArrayReadout
 
 _OTHER = ("time_s", "rest", *REFERENCES)
 _WORDS: Mapping[str, Callable[[Sequence[str]], np.ndarray]] = {"rest": marked, "element": np.array}
 _AREA_MM2 = 100.0
+_MOST = 0.5  # of the presses on a track
 _N_PER_KPA_MM2 = 1e-3
 
 
@@ -58,6 +62,52 @@ def session(
         return _session(path.stem, data, values, names, (number, area_mm2))
 
 
+def of_frames(paths: Sequence[Path], model: ArrayModel) -> list[Session]:
+    """Sessions of frames of an array with a design: C/C0 - 1 of its crossings, by the network where that counts.
+
+    Raises
+    ------
+    BadInput
+        As :func:`session`; no frame at rest.
+    """
+    m, n = model.here.shape
+    names, found = [f"r{i + 1}c{j + 1}" for i, j in np.ndindex(m, n)], []
+    for k, path in enumerate(paths):
+        frames = read(path, (m, n), None)
+        inverter = at_rest(model, ArrayReadout(frequency_hz=(frames.frequency_hz,)), frames.siemens[frames.rest])
+        ratio, _, _ = inverter.planned(missing(frames.siemens))
+        ratio = np.where(inverter.alive, ratio, np.nan).reshape(len(ratio), -1)
+        found.append(session(path, k, area_mm2=model.pitch_area_m2 * 1e6, values=ratio - 1, names=names))
+        refuse_swapped(found[-1], (m, n))
+    return found
+
+
+def refuse_swapped(of: Session, shape: tuple[int, int]) -> None:
+    """Refuse presses that most of the time are read by another row, or column, than the pressed one.
+
+    Raises
+    ------
+    BadInput
+        Wires are swapped; they are named.
+    """
+    pressed = (np.isfinite(of.pressure_kpa).sum(1) == 1) & np.isfinite(of.reading).any(1)
+    if not pressed.any():
+        return
+    true, largest = (
+        np.stack(np.unravel_index(np.nan_to_num(each[pressed], nan=-np.inf).argmax(1), shape))
+        for each in (of.pressure_kpa, of.reading)
+    )
+    for letter, own, read_at in zip("rc", true, largest, strict=True):
+        for track in np.unique(own[own != read_at]).tolist():
+            at = read_at[own == track]
+            other = int(np.bincount(at).argmax())
+            if other != track and np.mean(at == other) > _MOST:
+                raise BadInput(
+                    f"{of.name}: presses on {letter}{track + 1} are read at {letter}{other + 1}: wires swapped; "
+                    "exchange them, or name the press right"
+                )
+
+
 def _session(
     name: str, data: Mapping[str, np.ndarray], values: Real, names: Sequence[str], default: tuple[int, float]
 ) -> Session:  # fmt: skip
@@ -78,8 +128,8 @@ def _session(
     if "element" in data:
         of = _numbers_of(each("element", nothing), names, values.shape[1])
         known = np.where(np.isfinite(force), force / (area * _N_PER_KPA_MM2), pressure)
-        others = np.where((of < 0) & (known != 0), np.nan, 0.0)
-        pressure = np.where(np.arange(values.shape[1]) == of[:, None], known[:, None], others[:, None])
+        free = np.where((of < 0) & (known == 0), 0.0, np.nan)  # a cover spreads a press: others are not known
+        pressure = np.where(np.arange(values.shape[1]) == of[:, None], known[:, None], free[:, None])
         force = nothing
     pressure = np.broadcast_to(pressure.reshape(count, -1), values.shape)
     day = float(np.ravel(data.get("day", default[0]))[0])

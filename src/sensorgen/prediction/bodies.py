@@ -19,7 +19,7 @@ from sensorgen.scene.scene import Prism
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
-    from sensorgen.prediction.slices import PrintFile
+    from sensorgen.prediction.print_files import PrintFile
     from sensorgen.scene.scene import Scene
 
 
@@ -215,9 +215,9 @@ def default_body(design: Design, folder: Path | None = None) -> Body:
     folder : Path, optional
         With the design's files; ``out/NAME`` in the working folder if not given.
     """
-    from sensorgen.prediction import slices
+    from sensorgen.prediction import print_files
 
-    return of_file(design, slices.at_hand(design, folder)[0])
+    return of_file(design, print_files.at_hand(design, folder)[0])
 
 
 def of_file(design: Design, file: "PrintFile | None") -> Body:
@@ -226,9 +226,10 @@ def of_file(design: Design, file: "PrintFile | None") -> Body:
     Of an array it is one crossing, sliced alone by the same slicer.
     """
     if design.layout and file:
-        from sensorgen.prediction import slices
+        from sensorgen.prediction import print_files
 
-        return of_file(design.crossing, slices.at_hand(design.crossing, slicer=file.report.slicer.name)[0])
+        slicer = file.record["slicer"]["name"]
+        return of_file(design.crossing, print_files.at_hand(design.crossing, slicer=slicer)[0])
     if file is None:
         return estimated(design)
     return sliced(design, partial(file.printed, design), file.source, file.content)

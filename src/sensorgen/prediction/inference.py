@@ -176,12 +176,17 @@ class Fit(Samples):
 
     def step(self) -> Real:
         """Step to the least squares of the linear model (n, p)."""
-        return np.asarray(np.linalg.solve(self.information, self.gradient[:, :, None])[:, :, 0])
+        return _solved(self.information, self.gradient)
 
     def log_evidence(self) -> Real:
         """Ln of the integral of exp(-chi2/2) over the parameters, of the linear model (n,), less p/2 ln(2 pi)."""
         gain = np.einsum("ni,ni->n", self.step(), self.gradient)
         return np.asarray((gain - self.chi2 - np.linalg.slogdet(self.information)[1]) / 2)
+
+
+def _solved(matrix: Real, right: Real) -> Real:
+    """Solutions (n, p) of n systems of equations."""
+    return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
 
 
 class LeastSquares(ABC):
@@ -202,13 +207,19 @@ class LeastSquares(ABC):
 
     def step(self, fit: Fit, damping: Real) -> Real:
         """Damped step within reach and bounds (n, p)."""
-        information = fit.information.copy()
-        k = np.arange(information.shape[1])
-        information[:, k, k] *= 1 + damping[:, None]
-        step = np.linalg.solve(information, fit.gradient[:, :, None])[:, :, 0]
+        information = fit.information * (1 + damping[:, None, None] * np.eye(fit.at.shape[1]))
+        step = _solved(information, fit.gradient)
         if np.isfinite(self.reach):
             step *= self.reach / np.maximum(self.reach, np.abs(step).max(1, keepdims=True))
-        return np.asarray(np.clip(fit.at + step, -self.bound, self.bound) - fit.at)
+        within = np.clip(fit.at + step, -self.bound, self.bound) - fit.at
+        ended = np.abs(fit.at + step) > self.bound
+        if ended.any():  # those go to their bound, the others to the least squares along it
+            left = fit.gradient - np.einsum("nij,nj->ni", information, np.where(ended, within, 0.0))
+            free = ~(ended[:, :, None] | ended[:, None, :])
+            reduced = np.where(free, information, np.eye(fit.at.shape[1]))
+            step = _solved(reduced, np.where(ended, within, left))
+            within = np.clip(fit.at + step, -self.bound, self.bound) - fit.at
+        return np.asarray(within)
 
     def done(self, fit: Fit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
         """Samples of which this is the last step, by it and by its gain in the sum of squares."""

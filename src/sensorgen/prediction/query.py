@@ -2,17 +2,29 @@
 
 from dataclasses import dataclass, replace
 from math import inf
+from typing import TYPE_CHECKING, Annotated
 
 from sensorgen.core.errors import OutOfRange, UnknownName
-from sensorgen.core.units import M_PER_MM
-from sensorgen.design.design import Design
+from sensorgen.core.options import Option
+from sensorgen.core.units import FREQUENCY_HZ, M_PER_MM
 from sensorgen.design.tip import TIP_M, Tip
+
+if TYPE_CHECKING:
+    from sensorgen.design.design import Design
 
 TONES_HZ = (1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3)  # thesis, Table 5.1, its 4990 corrected
 FORCE_N = 6.0  # thesis 5.2: presses of 0 to 6 N
 NOISE = 1e-3  # of Re Z and of Im Z, each, relative to abs(Z)
 FLAT = Tip()  # the default
 LAWS = ("unconfined", "bonded", "symmetric", "infill", "free", "solved")  # of compression, closed forms first
+
+Frequencies = Annotated[
+    tuple[float, ...],
+    Option("Frequencies, as in 1.1kHz,2.3kHz; the thesis's seven if not given.", ("--frequencies",), FREQUENCY_HZ),
+]
+Noise = Annotated[
+    float, Option("Standard error of R and of X of a reading, relative to |Z|.", kind="proper share", typed="0.1%")
+]
 
 
 @dataclass(frozen=True)
@@ -37,23 +49,25 @@ class Query:
         position is given.
     tip : Tip or None
         What presses; the design's own if None.
-    law : str
-        Law of compression, as of :func:`sensorgen.prediction.planning.plan`.
+    law, --compression : str
+        How the cell deforms: as a plate, free or bonded, as infill of flat electrodes, or solved (needs NGSolve;
+        seconds in a cross-section, up to minutes in 3D); if not given, solved in a cross-section.
     accuracy : float or None
-        Of abs(Z), relative [-]; if None, the default of :mod:`sensorgen.prediction.planning`.
+        Of |Z|: cell, compression and line by the least expensive models that together meet it. Exit code 1 where they
+        do not.
     noise : float
         Standard deviation of Re Z and of Im Z, each, relative to abs(Z) [-].
     range_kpa : tuple of (float, float) or None
         Pressures between which the sensitivity is stated [kPa]; from rest to the reference load if not given.
     """
 
-    frequency_hz: tuple[float, ...] = TONES_HZ
+    frequency_hz: Frequencies = TONES_HZ
     force_n: float = FORCE_N
     position_m: float | None = None
     tip: Tip | None = None
-    law: str = ""
-    accuracy: float | None = None
-    noise: float = NOISE
+    law: Annotated[str, Option(kind=LAWS)] = ""
+    accuracy: Annotated[float | None, Option(kind="ratio")] = None
+    noise: Noise = NOISE
     range_kpa: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
@@ -68,15 +82,15 @@ class Query:
             low, high = self.range_kpa
             raise OutOfRange(f"sensitivity from {low:g} to {high:g} kPa; expected pressures that rise from 0 or more")
 
-    def tip_of(self, design: Design) -> Tip:
+    def tip_of(self, design: "Design") -> Tip:
         """Tip that presses a design."""
         return self.tip or design.tip.tip()
 
-    def of(self, design: Design) -> "Query":
+    def of(self, design: "Design") -> "Query":
         """The query with the tip that presses a design."""
         return replace(self, tip=self.tip_of(design))
 
-    def load(self, design: Design) -> Load:
+    def load(self, design: "Design") -> Load:
         """The reference load."""
         middle = design.params.length_mm * M_PER_MM / 2
         return Load(self.frequency_hz, self.force_n, middle if self.position_m is None else self.position_m)

@@ -1,39 +1,29 @@
-"""The print of a design by a real slicer: its G-code, all findings about it, and the one list that every command has.
+"""The print of a design by a real slicer: the report about its G-code, and the one list of findings of all commands."""
 
-A design is sliced once: its G-code is stored by design, profile, slicer and version.
-"""
-
-import os
-import shutil
 import tempfile
-import zlib
-from base64 import b64decode, b64encode
 from dataclasses import dataclass, fields, replace
 from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sensorgen.asprinted import printed as asprinted
-from sensorgen.checks import bed, support
+from sensorgen.checks import support
 from sensorgen.checks.review import LOST, Review, Step, advised, review
 from sensorgen.checks.volumes import Row
-from sensorgen.core import cache as stored
-from sensorgen.core.errors import MissingValue, SensorgenError, UnknownName
+from sensorgen.core.errors import MissingValue
 from sensorgen.core.findings import Finding, grouped
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
-from sensorgen.design.printer import folder as profiles
 from sensorgen.design.values import permittivities, resistivities
 from sensorgen.design.walls import WALLS, rule
 from sensorgen.export import machine
 from sensorgen.export.gcode.check import Checked
 from sensorgen.export.gcode.drags import Lifting
-from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, versions
-from sensorgen.export.slicers.loads import loads
-from sensorgen.export.slicers.run import find
+from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S, TITLES
+from sensorgen.prediction.print_files import NONE, PrintFile, at_hand
 from sensorgen.prediction.results import unpredicted
 
 if TYPE_CHECKING:
@@ -41,13 +31,8 @@ if TYPE_CHECKING:
 
     from sensorgen.export.gcode.drags import Lifted
 
-_LAST: dict[tuple[str, ...], asprinted.Printed] = {}  # body of the file that was read last
-VARIABLE = "SENSORGEN_SLICER"  # environment: prusa, cura, or none for estimates; the first that is installed if not set
-NONE = "none"
 GCODE = "13-gcode"  # rule of what the check of a G-code file reports
 SHORT, IDLE = "1-short", "10-waiver"
-_LIMIT_S = 300.0  # for a decision
-OUT = Path("out")  # folder of the designs' folders, where build and slice write, unless told otherwise
 
 
 @dataclass(frozen=True)
@@ -116,31 +101,6 @@ class SliceReport(Checked):
 
 
 @dataclass(frozen=True, eq=False)
-class PrintFile:
-    """A G-code file of a design: its report, its text, and the file's name, "" for one from the cache."""
-
-    report: SliceReport
-    content: bytes
-    name: str = ""
-
-    @property
-    def source(self) -> str:
-        """Slicer, version and file."""
-        made = self.report.slicer
-        return ", ".join(filter(None, (f"{made.name} {made.version}", self.name)))
-
-    def printed(self, design: Design) -> asprinted.Printed:
-        """Body that the lines print."""
-        from sensorgen.export.gcode import paths
-
-        key = (self.report.sha256, self.source, design.id())
-        if key not in _LAST:  # pictures, pages and the prediction of one print ask in turn
-            _LAST.clear()
-            _LAST[key] = asprinted.body(design, paths.read(self.content, design.machine), slicer=self.source)
-        return _LAST[key]
-
-
-@dataclass(frozen=True, eq=False)
 class NewSlice:
     """A print sliced now.
 
@@ -196,119 +156,15 @@ def slice_now(
         printer=printer.name, quality=design.layers.name,
         printed=Volumes(tuple(printed.rows), (*made.findings, *findings)), lifting=made.lifted.lifting,
     )  # fmt: skip
-    return NewSlice(PrintFile(report, content), printed, made.lifted)
-
-
-def deciding() -> str:
-    """Name of the slicer that decides; ``none`` where none is installed.
-
-    Raises
-    ------
-    UnknownName
-        The environment names another one.
-    """
-    word = os.environ.get(VARIABLE, "")
-    if word and word not in (*SLICERS, NONE):
-        raise UnknownName(f"slicer in {VARIABLE}", word, (*SLICERS, NONE))
-    return word or next((name for name in SLICERS if shutil.which(PROGRAMS[name][0])), NONE)
-
-
-def at_hand(
-    design: Design, folder: Path | None = None, slicer: str = "", step: Step = lambda _: None, program: str = ""
-) -> tuple[PrintFile | None, str]:  # fmt: skip
-    """G-code of a design: that of its folder, else sliced, now or before; or None, and why the print is estimated.
-
-    Parameters
-    ----------
-    design : Design
-        What is printed.
-    folder : Path, optional
-        With the design's files; ``out/NAME`` in the working folder if not given.
-    slicer : str
-        One of ``SLICERS``, whatever the folder has, or ``none``; the deciding one if not given.
-    step : callable
-        Called with the next step, for a progress display.
-    program : str
-        Path of the slicer's program; that on PATH if not given.
-
-    Raises
-    ------
-    SensorgenError
-        A slicer that is given is missing, or fails.
-    """
-    if not slicer and (found := in_folder(design, folder)):
-        return found, ""
-    decides = slicer or deciding()
-    if decides == NONE:
-        return None, "no slicer installed" if not slicer and not os.environ.get(VARIABLE) else ""
-    if not _fits(design):
-        return None, "it does not fit the bed"
-    try:
-        return _sliced(design, decides, find(*PROGRAMS[decides], program), step), ""
-    except SensorgenError as error:
-        if slicer:
-            raise
-        return None, str(error)
-
-
-def _fits(design: Design) -> bool:
-    """Truth of that a design fits the bed, or is said to."""
-    return all(f.waiver for f in design.waived(list(bed.check(design.printed, design.machine))))
-
-
-def _sliced(design: Design, slicer: str, program: str, step: Step) -> PrintFile:
-    """A design sliced now or before."""
-    question = _question(design, slicer, program)
-
-    def work() -> dict[str, Any]:
-        made = slice_now(design, slicer, program=program, time_limit_s=_LIMIT_S, step=step).file
-        return {
-            "report": _adapter().dump_python(made.report, mode="json"),
-            "gcode": b64encode(zlib.compress(made.content, 1)).decode(),
-        }
-
-    entry = stored.answer(question, work)
-    report = replace(_adapter().validate_python(entry["report"]), name=design.name)
-    return PrintFile(report, zlib.decompress(b64decode(entry["gcode"])))
-
-
-def _question(design: Design, slicer: str, program: str) -> dict[str, Any]:
-    """All that decides a slice and its findings: files and values that a profile is written by, not its text."""
-    changed = Path(program).stat().st_mtime_ns
-    version = tuple(
-        stored.answer(
-            {"what": "version", "program": program, "changed": changed},
-            lambda: list(versions.of_program(slicer, program)),
-        )
-    )
-    files = sorted(path for path in profiles().rglob("*") if path.is_file())
-    waivers = [waiver.model_dump() for waiver in design.waivers]
-    decides = repr((design.machine, design.layers, loads(design), waivers, [path.read_bytes() for path in files]))
-    return {
-        "what": "slice", "design": design.id(), "slicer": slicer, "version": version, "program": program,
-        "changed": changed, "profile": sha256(decides.encode()).hexdigest(),
-    }  # fmt: skip
+    return NewSlice(PrintFile(adapter().dump_python(report, mode="json"), content), printed, made.lifted)
 
 
 @cache
-def _adapter() -> "TypeAdapter[SliceReport]":
+def adapter() -> "TypeAdapter[SliceReport]":
+    """The report as plain data, and back."""
     from pydantic import TypeAdapter
 
     return TypeAdapter(SliceReport)
-
-
-def in_folder(design: Design, folder: Path | None = None) -> PrintFile | None:
-    """The sliced file of this very design in a folder, ``out/NAME`` if not given; its record is beside it."""
-    folder = folder or OUT / design.name
-    for note in sorted(folder.glob("*.gcode.json")) if os.path.isdir(folder) else ():  # noqa: PTH112 - a name too long
-        try:
-            content = note.with_suffix("").read_bytes()
-            report = _adapter().validate_json(note.read_bytes())
-            if report.design == design.id() and report.sha256 == sha256(content).hexdigest():
-                return PrintFile(report, content, note.with_suffix("").name)
-        except (OSError, ValueError):  # no file of ours
-            continue
-    return None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -2,56 +2,46 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import click
 
-from sensorgen.cli import body_options, escaped, render, show
+from sensorgen.cli import escaped, render, show
+from sensorgen.cli.body_options import BodyChoice
+from sensorgen.cli.commands import arguments, options_of
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.words import OneOf, Ratio
 from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.core.options import Option
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
 
 FILES = ("chart.csv", "chart.png", "chart.html")
 QUANTITIES = ("capacitance", "compression", "line", "prediction")
-_BUDGET_S = 60.0
 
 
-def _output() -> click.Option:
-    return click.Option(
-        ["--output", "-o"], default="out/chart", show_default=True, metavar="DIR", help="Folder of the files."
-    )
+Quantities = Annotated[tuple[str, ...], Option(kind=QUANTITIES)]
+Force = Annotated[float, Option(kind="ratio", typed="5")]
+Budget = Annotated[float, Option(kind="ratio", typed="5")]
 
 
-_SCENES: list[click.Parameter] = [
-    click.Option(
-        ["--scene"], multiple=True, metavar="NAME",
-        help="Without a design: a standard scene, as 'tri, 0.1 mm'; all if not given.",
-    ),
-    click.Option(["--budget"], type=Ratio(), metavar="SECONDS", help="Leave out what takes longer.  [default: 60]"),
-    _output(),
-    click.Option(["--json", "as_json"], is_flag=True, help="Print what was measured as JSON, too."),
-]  # fmt: skip
+def _of_design(
+    design: "Design", *, quantity: Quantities = (), force_n: Force, budget: Budget, body: BodyChoice,
+    output: Path = Path("out/chart"),
+) -> int:  # fmt: skip
+    """Measure the models that apply to a design.
 
-OWN: list[click.Parameter] = [
-    click.Option(
-        ["--quantity"], type=OneOf(QUANTITIES), multiple=True, help="Of these alone; may be given several times."
-    ),
-    click.Option(
-        ["--force", "force_n"], type=Ratio(), default="5", show_default=True, metavar="N",
-        help="Force in the middle, on a tip of 10 mm.",
-    ),
-    click.Option(
-        ["--budget"], type=Ratio(), default="5", show_default=True, metavar="SECONDS",
-        help="Leave out each step that should take longer.",
-    ),
-    *body_options.body_options(), _output(), *render.options(file=False),
-]  # fmt: skip
-
-
-def _of_design(design: "Design", *, quantity: tuple[str, ...], force_n: float, budget: float, output: str) -> int:
+    Parameters
+    ----------
+    quantity
+        Of these alone; may be given several times.
+    force_n : N
+        Force in the middle, on a tip of 10 mm.
+    budget : SECONDS
+        Leave out each step that should take longer.
+    output, --output, -o : DIR
+        Folder of the files.
+    """
     from sensorgen.analysis.plots.libraries import needed
     from sensorgen.core import files as store
     from sensorgen.core.document import to_json
@@ -60,7 +50,6 @@ def _of_design(design: "Design", *, quantity: tuple[str, ...], force_n: float, b
     from sensorgen.verification.design_chart.results import chart
 
     needed("matplotlib", "plotly")
-    body = body_options.body_of()(design)
     keys = quantity or QUANTITIES
     with show.progress(keys) as step:
 
@@ -68,20 +57,36 @@ def _of_design(design: "Design", *, quantity: tuple[str, ...], force_n: float, b
             step(words.partition(":")[0])
             step(words)
 
-        found = chart(body, Query(force_n=force_n), keys, budget_s=budget, step=on)
+        found = chart(body(design), Query(force_n=force_n), keys, budget_s=budget, step=on)
     contents = {"chart.json": to_json(found).encode(), "chart.csv": "".join(found.csv()).encode()}
     if found.points:
         contents |= {"chart.png": plot.png(found)}
     contents["chart.html"] = plot.html(found).encode()
     for name, content in contents.items():
-        store.replace(Path(output) / name, content)
+        store.replace(output / name, content)
     render.deliver(found)
     if not render.form():
-        render.say("\n".join(str(Path(output) / name) for name in contents))
+        render.say("\n".join(str(output / name) for name in contents))
     return render.verdict(*found.problems())
 
 
-def _of_scenes(scene: tuple[str, ...], budget: float | None, output: str, as_json: bool) -> None:
+def _of_scenes(
+    *, scene: tuple[str, ...] = (), budget: Annotated[float, Option(kind="ratio", typed="60")] = 60.0,
+    output: Path = Path("out/chart"), as_json: bool = False,
+) -> None:  # fmt: skip
+    """Measure the models on standard scenes.
+
+    Parameters
+    ----------
+    scene : NAME
+        Without a design: a standard scene, as 'tri, 0.1 mm'; all if not given.
+    budget : SECONDS
+        Leave out what takes longer.
+    output, --output, -o : DIR
+        Folder of the files.
+    as_json, --json
+        Print what was measured as JSON, too.
+    """
     import csv
     import io
 
@@ -96,7 +101,7 @@ def _of_scenes(scene: tuple[str, ...], budget: float | None, output: str, as_jso
             raise UnknownName("standard scene", name, chart.SCENES)
     names = scene or chart.SCENES
     with show.progress(names) as step:
-        points = chart.points(names, _BUDGET_S if budget is None else budget, step)
+        points = chart.points(names, budget, step)
     rows = [vars(one) for one in (*points, *chart.silent(names, points))]
     text = io.StringIO()
     table = csv.DictWriter(text, list(dict.fromkeys(key for row in rows for key in row)), lineterminator="\n")
@@ -106,9 +111,9 @@ def _of_scenes(scene: tuple[str, ...], budget: float | None, output: str, as_jso
     if overview := plot.overview(points):
         contents["overview.png"] = overview
     for name, content in contents.items():
-        store.replace(Path(output) / name, content)
+        store.replace(output / name, content)
         if not as_json:
-            render.say(Path(output) / name)
+            render.say(output / name)
     if as_json:
         render.say(escaped(json.dumps(rows, indent=2, ensure_ascii=False)))
 
@@ -117,7 +122,7 @@ def _begin(**given: Any) -> None:
     """Without a design, the standard scenes; before one, no options."""
     context = click.get_current_context()
     if context.invoked_subcommand is None:
-        _of_scenes(given["scene"], given["budget"], given["output"], given["as_json"])
+        _of_scenes(**arguments(_of_scenes, given))
         return
     for option in context.command.params:
         if option.name and context.get_parameter_source(option.name) is not click.core.ParameterSource.DEFAULT:
@@ -126,7 +131,8 @@ def _begin(**given: Any) -> None:
 
 
 command = DesignGroup(
-    _of_design, OWN, name="chart", params=_SCENES, callback=_begin, invoke_without_command=True,
+    "chart", _of_design, *render.options(file=False), params=options_of(_of_scenes), callback=_begin,
+    invoke_without_command=True,
     help="""Measure speed against accuracy of every model.
 
     With a design: every model that applies to it, and scikit-fem, NGSolve, FastCap, scikit-rf and ngspice where they

@@ -5,30 +5,31 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-
-import click
+from typing import Annotated
 
 from sensorgen.cli import FOUND_ERRORS, render, show
-from sensorgen.cli.words import OneOf
+from sensorgen.cli.commands import command as of_function
 from sensorgen.core.errors import NotInstalled
+from sensorgen.core.options import Option
 
 FORMATS = ("html", "md", "json")
 
 
-@click.command("thesis")
-@click.option(
-    "--output", "-o", default="out/thesis", show_default=True, metavar="DIR", help="Folder of thesis.html and the like."
-)
-@click.option(
-    "--format", "formats", type=OneOf(FORMATS), multiple=True, default=("html", "md"), show_default=True,
-    help="What to write; may be given several times.",
-)  # fmt: skip
-def command(output: str, formats: tuple[str, ...]) -> int:
+@of_function("thesis")
+def command(
+    *, output: Path = Path("out/thesis"), formats: Annotated[tuple[str, ...], Option(kind=FORMATS)] = ("html", "md")
+) -> int:
     """Compute every numbered equation, table and figure of the thesis, and say how far it agrees.
 
     Ends with 1 where a value differs for an unknown reason. What takes long is solved once and kept.
+
+    Parameters
+    ----------
+    output, --output, -o : DIR
+        Folder of thesis.html and the like.
+    formats, --format
+        What to write; may be given several times.
     """
-    from sensorgen.core import files as store
     from sensorgen.verification import thesis
     from sensorgen.verification.thesis.items import CHAPTERS
     from sensorgen.verification.thesis.verdicts import UNEXPLAINED, WORDS
@@ -42,9 +43,8 @@ def command(output: str, formats: tuple[str, ...]) -> int:
         "json": lambda rows: json.dumps(thesis.plain(rows), indent=2, ensure_ascii=False) + "\n",
     }  # fmt: skip
     for name in dict.fromkeys(formats):
-        file = Path(output) / f"thesis.{name}"
-        store.replace(file, made[name](rows).encode())
-        render.say(file)
+        file = output / f"thesis.{name}"
+        render.file(file, made[name](rows))
     counts = Counter(row.verdict.word for row in rows)
     render.say(", ".join(f"{counts[word]} {word}" for word in WORDS if counts[word]))
     for row in rows:

@@ -151,7 +151,9 @@ def short(design: Design, changes: Changes = MappingProxyType({}), periods: int 
         As :func:`changed`.
     """
     few = periods * float(changes.get(("parameters", "period_mm"), getattr(design.params, "period_mm", 0.0)))
-    sides = {("parameters", side): few for side in ("length_mm", "width_mm") if getattr(design.params, side) > few > 0}
+    sides: dict[Key, Value] = {
+        ("parameters", side): few for side in ("length_mm", "width_mm") if getattr(design.params, side) > few > 0
+    }
     return changed(design, {**changes, **sides}) if changes or sides else design
 
 

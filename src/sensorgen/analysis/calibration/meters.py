@@ -8,13 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from sensorgen.analysis.comparison import of_iteration
-from sensorgen.analysis.comparison.allowed import allowed
+from sensorgen.analysis.comparison.allowed import Allowed, allowed
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.design.body import BodyOf
 from sensorgen.measure import accuracy
 from sensorgen.measure.immittance import NEVER_NEGATIVE, pair, quantity_of
 from sensorgen.measure.log import Log, Reading
 from sensorgen.prediction.calibration.fitting import Meter
+from sensorgen.prediction.inference import whitening
 from sensorgen.prediction.inverse.verdict import NORMAL_90
 
 _R, _X = 0.05, 0.02  # a specimen's resistance and reactance differ by as much from session to session [-]
@@ -51,16 +52,17 @@ def readings_of(
         each for row in found.direct if row.predicted and row.reading.number in numbers
         and (each := allowed(row, found.bodies[row.predicted.design]))
     ]  # fmt: skip
-    ln_resistance = None
-    if ranges:
-        low, high = (float(np.mean([getattr(each, end) for each in ranges])) for end in ("low", "high"))
-        ln_resistance = (low + high) / 2 - ln(resistivity_ohm_m), hypot((high - low) / 2 / NORMAL_90, _R)
     left_out = list[str]()
-    return (
-        _meter([measured for one in counted for measured in _alternating(one, left_out)], ln_resistance),
-        counted,
-        left_out,
-    )
+    measured = [each for one in counted for each in _alternating(one, left_out)]
+    return _meter(measured, _ln_resistance(ranges, resistivity_ohm_m)), counted, left_out
+
+
+def _ln_resistance(ranges: Sequence[Allowed], resistivity_ohm_m: float) -> tuple[float, float] | None:
+    """Mean of ln of resistivities over the predicted one, and its standard deviation."""
+    if not ranges:
+        return None
+    low, high = (float(np.mean([getattr(each, end) for each in ranges])) for end in ("low", "high"))
+    return (low + high) / 2 - ln(resistivity_ohm_m), hypot((high - low) / 2 / NORMAL_90, _R)
 
 
 class _Measured(NamedTuple):
@@ -84,22 +86,29 @@ def _alternating(reading: Reading, left_out: list[str]) -> Iterator[_Measured]:
             left_out.append(f"reading {reading.number} at {f:g} Hz left out: {what} (X = {z.imag:.3g} ohm)")
             continue
         for quantity in pair(at.values) or at.values:
-            value, error = vars(at.value(quantity)).values()
-            if not isfinite(value) or value == 0 or (value < 0 and quantity in NEVER_NEGATIVE):
-                continue
-            if at.impedances and z is not None:
-                ends = quantity_of(quantity, [z, z + _R * z.real, z + 1j * _X * z.imag], f)
-                by_r, by_x = (ends[1:] - ends[0]).tolist()
-                unknown = accuracy.uncertainty(_UNKNOWN, quantity, value, z)
-            else:
-                of_r = quantity in _OF_R
-                by_r, by_x = abs(value) * _R * of_r, abs(value) * _X * (not of_r)
-                unknown = abs(value) * _UNKNOWN
-            if at.meter is None and not at.stated.get(quantity):  # repeats alone do not say what is common to them
-                error = hypot(np.nan_to_num(error), unknown)
-            error = max(error if isfinite(error) else unknown, _FINEST * abs(value))
-            if np.isfinite([error, by_r, by_x]).all():
-                yield _Measured(quantity, f, value, error, by_r, by_x)
+            if one := _quantity(at, quantity, f):
+                yield one
+
+
+def _quantity(at: accuracy.At, quantity: str, frequency_hz: float) -> _Measured | None:
+    """A quantity with what is uncertain of it; None where its value or uncertainty is none that a capacitor has."""
+    value, error = vars(at.value(quantity)).values()
+    if not isfinite(value) or value == 0 or (value < 0 and quantity in NEVER_NEGATIVE):
+        return None
+    if at.impedances and at.z_ohm is not None:
+        z = at.z_ohm
+        ends = quantity_of(quantity, [z, z + _R * z.real, z + 1j * _X * z.imag], frequency_hz)
+        by_r, by_x = (ends[1:] - ends[0]).tolist()
+        unknown = accuracy.uncertainty(_UNKNOWN, quantity, value, z)
+    else:
+        of_r = quantity in _OF_R
+        by_r, by_x = abs(value) * _R * of_r, abs(value) * _X * (not of_r)
+        unknown = abs(value) * _UNKNOWN
+    if at.meter is None and not at.stated.get(quantity):  # repeats alone do not say what is common to them
+        error = hypot(np.nan_to_num(error), unknown)
+    error = max(error if isfinite(error) else unknown, _FINEST * abs(value))
+    whole = np.isfinite([error, by_r, by_x]).all()
+    return _Measured(quantity, frequency_hz, value, error, by_r, by_x) if whole else None
 
 
 def _meter(measured: Sequence[_Measured], ln_resistance: tuple[float, float] | None) -> Meter | None:
@@ -118,5 +127,5 @@ def _meter(measured: Sequence[_Measured], ln_resistance: tuple[float, float] | N
         return scaled(np.stack(columns, -1)) if columns else np.empty((*z.shape[:-1], 0))
 
     covariance = np.diag((error / unit) ** 2) + sum(np.outer(by, by) for by in (by_r / unit, by_x / unit))
-    root = np.linalg.inv(np.linalg.cholesky(covariance))
-    return Meter(np.array([one.frequency_hz for one in measured]), observed, scaled(value), root, ln_resistance)
+    frequency_hz = np.array([one.frequency_hz for one in measured])
+    return Meter(frequency_hz, observed, scaled(value), whitening(covariance), ln_resistance)

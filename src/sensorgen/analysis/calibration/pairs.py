@@ -1,7 +1,8 @@
 """Known presses out of the recordings of a specimen, each with the reading at rest before it."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from sensorgen.measure.signal.presses import Pairs
 from sensorgen.measure.signal.run import processed
 from sensorgen.prediction.calibration.fitting import Data
 from sensorgen.prediction.calibration.rest import checked
-from sensorgen.prediction.calibration.specimen import Presses
+from sensorgen.prediction.calibration.specimen import Presses, no_presses
 from sensorgen.prediction.query import TONES_HZ
 
 _LEAST_ERROR = 3e-4  # of a mean at rest: from one recording to the next it differs by more than its noise
@@ -46,47 +47,55 @@ def known_presses(log: Log, name: str, rows: Sequence[BenchRun]) -> tuple[Data, 
         raise BadInput(
             f"the log has no recording of {name}; expected one: sensorgen log bench {name!r} LCR_FILE RIG_FILE"
         )
-    found, left_out = list[tuple[Real, Pairs | None, Complex, Real]](), list[str]()
+    runs, left_out = list[_Run](), list[str]()
     for row in rows:
         try:
-            parts, rig = read_again(log, row)
-            for part in parts:
-                beside = joined_all(part, rig) if rig is not None else [None] * len(part)
-                for recording, with_rig in zip(part, beside, strict=True):
-                    done = processed(recording, with_rig, remove_drift=False)
-                    left_out += [
-                        f"recording {row.number}: {note}" for note in (done.pairs.left_out if done.pairs else ())
-                    ]
-                    pairs = done.pairs if done.by_force else None
-                    if with_rig is not None and np.isnan(with_rig.offset_error_s):
-                        left_out.append(f"recording {row.number}: {with_rig.clock_text()}")
-                        pairs = pairs if np.isfinite(recording.epoch_s) else None
-                    found.append((recording.tones_hz, pairs, *_rest(done.recording, done.pairs)))
+            runs += _runs(log, row, left_out)
         except SensorgenError as error:
             left_out.append(f"recording {row.number} left out: {error}")
-    if not found:
+    if not runs:
         raise BadInput(f"{name}: none of {len(rows)} recordings can be used: {'; '.join(left_out)[:500]}")
-    tones = found[0][0]
-    same = []
-    for other, pairs, rest, noise in found:
-        with within(f"{name}: recordings at different tones; name those to use, --recording"):
-            order = checked(other, tones)
-        same.append((pairs and _ordered(pairs, order), rest[order], noise[order]))
-    return _data(same), tones, left_out
+    with within(f"{name}: recordings at different tones; name those to use, --recording"):
+        alike = [run.ordered(checked(run.tones_hz, runs[0].tones_hz)) for run in runs]
+    return _data(alike), runs[0].tones_hz, left_out
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """Tones of a recording, its known presses, and its mean reading at rest with that one's relative error."""
+
+    tones_hz: Real
+    pairs: Pairs | None
+    rest_ohm: Complex
+    noise: Real
+
+    def ordered(self, order: NDArray[np.intp]) -> "_Run":
+        """The run with its tones in an order."""
+        columns = ("before_ohm", "pressed_ohm", "difference_ohm", "error_ohm")
+        pairs = self.pairs and replace(self.pairs, **{name: getattr(self.pairs, name)[:, order] for name in columns})
+        return _Run(self.tones_hz[order], pairs, self.rest_ohm[order], self.noise[order])
+
+
+def _runs(log: Log, row: BenchRun, left_out: list[str]) -> Iterator[_Run]:
+    """Runs of a recording; notes on what is left out of them."""
+    parts, rig = read_again(log, row)
+    for part in parts:
+        for recording, with_rig in zip(
+            part, joined_all(part, rig) if rig is not None else [None] * len(part), strict=True
+        ):
+            result = processed(recording, with_rig, remove_drift=False)
+            left_out += [f"recording {row.number}: {note}" for note in (result.pairs.left_out if result.pairs else ())]
+            pairs = result.pairs if result.by_force else None
+            if with_rig is not None and np.isnan(with_rig.offset_error_s):
+                left_out.append(f"recording {row.number}: {with_rig.clock_text()}")
+                pairs = pairs if np.isfinite(recording.epoch_s) else None
+            yield _Run(recording.tones_hz, pairs, *_rest(result.recording, result.pairs))
 
 
 def nothing_recorded() -> Data:
     """Of a specimen that was never on the bench: no press, nothing known at the tones of the thesis's multi-sine."""
-    m, none = len(TONES_HZ), np.empty(0)
-    nothing = np.empty((0, m))
-    return Data(
-        Presses(none, none, none, none), nothing.astype(complex), nothing, np.zeros(m, complex), np.full(m, _UNKNOWN)
-    )
-
-
-def _ordered(pairs: Pairs, order: NDArray[np.intp]) -> Pairs:
-    columns = ("before_ohm", "pressed_ohm", "difference_ohm", "error_ohm")
-    return replace(pairs, **{name: getattr(pairs, name)[:, order] for name in columns})
+    m = len(TONES_HZ)
+    return Data.unread(no_presses(), np.zeros(m), rest_noise=np.full(m, _UNKNOWN))
 
 
 def _rest(recording: Recording, pairs: Pairs | None) -> tuple[Complex, Real]:
@@ -98,26 +107,22 @@ def _rest(recording: Recording, pairs: Pairs | None) -> tuple[Complex, Real]:
     return mean, np.maximum(z.std(axis=0) / np.abs(mean) / np.sqrt(2 * len(z)), _LEAST_ERROR)
 
 
-def _data(found: Sequence[tuple[Pairs | None, Complex, Real]]) -> Data:
-    weight = np.array([1 / noise**2 for _, _, noise in found])
-    rest = np.einsum("km,km->m", weight, [np.log(mean) for _, mean, _ in found]) / weight.sum(0)
-    m = len(rest)
-    held = [pairs for pairs, _, _ in found if pairs is not None]
+def _data(runs: Sequence[_Run]) -> Data:
+    weight = np.array([1 / run.noise**2 for run in runs])
+    rest = np.einsum("km,km->m", weight, [np.log(run.rest_ohm) for run in runs]) / weight.sum(0)
+    rest_noise, pairs = 1 / np.sqrt(weight.sum(0)), [run.pairs for run in runs if run.pairs is not None]
+    if not pairs:
+        return Data.unread(no_presses(), np.zeros(len(rest)), rest, rest_noise)
 
-    def all_of(name: str) -> Real:
-        return np.concatenate([getattr(pairs, name) for pairs in held]) if held else np.empty(0)
+    def all_of(name: str) -> NDArray[Any]:
+        return np.concatenate([getattr(one, name) for one in pairs])
 
-    force, peak = all_of("force_n"), all_of("peak_n")
-    known = np.isfinite(force) & np.isfinite(all_of("position_mm"))
-    before, pressed, error = (
-        np.concatenate([getattr(pairs, name) for pairs in held])[known] if held else np.empty((0, m), complex)
-        for name in ("before_ohm", "pressed_ohm", "error_ohm")
-    )
-    presses = Presses(
-        force, all_of("position_mm") * M_PER_MM, 1 - force / np.maximum(peak, force),
-        np.log10(np.maximum(all_of("hold_s"), _SHORTEST_S)),
-    ).rows(known)  # fmt: skip
+    force, position, peak = (all_of(name) for name in ("force_n", "position_mm", "peak_n"))
+    known = np.isfinite(force) & np.isfinite(position)
+    before, pressed, error = (all_of(name)[known] for name in ("before_ohm", "pressed_ohm", "error_ohm"))
+    decades = np.log10(np.maximum(all_of("hold_s"), _SHORTEST_S))
+    presses = Presses(force, position * M_PER_MM, 1 - force / np.maximum(peak, force), decades).rows(known)
     noise = np.abs(error) / np.abs(before) / np.sqrt(2)
-    means = np.sqrt((1 / all_of("samples")).sum(-1))[known] if held else np.empty(0)
+    means = np.sqrt((1 / all_of("samples")).sum(-1))[known]
     single = np.median(noise / means[:, None], axis=0) * np.sqrt(1.1) if len(noise) else None  # over ten at rest
-    return Data(presses, np.log(pressed / before), noise, rest, 1 / np.sqrt(weight.sum(0)), single)
+    return Data(presses, np.log(pressed / before), noise, rest, rest_noise, single)

@@ -12,6 +12,7 @@ last term keeps any value from resting on a single coupon.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import combinations, combinations_with_replacement, product
 
 import numpy as np
 
@@ -163,14 +164,13 @@ def _two_steps(found: Candidates, chosen: tuple[int, ...], count: int) -> set[tu
     every = range(len(found.coupons))
     steps: set[tuple[int, ...]] = set()
     for left in _without_one(chosen) if len(chosen) < count else ():
-        steps |= {tuple(sorted((*left, a, b))) for a in every for b in range(a, len(every))}
+        steps |= {tuple(sorted((*left, *pair))) for pair in combinations_with_replacement(every, 2)}
     few = len(chosen) ** 2 * len(every) ** 2 <= _MOST_PAIRS
     kinds = [few or (coupon.kind, coupon.material) for coupon in found.coupons]
     alike = {k: [j for j, kind in enumerate(kinds) if kind == kinds[k]] for k in chosen}
-    for m, i in enumerate(chosen):
-        for n, j in enumerate(chosen[m + 1 :], m + 1):
-            left = chosen[:m] + chosen[m + 1 : n] + chosen[n + 1 :]
-            steps |= {tuple(sorted((*left, a, b))) for a in alike[i] for b in alike[j]}
+    for m, n in combinations(range(len(chosen)), 2):
+        left = chosen[:m] + chosen[m + 1 : n] + chosen[n + 1 :]
+        steps |= {tuple(sorted((*left, *pair))) for pair in product(alike[chosen[m]], alike[chosen[n]])}
     return steps
 
 

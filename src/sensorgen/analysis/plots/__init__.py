@@ -39,12 +39,12 @@ def files(
     from sensorgen.analysis.plots.libraries import needed
 
     needed("matplotlib", "plotly")
-    found = response.response(sensor, frequency_hz, force_n, position_mm)
-    drawn = [identifiability.figure(sensor, frequency_hz, force_n=force_n[-1], title=title), *response.figures(found)]
+    answer = response.response(sensor, frequency_hz, force_n, position_mm)
+    drawn = [identifiability.figure(sensor, frequency_hz, force_n=force_n[-1], title=title), *response.figures(answer)]
     for figure in drawn:
         yield f"{figure.key}.png", static.png(figure)
     words = (
         f"{len(frequency_hz)} frequencies, {force_n[0]:g} to {force_n[-1]:g} N, "
-        f"{position_mm[0]:g} to {position_mm[-1]:g} mm, tip {found.tip_mm:g} mm."
+        f"{position_mm[0]:g} to {position_mm[-1]:g} mm, tip {answer.tip_mm:g} mm."
     )
     yield PAGE, pages.page(f"{title or 'Sensor'} under load", [words], [pages.Section(figures=tuple(drawn))]).encode()

@@ -30,19 +30,49 @@ def png(study: "ArrayStudy") -> bytes:
                              columns=len(panels)))  # fmt: skip
 
 
-def maps(found: "PressureMaps", true: "Real | None" = None) -> bytes:
-    """The heaviest frame's pressures, and the true ones beside them where these are known, as PNG.
+def maps(pressures: "PressureMaps", true: "Real | None" = None) -> bytes:
+    """The heaviest frame's pressures as PNG, the true ones beside them where these are known."""
+    return static.png(figure(pressures, true))
+
+
+def figure(pressures: "PressureMaps", true: "Real | None" = None, name: str = "map", title: str = "") -> Figure:
+    """The heaviest frame's pressures, and the true ones beside them where these are known.
 
     What is not determined is left white, never drawn as no pressure.
     """
-    k, layout = found.heaviest(), found.model.layout
-    shown = {f"frame at {found.time_s[k]:g} s": found.pressure_kpa[k]}
+    k, layout = pressures.heaviest(), pressures.model.layout
+    shown = {f"frame at {pressures.time_s[k]:g} s": pressures.pressure_kpa[k]}
     if true is not None:
-        shown = {"true": np.where(found.model.here, true[k], np.nan)} | shown
+        shown = {"true": np.where(pressures.model.here, true[k], np.nan)} | shown
     most = max(float(np.nanmax(values, initial=1.0)) for values in shown.values())
-    panels = [panel(layout, values, "pressure [kPa]", title, most) for title, values in shown.items()]
+    panels = [panel(layout, values, "pressure [kPa]", of, most) for of, values in shown.items()]
     alt = "Pressure at every crossing over the outline, the true one beside it where it is known."
-    return static.png(Figure("map", found.model.design.name, alt, {"": tuple(panels)}, columns=len(panels)))
+    return Figure(name, title or pressures.model.design.name, alt, {"": tuple(panels)}, columns=len(panels))
+
+
+def course(pressures: "PressureMaps", true: "Real", name: str, title: str) -> Figure:
+    """Total force over time and the trace of the centre of pressure, recovered and true on the same crossings."""
+    layout, area = pressures.model.layout, pressures.model.pitch_area_m2
+    newtons = np.where(np.isfinite(pressures.pressure_kpa), true * 1e3 * area, 0.0)
+    total = newtons.sum((1, 2))
+    with np.errstate(invalid="ignore"):
+        x, y = newtons.sum(1) @ layout.x_mm / total, newtons.sum(2) @ layout.y_mm / total
+    force, (own_x, own_y) = pressures.force_n[0], pressures.centre_mm
+    panels = [
+        Panel(
+            (
+                Curve("line", "true", one[0], one[1], colour=GREY, dash="dash"),
+                Curve("line", "recovered", other[0], other[1]),
+            ),
+            Axis(across), Axis(up),
+        )
+        for one, other, across, up in (
+            ((pressures.time_s, total), (pressures.time_s, force), "time [s]", "force [N]"),
+            ((x, y), (own_x, own_y), "centre x [mm]", "centre y [mm]"),
+        )
+    ]  # fmt: skip
+    alt = "Total force over time and centre of pressure, recovered and true."
+    return Figure(name, title, alt, {"": tuple(panels)}, columns=2)
 
 
 def panel(layout: "Layout", values: Real, label: str, title: str, most: float = nan) -> Panel:

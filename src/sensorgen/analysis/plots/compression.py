@@ -19,6 +19,6 @@ def figure(result: CompressionResult) -> Figure:
             for name, (values, colour, symbol) in bounds.items()
         )
         panels.append(Panel(curves, x, Axis("capacitance [nF/m²]")))
-    held = ", ".join(f"{key} {value}" for key, value in result.held.items())
+    conditions = ", ".join(f"{key} {value}" for key, value in result.held.items())
     alt = "Displacement of the top and capacitance per area over stress."
-    return Figure("compression", f"{result.model}: {held}", alt, {"": tuple(panels)}, columns=2)
+    return Figure("compression", f"{result.model}: {conditions}", alt, {"": tuple(panels)}, columns=2)

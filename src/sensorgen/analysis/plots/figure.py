@@ -256,12 +256,12 @@ def thinned(values: Real, most: int = MOST_POINTS) -> NDArray[np.intp]:
     starts = np.arange(len(rows)) * width
     low = np.argmin(np.where(np.isnan(rows), np.inf, rows), axis=1) + starts
     high = np.argmax(np.where(np.isnan(rows), -np.inf, rows), axis=1) + starts
-    found = np.unique(np.concatenate([low, high, [len(values) - 1]]))
-    return np.asarray(found[found < len(values)])
+    samples = np.unique(np.concatenate([low, high, [len(values) - 1]]))
+    return np.asarray(samples[samples < len(values)])
 
 
 def thinned_together(z: Complex, which: Mask | None = None) -> NDArray[np.intp]:
     """Samples of which the curves of both parts of each column are :func:`thinned`, among those of ``which``."""
     columns = (column if which is None else column[which] for column in z.T)
-    found = [thinned(part) for column in columns for part in (column.real, column.imag)]
-    return np.unique(np.concatenate(found))
+    samples = [thinned(part) for column in columns for part in (column.real, column.imag)]
+    return np.unique(np.concatenate(samples))

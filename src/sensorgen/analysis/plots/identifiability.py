@@ -84,5 +84,5 @@ def _by_frequency(setup: Setup) -> tuple[Panel, Panel]:
 
 
 def _single(setup: Setup, frequency_hz: Real) -> Bounds:
-    found = slopes(setup.sensor, frequency_hz, setup.force_n, setup.position_m)
-    return bounds(type(found)(*(slope[:, None] for slope in found)), setup.noise)
+    by_press = slopes(setup.sensor, frequency_hz, setup.force_n, setup.position_m)
+    return bounds(type(by_press)(*(slope[:, None] for slope in by_press)), setup.noise)

@@ -16,6 +16,8 @@ _BELOW_PX = 58  # from the last axis to a legend: below its title
 _MOST_MARKS = 4000  # of a map without a grid; WebGL would take more, but compiles scripts, which the page forbids
 _GAPS = (0.08, 0.34)  # between panels, of a panel's height: over one axis, or each over its own
 _DIVERGING = [[0, "#7f3b08"], [0.25, "#f1a340"], [0.5, "#f7f7f7"], [0.75, "#998ec3"], [1, "#2d004b"]]
+# Words of logarithmic ticks by the unit, else plain numbers; without a format, 20 is written as 2
+_LOG = {"[-]": {"exponentformat": "power"}, "[ohm]": {"tickformat": "~s"}, "[Hz]": {"tickformat": "~s"}}
 
 Data = dict[str, Any]
 
@@ -33,19 +35,25 @@ def _all_traces(panels: Sequence[Panel]) -> Iterator[Data]:
     """Of all panels; a name that comes again is not in the legend again."""
     named: set[str] = set()
     for k, panel in enumerate(panels):
-        places = ({"yaxis": f"y{k + 1}"} if k else {}) | ({"xaxis": f"x{k + 1}"} if k and not _alike(panels) else {})
-        for part in panel.content:
-            if isinstance(part, Body):
-                traces = [_body(part)]
-            elif isinstance(part, Map):
-                traces = [trace | places for trace in _map(part, panel, _domain(panels, k))]
-            else:
-                traces = [_curve(part, panel) | places]
-            for trace in traces:
-                if trace.get("showlegend"):
-                    trace["showlegend"] = trace["name"] not in named
-                    named.add(trace["name"])
-                yield trace
+        for trace in _traces(panel, _domain(panels, k)):
+            if trace.get("showlegend"):
+                trace["showlegend"] = trace["name"] not in named
+                named.add(trace["name"])
+            yield (
+                trace
+                | ({"yaxis": f"y{k + 1}"} if k else {})
+                | ({"xaxis": f"x{k + 1}"} if k and not _alike(panels) else {})
+            )
+
+
+def _traces(panel: Panel, domain: list[float]) -> Iterator[Data]:
+    for part in panel.content:
+        if isinstance(part, Body):
+            yield _body(part)
+        elif isinstance(part, Map):
+            yield from _map(part, panel, domain)
+        else:
+            yield _curve(part, panel)
 
 
 def height_px(figure: Figure) -> int:
@@ -99,22 +107,20 @@ def _domain(panels: Sequence[Panel], k: int) -> list[float]:
 
 
 def _axis(axis: Axis) -> Data:
-    found: Data = {"title": {"text": escape(axis.title)}, "automargin": True, "zeroline": False}
+    data: Data = {"title": {"text": escape(axis.title)}, "automargin": True, "zeroline": False}
     if axis.log:
-        found |= {"type": "log"}  # without a format, 20 is written as 2
-        prefixed = any(unit in axis.title for unit in ("[ohm]", "[Hz]"))
-        found |= {"exponentformat": "power"} if "[-]" in axis.title else {"tickformat": "~s" if prefixed else "~g"}
+        data |= {"type": "log", **_LOG.get(axis.title.rpartition(" ")[2], {"tickformat": "~g"})}
     if isfinite(axis.low) and isfinite(axis.high):
-        found["range"] = [log10(end) if axis.log else end for end in (axis.low, axis.high)]
+        data["range"] = [log10(end) if axis.log else end for end in (axis.low, axis.high)]
     elif isfinite(axis.low):
-        found["rangemode"] = "tozero"
+        data["rangemode"] = "tozero"
     if axis.names:
         names = [escape(n) for n in axis.names]
-        found |= {
+        data |= {
             "type": "category", "categoryorder": "array", "categoryarray": names,
             "range": [len(names) - 0.5, -0.5], "tickmode": "array", "tickvals": names,
         }  # fmt: skip
-    return found
+    return data
 
 
 def _scene(panel: Panel, stretch: tuple[float, float, float]) -> Data:
@@ -192,16 +198,16 @@ def _curve(curve: Curve, panel: Panel) -> Data:
         }  # fmt: skip
     if curve.kind == "line":
         line = {"color": curve.colour, "dash": curve.dash, "width": 1.4}
-        found = common | {"type": "scatter", "mode": "lines", "line": line}
+        trace = common | {"type": "scatter", "mode": "lines", "line": line}
     else:
         marker = {"color": curve.colour, "symbol": curve.symbol, "size": 8 if len(curve.x) < 200 else 5}
-        found = common | {"type": "scatter", "mode": "markers", "marker": marker}
+        trace = common | {"type": "scatter", "mode": "markers", "marker": marker}
     if len(curve.low):
-        found["error_x"] = _spread(curve, {"thickness": 1.5, "width": 4, "color": curve.colour})
+        trace["error_x"] = _spread(curve, {"thickness": 1.5, "width": 4, "color": curve.colour})
     if len(curve.text):
         where = "%{y}: %{x:.4g}<br>%{text}" if panel.y.names else "%{text}<br>%{x:.4g}, %{y:.4g}"
-        found |= {"text": [escape(t) for t in curve.text], "hovertemplate": f"{where}<extra></extra>"}
-    return found
+        trace |= {"text": [escape(t) for t in curve.text], "hovertemplate": f"{where}<extra></extra>"}
+    return trace
 
 
 def _spread(curve: Curve, how: Data) -> Data:
@@ -222,5 +228,5 @@ def packed(values: NDArray[Any] | Sequence[float]) -> dict[str, str]:
     # values that differ little for their size would show steps in single precision
     fine = bool(finite.size and np.ptp(finite) < 1e-4 * np.abs(finite).max())
     small = array.astype("<i4" if array.dtype.kind in "iu" else "<f8" if fine else "<f4")
-    found = {"dtype": small.dtype.str[1:], "bdata": base64.b64encode(small.tobytes()).decode()}
-    return found | ({"shape": ", ".join(map(str, array.shape))} if array.ndim > 1 else {})
+    data = {"dtype": small.dtype.str[1:], "bdata": base64.b64encode(small.tobytes()).decode()}
+    return data | ({"shape": ", ".join(map(str, array.shape))} if array.ndim > 1 else {})

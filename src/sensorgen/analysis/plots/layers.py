@@ -78,7 +78,7 @@ def placed(findings: Sequence[Finding], layers: Sequence[LayerRegions]) -> list[
 
 
 def stack(
-    layers: Sequence[LayerRegions], names: Sequence[str], size_mm: Sequence[float], found: Sequence[Placed],
+    layers: Sequence[LayerRegions], names: Sequence[str], size_mm: Sequence[float], listed: Sequence[Placed],
     travel: Sequence[Travel] = (),
 ) -> dict[str, Any]:  # fmt: skip
     """Data for the script: layers with their heights [mm], a path per body and per kind of travel, and findings."""
@@ -95,15 +95,15 @@ def stack(
         "findings": [
             None if at.layer is None
             else [at.layer, *(at.finding.place_mm or ()), f"{at.finding.severity}: {at.finding.message}", at.number]
-            for at in found
+            for at in listed
         ],
-        "first": next((at.layer for at in found if at.layer is not None), 0),
+        "first": next((at.layer for at in listed if at.layer is not None), 0),
     }  # fmt: skip
 
 
 def page(
     title: str, words: Sequence[str], shown: Sequence[BodyShown], data: Mapping[str, Any],
-    found: Sequence[Placed] = (), travel: Sequence[Travel] = (),
+    listed: Sequence[Placed] = (), travel: Sequence[Travel] = (),
 ) -> str:  # fmt: skip
     """The page as HTML that needs nothing else.
 
@@ -124,7 +124,7 @@ def page(
     """
     return pages.render(
         "sensorgen.analysis.plots", "layers.html", title=title, words=words, bodies=shown,
-        data=pages.packed_json(data), layers=len(data["layers"]), listed=found, travel=travel,
+        data=pages.packed_json(data), layers=len(data["layers"]), listed=listed, travel=travel,
     )  # fmt: skip
 
 
@@ -145,22 +145,22 @@ def of_print(
     """
     scene, files = printed.design.printed, list((travel or {}).items())
     kinds = [kind for file in files for kind in _travel(printed, *file, shown=file is files[-1])]
-    found = placed(findings, printed.first)
-    data = stack(printed.first, [body.name for body in scene.bodies], scene.size_mm, found, kinds)
-    return page(printed.design.name, [printed.provenance], bodies(printed.design), data, found, kinds)
+    listed = placed(findings, printed.first)
+    data = stack(printed.first, [body.name for body in scene.bodies], scene.size_mm, listed, kinds)
+    return page(printed.design.name, [printed.provenance], bodies(printed.design), data, listed, kinds)
 
 
-def _travel(printed: "Printed", when: str, found: "Stretches", *, shown: bool) -> Iterator[Travel]:
+def _travel(printed: "Printed", when: str, stretches: "Stretches", *, shown: bool) -> Iterator[Travel]:
     """Travel in contact, and travel near, by the layer that is printed at its height."""
     scene, tops = printed.design.printed, np.array([layer.top_mm for layer in printed.first])
     corner = np.array(printed.design.machine.bed_centre_mm()) - np.array(scene.size_mm[:2]) / 2
-    ways = np.stack([found.start_mm[:, :2], found.end_mm[:, :2]], axis=1) - corner
-    layer = np.searchsorted(tops, found.start_mm[:, 2] - _LEVEL_MM).clip(0, len(tops) - 1)
+    ways = np.stack([stretches.start_mm[:, :2], stretches.end_mm[:, :2]], axis=1) - corner
+    layer = np.searchsorted(tops, stretches.start_mm[:, 2] - _LEVEL_MM).clip(0, len(tops) - 1)
     for gap, touches, colour in _GAPS:
-        mine = found.touches == touches
+        mine = stretches.touches == touches
         by_tool = ", ".join(
-            f"{found.length_mm[mine & (found.tool == tool)].sum():.1f} mm by tool {tool}"
-            for tool in np.unique(found.tool[mine]).tolist()
+            f"{stretches.length_mm[mine & (stretches.tool == tool)].sum():.1f} mm by tool {tool}"
+            for tool in np.unique(stretches.tool[mine]).tolist()
         )
         words = f"travel {gap} another tool's material, {when}: {by_tool or '0.0 mm'}"
         yield Travel(words, colour, shown, {k: ways[mine & (layer == k)] for k in np.unique(layer[mine]).tolist()})

@@ -79,10 +79,10 @@ class Response:
         """Loads beyond which (F, x) -> (R, X) turns over: the sign of its determinant changes towards the next."""
         turning = (np.conj(self.by_force_ohm_per_n) * self.by_position_ohm_per_mm).imag
         turning = np.sign(np.where(np.abs(turning) > 1e-12 * np.abs(turning).max(initial=0), turning, 0))
-        found = np.zeros(turning.shape, bool)
-        found[:, :-1] |= turning[:, :-1] * turning[:, 1:] < 0
-        found[:, :, :-1] |= turning[:, :, :-1] * turning[:, :, 1:] < 0
-        return found
+        folded = np.zeros(turning.shape, bool)
+        folded[:, :-1] |= turning[:, :-1] * turning[:, 1:] < 0
+        folded[:, :, :-1] |= turning[:, :, :-1] * turning[:, :, 1:] < 0
+        return folded
 
 
 def response(
@@ -110,10 +110,10 @@ def response(
             f"{len(f)} frequencies, {len(force)} forces and {len(at)} positions are too much to draw; "
             f"expected up to {MOST_FREQUENCIES} frequencies and {LARGEST} points in all: use larger steps"
         )
-    found = sensor.response(f[:, None, None], force[:, None], at * M_PER_MM)
-    by_mm = found.by_position_ohm_per_m * M_PER_MM
+    result = sensor.response(f[:, None, None], force[:, None], at * M_PER_MM)
+    by_mm = result.by_position_ohm_per_m * M_PER_MM
     size = (sensor.tip_m / M_PER_MM, sensor.length_m / M_PER_MM)
-    return Response(f, force, at, found.impedance_ohm, found.by_force_ohm_per_n, by_mm, *size)
+    return Response(f, force, at, result.impedance_ohm, result.by_force_ohm_per_n, by_mm, *size)
 
 
 def lines(frequency_hz: Sequence[float], force_n: Real, position_mm: Real, impedance_ohm: Complex, name: str) -> Figure:

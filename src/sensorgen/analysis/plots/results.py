@@ -14,21 +14,21 @@ from sensorgen.prediction.sweep import Sweep
 _SEVERITIES = {"info": BLUE, "warning": ORANGE, "error": "#d1242f"}  # the most severe on top
 
 
-def findings(found: Review) -> Figure:
+def findings(review: Review) -> Figure:
     """Edges of the bodies from the side, with the places of findings."""
     curves = [
         Curve("line", name, *_from_side(mesh.vertices_mm[mesh.sharp_edges()]), colour=COLOURS[2:][k % len(COLOURS[2:])])
-        for k, (name, mesh) in enumerate(found.meshes.items())
+        for k, (name, mesh) in enumerate(review.meshes.items())
     ]
-    panel = Panel((*curves, *_places(found)), Axis("x [mm]"), Axis("z [mm]"))
+    panel = Panel((*curves, *_places(review)), Axis("x [mm]"), Axis("z [mm]"))
     alt = "Bodies of the sensor from the side, and where findings are."
-    return Figure("findings", f"{found.verdict}: {found.source}", alt, {"": (panel,)})
+    return Figure("findings", f"{review.verdict}: {review.source}", alt, {"": (panel,)})
 
 
-def _places(found: Review) -> Iterator[Curve]:
+def _places(review: Review) -> Iterator[Curve]:
     """Places of findings from the side, by severity."""
     for severity, colour in _SEVERITIES.items():
-        there = [f for f in found.findings if f.severity == severity and not f.waiver]
+        there = [f for f in review.findings if f.severity == severity and not f.waiver]
         x, z = ([f.place_mm[k] for f in there if f.place_mm] for k in (0, 2))
         text = [f.message for f in there if f.place_mm]
         yield Curve("points", severity, x, z, text=text, colour=colour)
@@ -42,10 +42,10 @@ def _from_side(ends_mm: Any) -> tuple[Any, Any]:
     return x, z
 
 
-def sweep(found: Sweep[Any]) -> Figure:
+def sweep(result: Sweep[Any]) -> Figure:
     """Each number of the results over the first setting, or, under load, over the load; a line for each other value."""
-    table, keys = found.table(), len(found.settings()[0])
-    x = keys if len(table.cells) > len(found.results) else 0
+    table, keys = result.table(), len(result.settings()[0])
+    x = keys if len(table.cells) > len(result.results) else 0
     panels = tuple(
         _panel(table, x, y, [k for k in range(keys) if k != x])
         for y in range(keys, len(table.columns))

@@ -40,11 +40,11 @@ def png(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Seque
     return static.png(Figure("sheet", title, alt, {"": panels}, columns=len(bounds)))
 
 
-def _panel(film: "Sheet", name: str, found: "Bounds", ports: Sequence["Port"], row: int) -> Panel:
-    none_mm = found.guess_m[row] / M_PER_MM
-    sigma_mm = found.sigma(outline=True)[..., 1 + row].T / M_PER_MM
+def _panel(film: "Sheet", name: str, bounds: "Bounds", ports: Sequence["Port"], row: int) -> Panel:
+    none_mm = bounds.guess_m[row] / M_PER_MM
+    sigma_mm = bounds.sigma(outline=True)[..., 1 + row].T / M_PER_MM
     shown = np.clip(sigma_mm, none_mm * _LEAST, none_mm)
-    drawn = Map(found.x_m / M_PER_MM, found.y_m / M_PER_MM, shown, f"error of {'xy'[row]} [mm]", none_mm * _LEAST,
+    drawn = Map(bounds.x_m / M_PER_MM, bounds.y_m / M_PER_MM, shown, f"error of {'xy'[row]} [mm]", none_mm * _LEAST,
                 none_mm, log=True)  # fmt: skip
     contacts = []
     for plus, _ in ports:

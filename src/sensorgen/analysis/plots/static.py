@@ -85,10 +85,10 @@ def drawn(figure: Figure, panels: Sequence[Panel], title: str = "") -> "Drawn":
         max(0.6 + _ROW_IN * len(p.y.names) if p.y.names else 4.0 if p.solid else tall for p in row) for row in rows
     ]
     width = max(_MARGIN_IN + columns * wide + 1.6 * figure.beside, 6.5)
-    made = Drawn(figsize=(width, _FRAME_IN + sum(heights)), dpi=100, layout="constrained")
-    made.suptitle(title, fontsize="large", x=0.01, ha="left", wrap=True)
+    canvas = Drawn(figsize=(width, _FRAME_IN + sum(heights)), dpi=100, layout="constrained")
+    canvas.suptitle(title, fontsize="large", x=0.01, ha="left", wrap=True)
     how: Any = {"projection": "3d"} if panels[0].solid else {}
-    grid = made.subplots(len(rows), columns, squeeze=False, height_ratios=heights, subplot_kw=how).ravel().tolist()
+    grid = canvas.subplots(len(rows), columns, squeeze=False, height_ratios=heights, subplot_kw=how).ravel().tolist()
     for axes in grid[len(panels) :]:
         axes.set_axis_off()
     for k, (axes, panel) in enumerate(zip(grid, panels, strict=False)):
@@ -102,9 +102,9 @@ def drawn(figure: Figure, panels: Sequence[Panel], title: str = "") -> "Drawn":
     handles = [axes.get_legend_handles_labels() for axes in grid]
     named = {label: handle for pair in handles for handle, label in zip(*pair, strict=True)}
     if named and not figure.beside:  # every name once, under the panels
-        ncols = min(len(named), 6 if made.get_figwidth() > 9 else 4)
-        made.legend(named.values(), named.keys(), loc="outside lower left", ncols=ncols, frameon=False)
-    return made
+        ncols = min(len(named), 6 if canvas.get_figwidth() > 9 else 4)
+        canvas.legend(named.values(), named.keys(), loc="outside lower left", ncols=ncols, frameon=False)
+    return canvas
 
 
 def _panel(axes: "Axes", panel: Panel, figure: Figure) -> None:

@@ -18,7 +18,7 @@ _SEEN = 1.0  # per cent: shorter bars are left out
 
 
 def page(
-    printed: Printed, held: Review, predicted: Prediction, numbers: Iterable[Part],
+    printed: Printed, review: Review, predicted: Prediction, numbers: Iterable[Part],
     advice: Iterable[Part] = (),
 ) -> str:  # fmt: skip
     """The page as HTML that needs nothing else.
@@ -37,13 +37,13 @@ def page(
         Changes that were tried, if any were.
     """
     design, scene = printed.design, printed.design.printed
-    names, listed = [body.name for body in scene.bodies], layers.placed(held.findings, printed.first)
+    names, listed = [body.name for body in scene.bodies], layers.placed(review.findings, printed.first)
     header = layers.stack(printed.first, names, scene.size_mm, listed)
     data = geometry.block(header, {"drawn": scene, "printed": printed.scene}, names)
-    sheet = draw(design, held, printed.scene, printed.provenance)
+    sheet = draw(design, review, printed.scene, printed.provenance)
     return pages.render(
-        "sensorgen.analysis.preview", "preview.html", headline=headline(design.name, held.findings, held.source),
-        title=design.name, verdict=held.verdict, bodies=layers.bodies(design),
+        "sensorgen.analysis.preview", "preview.html", headline=headline(design.name, review.findings, review.source),
+        title=design.name, verdict=review.verdict, bodies=layers.bodies(design),
         provenance=printed.provenance, printer=f"{design.machine.name}, {design.layers.name}",
         size=" × ".join(f"{side:g}" for side in scene.size_mm), layers=len(printed.first),
         sections=geometry.figures(scene, printed.scene, names, design.layers.boundaries_mm(scene.size_mm[2])),

@@ -10,12 +10,12 @@ FORMATS = ("html", "md", "csv", "json")
 __all__ = ["FORMATS", "Report", "Section", "pieces", "report", "written"]
 
 
-def written(made: Report, how: str) -> str:
+def written(content: Report, how: str) -> str:
     """A report as text; parameters as :func:`pieces`."""
-    return "".join(pieces(made, how))
+    return "".join(pieces(content, how))
 
 
-def pieces(made: Report, how: str) -> Iterator[str]:
+def pieces(content: Report, how: str) -> Iterator[str]:
     """A report as pieces of text, one after the other.
 
     Parameters
@@ -27,4 +27,4 @@ def pieces(made: Report, how: str) -> Iterator[str]:
     """
     from sensorgen.analysis.report.formats import WRITERS
 
-    yield from WRITERS[how](made)
+    yield from WRITERS[how](content)

@@ -61,11 +61,11 @@ def verdict(z: complex) -> str:
     return "capacitor" if -z.imag >= z.real else "leaking"
 
 
-def rows(found: Comparison) -> list[AcRow]:
+def rows(comparison: Comparison) -> list[AcRow]:
     """A row for each reading and frequency, in the order of the log."""
     return [
-        _row(reading, frequency_hz, found.predictions.get(found.names.get(reading.specimen, "")))
-        for reading in found.alternating
+        _row(reading, frequency_hz, comparison.predictions.get(comparison.names.get(reading.specimen, "")))
+        for reading in comparison.alternating
         for frequency_hz in sorted(set(reading.frequency_hz))
     ]
 
@@ -115,14 +115,14 @@ def _predicted(of: Predicted | None, frequency_hz: float) -> tuple[_Range, _Rang
     return (c, c * by[0], c * by[1]), (abs(z[0]), min(low, abs(z[0])), max(high, abs(z[0])))
 
 
-def table(made: Sequence[AcRow]) -> Table:
+def table(rows: Sequence[AcRow]) -> Table:
     """The rows as a table."""
-    return Table.of("ac", "AC readings and their prediction as printed, by frequency", tuple(made))
+    return Table.of("ac", "AC readings and their prediction as printed, by frequency", tuple(rows))
 
 
-def headline(made: Sequence[AcRow]) -> Iterator[str]:
+def headline(rows: Sequence[AcRow]) -> Iterator[str]:
     """Capacitance against the prediction, in one sentence."""
-    known = [row for row in made if isfinite(row.c_ratio) and row.c_ratio > 0]
+    known = [row for row in rows if isfinite(row.c_ratio) and row.c_ratio > 0]
     if not known:
         return
     lowest = min({row.frequency_hz for row in known}, key=lambda f: (-sum(r.frequency_hz == f for r in known), f))
@@ -154,20 +154,20 @@ def at_text(frequency_hz: float) -> str:
     return frequency_text(float(f"{frequency_hz:.4g}"))
 
 
-def findings(made: Sequence[AcRow]) -> Iterator[str]:
+def findings(rows: Sequence[AcRow]) -> Iterator[str]:
     """From which frequency on each specimen is a capacitor, and how many values are flagged."""
     sentences: dict[str, list[str]] = {}
-    for specimen in dict.fromkeys(row.specimen for row in made if row.verdict):
-        last = {row.frequency_hz: row.verdict for row in made if row.specimen == specimen and row.verdict}
+    for specimen in dict.fromkeys(row.specimen for row in rows if row.verdict):
+        last = {row.frequency_hz: row.verdict for row in rows if row.specimen == specimen and row.verdict}
         sentences.setdefault(capacitor_from(last), []).append(specimen)
-    for said, specimens in sentences.items():
+    for words, specimens in sentences.items():
         names = ", ".join(specimens[:8]) + (f" and {len(specimens) - 8} more" if len(specimens) > 8 else "")
-        yield f"By frequency: {names}: {said}."
-    flagged = [row for row in made if row.flag]
+        yield f"By frequency: {names}: {words}."
+    flagged = [row for row in rows if row.flag]
     if flagged:
         kinds = dict.fromkeys(kind for row in flagged for kind in row.flag.split("; "))
         counted = ", ".join(f"{sum(kind in row.flag for row in flagged)} {kind}" for kind in kinds)
-        yield f"Flagged: {len(flagged)} of {len(made)} AC values ({counted}): check contacts, compensation and range."
+        yield f"Flagged: {len(flagged)} of {len(rows)} AC values ({counted}): check contacts, compensation and range."
 
 
 def capacitor_from(verdicts: dict[float, str]) -> str:
@@ -188,10 +188,10 @@ def capacitor_from(verdicts: dict[float, str]) -> str:
     return f"a capacitor from {at_text(rising[start])} on"
 
 
-def behind_leak(found: Comparison) -> Iterator[str]:
+def behind_leak(comparison: Comparison) -> Iterator[str]:
     """Above which frequency a film that leaks at DC is a capacitor, if it has the predicted capacitance."""
     corners = [
-        row.verdict.leak_s / (2 * pi * c.value) for row in found.last
+        row.verdict.leak_s / (2 * pi * c.value) for row in comparison.last
         if row.verdict.film == "leak" and row.predicted and (c := row.predicted.prediction.capacitance)
         and isfinite(row.verdict.leak_s)
     ]  # fmt: skip
@@ -203,9 +203,9 @@ def behind_leak(found: Comparison) -> Iterator[str]:
         )
 
 
-def figures(made: Sequence[AcRow]) -> Iterator[Figure]:
+def figures(rows: Sequence[AcRow]) -> Iterator[Figure]:
     """Measured over predicted capacitance, by frequency."""
-    known = [row for row in made if isfinite(row.c_ratio) and row.c_ratio > 0]
+    known = [row for row in rows if isfinite(row.c_ratio) and row.c_ratio > 0]
     if len(known) < 2:
         return
     ends = [min(row.frequency_hz for row in known), max(row.frequency_hz for row in known)]

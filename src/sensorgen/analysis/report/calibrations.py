@@ -36,13 +36,13 @@ class CalibrationRow:
 def latest(log: Log, specimens: Container[str], left_out: list[tuple[str, str]]) -> list[Calibration]:
     """The latest calibration of each specimen; those that cannot be read go to ``left_out``."""
     rows = {row.specimen: row for row in log.entries(Row) if row.specimen in specimens}
-    found = []
+    calibrated = []
     for name, row in rows.items():
         try:
-            found.append(from_json(row.data))
+            calibrated.append(from_json(row.data))
         except BadInput as error:
             left_out.append((f"calibration {row.number}, {name}", str(error)))
-    return found
+    return calibrated
 
 
 def table(calibrations: Sequence[Calibration]) -> Table:
@@ -51,12 +51,13 @@ def table(calibrations: Sequence[Calibration]) -> Table:
 
 
 def _row(one: Calibration) -> CalibrationRow:
-    values, held, sensor = {v.name: v.value for v in one.values()}, one.held_out, one.model.sensor
+    values, held_out, sensor = {v.name: v.value for v in one.values()}, one.held_out, one.model.sensor
     return CalibrationRow(
         one.specimen, one.design, one.posterior.presses, values["resistance"] / sensor.resistance_ohm(),
         values["capacitance"] * 1e-12 / sensor.capacitance_f(), values["rise at 4 N"], 100 * one.posterior.scatter,
-        f"{held.force} of {held.presses}" if held else "", f"{held.position} of {held.presses}" if held else "",
-        held.force_width_n if held else None, held.position_width_m * 1e3 if held else None,
+        f"{held_out.force} of {held_out.presses}" if held_out else "",
+        f"{held_out.position} of {held_out.presses}" if held_out else "",
+        held_out.force_width_n if held_out else None, held_out.position_width_m * 1e3 if held_out else None,
     )  # fmt: skip
 
 

@@ -106,11 +106,11 @@ def report(
     """
     step("readings")
     specimens = tuple(named(name, log).specimen for name in specimens)
-    found = of_iteration(log, iteration, step, specimens=specimens)
-    left_out = list(found.left_out)
+    comparison = of_iteration(log, iteration, step, specimens=specimens)
+    left_out = list(comparison.left_out)
     step("recordings")
     recorded = list(runs(log, iteration, left_out, specimens=specimens))
-    if not found.rows and not recorded:
+    if not comparison.rows and not recorded:
         known = ", ".join(map(str, known_iterations(log))) or "none"
         lost = "; ".join(f"{what}: {why}" for what, why in left_out)
         of = ", ".join(specimens) or f"iteration {iteration}"
@@ -119,33 +119,33 @@ def report(
             "Log some with: sensorgen log add SPECIMEN --y 0.65k --z OL"
         )
     step("residuals")
-    names = {row.reading.specimen for row in found.rows} | {run.entry.specimen for run in recorded}
+    names = {row.reading.specimen for row in comparison.rows} | {run.entry.specimen for run in recorded}
     calibrated = calibrations.latest(log, names, left_out)
     own = {one.specimen for one in calibrated}  # a calibration explains more than one parameter can
-    explanations = explained.explanations(found, [run for run in recorded if run.entry.specimen not in own])
-    impedances = recordings.impedances(recorded, found) if recorded else None
-    verdicts = (*yields.headline(found),) if found.direct else ()
-    shorts = (*yields.findings(found), *direction.findings(found)) if found.direct else ()
-    ac = alternating.rows(found)
-    changes = history.rows(found, ac)
-    headline = (*electrodes.headline(found), *verdicts, *alternating.headline(ac), *_untrusted(left_out))
+    explanations = explained.explanations(comparison, [run for run in recorded if run.entry.specimen not in own])
+    impedances = recordings.impedances(recorded, comparison) if recorded else None
+    verdicts = (*yields.headline(comparison),) if comparison.direct else ()
+    shorts = (*yields.findings(comparison), *direction.findings(comparison)) if comparison.direct else ()
+    ac = alternating.rows(comparison)
+    changes = history.rows(comparison, ac)
+    headline = (*electrodes.headline(comparison), *verdicts, *alternating.headline(ac), *_untrusted(left_out))
     by_frequency = (
         *alternating.findings(ac),
-        *alternating.behind_leak(found),
-        *electrodes.beyond_meter(found),
+        *alternating.behind_leak(comparison),
+        *electrodes.beyond_meter(comparison),
         *recordings.findings(recorded, impedances),
     )
     findings = (
         *calibrations.findings(calibrated), *shorts, *history.findings(changes), *by_frequency,
         *explained.sentences(explanations),
-        *electrodes.findings(found),
+        *electrodes.findings(comparison),
     )  # fmt: skip
     step("variants")
-    sections = list(_sections(log, found, recorded, explanations, impedances, ac, changes, calibrated, left_out))
+    sections = list(_sections(log, comparison, recorded, explanations, impedances, ac, changes, calibrated, left_out))
     step("page")
     return Report(
         iteration, specimens, datetime.now(UTC).isoformat(timespec="seconds"),
-        (*headline, *recordings.headline(impedances), *_basis(found, recorded)), findings,
+        (*headline, *recordings.headline(impedances), *_basis(comparison, recorded)), findings,
         tuple(s for s in sections if s.tables or s.figures or s.drawings),
     )  # fmt: skip
 
@@ -157,35 +157,35 @@ def _untrusted(left_out: Sequence[tuple[str, str]]) -> Iterator[str]:
         yield f"Not compared: {names[0]}{f' and {len(names) - 1} more' if names[1:] else ''}: {why}."
 
 
-def _basis(found: Comparison, recorded: Sequence[Run]) -> Iterator[str]:
+def _basis(comparison: Comparison, recorded: Sequence[Run]) -> Iterator[str]:
     """Summary of the measurements, in one sentence; none of a single reading."""
-    specimens = {row.reading.specimen for row in found.rows} | {run.entry.specimen for run in recorded}
-    if len(found.rows) + len(recorded) > 1:
+    specimens = {row.reading.specimen for row in comparison.rows} | {run.entry.specimen for run in recorded}
+    if len(comparison.rows) + len(recorded) > 1:
         yield (
-            f"Basis: {len(found.rows)} readings and {len(recorded)} recordings; specimens: {len(specimens)}; designs: "
-            f"{len(found.predictions)}."
+            f"Basis: {len(comparison.rows)} readings and {len(recorded)} recordings; specimens: {len(specimens)}; "
+            f"designs: {len(comparison.predictions)}."
         )
 
 
 def _sections(
-    log: Log, found: Comparison, recorded: Sequence[Run], explanations: Sequence[explained.Explanation],
+    log: Log, comparison: Comparison, recorded: Sequence[Run], explanations: Sequence[explained.Explanation],
     impedances: Table | None, ac: Sequence[alternating.AcRow], changes: Sequence[history.HistoryRow],
     calibrated: Sequence[Calibration], left_out: Sequence[tuple[str, str]],
 ) -> Iterator[Section]:  # fmt: skip
-    alone = len(found.rows) <= 1 and not recorded  # a short page
-    figures = (*electrodes.figures(found), *(recordings.residuals(impedances) if impedances else ()))
-    tables = (*([electrodes.readings(found)] if found.direct else ()), *([impedances] if impedances else ()))
+    alone = len(comparison.rows) <= 1 and not recorded  # a short page
+    figures = (*electrodes.figures(comparison), *(recordings.residuals(impedances) if impedances else ()))
+    tables = (*([electrodes.readings(comparison)] if comparison.direct else ()), *([impedances] if impedances else ()))
     parts: tuple[Part, ...]
-    notes: tuple[str, ...] = electrodes.NOTES if found.direct and not alone else ()
+    notes: tuple[str, ...] = electrodes.NOTES if comparison.direct and not alone else ()
     yield Section("measured", "Measured and predicted", figures, (*tables, *notes))
     if ac:
         parts = (alternating.table(ac), alternating.NOTE)
         yield Section("ac", "Capacitance and impedance by frequency", tuple(alternating.figures(ac)), parts)
-    if found.direct:
-        grouped = (yields.table(found) if len(found.last) > 1 else None, direction.table(found))
-        notes = () if alone else yields.notes(found)
-        parts = (*filter(None, grouped), electrodes.reasons(found), *notes)
-        yield Section("verdicts", "Verdicts and yield", yields.figures(found), parts)
+    if comparison.direct:
+        grouped = (yields.table(comparison) if len(comparison.last) > 1 else None, direction.table(comparison))
+        notes = () if alone else yields.notes(comparison)
+        parts = (*filter(None, grouped), electrodes.reasons(comparison), *notes)
+        yield Section("verdicts", "Verdicts and yield", yields.figures(comparison), parts)
     if changes:
         notes = () if alone else (history.NOTE,)
         yield Section("changes", "Bake, shrinkage and defects", (), (history.table(changes), *notes))
@@ -198,10 +198,12 @@ def _sections(
     if recorded:
         figures = tuple(recordings.figures(recorded))
         yield Section("recorded", "Recordings", figures, (recordings.facts(recorded),))
-    figures = () if alone else tuple(variants.figures(found))
-    yield Section("variants", "The variants", figures, variants.identifiability(found), variants.drawings(found))
+    figures = () if alone else tuple(variants.figures(comparison))
+    yield Section(
+        "variants", "The variants", figures, variants.identifiability(comparison), variants.drawings(comparison)
+    )
     if left_out:
         caption = "What was left out, or taken with care, and why"
         parts = (Table.of("left_out", caption, tuple(LeftOut(*row) for row in left_out)),)
         yield Section("left-out", "What was left out, and why", parts=parts)
-    yield Section("provenance", "Provenance", parts=(origins(log, found, brief=alone),))
+    yield Section("provenance", "Provenance", parts=(origins(log, comparison, brief=alone),))

@@ -32,27 +32,27 @@ class DirectionRow:
     p: Annotated[float, Column("p", "", "Wilcoxon rank-sum test of the plates' medians")]
 
 
-def rows(found: Comparison) -> list[DirectionRow]:
+def rows(comparison: Comparison) -> list[DirectionRow]:
     """A row for each shape and film with both directions, two specimens of each at least."""
-    last = {row.reading.specimen: row for row in usable(found)}
+    last = {row.reading.specimen: row for row in usable(comparison)}
     groups: dict[tuple[str, float | None], dict[str, list[str]]] = {}
     for name, row in last.items():
         of = row.evidence
         if of.axes:
             groups.setdefault((of.shape, of.film_mm), {}).setdefault(of.axes, []).append(name)
-    made = []
+    tests = []
     for (shape, film_mm), by in sorted(groups.items(), key=lambda item: (item[0][0], item[0][1] is None, item[0][1])):
         if len(by) != 2 or min(map(len, by.values())) < 2:
             continue
         (first, ones), (second, others) = sorted(by.items())
         one, other = (_by_plate([last[name] for name in names]) for names in (ones, others))
         expected = [_predicted([last[name] for name in names]) for names in (ones, others)]
-        made.append(DirectionRow(
+        tests.append(DirectionRow(
             shape, "unknown" if film_mm is None else f"{film_mm:g} mm", first, len(ones), median(one), second,
             len(others), median(other), median(other) / median(one), expected[1] / expected[0],
             rank_p(one, other),
         ))  # fmt: skip
-    return made
+    return tests
 
 
 def _by_plate(of: Sequence[Compared]) -> list[float]:
@@ -69,25 +69,25 @@ def _predicted(of: Sequence[Compared]) -> float:
     return geometric_mean(values) if values else nan
 
 
-def table(found: Comparison) -> Table | None:
+def table(comparison: Comparison) -> Table | None:
     """The rows as a table; None without any."""
-    made = rows(found)
-    return Table.of("direction", "Electrode resistance by direction of the cogs", made) if made else None
+    tests = rows(comparison)
+    return Table.of("direction", "Electrode resistance by direction of the cogs", tests) if tests else None
 
 
-def findings(found: Comparison) -> Iterator[str]:
+def findings(comparison: Comparison) -> Iterator[str]:
     """Shapes and films of which the directions differ, each in a sentence; and how many do not."""
-    made = rows(found)
-    level = LEVEL / max(len(made), 1)
-    differing = [row for row in made if row.p < level]
+    tests = rows(comparison)
+    level = LEVEL / max(len(tests), 1)
+    differing = [row for row in tests if row.p < level]
     for row in differing:
         yield (
             f"Direction: {row.shape} {row.second} has {row.ratio:.2g} times the electrode resistance of {row.shape} "
             f"{row.first}, film {row.film} (medians of {row.others} and {row.specimens} sensors; p = {row.p:.2g}, "
             f"affirmed below {level:.2g}); predicted as printed {row.predicted:.2g}."
         )
-    if len(made) > len(differing):
-        yield f"Direction: no significant difference in {len(made) - len(differing)} of {len(made)} shapes and films."
+    if len(tests) > len(differing):
+        yield f"Direction: no significant difference in {len(tests) - len(differing)} of {len(tests)} shapes and films."
 
 
 def rank_p(one: Sequence[float], other: Sequence[float]) -> float:

@@ -69,11 +69,11 @@ class VerdictRow:
     doubts: Annotated[str, Column("doubts")]
 
 
-def readings(found: Comparison) -> Table:
+def readings(comparison: Comparison) -> Table:
     """A row for each reading, the largest deviation first."""
 
     def row_of(k: int) -> ReadingRow:
-        row = found.direct[k]
+        row = comparison.direct[k]
         r, v = row.reading, row.verdict
         expected = row.expected_ohm
         bounds = (expected.lower, expected.value, expected.upper) if expected else (nan, nan, nan)
@@ -84,7 +84,7 @@ def readings(found: Comparison) -> Table:
             v.leak_s, v.word,
         )  # fmt: skip
 
-    off = np.array([-abs(row.residual) if isfinite(row.residual) else 1.0 for row in found.direct])
+    off = np.array([-abs(row.residual) if isfinite(row.residual) else 1.0 for row in comparison.direct])
     rows = Lazy(row_of, range(len(off))).at(np.argsort(off, kind="stable").tolist())
     return Table.of("readings", "Every reading and its prediction; the largest deviation first", rows)
 
@@ -98,10 +98,10 @@ def _error(row: Compared) -> float:
     return hypot(scatter, limit) if limit is not None else scatter or nan
 
 
-def beyond_meter(found: Comparison) -> Iterator[str]:
+def beyond_meter(comparison: Comparison) -> Iterator[str]:
     """DC resistances that are beyond the ranges of the meter that they were read from, in one sentence."""
     beyond = []
-    for row in found.direct:
+    for row in comparison.direct:
         words = row.reading.words
         meter = accuracy.find(words.instrument) if words.instrument else None
         values = (value for value in (*row.reading.y_ohm, *row.reading.z_ohm) if isfinite(value))
@@ -111,26 +111,26 @@ def beyond_meter(found: Comparison) -> Iterator[str]:
         yield f"Flagged: a resistance beyond the meter's ranges: {', '.join(dict.fromkeys(beyond))}."
 
 
-def reasons(found: Comparison) -> Table:
+def reasons(comparison: Comparison) -> Table:
     """Verdicts with reasons, remarks and doubts, in the order of the log."""
 
     def row_of(k: int) -> VerdictRow:
-        row = found.direct[k]
+        row = comparison.direct[k]
         r, words, (electrode, film) = row.reading, row.reading.words, row.verdict.reasons
         doubts = "; ".join(words.doubts)
         return VerdictRow(r.number, r.specimen, row.verdict.word, electrode, film, words.remark, doubts)
 
-    return Table.of("verdicts", "Verdicts and their reasons", Lazy(row_of, range(len(found.direct))))
+    return Table.of("verdicts", "Verdicts and their reasons", Lazy(row_of, range(len(comparison.direct))))
 
 
-def usable(found: Comparison) -> Lazy[Compared]:
+def usable(comparison: Comparison) -> Lazy[Compared]:
     """Rows with a prediction, and an electrode that is neither open nor so low that a prefix k was lost."""
-    return found.rows.where(lambda r: isfinite(r.residual) and r.verdict.electrode in ("sound", "dry joint"))
+    return comparison.rows.where(lambda r: isfinite(r.residual) and r.verdict.electrode in ("sound", "dry joint"))
 
 
-def headline(found: Comparison) -> Iterator[str]:
+def headline(comparison: Comparison) -> Iterator[str]:
     """Measured against predicted, in one sentence."""
-    rows = usable(found)
+    rows = usable(comparison)
     if len(rows) == 1 and (expected := rows[0].expected_ohm):
         where = "within" if rows[0].inside else "outside"
         yield (
@@ -145,13 +145,13 @@ def headline(found: Comparison) -> Iterator[str]:
             f"Electrode resistance: measured {words} (median of {len(rows)} readings; "
             f"{sum(bool(r.inside) for r in rows)} within the predicted interval)."
         )
-    elif found.direct:
+    elif comparison.direct:
         yield "Electrode resistance: no reading can be compared with a prediction."
 
 
-def findings(found: Comparison) -> Iterator[str]:
+def findings(comparison: Comparison) -> Iterator[str]:
     """When predictions were made, and which electrodes touch as drawn."""
-    every = list(found.predictions.values())
+    every = list(comparison.predictions.values())
     before = sum(bool(p.stored_at) and p.before is True for p in every)
     late = {
         "by the clocks of the log alone": sum(bool(p.stored_at) and p.before is None for p in every),
@@ -163,15 +163,15 @@ def findings(found: Comparison) -> Iterator[str]:
         order = "stored before anything was measured, by the order of the log's records"
         predictions = "prediction was" if len(every) == 1 else "predictions were"
         yield f"{before} of {len(every)} {predictions} {order}{rest}."
-    touching = Counter(r.predicted.design for r in found.rows if r.predicted and r.predicted.touches)
+    touching = Counter(r.predicted.design for r in comparison.rows if r.predicted and r.predicted.touches)
     if touching:
         names = ", ".join(f"{name} ({count})" for name, count in sorted(touching.items()))
         yield f"Shorted by design, the electrodes touch as printed: {names}; {touching.total()} readings."
 
 
-def figures(found: Comparison) -> tuple[Figure, ...]:
+def figures(comparison: Comparison) -> tuple[Figure, ...]:
     """Measured over predicted, and both in ohm."""
-    known = found.rows.where(lambda row: isfinite(row.residual))
+    known = comparison.rows.where(lambda row: isfinite(row.residual))
     some = known.where(lambda row: row.verdict.electrode != "unknown")
     every = some.at(np.argsort([row.residual for row in some], kind="stable").tolist())
     if not every:

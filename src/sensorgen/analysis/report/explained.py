@@ -67,36 +67,36 @@ class Explanation:
     share_percent: Annotated[float, Column("residual explained", "%", "of the sum of squares")]
 
 
-def explanations(found: Comparison, recorded: Sequence[Run]) -> list[Explanation]:
+def explanations(comparison: Comparison, recorded: Sequence[Run]) -> list[Explanation]:
     """All parameters for all kinds of measurements with two values or more, the best of each kind first."""
-    kinds = [kind for kind in (*_resistances(found), *_impedances(found, recorded)) if len(kind.measured) > 1]
+    kinds = [kind for kind in (*_resistances(comparison), *_impedances(comparison, recorded)) if len(kind.measured) > 1]
     return [
         one for kind in kinds
         for one in sorted((_explained(kind, p) for p in PARAMETERS), key=lambda one: -one.share_percent)
     ]  # fmt: skip
 
 
-def table(found: Sequence[Explanation]) -> Table:
+def table(explanations: Sequence[Explanation]) -> Table:
     """A row for each."""
-    return Table.of("explained", "Share of the residuals that one parameter explains", tuple(found))
+    return Table.of("explained", "Share of the residuals that one parameter explains", tuple(explanations))
 
 
-def sentences(found: Sequence[Explanation]) -> Iterator[str]:
+def sentences(explanations: Sequence[Explanation]) -> Iterator[str]:
     """The best parameter of each kind, and those that the readings cannot constrain."""
-    for kind in dict.fromkeys(e.kind for e in found):
-        best = next(e for e in found if e.kind == kind)
+    for kind in dict.fromkeys(e.kind for e in explanations):
+        best = next(e for e in explanations if e.kind == kind)
         if best.share_percent > 100 * _FLAT:
             by = f"of {best.value:.3g} S" if best.parameter == LEAK else f"scaled by {best.value:.3g}"
             yield (
                 f"{kind.capitalize()}: {best.parameter} {by} explains {best.share_percent:.3g} % of the squared "
                 "residuals."
             )
-    silent = [p for p in PARAMETERS if all(e.share_percent <= 100 * _FLAT for e in found if e.parameter == p)]
-    if silent and found:
+    silent = [p for p in PARAMETERS if all(e.share_percent <= 100 * _FLAT for e in explanations if e.parameter == p)]
+    if silent and explanations:
         yield f"These readings cannot constrain {', '.join(silent[:-1])}{' or ' if silent[1:] else ''}{silent[-1]}."
 
 
-def _resistances(found: Comparison) -> Iterator[Kind]:
+def _resistances(comparison: Comparison) -> Iterator[Kind]:
     """Electrodes, and films up to what the meter can tell from an open circuit."""
 
     def across(ohm: float, parameter: str, value: float) -> float:
@@ -104,7 +104,8 @@ def _resistances(found: Comparison) -> Iterator[Kind]:
 
     rows = (
         (v.ry_ohm, v.rz_ohm, row.expected_ohm.value, row.predicted.ry_ohm.value, v.leak_s, not row.evidence.touching)
-        for row in usable(found) if row.predicted and row.predicted.ry_ohm and row.expected_ohm for v in (row.verdict,)
+        for row in usable(comparison) if row.predicted and row.predicted.ry_ohm and row.expected_ohm
+        for v in (row.verdict,)
     )  # fmt: skip
     kind = np.dtype([(name, "f8") for name in ("y", "z", "expected", "alone", "leak")] + [("apart", "?")])
     known = np.fromiter(rows, kind)
@@ -140,11 +141,15 @@ def _of_electrodes(middles: Real, law: Callable[[float, str, float], float]) -> 
     return lambda parameter, value: np.log([complex(law(ohm, parameter, value)) for ohm in distinct.tolist()])[of]
 
 
-def _impedances(found: Comparison, recorded: Sequence[Run]) -> Iterator[Kind]:
+def _impedances(comparison: Comparison, recorded: Sequence[Run]) -> Iterator[Kind]:
     """Z at rest, and its change under load, where a line can be made of the design."""
     known: list[tuple[Run, Movable]] = []
     for run in recorded:
-        of = Movable(found.bodies[found.names[run.entry.specimen]]) if run.entry.specimen in found.names else None
+        of = (
+            Movable(comparison.bodies[comparison.names[run.entry.specimen]])
+            if run.entry.specimen in comparison.names
+            else None
+        )
         try:
             if of is not None and np.isfinite(run.rest_ohm).all():
                 _ = of.model.sensor
@@ -162,16 +167,16 @@ def _impedances(found: Comparison, recorded: Sequence[Run]) -> Iterator[Kind]:
 
 def _modelled(known: Sequence[tuple[Run, Movable]], parameter: str, value: float, *, loaded: bool) -> Complex:
     """Ln Z of recordings at rest, or its change under load, with one parameter moved."""
-    found = []
+    parts = []
     for run, of in known:
         sensor, f = moved(of.model.sensor, **_moves(of, parameter, value)), run.tones_hz
         if loaded and run.pairs is not None:
             stiffness = value if parameter == MODULUS else 1.0
             where = run.pairs.force_n, run.pairs.position_mm * M_PER_MM
-            found.append(pressed(sensor, f, *where, stiffness).ravel())
+            parts.append(pressed(sensor, f, *where, stiffness).ravel())
         else:
-            found.append(at_rest(sensor, f))
-    return np.concatenate(found)
+            parts.append(at_rest(sensor, f))
+    return np.concatenate(parts)
 
 
 def _moves(of: Movable, parameter: str, value: float) -> dict[str, float]:

@@ -38,28 +38,28 @@ class HistoryRow:
     verdict: Annotated[str, Column("verdict")]
 
 
-def rows(found: Comparison, ac: Sequence[AcRow]) -> list[HistoryRow]:
+def rows(comparison: Comparison, ac: Sequence[AcRow]) -> list[HistoryRow]:
     """A row for each reading of which a bake, shrinkage, a defect or a remark is known and new."""
     measured: dict[int, dict[float, tuple[float, float]]] = {}
     for one in ac:
         measured.setdefault(one.number, {})[one.frequency_hz] = one.c_pf, one.c_ratio
-    made, before = [], dict[str, _Before]()
-    for row in found.rows:
+    listed, before = [], dict[str, _Before]()
+    for row in comparison.rows:
         name = row.reading.specimen
-        shrinkage = _shrinkage(found, name)
+        shrinkage = _shrinkage(comparison, name)
         earlier, c = before.get(name), measured.get(row.reading.number, {})
         state = _state(row)
         known = (state != _UNTOLD or shrinkage) and not (earlier and state == _state(earlier[0]))
         if known:
-            made.append(_row(row, earlier, c, shrinkage))
-        kept = earlier[1] if earlier and not known else {}
-        before[name] = row, {**kept, **{f: pf for f, (pf, _) in c.items()}}
-    return made
+            listed.append(_row(row, earlier, c, shrinkage))
+        c_before = earlier[1] if earlier and not known else {}
+        before[name] = row, {**c_before, **{f: pf for f, (pf, _) in c.items()}}
+    return listed
 
 
-def _shrinkage(found: Comparison, specimen: str) -> float:
+def _shrinkage(comparison: Comparison, specimen: str) -> float:
     """By which the bake shrinks a specimen, as its design has it [-]; 0 without a design."""
-    body = found.bodies.get(found.names.get(specimen, ""))
+    body = comparison.bodies.get(comparison.names.get(specimen, ""))
     return body.design.shrinkage if body else 0.0
 
 
@@ -109,22 +109,22 @@ def _ratio(now: float, before: float) -> float:
     return now / before if isfinite(now) and isfinite(before) and before > 0 else nan
 
 
-def findings(made: Sequence[HistoryRow]) -> Iterator[str]:
+def findings(rows: Sequence[HistoryRow]) -> Iterator[str]:
     """Sentences about changes by bakes and defects, where one specimen has them."""
-    if len({row.specimen for row in made}) > 1:
+    if len({row.specimen for row in rows}) > 1:
         return
-    for row in made:
+    for row in rows:
         changes = {
             "electrode resistance": row.electrode_change, "film resistance": row.film_change,
             f"C at {row.at}": row.capacitance_change,
         }  # fmt: skip
-        said = ", ".join(f"{name} x {value:.3g}" for name, value in changes.items() if isfinite(value))
+        changed = ", ".join(f"{name} x {value:.3g}" for name, value in changes.items() if isfinite(value))
         state = ", ".join(filter(None, (row.bake, row.defects, row.remark)))
         shrunk = f"; its shrinkage alone makes C x {row.expected_change:.3g}" if row.expected_change else ""
-        if said and state:
-            yield f"Reading {row.number} ({state}) against {row.against}: {said}{shrunk}."
+        if changed and state:
+            yield f"Reading {row.number} ({state}) against {row.against}: {changed}{shrunk}."
 
 
-def table(made: Sequence[HistoryRow]) -> Table:
+def table(rows: Sequence[HistoryRow]) -> Table:
     """The rows as a table."""
-    return Table.of("changes", "Bake, shrinkage and defects, and the change that they made", tuple(made))
+    return Table.of("changes", "Bake, shrinkage and defects, and the change that they made", tuple(rows))

@@ -24,7 +24,7 @@ class Origin:
     which: Annotated[str, Column("which")]
 
 
-def origins(log: Log, found: Comparison, *, brief: bool = False) -> Table:
+def origins(log: Log, comparison: Comparison, *, brief: bool = False) -> Table:
     """Versions, the log, raw files, designs with the predictions of each, and sources of material values.
 
     Parameters
@@ -37,30 +37,30 @@ def origins(log: Log, found: Comparison, *, brief: bool = False) -> Table:
         Only program, log and predictions.
     """
     records, head = log.head()
-    readings = Counter(r.reading.words.source for r in found.rows)
+    readings = Counter(r.reading.words.source for r in comparison.rows)
     predictions = [
-        Origin("prediction", f"{p.design} ({p.design_id})", p.provenance) for p in found.predictions.values()
+        Origin("prediction", f"{p.design} ({p.design_id})", p.provenance) for p in comparison.predictions.values()
     ]
+    program = Origin("program", "sensorgen", __version__)
+    logged = Origin("log", log.path.name, f"{records} records; head {head}")
     if brief:
-        program, kept = Origin("program", "sensorgen", __version__), f"{records} records; head {head}"
-        rows = [program, Origin("log", log.path.name, kept), *predictions]
-        return Table.of("provenance", "Program, log and prediction", tuple(rows))
+        return Table.of("provenance", "Program, log and prediction", (program, logged, *predictions))
     anchors = log.entries(Anchor)
     rows = [
-        Origin("program", "sensorgen", __version__), Origin("program", "Python", platform.python_version()),
+        program, Origin("program", "Python", platform.python_version()),
         *(Origin("library", name, version(name)) for name in LIBRARIES),
-        Origin("log", log.path.name, f"{records} records; head {head}"),
+        logged,
         *(Origin("anchor", a.file, f"{a.logged_at}: record {log.sequence(a.head)}, {a.head}") for a in anchors),
         *(Origin("raw file", f.name, f"SHA-256 {f.uid}, {f.size} bytes") for f in log.entries(RawFile)),
         *(Origin("source of readings", name, f"{count} readings") for name, count in sorted(readings.items())),
-        *predictions, *_sources(found),
+        *predictions, *_sources(comparison),
     ]  # fmt: skip
     return Table.of("provenance", "Programs, files, designs and sources", tuple(rows))
 
 
-def _sources(found: Comparison) -> list[Origin]:
+def _sources(comparison: Comparison) -> list[Origin]:
     used: dict[str, set[str]] = {}
-    for of in found.predictions.values():
+    for of in comparison.predictions.values():
         for value in of.prediction.values:
             used.setdefault(value.source, set()).add(f"{value.material} {value.quantity} = {value.value:.6g}")
     known = citations() | {SET: "by the design itself"}

@@ -65,11 +65,11 @@ class RecordingRow:
     notes: Annotated[str, Column("notes")]
 
 
-def impedances(recorded: Sequence[Run], found: Comparison) -> Table:
+def impedances(recorded: Sequence[Run], comparison: Comparison) -> Table:
     """Impedance at rest, frequency by frequency, and its prediction."""
     rows: list[ImpedanceRow] = []
     for run in recorded:
-        of = found.predictions.get(found.names.get(run.entry.specimen, ""))
+        of = comparison.predictions.get(comparison.names.get(run.entry.specimen, ""))
         capacitance = [
             None if c is None else c / _F_PER_PF for c in _predicted(of.prediction.capacitance if of else None)
         ]
@@ -132,8 +132,8 @@ def findings(recorded: Sequence[Run], table: Table | None) -> Iterator[str]:
             at = ", ".join(negative)
             yield f"Flagged: {run.name} has a negative resistance at {at}: check the bridge's calibration."
         off = {part: ", ".join(_outside(mine, part)) for part in "RX"}
-        if said := " and ".join(f"{part} at {where}" for part, where in off.items() if where):
-            yield f"Flagged: {run.name} is outside the predicted range by its {said}."
+        if where_off := " and ".join(f"{part} at {where}" for part, where in off.items() if where):
+            yield f"Flagged: {run.name} is outside the predicted range by its {where_off}."
         if run.pairs is not None or not mine:
             continue
         low = min(mine, key=lambda row: row.frequency_hz)

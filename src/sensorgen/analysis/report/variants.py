@@ -31,11 +31,11 @@ class IdentifiabilityRow:
     verdict: Annotated[str, Column("verdict")]
 
 
-def drawings(found: Comparison) -> tuple[Drawing, ...]:
+def drawings(comparison: Comparison) -> tuple[Drawing, ...]:
     """Every variant of which a specimen was printed, with its prediction in words."""
     sheets = []
-    for name, body in found.bodies.items():
-        of, design = found.predictions[name], body.design
+    for name, body in comparison.bodies.items():
+        of, design = comparison.predictions[name], body.design
         r, c = of.ry_ohm, of.prediction.capacitance
         words = (
             f"electrode resistance {r.words() if r else 'unknown'}",
@@ -46,10 +46,10 @@ def drawings(found: Comparison) -> tuple[Drawing, ...]:
     return tuple(sheets)
 
 
-def identifiability(found: Comparison) -> tuple[Table, ...]:
+def identifiability(comparison: Comparison) -> tuple[Table, ...]:
     """A row for each variant with a prediction."""
     rows = []
-    for name, of in found.predictions.items():
+    for name, of in comparison.predictions.items():
         card = of.prediction.identifiability
         known = (card.sigma_force_n, card.sigma_position_m, card.correlation) if card else (None, None, None)
         force, place, together = (nan if value is None else value for value in known)
@@ -59,9 +59,9 @@ def identifiability(found: Comparison) -> tuple[Table, ...]:
     return (Table.of("identifiability", caption, rows),) if rows else ()
 
 
-def figures(found: Comparison) -> Iterator[Figure]:
+def figures(comparison: Comparison) -> Iterator[Figure]:
     """Standard errors over position for three forces, and the bodies; of every variant, one at a time."""
-    cards = {name: of.prediction.identifiability for name, of in found.predictions.items()}
+    cards = {name: of.prediction.identifiability for name, of in comparison.predictions.items()}
     known = {name: errors(card) for name, card in cards.items() if card}
     if known:
         yield Figure(
@@ -69,20 +69,20 @@ def figures(found: Comparison) -> Iterator[Figure]:
             "Least standard error (Cramér-Rao) of force above, of position below, over the position of the load, for "
             "the frequencies and noise of the prediction. Dashed: required. Gaps: undefined.", known, "variant",
         )  # fmt: skip
-    if found.bodies:
+    if comparison.bodies:
         axes = Axis("x [mm]"), Axis("y [mm]"), Axis("z [mm]")
         yield Figure(
             "bodies", f"Bodies, height x {_STRETCH[2]:g}",
             "The bodies of the chosen variant, to be turned with the mouse, their height enlarged. The drawings show "
             "them in section.",
-            {name: (Panel(tuple(_bodies(body.design)), *axes),) for name, body in found.bodies.items()}, "variant",
+            {name: (Panel(tuple(_bodies(body.design)), *axes),) for name, body in comparison.bodies.items()}, "variant",
             stretch=_STRETCH,
         )  # fmt: skip
 
 
-def errors(found: Identifiability) -> tuple[Panel, Panel]:
+def errors(card: Identifiability) -> tuple[Panel, Panel]:
     """Standard errors over position [mm], for a weak, a middling and the greatest force."""
-    over, required = found.map, found.required
+    over, required = card.map, card.required
     place, panels = [x / M_PER_MM for x in over.position_m], []
     for quantity, unit, sigma, needed, per in (
         ("force", "N", over.sigma_force_n, required.sigma_force_n, 1.0),
@@ -103,5 +103,10 @@ def errors(found: Identifiability) -> tuple[Panel, Panel]:
 def _bodies(design: Design) -> Iterator[Body]:
     """The bodies of the sensor in use, as triangles."""
     for body in design.in_use.bodies:
-        made = mesh(body)
-        yield Body(body.name.replace("_", " "), made.vertices_mm, made.triangles, design.material(body.material).colour)
+        body_mesh = mesh(body)
+        yield Body(
+            body.name.replace("_", " "),
+            body_mesh.vertices_mm,
+            body_mesh.triangles,
+            design.material(body.material).colour,
+        )

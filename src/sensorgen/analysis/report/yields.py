@@ -67,45 +67,45 @@ class YieldRow:
     median_ratio: Annotated[float, Column("median film / electrode", "", "ratio of the two resistances")]
 
 
-def judged(found: Comparison, by: str) -> list[Group]:
+def judged(comparison: Comparison, by: str) -> list[Group]:
     """Groups of one kind."""
-    rows = found.by_bake if by == "bake" else found.last
+    rows = comparison.by_bake if by == "bake" else comparison.last
     return groups(((row.evidence, row.verdict) for row in rows), BY[by])
 
 
-def everything(found: Comparison) -> Group:
+def everything(comparison: Comparison) -> Group:
     """All specimens as one group."""
-    return groups(((row.evidence, row.verdict) for row in found.last), lambda _: ())[0]
+    return groups(((row.evidence, row.verdict) for row in comparison.last), lambda _: ())[0]
 
 
-def headline(found: Comparison) -> Iterator[str]:
+def headline(comparison: Comparison) -> Iterator[str]:
     """The yield, in one sentence."""
-    whole = everything(found).intact
-    if len(found.last) == 1:
-        row = found.last[0]
-        limit = f" (film intact from {_intact(found)} on)" if row.verdict.film in ("intact", "leak") else ""
+    whole = everything(comparison).intact
+    if len(comparison.last) == 1:
+        row = comparison.last[0]
+        limit = f" (film intact from {_intact(comparison)} on)" if row.verdict.film in ("intact", "leak") else ""
         yield f"Verdict of {row.reading.specimen}: {row.verdict.word}{limit}."
     elif whole.total:
         which = "None" if not whole.count else "All" if whole.count == whole.total else f"{whole.count}"
         verb = "is" if whole.count in (0, 1) and which != "All" else "are"
         yield (
-            f"{which} of the {whole.total} testable sensors {verb} intact (film from {_intact(found)} on): yield "
+            f"{which} of the {whole.total} testable sensors {verb} intact (film from {_intact(comparison)} on): yield "
             f"{_range(whole)}, 95 % confidence."
         )
 
 
-def _intact(found: Comparison) -> str:
+def _intact(comparison: Comparison) -> str:
     """Least resistances of intact films, in words."""
-    ends = [of(row.verdict.intact_ohm for row in found.last) / 1e6 for of in (min, max)]
+    ends = [of(row.verdict.intact_ohm for row in comparison.last) / 1e6 for of in (min, max)]
     return " to ".join(dict.fromkeys(f"{value:.3g}" for value in ends)) + " Mohm"
 
 
-def findings(found: Comparison) -> Iterator[str]:
+def findings(comparison: Comparison) -> Iterator[str]:
     """Shorts and leaks of all sensors, and of groups."""
-    both = found.last.where(lambda row: row.verdict.same_order is not None)
+    both = comparison.last.where(lambda row: row.verdict.same_order is not None)
     if len(both) < 2:
         return
-    such, whole = both.where(lambda row: bool(row.verdict.same_order)), everything(found)
+    such, whole = both.where(lambda row: bool(row.verdict.same_order)), everything(comparison)
     design = sum(row.evidence.touching for row in such)
     implausible = sum(row.verdict.electrode != "sound" for row in such)
     of = ", ".join(
@@ -118,14 +118,14 @@ def findings(found: Comparison) -> Iterator[str]:
         f"{len(such)} of {len(both)} sensors are shorted or leaking{f' ({of})' if of else ''}: film "
         f"resistance at most {ORDER:g} times the electrode's. {ratio}"
     )
-    yield from _parted(found)
+    yield from _parted(comparison)
     if design and whole.shorted.total:
         yield (
             f"Without those shorted by design: {whole.shorted.count} of {whole.shorted.total} are shorted or leaking, "
             f"{_range(whole.shorted)} of such prints, 95 % confidence."
         )
     for by in TESTED:
-        known = [g for g in judged(found, by) if g.shorted.total]
+        known = [g for g in judged(comparison, by) if g.shorted.total]
         if len(known) > 1:
             chance = dependence(known)
             parts = ", ".join(f"{_name(g)}: {g.shorted.count} of {g.shorted.total}" for g in known)
@@ -133,9 +133,11 @@ def findings(found: Comparison) -> Iterator[str]:
             yield f"Shorted or leaking by {by}: {parts}; {differ} (p = {chance:.2g})."
 
 
-def _parted(found: Comparison) -> Iterator[str]:
+def _parted(comparison: Comparison) -> Iterator[str]:
     """Specimens whose electrodes touch as drawn, judged by their gap as printed."""
-    rows = [row for row in found.last if row.predicted and row.predicted.parted and row.verdict.same_order is not None]
+    rows = [
+        row for row in comparison.last if row.predicted and row.predicted.parted and row.verdict.same_order is not None
+    ]
     if rows:
         gaps = {row.predicted.design: row.predicted.prediction.gap for row in rows if row.predicted}
         gap = "; ".join(f"{name} {bounds.words()}" for name, bounds in sorted(gaps.items()) if bounds)
@@ -155,7 +157,7 @@ def _name(group: Group) -> str:
     return ", ".join(map(str, group.key))
 
 
-def notes(found: Comparison) -> tuple[str, ...]:
+def notes(comparison: Comparison) -> tuple[str, ...]:
     """Notes on the rules of verdicts and counts."""
     how = (
         "The verdict is the gravest of the electrode's and the film's. An electrode is compared with the median of its "
@@ -163,9 +165,9 @@ def notes(found: Comparison) -> tuple[str, ...]:
         f"{REACTANCES:g} times its predicted reactance at {TONES_HZ[0] / 1e3:g} kHz on, where a leak changes the "
         f"impedance by {50 / REACTANCES**2:g} %, or from the meter's highest range on; between, it leaks."
     )
-    if len(found.last) == 1:
+    if len(comparison.last) == 1:
         return (how,)
-    earlier = len(found.direct) - len(found.last)
+    earlier = len(comparison.direct) - len(comparison.last)
     more = f"; {earlier} earlier readings are not counted" if earlier else ""
     return (
         how,
@@ -177,12 +179,12 @@ def notes(found: Comparison) -> tuple[str, ...]:
     )
 
 
-def table(found: Comparison) -> Table:
+def table(comparison: Comparison) -> Table:
     """Verdicts, yield and shorts of all specimens, and by each grouping that has more than one group."""
-    rows = [_row("all", "all", everything(found))]
+    rows = [_row("all", "all", everything(comparison))]
     for by in BY:
-        known = judged(found, by)
-        alone = by == "shape and film" and any(len(judged(found, part)) < 2 for part in TESTED)
+        known = judged(comparison, by)
+        alone = by == "shape and film" and any(len(judged(comparison, part)) < 2 for part in TESTED)
         rows += [_row(by, _name(g), g) for g in known if len(known) > 1 and not alone]
     return Table.of("yield", "Verdicts and yield", tuple(rows))
 
@@ -199,16 +201,16 @@ def _percents(of: Share) -> tuple[Cell, Cell, Cell]:
     return (100 * of.share, 100 * of.low, 100 * of.high) if of.total else (None, None, None)
 
 
-def figures(found: Comparison) -> tuple[Figure, ...]:
+def figures(comparison: Comparison) -> tuple[Figure, ...]:
     """Film resistance over the electrode's, and verdicts and shorts by shape and film; none of one specimen."""
-    if len(found.last) < 2:
+    if len(comparison.last) < 2:
         return ()
-    known = judged(found, "shape and film")
-    return (*_ratios(found), _counts(known), *_shares(known))
+    known = judged(comparison, "shape and film")
+    return (*_ratios(comparison), _counts(known), *_shares(known))
 
 
-def _ratios(found: Comparison) -> Iterator[Figure]:
-    known = found.rows.where(lambda r: isfinite(r.verdict.ratio) and r.verdict.rz_ohm > 0)
+def _ratios(comparison: Comparison) -> Iterator[Figure]:
+    known = comparison.rows.where(lambda r: isfinite(r.verdict.ratio) and r.verdict.rz_ohm > 0)
     if not known:
         return
     every, rows = len(known), list(known[:: -(-len(known) // MOST_POINTS)])
@@ -224,7 +226,7 @@ def _ratios(found: Comparison) -> Iterator[Figure]:
                   text=[f"{r.reading.specimen}: {r.verdict.word}" for r in here],
                   **_LOOKS.get(shape, _OTHER))
         )  # fmt: skip
-    zero, overload = (sum(r.verdict.rz_ohm == value for r in found.rows) for value in (0, inf))
+    zero, overload = (sum(r.verdict.rz_ohm == value for r in comparison.rows) for value in (0, inf))
     x, y = Axis("electrode resistance [ohm]", log=True), Axis("film resistance [ohm]", log=True)
     yield Figure(
         "shorts", "Film resistance over electrode resistance",

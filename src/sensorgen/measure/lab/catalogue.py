@@ -91,6 +91,8 @@ def names() -> list[str]:
 
 def listed() -> dict[str, str]:
     """Every kind with its role, those of PyMeasure included, or how to get them."""
+    from sensorgen.measure.lab import pymeasure_meters
+
     roles = dict[str, str]()
     for name in names():
         try:
@@ -98,7 +100,7 @@ def listed() -> dict[str, str]:
         except BadInput as error:
             roles[name] = f"cannot be used: {error}"
     try:
-        return roles | _pymeasure_roles()
+        return roles | {name: role for name, (role, _) in pymeasure_meters.roles().items()}
     except NotInstalled as error:
         return roles | {f"{PYMEASURE}CLASS": str(error)}
 
@@ -200,7 +202,7 @@ def _at_port(
     role: Role, settings: type[Strict], driver: Callable[[Any, Clock, Any], Device], port: Callable[[str, Any], Any],
     simulator: Callable[[Plant, Any], Any],
 ) -> Kind:  # fmt: skip
-    """A kind whose driver speaks through a port, to a device or to a simulator."""
+    """A kind whose driver has a port: of a device, or of a simulator."""
     from sensorgen.measure.lab.port import SimulatedPort
 
     def simulate(plant: Plant, given: Any, clock: Clock) -> Simulated:
@@ -272,16 +274,11 @@ def _scpi(name: str) -> Kind:
     )  # fmt: skip
 
 
-def _pymeasure_roles() -> dict[str, str]:
-    from sensorgen.measure.lab import pymeasure_meters
-
-    return {name: role for name, (role, _) in pymeasure_meters.roles().items()}
-
-
 def _pymeasure(name: str) -> Kind:
     from sensorgen.measure.lab import pymeasure_meters
 
-    return Kind(pymeasure_meters.role(name), pymeasure_meters.Settings, partial(pymeasure_meters.opened, name))
+    role, driver = pymeasure_meters.meter(name)
+    return Kind(role, pymeasure_meters.Settings, driver)
 
 
 _KINDS: dict[str, Callable[[], Kind]] = {

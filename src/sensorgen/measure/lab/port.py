@@ -15,6 +15,7 @@ from typing import Any, Protocol
 from sensorgen.core.errors import BadInput, NotInstalled
 from sensorgen.measure.lab.clock import Clock, RealClock
 from sensorgen.measure.lab.devices import DeviceFault
+from sensorgen.measure.virtual.plant import Simulator
 
 _POLL_S = 0.005  # of the serial driver; half a period of the fastest control loop
 
@@ -53,24 +54,6 @@ class Web(Protocol):
 
     def get(self, path: str, timeout_s: float) -> tuple[int, bytes]:
         """Status and content of one GET request; :class:`DeviceFault` if nothing answers."""
-
-
-class Simulator(Protocol):
-    """Simulator of a device at the other end of a line.
-
-    Attributes
-    ----------
-    fault : str
-        Planted fault, "" for none.
-    heard : list of bytes
-        Every message that has come.
-    """
-
-    fault: str
-    heard: list[bytes]
-
-    def exchange(self, data: bytes, time_s: float) -> bytes:
-        """Bytes sent by a time, after having received some; OSError where the cable is out."""
 
 
 @contextmanager

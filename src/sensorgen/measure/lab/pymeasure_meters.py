@@ -9,9 +9,9 @@ import math
 import pkgutil
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from typing import Any
 
@@ -82,8 +82,8 @@ def _way(kind: Any, wires: int) -> tuple[dict[str, str], str]:
     return {}, next((name for name in _READS[wires] if hasattr(kind, name)), "")
 
 
-def role(name: str) -> Role:
-    """Role of a meter by its name.
+def meter(name: str) -> tuple[Role, Callable[[Any, Settings, Clock], "Multimeter | LcrMeter"]]:
+    """Role of a meter, and its driver by address, settings and clock; it connects when it is asked what it is.
 
     Raises
     ------
@@ -92,14 +92,8 @@ def role(name: str) -> Role:
     """
     if name not in roles():
         raise UnknownName("meter of PyMeasure", name, roles())
-    return roles()[name][0]
-
-
-def opened(name: str, address: str, settings: Settings, clock: Clock) -> "Multimeter | LcrMeter":
-    """Driver of a meter; the connection is made when it is asked what it is."""
-    kind = roles()[name][1]
-    made = LcrMeter if role(name) == "impedance" else Multimeter
-    return made(kind, address, settings, clock)
+    role, kind = roles()[name]
+    return role, partial(LcrMeter if role == "impedance" else Multimeter, kind)
 
 
 class _Meter:

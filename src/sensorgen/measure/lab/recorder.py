@@ -10,7 +10,7 @@ import json
 import os
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,10 +18,9 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from sensorgen.core import units
+from sensorgen.core import files, units
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, Unwritable
-from sensorgen.core.files import replacing
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import Readings
 
@@ -71,7 +70,7 @@ class Appended:
         """Sync and close; a file that was removed is written again, and named as an error."""
         try:
             if not self._there():
-                with replacing(self._path) as copy:
+                with files.replacing(self._path) as copy:
                     for at in range(0, os.fstat(self._file).st_size, 1 << 20):
                         copy.write(os.pread(self._file, 1 << 20, at))
                 raise Unwritable(f"{str(self._path)!r} was removed during the run, and is written again")
@@ -267,24 +266,9 @@ def new_folder(log: Path) -> Path:
             return folder
 
 
-@contextmanager
-def alone(folder: Path) -> Iterator[bool]:
+def alone(folder: Path) -> AbstractContextManager[bool]:
     """Hold the run's lock inside, which the system lets go with the process; False where another process has it."""
-    handle = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
-    try:
-        try:
-            import fcntl
-        except ImportError:  # Windows
-            yield True
-            return
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            yield False
-            return
-        yield True
-    finally:
-        os.close(handle)
+    return files.alone(folder / ".lock", wait=False)
 
 
 def log_attempts(log: "Log", folder: Path, clock: Clock) -> "list[BenchRun]":

@@ -1,6 +1,6 @@
 """A virtual array: a print with scatter, faults, play, creep, drift and noise, its network solved by nodal analysis.
 
-No code of the inversion: the network is a sparse matrix of all nodes and terminals, and :func:`closing` a law of its own.
+No code of the inversion: the network is a sparse matrix of all nodes and terminals, :func:`closing` a law of its own.
 Loads are maps of pressure on the surface [kPa].
 """
 
@@ -98,8 +98,8 @@ class VirtualArray:
         Its network at rest.
     rise : callable
         C/C0 - 1 of every crossing by the pressure that it feels, (m, n) [kPa].
-    play_kpa : float
-        By which unloading lags behind loading [kPa].
+    play : float
+        By which unloading lags behind loading, half of it each way, over the largest pressure before [-].
     creep : float
         Share of the pressure that is felt with ``creep_s`` only [-].
     creep_s : float
@@ -110,7 +110,7 @@ class VirtualArray:
 
     tracks: Tracks
     rise: Callable[[Real], Real]
-    play_kpa: float = 0.0
+    play: float = 0.0
     creep: float = 0.0
     creep_s: float = 100.0
     drift: float = 0.0
@@ -120,9 +120,10 @@ class VirtualArray:
     ) -> Complex:
         """Frames under loads, (k, m, n), by the first frequency [S]."""
         found = np.empty(pressure_kpa.shape, complex)
-        play, slow = pressure_kpa[0], np.zeros(pressure_kpa.shape[1:])
+        play = slow = most = np.zeros(pressure_kpa.shape[1:])
         for k, (load, elapsed) in enumerate(zip(pressure_kpa, np.diff(time_s, prepend=time_s[0]), strict=True)):
-            play = np.clip(play, load - self.play_kpa, load + self.play_kpa)
+            most = np.maximum(most, load)
+            play = np.clip(play, load - self.play * most, load + self.play * most)
             slow = slow + (load - slow) * -np.expm1(-elapsed / self.creep_s)
             felt = (1 - self.creep) * (load + play) / 2 + self.creep * slow
             ratio = 1 + np.exp(self.drift * day) * self.rise(felt)
@@ -143,7 +144,7 @@ def closing(strain: Real, power: Real) -> Callable[[Real], Real]:
 
 def printed(
     model: ArrayModel, seed: int, scatter: float = _SCATTER, faults: Sequence[str] = (), *,
-    stiffness: float = 1.0, play_kpa: float = 0.0, creep: float = 0.0, drift: float = 0.0, own_law: bool = False,
+    stiffness: float = 1.0, play: float = 0.0, creep: float = 0.0, drift: float = 0.0, own_law: bool = False,
 ) -> VirtualArray:  # fmt: skip
     """A print of an array.
 
@@ -159,7 +160,7 @@ def printed(
         As of :func:`sensorgen.prediction.array.readout.faulty`.
     stiffness : float
         Of the print over the predicted one, with ``own_law`` [-].
-    play_kpa, creep, drift : float
+    play, creep, drift : float
         As of :class:`VirtualArray`.
     own_law : bool
         Whether cells close by :func:`closing`; else by the predicted law.
@@ -172,11 +173,11 @@ def printed(
         return np.asarray(gain * (model.under(kpa * 1e3)[0] - 1))
 
     if not own_law:
-        return VirtualArray(tracks, predicted, play_kpa, creep, drift=drift)
+        return VirtualArray(tracks, predicted, play, creep, drift=drift)
     at_full = float(model.under(np.array(_FULL_KPA * 1e3))[0]) - 1
     power = 0.95 + 0.02 * draw.normal(size=shape)
     own = closing(gain * at_full / (1 + at_full) / stiffness, power)
-    return VirtualArray(tracks, own, play_kpa, creep, drift=drift)
+    return VirtualArray(tracks, own, play, creep, drift=drift)
 
 
 def nodal(tracks: Tracks, capacitance_f: Real, readout: ArrayReadout) -> Complex:

@@ -25,8 +25,9 @@ TARE_S = 20.0  # unloaded seconds of a session that are its tare
 UNLOADED = 0.01  # of the largest reference: less is no load
 _SHAPES = 3  # powers of x
 _EM = 25
+_RATE, _GAIN = 0.005, 0.01  # standard deviation of drifts before any data [1/d], least of gains between sessions
 _ROUNDS = 2  # of laws and drift in turn
-_EFFECTIVE = 2.0  # at least, samples of a session
+_EFFECTIVE = 20.0  # at least, samples of a session
 _RESPONDS = 0.5  # share of the variance of a reference that a live element's reading explains
 _N_PER_KPA_MM2 = 1e-3
 
@@ -100,8 +101,8 @@ class Session:
         if len(known) < 3 or not known.std():
             return 1.0
         off = known - known.mean()
-        rho = float(np.clip((off[1:] @ off[:-1]) / (off @ off), 0.0, 1 - _EFFECTIVE / len(known)))
-        return max((1 - rho) / (1 + rho), _EFFECTIVE / len(known))
+        rho = float(np.clip((off[1:] @ off[:-1]) / (off @ off), 0.0, 1.0))
+        return min(max((1 - rho) / (1 + rho), _EFFECTIVE / len(known)), 1.0)
 
 
 def _nothing(reference: Real) -> Mask:
@@ -288,9 +289,9 @@ def _drift(sums: Sequence[Sums], days: Real, at: Real) -> tuple[float, float]:
     along = np.array([np.einsum("nq,nq->", at, s.cross) + s.total(at) @ s.force for s in sums])
     ln = np.log(np.maximum(along / np.maximum(size, 1e-30), 0.1))
     off, away = ln - ln.mean(), days - days.mean()
-    rate = float(away @ off / (away @ away))
-    left = off - rate * away
-    return rate, float(np.sqrt(left @ left / max(len(days) - 2, 1) / (away @ away)))
+    scatter = max(float(off.std()), _GAIN)
+    information = float(away @ away) / scatter**2 + 1 / _RATE**2
+    return float(away @ off) / scatter**2 / information, float(information**-0.5)
 
 
 def _expected(sums: Sequence[Sums], gains: Real, alive: Mask) -> tuple[Real, Real]:

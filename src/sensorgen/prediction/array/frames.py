@@ -1,7 +1,7 @@
 """Frames of an array to pressure maps: by C/C0 where that suffices, else with the network of the tracks."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from io import BytesIO
 from typing import Any
@@ -24,6 +24,8 @@ _STEPS = 25  # of Gauss-Newton with the slopes at rest
 _DONE = 0.02  # of a standard error: a smaller step ends it
 _SUFFICES = 1.0  # standard error by which C/C0 may differ from the network
 _ALIVE = 3.0  # factor of a reading at rest to the predicted one; prints differ by less
+_SHORTED = 10.0  # real part at rest over the predicted magnitude
+_LEAKS = 6  # steps to the conductance of shorts
 _SHOWN = 6  # crossings that are named
 _CI = 1.96  # standard errors of 95 %
 
@@ -79,9 +81,12 @@ class PressureMaps:
 
     @cached_property
     def centre_mm(self) -> tuple[Real, Real]:
-        """Centre of pressure of the touched crossings, from the print's corner; nan where nothing is [mm]."""
-        weight = np.where(self.touched, self._newtons, 0.0)
-        total = weight.sum((1, 2))
+        """Centre of pressure of all determined crossings, from the print's corner; nan where nothing is touched [mm].
+
+        A threshold would leave light loads with a long arm out; noise of many unloaded crossings has a mean of 0.
+        """
+        weight = np.nan_to_num(self._newtons)
+        total = np.where(self.touched.any((1, 2)), weight.sum((1, 2)), np.nan)
         layout = self.model.layout
         with np.errstate(invalid="ignore", divide="ignore"):
             return (weight.sum(1) @ layout.x_mm) / total, (weight.sum(2) @ layout.y_mm) / total
@@ -199,31 +204,47 @@ class MapInverter:
             )
 
     def read(self, capacitance_f: Real) -> Readings:
-        """Readings of the network."""
+        """Readings of the network, with the shorts that the readings at rest show."""
+        return self._network(capacitance_f, self.leaks_s)
+
+    def _network(self, capacitance_f: Real, leaks_s: Real) -> Readings:
         return readings(
-            self.model.tracks(capacitance_f), self.readout.frequency_hz[0], readout=self.readout.kind,
-            input_ohm=self.readout.input_ohm,
+            replace(self.model.tracks(capacitance_f), leak_s=leaks_s), self.readout.frequency_hz[0],
+            readout=self.readout.kind, input_ohm=self.readout.input_ohm,
         )  # fmt: skip
 
     @cached_property
+    def leaks_s(self) -> Real:
+        """Conductance of shorted crossings, (m, n): those whose real part at rest is beyond what a crossing has [S]."""
+        leaks: Real = np.zeros(self.model.here.shape)
+        with np.errstate(invalid="ignore"):
+            shorted = self.model.here & (self.rest_s.real > _SHORTED * np.abs(self.nominal.siemens))
+        leaks[shorted] = self.rest_s.real[shorted]
+        for _ in range(_LEAKS if shorted.any() else 0):
+            read = self._network(self.model.capacitances(), leaks).siemens.real[shorted]
+            ohm = 1 / leaks[shorted] + 1 / self.rest_s.real[shorted] - 1 / read
+            leaks[shorted] = 1 / np.maximum(ohm, 1e-3 / leaks[shorted])
+        return leaks
+
+    @cached_property
     def parts(self) -> tuple[Mask, Mask]:
-        """Parts of the readings that count, real and imaginary, (m, n) each."""
-        return np.isfinite(self.rest_s.real), np.isfinite(self.rest_s.imag) & self.model.here
+        """Parts of the readings that count, real and imaginary, (m, n) each: of crossings that are alive."""
+        return np.isfinite(self.rest_s.real) & self.alive, self.alive
 
     @cached_property
     def nominal(self) -> Readings:
         """Readings of the array as predicted, at rest."""
-        return self.read(self.model.capacitances())
+        return self._network(self.model.capacitances(), np.zeros(self.model.here.shape))
 
     @cached_property
     def alive(self) -> Mask:
         """Crossings that read at rest within a factor of what is predicted, and of its sign, (m, n): no others."""
-        real, imaginary = self.parts
+        real, imaginary = np.isfinite(self.rest_s.real), np.isfinite(self.rest_s.imag) & self.model.here
         nominal = self.nominal.siemens
         with np.errstate(invalid="ignore", divide="ignore"):
             size = np.where(real, np.abs(self.rest_s), np.abs(self.rest_s.imag))
             ratio = size / np.where(real, np.abs(nominal), np.abs(nominal.imag))
-            return imaginary & (ratio > 1 / _ALIVE) & (ratio < _ALIVE) & self._same_sign(self.rest_s)
+            return np.asarray(imaginary & (ratio > 1 / _ALIVE) & (ratio < _ALIVE) & self._same_sign(self.rest_s))
 
     def _same_sign(self, siemens: Complex) -> Mask:
         """Readings with an imaginary part of the predicted one's sign: others are of no capacitance."""
@@ -260,12 +281,13 @@ class MapInverter:
         """Capacitances by weighed readings, (m n, 2 m n) or of each crossing alone, and their variances [F2]."""
         real, imaginary = self.parts
         weight = np.concatenate([part.ravel() for part in self._weights(real, imaginary)])
+        working = self.read(self.model.capacitances())
         if self.model.here.size > MOST_DENSE:
-            slopes = own_slopes(self.nominal)
+            slopes = own_slopes(working)
             by = np.stack([slopes.real.ravel(), slopes.imag.ravel()]) * weight.reshape(2, -1)
             variance = 1 / ((by**2).sum(0) + 1 / self.prior_f.ravel() ** 2)
             return by * variance, variance
-        matrix = self.nominal.matrix()
+        matrix = working.matrix()
         slopes_all = np.vstack([matrix.real, matrix.imag]) * weight[:, None]
         spread = np.linalg.inv(slopes_all.T @ slopes_all + np.diag(1 / self.prior_f.ravel() ** 2))
         return spread @ slopes_all.T, np.diag(spread)

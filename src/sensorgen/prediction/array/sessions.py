@@ -17,6 +17,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.files import reading
 from sensorgen.prediction.array.elements import (
     TARE_S,
+    UNLOADED,
     Form,
     Law,
     Session,
@@ -227,7 +228,7 @@ def calibrated(sessions: Sequence[Session], form: "Form | None" = None) -> Array
     """
     form = form or chosen(sessions)
     tares = np.stack([session.tare for session in sessions])
-    quiet = np.nanmedian([np.nanstd(session.reading[session.unloaded], 0) for session in sessions], 0)
+    quiet = np.median([np.nan_to_num(session.reading[session.unloaded]).std(0) for session in sessions], 0)
     law = law_of(sessions, form)
     several = len(sessions) > 1
     errors = [
@@ -239,31 +240,33 @@ def calibrated(sessions: Sequence[Session], form: "Form | None" = None) -> Array
     off, mean, sigma = (np.concatenate(each) for each in zip(*errors, strict=True))
     if not off.size:  # total forces alone: the parameters' covariance is what is known
         return ArrayCalibration(law, 0.0, 0.0, NORMAL_90, common, tares, quiet)
-    floor, share = _scale(off, mean)
-    reach = np.quantile(np.abs(off) / np.sqrt(sigma**2 + floor**2 + (share * mean) ** 2), LEVEL)
-    return ArrayCalibration(law, floor, share, float(reach), common, tares, quiet)
+    floor, share = _scale(np.maximum(off**2 - sigma**2, 0.1 * off**2), mean)
+    reach = float(np.quantile(np.abs(off) / np.sqrt(sigma**2 + floor**2 + (share * mean) ** 2), LEVEL))
+    reach *= float(np.sqrt(1 + 1 / len(sessions)))  # one more session, by a scatter that so few tell
+    return ArrayCalibration(law, floor, share, reach, common, tares, quiet)
 
 
 def _residuals(session: Session, law: Law) -> tuple[Real, Real, Real]:
-    """Errors, pressures and standard errors by the parameters, of frames evenly taken [kPa]."""
+    """Errors, pressures and standard errors by the parameters, of loaded frames evenly taken [kPa]."""
     mean, sigma = law.pressures(session)
-    known = np.isfinite(session.pressure_kpa) & np.isfinite(mean)
+    size = np.abs(session.pressure_kpa)
+    with np.errstate(invalid="ignore"):
+        known = (size > UNLOADED * np.nanmax(size, initial=0.0)) & np.isfinite(mean)
     step = max(1, len(mean) // _FRAMES)
     off = np.where(known, mean - session.pressure_kpa, 0.0)[::step][known[::step]]
     return off, mean[::step][known[::step]], sigma[::step][known[::step]]
 
 
-def _scale(off: Real, mean: Real) -> tuple[float, float]:
-    """Constant and relative part of the errors: squares of both fitted to squares of the errors by pressure."""
+def _scale(squares: Real, mean: Real) -> tuple[float, float]:
+    """Constant and relative part of errors, by their squares over the pressure."""
     from scipy.optimize import nnls
 
     order = np.argsort(np.abs(mean))
     parts = [part for part in np.array_split(order, 20) if part.size]
-    y = np.array([np.mean(off[part] ** 2) for part in parts])
+    y = np.array([np.mean(squares[part]) for part in parts])
     by = np.array([[1.0, np.mean(mean[part] ** 2)] for part in parts])
-    weight = 1 / np.maximum(y, 1e-12 + 1e-3 * y.max())
     size = np.maximum(by.max(0), 1e-30)
-    floor, share = nnls(by / size * weight[:, None], y * weight)[0] / size
+    floor, share = nnls(by / size, y)[0] / size
     return float(np.sqrt(max(floor, 1e-12))), float(np.sqrt(share))
 
 

@@ -2,16 +2,19 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from math import hypot, isnan
+from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.units import si
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Real = float | NDArray[np.float64]
+
 Rows = tuple[tuple[float | None, ...], ...]
-Real = float | NDArray[np.float64]
 FORCE_SHARE = 0.1  # force is sensed where its standard error is a tenth of it
 CANNOT_SENSE, CANNOT_LOCATE = "cannot sense force", "cannot locate"
 GUESS = 12**-0.5  # standard deviation of a uniform distribution, relative to its range [-]
@@ -26,7 +29,7 @@ class Cartesian:
     im: float
 
     def __abs__(self) -> float:
-        return float(np.hypot(self.re, self.im))
+        return hypot(self.re, self.im)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -331,7 +334,7 @@ def _percent(share: float | None) -> float | None:
     return None if share is None else float(f"{100 * share:.0f}")
 
 
-def newtons(value: Real | None) -> str:
+def newtons(value: "Real | None") -> str:
     """A force to two digits.
 
     >>> newtons(2.2299), newtons(213.4), newtons(0.1508), newtons(None)
@@ -340,7 +343,7 @@ def newtons(value: Real | None) -> str:
     return _text(value, {"N": 1.0}, "kN")
 
 
-def metres(value: Real | None) -> str:
+def metres(value: "Real | None") -> str:
     """A length to two digits.
 
     >>> metres(0.22495), metres(21.34), metres(0.00829), metres(2e5)
@@ -349,9 +352,9 @@ def metres(value: Real | None) -> str:
     return _text(value, {"mm": 1e-3, "m": 1.0}, "km")
 
 
-def _text(value: Real | None, units: dict[str, float], beyond: str) -> str:
+def _text(value: "Real | None", units: dict[str, float], beyond: str) -> str:
     """A value in the first unit that keeps it below a thousand."""
-    if value is None or np.isnan(value):
+    if value is None or isnan(value):
         return "undefined"
     for unit, size in units.items():
         shown = float(value) / size
@@ -362,9 +365,9 @@ def _text(value: Real | None, units: dict[str, float], beyond: str) -> str:
     return f"more than 1 {beyond}"
 
 
-def finite(value: float | NDArray[np.float64]) -> float | None:
+def finite(value: "Real") -> float | None:
     """A number, None for nan."""
-    return None if np.isnan(value) else float(value)
+    return None if isnan(value) else float(value)
 
 
 def cartesian(value: complex) -> Cartesian:

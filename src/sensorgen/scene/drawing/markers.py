@@ -91,9 +91,9 @@ def on_detail(
         elif place := _free(spot, panels[k], taken):
             taken += [spot, place]
             yield _marker(mark, spot, place)
-    for k, found in sorted(edges.items()):
+    for k, edge in sorted(edges.items()):
         frame = panels[k].frame
-        fitting = sorted(found[: int((frame.bed - frame.top + 14) // CLEAR)], key=lambda at: (at[0][1], at[1].number))
+        fitting = sorted(edge[: int((frame.bed - frame.top + 14) // CLEAR)], key=lambda at: (at[0][1], at[1].number))
         heights = spread([spot[1] for spot, _ in fitting], [CLEAR] * len(fitting), frame.top - 8, frame.bed + 6)
         for (spot, mark), y in zip(fitting, heights, strict=True):
             yield _marker(mark, spot, (frame.right + GUTTER / 2 + 0.6, y))

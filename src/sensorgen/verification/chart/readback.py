@@ -10,7 +10,7 @@ import numpy as np
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.inverse import Estimator
+from sensorgen.prediction.inverse.estimator import Estimator
 from sensorgen.verification.chart import lines
 from sensorgen.verification.chart.measured import DIGITS, Point, climbed
 

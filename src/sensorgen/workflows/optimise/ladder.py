@@ -19,10 +19,10 @@ from sensorgen.design.walls import rules as wall_rules
 from sensorgen.prediction import bodies
 from sensorgen.prediction.compression_law import at_a_few_pressures
 from sensorgen.prediction.identifiability.fisher import bounds, slopes
+from sensorgen.prediction.print_files import NONE
 from sensorgen.prediction.query import DEFAULT, Query
 from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.prediction.sensor_model import build_sensor, piece, pressure_pa
-from sensorgen.prediction.slices import NONE
 from sensorgen.workflows.moves import short
 from sensorgen.workflows.optimise.target import NUMBERS
 from sensorgen.workflows.trial import Numbers, Trial, trial

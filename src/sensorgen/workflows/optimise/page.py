@@ -1,32 +1,44 @@
 """The front as one page: every evaluated design in the plane of the first two objectives, and the tables."""
 
 from sensorgen.analysis.plots import pages
-from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, Axis, Curve, Figure, Panel
+from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, PINK, Axis, Curve, Figure, Panel
 from sensorgen.core.bounds import Bounds
 from sensorgen.workflows.optimise.result import Chosen, Optimised
 from sensorgen.workflows.optimise.target import NUMBERS
 
 
-def page(found: Optimised) -> str:
+def page(result: Optimised) -> str:
     """A self-contained page; raises MissingValue where Plotly is not installed."""
-    names = [*found.objectives, *({n: 0 for c in found.front for n in c.numbers})]
-    across, up = list(dict.fromkeys(names))[:2] if len(set(names)) > 1 else (names[0], names[0])
-    front = {c.number for c in found.front}
-    groups = (
-        ("leads", BLUE, [c for c in found.front if c.leads]),
-        ("on the front by its interval", ORANGE, [c for c in found.front if not c.leads]),
-        ("evaluated", GREY, [c for c in found.designs if c.numbers and c.number not in front and not c.violated]),
-        ("violates a constraint", "#cc79a7", [c for c in found.designs if c.numbers and c.violated]),
-    )
-    blind = sum(not all(c.senses(k) for k in (across, up)) for c in found.designs)
-    curves = tuple(_points(name, colour, some, across, up) for name, colour, some in groups if _known(some, across, up))
+    names = list(dict.fromkeys([*result.objectives, *(n for c in result.front for n in c.numbers)]))
+    across, up = names[0], names[min(1, len(names) - 1)]
+    curves = tuple(
+        _points(name, colour, shown, across, up)
+        for name, (colour, some) in _groups(result).items() if (shown := _known(some, across, up))
+    )  # fmt: skip
     x, y = (NUMBERS[key].words for key in (across, up))
-    panel = Panel(curves, *(Axis(f"{NUMBERS[key].words} [{NUMBERS[key].unit}]", log=True) for key in (across, up)))
+    axes = [Axis(f"{NUMBERS[key].words} [{NUMBERS[key].unit}]", log=True) for key in (across, up)]
     alt = f"Evaluated designs by {x} and {y}, with what the models leave open of {x}."
-    figures = (Figure("front", f"{x.capitalize()} and {y} as printed", alt, {"": (panel,)}),) if curves else ()
+    figures = (
+        (Figure("front", f"{x.capitalize()} and {y} as printed", alt, {"": (Panel(curves, axes[0], axes[1]),)}),)
+        if curves
+        else ()
+    )
+    blind = sum(not (c.senses(across) and c.senses(up)) for c in result.designs)
     words = [f"{blind} designs that cannot sense force or cannot locate are in the table alone"] * (blind > 0)
-    section = pages.Section("", "", figures, tuple(found.document()))
-    return pages.page(f"Best designs: {found.name}", words, [section])
+    section = pages.Section("", "", figures, tuple(result.document()))
+    return pages.page(f"Best designs: {result.name}", words, [section])
+
+
+def _groups(result: Optimised) -> dict[str, tuple[str, list[Chosen]]]:
+    """Colour and designs of each group, by its name."""
+    front = {c.number for c in result.front}
+    others = [c for c in result.designs if c.numbers and (c.violated or c.number not in front)]
+    return {
+        "leads": (BLUE, [c for c in result.front if c.leads]),
+        "on the front by its interval": (ORANGE, [c for c in result.front if not c.leads]),
+        "evaluated": (GREY, [c for c in others if not c.violated]),
+        "violates a constraint": (PINK, [c for c in others if c.violated]),
+    }
 
 
 def _known(some: list[Chosen], *keys: str) -> list[Chosen]:
@@ -34,8 +46,7 @@ def _known(some: list[Chosen], *keys: str) -> list[Chosen]:
     return [c for c in some if all(k in c.numbers and c.numbers[k].value > 0 and c.senses(k) for k in keys)]
 
 
-def _points(name: str, colour: str, some: list[Chosen], across: str, up: str) -> Curve:
-    shown = _known(some, across, up)
+def _points(name: str, colour: str, shown: list[Chosen], across: str, up: str) -> Curve:
     x: list[Bounds] = [c.numbers[across] for c in shown]
     return Curve(
         "points", name, [b.value for b in x], [c.numbers[up].value for c in shown], low=[b.model.lower for b in x],

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from sensorgen.checks import RULES
+from sensorgen.checks.rules import RULES
 from sensorgen.core import yamlfile
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.errors import BadInput, UnknownName, within

@@ -1,0 +1,236 @@
+"""Commands made from functions: their parameters are the options, their docstring is the help, their result is shown.
+
+Positional parameters are arguments, keyword-only ones options. The docstring's section of parameters (of a record of
+options: of attributes) has the help of each, behind the name flags that are not made of it, and behind " : " the
+placeholder of its value::
+
+    output, --output, -o : FILE
+        File to write.
+
+A name that ends in a unit reads that quantity: ``force_n`` is ``--force``, in newtons unless another unit is typed.
+"""
+
+import re
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import is_dataclass, replace
+from inspect import Parameter, getdoc, signature
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_args, get_origin
+
+import click
+from click.shell_completion import CompletionItem
+
+from sensorgen.cli import render
+from sensorgen.cli.words import KINDS, OneOf, Value, Values
+from sensorgen.core import units
+from sensorgen.core.errors import BadInput, SensorgenError
+from sensorgen.core.options import Argument, Option, Without
+
+if TYPE_CHECKING:
+    from sensorgen.core.document import Part
+
+Work = Callable[..., Any]
+_SECTION = re.compile(r"(?:^|\n\n)(?:Parameters|Attributes)\n-+\n(.*?)(?=\n\n[A-Z][a-z]+\n-+\n|\Z)", re.DOTALL)
+_ENTRY = re.compile(r"^(\S[^\n]*)\n?((?:    [^\n]*\n?)*)", re.MULTILINE)
+_UNIT = re.compile(r"_(mm|n|hz|kpa|s|ohm|deg)$")
+_QUANTITIES = {"mm": units.LENGTH_MM, "n": units.FORCE_N, "hz": units.FREQUENCY_HZ}
+
+
+class _Entry(NamedTuple):
+    """Entry of a docstring: flags, placeholder and help of a parameter."""
+
+    flags: tuple[str, ...] = ()
+    metavar: str = ""
+    about: str = ""
+
+    def option(self, name: str, stated: Option) -> Option:
+        """An option with what the docstring has and its annotation does not state."""
+        flags = stated.flags or self.flags or (flag_of(name),)
+        return replace(
+            stated, flags=flags, about=stated.about or self.about, metavar=stated.metavar or self.metavar or None
+        )
+
+
+def described(work: Work) -> tuple[str, dict[str, _Entry]]:
+    """Help and entries of a docstring."""
+    text = getdoc(work) or ""
+    section = _SECTION.search(text)
+    if section is None:
+        return text, {}
+    entries = {}
+    for head, about in _ENTRY.findall(section[1]):
+        names, _, metavar = head.partition(" : ")
+        name, *flags = names.split(", ")
+        typed = not metavar[:1].islower() and " or " not in metavar  # no type of Python
+        entries[name] = _Entry(tuple(flags), metavar * typed, " ".join(about.split()))
+    return text[: section.start()], entries
+
+
+def options_of(work: Work, without: Collection[str] = ()) -> list[click.Parameter]:
+    """Options and arguments of the parameters of a function, or of the fields of a dataclass, in their order.
+
+    A parameter whose type is a dataclass stands for the options of its fields. One whose annotation is a text has none.
+    """
+    entries = described(work)[1]
+    parameters = (one for name, one in signature(work).parameters.items() if name not in without)
+    record = _is_record(work)
+    return [option for one in parameters for option in _options(one, entries.get(one.name, _Entry()), of_record=record)]
+
+
+def _options(parameter: Parameter, entry: "_Entry", *, of_record: bool) -> Sequence[click.Parameter]:
+    kind, stated = _stated(parameter)
+    if isinstance(kind, str):
+        return ()
+    if _is_record(kind):
+        return options_of(kind, stated.names if isinstance(stated, Without) else ())
+    if isinstance(stated, Argument) or (parameter.kind is not Parameter.KEYWORD_ONLY and not of_record):
+        return [_argument(parameter, kind, stated or Argument(), entry)]
+    return [_option(parameter, kind, entry.option(parameter.name, stated or Option()))]
+
+
+def arguments(work: Work, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of a function for what was typed; what was not typed keeps the function's own default."""
+    values: dict[str, Any] = {}
+    for parameter in signature(work).parameters.values():
+        kind, _ = _stated(parameter)
+        if _is_record(kind):
+            values[parameter.name] = kind(**arguments(kind, given))
+        elif given.get(parameter.name) not in (None, ()):
+            values[parameter.name] = given[parameter.name]
+    return values
+
+
+def _stated(parameter: Parameter) -> tuple[Any, Any]:
+    """Type of a parameter, and what its annotation states about the command line."""
+    kind = parameter.annotation
+    return get_args(kind) if get_origin(kind) is Annotated else (kind, None)
+
+
+def _is_record(kind: Any) -> bool:
+    return isinstance(kind, type) and is_dataclass(kind)
+
+
+def _plain(kind: Any) -> tuple[Any, bool]:
+    """Type of one value, and whether there may be several."""
+    if get_origin(kind) is UnionType:
+        kind = next(one for one in get_args(kind) if one is not NoneType)
+    return (get_args(kind)[0], True) if get_origin(kind) is tuple else (kind, False)
+
+
+def _argument(parameter: Parameter, kind: Any, stated: Argument, entry: _Entry) -> click.Argument:
+    plain, many = _plain(kind)
+    return click.Argument(
+        [parameter.name], type=_type(plain, stated.kind) or plain, metavar=entry.metavar or None,
+        nargs=-1 if many else 1, required=parameter.default is Parameter.empty,
+        **{} if parameter.default in (Parameter.empty, None, ()) else {"default": parameter.default},
+    )  # fmt: skip
+
+
+def _option(parameter: Parameter, kind: Any, stated: Option) -> click.Option:
+    plain, many = _plain(kind)
+    words = _type(plain, stated.kind) or _quantity(parameter.name, plain, stated, many=many)
+    of_quantity, either = isinstance(words, Values), "/" in stated.flags[-1]
+    more = _default(stated.typed if of_quantity else parameter.default, stated.typed, either=either)
+    if plain is bool and not either:
+        more["is_flag"] = True
+    else:
+        more |= {"type": words or plain, "multiple": many and not of_quantity}
+    names = [*stated.flags, parameter.name]
+    return click.Option(names, help=stated.about, metavar=stated.metavar, **more, **stated.more)
+
+
+def flag_of(name: str) -> str:
+    """Flag of a parameter, without its unit: ``hang_height_mm`` is ``--hang-height``."""
+    return "--" + _UNIT.sub("", name).replace("_", "-")
+
+
+def _default(default: Any, typed: str | None, *, either: bool) -> dict[str, Any]:
+    """Default of an option for click; nothing where it says nothing to a user, so that Python's own applies."""
+    default = default if typed is None else typed
+    shown = default is not False and default not in (Parameter.empty, None, "", ())
+    return {"default": default, "show_default": shown} if shown or either else {}
+
+
+def _quantity(name: str, plain: Any, stated: Option, *, many: bool) -> Values | None:
+    """Type of click for a quantity: the one that is stated, or that of the unit in a name."""
+    unit = _UNIT.search(name)
+    quantity = stated.kind or (_QUANTITIES.get(unit[1]) if unit and plain is float else None)
+    if quantity is None:
+        return None
+    if many:
+        return Values(quantity, zero=stated.zero)
+    return Value(quantity, zero=stated.zero, unit=unit[1] if unit else quantity.name)
+
+
+def _type(plain: Any, stated: Any) -> Any:
+    """Type of click that is stated; None of a quantity, and where the annotation decides."""
+    if isinstance(stated, tuple):
+        return OneOf(stated)
+    if isinstance(stated, str):
+        return KINDS[stated]
+    if isinstance(stated, units.Quantity):
+        return None
+    return click.Path(path_type=Path) if stated is None and plain is Path else stated
+
+
+def ended(result: Any, *, before: "Iterable[Part]" = ()) -> int:
+    """Exit code of a command; a result that is no code is delivered, with its problems."""
+    if result is None or isinstance(result, int):
+        return result or 0
+    render.deliver(result, before=before)
+    return render.verdict(*(result.problems() if hasattr(result, "problems") else ()))
+
+
+def command(
+    name: str, *more: click.Parameter, group: click.Group | None = None, about: str = "", short: str | None = None,
+) -> Callable[[Work], click.Command]:  # fmt: skip
+    """Make a command of a function, with ``more`` options after its own, and add it to a group of commands."""
+
+    def made(work: Work) -> click.Command:
+        one = click.Command(
+            name, params=[*options_of(work), *more], help=about or described(work)[0], short_help=short,
+            callback=lambda **given: ended(work(**arguments(work, given))),
+        )  # fmt: skip
+        if group is not None:
+            group.add_command(one)
+        return one
+
+    return made
+
+
+class FirstWord(click.Group):
+    """A command whose first word is a thing, as a plan's file, or one of its commands; options follow it."""
+
+    thing = ""
+    form = ""  # of the words, in a message
+
+    def __init__(self, name: str, **attributes: Any) -> None:
+        """Options belong to the first word."""
+        super().__init__(name, options_metavar="", context_settings={"ignore_unknown_options": True}, **attributes)
+
+    def of(self, name: str) -> click.Command:
+        """The command for a thing."""
+        raise NotImplementedError
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        """One of the commands, or the one for a thing."""
+        return super().get_command(ctx, name) or self.of(name)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str],
+    ) -> tuple[str | None, click.Command | None, list[str]]:  # fmt: skip
+        """Take the first word; an option in its place is the user's slip, but while the shell completes words."""
+        try:
+            if args[0].startswith("-"):
+                words = self.form.format(option=args[0])
+                raise BadInput(f"{args[0]} stands before the {self.thing}; write {ctx.command_path} {words}")
+            return args[0], self.get_command(ctx, args[0]), args[1:]
+        except SensorgenError:
+            if ctx.resilient_parsing:
+                return None, None, []
+            raise
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Files, and the commands."""
+        return [CompletionItem(incomplete, type="file"), *super().shell_complete(ctx, incomplete)]
