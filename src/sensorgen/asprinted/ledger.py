@@ -272,20 +272,16 @@ def _foreign(design: Design, raster: LayerRaster) -> Iterator[Disagreement]:
 
 
 def _local(design: Design, raster: LayerRaster) -> Iterator[Disagreement]:
-    """A tool's deposit is spread as the drawing is; how much it is in all is another rule's.
-
-    Narrow parts may take less than is drawn. Solid parts beside them are then full, which is not too much.
-    """
+    """A tool's deposit is spread as the drawing is; how much it is in all is another rule's."""
     sparse, line = _sparse(design), design.machine.line_mm()
     for tool, printed in raster.printed.items():
         for lines, least, most in _STRIPS if raster.strips else _LOCAL:
             window, off = lines * line / sparse, []
             for plan in raster.drawn[tool]:
                 ratio = float(printed.sum() / max(float(plan.sum()), 1.0))
-                full = _mean((ratio - max(ratio, sparse)) * plan, window)
-                off.append((_mean(printed - ratio * plan, window), full))
-            lacking, full = min(off, key=lambda each: float(np.ptp(each[0])))
-            for wrong, what in ((lacking < least, "lacks"), (lacking + full > most, "is too much")):
+                off.append(_mean(printed - ratio * plan, window))
+            worst = min(off, key=lambda each: float(np.ptp(each)))
+            for wrong, what in ((worst < least, "lacks"), (worst > most, "is too much")):
                 if wrong.any():
                     area, at = _largest(wrong)
                     material = f"tool {tool}: material {what} over {max(area, window**2):.2g} mm2"

@@ -70,7 +70,7 @@ class Params(Envelope):
     )
     lead_mm: float = field(default=1.8, metadata={"help": "Width of leads and pads.", "range": (0.2, 50.0)})
     pad_mm: float = field(default=6.0, metadata={"help": "Length of the pads.", "range": (1.0, 50.0)})
-    margin_mm: float = field(default=2.0, metadata={"help": "Edge around tracks and leads.", "range": (0.2, 50.0)})
+    margin_mm: float = field(default=2.5, metadata={"help": "Edge around tracks and leads.", "range": (0.2, 50.0)})
     between: str = field(
         default="dielectric",
         metadata={"help": "Between columns above the film: solid dielectric, or air that carries no load.",
