@@ -10,7 +10,7 @@ from sensorgen.core import document
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.array_sessions import refuse_swapped, session
 from sensorgen.prediction.array import sessions as calibration
-from sensorgen.prediction.array.elements import Form, Session, lagged
+from sensorgen.prediction.array.elements import ArraySession, Form, lagged
 from sensorgen.prediction.array.sessions import calibrated, law_of, stored, study
 
 PRINT = Insole(elements=20, bad=6, minutes=4.0, rate_hz=1.0)
@@ -21,7 +21,7 @@ def recorded(insole, days=(0.0, 1.0, 3.0, 5.0, 8.0)):
     for day, time_s, counts, kpa in insole.sessions(days):
         none = np.full(len(time_s), np.nan)
         found.append(
-            Session(f"day {day:g}", day, time_s, counts, none < 0, np.tile(kpa[:, None], counts.shape[1]), none)
+            ArraySession(f"day {day:g}", day, time_s, counts, none < 0, np.tile(kpa[:, None], counts.shape[1]), none)
         )
     return found
 
@@ -96,7 +96,7 @@ def made(kpa, *, force_n=None, known=True, **more):
     k, none = len(kpa), np.full(len(kpa), np.nan)
     pressure = kpa if known else np.full(kpa.shape, np.nan)
     rest = (kpa == 0).all(1)
-    return Session("s", 0.0, np.arange(k) * 60.0, straight(GAINS, kpa, **more), rest, pressure,
+    return ArraySession("s", 0.0, np.arange(k) * 60.0, straight(GAINS, kpa, **more), rest, pressure,
                    none if force_n is None else force_n)  # fmt: skip
 
 
@@ -227,7 +227,7 @@ def test_swapped_wires_are_named():
 
     def pressed(order):
         reads = np.where(np.isfinite(kpa), 0.1, 0.0).reshape(3, *shape)[:, :, order].reshape(3, 6)
-        return Session("p", 0.0, np.arange(3.0), reading + reads, none < 0, kpa, none)
+        return ArraySession("p", 0.0, np.arange(3.0), reading + reads, none < 0, kpa, none)
 
     refuse_swapped(pressed([0, 1, 2]), shape)
     with pytest.raises(BadInput, match="presses on c1 are read at c2: wires swapped"):

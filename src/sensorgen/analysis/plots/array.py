@@ -60,7 +60,10 @@ def course(found: "PressureMaps", true: "Real", name: str, title: str) -> Figure
     force, (own_x, own_y) = found.force_n[0], found.centre_mm
     panels = [
         Panel(
-            (Curve("line", "true", *one, colour=GREY, dash="dash"), Curve("line", "recovered", *other)),
+            (
+                Curve("line", "true", one[0], one[1], colour=GREY, dash="dash"),
+                Curve("line", "recovered", other[0], other[1]),
+            ),
             Axis(across), Axis(up),
         )
         for one, other, across, up in (
