@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from insole_sessions import Insole
 
+from in_process import run
 from sensorgen.core import document
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.array_sessions import refuse_swapped, session
 from sensorgen.prediction.array import sessions as calibration
-from sensorgen.prediction.array.elements import Form, Session, lagged
+from sensorgen.prediction.array.elements import ArraySession, Form, lagged
 from sensorgen.prediction.array.sessions import calibrated, law_of, stored, study
 
 PRINT = Insole(elements=20, bad=6, minutes=4.0, rate_hz=1.0)
@@ -21,7 +22,7 @@ def recorded(insole, days=(0.0, 1.0, 3.0, 5.0, 8.0)):
     for day, time_s, counts, kpa in insole.sessions(days):
         none = np.full(len(time_s), np.nan)
         found.append(
-            Session(f"day {day:g}", day, time_s, counts, none < 0, np.tile(kpa[:, None], counts.shape[1]), none)
+            ArraySession(f"day {day:g}", day, time_s, counts, none < 0, np.tile(kpa[:, None], counts.shape[1]), none)
         )
     return found
 
@@ -96,7 +97,7 @@ def made(kpa, *, force_n=None, known=True, **more):
     k, none = len(kpa), np.full(len(kpa), np.nan)
     pressure = kpa if known else np.full(kpa.shape, np.nan)
     rest = (kpa == 0).all(1)
-    return Session("s", 0.0, np.arange(k) * 60.0, straight(GAINS, kpa, **more), rest, pressure,
+    return ArraySession("s", 0.0, np.arange(k) * 60.0, straight(GAINS, kpa, **more), rest, pressure,
                    none if force_n is None else force_n)  # fmt: skip
 
 
@@ -227,8 +228,28 @@ def test_swapped_wires_are_named():
 
     def pressed(order):
         reads = np.where(np.isfinite(kpa), 0.1, 0.0).reshape(3, *shape)[:, :, order].reshape(3, 6)
-        return Session("p", 0.0, np.arange(3.0), reading + reads, none < 0, kpa, none)
+        return ArraySession("p", 0.0, np.arange(3.0), reading + reads, none < 0, kpa, none)
 
     refuse_swapped(pressed([0, 1, 2]), shape)
     with pytest.raises(BadInput, match="presses on c1 are read at c2: wires swapped"):
         refuse_swapped(pressed([1, 0, 2]), shape)
+
+
+def test_commands_calibrate_and_invert_any_array(tmp_path):
+    """Three days of a bladder, then a later session by the calibration alone, unloaded seconds recognised."""
+    *known, later = Insole(elements=8, bad=2, minutes=2.0, rate_hz=1.0).sessions((0.0, 1.0, 2.0, 3.0))
+    for number, (day, time_s, counts, kpa) in enumerate(known):
+        rows = [[t, day, p, *c] for t, p, c in zip(time_s, kpa, counts, strict=True)]
+        table(tmp_path / f"{number}.csv", ["time_s", "day", "pressure_kpa", *"abcdefgh"], rows)
+    files = [f"{number}.csv" for number in range(3)]
+    code, text = run(tmp_path, "calibrate", *files, "--calibration", "c.npz")
+    assert code == 0
+    assert "2 elements, from 1:" in text
+    np.savez(tmp_path / "later.npz", reading=later[2], time_s=later[1], rest=later[3] == 0)
+    assert run(tmp_path, "invert", "c.npz", "later.npz", "-o", "p.csv")[0] == 0
+    lines = (tmp_path / "p.csv").read_text().splitlines()
+    found = np.genfromtxt(lines[1:], delimiter=",")[:, 1::2]
+    assert np.nanmedian(np.abs(found - later[3][:, None])) < 15
+    assert np.isnan(found).all(0).sum() == 2
+    assert run(tmp_path, "calibrate", "0.csv", "S1")[0] == 2
+    assert run(tmp_path, "invert", "later.npz", "later.npz")[0] == 2

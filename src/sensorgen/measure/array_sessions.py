@@ -15,7 +15,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.files import reading
 from sensorgen.measure.array_frames import BINARY, REFERENCES, column, marked, numbers, read, table
-from sensorgen.prediction.array.elements import Session
+from sensorgen.prediction.array.elements import ArraySession
 from sensorgen.prediction.array.frames import at_rest, missing
 from sensorgen.prediction.array.model import ArrayModel
 from sensorgen.prediction.array.readout import ArrayReadout
@@ -29,7 +29,7 @@ _N_PER_KPA_MM2 = 1e-3
 
 def session(
     path: Path, number: int, *, area_mm2: float = _AREA_MM2, values: "Real | None" = None, names: Sequence[str] = ()
-) -> Session:  # fmt: skip
+) -> ArraySession:  # fmt: skip
     """A session of a file.
 
     Parameters
@@ -62,7 +62,7 @@ def session(
         return _session(path.stem, data, values, names, (number, area_mm2))
 
 
-def of_frames(paths: Sequence[Path], model: ArrayModel) -> list[Session]:
+def of_frames(paths: Sequence[Path], model: ArrayModel) -> list[ArraySession]:
     """Sessions of frames of an array with a design: C/C0 - 1 of its crossings, by the network where that counts.
 
     Raises
@@ -82,7 +82,7 @@ def of_frames(paths: Sequence[Path], model: ArrayModel) -> list[Session]:
     return found
 
 
-def refuse_swapped(of: Session, shape: tuple[int, int]) -> None:
+def refuse_swapped(of: ArraySession, shape: tuple[int, int]) -> None:
     """Refuse presses that most of the time are read by another row, or column, than the pressed one.
 
     Raises
@@ -110,7 +110,7 @@ def refuse_swapped(of: Session, shape: tuple[int, int]) -> None:
 
 def _session(
     name: str, data: Mapping[str, np.ndarray], values: Real, names: Sequence[str], default: tuple[int, float]
-) -> Session:  # fmt: skip
+) -> ArraySession:  # fmt: skip
     count = len(values)
 
     def each(key: str, otherwise: Real) -> Real:
@@ -133,7 +133,7 @@ def _session(
         force = nothing
     pressure = np.broadcast_to(pressure.reshape(count, -1), values.shape)
     day = float(np.ravel(data.get("day", default[0]))[0])
-    return Session(
+    return ArraySession(
         name, day, time_s, values, each("rest", np.zeros(count)).astype(bool), np.array(pressure), force, area
     )
 

@@ -14,7 +14,7 @@ from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from sensorgen.measure.virtual.array import Step, VirtualArray
+    from sensorgen.measure.virtual.array import VirtualArray, WalkedStep
     from sensorgen.prediction.array.frames import PressureMaps
     from sensorgen.prediction.array.model import ArrayModel
     from sensorgen.prediction.array.readout import ArrayReadout
@@ -25,8 +25,7 @@ _REST = 100  # frames without load at the begin of each recording
 _SCATTER, _PLAY, _CREEP, _DRIFT = 0.05, 0.02, 0.02, -0.002  # of the virtual print
 _DESIGN: Mapping[str, Any] = {
     "shape": "array",
-    "border": "POLYGON ((0 40, 10 18, 40 10, 85 18, 130 14, 180 2, 205 0, 235 8, 255 24, 262 38, 252 54, 232 74, "
-    "200 92, 165 97, 130 92, 85 86, 40 82, 10 66, 0 40))",
+    "border": "foot 42 left",
     "parameters": {"pitch_x_mm": 10.0, "pitch_y_mm": 10.0, "column_mm": 8.15, "row_mm": 8.15},
     "cell": {"shape": "porous", "parameters": {"dielectric_mm": 0.6, "space_mm": 0.35}},
 }  # fmt: skip
@@ -39,7 +38,7 @@ _CHANGES: tuple[_Change, ...] = (
 
 
 @dataclass(frozen=True)
-class Run:
+class InsoleRun:
     """One design, printed, calibrated and walked on."""
 
     design: Annotated[str, Column("design")]
@@ -63,7 +62,7 @@ class InsoleDemo:
     ----------
     folder, page : str
         Where the files are, and the page with the maps.
-    runs : tuple of Run
+    runs : tuple of InsoleRun
         The first design, and that which its report changed.
     advice : str
         The change, and why.
@@ -71,7 +70,7 @@ class InsoleDemo:
 
     folder: str
     page: str
-    runs: tuple[Run, ...]
+    runs: tuple[InsoleRun, ...]
     advice: str
 
     def document(self) -> Iterator[Part]:
@@ -146,7 +145,7 @@ def _noise_after(change: _Change) -> float:
 
 def _run(
     folder: Path, name: str, data: Mapping[str, Any], seed: int, step: Callable[[str], None]
-) -> "tuple[Run, PressureMaps, Step]":  # fmt: skip
+) -> "tuple[InsoleRun, PressureMaps, WalkedStep]":  # fmt: skip
     """One design through the whole chain."""
     from sensorgen.checks.review import review
     from sensorgen.design.design import load
@@ -221,7 +220,7 @@ def _recorded(
     return packed(siemens=siemens, time_s=time_s, rest=rest, day=day, frequency_hz=readout.frequency_hz[0], **reference)
 
 
-def _stepped(print_: "VirtualArray", true: "Step", readout: "ArrayReadout", draw: np.random.Generator) -> bytes:
+def _stepped(print_: "VirtualArray", true: "WalkedStep", readout: "ArrayReadout", draw: np.random.Generator) -> bytes:
     from sensorgen.measure.virtual.array import RATE_HZ, packed
 
     load = np.concatenate([np.zeros((_REST, *true.pressure_kpa.shape[1:])), true.pressure_kpa])
@@ -232,7 +231,7 @@ def _stepped(print_: "VirtualArray", true: "Step", readout: "ArrayReadout", draw
     )  # fmt: skip
 
 
-def _compared(name: str, verdict: str, before: "PressureMaps", found: "PressureMaps", true: "Step") -> Run:
+def _compared(name: str, verdict: str, before: "PressureMaps", found: "PressureMaps", true: "WalkedStep") -> InsoleRun:
     """Maps against the true load."""
     from sensorgen.prediction.array.readout import ArrayReadout
     from sensorgen.prediction.array.study import study
@@ -245,7 +244,7 @@ def _compared(name: str, verdict: str, before: "PressureMaps", found: "PressureM
     of_noise = study(found.model, ArrayReadout(), float(np.sqrt(np.mean(kpa[known] ** 2))))
     centre = np.stack(found.centre_mm, 1) - _centres(found, np.where(known, newtons, 0.0))
     heavy = force > 0.1 * force.max()
-    return Run(
+    return InsoleRun(
         name, verdict, int(known.any(0).sum()), int((found.model.here & ~known.any(0)).sum()),
         _rms(before.pressure_kpa - kpa), _rms(found.pressure_kpa - kpa),
         float(np.median(of_noise.sigma_kpa[of_noise.determined])), float(((low < kpa) & (kpa < high))[known].mean()),

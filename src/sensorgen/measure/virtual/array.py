@@ -30,7 +30,7 @@ _LOBES = (
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class WalkedStep:
     """One step over an array.
 
     Attributes
@@ -71,7 +71,7 @@ def points(layout: Layout, fine: int) -> tuple[Real, Real]:
     return x, y
 
 
-def walked(layout: Layout, fine: int = 1, frames: int = STEP) -> Step:
+def walked(layout: Layout, fine: int = 1, frames: int = STEP) -> WalkedStep:
     """One step from heel to toe."""
     whole, (x, y) = foot(layout, fine), points(layout, fine)
     along = np.broadcast_to((x - x[0]) / max(np.ptp(x), 1.0), whole.shape)
@@ -85,7 +85,7 @@ def walked(layout: Layout, fine: int = 1, frames: int = STEP) -> Step:
         maps[k] = load.reshape(m, fine, n, fine).mean((1, 3))
         if total := load.sum():
             centres[k] = (load.sum(0) @ x) / total, (load.sum(1) @ y) / total
-    return Step(maps, centres)
+    return WalkedStep(maps, centres)
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ _N_PER_KPA_MM2 = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Session:
+class ArraySession:
     """Recording of one session.
 
     Attributes
@@ -188,7 +188,7 @@ class Sums:
         return np.asarray(np.einsum("rnq,nq->r", self.rows, at))
 
 
-def sums_of(session: Session, form: Form, scale: float) -> Sums:
+def sums_of(session: ArraySession, form: Form, scale: float) -> Sums:
     """Sums of a session, its frames weighed as far as they are independent."""
     phi = features(session, form, scale)
     known = np.isfinite(session.pressure_kpa) & np.isfinite(session.reading)
@@ -202,7 +202,7 @@ def sums_of(session: Session, form: Form, scale: float) -> Sums:
     return Sums(session.day, gram, cross, w * (y**2).sum(0), w * known.sum(0), rows, session.force_n[total])
 
 
-def features(session: Session, form: Form, scale: float, tare: "Real | None" = None) -> Real:
+def features(session: ArraySession, form: Form, scale: float, tare: "Real | None" = None) -> Real:
     """Terms of the law of every frame and element, (k, n, terms)."""
     zero = session.tare if tare is None else tare
     x = session.reading - zero if form.tared else session.reading
@@ -236,7 +236,7 @@ class Law:
     unsure: float
     alive: Mask
 
-    def pressures(self, session: Session, tare: "Real | None" = None) -> tuple[Real, Real]:
+    def pressures(self, session: ArraySession, tare: "Real | None" = None) -> tuple[Real, Real]:
         """Pressures of a session and their standard errors by the parameters alone, (k, n); nan of no reading [kPa]."""
         phi = features(session, self.form, self.scale, tare)
         gain = np.exp(self.drift * (session.day - self.day))
@@ -247,7 +247,7 @@ class Law:
         return np.where(known, mean, np.nan), np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan)
 
 
-def scale_of(sessions: Sequence[Session], form: Form) -> float:
+def scale_of(sessions: Sequence[ArraySession], form: Form) -> float:
     """Median over elements of the span of their readings, so that the terms are near 1."""
     spans = [_span(s.reading - s.tare if form.tared else s.reading) for s in sessions]
     found = float(np.nanmedian(np.nanmax(spans, 0)))

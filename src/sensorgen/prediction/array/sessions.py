@@ -18,9 +18,9 @@ from sensorgen.core.files import reading
 from sensorgen.prediction.array.elements import (
     TARE_S,
     UNLOADED,
+    ArraySession,
     Form,
     Law,
-    Session,
     Sums,
     learnt,
     responding,
@@ -68,7 +68,7 @@ class ArrayCalibration:
     tares: Real
     quiet: Real
 
-    def pressures(self, session: Session, tare: "Real | None" = None) -> tuple[Real, Real]:
+    def pressures(self, session: ArraySession, tare: "Real | None" = None) -> tuple[Real, Real]:
         """Pressures, and half-widths of their intervals, (k, n); nan of dead elements and missing readings [kPa]."""
         mean, by_law = self.law.pressures(session, tare)
         return mean, self.reach * np.sqrt(by_law**2 + self.floor_kpa**2 + (self.share * mean) ** 2)
@@ -80,10 +80,10 @@ class ArrayCalibration:
                 f"a calibration of {len(self.law.alive)} elements; expected {ratio.shape[1]}, as of the array"
             )
         nothing = np.full(len(ratio), np.nan)
-        session = Session("", day, time_s, ratio - 1, np.zeros(len(ratio), bool), nothing[:, None], nothing)
+        session = ArraySession("", day, time_s, ratio - 1, np.zeros(len(ratio), bool), nothing[:, None], nothing)
         return self.pressures(session, np.zeros(ratio.shape[1]))
 
-    def recognised(self, session: Session) -> Mask:
+    def recognised(self, session: ArraySession) -> Mask:
         """Frames of the first unloaded second, by the readings alone.
 
         A second is unloaded where no element moves by more than noise, and all readings differ from the tares of the
@@ -153,12 +153,12 @@ def _spread_of_tares(tares: Real) -> tuple[Real, float, Real]:
     return middle, float(common.std(ddof=1)), np.hypot(own, np.median(own)) / np.sqrt(2)
 
 
-def training(sessions: Sequence[Session], held_out: int) -> list[Session]:
+def training(sessions: Sequence[ArraySession], held_out: int) -> list[ArraySession]:
     """All sessions but one."""
     return [session for k, session in enumerate(sessions) if k != held_out]
 
 
-def law_of(sessions: Sequence[Session], form: Form) -> Law:
+def law_of(sessions: Sequence[ArraySession], form: Form) -> Law:
     """Law of every element by sessions, of a given form."""
     scale = scale_of(sessions, form)
     return _law([sums_of(session, form, scale) for session in sessions], form, scale)
@@ -171,7 +171,7 @@ def _law(sums: Sequence[Sums], form: Form, scale: float) -> Law:
     return learnt(sums, form, scale, alive)
 
 
-def chosen(sessions: Sequence[Session]) -> Form:
+def chosen(sessions: Sequence[ArraySession]) -> Form:
     """Form of the law that leaves the least error in sessions left out; a further term has to lower it by 2 %.
 
     Powers first, then one memory state, then a drift of the gain; of one session a cubic.
@@ -199,7 +199,7 @@ def _joined(base: Form, option: Form) -> Form:
     )
 
 
-def _left_out(sessions: Sequence[Session], form: Form) -> float:
+def _left_out(sessions: Sequence[ArraySession], form: Form) -> float:
     """Mean over sessions of the median error of an element in a session left out [kPa]; by totals where alone [N]."""
     if len(sessions) < 2:
         return float("inf")
@@ -221,7 +221,7 @@ def _error(own: Sums, law: Law) -> float:
     return float(np.sqrt(np.mean((own.force - own.total(at * law.alive[:, None])) ** 2)))
 
 
-def calibrated(sessions: Sequence[Session], form: "Form | None" = None) -> ArrayCalibration:
+def calibrated(sessions: Sequence[ArraySession], form: "Form | None" = None) -> ArrayCalibration:
     """Calibration by sessions, its form chosen among them if none is given.
 
     The intervals' width is set by errors in each of them left out in turn; of one session by its own residuals.
@@ -246,7 +246,7 @@ def calibrated(sessions: Sequence[Session], form: "Form | None" = None) -> Array
     return ArrayCalibration(law, floor, share, reach, common, tares, quiet)
 
 
-def _residuals(session: Session, law: Law) -> tuple[Real, Real, Real]:
+def _residuals(session: ArraySession, law: Law) -> tuple[Real, Real, Real]:
     """Errors, pressures and standard errors by the parameters, of loaded frames evenly taken [kPa]."""
     mean, sigma = law.pressures(session)
     size = np.abs(session.pressure_kpa)
@@ -290,7 +290,7 @@ class CalibrationStudy:
     ----------
     calibration : ArrayCalibration
         By all sessions.
-    sessions : tuple of Session
+    sessions : tuple of ArraySession
         That trained.
     errors : tuple of SessionError
         Of each session left out, or of each after the first.
@@ -299,7 +299,7 @@ class CalibrationStudy:
     """
 
     calibration: ArrayCalibration
-    sessions: tuple[Session, ...]
+    sessions: tuple[ArraySession, ...]
     errors: tuple[SessionError, ...]
     by_first: bool = False
 
@@ -332,7 +332,7 @@ class CalibrationStudy:
             yield "dead", f"{dead.size} elements, from 1: {', '.join(map(str, dead[:_SHOWN].tolist()))}{more}"
 
 
-def study(sessions: Sequence[Session], *, by_first: bool = False) -> CalibrationStudy:
+def study(sessions: Sequence[ArraySession], *, by_first: bool = False) -> CalibrationStudy:
     """Calibrate by all sessions, and test on each by all others, or by the first alone.
 
     Raises
@@ -347,7 +347,7 @@ def study(sessions: Sequence[Session], *, by_first: bool = False) -> Calibration
     return CalibrationStudy(calibrated(sessions), tuple(sessions), tuple(errors), by_first)
 
 
-def _refuse(sessions: Sequence[Session]) -> None:
+def _refuse(sessions: Sequence[ArraySession]) -> None:
     count = sessions[0].reading.shape[1]
     for session in sessions:
         if session.reading.shape[1] != count:
@@ -356,7 +356,7 @@ def _refuse(sessions: Sequence[Session]) -> None:
             raise BadInput(f"{session.name}: no reference; expected pressure_kpa, or force_n of a press or a plate")
 
 
-def _tested(sessions: Sequence[Session], k: int, others: Sequence[Session]) -> SessionError:
+def _tested(sessions: Sequence[ArraySession], k: int, others: Sequence[ArraySession]) -> SessionError:
     """Errors in one session of calibrations by others."""
     session, found = sessions[k], calibrated(others)
     mean, half = found.pressures(session)
@@ -367,7 +367,7 @@ def _tested(sessions: Sequence[Session], k: int, others: Sequence[Session]) -> S
     return SessionError(session.name, found.law.form.words(), static, tared, own, float(inside.mean()))
 
 
-def median_error(mean: Real, session: Session) -> float:
+def median_error(mean: Real, session: ArraySession) -> float:
     """Median over elements of the rms error in a session [kPa]."""
     off = mean - session.pressure_kpa
     with np.errstate(invalid="ignore"):
