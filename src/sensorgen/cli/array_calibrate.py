@@ -15,7 +15,7 @@ SUFFIXES = (".csv", ".npz", ".h5", ".hdf5", ".hdf")
 
 
 @dataclass(frozen=True)
-class ArrayCalibration:
+class ArrayOptions:
     """Calibration of an array.
 
     Attributes
@@ -41,7 +41,7 @@ def are_files(words: Sequence[str]) -> bool:
     return count > 0
 
 
-def calibrate(files: Sequence[str], how: ArrayCalibration) -> int:
+def calibrate(files: Sequence[str], how: ArrayOptions) -> int:
     """Calibrate the elements of an array by sessions."""
     from sensorgen.core import files as store
     from sensorgen.prediction.array.sessions import study
