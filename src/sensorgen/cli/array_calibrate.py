@@ -11,7 +11,7 @@ SUFFIXES = (".csv", ".npz", ".h5", ".hdf5", ".hdf")
 
 
 @dataclass(frozen=True)
-class ArrayCalibration:
+class ArrayOptions:
     """Calibration of an array.
 
     Attributes
@@ -37,7 +37,7 @@ def are_files(words: Sequence[str]) -> bool:
     return count > 0
 
 
-def calibrate(files: Sequence[str], how: ArrayCalibration) -> int:
+def calibrate(files: Sequence[str], how: ArrayOptions) -> int:
     """Calibrate the elements of an array by sessions."""
     from sensorgen.core import files as store
     from sensorgen.measure.array_sessions import of_frames, session

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sensorgen.cli import FOUND_ERRORS, body_options, log_words, render, show
+from sensorgen.cli import FOUND_ERRORS, body_options, render, show
 from sensorgen.cli.body_options import Compensate
 from sensorgen.cli.designs import of_design
 from sensorgen.cli.options import Advising, Strict
@@ -96,6 +96,7 @@ def _refuse(design: "Design", error: Unprintable, budget_s: float | None, advisi
 
 
 def _verify(design: "Design", folder: Path) -> int:
+    from sensorgen.cli import log_words
     from sensorgen.workflows.sealed import build_differences
 
     with log_words.LogFile().existing() as log:

@@ -6,7 +6,7 @@ from typing import Annotated
 import click
 
 from sensorgen.cli import FOUND_ERRORS, array_calibrate, options, render, show
-from sensorgen.cli.array_calibrate import ArrayCalibration
+from sensorgen.cli.array_calibrate import ArrayOptions
 from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import command as of_function
 from sensorgen.cli.log_words import LogFile
@@ -20,7 +20,7 @@ Recordings = Annotated[tuple[int, ...], Option(kind=click.IntRange(1))]
 @of_function("calibrate", *render.options("json", "markdown"))
 def command(
     specimens: tuple[str, ...], bench: BenchTip, *, recordings: Recordings = (), again: bool = False,
-    page: Path | None = None, source: Path | None = None, of_array: ArrayCalibration, log: LogFile, body: BodyChoice,
+    page: Path | None = None, source: Path | None = None, of_array: ArrayOptions, log: LogFile, body: BodyChoice,
     dry_run: bool = False,
 ) -> int:  # fmt: skip
     """Calibrate specimens by recordings with known presses, and by readings of meters, that the log has of them.

@@ -19,8 +19,8 @@ from math import ceil
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput, OutOfRange
+from sensorgen.design.effects import TipData
 from sensorgen.design.tip import EVEN
-from sensorgen.design.tip_data import TipData
 from sensorgen.scene.lettering import LINE_DOTS, runs
 from sensorgen.scene.scene import SLIVER_MM, Body, Envelope, Fill, Piece, Point, Prism, Scene, box, rounded
 from sensorgen.scene.shifting import shifted, transposed

@@ -150,7 +150,7 @@ def law_of(
 
 
 @dataclass(frozen=True)
-class Option:
+class LawOption:
     """An available law.
 
     Attributes
@@ -174,17 +174,17 @@ class Option:
 def options(
     design: Design, answer: Answer, name: str = "", *, printed: Piece | None = None, tip: Tip = FLAT,
     until_pa: float = 0.0,
-) -> list[Option]:  # fmt: skip
+) -> list[LawOption]:  # fmt: skip
     """The available laws of a design, the least expensive first; parameters and errors as of :func:`law_of`."""
     piece, moduli = printed or drawn(design), of_all_materials(design, "youngs_modulus_pa")
     asked = name == "solved" and not is_plate(answer, piece.scene)
     at_once = law_of(design, answer, "" if asked else name, printed=printed, tip=tip, until_pa=until_pa)
-    known = Option(at_once.compression.name, 0.0, at_once, lambda: at_once)
+    known = LawOption(at_once.compression.name, 0.0, at_once, lambda: at_once)
     if at_once.bounded or name == "unconfined":
         return [known]
     model = model_of(piece, quick=not asked)
     meshes = [
-        Option(
+        LawOption(
             mesh.name,
             mesh.seconds,
             _cell(expected(design, mesh), moduli),

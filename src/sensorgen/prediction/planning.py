@@ -13,7 +13,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.design.body import Body
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.capacitance import Answer, default_width, weighed
-from sensorgen.prediction.compression_law import Law, Option, infill, options
+from sensorgen.prediction.compression_law import Law, LawOption, infill, options
 from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, run_until_within
 from sensorgen.prediction.query import DEFAULT, FLAT, Load, Query, Tip
 from sensorgen.prediction.reference_load import ReferenceLoad
@@ -49,7 +49,7 @@ class PredictionPlan:
     body: Body
     load: Load
     tip: Tip
-    options: Callable[[Answer], list[Option]]
+    options: Callable[[Answer], list[LawOption]]
     rough: SensorModel
     by_capacitance: float
     plan: Plan
@@ -101,7 +101,7 @@ def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", t
     by_capacitance = _by_capacitance(sensor, load)
     printed = None if body.is_drawn else piece(body)
 
-    def laws(answer: Answer) -> list[Option]:
+    def laws(answer: Answer) -> list[LawOption]:
         found = options(body.design, answer, law, printed=printed, tip=tip, until_pa=until_pa)
         return found if thorough else _inexpensive(found, body)
 
@@ -111,7 +111,7 @@ def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", t
     return PredictionPlan(body, load, tip, laws, rough, by_capacitance, Plan(wanted, at, levels))
 
 
-def _inexpensive(found: list[Option], body: Body) -> list[Option]:
+def _inexpensive(found: list[LawOption], body: Body) -> list[LawOption]:
     """Without cells in 3D: in their place infill's law, else the nearest prototype's, of unknown error."""
     spatial = [option for option in found if option.name.startswith("press3d")]
     if not spatial:
@@ -123,7 +123,7 @@ def _inexpensive(found: list[Option], body: Body) -> list[Option]:
     known = law or replace(spatial[0].expected, bounded=False)
     said += f": solving this cell takes some {spatial[0].seconds:.0f} s (predict --compression solved)"
     known = replace(known, doubts=(said,))
-    return [Option(name, 0.0, known, lambda: known)]
+    return [LawOption(name, 0.0, known, lambda: known)]
 
 
 def execute(planned: PredictionPlan) -> tuple[SensorModel, Plan]:
@@ -187,7 +187,7 @@ def _results(cell: Level, answer: Answer) -> Level:
     return replace(cell, candidates=candidates, chosen=answer.model)
 
 
-def _compression(laws: list[Option], sensor: Sensor, load: Load, allowed: float) -> Level:
+def _compression(laws: list[LawOption], sensor: Sensor, load: Load, allowed: float) -> Level:
     candidates = tuple(Candidate(o.name, _error_of_law(sensor, load, o.expected), o.seconds) for o in laws)
     return Level("compression", _ERROR_OF_Z, allowed, candidates, cheapest(candidates, allowed))
 

@@ -19,7 +19,6 @@ from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
 from sensorgen.design.values import permittivities, resistivities
 from sensorgen.design.walls import WALLS, rule
-from sensorgen.export import machine
 from sensorgen.export.gcode.check import Checked
 from sensorgen.export.gcode.drags import Lifting
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S, TITLES
@@ -227,7 +226,11 @@ def estimated(design: Design, drawn: Review, walls: str = "", why: str = "") -> 
 
 def of_own_machine(design: Design) -> list[Finding]:
     """Faults of a printer or quality of the user's own; what ships is tested."""
-    return machine.of_design(design) if design.own.keys() & {"printers", "qualities"} else []
+    if not design.own.keys() & {"printers", "qualities"}:
+        return []
+    from sensorgen.export import machine
+
+    return machine.of_design(design)
 
 
 def _at_crossing(design: Design, finding: Finding) -> Finding:
