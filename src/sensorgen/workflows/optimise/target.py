@@ -289,8 +289,10 @@ def around(design: Design) -> Target:
     plane by a quarter.
     """
     several = list(lengths(design))
-    own = {name: value for name, value, _ in several} | {"quality": design.quality}
-    near = [{name: to} for name, value, vertical in several for to in _beside(design, name, value, vertical)]
+    own: dict[str, float | str] = {name: value for name, value, _ in several} | {"quality": design.quality}
+    near: list[dict[str, float | str]] = [
+        {name: to} for name, value, vertical in several for to in _beside(design, name, value, vertical)
+    ]
     return checked(Target, {
         "design": design.model_dump(mode="json", exclude_unset=True, exclude={"name"}),
         "parameters": {key: [value] for key, value in own.items()}, "accept_doubts": ["plate bonded"],
