@@ -8,7 +8,7 @@ import time
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design import design, packs
-from sensorgen.prediction.slices import slice_now
+from sensorgen.prediction.new_slice import slice_now
 from slicers import NEWER, RESULTS
 
 PROGRAMS = (("prusa", ""), ("prusa", str(NEWER / "prusa-slicer")), ("cura", ""), ("cura", str(NEWER / "CuraEngine")))
@@ -24,7 +24,7 @@ def outcome(shape, slicer, program):
     """Result of one slicer for a shape: its version, and "accepted" or why not."""
     made = design.make({"shape": shape})
     try:
-        report = slice_now(made, slicer, program=program).file.report
+        report = slice_now(made, slicer, program=program).report
     except SensorgenError as error:
         return "", f"refused: {error!s:.120}"
     errors = [

@@ -17,7 +17,9 @@ from sensorgen.design.walls import rule
 from sensorgen.export.gcode.report import Report
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 from sensorgen.export.slicing import Step
-from sensorgen.prediction.slices import SliceReport, combined, estimated, of_own_machine, slice_now
+from sensorgen.prediction.new_slice import SliceReport, slice_now
+from sensorgen.prediction.print_files import PrintFile
+from sensorgen.prediction.slices import combined, estimated, of_own_machine
 from sensorgen.workflows import compensation
 from sensorgen.workflows.compensation import Change
 
@@ -108,8 +110,8 @@ def slice_design(
         held = estimated(design, drawn)
         raise Unprintable(held.findings, held.errors(strict))
     made = slice_now(design, slicer, program=program, time_limit_s=time_limit_s, strict=strict, step=step)
-    report = made.file.report
-    held = combined(design, drawn, report.slicer.words, report.of_print(), made.file)
+    report = made.report
+    held = combined(design, drawn, report.slicer.words, report.of_print(), PrintFile(made.record(), made.content))
     page = ""
     if made.printed.lines and len(made.printed.lines.number):
         travel = {"as sliced": made.lifted.before, "as written": made.lifted.after}
@@ -121,7 +123,7 @@ def slice_design(
         **vars(report), gcode=names[0], verdict=held.verdict, all_findings=tuple(held.findings),
         compensated=tuple(compensated),
     )  # fmt: skip
-    return _written(result, out / design.name, made.file.content, page, others)
+    return _written(result, out / design.name, made.content, page, others)
 
 
 def _written(result: Printed, folder: Path, content: bytes, page: str, others: tuple[str, ...]) -> Printed:
