@@ -289,14 +289,15 @@ def around(design: Design) -> Target:
     plane by a quarter.
     """
     several = list(lengths(design))
-    own = {name: value for name, value, _ in several} | {"quality": design.quality}
+    own: dict[str, float | str] = {name: value for name, value, _ in several}
+    own["quality"] = design.quality
     near = [{name: to} for name, value, vertical in several for to in _beside(design, name, value, vertical)]
     return checked(Target, {
         "design": design.model_dump(mode="json", exclude_unset=True, exclude={"name"}),
         "parameters": {key: [value] for key, value in own.items()}, "accept_doubts": ["plate bonded"],
         "objectives": dict.fromkeys(("force_resolution_n", "position_resolution_mm"), "minimise"),
-        "also": [own | one for one in near]
-        + [own | one.parameters | {"quality": one.quality} for one in best.of(design.shape)],
+        "also": [{**own, **one} for one in near]
+        + [{**own, **one.parameters, "quality": one.quality} for one in best.of(design.shape)],
     })  # fmt: skip
 
 
