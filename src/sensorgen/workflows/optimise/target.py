@@ -297,8 +297,8 @@ def around(design: Design) -> Target:
         "design": design.model_dump(mode="json", exclude_unset=True, exclude={"name"}),
         "parameters": {key: [value] for key, value in own.items()}, "accept_doubts": ["plate bonded"],
         "objectives": dict.fromkeys(("force_resolution_n", "position_resolution_mm"), "minimise"),
-        "also": [own | one for one in near]
-        + [own | one.parameters | {"quality": one.quality} for one in best.of(design.shape)],
+        "also": [{**own, **one} for one in near]
+        + [{**own, **one.parameters, "quality": one.quality} for one in best.of(design.shape)],
     })  # fmt: skip
 
 
