@@ -8,7 +8,7 @@ from sensorgen.cli.options import ArrayFrames, refuse_input
 from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from sensorgen.cli.invert_command import Task
+    from sensorgen.cli.inversion_task import Task
     from sensorgen.design.design import Design
     from sensorgen.prediction.array.frames import PressureMaps
 

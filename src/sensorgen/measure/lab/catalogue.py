@@ -11,20 +11,18 @@ No package is imported before one of its kinds is asked for.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from sensorgen.core.errors import BadInput, NotInstalled, UnknownName
 from sensorgen.core.records import Line, Strict, checked
 from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import Actuator, ImpedanceMeter, Meter, Stage
+from sensorgen.measure.lab.devices import PYMEASURE, Actuator, ImpedanceMeter, Meter, Role, Stage
 from sensorgen.measure.virtual.plant import Plant
 
 GROUP = "sensorgen.devices"
-PYMEASURE = "pymeasure:"  # begin of the kinds that are classes of PyMeasure
 Device = Actuator | Stage | ImpedanceMeter | Meter
-Role = Literal["actuator", "stage", "impedance", "meter"]
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,15 @@ sends it nothing but that question. Any failure is a :class:`DeviceFault`.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import InstrumentFailed
+
+PYMEASURE = "pymeasure:"  # begin of the kinds that are classes of PyMeasure
+Role = Literal["actuator", "stage", "impedance", "meter"]
 
 
 class DeviceFault(InstrumentFailed):

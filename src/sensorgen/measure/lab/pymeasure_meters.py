@@ -21,9 +21,8 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.errors import NotInstalled, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.records import Line, Strict
 from sensorgen.measure.lab import scpi
-from sensorgen.measure.lab.catalogue import PYMEASURE, Role
 from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings, WrongDevice
+from sensorgen.measure.lab.devices import PYMEASURE, DeviceFault, Identity, Readings, Role, WrongDevice
 
 _HP = ("agilent", "hewlett-packard", "hp", "keysight")
 _FUNCTION = {2: "RES", 4: "FRES"}
