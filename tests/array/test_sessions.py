@@ -11,7 +11,7 @@ from sensorgen.core import document
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.array_sessions import refuse_swapped, session
 from sensorgen.prediction.array import sessions as calibration
-from sensorgen.prediction.array.elements import ArraySession, Form, lagged
+from sensorgen.prediction.array.elements import ArraySession, LawForm, lagged
 from sensorgen.prediction.array.sessions import calibrated, law_of, stored, study
 
 PRINT = Insole(elements=20, bad=6, minutes=4.0, rate_hz=1.0)
@@ -116,7 +116,7 @@ def test_gains_come_back_from_every_reference(reference):
     if reference == "presses":
         kpa = kpa * (np.arange(5) == (np.arange(60) % 5)[:, None])
     force = kpa.sum(1) * 0.1 if reference == "plate" else None
-    law = law_of([made(kpa, force_n=force, known=force is None, tare=7.0, noise=0.02)], Form(powers=1))
+    law = law_of([made(kpa, force_n=force, known=force is None, tare=7.0, noise=0.02)], LawForm(powers=1))
     assert law.at[:, 0] / law.scale == pytest.approx(GAINS, rel=1e-2)
     other = made(loads(20, 3), tare=3.0)
     assert np.abs(law.pressures(other)[0] - other.pressure_kpa).max() < 5
@@ -127,7 +127,7 @@ def test_an_element_without_data_takes_the_print_s_gain():
     known = made(loads(40, 2), noise=0.05)
     pressure = known.pressure_kpa.copy()
     pressure[:, 2] = np.nan
-    law = law_of([replace(known, pressure_kpa=pressure)], Form(powers=1))
+    law = law_of([replace(known, pressure_kpa=pressure)], LawForm(powers=1))
     others = GAINS[[0, 1, 3, 4]]
     assert law.at[2, 0] / law.scale == pytest.approx(others.mean(), rel=0.01)
     assert np.sqrt(law.spread[2, 0, 0]) / law.scale == pytest.approx(others.std(), rel=0.2)
@@ -158,7 +158,7 @@ def test_unloaded_seconds_are_recognised_by_the_readings(days, all_days):
     with pytest.raises(BadInput, match="no unloaded second is recognised"):
         known.recognised(cut)
     with pytest.raises(BadInput, match="tares of 2 sessions are known"):
-        calibrated(days[:2], Form(powers=1)).recognised(later)
+        calibrated(days[:2], LawForm(powers=1)).recognised(later)
 
 
 def test_a_calibration_is_stored_whole(tmp_path, all_days, days):

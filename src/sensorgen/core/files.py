@@ -225,7 +225,7 @@ def alone(path: Path, *, wait: bool) -> Iterator[bool]:
     path : Path
         The folder or file.
     wait : bool
-        Until the other process lets it go; without a lock where the system has none, as in a network folder.
+        Until the other process releases it; without a lock where the system has none, as in a network folder.
     """
     try:
         import fcntl

@@ -68,7 +68,7 @@ class Settings(Strict):
     aperture: Literal["SHOR", "MED", "LONG"] = "MED"
 
 
-class LcrMeter(scpi.Instrument):
+class LcrMeter(scpi.ScpiInstrument):
     """Driver of an analyser.
 
     Parameters

@@ -17,7 +17,7 @@ _QUERY = {2: "MEAS:RES?", 4: "MEAS:FRES?"}
 _NUMBER = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?(E[-+]?[0-9]{1,3})?", re.IGNORECASE)
 
 
-class Multimeter(scpi.Instrument):
+class Multimeter(scpi.ScpiInstrument):
     """Driver of a multimeter.
 
     Parameters

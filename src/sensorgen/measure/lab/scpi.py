@@ -9,7 +9,7 @@ _READING = re.compile(r'[-+0-9.,E\s]*|[-+]?[0-9]+,".*"')  # numbers, or an entry
 _STALE = 4
 
 
-class Instrument:
+class ScpiInstrument:
     """Part that all drivers share.
 
     Parameters

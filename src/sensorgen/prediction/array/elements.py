@@ -138,7 +138,7 @@ def lagged(x: Real, time_s: Real, tau_s: float, start: "Real | None" = None) -> 
 
 
 @dataclass(frozen=True)
-class Form:
+class LawForm:
     """Form of the law.
 
     Attributes
@@ -188,7 +188,7 @@ class Sums:
         return np.asarray(np.einsum("rnq,nq->r", self.rows, at))
 
 
-def sums_of(session: ArraySession, form: Form, scale: float) -> Sums:
+def sums_of(session: ArraySession, form: LawForm, scale: float) -> Sums:
     """Sums of a session, its frames weighed as far as they are independent."""
     phi = features(session, form, scale)
     known = np.isfinite(session.pressure_kpa) & np.isfinite(session.reading)
@@ -202,7 +202,7 @@ def sums_of(session: ArraySession, form: Form, scale: float) -> Sums:
     return Sums(session.day, gram, cross, w * (y**2).sum(0), w * known.sum(0), rows, session.force_n[total])
 
 
-def features(session: ArraySession, form: Form, scale: float, tare: "Real | None" = None) -> Real:
+def features(session: ArraySession, form: LawForm, scale: float, tare: "Real | None" = None) -> Real:
     """Terms of the law of every frame and element, (k, n, terms)."""
     zero = session.tare if tare is None else tare
     x = session.reading - zero if form.tared else session.reading
@@ -215,7 +215,7 @@ class Law:
 
     Attributes
     ----------
-    form : Form
+    form : LawForm
         Its form.
     scale : float
         Unit of the readings.
@@ -227,7 +227,7 @@ class Law:
         Elements that respond.
     """
 
-    form: Form
+    form: LawForm
     scale: float
     at: Real
     spread: Real
@@ -247,7 +247,7 @@ class Law:
         return np.where(known, mean, np.nan), np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan)
 
 
-def scale_of(sessions: Sequence[ArraySession], form: Form) -> float:
+def scale_of(sessions: Sequence[ArraySession], form: LawForm) -> float:
     """Median over elements of the span of their readings, so that the terms are near 1."""
     spans = [_span(s.reading - s.tare if form.tared else s.reading) for s in sessions]
     found = float(np.nanmedian(np.nanmax(spans, 0)))
@@ -267,7 +267,7 @@ def responding(sums: Sequence[Sums]) -> Mask:
     return np.asarray((count == 0) | (explained > _RESPONDS * square))
 
 
-def learnt(sums: Sequence[Sums], form: Form, scale: float, alive: Mask) -> Law:
+def learnt(sums: Sequence[Sums], form: LawForm, scale: float, alive: Mask) -> Law:
     """Law of every element by empirical Bayes: EM over the print's mean, covariance and noise; dead ones left out."""
     day = float(np.mean([s.day for s in sums]))
     days = np.array([s.day for s in sums]) - day

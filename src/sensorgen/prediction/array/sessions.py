@@ -19,7 +19,7 @@ from sensorgen.prediction.array.elements import (
     TARE_S,
     UNLOADED,
     ArraySession,
-    Form,
+    LawForm,
     Law,
     Sums,
     learnt,
@@ -137,7 +137,7 @@ def stored(path: Path) -> ArrayCalibration:
             powers, tau_s, drift, tared = data["form"].tolist()
             day, rate, unsure, floor, share, reach, common = data["numbers"].tolist()
             law = Law(
-                Form(int(powers), tau_s, bool(drift), bool(tared)), float(data["scale"]), data["at"], data["spread"],
+                LawForm(int(powers), tau_s, bool(drift), bool(tared)), float(data["scale"]), data["at"], data["spread"],
                 day, rate, unsure, data["alive"],
             )  # fmt: skip
             return ArrayCalibration(law, floor, share, reach, common, data["tares"], data["quiet"])
@@ -158,25 +158,25 @@ def training(sessions: Sequence[ArraySession], held_out: int) -> list[ArraySessi
     return [session for k, session in enumerate(sessions) if k != held_out]
 
 
-def law_of(sessions: Sequence[ArraySession], form: Form) -> Law:
+def law_of(sessions: Sequence[ArraySession], form: LawForm) -> Law:
     """Law of every element by sessions, of a given form."""
     scale = scale_of(sessions, form)
     return _law([sums_of(session, form, scale) for session in sessions], form, scale)
 
 
-def _law(sums: Sequence[Sums], form: Form, scale: float) -> Law:
+def _law(sums: Sequence[Sums], form: LawForm, scale: float) -> Law:
     alive = responding(sums)
     if not alive.any():
         raise BadInput("no element's reading follows its reference; expected half of its variance or more of one")
     return learnt(sums, form, scale, alive)
 
 
-def chosen(sessions: Sequence[ArraySession]) -> Form:
+def chosen(sessions: Sequence[ArraySession]) -> LawForm:
     """Form of the law that leaves the least error in sessions left out; a further term has to lower it by 2 %.
 
     Powers first, then one memory state, then a drift of the gain; of one session a cubic.
     """
-    best, error = Form(), _left_out(sessions, Form())
+    best, error = LawForm(), _left_out(sessions, LawForm())
     if len(sessions) < 2:
         return best
     for options in (
@@ -192,14 +192,14 @@ def chosen(sessions: Sequence[ArraySession]) -> Form:
     return best
 
 
-def _joined(base: Form, option: Form) -> Form:
+def _joined(base: LawForm, option: LawForm) -> LawForm:
     """The base with what an option has beyond the usual form."""
     return replace(
         base, powers=min(base.powers, option.powers), tau_s=option.tau_s or base.tau_s, drift=option.drift or base.drift
     )
 
 
-def _left_out(sessions: Sequence[ArraySession], form: Form) -> float:
+def _left_out(sessions: Sequence[ArraySession], form: LawForm) -> float:
     """Mean over sessions of the median error of an element in a session left out [kPa]; by totals where alone [N]."""
     if len(sessions) < 2:
         return float("inf")
@@ -221,7 +221,7 @@ def _error(own: Sums, law: Law) -> float:
     return float(np.sqrt(np.mean((own.force - own.total(at * law.alive[:, None])) ** 2)))
 
 
-def calibrated(sessions: Sequence[ArraySession], form: "Form | None" = None) -> ArrayCalibration:
+def calibrated(sessions: Sequence[ArraySession], form: "LawForm | None" = None) -> ArrayCalibration:
     """Calibration by sessions, its form chosen among them if none is given.
 
     The intervals' width is set by errors in each of them left out in turn; of one session by its own residuals.
@@ -362,7 +362,7 @@ def _tested(sessions: Sequence[ArraySession], k: int, others: Sequence[ArraySess
     mean, half = found.pressures(session)
     known = np.isfinite(session.pressure_kpa) & np.isfinite(mean)
     inside = (np.abs(mean - session.pressure_kpa) < half)[known]
-    plain = (law_of(others, Form(tared=tared)).pressures(session)[0] for tared in (False, True))
+    plain = (law_of(others, LawForm(tared=tared)).pressures(session)[0] for tared in (False, True))
     static, tared, own = (median_error(each, session) for each in (*plain, mean))
     return SessionError(session.name, found.law.form.words(), static, tared, own, float(inside.mean()))
 

@@ -74,7 +74,7 @@ class _Presses(inference.LeastSquares):
         return np.stack([within, _inside(at_position, inside)], 1)
 
     def done(self, fit: Fit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
-        """Samples near enough; one far below noise goes on to the end."""
+        """Samples within the accuracy asked for; one far below noise goes on to the end."""
         rounding = ROUNDING**2 * np.einsum("nk,nk->n", self.target.weight[rows], self.target.weight[rows])
         return np.asarray(gain <= self.offset**2 * fit.chi2 * np.minimum(fit.chi2, 1.0) + rounding)
 
