@@ -1,6 +1,6 @@
 """Sessions that calibrate an array: readings of its elements, and references by bladder, press or force plate.
 
-CSV: ``time_s``, a column for each element, and the known part of the load: ``pressure_kpa`` of all elements (a bladder);
+CSV: ``time_s``, a column for each element, and the load: ``pressure_kpa`` of all elements (a bladder);
 ``element`` with ``force_n`` or ``pressure_kpa`` of a press on it alone; else ``force_n`` of all (a person on a plate).
 ``rest`` is 1 without load, ``day`` counts days. NPZ and HDF5: ``reading`` (frames, elements), or of an array with a
 design its frames, and the same names; ``element`` by number from 1, ``area_mm2`` of one.
