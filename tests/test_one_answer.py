@@ -17,9 +17,11 @@ from functools import cached_property
 from pathlib import Path
 
 import pytest
+from pydantic import TypeAdapter
 
 import sensorgen
 from in_process import run
+from sensorgen.core.bounds import Bounds
 
 VALUES = """\
 shape: reference
@@ -200,12 +202,12 @@ def report(asked):
     tables = {table["key"]: _rows(table) for section in sections for table in section["tables"]}
     reading, card = tables["readings"][0], tables["identifiability"][0]
     words = next(variant["words"] for section in sections for variant in section["variants"])
-    said = re.search(r"capacitance ([\d.]+) to ([\d.]+) pF", words)
+    said = re.search(r"capacitance ([^;]+? \(.+?\))", words)
     position_mm = card["standard error of position"]
     position_m = None if position_mm is None else position_mm * 1e-3
     return Answer(
         {
-            "capacitance": {"four digits": (float(said[1]), float(said[2]))} if said else None,
+            "capacitance": {"words": said[1]} if said else None,
             "resistance": _scaled(1.0, {"from": reading["predicted from"], "to": reading["predicted to"]}),
             "resolution": _scaled(1.0, {"force": card["standard error of force"], "position": position_m}),
         }
@@ -267,15 +269,11 @@ def _quantities(data):
     return {
         "body": data["body"],
         "capacitance": data["capacitance"]
-        and {**data["capacitance"], "four digits": _four_digits(data["capacitance"])},
+        and {**data["capacitance"], "words": TypeAdapter(Bounds).validate_python(data["capacitance"]).words()},
         "resistance": _ohm(data["resistance"]) if data["resistance"] else None,
         "gap": data["gap"],
         "resolution": None if None in resolution.values() else resolution,
     }
-
-
-def _four_digits(bounds):
-    return tuple(float(f"{bounds[end] * 1e12:.4g}") for end in ("lower", "upper"))
 
 
 def _ohm(ends):

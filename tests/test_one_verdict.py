@@ -74,7 +74,7 @@ def _drawn_in_report(folder):
         binding.bind(log, ["S1"], str(folder / "d.yaml"))
         log.add([notes.reading("S1", "700", "OL", log=log)])
         made = report(log, None, specimens=["S1"])
-    ((drawing,),) = [section.variants for section in made.sections if section.variants]
+    ((drawing,),) = [section.drawings for section in made.sections if section.drawings]
     return drawing.svg
 
 

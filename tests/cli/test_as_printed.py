@@ -159,6 +159,6 @@ def test_the_print_by_any_file(run, program, tmp_path):
     assert found["body"] == f"printed, {file.name}"
     assert found["capacitance"]["value"] == pytest.approx(sliced["capacitance"]["value"], rel=1e-5, abs=0)
     both = run("predict", *words, "--gcode", str(file), "--drawn")
-    assert (both.code, both.line) == (2, "sensorgen: --gcode and --drawn at once; expected one of them")
+    assert (both.code, both.line) == (2, "sensorgen: --drawn and --gcode at once; expected one of them")
     missing = run("predict", *words, "--gcode", "none.gcode")
     assert (missing.code, missing.line) == (2, "sensorgen: cannot read 'none.gcode': No such file or directory")

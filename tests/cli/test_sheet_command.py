@@ -122,7 +122,7 @@ def test_maps_are_drawn(run, tmp_path):
         (["--compression", "bound"], "did you mean 'bonded'"),
         (["--pad", "0-10"], "expected X0-X1,Y0-Y1 in mm"),
         (["--pad", "0-10,0-10-20"], "expected X0-X1,Y0-Y1 in mm"),
-        (["--pad", "0-ten,0-10"], "--pad '0-ten,0-10': 'ten' is not a length"),
+        (["--pad", "0-ten,0-10"], "--pad: '0-ten,0-10': 'ten' is not a length"),
         (["--pad=-5-10,0-10"], "expected X0-X1,Y0-Y1"),
         (["--pad", "10-0,0-10"], "give the lower first"),
         (["--pad", "0,0"], "without length"),

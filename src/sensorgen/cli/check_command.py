@@ -34,6 +34,6 @@ def command(design: "Design", advising: Advising, *, strict: Strict = False) -> 
         decided = decision.decision(design, review, advising.budget, predict=advising.budget > 0, step=step)
     render.deliver(decided)
     if decided.findings and render.early():
-        render.say("each finding in its place, in 3D, drawing and layers: sensorgen show", err=True)
+        render.say("each finding in its place, in 3D, drawing and layers: sensorgen show")
     advising.write(design, decided.advice)
     return 1 if review.errors(strict) or review.verdict == "CHANGE" else 0

@@ -270,7 +270,7 @@ def _design(base: Data, given: Data, word: str) -> "Design":
     """The design of a file or a shape with the options that were given."""
     from sensorgen.design import design, packs, settings
 
-    name, unnamed = base.get("name"), {k: v for k, v in base.items() if k != "name"}
+    unnamed = {k: v for k, v in base.items() if k != "name"}
     if isinstance(unnamed.get("materials"), dict):
         unnamed["materials"] = packs.slots(unnamed["materials"])
     chosen = DesignOptions(**arguments(DesignOptions, given))
@@ -278,9 +278,10 @@ def _design(base: Data, given: Data, word: str) -> "Design":
     data = settings.merged(unnamed, _given(chosen.changes(base) | {"tip": given["tip"]}, parameters))
     for key, value in pairs(chosen.settings, "--set"):
         data = settings.merged(data, settings.setting(key, value, set(parameters)))
-    name = name if chosen.name is None and data == unnamed else chosen.name
-    if name is not None:
-        data["name"] = name
+    if chosen.name is not None:
+        data["name"] = chosen.name
+    elif data == unnamed and "name" in base:
+        data["name"] = base["name"]
     return design.make(data, word if _is_file(word) else "")
 
 

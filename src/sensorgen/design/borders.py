@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import BadInput
-from sensorgen.design import feet
 
 if TYPE_CHECKING:
     import shapely
@@ -34,6 +33,8 @@ def with_border(data: dict[str, Any], folder: Path) -> dict[str, Any]:
         return data
     if data.get("geometry"):
         raise BadInput("border: an imported sensor has its own; cut it in CAD")
+    from sensorgen.design import feet
+
     if given.startswith(_START):
         text = given
     elif (corners := feet.outline(given)) is not None:
