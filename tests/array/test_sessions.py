@@ -245,7 +245,9 @@ def test_commands_calibrate_and_invert_any_array(tmp_path):
     code, text = run(tmp_path, "calibrate", *files, "--calibration", "c.npz")
     assert code == 0
     assert "2 elements, from 1:" in text
-    np.savez(tmp_path / "later.npz", reading=later[2], time_s=later[1], rest=later[3] == 0)
+    np.savez(tmp_path / "dayless.npz", reading=later[2], time_s=later[1], rest=later[3] == 0)
+    assert run(tmp_path, "invert", "c.npz", "dayless.npz", "-o", "p.csv")[0] == 2
+    np.savez(tmp_path / "later.npz", reading=later[2], time_s=later[1], rest=later[3] == 0, day=3.0)
     assert run(tmp_path, "invert", "c.npz", "later.npz", "-o", "p.csv")[0] == 0
     lines = (tmp_path / "p.csv").read_text().splitlines()
     found = np.genfromtxt(lines[1:], delimiter=",")[:, 1::2]

@@ -63,7 +63,7 @@ def test_the_chain_recovers_a_step(model, tmp_path):
     known = calibrated(of_frames(recorded(model, tmp_path), model))
     frames, true = read(tmp_path / "step.npz", (5, 6), None), walked(model.layout, 5)
     by_design, found = (
-        inverted(model, ArrayReadout(), frames.siemens, frames.rest, frames.time_s, calibration=calibration)
+        inverted(model, ArrayReadout(), frames.siemens, frames.rest, frames.time_s, calibration=calibration, day=4.0)
         for calibration in (None, known)
     )
     run = insole._compared("a", "", by_design, found, true)

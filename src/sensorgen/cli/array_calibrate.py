@@ -1,11 +1,13 @@
 """``sensorgen calibrate`` and ``invert`` of arrays: sessions with references, and readings by a calibration."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import nan
 from pathlib import Path
 
 from sensorgen.cli import render
-from sensorgen.core.errors import BadInput
+from sensorgen.cli.inversion_task import Task
+from sensorgen.core.errors import BadInput, within
 
 SUFFIXES = (".csv", ".npz", ".h5", ".hdf5", ".hdf")
 
@@ -59,7 +61,7 @@ def calibrate(files: Sequence[str], how: ArrayOptions) -> int:
     return 0
 
 
-def invert(calibration: str, measured: str, output: str) -> int:
+def invert(calibration: str, task: Task) -> int:
     """Pressures of an array's elements by a calibration alone, a row for each frame, with half-widths of 90 %."""
     import numpy as np
 
@@ -68,7 +70,14 @@ def invert(calibration: str, measured: str, output: str) -> int:
     from sensorgen.measure.array_sessions import session
     from sensorgen.prediction.array.sessions import stored
 
-    known, of = stored(Path(calibration)), session(Path(measured), 0)
+    given = {"--rest": task.rest_file, "--noise": task.noise, "--prior": task.prior, "--newest": task.newest,
+             "--force-limit": task.force_limit_n}  # fmt: skip
+    if refused := next((option for option, value in given.items() if value), None):
+        raise BadInput(f"{refused} has no meaning with a calibration of an array; mark unloaded frames in 'rest'")
+    measured, output, known = task.measured, task.output, stored(Path(calibration))
+    of = session(Path(measured), nan)
+    with within(measured):
+        of = replace(of, day=known.counted(of.day))
     if of.reading.shape[1] != len(known.law.alive):
         raise BadInput(f"{measured}: {of.reading.shape[1]} elements; expected {len(known.law.alive)}, as calibrated")
     free = of.unloaded if of.rest.any() else known.recognised(of)

@@ -14,6 +14,14 @@ from sensorgen.cli.options import BenchTip
 from sensorgen.core.errors import BadInput
 from sensorgen.core.options import Option
 
+_OF_SPECIMENS = {
+    "recordings": "--recording",
+    "again": "--recheck",
+    "page": "--page",
+    "source": "--source",
+    "dry_run": "--dry-run",
+}
+_OF_ARRAYS = {"array": "--array", "calibration": "--calibration", "by_first": "--by-first"}
 Recordings = Annotated[tuple[int, ...], Option(kind=click.IntRange(1))]
 
 
@@ -46,7 +54,11 @@ def command(
     dry_run
         Log nothing.
     """
-    if array_calibrate.are_files(specimens):
+    files = array_calibrate.are_files(specimens)
+    wrong = _OF_SPECIMENS if files else _OF_ARRAYS
+    if refused := next((flag for name, flag in wrong.items() if options.typed(name)), None):
+        raise BadInput(f"{refused} is for {'specimens' if files else 'files of an array'}, not for what is given")
+    if files:
         return array_calibrate.calibrate(specimens, of_array)
     from sensorgen.analysis import calibration
 

@@ -171,7 +171,15 @@ def _type(plain: Any, stated: Any) -> Any:
         return KINDS[stated]
     if isinstance(stated, units.Quantity):
         return None
-    return click.Path(path_type=Path) if stated is None and plain is Path else stated
+    return _File(path_type=Path) if stated is None and plain is Path else stated
+
+
+class _File(click.Path):
+    """A path; a text without a letter is none, and not the working folder."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The path of a word."""
+        return None if value == "" else super().convert(value, param, ctx)
 
 
 def ended(result: Any, *, before: "Iterable[Part]" = ()) -> int:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import click
 
-from sensorgen.cli.commands import FirstWord, Work, arguments, described, ended, flag_of, options_of
+from sensorgen.cli import render
+from sensorgen.cli.commands import FirstWord, Work, arguments, described, ended, options_of
 from sensorgen.cli.options import DesignTip
 from sensorgen.cli.words import Length, OneOf, completed, pairs
 from sensorgen.core import plugins as registry
@@ -83,7 +84,9 @@ class DesignGroup(FirstWord):
         def run(**given: Any) -> int:
             own = {p.name: given.pop(p.name) for p in self.own if p.name in given}
             given["tip"] = own.pop("tip", None)
-            parts = self.parts(_design(base, given, name), own)
+            parts = list(self.parts(_design(base, given, name), own))
+            if len(parts) > 1:
+                _refuse_one_result(len(parts), own)
             return max(ended(self.work(part, **arguments(self.work, own))) for part in parts)
 
         others = [*options_of(DesignOptions), *self.own]
@@ -157,11 +160,20 @@ ARRAY = "array"  # shape of crossing tracks, with cells of another one
 _OF_SHAPE = "of_shape_"  # before names of parameters, which a command's own may equal
 
 
+def _refuse_one_result(count: int, own: Data) -> None:
+    """Refuse of several tiles what takes one result."""
+    if own.get("apply") is not None:
+        raise BadInput(f"--apply of {count} tiles; expected no change of each: change the design's file")
+    if not render.early():
+        raise BadInput(f"{count} tiles have {count} results; expected no --json, --csv, --markdown and --output")
+
+
 def _parameter_options(params: type, taken: set[str]) -> list[click.Parameter]:
     """Options for a shape's parameters; one that the command has itself is led by "shape", as ``--shape-tip``."""
     options: list[click.Parameter] = []
     for field in dataclasses.fields(params):
-        choices, option = field.metadata.get("choices"), flag_of(field.name)
+        choices = field.metadata.get("choices")
+        option = f"--{field.name.removesuffix('_mm').removesuffix('_deg').replace('_', '-')}"
         option = f"--shape{option[1:]}" if option in taken else option
         options.append(
             click.Option(

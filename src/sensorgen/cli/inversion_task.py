@@ -47,7 +47,7 @@ class Task:
     measured: Annotated[str, Argument()]
     rest_file: str = ""  # fmt: skip
     noise: Annotated[float | None, Option(kind="share")] = None  # fmt: skip
-    prior: str = ""
+    prior: str | None = None
     force_limit_n: float | None = None  # fmt: skip
     output: str = ""  # fmt: skip
     newest: bool = False
@@ -67,8 +67,8 @@ class Task:
         """The prior as typed."""
         from sensorgen.prediction.inverse.prior import Prior
 
-        if not self.prior or self.prior.strip() == "uniform":
-            return Prior() if self.prior else None
+        if self.prior is None or self.prior.strip() == "uniform":
+            return None if self.prior is None else Prior()
         normal: dict[str, tuple[float, float]] = {}
         for word in self.prior.split(","):
             match = _NORMAL.fullmatch(word.strip().replace(" ", ""))

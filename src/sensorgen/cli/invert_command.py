@@ -254,7 +254,7 @@ class _Specimens(DesignGroup):
 
             @of_function(name, about=array_calibrate.invert.__doc__ or "")
             def calibrated(task: Task) -> int:
-                return array_calibrate.invert(name, task.measured, task.output)
+                return array_calibrate.invert(name, task)
 
             return calibrated
         try:

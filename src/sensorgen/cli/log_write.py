@@ -369,6 +369,8 @@ def _import(
 
     if thesis == bool(path):
         raise BadInput(f"{'both' if path else 'neither'} of FILE and --thesis given; expected one of them")
+    if thesis and lcr.specimen:
+        raise BadInput("--thesis and --specimen at once; expected one of them")
     named = dict(pairs(columns, "--column"))
     with file.opened(create=True) as log:
         if path is None:

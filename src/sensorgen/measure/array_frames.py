@@ -44,6 +44,8 @@ class Frames:
         True pressures, where the array was virtual [kPa].
     unused : tuple of str
         Names in the file that are not read.
+    day : float
+        Of the recording, as a calibration counts them; nan where none is known [d].
     """
 
     siemens: Complex
@@ -52,6 +54,7 @@ class Frames:
     frequency_hz: float
     pressure_kpa: "Real | None" = None
     unused: tuple[str, ...] = ()
+    day: float = math.nan
 
     def at_rest(self) -> Complex:
         """Readings of the frames marked at rest; of all where none is marked [S]."""
@@ -103,7 +106,8 @@ def _checked(found: dict[str, np.ndarray], shape: tuple[int, int], frequency_hz:
     true = found.get("pressure_kpa", np.zeros(0))
     return Frames(
         values.astype(complex), _each(found, "time_s", np.arange(float(count))),
-        _each(found, "rest", np.zeros(count)).astype(bool), hertz, true if true.shape == values.shape else None,
+        np.nan_to_num(_each(found, "rest", np.zeros(count)).astype(float)) != 0, hertz,
+        true if true.shape == values.shape else None, day=float(np.ravel(found.get("day", np.nan))[0]),
     )  # fmt: skip
 
 

@@ -28,7 +28,7 @@ _N_PER_KPA_MM2 = 1e-3
 
 
 def session(
-    path: Path, number: int, *, area_mm2: float = _AREA_MM2, values: "Real | None" = None, names: Sequence[str] = ()
+    path: Path, number: float, *, area_mm2: float = _AREA_MM2, values: "Real | None" = None, names: Sequence[str] = ()
 ) -> ArraySession:  # fmt: skip
     """A session of a file.
 
@@ -36,7 +36,7 @@ def session(
     ----------
     path : Path
         CSV, NPZ or HDF5.
-    number : int
+    number : float
         Of the session: its day where the file has none.
     area_mm2 : float
         Of an element, where the file has none [mm2].
@@ -58,6 +58,10 @@ def session(
             if "reading" not in data:
                 raise BadInput("no readings; expected a column for each element, or 'reading' (frames, elements)")
             values = np.asarray(data["reading"], float)
+        if values.ndim < 2 or not values.size:
+            raise BadInput(
+                f"readings of {values.ndim} dimensions; expected a row for each frame, elements side by side"
+            )
         values = values.reshape(len(values), -1)
         return _session(path.stem, data, values, names, (number, area_mm2))
 
@@ -90,7 +94,8 @@ def refuse_swapped(of: ArraySession, shape: tuple[int, int]) -> None:
     BadInput
         Wires are swapped; they are named.
     """
-    pressed = (np.isfinite(of.pressure_kpa).sum(1) == 1) & np.isfinite(of.reading).any(1)
+    known = np.isfinite(of.pressure_kpa)
+    pressed = (known.sum(1) == 1) & (known & np.isfinite(of.reading)).any(1)  # a press on a dead one tells nothing
     if not pressed.any():
         return
     true, largest = (
@@ -109,20 +114,22 @@ def refuse_swapped(of: ArraySession, shape: tuple[int, int]) -> None:
 
 
 def _session(
-    name: str, data: Mapping[str, np.ndarray], values: Real, names: Sequence[str], default: tuple[int, float]
+    name: str, data: Mapping[str, np.ndarray], values: Real, names: Sequence[str], default: tuple[float, float]
 ) -> ArraySession:  # fmt: skip
     count = len(values)
 
     def each(key: str, otherwise: Real) -> Real:
         found = np.asarray(data.get(key, otherwise))
-        if found.shape[:1] != (count,):
-            raise BadInput(f"{key} has {len(np.atleast_1d(found))} values; expected one for each of {count} frames")
-        return found
+        if found.shape[:1] != (count,) or (found.size != count and key != "pressure_kpa"):
+            raise BadInput(f"{key} has {found.size} values; expected one for each of {count} frames")
+        return found if key == "pressure_kpa" else found.reshape(count)
 
     time_s = each("time_s", np.arange(float(count))).astype(float)
     if not (np.diff(time_s) > 0).all():
         raise BadInput("time_s does not rise from each frame to the next; expected seconds of one session")
-    area = float(np.ravel(data.get("area_mm2", default[1]))[0])
+    area, day = (_one(data, key, usual) for key, usual in (("area_mm2", default[1]), ("day", default[0])))
+    if not 0 < area < np.inf:
+        raise BadInput(f"area_mm2 is {area:g}; expected the area of an element, above 0")
     nothing = np.full(count, np.nan)
     force, pressure = each("force_n", nothing).astype(float), each("pressure_kpa", nothing).astype(float)
     if "element" in data:
@@ -131,16 +138,23 @@ def _session(
         free = np.where((of < 0) & (known == 0), 0.0, np.nan)  # a cover spreads a press: others are not known
         pressure = np.where(np.arange(values.shape[1]) == of[:, None], known[:, None], free[:, None])
         force = nothing
+    if pressure.size not in (count, values.size):
+        raise BadInput(f"pressure_kpa has {pressure.size} values; expected one for each frame, or for each element too")
     pressure = np.broadcast_to(pressure.reshape(count, -1), values.shape)
-    day = float(np.ravel(data.get("day", default[0]))[0])
-    return ArraySession(
-        name, day, time_s, values, each("rest", np.zeros(count)).astype(bool), np.array(pressure), force, area
-    )
+    rest = np.nan_to_num(each("rest", np.zeros(count)).astype(float)) != 0
+    return ArraySession(name, day, time_s, values, rest, np.array(pressure), force, area)
+
+
+def _one(data: Mapping[str, np.ndarray], key: str, usual: float) -> float:
+    """A number of the whole session: the first that is one."""
+    values = np.ravel(np.asarray(data.get(key, usual), float))
+    values = values[np.isfinite(values)]
+    return float(values[0]) if values.size else usual
 
 
 def _numbers_of(words: np.ndarray, names: Sequence[str], count: int) -> np.ndarray:
     """Number of the pressed element of each frame, from 0 on; -1 of none."""
-    known = {name: k for k, name in enumerate(names)} | {str(k + 1): k for k in range(count)} | {"": -1, "0": -1}
+    known = {"": -1, "0": -1} | {str(k + 1): k for k in range(count)} | {name: k for k, name in enumerate(names)}
     found = [f"{word:g}" if isinstance(word, float) else str(word).strip() for word in words.tolist()]
     unknown = next((word for word in found if word not in known and word != "nan"), None)
     if unknown is not None:

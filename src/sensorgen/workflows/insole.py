@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 PRESSES, LEVELS_KPA = 40, 400.0  # known presses, and the bladder's largest pressure
 _FINE = 5  # points along a side of a crossing's square, of the true load
+_STEP_DAY = 4.0  # two days after the last recording of the calibration
 _REST = 100  # frames without load at the begin of each recording
 _SCATTER, _PLAY, _CREEP, _DRIFT = 0.05, 0.02, 0.02, -0.002  # of the virtual print
 _DESIGN: Mapping[str, Any] = {
@@ -179,7 +180,7 @@ def _run(
     store.replace(folder / f"{name}-calibration.npz", known.npz())
     frames = read(target, (model.here.shape[0], model.here.shape[1]), None)
     by_design, found = (
-        inverted(model, readout, frames.siemens, frames.rest, frames.time_s, calibration=calibration)
+        inverted(model, readout, frames.siemens, frames.rest, frames.time_s, calibration=calibration, day=frames.day)
         for calibration in (None, known)
     )
     store.replace(folder / f"{name}-maps.npz", found.npz())
@@ -226,8 +227,8 @@ def _stepped(print_: "VirtualArray", true: "WalkedStep", readout: "ArrayReadout"
     load = np.concatenate([np.zeros((_REST, *true.pressure_kpa.shape[1:])), true.pressure_kpa])
     time_s = np.arange(len(load)) / RATE_HZ
     return packed(
-        siemens=print_.frames(load, time_s, readout, draw, 4.0), pressure_kpa=load, time_s=time_s,
-        rest=np.arange(len(load)) < _REST, frequency_hz=readout.frequency_hz[0],
+        siemens=print_.frames(load, time_s, readout, draw, _STEP_DAY), pressure_kpa=load, time_s=time_s,
+        rest=np.arange(len(load)) < _REST, day=_STEP_DAY, frequency_hz=readout.frequency_hz[0],
     )  # fmt: skip
 
 

@@ -66,7 +66,7 @@ def tiles(design: Design) -> tuple[tuple[Tile, Design], ...]:
         return ()
     if design.border:
         raise BadInput(f"{design.name}: the outline is larger than the bed; only rectangles are printed as tiles")
-    splits = product((1, 2), range(1, min(p.counts[0], _MOST_UP) + 1))
+    splits = product(range(1, min(p.counts[1], 2) + 1), range(1, min(p.counts[0], _MOST_UP) + 1))
     for across, up in sorted(splits, key=prod):
         places = tuple(_places(design, across, up))
         if all(_fits(layout(Params(**own)), design) for _, own in places):

@@ -192,6 +192,7 @@ def sums_of(session: ArraySession, form: LawForm, scale: float) -> Sums:
     """Sums of a session, its frames weighed as far as they are independent."""
     phi = features(session, form, scale)
     known = np.isfinite(session.pressure_kpa) & np.isfinite(session.reading)
+    known &= np.isfinite(session.tare) | (not form.tared)
     w, y = session.weight, np.where(known, session.pressure_kpa, 0.0)
     some = known[:, :, None] * phi
     by_element = some.transpose(1, 2, 0)
@@ -243,7 +244,8 @@ class Law:
         mean = gain * np.einsum("knq,nq->kn", phi, self.at)
         variance = gain**2 * np.einsum("knq,nqr,knr->kn", phi, self.spread, phi, optimize=True)
         variance += (self.unsure * (session.day - self.day) * mean) ** 2
-        known = np.isfinite(session.reading) & self.alive
+        zero = session.tare if tare is None else tare
+        known = np.isfinite(session.reading) & self.alive & (np.isfinite(zero) | (not self.form.tared))
         return np.where(known, mean, np.nan), np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan)
 
 

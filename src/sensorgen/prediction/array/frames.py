@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from io import BytesIO
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -366,7 +367,7 @@ class MapInverter:
         return ratio, error, by
 
     def maps(
-        self, siemens: Complex, time_s: Real, calibration: "ArrayCalibration | None" = None, *, day: float = 0.0
+        self, siemens: Complex, time_s: Real, calibration: "ArrayCalibration | None" = None, day: float = nan
     ) -> PressureMaps:  # fmt: skip
         """Pressure maps of frames, by the law of the cell, or of each element where they are calibrated."""
         ratio, error, by = self.planned(siemens)
@@ -377,7 +378,7 @@ class MapInverter:
         if calibration:
             by += f"; {calibration.law.form.words()} of each element, calibrated"
             shape = ratio.shape
-            mean, half = calibration.of_ratio(ratio.reshape(shape[0], -1), time_s, day)
+            mean, half = calibration.of_ratio(ratio.reshape(shape[0], -1), time_s, calibration.counted(day))
             pressure, sigma = PA_PER_KPA * mean.reshape(shape), PA_PER_KPA / NORMAL_90 * half.reshape(shape)
         shown, error_kpa = (np.where(given, each / PA_PER_KPA, np.nan) for each in (pressure, sigma))
         return PressureMaps(self.model, by, time_s, shown, error_kpa, calibration)
@@ -413,6 +414,7 @@ def at_rest(
 def inverted(
     model: ArrayModel, readout: ArrayReadout, siemens: Complex, rest: Mask, time_s: Real, scatter: float = SCATTER,
     apart: "Complex | None" = None, unused: Sequence[str] = (), calibration: "ArrayCalibration | None" = None,
+    day: float = nan,
 ) -> PressureMaps:  # fmt: skip
     """Pressure maps of a recording.
 
@@ -434,17 +436,19 @@ def inverted(
         Samples that were not read, named where no frame is at rest.
     calibration : ArrayCalibration, optional
         Of each element.
+    day : float
+        Of the recording, as the calibration counts them [d].
 
     Raises
     ------
     BadInput
-        No frame at rest, or none under load.
+        No frame at rest, or none under load; no day, where the gain drifts.
     """
     inverter = at_rest(model, readout, siemens[rest] if apart is None else apart, scatter, unused)
     loaded = ~rest
     if not loaded.any():
         raise BadInput("all frames are at rest; expected some under load")
-    return inverter.maps(missing(siemens)[loaded], time_s[loaded], calibration)
+    return inverter.maps(missing(siemens)[loaded], time_s[loaded], calibration, day)
 
 
 def missing(siemens: Complex) -> Complex:

@@ -13,6 +13,7 @@ from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import BadInput, MissingValue
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.arrays import Layout, Track
+from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.models.compression import Curve
 from sensorgen.prediction import bodies
@@ -238,7 +239,7 @@ def wire_table(design: Design) -> Table:
     return Table.of("wires", "", array_model(design).wires())
 
 
-def array_model(design: Design, until_kpa: float = USUAL_KPA) -> ArrayModel:
+def array_model(design: Design, until_kpa: float = USUAL_KPA, body: Body | None = None) -> ArrayModel:
     """Numbers of an array as printed: by G-code of one crossing where a slicer is there, else estimated.
 
     Parameters
@@ -247,6 +248,8 @@ def array_model(design: Design, until_kpa: float = USUAL_KPA) -> ArrayModel:
         An array.
     until_kpa : float
         Pressure on a cell up to which its law is wanted [kPa]; beyond the usual one a cell is solved, for a minute.
+    body : Body, optional
+        Of one crossing, in place of that.
 
     Raises
     ------
@@ -261,7 +264,7 @@ def array_model(design: Design, until_kpa: float = USUAL_KPA) -> ArrayModel:
         raise BadInput(f"{design.name}: {design.shape} has no crossings; expected shape: array")
     p = design.layout.params
     query = Query(force_n=until_kpa * p.column_mm * p.row_mm * _N_PER_KPA_MM2)
-    model, _ = sensor_model(bodies.default_body(design.crossing), query)
+    model, _ = sensor_model(body or bodies.default_body(design.crossing), query)
     top, bottom = (model.rest.resistance[end] for end in ("top", "bottom"))
     scene = model.body.cells.first()
     mean_mm = sum(b.volume_mm3() for b in scene.bodies if b.terminal == "top") / (scene.size_mm[0] * scene.size_mm[1])

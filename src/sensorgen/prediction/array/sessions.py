@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 from typing import Annotated
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -83,6 +84,20 @@ class ArrayCalibration:
         session = ArraySession("", day, time_s, ratio - 1, np.zeros(len(ratio), bool), nothing[:, None], nothing)
         return self.pressures(session, np.zeros(ratio.shape[1]))
 
+    def counted(self, day: float) -> float:
+        """A day, or where none is known that of the calibration.
+
+        Raises
+        ------
+        BadInput
+            No day, though the calibration is of several: the gain may have drifted since.
+        """
+        if np.isfinite(day):
+            return day
+        if self.law.drift or self.law.unsure:
+            raise BadInput("no 'day' of the readings; expected it, counted as in the sessions that calibrated")
+        return self.law.day
+
     def recognised(self, session: ArraySession) -> Mask:
         """Frames of the first unloaded second, by the readings alone.
 
@@ -94,7 +109,8 @@ class ArrayCalibration:
         BadInput
             No such second, or fewer than three sessions: a standing load is never taken for rest.
         """
-        alive, expected = self.law.alive, "mark unloaded frames in 'rest'; a standing load is never taken for rest"
+        alive = self.law.alive & np.isfinite(self.tares).all(0)
+        expected = "mark unloaded frames in 'rest'; a standing load is never taken for rest"
         if len(self.tares) < _SURE:
             raise BadInput(
                 f"{session.name}: tares of {len(self.tares)} sessions are known, {_SURE} recognise; {expected}"
@@ -141,8 +157,8 @@ def stored(path: Path) -> ArrayCalibration:
                 day, rate, unsure, data["alive"],
             )  # fmt: skip
             return ArrayCalibration(law, floor, share, reach, common, data["tares"], data["quiet"])
-    except (KeyError, TypeError, ValueError, EOFError):
-        raise BadInput(f"{path}: no calibration of an array; expected a file of 'sensorgen calibrate -o'") from None
+    except (KeyError, TypeError, ValueError, EOFError, BadZipFile):
+        raise BadInput(f"{path}: no calibration of an array; expected a file of 'calibrate --calibration'") from None
 
 
 def _spread_of_tares(tares: Real) -> tuple[Real, float, Real]:
@@ -349,7 +365,9 @@ def study(sessions: Sequence[ArraySession], *, by_first: bool = False) -> Calibr
 
 def _refuse(sessions: Sequence[ArraySession]) -> None:
     count = sessions[0].reading.shape[1]
-    for session in sessions:
+    for k, session in enumerate(sessions):
+        if any(np.array_equal(session.reading, other.reading, equal_nan=True) for other in sessions[:k]):
+            raise BadInput(f"{session.name}: the readings of an earlier file again; expected each session once")
         if session.reading.shape[1] != count:
             raise BadInput(f"{session.name}: {session.reading.shape[1]} elements; expected {count}, as of the first")
         if not (np.isfinite(session.pressure_kpa).any() or np.isfinite(session.force_n).any()):

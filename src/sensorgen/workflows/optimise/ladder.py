@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 AT_REST = frozenset({"gap_mm", "capacitance_pf", "top_electrode_ohm", "bottom_electrode_ohm"})
 COARSE = AT_REST | {"force_resolution_n", "position_resolution_mm", "sensitivity_per_kpa"}
 _PA_PER_KPA = 1e3
-_TRIAL = 4  # version of the stored trials
+_TRIAL = 5  # version of the stored trials
 
 
 @dataclass(frozen=True)
@@ -142,20 +142,21 @@ def everything(design: Design, query: Query, slicer: str) -> Trial:
     def work() -> object:
         found = trial(design, query, slicer=slicer or NONE, drawn=False)
         if design.layout and found.status == "predicted":
-            found = replace(found, printed=_of_array(design, query, found.printed))
+            found = replace(found, printed=_of_array(design, query, slicer, found.printed))
         return json.loads(_adapter().dump_json(found))
 
     return _adapter().validate_json(json.dumps(cache.answer(question, work)))
 
 
-def _of_array(design: Design, query: Query, numbers: Numbers) -> Numbers:
+def _of_array(design: Design, query: Query, slicer: str, numbers: Numbers) -> Numbers:
     """Numbers of a crossing with the resolution of the array, guarded, and its wires."""
     from sensorgen.prediction.array.model import array_model
     from sensorgen.prediction.array.readout import ArrayReadout
     from sensorgen.prediction.array.study import study
 
+    body = None if slicer else bodies.estimated(design.crossing)
     tones = ArrayReadout().frequency_hz if query.frequency_hz == DEFAULT.frequency_hz else query.frequency_hz
-    found = study(array_model(design), ArrayReadout(frequency_hz=tones, noise=query.noise))
+    found = study(array_model(design, body=body), ArrayReadout(frequency_hz=tones, noise=query.noise))
     sigma = found.sigma_kpa[found.model.here & found.determined]
     resolution = float(np.median(sigma)) if sigma.size else float("inf")
     return replace(numbers, pressure_resolution=resolution, wires=float(len(found.model.wires())))
