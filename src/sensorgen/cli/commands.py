@@ -175,11 +175,12 @@ def _type(plain: Any, stated: Any) -> Any:
 
 
 class _File(click.Path):
-    """A path; a text without a letter is none, and not the working folder."""
+    """A path; an empty text is none, and not the working folder, where none is usual."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The path of a word."""
-        return None if value == "" else super().convert(value, param, ctx)
+        folder = param is not None and isinstance(param.default, str | Path)  # the working folder in place of another
+        return None if value == "" and not folder else super().convert(value, param, ctx)
 
 
 def ended(result: Any, *, before: "Iterable[Part]" = ()) -> int:

@@ -85,8 +85,7 @@ class DesignGroup(FirstWord):
             own = {p.name: given.pop(p.name) for p in self.own if p.name in given}
             given["tip"] = own.pop("tip", None)
             parts = list(self.parts(_design(base, given, name), own))
-            if len(parts) > 1:
-                _refuse_one_result(len(parts), own)
+            _refuse_one_result(len(parts), own)
             return max(ended(self.work(part, **arguments(self.work, own))) for part in parts)
 
         others = [*options_of(DesignOptions), *self.own]
@@ -162,9 +161,9 @@ _OF_SHAPE = "of_shape_"  # before names of parameters, which a command's own may
 
 def _refuse_one_result(count: int, own: Data) -> None:
     """Refuse of several tiles what takes one result."""
-    if own.get("apply") is not None:
+    if count > 1 and own.get("apply") is not None:
         raise BadInput(f"--apply of {count} tiles; expected no change of each: change the design's file")
-    if not render.early():
+    if count > 1 and not render.early():
         raise BadInput(f"{count} tiles have {count} results; expected no --json, --csv, --markdown and --output")
 
 
