@@ -93,7 +93,8 @@ def table() -> list[str]:
     found = study(model, ArrayReadout(noise=NOISE))
     worst = float(np.nanmax(found.sigma_kpa))
     rows.append(
-        f"| {m} x {n} crossing tracks | {m + n} | {p.pitch[0] / 12**0.5:.2g} mm | {2 * p.pitch[0]:g} mm, any direction "
+        f"| {m} x {n} crossing tracks | {m + n} | {p.pitch[0] / 12**0.5:.2g} mm "
+        f"| {2 * p.pitch[0]:g} mm (two pitches, assumed) "
         f"| {m * n}, each to {worst:.2g} kPa |"
     )
     return rows

@@ -15,7 +15,7 @@ PARAMETERS = {"length_mm": 10, "width_mm": 10, "pitch_x_mm": 5, "pitch_y_mm": 5,
 
 @pytest.mark.parametrize("slicer", ["prusa", "cura"])
 def test_an_array_of_tri_prints(slicer, program, cache):
-    """Its base, of another tool than the electrodes, lies on the bed; all dielectric is one body."""
+    """An array whose base, of another tool than the electrodes, lies on the bed; all dielectric is one body."""
     name, package = PROGRAMS[slicer]
     program(package, name)
     held = reviewed(make({"shape": "array", "parameters": PARAMETERS, "cell": {"shape": "tri"}}), slicer=slicer)

@@ -32,17 +32,9 @@ def invert(design: "Design", task: "Task", frames: ArrayFrames, *, perfect: bool
     how = ArrayReadout(frames.readout, frames.input_ohm, (read_in.frequency_hz,), noise)  # type: ignore[arg-type]
     known = None if frames.calibration is None else stored(frames.calibration)
     maps = inverted(
-        model,
-        how,
-        read_in.siemens,
-        read_in.rest,
-        read_in.time_s,
-        frames.scatter,
-        apart,
-        read_in.unused,
-        known,
+        model, how, read_in.siemens, read_in.rest, read_in.time_s, frames.scatter, apart, read_in.unused, known,
         read_in.day,
-    )
+    )  # fmt: skip
     if task.output:
         _write(maps, task.output)
     if frames.plot is not None:

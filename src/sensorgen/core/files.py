@@ -72,6 +72,19 @@ def _refuse_file(folder: Path) -> None:
             )
 
 
+def new_folder(folder: Path) -> None:
+    """Make a folder, or take an empty one.
+
+    Raises
+    ------
+    BadInput
+        It has files.
+    """
+    if folder.exists() and any(folder.iterdir()):
+        raise BadInput(f"{str(folder)!r} has files; expected a new or empty folder: --out another one")
+    folder.mkdir(parents=True, exist_ok=True)
+
+
 def part_of(target: Path) -> Path:
     """Temporary place to write before it is renamed to ``target``: a new one each time, with the process id."""
     part = target.parent / f".{target.name}.{token_hex(4)}.{os.getpid()}.part"

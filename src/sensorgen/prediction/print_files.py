@@ -122,7 +122,7 @@ def at_hand(
 
 
 def _fits(design: Design) -> bool:
-    """Truth of that a design fits the bed, or is said to."""
+    """Test whether a design fits the bed, or a waiver says so."""
     from sensorgen.checks import bed
 
     return all(f.waiver for f in design.waived(list(bed.check(design.printed, design.machine))))

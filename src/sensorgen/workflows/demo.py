@@ -113,9 +113,7 @@ def demo(folder: Path, *, count: int = 5, seed: int = 1, step: Callable[[str], N
     from sensorgen.measure.log import Log, importing
     from sensorgen.workflows import batch
 
-    if folder.exists() and any(folder.iterdir()):
-        raise BadInput(f"{str(folder)!r} has files; expected a new or empty folder: --out another one")
-    folder.mkdir(parents=True, exist_ok=True)
+    store.new_folder(folder)
     plan = folder / "column.yaml"
     store.replace(plan, _PLAN.format(count=count).encode())
     step("print: batch column.yaml")

@@ -11,7 +11,6 @@ import yaml
 from sensorgen.core import files as store
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Part, Table
-from sensorgen.core.errors import BadInput
 
 if TYPE_CHECKING:
     from sensorgen.measure.virtual.array import VirtualArray, WalkedStep
@@ -102,9 +101,7 @@ def demo(folder: Path, *, seed: int = 1, step: Callable[[str], None] = lambda _:
     from sensorgen.analysis.plots import array as plots
     from sensorgen.analysis.plots import pages
 
-    if folder.exists() and any(folder.iterdir()):
-        raise BadInput(f"{str(folder)!r} has files; expected a new or empty folder: --out another one")
-    folder.mkdir(parents=True, exist_ok=True)
+    store.new_folder(folder)
     first, found, true = _run(folder, "insole", _DESIGN, seed, step)
     step("change")
     change = min(_CHANGES, key=_noise_after)

@@ -84,7 +84,7 @@ def table(found: tuple[tuple[Tile, Design], ...]) -> Table:
 
 
 def _fits(of: Layout, design: Design) -> bool:
-    """Truth of that the bed holds a print of some tracks."""
+    """Test whether the bed holds a print of some tracks."""
     p, grown = of.params, 1 / (1 - design.shrinkage)
     size = of.size_mm[0] * grown, (of.size_mm[1] + p.ledge_mm) * grown
     sizes = zip(size if p.pads == "bottom" else size[::-1], design.machine.bed_mm, strict=True)
