@@ -160,7 +160,7 @@ def test_elements_are_matched_by_their_names(days, all_days):
     assert one.names == names
     with pytest.raises(BadInput, match="u is an element here or in the calibration alone"):
         turned.matched(("u", *names[1:]))
-    with pytest.raises(BadInput, match="20 elements, a, b ...; expected 20, r1c1 to r4c5"):
+    with pytest.raises(BadInput, match=r"20 elements, a, b \.\.\.; expected 20, r1c1 to r4c5"):
         one.of_ratio(np.ones((1, 4, 5)), np.zeros(1), 0.0)
     memory = replace(all_days.calibration, names=())
     with pytest.raises(BadInput, match="no time_s of the frames"):

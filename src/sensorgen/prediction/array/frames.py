@@ -13,9 +13,9 @@ from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.document import Column, Facts, Part, Table, comma_separated, to_json
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
+from sensorgen.prediction.array.elements import doubtful_time
 from sensorgen.prediction.array.model import PA_PER_KPA, ArrayModel
 from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayReadout, own_slopes
-from sensorgen.prediction.array.elements import doubtful_time
 from sensorgen.prediction.array.sessions import ArrayCalibration
 from sensorgen.prediction.array.study import DETECTED, DETERMINED
 from sensorgen.prediction.inverse.verdict import NORMAL_90
