@@ -41,6 +41,7 @@ def with_border(data: dict[str, Any], folder: Path) -> dict[str, Any]:
         import shapely
 
         text = str(shapely.Polygon(corners).wkt)
+        data = {"regions": feet.regions(given), **data} if data.get("cell") or data.get("shape") == "array" else data
     else:
         from sensorgen.scene.geometry import outline_files
 
