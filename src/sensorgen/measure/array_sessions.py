@@ -170,11 +170,12 @@ def _of_csv(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
         names = [name for name in table.names if name and name not in _OTHER]
         if not names:
             raise BadInput("no readings; expected a column for each element")
-        text = [name for name in _WORDS if name in table.names]
-        numbers = [*names, *(name for name in table.names if name in _OTHER and name not in text)]
-        blocks = list(table.blocks([*map(table.names.index, numbers)], [*map(table.names.index, text)]))
+        beside = [*({*table.names} & {*_OTHER} - {*_WORDS})]
+        text = [*({*table.names} & {*_WORDS})]
+        at = table.names.index
+        blocks = list(table.blocks([*map(at, names), *map(at, beside)], [*map(at, text)]))
     values = np.concatenate([block.numbers for block in blocks])
-    words = zip(*(row for block in blocks for row in block.text), strict=True)
-    data: dict[str, np.ndarray] = {"reading": values[:, : len(names)]}
-    data |= dict(zip(numbers[len(names) :], values[:, len(names) :].T, strict=True))
-    return data | {name: _WORDS[name](column) for name, column in zip(text, words, strict=True)}, names
+    data = {"reading": values[:, : len(names)], **dict(zip(beside, values[:, len(names) :].T, strict=True))}
+    for k, name in enumerate(text):
+        data[name] = _WORDS[name]([row[k] for block in blocks for row in block.text])
+    return data, names
