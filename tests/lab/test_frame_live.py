@@ -1,4 +1,4 @@
-"""An array live: maps lot by lot against the whole, recordings as invert reads them, the queue, the page in Chromium."""
+"""An array live: lots against the whole recording, files as invert reads them, the queue, the page in Chromium."""
 
 import json
 from pathlib import Path
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from served_frames import HERTZ, Device, lines, walker
 
-from in_process import run
+from in_process import run, run_all
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import load
 from sensorgen.measure.array_frames import lots, read
@@ -56,9 +56,8 @@ def test_lots_give_what_the_whole_recording_gives(model, hertz):
     readout = ArrayReadout(frequency_hz=(hertz,))
     siemens, time_s, rest = recording(model, readout)
     whole, live, parts = inverted(model, readout, siemens, rest, time_s), LiveMaps(model, readout), []
-    for part in np.array_split(np.arange(len(time_s)), 8):
-        if (maps := live.take(siemens[part], time_s[part], rest[part])) is not None:
-            parts.append(maps)
+    lot_s = np.array_split(np.arange(len(time_s)), 8)
+    parts.extend(filter(None, (live.take(siemens[part], time_s[part], rest[part]) for part in lot_s)))
     assert live.plan.network == whole.by.startswith("the network")
     assert live.plan.network == (hertz > 1e4)
     kpa = np.concatenate([maps.pressure_kpa for maps in parts])
@@ -218,21 +217,18 @@ def test_frames_of_the_standard_input_are_inverted_as_they_come(folder, model, m
     expected = [line.split(",") for line in (folder / "whole.csv").read_text().splitlines()]
     assert head == expected[0]
     assert np.array(rows, float) == pytest.approx(np.array(expected[1:], float))
-    (folder / "standing.csv").write_text(
-        "".join(line for k, line in enumerate((folder / "in.csv").open()) if k != 0 or 1)
-    )
     text = (folder / "in.csv").read_text().splitlines()
     (folder / "standing.csv").write_text("\n".join([text[0], *text[REST + 1 :]]) + "\n")
     with (folder / "standing.csv").open() as given:
         monkeypatch.setattr("sys.stdin", given)
-        code, text = run(folder, "invert", "a.yaml", "-")
+        code, _, text = run_all(folder, "invert", "a.yaml", "-")
     assert code == 2
     assert "never taken for rest" in text
 
 
 def test_the_command_records_a_virtual_array(folder):
     words = ("--simulate", "--rate", "20", "--unloaded", "1", "--seconds", "2", "--no-page", "--fault", "r2:3")
-    code, text = run(folder, "bench", "array", "a.yaml", *words, "--record", "v.npz")
+    code, _, text = run_all(folder, "bench", "array", "a.yaml", *words, "--record", "v.npz")
     assert code == 0
     assert "array of 5 x 6, capacitance" in text
     found = read(folder / "v.npz", (5, 6), None)
@@ -249,6 +245,6 @@ def test_frames_of_another_array_are_refused(folder):
 
     form = FrameForm(2, 3)
     with serving.pseudo_terminal(Device([form.header(), *lines(3)] * 50), RealClock()) as path:
-        code, text = run(folder, "bench", "array", "a.yaml", "--port", path, "--no-page", "--seconds", "1")
+        code, _, text = run_all(folder, "bench", "array", "a.yaml", "--port", path, "--no-page", "--seconds", "1")
     assert code == 2
     assert "frames of 2 x 3; expected 5 x 6, as of a" in text
