@@ -28,11 +28,14 @@ function hatched(pen, x, y, width, height, ink) {
 }
 
 function drawMap() {
-  const { outline, x, y, pitch, here } = page.about, canvas = byId("map"), pen = sized(canvas);
+  const { outline, x, y, pitch, here } = page.about, canvas = byId("map");
   const xs = outline.map(p => p[0]), ys = outline.map(p => p[1]), low = [Math.min(...xs), Math.min(...ys)];
   const size = [Math.max(...xs) - low[0], Math.max(...ys) - low[1]], margin = 6;
+  canvas.style.height = `${Math.min(0.6 * innerHeight, canvas.clientWidth * size[1] / size[0] + margin)}px`;
+  const pen = sized(canvas);
   const scale = Math.min((canvas.clientWidth - 2 * margin) / size[0], (canvas.clientHeight - 2 * margin) / size[1]);
-  const px = v => margin + (v - low[0]) * scale, py = v => canvas.clientHeight - margin - (v - low[1]) * scale;
+  const left = (canvas.clientWidth - size[0] * scale) / 2;
+  const px = v => left + (v - low[0]) * scale, py = v => canvas.clientHeight - margin - (v - low[1]) * scale;
   const style = getComputedStyle(document.documentElement), ink = style.getPropertyValue("--faint").trim();
   const kpa = page.state && page.state.kpa;
   if (kpa) page.most = Math.max(50, 0.98 * page.most, ...kpa.filter(v => v !== null));
@@ -51,8 +54,6 @@ function drawMap() {
   pen.stroke();
   const end = page.rows.length ? page.rows[page.rows.length - 1][0] : 0;
   const trace = page.rows.filter(r => r[0] > end - TRACE_S);
-  pen.strokeStyle = "#ffffff";
-  pen.lineWidth = 3;
   for (const [stroke, width] of [["#ffffff", 4], ["#b3121d", 2]]) {
     pen.strokeStyle = stroke;
     pen.lineWidth = width;
