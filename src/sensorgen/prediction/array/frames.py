@@ -19,7 +19,7 @@ from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayR
 from sensorgen.prediction.array.sessions import ArrayCalibration
 from sensorgen.prediction.array.study import DETECTED, DETERMINED
 from sensorgen.prediction.inverse.verdict import NORMAL_90
-from sensorgen.solvers.tracks import Readings, readings
+from sensorgen.solvers.tracks import Readings, Tracks, readings
 
 SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration of each
 _STEPS = 25  # of Gauss-Newton with the slopes at rest
@@ -274,9 +274,13 @@ class MapInverter:
 
     def _network(self, capacitance_f: Real, leaks_s: Real) -> Readings:
         return readings(
-            replace(self.model.tracks(capacitance_f), leak_s=leaks_s), self.readout.frequency_hz[0],
+            replace(self._tracks, capacitance_f=capacitance_f, leak_s=leaks_s), self.readout.frequency_hz[0],
             readout=self.readout.kind, input_ohm=self.readout.input_ohm,
         )  # fmt: skip
+
+    @cached_property
+    def _tracks(self) -> Tracks:
+        return self.model.tracks()
 
     @cached_property
     def leaks_s(self) -> Real:
