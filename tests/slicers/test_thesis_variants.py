@@ -8,7 +8,7 @@ import pytest
 
 from sensorgen.design import design
 from sensorgen.export.slicers import curaengine, prusa
-from sensorgen.export.slicers.loads import Load
+from sensorgen.export.slicers.loads import ToolLoad
 from sensorgen.scene.geometry import meshes
 from sensorgen.workflows.build import build
 
@@ -68,7 +68,7 @@ def test_prusaslicer_prints_every_body_on_its_tool(name, tmp_path, prusa_slicer,
 @variants
 def test_curaengine_prints_every_body_on_its_tool(name, tmp_path, cura_engine, record_property):
     variant = design.load(DESIGNS / name)
-    loads = {variant.tool(m): Load(design.material_files.load(m), source) for m, source in variant.used().items()}
+    loads = {variant.tool(m): ToolLoad(design.material_files.load(m), source) for m, source in variant.used().items()}
     settings = curaengine.engine_settings(variant.machine, variant.layers, loads)
     bodies = [
         (stl(tmp_path, variant, b), variant.machine.slicer_index(variant.tool(b.material)))

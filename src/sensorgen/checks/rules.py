@@ -26,7 +26,7 @@ def findings(
     quality: Quality,
     gap_mm: float,
     walls: str = "arachne",
-    laid: Mapping[str, estimate.Lines] | None = None,
+    laid: Mapping[str, estimate.LineLayout] | None = None,
 ) -> list[Finding]:
     """All findings about a scene, the most severe first.
 

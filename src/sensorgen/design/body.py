@@ -13,7 +13,7 @@ DRAWN: Literal["drawn"] = "drawn"
 
 
 @dataclass(frozen=True)
-class Film:
+class FilmThickness:
     """Thickness of the film between the electrodes of a print.
 
     Attributes
@@ -62,7 +62,7 @@ class Cells:
     gaps: Callable[[], Mapping[str, float]]
     tracks: Any = None
     remarks: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    film: Film | None = None
+    film: FilmThickness | None = None
     count_error: float = 0.0
     beside: tuple[tuple[Scene, float], ...] = ()
 

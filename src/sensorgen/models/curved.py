@@ -19,7 +19,7 @@ from sensorgen.scene.layers import Region
 from sensorgen.scene.repetition import Repeat, halved, repeat
 from sensorgen.scene.scene import SLIVER_MM, Piece, Scene
 from sensorgen.solvers.electrostatics import bounds as fem
-from sensorgen.solvers.electrostatics.round_bodies import Cell, bounds
+from sensorgen.solvers.electrostatics.round_bodies import RoundCell, bounds
 
 SOURCE = "Dirichlet's and Thomson's principles; curved tetrahedra, H1 and hybrid H(div) by NGSolve"
 COST = 3
@@ -66,7 +66,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     own, x, y = cell(scene)
     values = [float(permittivity[name]) for name in own.materials]
     shares = np.outer(x.shares, y.shares)
-    plan = Cell(
+    plan = RoundCell(
         own.low_mm,
         own.high_mm,
         own.pieces,
@@ -89,8 +89,8 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
 
 
 @dataclass(frozen=True)
-class Window:
-    """Pieces between the mirrors of a scene, as of :class:`Cell`, and the materials of its dielectrics."""
+class MirrorWindow:
+    """Pieces between the mirrors of a scene, as of :class:`RoundCell`, and the materials of its dielectrics."""
 
     low_mm: tuple[float, float, float]
     high_mm: tuple[float, float, float]
@@ -119,7 +119,7 @@ def _at(scene: Scene, z_mm: float) -> Iterator[Region]:
 
 
 @lru_cache(maxsize=8)
-def cell(scene: Scene) -> tuple[Window, Repeat, Repeat]:
+def cell(scene: Scene) -> tuple[MirrorWindow, Repeat, Repeat]:
     """The cell of a scene, and how it repeats along x and y.
 
     Raises
@@ -150,4 +150,4 @@ def cell(scene: Scene) -> tuple[Window, Repeat, Repeat]:
         _ENDS.index(body.terminal) if body.terminal else len(_ENDS) + materials.index(body.material) for body, _ in near
     ]
     pieces = tuple((piece, kind) for (_, piece), kind in zip(near, kinds, strict=True))
-    return Window(low, high, pieces, materials), x, y
+    return MirrorWindow(low, high, pieces, materials), x, y

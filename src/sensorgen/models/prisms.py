@@ -27,7 +27,7 @@ from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene, seen_from_ab
 from sensorgen.scene.slabs import is_open, slabs
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.enclosed import enclosing
-from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, Layers, Mesh, plan, solved
+from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, LayerCell, PrismMesh, plan, solved
 
 SOURCE = "Dirichlet's and Thomson's principles; prisms of triangles, H1 and hybrid H(div) by NGSolve"
 COST = 3
@@ -119,7 +119,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
         raise failed
 
 
-def _meshes(cell: "_Cell", layers: Layers, beside_mm: Sequence[float]) -> tuple[Mesh, Mesh, bool]:
+def _meshes(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> tuple[PrismMesh, PrismMesh, bool]:
     """The mesh of a cell for the flux, that for the potential, and whether their outlines enclose the cell's.
 
     With air around it, the flux stays in that air, and the potential is constant beyond: a conductor that floats.
@@ -131,9 +131,9 @@ def _meshes(cell: "_Cell", layers: Layers, beside_mm: Sequence[float]) -> tuple[
     for times in _STRETCHED if is_sound else ():
         with suppress(fem.Unsolved):
             beside = [times * far for far in beside_mm]
-            exact = Mesh.of(layers, beside, _GRID_MM, far_mm)
+            exact = PrismMesh.of(layers, beside, _GRID_MM, far_mm)
             if exact.plan.slenderness_mm() > _SLENDER_MM:
-                other = Mesh.of(cell.inside_shell(layers), beside, _GRID_MM, far_mm) if cell.air_mm else exact
+                other = PrismMesh.of(cell.inside_shell(layers), beside, _GRID_MM, far_mm) if cell.air_mm else exact
                 return exact, other, False
     found = []
     for outwards, least_mm in ((False, _SLENDER_MM), (True, _SLENDER_MM / 10)):  # a potential bears more than a flux
@@ -142,7 +142,7 @@ def _meshes(cell: "_Cell", layers: Layers, beside_mm: Sequence[float]) -> tuple[
             near = enclosing(some, grid_mm, far_mm, loose_mm, outwards=outwards)
             if outwards and cell.air_mm:
                 near = cell.inside_shell(near)
-            mesh = Mesh.of(near, beside_mm, grid_mm, far_mm)
+            mesh = PrismMesh.of(near, beside_mm, grid_mm, far_mm)
             if mesh.plan.slenderness_mm() > least_mm:
                 break
         found.append(mesh)
@@ -186,7 +186,7 @@ class _Cell:
     open_sides: tuple[tuple[bool, bool], tuple[bool, bool]] = ((False, False), (False, False))
     outer: list[dict[int, Region]] | None = None
 
-    def inside_shell(self, layers: Layers) -> Layers:
+    def inside_shell(self, layers: LayerCell) -> LayerCell:
         """Layers of it in a shell that conducts and floats: any potential in there goes on as a constant outside."""
         (x0, x1), (y0, y1) = self.open_sides
         thick, (x, y) = _SHELL * self.air_mm, layers.size_mm
@@ -201,16 +201,16 @@ class _Cell:
         regions[0] = regions[-1] = {own: whole}
         return replace(layers, regions=regions, conductors=own + 1, in_shell=True)
 
-    def layers(self, permittivity: Sequence[float]) -> Layers:
+    def layers(self, permittivity: Sequence[float]) -> LayerCell:
         """For the solver."""
         size = (self.x.high_mm - self.x.low_mm, self.y.high_mm - self.y.low_mm)
         cuts = tuple((side.places_mm[1:-1] - side.low_mm).tolist() for side in (self.x, self.y))
         shifts = self.x.shifts, self.y.shifts
-        return Layers(
+        return LayerCell(
             size, np.array(self.heights_mm), self.regions, self.conductors, permittivity, shifts, (cuts[0], cuts[1])
         )
 
-    def shares(self, mesh: Mesh) -> np.ndarray:
+    def shares(self, mesh: PrismMesh) -> np.ndarray:
         """Number of times that each triangle of a mesh occurs in the sensor, beyond the least (t,)."""
         middle = mesh.plan.points_mm[mesh.plan.triangles].mean(1)
         found = np.ones(len(middle))

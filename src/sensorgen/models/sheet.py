@@ -10,11 +10,21 @@ from numpy.typing import ArrayLike
 from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import UnknownName
 from sensorgen.solvers.sheet.network import BY
-from sensorgen.solvers.sheet.parts import Contact, Patch, Port, Sheet
-from sensorgen.solvers.sheet.solve import Bounds, Solution, bounds, contact_sets, depth_m, solution
+from sensorgen.solvers.sheet.parts import Contact, Port, Sheet, SheetPatch
+from sensorgen.solvers.sheet.solve import PressErrors, Solution, bounds, contact_sets, depth_m, solution
 
 __all__ = [
-    "BY", "Bounds", "Contact", "Patch", "Port", "Sheet", "Solution", "contact_sets", "depth_m", "impedance", "localise",
+    "BY",
+    "Contact",
+    "Port",
+    "PressErrors",
+    "Sheet",
+    "SheetPatch",
+    "Solution",
+    "contact_sets",
+    "depth_m",
+    "impedance",
+    "localise",
     "solve",
 ]  # fmt: skip
 
@@ -23,7 +33,11 @@ COST = 2
 
 
 def impedance(
-    sheet: Sheet, ports: Sequence[Port], frequency_hz: ArrayLike, patch: Patch | None = None, cells: int | None = None
+    sheet: Sheet,
+    ports: Sequence[Port],
+    frequency_hz: ArrayLike,
+    patch: SheetPatch | None = None,
+    cells: int | None = None,
 ) -> Complex:
     r"""Impedance matrix between pairs of contacts.
 
@@ -77,7 +91,7 @@ def solve(
     sheet: Sheet,
     ports: Sequence[Port],
     frequency_hz: ArrayLike,
-    patch: Patch | None = None,
+    patch: SheetPatch | None = None,
     of: Iterable[str] = (),
     cells: int | None = None,
     accuracy: float = 1e-3,
@@ -134,12 +148,12 @@ def localise(
     sheet: Sheet,
     ports: Sequence[Port],
     frequency_hz: ArrayLike,
-    press: Patch,
+    press: SheetPatch,
     per_newton: Mapping[str, float],
     noise: float = 1e-3,
     places: int = 7,
     done: Callable[[int], object] | None = None,
-) -> Bounds:
+) -> PressErrors:
     r"""Cramer-Rao bounds of force, x and y of a press, anywhere on the sheet.
 
     .. math:: \mathrm{cov} \ge \Bigl(\sum_{f,p} \frac{\Re g\, \Re g^T + \Im g\, \Im g^T}{\nu^2}\Bigr)^{-1},

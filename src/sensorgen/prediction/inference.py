@@ -136,7 +136,7 @@ def slopes(function: Callable[[Real], Real], at: Real) -> Real:
 
 
 @dataclass
-class Fit(Samples):
+class LocalFit(Samples):
     """Sum of squares near points, for n samples of p parameters.
 
     Attributes
@@ -202,10 +202,10 @@ class LeastSquares(ABC):
     """First damping where a step failed, relative to the information."""
 
     @abstractmethod
-    def fit(self, at: Real, rows: Index) -> Fit:
+    def fit(self, at: Real, rows: Index) -> LocalFit:
         """Sum of squares of some samples at points."""
 
-    def step(self, fit: Fit, damping: Real) -> Real:
+    def step(self, fit: LocalFit, damping: Real) -> Real:
         """Damped step within reach and bounds (n, p)."""
         information = fit.information * (1 + damping[:, None, None] * np.eye(fit.at.shape[1]))
         step = _solved(information, fit.gradient)
@@ -221,12 +221,12 @@ class LeastSquares(ABC):
             within = np.clip(fit.at + step, -self.bound, self.bound) - fit.at
         return np.asarray(within)
 
-    def done(self, fit: Fit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
+    def done(self, fit: LocalFit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
         """Samples of which this is the last step, by it and by its gain in the sum of squares."""
         return np.asarray(np.abs(step).max(1) < self.settled)
 
 
-def descend(problem: LeastSquares, start: Real) -> Fit:
+def descend(problem: LeastSquares, start: Real) -> LocalFit:
     """Least squares by damped Gauss-Newton (Levenberg and Marquardt), many samples together.
 
     Parameters

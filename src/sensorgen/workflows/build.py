@@ -31,7 +31,7 @@ from sensorgen.prediction.results import Prediction, timeless, to_json
 from sensorgen.prediction.slices import PrintReview, reviewed
 from sensorgen.workflows import compensation, decision, sealed
 from sensorgen.workflows.changes import Advice
-from sensorgen.workflows.compensation import Change
+from sensorgen.workflows.compensation import Adjustment
 from sensorgen.workflows.decision import Decision
 from sensorgen.workflows.trial import Trial, table
 
@@ -78,7 +78,7 @@ class Built:
     verdict: str
     findings: tuple[Finding, ...]
     prediction: Prediction
-    compensated: tuple[Change, ...] = ()
+    compensated: tuple[Adjustment, ...] = ()
     replaced: tuple[str, ...] = ()
     trial: Trial | None = None
     advice: Advice | None = None
@@ -129,7 +129,7 @@ def build(
     cad: bool = True,
     force: bool = False,
     strict: bool = False,
-    compensated: Sequence[Change] = (),
+    compensated: Sequence[Adjustment] = (),
     budget_s: float | None = None,
     step: Step = lambda _: None,
     decided: Callable[[Built], None] = lambda _: None,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sensorgen.analysis.plots.figure import GREY, SYMBOLS, Axis, Body, Curve, Figure, Map, Panel
+from sensorgen.analysis.plots.figure import GREY, SYMBOLS, Axis, BodyTriangles, Curve, Figure, Map, Panel
 from sensorgen.analysis.plots.libraries import needed
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def _panel(axes: "Axes", panel: Panel, figure: Figure) -> None:
     if panel.title:
         axes.set_title(panel.title, fontsize="medium")
     if panel.solid:
-        _bodies(axes, [body for body in panel.content if isinstance(body, Body)], figure)
+        _bodies(axes, [body for body in panel.content if isinstance(body, BodyTriangles)], figure)
         return
     axes.set(xscale="log" if panel.x.log else "linear", yscale="log" if panel.y.log else "linear")
     left = np.zeros(max(1, len(panel.y.names)))
@@ -203,7 +203,7 @@ def _map(axes: "Axes", part: Map, label: str) -> None:
                 bar.ax.axhline(level, color=colour, linestyle=style)
 
 
-def _bodies(axes: Any, bodies: Sequence[Body], figure: Figure) -> None:
+def _bodies(axes: Any, bodies: Sequence[BodyTriangles], figure: Figure) -> None:
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
     faces = np.concatenate([body.vertices_mm[body.triangles] for body in bodies])

@@ -26,7 +26,7 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class FileFault:
     """Part of a file that could not be read or followed, with its place."""
 
     number: int
@@ -35,7 +35,7 @@ class Fault:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ToolChange:
     """A tool is taken, by ``T`` or by a macro: the moves before it, its line, the tool, and how."""
 
     row: int
@@ -45,7 +45,7 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
-class Track:
+class ModalValues:
     """Something that holds from one place in the file to the next: its values, and the moves before each."""
 
     rows: list[int]
@@ -97,15 +97,15 @@ class Motion:
     arcs: Arcs
     events: Sequence[Event]
     odd: Sequence[Event]
-    changes: Sequence[Change]
-    tools: Track
+    changes: Sequence[ToolChange]
+    tools: ModalValues
     kinds: tuple[str, ...]
-    kind: Track
-    width_mm: Track
-    height_mm: Track
-    layer: Track
-    absolute_e: Track
-    faults: Sequence[Fault]
+    kind: ModalValues
+    width_mm: ModalValues
+    height_mm: ModalValues
+    layer: ModalValues
+    absolute_e: ModalValues
+    faults: Sequence[FileFault]
     lines: int
     maker: str
     z_stated: NDArray[np.bool_]

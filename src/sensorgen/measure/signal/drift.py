@@ -55,7 +55,7 @@ class Drift:
     law: str
     reason: str
     start_s: float
-    fit: laws.Fit
+    fit: laws.LawFit
 
     def at(self, time_s: Real) -> Complex:
         """Drift of ln Z since the first reading, at any times [s] (n, m) [-]."""

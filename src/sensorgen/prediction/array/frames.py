@@ -18,7 +18,7 @@ from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayR
 from sensorgen.prediction.array.sessions import ArrayCalibration
 from sensorgen.prediction.array.study import DETECTED, DETERMINED
 from sensorgen.prediction.inverse.verdict import NORMAL_90
-from sensorgen.solvers.tracks import Readings, readings
+from sensorgen.solvers.tracks import CrossingReadings, readings
 
 SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration of each
 _STEPS = 25  # of Gauss-Newton with the slopes at rest
@@ -204,11 +204,11 @@ class MapInverter:
                 f"{self.model.here.size} crossings by two terminals; expected at most {MOST_DENSE}: read it guarded"
             )
 
-    def read(self, capacitance_f: Real) -> Readings:
+    def read(self, capacitance_f: Real) -> CrossingReadings:
         """Readings of the network, with the shorts that the readings at rest show."""
         return self._network(capacitance_f, self.leaks_s)
 
-    def _network(self, capacitance_f: Real, leaks_s: Real) -> Readings:
+    def _network(self, capacitance_f: Real, leaks_s: Real) -> CrossingReadings:
         return readings(
             replace(self.model.tracks(capacitance_f), leak_s=leaks_s), self.readout.frequency_hz[0],
             readout=self.readout.kind, input_ohm=self.readout.input_ohm,
@@ -233,7 +233,7 @@ class MapInverter:
         return np.isfinite(self.rest_s.real) & self.alive, self.alive
 
     @cached_property
-    def nominal(self) -> Readings:
+    def nominal(self) -> CrossingReadings:
         """Readings of the array as predicted, at rest."""
         return self._network(self.model.capacitances(), np.zeros(self.model.here.shape))
 

@@ -12,10 +12,10 @@ from sensorgen.core.bounds import Bounds
 from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import BadInput, MissingValue
 from sensorgen.core.units import M_PER_MM
-from sensorgen.design.arrays import Layout, Track
+from sensorgen.design.arrays import ArrayLayout, ArrayTrack
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
-from sensorgen.models.compression import Curve
+from sensorgen.models.compression import CapacitanceCurve
 from sensorgen.prediction import bodies
 from sensorgen.prediction.error_budget import modulus_range
 from sensorgen.prediction.query import Query
@@ -68,7 +68,7 @@ class ArrayModel:
     lead_ohm: tuple[float, float]
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> ArrayLayout:
         """Tracks in plan."""
         found = self.design.layout
         if found is None:
@@ -118,7 +118,7 @@ class ArrayModel:
     def known_pa(self) -> float:
         """Pressure on the surface up to which the law of the cell is known, further straight; infinite of a plate."""
         law = self.crossing.law.compression
-        return law.stress_pa[-1] / self.load_factor if isinstance(law, Curve) else float("inf")
+        return law.stress_pa[-1] / self.load_factor if isinstance(law, CapacitanceCurve) else float("inf")
 
     @cached_property
     def shared_factor(self) -> tuple[float, float]:
@@ -201,7 +201,7 @@ class ArrayModel:
             np.zeros(n, dtype=np.int64), self.crossing.lost.tan_delta, np.zeros((m, n)),
         )  # fmt: skip
 
-    def _stretches(self, track: Track, at_mm: Sequence[float]) -> tuple[Real, float]:
+    def _stretches(self, track: ArrayTrack, at_mm: Sequence[float]) -> tuple[Real, float]:
         """Resistances between crossings, infinite beyond the track's end, and from crossing 0 to the pad [ohm]."""
         start, per_track, per_lead = self._per_mm(track)
         ends = np.asarray(at_mm)
@@ -209,7 +209,7 @@ class ArrayModel:
         stretches = np.where(np.arange(1, len(ends)) <= track.last, np.diff(ohm), np.inf)
         return stretches, float(track.lead_length_mm * per_lead + ohm[0])
 
-    def _per_mm(self, track: Track) -> tuple[float, float, float]:
+    def _per_mm(self, track: ArrayTrack) -> tuple[float, float, float]:
         """Where a track begins along itself [mm], and resistances of track and lead per length [ohm/mm]."""
         p, is_row = self.layout.params, track.name.startswith("r")
         sheet, width = (self.row_ohm, p.row_mm) if is_row else (self.column_ohm, p.column_mm)
@@ -220,7 +220,7 @@ class ArrayModel:
         found = sorted([*self.layout.rows, *self.layout.columns], key=lambda t: t.pad[0])
         return tuple(self._wire(k, track) for k, track in enumerate(found, 1))
 
-    def _wire(self, number: int, track: Track) -> Wire:
+    def _wire(self, number: int, track: ArrayTrack) -> Wire:
         _, per_track, per_lead = self._per_mm(track)
         x0, x1, y0, y1 = track.body
         is_row = track.name.startswith("r")

@@ -29,7 +29,7 @@ _HALTON = 200  # presses that stand for all
 
 
 @dataclass(frozen=True)
-class Range:
+class PossiblePresses:
     """Presses that are possible.
 
     Attributes
@@ -90,7 +90,7 @@ class NextPress:
     """
 
     model: SpecimenModel
-    within: Range
+    within: PossiblePresses
     noise: Real
     aim: str = "values"
 

@@ -17,7 +17,7 @@ from sensorgen.scene.polyhedra import surface
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Piece, Prism
 from sensorgen.solvers.electrostatics.bounds import Unsolved
-from sensorgen.solvers.electrostatics.round_cell import SAME_MM, Cell, ProfileEdge, Touch, profile, touches
+from sensorgen.solvers.electrostatics.round_cell import SAME_MM, DomeTouch, ProfileEdge, RoundCell, profile, touches
 
 ROUND = "round"  # end of the name of faces that elements approach by polynomials
 SIDE, BETWEEN = "side", "between"  # names of mirrors, and of faces between dielectrics
@@ -53,13 +53,13 @@ class RoundMesh:
         Which regions of the boundary elements approach by polynomials.
     """
 
-    cell: Cell
+    cell: RoundCell
     ngsolve: Any
-    touches: list[Touch]
+    touches: list[DomeTouch]
     round: Mask
 
 
-def mesh_of(cell: Cell, order: int, layers: int, closed: float) -> RoundMesh:
+def mesh_of(cell: RoundCell, order: int, layers: int, closed: float) -> RoundMesh:
     """A mesh whose curved elements are sound.
 
     Parameters
@@ -157,7 +157,7 @@ def _middles(mesh: Any) -> Real:
     return np.array([points[[v.nr for v in element.vertices]].mean(0) for element in mesh.Elements()])
 
 
-def _shape(cell: Cell, cusps: Sequence[tuple[Touch, float]]) -> tuple[Any, "_Grading"]:
+def _shape(cell: RoundCell, cusps: Sequence[tuple[DomeTouch, float]]) -> tuple[Any, "_Grading"]:
     """All dielectrics with their common faces, named by conductor; edges and tips to be graded are marked."""
     import netgen.occ as occ
 
@@ -181,7 +181,7 @@ def _shape(cell: Cell, cusps: Sequence[tuple[Touch, float]]) -> tuple[Any, "_Gra
     return occ.Compound(kept), grading
 
 
-def _refuse_open(cell: Cell, kept: Sequence[Any]) -> None:
+def _refuse_open(cell: RoundCell, kept: Sequence[Any]) -> None:
     """Refuse a dielectric that reaches the bottom or the top of the cell."""
     for face in (face for one in kept for face in one.faces if (face.name or "x")[0] != "c"):
         low, high = face.bounding_box
@@ -190,7 +190,7 @@ def _refuse_open(cell: Cell, kept: Sequence[Any]) -> None:
                 raise Unsolved("an electrode does not cover the whole sensor")
 
 
-def _solids(cell: Cell, cusps: Sequence[tuple[Touch, float]]) -> list[tuple[str, Any]]:
+def _solids(cell: RoundCell, cusps: Sequence[tuple[DomeTouch, float]]) -> list[tuple[str, Any]]:
     """Conductors, parts of dielectrics and cusps, by name."""
     import netgen.occ as occ
 
@@ -280,7 +280,7 @@ class _Grading:
         Places on marked edges [mm].
     """
 
-    cell: Cell
+    cell: RoundCell
     any: bool = False
     along: list[tuple[float, float, float]] = field(default_factory=list)
 

@@ -32,7 +32,7 @@ def html(found: DesignChart) -> str:
     """A page: each quantity with its figure, whose axis can be chosen, and its table."""
     shown = {figure.key: figure for figure in figures(found)}
     sections = [
-        pages.Section(key, title, (shown[key],) if key in shown else (), tuple(found.parts(key)))
+        pages.PageSection(key, title, (shown[key],) if key in shown else (), tuple(found.parts(key)))
         for key, title in found.titles.items()
     ]
     return pages.page(

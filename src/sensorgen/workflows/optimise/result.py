@@ -90,7 +90,7 @@ class Chosen:
 
 
 @dataclass(frozen=True)
-class Spread:
+class ObjectiveSpread:
     """An objective over variants of a design: best value, median, worst, and the worst with all material ranges."""
 
     value: float
@@ -127,7 +127,7 @@ class Recommended:
     design: Chosen
     folder: str = ""
     verdict: str = ""
-    robust: dict[str, Spread] | None = None
+    robust: dict[str, ObjectiveSpread] | None = None
     sliced: dict[str, Bounds] | None = None
     slicer: str = ""
     ties: tuple[int, ...] = ()
