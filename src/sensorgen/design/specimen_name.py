@@ -98,7 +98,7 @@ class SpecimenName:
     def format(self) -> str:
         """The name in its normal form.
 
-        >>> Specimen(23, "tri", "Y", 0.2, 3).format()
+        >>> SpecimenName(23, "tri", "Y", 0.2, 3).format()
         '23 triY .2mm 3'
         """
         number = "" if self.iteration is None else str(self.iteration)

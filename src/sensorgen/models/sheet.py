@@ -136,7 +136,7 @@ def solve(
     --------
     >>> plate = Sheet(0.1, 0.1, (900.0, 900.0), 7e-8)
     >>> corner = tuple(Contact(side, (0.0, 0.01), (0.0, 0.01)) for side in ("top", "bottom"))
-    >>> press = Patch(0.02, 0.03, 0.02, 0.02, capacitance_factor=1.05)
+    >>> press = SheetPatch(0.02, 0.03, 0.02, 0.02, capacitance_factor=1.05)
     >>> found = solve(plate, [corner], [1e5], press, of=["x_m"])
     >>> found.cells, found.error < 1e-3, round(float(found.by["x_m"][0, 0, 0].real), 1)
     (80, True, 45.7)
@@ -197,7 +197,7 @@ def localise(
     One port and one frequency give two numbers, and the press has three unknowns:
 
     >>> film = Sheet(0.1, 0.1, (450.0, 450.0), 7e-8)
-    >>> tip = Patch(0.0, 0.0, 0.02, 0.02, capacitance_factor=1.05)
+    >>> tip = SheetPatch(0.0, 0.0, 0.02, 0.02, capacitance_factor=1.05)
     >>> found = localise(film, contact_sets(film)["one-edge"], [1e5], tip, {"capacitance_factor": 0.01}, places=1)
     >>> found.located(), [float(at) for at in found.sigma()[0, 0]]
     (0.0, [inf, inf, inf])
