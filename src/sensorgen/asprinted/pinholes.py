@@ -78,7 +78,7 @@ class Pinholes:
     ----------
     design : str
         Name of the design.
-    rows : tuple of Row
+    rows : tuple of OpenPlaces
         By film and width.
     """
 

@@ -123,7 +123,7 @@ def layers(
         What prints it.
     walls : str
         One of ``RULES``.
-    laid : mapping of str to Lines, optional
+    laid : mapping of str to LineLayout, optional
         Material to its lines; solid ones of the printer's width if not given.
     shift : (float, float), optional
         How far the infill of odd and of even layers lies aside, in pitches [-]; so that lines of two layers meet as

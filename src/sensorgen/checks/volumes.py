@@ -145,7 +145,7 @@ def findings(found: Iterable[LayerVolume], scene: Scene) -> list[Finding]:
 
     Parameters
     ----------
-    found : iterable of Row
+    found : iterable of LayerVolume
         Of one print.
     scene : Scene
         The sensor on its bed.

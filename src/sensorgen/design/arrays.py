@@ -213,7 +213,7 @@ class ArrayLayout:
     ----------
     params : Params
         Of the array.
-    rows, columns : tuple of Track
+    rows, columns : tuple of ArrayTrack
         From below, from the left.
     x_mm, y_mm : tuple of float
         Middles of all columns and rows [mm].
@@ -549,7 +549,7 @@ def scene(of: ArrayLayout, fill: Fill, strip: Any, params: Envelope) -> Scene:
 
     Parameters
     ----------
-    of : Layout
+    of : ArrayLayout
         Its tracks.
     fill : Fill
         Materials.

@@ -48,7 +48,7 @@ class Cells:
         Extruded lines, where a tool path is known.
     remarks : mapping of str to tuple of str
         Where electrodes touch, and which conductors float, by the same rules.
-    film : Film or None
+    film : FilmThickness or None
         Of a print; None of a drawing, and where no film lies between the electrodes.
     count_error : float
         Of ``count``, relative, where a border cuts cells [-].

@@ -32,7 +32,7 @@ def faults(machine: Printer, layers: Quality, loaded: Mapping[int, ToolLoad]) ->
     ----------
     machine, layers : Printer, Quality
         Whose files were read.
-    loaded : mapping of int to Load
+    loaded : mapping of int to ToolLoad
         What each tool prints.
     """
     from sensorgen.export.gcode.check import check

@@ -51,7 +51,7 @@ class Readings:
 
     Parameters
     ----------
-    table : Table
+    table : CsvTable
         The open file.
     beside : sequence of str
         Columns to give as numbers, where the file has them.

@@ -69,9 +69,9 @@ class LineContact:
         Where it begins and how long it is [m].
     width_m : float
         Across the sensor [m].
-    pieces : Pieces
+    pieces : TipPieces
         How its pressure is spread.
-    by_force, by_position : Motion
+    by_force, by_position : ContactSlopes
         How all this moves.
     """
 
@@ -156,7 +156,7 @@ def impedance(track: RestLine, tip: LineContact, law: Compression, frequency_hz:
 
     Parameters
     ----------
-    track, tip : Track, Tip
+    track, tip : RestLine, LineContact
         The line and what rests on it.
     law : Compression
         Capacitive strain of the film over pressure.

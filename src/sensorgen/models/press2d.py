@@ -63,7 +63,7 @@ def press(
 
     Parameters
     ----------
-    cell : Cell
+    cell : ContactCell
         From :func:`cell`.
     solids : mapping of str to Elastic
         By material.

@@ -163,7 +163,7 @@ def press(
         Relative permittivity by material, with "air"; without it no capacitance is computed [-].
     boundary : BoundaryConditions, optional
         Base, period ("free": in both directions), top and contact.
-    fineness : Pieces, optional
+    fineness : BrickCounts, optional
         Of the mesh; fewer pieces, with a remark, where they would be too many.
     step : callable, optional
         Called with every pressure of ``stress_pa`` that is reached [Pa].

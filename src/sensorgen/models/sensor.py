@@ -56,7 +56,7 @@ class Sensor:
         Length of the tip along the sensor [m].
     profile : str
         Distribution of its pressure: one of :data:`sensorgen.models.pressure.PROFILES`.
-    contact : Contact or None
+    contact : RoundContact or None
         Growth of a round tip's contact with the force, up to ``tip_m``; None where all of the tip always touches.
     pieces : int
         Number of pieces that a tip whose pressure is not uniform is cut into.

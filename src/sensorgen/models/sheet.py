@@ -53,7 +53,7 @@ def impedance(
         Current enters at the first contact of a pair and leaves at the second; both may be on one sheet.
     frequency_hz : float or (n,) array
         0 or more [Hz].
-    patch : Patch
+    patch : SheetPatch
         Pressed rectangle, if any.
     cells : int
         Cells along the longer side; the fewest of 10, 20, 40 ... with an estimated error under 1e-3 unless given [-].
@@ -165,7 +165,7 @@ def localise(
         As of :func:`impedance`; each port is read by itself, the others are open.
     frequency_hz : float or (n,) array
         Frequencies that are read at every port, above 0 unless the film leaks [Hz].
-    press : Patch
+    press : SheetPatch
         Size of the tip, and its factors at the force in question; its place is not looked at.
     per_newton : dict of str to float
         Derivatives by force of the factors, by their names in ``BY`` [1/N].

@@ -240,7 +240,7 @@ class Stack:
         ----------
         frequency_hz : float or array
             Frequencies, above 0 [Hz].
-        touch, body : Touch, Body
+        touch, body : Touch, GroundTie
             Where and through what it touches; how it is tied to the ground of the instrument.
         driven, low : int
             Track that the instrument drives, and track that it holds at ground, counted from 0 at the bottom.

@@ -49,7 +49,7 @@ def resistance(
 
     Parameters
     ----------
-    lines : Lines
+    lines : StraightLines
         All of one electrode.
     resistivity_ohm_m : float
         Bulk resistivity along a line [ohm m], above 0.

@@ -65,7 +65,7 @@ class Answer:
         Why other models do not apply to the scene.
     wanted : float
         How wide the interval might be, relative to its middle [-].
-    plan : tuple of Candidate
+    plan : tuple of PlanCandidate
         All models, in the order in which they were weighed.
     known : bool
         Whether the answer was known from before.

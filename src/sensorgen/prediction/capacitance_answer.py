@@ -80,7 +80,7 @@ class CellCapacitance(Displayed):
         Of the field, where dielectrics lose [Hz].
     refused : tuple of str
         Why other models do not apply.
-    plan : tuple of Candidate
+    plan : tuple of PlanCandidate
         All models, with what they reached.
     values : tuple of MaterialValue
         Material values used.
@@ -160,7 +160,7 @@ def answer(body: Body, asked: CapacitanceQuestion) -> CellCapacitance:
     ----------
     body : Body
         Drawn or printed.
-    asked : Asked
+    asked : CapacitanceQuestion
         Accuracy and model.
 
     Raises

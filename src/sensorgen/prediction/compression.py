@@ -236,7 +236,7 @@ def answer(body: Body, asked: PressQuestion, *, step: Step | None = None) -> Com
     ----------
     body : Body
         Drawn or printed.
-    asked : Asked
+    asked : PressQuestion
         Stresses, boundary conditions and accuracy.
     step : callable, optional
         Called with every stress that is reached [Pa].

@@ -103,7 +103,7 @@ def law_of(
         Its unloaded capacitance.
     name : str
         One of ``LAWS``, or "" for the best available without solving.
-    printed : Piece, optional
+    printed : PressedPiece, optional
         As printed; as drawn where not given.
     tip : Tip
         What presses.
@@ -209,7 +209,7 @@ def infill(design: Design, piece: PressedPiece) -> Law | None:
     ----------
     design : Design
         Whose materials it has.
-    piece : Piece
+    piece : PressedPiece
         Drawn or printed.
     """
     from sensorgen.models import porous
@@ -371,7 +371,7 @@ def solved(
     ----------
     design : Design
         As drawn.
-    printed : Piece, optional
+    printed : PressedPiece, optional
         As printed; as drawn where not given.
     level : int
         Of the mesh, as of :func:`sensorgen.prediction.mesh_ladder.pressed`.
@@ -421,7 +421,7 @@ def under_tops(
     ----------
     design, piece, model, tip, boundary
         As of :func:`case_of`.
-    own : Curve
+    own : CapacitanceCurve
         Under the tip.
     """
     loads, level = [own.stress_pa[-1] * share for share in _COARSE], coarsest(model)

@@ -67,7 +67,7 @@ class Case:
 
     Attributes
     ----------
-    piece : Piece
+    piece : PressedPiece
         That is pressed.
     model : str
         One of ``MODELS``.
@@ -127,7 +127,7 @@ def mesh_levels(piece: PressedPiece, model: str, loads: int) -> list[MeshLevel]:
 
     Parameters
     ----------
-    piece : Piece
+    piece : PressedPiece
         That is pressed.
     model : str
         One of ``MODELS``.

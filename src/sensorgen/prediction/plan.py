@@ -63,7 +63,7 @@ class Level:
         What the errors of its candidates are of, in words.
     allowed : float
         Tolerance [-].
-    candidates : tuple of Candidate
+    candidates : tuple of PlanCandidate
         The least expensive first.
     chosen : str
         The model whose answer is used, or that is expected to meet the tolerance; "" where none applies.

@@ -116,11 +116,11 @@ class SheetStudy:
     ----------
     sheet : Sheet
         The film and its electrodes.
-    press : Patch
+    press : SheetPatch
         Size of the tip, and its factors at the force.
     ports : mapping of str to tuple of Port
         Contacts of each set.
-    bounds : mapping of str to Bounds
+    bounds : mapping of str to PressErrors
         With each set.
     force_n, noise : float
         The force [N], the noise of a reading relative to abs(Z) [-].

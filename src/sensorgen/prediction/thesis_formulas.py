@@ -88,7 +88,7 @@ def answer(design: Design, asked: CapacitanceQuestion, press_mm: float | None = 
     ----------
     design : Design
         Of a shape that the formula applies to.
-    asked : Asked
+    asked : CapacitanceQuestion
         The formula as its model; the accuracy of the field on the pressed geometry of 3.1.2.
     press_mm : float, optional
         Displacement of the top [mm]; only for those in ``PRESSED``.
@@ -125,7 +125,7 @@ def sweep(
         The setting that is varied, or "" for presses.
     points : sequence of (value, Design)
         Its values and their designs; one of them for presses.
-    asked : Asked
+    asked : CapacitanceQuestion
         As of :func:`answer`.
     press_mm : sequence of float
         Displacements of the top [mm]; may be empty.

@@ -25,7 +25,7 @@ class OverlayPart:
     ----------
     depth_mm : float
         Of all columns [mm].
-    columns : tuple of Column
+    columns : tuple of SectionColumn
         From left to right in a cross-section; in plan in no order, each 1 mm deep and as wide as that makes its area.
     looks : tuple of int
         Of each column, the number of the first that looks like it.

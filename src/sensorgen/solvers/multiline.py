@@ -60,7 +60,7 @@ def piece(line: LineMatrices, length_m: Real) -> Moving:
 
     Parameters
     ----------
-    line : Line
+    line : LineMatrices
         Matrices (..., n, n).
     length_m : array
         Length, with two axes of 1 at its end [m].

@@ -54,7 +54,7 @@ class TimedAnswer:
 
     Attributes
     ----------
-    answer : Answer
+    answer : ModelAnswer
         Of the first time.
     cold, warm : Cost
         From the start of the process, nothing stored; once more in the same process, with what it has stored.

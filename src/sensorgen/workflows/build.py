@@ -58,7 +58,7 @@ class Built:
         About the print.
     prediction : Prediction
         Of the print, with the drawing's beside it.
-    compensated : tuple of Change
+    compensated : tuple of Adjustment
         How the design differs from the one that was asked for.
     replaced : tuple of str
         What made room: files of another design in the same folder.
@@ -148,7 +148,7 @@ def build(
         Write the files even if checks report errors.
     strict : bool
         Take warnings for errors.
-    compensated : sequence of Change
+    compensated : sequence of Adjustment
         How the design differs from the one that was asked for, for the record.
     budget_s : float
         Processor time for trying changes that remove findings [s]; none are tried if not given.

@@ -68,7 +68,7 @@ class Demo:
     ----------
     folder, page : str
         Where its files are, and the report.
-    found : tuple of Found
+    found : tuple of DemoValues
         Material values of each specimen.
     inverted : tuple of Inverted
         Presses of each specimen that were found again.

@@ -36,7 +36,7 @@ class SlicedFile(SliceReport):
         CHANGE where a finding is an error, PRINT WITH WARNINGS, or PRINT.
     all_findings : tuple of Finding
         About drawing, file and print, as every command lists them.
-    compensated : tuple of Change
+    compensated : tuple of Adjustment
         How the design differs from the one that was asked for.
     """
 
@@ -90,7 +90,7 @@ def slice_design(
         Slice even if checks of the design report errors; those of the G-code refuse it none the less.
     strict : bool
         Take warnings for errors.
-    compensated : sequence of Change
+    compensated : sequence of Adjustment
         How the design differs from the one that was asked for, for the record.
     step : callable
         Called with the next step, for a progress display.

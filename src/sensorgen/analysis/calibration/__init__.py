@@ -51,7 +51,7 @@ class CalibrationWork:
         The result.
     data : Data
         Presses and rest.
-    held : Found or None
+    held : InvertedPresses or None
         The presses, each found again from the others; None of too few.
     """
 
@@ -381,7 +381,7 @@ class Recheck:
         Known ones, and those of them in their intervals by the old calibration.
     z : float
         Mean of force less median over its standard deviation, times the root of the number of presses [-].
-    change : Change
+    change : RestChange
         Of the reading at rest.
     """
 

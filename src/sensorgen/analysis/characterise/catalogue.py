@@ -118,9 +118,9 @@ class Coupon:
         Name on plate and form; "bar", "ladder", "plate", "disc" or "pads".
     material : str
         What it is made of; of a plate the film's.
-    sizes : tuple of Size
+    sizes : tuple of CouponSize
         Drawn ones, those that calipers measure first.
-    readings : tuple of Reading
+    readings : tuple of CouponReading
         In the order of ``expected``.
     expected : callable
         Readings from unknowns and sizes [ohm, F, N/m].

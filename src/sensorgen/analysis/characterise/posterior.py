@@ -30,7 +30,7 @@ class Observation:
     ----------
     coupon : Coupon
         What was read.
-    sizes : tuple of Size
+    sizes : tuple of CouponSize
         As measured, each with its standard deviation.
     log_values : (n,) array
         ln of the readings in SI units; nan where there is none.

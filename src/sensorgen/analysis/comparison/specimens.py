@@ -46,7 +46,7 @@ class Compared:
         What the log has of it.
     predicted : Predicted or None
         None where no design is known.
-    evidence, verdict : Evidence, Verdict
+    evidence, verdict : Evidence, SignalVerdict
         What the readings say by themselves; what an electrode should have is the median of its own shape.
     """
 

@@ -44,7 +44,7 @@ def by_group(groups: Mapping[str, Sequence[tuple[AllowedValues, bool]]], materia
 
     Parameters
     ----------
-    groups : mapping of str to sequence of (Allowed, bool)
+    groups : mapping of str to sequence of (AllowedValues, bool)
         Readings of a group, and whether the electrode is sound: others are predicted, but not fitted to.
     material : str
         Of the electrodes.

@@ -47,7 +47,7 @@ def of_specimen(known: SpecimenEntries, print_: str, of: Movable) -> OfSpecimen:
 
     Parameters
     ----------
-    known : Known
+    known : SpecimenEntries
         What the log has of it.
     print_ : str
         Name of its print bed; its own if that is unknown.

@@ -117,7 +117,7 @@ def page(
         Bodies, in the order of their names in ``data``.
     data : mapping
         As of :func:`stack`.
-    found : sequence of Placed
+    found : sequence of PlacedFinding
         Listed below the picture; it opens at the layer of the first that has one.
     travel : sequence of Travel
         Drawn over the bodies, each with a box to show or hide it.

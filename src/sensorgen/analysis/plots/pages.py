@@ -88,7 +88,7 @@ def page(
         Heading of the page.
     words, headline, findings : sequence of str
         Paragraphs below it, sentences that decide, and further ones in a list.
-    sections : sequence of Section
+    sections : sequence of PageSection
         With links to those that have a title.
     made_at : str
         For the foot of the page.

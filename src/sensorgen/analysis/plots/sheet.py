@@ -24,7 +24,7 @@ def png(film: "Sheet", bounds: Mapping[str, "PressErrors"], ports: Mapping[str, 
     ----------
     film : Sheet
         Under load.
-    bounds : mapping of str to Bounds
+    bounds : mapping of str to PressErrors
         By the name of the set of contacts.
     ports : mapping of str to sequence of Port
         The contacts of each set.

@@ -55,7 +55,7 @@ class Report:
         Measured against predicted, one sentence for each quantity.
     findings : tuple of str
         Further results, in sentences.
-    sections : tuple of Section
+    sections : tuple of PageSection
         Residuals first.
     """
 

@@ -22,7 +22,7 @@ class Checked(FileNeeds):
 
     Attributes
     ----------
-    findings : tuple of Found
+    findings : tuple of GcodeFinding
         The severe first.
     """
 

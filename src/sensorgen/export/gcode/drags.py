@@ -60,7 +60,7 @@ class Drags:
 
     Attributes
     ----------
-    tools : tuple of OfTool
+    tools : tuple of ToolTravel
         Every tool that moves over another's material.
     layers : tuple of OfLayer
         Travel alone, by height of the nozzle.

@@ -73,17 +73,17 @@ class Motion:
         All other commands.
     odd : sequence of Event
         Moves that have words of their own, as those of further axes; they are among the moves too.
-    changes : sequence of Change
+    changes : sequence of ToolChange
         Tools in the order in which they are taken, also the same again; ``NO_TOOL`` where one is put down.
-    tools : Track
+    tools : ModalValues
         The tool in hand, ``NO_TOOL`` before the first.
     kinds : tuple of str
         Kinds of line that comments name, in lower case; the first is "".
-    kind, width_mm, height_mm, layer : Track
+    kind, width_mm, height_mm, layer : ModalValues
         Index into ``kinds``, and what comments say of the lines: width and height [mm], and layer from 1.
-    absolute_e : Track
+    absolute_e : ModalValues
         1 where E is absolute, 0 where it is relative.
-    faults : sequence of Fault
+    faults : sequence of FileFault
         What could not be read or followed.
     lines : int
         How many lines the file has.

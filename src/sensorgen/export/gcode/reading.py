@@ -54,7 +54,7 @@ class GcodeFile:
         Place, tool and whether a macro takes it.
     turns : list of int
         Places at which the firmware runs its macros of a change.
-    faults : list of Fault
+    faults : list of FileFault
         What could not be read.
     scale, relative, absolute_e, level : Holding
         Millimetres of a unit, whether places are relative, whether E is absolute, whether arcs lie in the bed's plane.

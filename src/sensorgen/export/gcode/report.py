@@ -39,7 +39,7 @@ class FileNeeds:
         How many it has; layers as its comments count, 0 without [-].
     time_s : float
         At the feeds of the file, without acceleration, heating and changing tools: a lower bound [s].
-    tools : tuple of OfTool
+    tools : tuple of ToolMaterial
         Each tool that prints.
     tool_changes : int
         How often another tool is taken [-].

@@ -86,7 +86,7 @@ def recipe(printer: Printer, quality: Quality, tool: int, load: ToolLoad) -> Rec
         What prints, and in which layers.
     tool : int
         The printer's own number of the tool [-]; errors name it.
-    load : Load
+    load : ToolLoad
         What that tool prints.
 
     Raises

@@ -96,7 +96,7 @@ def volume_settings(printer: Printer, quality: Quality, tool: int, load: ToolLoa
         What prints, and in which layers.
     tool : int
         The printer's own number of the tool [-].
-    load : Load
+    load : ToolLoad
         What that tool prints.
     """
     r = recipe(printer, quality, tool, load)

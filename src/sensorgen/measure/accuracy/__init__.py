@@ -74,11 +74,11 @@ class Instrument:
         Other types with the same specification.
     source : str
         Document, and its conditions.
-    ranges : tuple of Range
+    ranges : tuple of MeterRange
         DC resistance, the smallest range first.
     leads_ohm : float
         Added with two wires [ohm].
-    bands : tuple of Band
+    bands : tuple of MeterBand
         AC quantities.
     least_ohm, most_ohm : float
         Impedances between which the specification holds [ohm].

@@ -40,7 +40,7 @@ class ByModel:
         ----------
         part : Next
             With the places that are possible.
-        pressed : sequence of Pressed
+        pressed : sequence of DonePress
             All so far.
         rest_ohm : (m,) array
             The latest mean at rest [ohm].

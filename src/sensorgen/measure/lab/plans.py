@@ -71,7 +71,7 @@ class DonePress:
 
     Attributes
     ----------
-    step : Step
+    step : PlannedPress
         What it was to be.
     before_ohm, pressed_ohm : (m,) array
         Mean at rest before it, and over the last second of its hold [ohm].

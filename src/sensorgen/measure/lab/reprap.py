@@ -326,7 +326,7 @@ class RepRapStage:
 
     Parameters
     ----------
-    link : Link
+    link : FirmwareLink
         Serial or HTTP.
     clock : Clock
         Of the run.

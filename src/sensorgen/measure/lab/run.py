@@ -110,7 +110,7 @@ class PlannedRun:
         What was asked.
     length_mm : float
         Of the specimen [mm].
-    steps : tuple of Step
+    steps : tuple of PlannedPress
         All presses.
     seconds : float
         How long they take, about [s].
@@ -188,7 +188,7 @@ def run(
         Real, or simulated, with simulated devices alone.
     log : Log
         An open log, which gets the recording.
-    rig : Rig
+    rig : RunDevices
         The devices; they are closed at the end.
     simulated : bool
         Whether the devices are; the log says so.

@@ -79,7 +79,7 @@ def made_safe(rig: RunDevices, clock: Clock, beat: Callable[[], None] = lambda: 
 
     Parameters
     ----------
-    rig : Rig
+    rig : RunDevices
         The devices.
     clock : Clock
         The run's.

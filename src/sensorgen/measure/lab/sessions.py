@@ -103,7 +103,7 @@ class Session:
 
     Parameters
     ----------
-    asked : Asked
+    asked : SessionTask
         What is to be done.
     log : Log
         An open log.
@@ -118,7 +118,7 @@ class Session:
     ----------
     url : str
         Address of the page; "" without one.
-    mechanism : Rig or None
+    mechanism : RunDevices or None
         Of a simulated run: what was really done to the specimen.
 
     Raises

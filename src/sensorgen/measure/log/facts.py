@@ -98,7 +98,7 @@ class RecordingFacts:
         Every lock-in of the file.
     columns, rig_columns : dict of str to str
         From the columns of the files to sensorgen's, to read the files again.
-    rig : Rig or None
+    rig : RigDay or None
         None without a log of the rig.
     """
 

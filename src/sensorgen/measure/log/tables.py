@@ -51,7 +51,7 @@ def readings(table: CsvTable, columns: Mapping[str, str], source: str) -> tuple[
 
     Parameters
     ----------
-    table : Table
+    table : CsvTable
         An open table.
     columns : mapping
         From our columns (``NAMES``) to the table's, where the names are not recognised.

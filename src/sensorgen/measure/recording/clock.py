@@ -31,7 +31,7 @@ class Rebuilt:
     ----------
     time_s : (n,) array
         Rising [s].
-    clock : Clock
+    clock : RecordingClock
         Relation to real time.
     marks : dict of str to (n,) array
         Marks of gaps and of bad stamps.

@@ -34,7 +34,7 @@ def variables(path: Path, wanted: Collection[str], spool: FileSpool) -> dict[str
         The file.
     wanted : collection of str
         Names of variables; others are skipped unread.
-    spool : Spool
+    spool : FileSpool
         Where large arrays are copied to.
 
     Raises

@@ -81,7 +81,7 @@ def variables(content: bytes | memoryview, wanted: Collection[str], spool: FileS
         The whole file.
     wanted : collection of str
         Names of variables; others are skipped unread.
-    spool : Spool
+    spool : FileSpool
         Where packed variables are unpacked to.
 
     Returns

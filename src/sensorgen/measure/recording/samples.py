@@ -131,7 +131,7 @@ class Recording:
         Complex impedance [ohm]; nan where none was measured.
     marks : mapping of str to (n,) array
         Marked samples, for every name of ``MARKS``.
-    clock : Clock
+    clock : RecordingClock
         Relation of ``time_s`` to real time.
     source : Source
         Origin.

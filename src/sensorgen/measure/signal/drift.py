@@ -48,7 +48,7 @@ class Drift:
         Reason for the law.
     start_s : float
         Time of the first reading [s].
-    fit : Fit
+    fit : LawFit
         ln Z at rest, at any time.
     """
 

@@ -159,7 +159,7 @@ def relaxing(bins: Bins, fit: LawFit, time_s: Real, force_n: Real, fastest_s: fl
     ----------
     bins : Bins
         Of the readings at rest.
-    fit : Fit
+    fit : LawFit
         Fit to extend.
     time_s, force_n : (n,) array
         Time and force [s], [N].

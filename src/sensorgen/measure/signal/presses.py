@@ -160,7 +160,7 @@ def pairs(
         Readings, not filtered: their mean is the better filter, and its error is known [ohm].
     valid : (n,) array of bool
         Valid readings.
-    presses : list of Press
+    presses : list of PressTimes
         As :func:`by_force` or :func:`by_readings` returns them.
     force_n, position_mm : (n,) array
         Force and position; nan where unknown [N], [mm].

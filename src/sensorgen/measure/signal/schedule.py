@@ -108,7 +108,7 @@ class Schedule:
 
     Attributes
     ----------
-    plan : Plan
+    plan : RunPlan
         Its parameters.
     design : str
         Name of the design.

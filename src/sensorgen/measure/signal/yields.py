@@ -46,9 +46,9 @@ class Group:
     ----------
     key : tuple
         Common property.
-    intact : Share
+    intact : CountShare
         The yield: intact specimens among those with a verdict, without shorts by design.
-    shorted : Share
+    shorted : CountShare
         Specimens whose R_Z is below ten times R_Y among those with both readings, without shorts by design.
     median_ratio : float
         Median of R_Z over R_Y [-]; nan without any.
@@ -125,7 +125,7 @@ def groups(
 
     Parameters
     ----------
-    judged : iterable of (Evidence, Verdict)
+    judged : iterable of (Evidence, SignalVerdict)
         Specimens.
     by : function
         Key of a specimen, as ``lambda of: (of.shape, of.film_mm)``.

@@ -217,7 +217,7 @@ def pressed(
 
     Parameters
     ----------
-    raster : Raster or Bricks
+    raster : SectionRaster or CellBricks
         The section, or the cell.
     solids : sequence of Solid
         Materials by number; the first, of air, counts by its permittivity alone.
@@ -383,7 +383,7 @@ def capacitance(raster: SectionRaster | CellBricks, permittivity: Sequence[float
 
     Parameters
     ----------
-    raster : Raster or Bricks
+    raster : SectionRaster or CellBricks
         The section, or the cell.
     permittivity : sequence of float
         Relative, by material; the first of air.

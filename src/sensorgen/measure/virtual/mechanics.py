@@ -120,7 +120,7 @@ class VirtualRig:
 
     Attributes
     ----------
-    specimen : Specimen
+    specimen : PressedSpecimen
         Below the tip.
     mechanics : Mechanics
         Of piston, tip and stage.
@@ -136,7 +136,7 @@ class VirtualRig:
         So far, in the order of their begin.
     fault : str
         Name of a fault of the mechanism or of the cables, see :mod:`sensorgen.measure.virtual.faults`; "" for none.
-    planted : Schedule or None
+    planted : FaultSchedule or None
         Faults to come; those that strike the rig set ``fault``, others that of the simulators attached to it.
     """
 

@@ -47,7 +47,7 @@ class ArrayCalibration:
 
     Attributes
     ----------
-    law : Law
+    law : ElementLaw
         Of every element.
     floor_kpa, share : float
         Error besides that of the parameters: constant [kPa], and relative to the pressure [-].

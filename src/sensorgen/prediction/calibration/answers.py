@@ -31,7 +31,7 @@ def rows(given: Sequence[Sequence[str]], found: InvertedPresses, rest: Mask) -> 
     ----------
     given : sequence of sequence of str
         The input's other cells, row by row.
-    found : Found
+    found : InvertedPresses
         The results.
     rest : (n,) array of bool
         Readings at rest.

@@ -80,7 +80,7 @@ class Data:
         Standard deviation of its real and imaginary part [-].
     single : (m,) array or None
         Standard deviation of the parts of a ratio of single readings, where ``ratio`` has means [-].
-    meter : Meter or None
+    meter : MeterReadings or None
         Readings apart from the bench.
     """
 

@@ -316,7 +316,7 @@ def doubt_rest(found: InvertedPresses, rest: Mask, left: int) -> int:
 
     Parameters
     ----------
-    found : Found
+    found : InvertedPresses
         Results in the order of time; their verdicts change.
     rest : (n,) array of bool
         Readings at rest.

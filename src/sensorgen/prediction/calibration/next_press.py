@@ -81,7 +81,7 @@ class NextPress:
     ----------
     model : SpecimenModel
         Of the specimen.
-    within : Range
+    within : PossiblePresses
         Presses that are possible.
     noise : (m,) array
         Standard deviation of the real and imaginary part of a press's ratio, a mean over its readings [-].

@@ -30,7 +30,7 @@ class Rest:
 
     Attributes
     ----------
-    change : Change or None
+    change : RestChange or None
         The first reading at rest that was of another sensor than the calibrated one, or of one that has changed.
     """
 

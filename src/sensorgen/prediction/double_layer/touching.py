@@ -67,7 +67,7 @@ class Touching:
         The press that a touch is mistaken for, at the same place.
     noise : float
         Relative noise, by which frequencies are weighted [-].
-    body : Body
+    body : GroundTie
         Its coupling to ground.
     """
 

@@ -86,7 +86,7 @@ def descend(target: FitGoal, model: Model, start: Real, offset: float) -> LocalF
 
     Parameters
     ----------
-    target : Target
+    target : FitGoal
         Responses and prior.
     model : callable
         Response and derivatives at scaled presses.

@@ -70,11 +70,11 @@ def posterior(target: FitGoal, table: ResponseTable, fit: LocalFit) -> PressPost
 
     Parameters
     ----------
-    target : Target
+    target : FitGoal
         The responses, and the prior.
-    table : Table
+    table : ResponseTable
         The sensor.
-    fit : Fit
+    fit : LocalFit
         Its least squares.
     """
     n = len(fit.at)

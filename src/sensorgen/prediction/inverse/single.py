@@ -70,7 +70,7 @@ class Single:
     ----------
     forward : Forward
         The exact model.
-    table : Table
+    table : ResponseTable
         Its table.
     sigma : (2 n_tones,) array
         Standard deviations of ln Z.

@@ -61,7 +61,7 @@ def statuses(fit: LocalFit, variance: Real, tones: NDArray[np.intp], ambiguous: 
 
     Parameters
     ----------
-    fit : Fit
+    fit : LocalFit
         The estimates, scaled.
     variance : (n, 2) array
         Of scaled force and position, from the data alone.

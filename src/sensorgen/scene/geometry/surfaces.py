@@ -53,7 +53,7 @@ class Closed:
         Connected surfaces, each edge between two triangles; cavities, which are inside out, after the outer ones.
     repairs : tuple of str
         What was put right.
-    faults : tuple of Fault
+    faults : tuple of SurfaceFault
         What was not; without shells.
     """
 

@@ -23,11 +23,11 @@ class Carried:
 
     Attributes
     ----------
-    field : Mesh
+    field : TriangleMesh
         Of solids and air, as drawn.
-    solids : Mesh
+    solids : TriangleMesh
         That is pressed.
-    cell : Cell
+    cell : ContactCell
         Whose regions both have.
     """
 

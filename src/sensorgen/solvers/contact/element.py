@@ -116,7 +116,7 @@ class ElementMesh:
 
     Attributes
     ----------
-    reference : Reference
+    reference : ElementReference
         Its shape functions.
     points_m : (n, d) array
         Places of the nodes [m].

@@ -57,7 +57,7 @@ class MappedField:
         All boxes of the cell, air included.
     permittivity : mapping of str to float
         Relative permittivity by material, with "air" [-].
-    orders : Orders
+    orders : FieldOrders
         Of the polynomials.
 
     Raises

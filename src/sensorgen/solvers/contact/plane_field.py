@@ -38,9 +38,9 @@ def capacitance(cell: ContactCell, mesh: TriangleMesh, permittivity: Mapping[str
 
     Parameters
     ----------
-    cell : Cell
+    cell : ContactCell
         Mirrored.
-    mesh : Mesh
+    mesh : TriangleMesh
         From :func:`meshed`, pressed or not.
     permittivity : mapping of str to float
         Relative permittivity by material, with "air" [-].
@@ -108,7 +108,7 @@ def meshed(cell: ContactCell, coarse_mm: float, growth: float, count: int = 6) -
 
     Parameters
     ----------
-    cell : Cell
+    cell : ContactCell
         Its outlines, pressed or not.
     coarse_mm, growth : float
         Largest triangle [mm], and by how much triangles grow per distance [-].

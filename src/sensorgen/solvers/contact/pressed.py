@@ -155,7 +155,7 @@ def solve(
 
     Parameters
     ----------
-    mesh : Mesh or BrickMesh
+    mesh : TriangleMesh or BrickMesh
         Of the solid parts of a cell.
     solids : sequence of Elastic
         Of each element.

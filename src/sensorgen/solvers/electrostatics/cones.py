@@ -99,7 +99,7 @@ class Cone:
 
     Attributes
     ----------
-    layout : Layout
+    layout : RingLayout
         Of its unknowns.
     matrix : (m, m) or (m + 1, m + 1) array
         Of the outermost unknowns, and of the held value if there is one.

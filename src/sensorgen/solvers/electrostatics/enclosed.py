@@ -27,7 +27,7 @@ def enclosing(cell: LayerCell, grid_mm: float, far_mm: float, loose_mm: float, *
 
     Parameters
     ----------
-    cell : Layers
+    cell : LayerCell
         Of polygons.
     grid_mm : float
         To which its corners will be rounded [mm].

@@ -96,7 +96,7 @@ def plan(cell: LayerCell, beside_mm: Sequence[float], grid_mm: float) -> PlanTri
 
     Parameters
     ----------
-    cell : Layers
+    cell : LayerCell
         Of polygons.
     beside_mm : sequence of float
         Distances of further lines from the outlines of conductors [mm].
@@ -205,9 +205,9 @@ class PrismMesh:
 
     Attributes
     ----------
-    cell : Layers
+    cell : LayerCell
         That is meshed.
-    plan : Plan
+    plan : PlanTriangles
         Its triangles.
     heights_mm : (h,) array
         Planes [mm].
@@ -399,7 +399,7 @@ def solved(inner: PrismMesh, outer: PrismMesh, order: int, weight: Real, *, encl
 
     Parameters
     ----------
-    inner, outer : Mesh
+    inner, outer : PrismMesh
         Of a cell for the flux, and of the same or of one with more conductor for the potential.
     order : int
         Of the potential's polynomials.

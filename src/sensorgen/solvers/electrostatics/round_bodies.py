@@ -43,7 +43,7 @@ def bounds(cell: RoundCell, width: float) -> Iterator[tuple[RoundLevel, int, Ene
 
     Parameters
     ----------
-    cell : Cell
+    cell : RoundCell
         Between mirrors.
     width : float
         Relative width of the bounds that is wanted: the first mesh often reaches it [-].

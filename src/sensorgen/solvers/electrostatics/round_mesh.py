@@ -42,12 +42,12 @@ class RoundMesh:
 
     Attributes
     ----------
-    cell : Cell
+    cell : RoundCell
         What is meshed.
     ngsolve : Mesh
         Materials are "d0p1" for part 1 of dielectric 0, and "t0" for what fills the cusp of touch 0; boundaries are
         "c0" for a conductor, "t0" around a cusp, ``SIDE`` and ``BETWEEN``.
-    touches : list of Touch
+    touches : list of DomeTouch
         Whose cusps are closed.
     round : (n,) array of bool
         Which regions of the boundary elements approach by polynomials.
@@ -64,7 +64,7 @@ def mesh_of(cell: RoundCell, order: int, layers: int, closed: float) -> RoundMes
 
     Parameters
     ----------
-    cell : Cell
+    cell : RoundCell
         What is meshed.
     order : int
         Of the potential; faces are approached by polynomials of one more.
@@ -272,7 +272,7 @@ class _Grading:
 
     Attributes
     ----------
-    cell : Cell
+    cell : RoundCell
         What is meshed.
     any : bool
         Whether some were marked.

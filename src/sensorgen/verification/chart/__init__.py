@@ -41,7 +41,7 @@ def silent(scenes: Sequence[str], found: Sequence[ChartPoint]) -> list[SilentMod
     ----------
     scenes : sequence of str
         Of ``SCENES``.
-    found : sequence of Point
+    found : sequence of ChartPoint
         What the others gave there.
     """
     spoke = {(p.scene, p.model.partition(":")[0]) for p in found}

@@ -99,9 +99,9 @@ def judged(item: ThesisItem, parts: Sequence[ItemPart]) -> ItemVerdict:
 
     Parameters
     ----------
-    item : Item
+    item : ThesisItem
         A misprint or a difference that is announced has to be found, and one that is found has to be announced.
-    parts : sequence of Part
+    parts : sequence of ItemPart
         What was computed.
     """
     wrong = [part for part in parts if not abs(part.off()) <= item.tolerance]

@@ -35,9 +35,9 @@ class Arranged:
 
     Attributes
     ----------
-    plan : Plan
+    plan : BatchPlan
         As read.
-    pieces : tuple of Piece
+    pieces : tuple of PrintPiece
         In the random order in which the plate is filled.
     room : Room
         What the plate has to offer.
@@ -69,7 +69,7 @@ class Batch:
     ----------
     folder : Path
         Where the files are.
-    record : Record
+    record : BatchRecord
         As in ``batch.json``.
     findings : dict of str to list of Finding
         Findings about each design printed alone, by its name.

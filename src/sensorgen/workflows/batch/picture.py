@@ -62,7 +62,7 @@ def svg(title: str, printer: Printer, room: Room, plate: Plate, pieces: Sequence
         What the plate had to offer.
     plate : mapping of int to Rect
         Place of each specimen.
-    pieces : sequence of Piece
+    pieces : sequence of PrintPiece
         The specimens, by the same numbers.
     """
     bed = bed_of(printer)

@@ -18,7 +18,7 @@ class PrintPiece:
 
     Attributes
     ----------
-    specimen : Specimen
+    specimen : SpecimenName
         Its name.
     design : Design
         What it is; copies share one.
@@ -41,7 +41,7 @@ def pieces(plan: BatchPlan, folder: Path) -> tuple[PrintPiece, ...]:
 
     Parameters
     ----------
-    plan : Plan
+    plan : BatchPlan
         Checked.
     folder : Path
         What the plan's design files are relative to.
@@ -71,7 +71,7 @@ def shuffled(found: Sequence[PrintPiece], seed: int) -> tuple[PrintPiece, ...]:
 
     Parameters
     ----------
-    found : sequence of Piece
+    found : sequence of PrintPiece
         In any order.
     seed : int
         Another seed, another order.

@@ -90,7 +90,7 @@ class PrintedDesign:
         Name of the specimen that was read, and of its design.
     prediction : Prediction or None
         Its prediction; None if the print cannot be read.
-    layers : tuple of Row
+    layers : tuple of LayerVolume
         Printed over drawn volume.
     findings : tuple of Finding
         Rule 7.
@@ -177,7 +177,7 @@ class BatchRecord:
         What is done by hand before, at and after the print.
     bake : tuple of Bake
         As in the plan.
-    specimens : dict of str to Specimen
+    specimens : dict of str to PlateSpecimen
         By name, in the order of the plate.
     predictions : dict of str to Prediction
         What each design should measure, by its identity: of the first slicer's print, else of the estimated one.

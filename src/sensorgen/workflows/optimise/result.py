@@ -113,7 +113,7 @@ class Recommended:
         With its files; "" where it was not built.
     verdict : str
         Of the build.
-    robust : dict of str to Spread
+    robust : dict of str to ObjectiveSpread
         Objectives over walls of slicers, and lengths in the plane by the tolerance to both sides.
     sliced : dict of str to Bounds
         Objectives by the G-code of a real slicer.

@@ -70,7 +70,7 @@ class Row:
         Why it was not evaluated; "" if it was.
     certified : bool
         Whether the discard is proven; else it holds by the models.
-    known : dict of str to Known
+    known : dict of str to EarlyNumber
         Numbers before it was evaluated.
     trial : Trial or None
         The design tried.
