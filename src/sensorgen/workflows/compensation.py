@@ -32,7 +32,8 @@ _STEP = log(1.12)  # from one width or period to the next, in logarithms
 _SHARES = (log(0.5), log(5.0))  # of its own value, that a width or a period may take, in logarithms
 _STIFFNESS = "stiffness_kpa_per_mm"
 _ACCURACY = 1e-2  # of a capacitance, relative
-_HALVINGS = 12  # of a step between two widths
+_TRIES = 12  # between two widths
+_STEEPEST = 5.0  # power of a width or period that a capacitance may follow; steeper, lines come or go [-]
 _MOST_TRIED, _MOST_SOLVED = 250, 30  # designs whose gap, and whose capacitance is found, before it gives up
 _PERIODS = 4  # of a sensor by which prints are estimated
 _MOST_PRESSED = 12  # designs whose stiffness is found
@@ -333,8 +334,7 @@ class _CompensationSearch:
             if here and before:
                 one, other = before[1].off(self.wanted), here.off(self.wanted)
                 if (one > 0) != (other > 0):
-                    hit = self._between(heights, key, start, (before[0], share), one > 0)
-                    return hit, abs(share)
+                    return self._between(heights, key, start, ((before[0], one), (share, other))), abs(share)
                 if abs(other) > abs(one):  # the other way
                     break
             before = (share, here) if here else None
@@ -342,15 +342,19 @@ class _CompensationSearch:
         return None, inf
 
     def _between(
-        self, heights: _Changes, key: Key, start: float, ends: tuple[float, float], above: bool
+        self, heights: _Changes, key: Key, start: float, ends: tuple[tuple[float, float], tuple[float, float]]
     ) -> CompensatedDesign | None:
+        """Regula falsi and halvings in turn from two shares with values of :meth:`Found.off`; None at a jump."""
         low, high = ends
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2
-            here = self._at(heights | {key: start * exp(middle)})
+        for k in range(_TRIES):
+            if abs(high[1] - low[1]) > _STEEPEST * abs(high[0] - low[0]):
+                return None
+            share = low[0] + (high[0] - low[0]) * (0.5 if k % 2 else low[1] / (low[1] - high[1]))
+            here = self._at(heights | {key: start * exp(share)})
             if here is None or abs(here.off(self.wanted)) <= WITHIN / 4:
                 return here
-            low, high = (middle, high) if (here.off(self.wanted) > 0) == above else (low, middle)
+            middle = share, here.off(self.wanted)
+            low, high = (middle, high) if (middle[1] > 0) == (low[1] > 0) else (low, middle)
         return None
 
     def _at(self, changes: _Changes) -> CompensatedDesign | None:
