@@ -18,11 +18,11 @@ from pydantic import Field
 from sensorgen.core.errors import BadInput, NotInstalled, UnknownName
 from sensorgen.core.records import Line, Strict, checked
 from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import PYMEASURE, Actuator, ImpedanceMeter, Meter, Role, Stage
+from sensorgen.measure.lab.devices import PYMEASURE, Actuator, FrameMeter, ImpedanceMeter, Meter, Role, Stage
 from sensorgen.measure.virtual.plant import Plant
 
 GROUP = "sensorgen.devices"
-Device = Actuator | Stage | ImpedanceMeter | Meter
+Device = Actuator | Stage | ImpedanceMeter | Meter | FrameMeter
 
 
 @dataclass(frozen=True)
@@ -272,6 +272,16 @@ def _scpi(name: str) -> Kind:
     )  # fmt: skip
 
 
+def _frames() -> Kind:
+    from sensorgen.measure.lab import frame_stream, port
+
+    def at(address: str, given: frame_stream.Settings, clock: Clock) -> Device:
+        line = port.TcpPort(address) if "://" in address else port.SerialPort(address, given.baud)
+        return frame_stream.FrameStream(line, clock)
+
+    return Kind("array", frame_stream.Settings, at)
+
+
 def _pymeasure(name: str) -> Kind:
     from sensorgen.measure.lab import pymeasure_meters
 
@@ -283,5 +293,6 @@ _KINDS: dict[str, Callable[[], Kind]] = {
     "smac-lcc10": _smac,
     "reprapfirmware": _reprap,
     "handyscope-hs5": _handyscope,
+    "frame-stream": _frames,
     **{name: partial(_scpi, name) for name in ("hp-4284a", "keysight-e4980a", "hp-34401a", "keithley-2000")},
 }

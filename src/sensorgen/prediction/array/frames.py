@@ -13,6 +13,7 @@ from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.document import Column, Facts, Part, Table, comma_separated, to_json
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
+from sensorgen.prediction.array.elements import doubtful_time
 from sensorgen.prediction.array.model import PA_PER_KPA, ArrayModel
 from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayReadout, own_slopes
 from sensorgen.prediction.array.sessions import ArrayCalibration
@@ -42,7 +43,7 @@ class PressureMaps:
     by : str
         Model that inverted the readings, and why.
     time_s : (k,) array
-        Of each frame [s].
+        Of each frame; nan where it is not known [s].
     pressure_kpa, sigma_kpa : (k, m, n) array
         Pressure on the surface and its standard error of noise and scatter alone; nan where it is not determined [kPa].
     calibration : ArrayCalibration or None
@@ -142,6 +143,9 @@ class PressureMaps:
             yield from self.model.shared()
             yield from self.model.beyond(self.peak_kpa)
         yield from (f"doubtful: {doubt}" for doubt in self.model.crossing.doubts)
+        if np.isnan(self.time_s).any():
+            yield "no time_s: times of the frames are not known"
+        yield from doubtful_time(self.time_s)
 
     def _names(self, k: int) -> str:
         """First crossings that a frame does not determine."""
@@ -377,9 +381,8 @@ class MapInverter:
         given = _known(sigma) & self.alive & np.isfinite(ratio) & self._same_sign(siemens)
         if calibration:
             by += f"; {calibration.law.form.words()} of each element, calibrated"
-            shape = ratio.shape
-            mean, half = calibration.of_ratio(ratio.reshape(shape[0], -1), time_s, calibration.counted(day))
-            pressure, sigma = PA_PER_KPA * mean.reshape(shape), PA_PER_KPA / NORMAL_90 * half.reshape(shape)
+            mean, half = calibration.of_ratio(ratio, time_s, calibration.counted(day))
+            pressure, sigma = PA_PER_KPA * mean, PA_PER_KPA / NORMAL_90 * half
         shown, error_kpa = (np.where(given, each / PA_PER_KPA, np.nan) for each in (pressure, sigma))
         return PressureMaps(self.model, by, time_s, shown, error_kpa, calibration)
 
