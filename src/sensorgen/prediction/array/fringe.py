@@ -5,8 +5,8 @@ the space beside it, with both as mirrors; the cell is the homogeneous layer tha
 
 .. math:: C = C_0 (1 + f_x)(1 + f_y)
 
-The product leaves the corners out: 0.3 % of C by finite volumes in three dimensions. Of what closing a crossing changes,
-closing its neighbour changes 0.5 %.
+The product leaves the corners out: 0.3 % of C by finite volumes in three dimensions. Of what closing a crossing does,
+closing its neighbour does 0.5 %.
 """
 
 from collections.abc import Mapping
