@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 from shapely.affinity import translate
 
-from sensorgen.core.arrays import Real
+from sensorgen.core.arrays import Real, Whole
 from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.connections import groups
@@ -229,16 +229,29 @@ def _cell(scene: Scene) -> _Cell:
         raise ValueError(f"{slanted.name} is slanted or curved in elevation: its layers are no prisms")
     levels = np.unique(np.array([z for b in scene.bodies for p in b.pieces for z in p.span("z")]).round(9))
     levels = levels[np.append(True, np.diff(levels) > SLIVER_MM)]
-    parts = []
-    for low, high in pairwise(levels.tolist()):
-        middle = (low + high) / 2
-        outlines: dict[Body, list[shapely.Polygon]] = defaultdict(list)
-        for body in scene.bodies:
-            for p in body.pieces:
-                if p.span("z")[0] < middle < p.span("z")[1]:
-                    outlines[body].append(shapely.Polygon(seen_from_above(p)))
-        parts.append((low, high, {body: shapely.union_all(own) for body, own in outlines.items()}))
-    patterned = [region for *_, own in parts for region in own.values()]
+    layers = [(low, high, _outlines(scene, (low + high) / 2)) for low, high in pairwise(levels.tolist())]
+    patterned = [region for *_, own in layers for region in own.values()]
+    x, y = _sides(scene, patterned)
+    whole = shapely.box(x.low_mm, y.low_mm, x.high_mm, y.high_mm)
+    half = halved((x, y), [shapely.intersection(r, whole) for r in dict.fromkeys(patterned)])
+    try:
+        return _numbered(levels.tolist(), _within(layers, *half), *half)
+    except _Uncovered as error:
+        return _surrounded(scene, levels.tolist(), layers, x, y, error.gap_mm)
+
+
+def _outlines(scene: Scene, z_mm: float) -> dict[Body, Region]:
+    """Region of each body at a height, of upright pieces."""
+    outlines: dict[Body, list[shapely.Polygon]] = defaultdict(list)
+    for body in scene.bodies:
+        for p in body.pieces:
+            if p.span("z")[0] < z_mm < p.span("z")[1]:
+                outlines[body].append(shapely.Polygon(seen_from_above(p)))
+    return {body: shapely.union_all(own) for body, own in outlines.items()}
+
+
+def _sides(scene: Scene, patterned: Sequence[Region]) -> tuple[Repeat, Repeat]:
+    """The repeating part along x and y, by what its regions show, or of boxes by their planes."""
     if any(scene.repeats) or not all(p.is_box() for body in scene.bodies for p in body.pieces):
         x, y = (
             Repeat.of(0.0, scene.size_mm[axis], True, scene.size_mm[axis])
@@ -246,17 +259,11 @@ def _cell(scene: Scene) -> _Cell:
             else repeat(patterned, scene.size_mm, axis)
             for axis in (0, 1)
         )
-    else:  # the mirrors of :mod:`sensorgen.models.fem3d`
-        bodies = list(scene.bodies)
-        boxes = raster(scene, bodies.index, len(bodies), [(0.0, size) for size in scene.size_mm])
-        x = _mirrored(boxes.planes_mm[0], boxes.shares[:, 0])
-        y = _mirrored(boxes.planes_mm[1], boxes.shares[0] / boxes.shares[0, 0])
-    whole = shapely.box(x.low_mm, y.low_mm, x.high_mm, y.high_mm)
-    half = halved((x, y), [shapely.intersection(r, whole) for r in dict.fromkeys(patterned)])
-    try:
-        return _numbered(levels.tolist(), _within(parts, *half), *half)
-    except _Uncovered as error:
-        return _surrounded(scene, levels.tolist(), parts, x, y, error.gap_mm)
+        return x, y
+    bodies = list(scene.bodies)  # the mirrors of :mod:`sensorgen.models.fem3d`
+    boxes = raster(scene, bodies.index, len(bodies), [(0.0, size) for size in scene.size_mm])
+    y_shares = boxes.shares[0] / boxes.shares[0, 0]
+    return _mirrored(boxes.planes_mm[0], boxes.shares[:, 0]), _mirrored(boxes.planes_mm[1], y_shares)
 
 
 class _Uncovered(ValueError):
@@ -375,16 +382,8 @@ def _numbered(
     every = np.concatenate([shapely.transform(plans, lambda p, to=to: p + to) for to in images])
     one, other = shapely.STRtree(every).query(every, predicate="dwithin", distance=SLIVER_MM) % max(count, 1)
     near = abs(slab[one] - slab[other]) < 2
-    label = groups(count, one[near], other[near])
-    numbers: dict[int, int] = {}
-    for end, name in ((BOTTOM, "bottom"), (TOP, "top")):
-        for piece in {int(label[k]) for k, (_, terminal, _) in enumerate(pieces) if terminal == name}:
-            if numbers.setdefault(piece, end) != end:
-                raise ValueError("the electrodes touch: the capacitance grows without bound")
-    for piece in label.tolist():
-        numbers.setdefault(piece, len({*numbers.values(), BOTTOM, TOP}))
-    conductors = len({*numbers.values(), BOTTOM, TOP})
-    kinds = np.array([numbers[piece] for piece in label.tolist()])
+    kinds = _conductors(groups(count, one[near], other[near]).tolist(), [terminal for _, terminal, _ in pieces])
+    conductors = len({BOTTOM, TOP, *kinds.tolist()})
     uncovered = _uncovered(plans, kinds, sizes)
     low, high = int(slab[kinds == BOTTOM].min()), int(slab[kinds == TOP].max())
     if uncovered:  # the field leaves the electrodes
@@ -392,20 +391,36 @@ def _numbered(
     names = [*sorted({b.material for own in inside[low : high + 1] for b in own if not b.terminal} - {"air"}), "air"]
     regions = []
     for k in range(low, high + 1):
-        here = {
-            kind: shapely.union_all(plans[(slab == k) & (kinds == kind)])
-            for kind in np.unique(kinds[slab == k]).tolist()
-        }
-        for body, region in inside[k].items():
-            if not body.terminal and body.material != "air" and not region.is_empty:
-                kind = conductors + names.index(body.material)
-                here[kind] = shapely.union_all([here.get(kind, region), region])
-        regions.append(here)
+        here = kinds[slab == k]
+        metal = {kind: shapely.union_all(plans[slab == k][here == kind]) for kind in np.unique(here).tolist()}
+        regions.append(metal | _dielectrics(inside[k], conductors, names))
     heights = tuple(levels_mm[low : high + 2])
     gap_mm = _gap_mm(regions, heights, conductors)
     if uncovered and not air_mm:
         raise _Uncovered(uncovered, gap_mm)
     return _Cell(x, y, heights, regions, conductors, names, gap_mm, air_mm)
+
+
+def _dielectrics(own: Mapping[Body, Region], first: int, names: Sequence[str]) -> dict[int, Region]:
+    """Region of each dielectric of a layer, numbered by its material; air is left out."""
+    found: dict[int, Region] = {}
+    for body, region in own.items():
+        if not body.terminal and body.material != "air" and not region.is_empty:
+            kind = first + names.index(body.material)
+            found[kind] = shapely.union_all([found.get(kind, region), region])
+    return found
+
+
+def _conductors(connected: Sequence[int], terminals: Sequence[str]) -> Whole:
+    """Number of the conductor that each piece is a part of; raises ValueError where bottom and top are connected."""
+    numbers: dict[int, int] = {}
+    ends = {"bottom": BOTTOM, "top": TOP}
+    for piece, terminal in zip(connected, terminals, strict=True):
+        if terminal in ends and numbers.setdefault(piece, ends[terminal]) != ends[terminal]:
+            raise ValueError("the electrodes touch: the capacitance grows without bound")
+    for piece in connected:
+        numbers.setdefault(piece, len({*numbers.values(), BOTTOM, TOP}))
+    return np.array([numbers[piece] for piece in connected], int)
 
 
 def _uncovered(plans: np.ndarray, kinds: np.ndarray, sizes_mm: tuple[float, float]) -> str:

@@ -93,18 +93,22 @@ def drawn(figure: Figure, panels: Sequence[Panel], title: str = "") -> "Drawn":
         axes.set_axis_off()
     for k, (axes, panel) in enumerate(zip(grid, panels, strict=False)):
         _panel(axes, panel, figure)
-        if panel.solid:
-            axes.set(xlabel=panel.x.title, ylabel=panel.y.title, zlabel=panel.z.title)
-        else:  # titles of the axes: across under the last panel of those alike, upwards at the first one
-            below, before = panels[k + columns : k + columns + 1], panels[k - 1 : k] if k % columns else ()
-            axes.set_xlabel("" if below and below[0].x.title == panel.x.title else panel.x.title)
-            axes.set_ylabel("" if before and before[0].y.title == panel.y.title else panel.y.title)
+        _titled(axes, panel, panels[k + columns : k + columns + 1], panels[k - 1 : k] if k % columns else ())
     handles = [axes.get_legend_handles_labels() for axes in grid]
     named = {label: handle for pair in handles for handle, label in zip(*pair, strict=True)}
     if named and not figure.beside:  # every name once, under the panels
         ncols = min(len(named), 6 if canvas.get_figwidth() > 9 else 4)
         canvas.legend(named.values(), named.keys(), loc="outside lower left", ncols=ncols, frameon=False)
     return canvas
+
+
+def _titled(axes: "Axes", panel: Panel, below: Sequence[Panel], before: Sequence[Panel]) -> None:
+    """Titles of the axes: across under the last panel of those alike, upwards at the first one."""
+    if panel.solid:
+        axes.set(xlabel=panel.x.title, ylabel=panel.y.title, zlabel=panel.z.title)
+        return
+    axes.set_xlabel("" if below and below[0].x.title == panel.x.title else panel.x.title)
+    axes.set_ylabel("" if before and before[0].y.title == panel.y.title else panel.y.title)
 
 
 def _panel(axes: "Axes", panel: Panel, figure: Figure) -> None:

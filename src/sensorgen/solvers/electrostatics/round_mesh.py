@@ -6,6 +6,7 @@ the field is infinite (hp-refinement), and where bodies are near each other.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 from math import atan2, pi
 from typing import Any
 
@@ -166,19 +167,26 @@ def _shape(cell: RoundCell, cusps: Sequence[tuple[DomeTouch, float]]) -> tuple[A
         for one in shape.solids:
             one.name = name
     whole = occ.Glue([one for _, shape in named for one in shape.solids]).solids
-    metal, kept = ([one for one in whole if (one.name[0] == "c") == held] for held in (True, False))
-    held: dict[str, list[Any]] = {}
-    for one in [one for one in kept if one.name[0] == "t"] + metal:
+    metal, dielectrics = ([one for one in whole if (one.name[0] == "c") == is_metal] for is_metal in (True, False))
+    faces = _named_faces([one for one in dielectrics if one.name[0] == "t"] + metal)
+    conductors = [faces.get(f"c{k}", []) for k in range(cell.conductors)]
+    places = [{_key(v.p) for face in own for v in face.vertices} for own in conductors]
+    if not dielectrics or any(a & b for a, b in combinations(places, 2)):
+        raise Unsolved("the electrodes touch: the capacitance grows without bound")
+    _refuse_open(cell, dielectrics)
+    grading = _Grading(cell)
+    grading.mark([face for name, own in faces.items() if name[0] == "c" for face in own])
+    return occ.Compound(dielectrics), grading
+
+
+def _named_faces(solids: Sequence[Any]) -> dict[str, list[Any]]:
+    """Faces of solids by their solid's name, which they get; round ones are marked."""
+    faces: dict[str, list[Any]] = {}
+    for one in solids:
         for face in one.faces:
             face.name = one.name + (ROUND if (face.name or "").endswith(ROUND) else "")
-        held.setdefault(one.name, []).extend(one.faces)
-    places = [{_key(v.p) for f in held.get(f"c{k}", ()) for v in f.vertices} for k in range(cell.conductors)]
-    if not kept or any(a & b for k, a in enumerate(places) for b in places[:k]):
-        raise Unsolved("the electrodes touch: the capacitance grows without bound")
-    _refuse_open(cell, kept)
-    grading = _Grading(cell)
-    grading.mark([face for name, faces in held.items() if name[0] == "c" for face in faces])
-    return occ.Compound(kept), grading
+        faces.setdefault(one.name, []).extend(one.faces)
+    return faces
 
 
 def _refuse_open(cell: RoundCell, kept: Sequence[Any]) -> None:
