@@ -80,7 +80,7 @@ def test_the_forward_model_is_the_sensor(name):
 @pytest.mark.parametrize("name", SENSORS)
 def test_without_noise_every_press_comes_back(name):
     sensor, tones = SENSORS[name]
-    force, position = presses(6000)
+    force, position = presses(2000)
     found = estimate(sensor, tones, readings(sensor, tones, force, position))
     told = found.status <= Status.AMBIGUOUS
     assert told.mean() > 0.9
@@ -177,7 +177,7 @@ def test_the_thesis_plate_senses_neither():
 
 def test_noise_above_the_signal_says_nothing():
     sensor, tones = SENSORS["5 ohm m, tones to 1 MHz"]
-    z = noisy(readings(sensor, tones, *presses(300)), 0.5)
+    z = noisy(readings(sensor, tones, *presses(150)), 0.5)
     found = estimate(sensor, tones, z, 0.5)
     assert np.mean(found.status == Status.NOT_IDENTIFIABLE) > 0.9  # the logarithm of such noise has a long tail: no fit
     assert (found.status >= Status.NOT_IDENTIFIABLE).mean() > 0.96
@@ -371,7 +371,7 @@ def test_blocks_do_not_show():
 def test_a_wide_posterior_is_better_than_least_squares():
     """Noise above signal: presses from the prior, so that the posterior mean has the least error that there is."""
     rng = np.random.default_rng(5)
-    force, position = rng.uniform(0, 6, 1500), rng.uniform(0, 0.1, 1500)
+    force, position = rng.uniform(0, 6, 900), rng.uniform(0, 0.1, 900)
     z = noisy(readings(PLATE, TONES, force, position), 3e-3)
     plain = Estimator(PLATE, TONES, 3e-3, force_limit_n=6.0).batch(z)
     known = Estimator(PLATE, TONES, 3e-3, Prior(), force_limit_n=6.0).batch(z)

@@ -3,7 +3,7 @@
 Each parameter is a standard normal number before calibration; its unit is the standard deviation of the prior.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import pairwise
@@ -224,7 +224,7 @@ class SpecimenModel:
         if frequency_hz is not None:
             at = np.array(at)
             at[..., [self._at["lead"], self._at["stray"]]] = -np.inf
-        return next(self._read(at, nothing, (False,), frequency_hz=frequency_hz))[..., 0, :]
+        return self._read(at, nothing, (False,), frequency_hz=frequency_hz)[0][..., 0, :]
 
     def ratio(self, at: Real, presses: Presses, changes: Real | None = None) -> Complex:
         """Ln of pressed over rest.
@@ -246,7 +246,7 @@ class SpecimenModel:
         if changes is None:
             pressed, free = self._read(at, presses, (True, False))
         else:  # since the rest reading
-            (pressed,), (free,) = self._read(at, presses, (True,), changes), self._read(at, presses, (False,))
+            pressed, free = self._read(at, presses, (True,), changes)[0], self._read(at, presses, (False,))[0]
         return pressed - free
 
     def _pressed(
@@ -268,8 +268,8 @@ class SpecimenModel:
     def _read(
         self, at: Real, presses: Presses, loads: Sequence[bool], changes: Real | None = None,
         frequency_hz: Real | None = None,
-    ) -> Iterator[Complex]:  # fmt: skip
-        """Ln of the impedance that the bench reads, with the tip down or not."""
+    ) -> Complex:  # fmt: skip
+        """Ln of the impedance that the bench reads, with the tip down or not, along the first axis."""
         sensor = self.sensor
         value = {name: self.value(name, at)[..., None] for name in self.names}
         rise, c, r = np.moveaxis(np.zeros(3) if changes is None else changes, -1, 0)[..., None]
@@ -286,14 +286,14 @@ class SpecimenModel:
         tracks = [(whole * np.exp(self._bent(value, start, end)))[..., None] for start, end in pairwise(ends)]
         films, lengths = [leak + stored] * len(tracks), [one[..., None] for one in np.diff(ends, axis=0)]
         stray, lead = (value[name][..., None] for name in ("stray", "lead"))
-        for loaded in loads:
-            own, film = list(tracks), list(films)
-            if loaded:
-                lifted, stress = self._pressed(at, value, presses, length, rise)
-                film[_PIECES] = leak + stored * lifted[..., None]
-                own[_PIECES] = own[_PIECES] + (stress * by_pressure)[..., None]
-            z = line.cascade(own, film, lengths, sensor.far_end)
-            yield np.asarray(np.log(lead + 1 / (1 / z + 1j * omega * stray)))
+        if any(loads):
+            lifted, stress = self._pressed(at, value, presses, length, rise)
+            down = np.reshape(loads, (-1, *[1] * (lifted.ndim + 1)))
+            films[_PIECES] = leak + stored * np.where(down, lifted[..., None], 1.0)
+            tracks[_PIECES] = tracks[_PIECES] + down * (stress * by_pressure)[..., None]
+        z = line.cascade(tracks, films, lengths, sensor.far_end)
+        found = np.asarray(np.log(lead + 1 / (1 / z + 1j * omega * stray)))
+        return found if any(loads) else found[None]
 
     def _film(self, value: Mapping[str, Real], c: Real, omega: Real) -> tuple[Complex, Complex]:
         """Admittance of the film with nothing on it [S/m]: of its leak, and of what rises with C."""
@@ -313,16 +313,26 @@ class SpecimenModel:
         return ln
 
     def slopes(self, at: Real, presses: Presses) -> Real:
-        """Derivatives of the ratio's real and imaginary parts by the parameters, (n, 2 m, p)."""
-        return slopes(lambda near: parts(self.ratio(near, presses)), at)
+        """Derivatives of the ratio's real and imaginary parts by the parameters, (n, 2 m, p).
+
+        Parameters of the rise alone have a part in the derivative by ln of the rise.
+        """
+        ln = np.log(np.maximum(presses.force_n + self.value("force offset", at), _NOTHING_N))
+        by = np.array([np.interp(ln, np.log(FORCES_N), weights) for weights in self.law_weights().T])
+        for name, course in (("hysteresis", presses.unloading), ("creep", presses.decades)):
+            by[self._at[name]] = self.value(name, at) * np.nan_to_num(course)
+        found = self.scatters(at, presses, [0]) * by.T[:, None, :]
+        others = [k for k, name in enumerate(self.names) if not name.startswith(("rise", "hysteresis", "creep"))]
+        found[..., others] = slopes(lambda near: parts(self.ratio(near, presses)), at, others)
+        return found
 
     def rest_slopes(self, at: Real) -> Real:
         """Derivatives of the rest reading's parts by the parameters, (2 m, p)."""
         return slopes(lambda near: parts(self.rest(near)), at)
 
-    def scatters(self, at: Real, presses: Presses) -> Real:
+    def scatters(self, at: Real, presses: Presses, which: Sequence[int] = range(3)) -> Real:
         """Derivatives of the ratio's parts by ln of the rise, of C and of R since the rest reading, (n, 2 m, 3)."""
-        return slopes(lambda changes: parts(self.ratio(at, presses, changes)), np.zeros(3))
+        return slopes(lambda changes: parts(self.ratio(at, presses, changes)), np.zeros(3), which)
 
 
 def _interpolated(ln_force: Real, knots: Real) -> Real:
