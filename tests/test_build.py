@@ -56,6 +56,7 @@ def test_rebuilt_it_is_the_same_to_the_byte(whole, tmp_path):
     sealed = [json.loads(files.pop("manifest.json")) for files in (again, first)]
     for kept in sealed:
         kept["files"].pop("trix-d0.2.step", None)
+        del kept["sha256"]
         kept["versions"].pop("build123d", None)
     assert again == first
     assert sealed[0] == sealed[1]

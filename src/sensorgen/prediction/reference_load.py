@@ -18,6 +18,7 @@ from sensorgen.prediction.results import Changes, Term
 
 SOURCES = "sources"
 _STEPS = 4  # of Gauss and Newton, to a press that is misread
+_SETTLED = 1e-6  # of the force and of the length: a last step
 _PARALLEL = 1e-9  # of the larger direction, below which another one does not tell; of a press, what is rounding
 _MOST = 20.0  # force that a press is misread as, over its own [-]
 
@@ -117,13 +118,15 @@ class ReferenceLoad:
 
         Least squares of the logarithms, by Gauss-Newton steps that stay on the sensor and within its law.
         """
-        force = self.force_n
-        own, sought, scale = self._own, read.shift(), np.array([force, self.sensor.length_m])
+        own, sought, scale = self._own, read.shift(), np.array([self.force_n, self.sensor.length_m])
         at = np.array(self.at)
         for _ in range(_STEPS):
             by = np.column_stack([_parts(own.by_force / own.pressed), _parts(own.by_position / own.pressed)])
             step = np.linalg.lstsq(by * scale, sought - own.shift(), rcond=_PARALLEL)[0]
-            after = np.clip(at + step * scale, 0.0, [_MOST * force, self.sensor.length_m])
+            after = np.clip(at + step * scale, 0.0, [_MOST * self.force_n, self.sensor.length_m])
+            if (np.abs(after - at) <= _SETTLED * scale).all():
+                at = after
+                break
             try:
                 pressed = self.sensor.response(self._frequency, *after.tolist())
             except OutOfRange:
