@@ -6,6 +6,7 @@ import shutil
 import signal
 import sys
 from contextlib import suppress
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -15,10 +16,15 @@ with suppress(ValueError):  # not in the main thread
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job would hand down a deaf ear
 
 
+_NUMBERS = count()
+
+
 def _own_folders(monkeypatch, tmp_path_factory, cache):
     """Whatever the user, or another test, has kept is out of sight."""
-    monkeypatch.setenv("SENSORGEN_CACHE", str(cache))
-    own = tmp_path_factory.mktemp("own")  # one folder: those of ten thousand tests take time to make and to remove
+    # one folder, apart: `mktemp` looks at those of all tests before
+    own = tmp_path_factory.getbasetemp() / "own" / str(next(_NUMBERS))
+    own.mkdir(parents=True)
+    monkeypatch.setenv("SENSORGEN_CACHE", str(cache or own / "cache"))
     monkeypatch.setenv("SENSORGEN_LOG", str(own / "log.db"))
     monkeypatch.setenv("BROWSER", "true")  # opens nothing
     monkeypatch.setenv("SENSORGEN_BUDGET", "0")  # changes of designs are tried by the tests of that alone
@@ -47,7 +53,7 @@ def _cache(request, monkeypatch, tmp_path_factory, session_cache):
     """A test that patches, or is marked `own_cache`, neither reads nor keeps predictions of others."""
     patches = "monkeypatch" in request.node._fixtureinfo.argnames and "shared_cache" not in request.fixturenames
     own = patches or request.node.get_closest_marker("own_cache")
-    _own_folders(monkeypatch, tmp_path_factory, tmp_path_factory.mktemp("cache") if own else session_cache)
+    _own_folders(monkeypatch, tmp_path_factory, None if own else session_cache)
 
 
 @pytest.fixture
@@ -76,6 +82,15 @@ def unpredicted(_cache):
     import no_numbers
 
     with no_numbers.unpredicted():
+        yield
+
+
+@pytest.fixture
+def at_rest(unpressed):
+    """No design is predicted under a load: for tests that look at capacitance, resistance and gap alone."""
+    import no_numbers
+
+    with no_numbers.at_rest():
         yield
 
 
