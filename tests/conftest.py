@@ -137,6 +137,16 @@ def browser(program, _started, tmp_path_factory):
     return _started[-1]
 
 
+@pytest.fixture(scope="session")
+def forked():
+    """Run a command in a process of its own, see :class:`forks.Forks`."""
+    from forks import Forks
+
+    forks = Forks()
+    yield forks
+    forks.close()
+
+
 @pytest.fixture
 def newer_program():
     """Path of a slicer of Debian 13, newer than this machine's own; without it a test is skipped, but never on CI."""

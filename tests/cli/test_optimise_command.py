@@ -164,7 +164,8 @@ def test_discards_on_a_coarse_mesh_hold_or_are_taken_back(monkeypatch):
         return {"force_resolution_n": ladder.Known(film if film != 0.4 else 9.0, film if film != 0.4 else 9.0, False)}
 
     monkeypatch.setattr(ladder, "known", lying)
-    search_ = found(objectives={"force_resolution_n": "minimise"})
+    films = {"dielectric_mm": {"from": 0.1, "to": 0.4}}
+    search_ = found(parameters=films, objectives={"force_resolution_n": "minimise"})
     assert search_.largest > 1.5
     assert search_.margin > search_.largest
     assert not any(row.discarded == "dominated" for row in search_.rows if row.candidate.values["dielectric_mm"] == 0.4)
@@ -362,6 +363,7 @@ def test_the_example_of_the_page_is_a_target(tmp_path):
     assert load(Path(__file__).parents[2] / "bench" / "best-tri.yaml").refuse_warnings == ("2-film",)
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_the_best_are_built_and_the_page_needs_nothing_else(tmp_path, run):
     (tmp_path / "plates.yaml").write_text(json.dumps(PLATES))
     said = run("optimise", "plates.yaml", "--no-gcode", "--jobs", "1")

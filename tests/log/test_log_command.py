@@ -138,7 +138,6 @@ def test_a_prediction_is_kept_when_it_is_made(run, path):
     assert "is sound: 3 rows" in run("verify").out
 
 
-@pytest.mark.usefixtures("at_rest")
 def test_a_prediction_ahead_of_the_measurement(run, path, tmp_path):
     said = run("multimeter", "26 triX .1mm", "--y", "650", "--predict")
     assert (said.code, said.err) == (0, "")
@@ -159,7 +158,6 @@ def test_a_prediction_ahead_of_the_measurement(run, path, tmp_path):
         assert predictions[1].design_id == readings[2].design_id
 
 
-@pytest.mark.usefixtures("at_rest")
 def test_a_print_beds_own_design_is_the_one_that_is_predicted(run, path, tmp_path):
     (tmp_path / "batch.json").write_text(json.dumps(BATCH))
     run("import", "batch.json")
