@@ -21,7 +21,7 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import Query
 from sensorgen.workflows.optimise import ladder, recommend, result
-from sensorgen.workflows.optimise.result import Recommended, Spread
+from sensorgen.workflows.optimise.result import ObjectiveSpread, Recommended
 from sensorgen.workflows.optimise.sample import _objectives, sample
 from sensorgen.workflows.optimise.search import Row, Searched, search
 from sensorgen.workflows.optimise.space import MOST, Candidate, candidates, space
@@ -161,7 +161,9 @@ def test_discards_on_a_coarse_mesh_hold_or_are_taken_back(monkeypatch):
 
     def lying(design, query, solve):
         film = design.params.dielectric_mm
-        return {"force_resolution_n": ladder.Known(film if film != 0.4 else 9.0, film if film != 0.4 else 9.0, False)}
+        return {
+            "force_resolution_n": ladder.EarlyNumber(film if film != 0.4 else 9.0, film if film != 0.4 else 9.0, False)
+        }
 
     monkeypatch.setattr(ladder, "known", lying)
     films = {"dielectric_mm": {"from": 0.1, "to": 0.4}}
@@ -297,7 +299,7 @@ def test_ties_and_what_cannot_be_sensed_are_shown(plate):
         (">", 1.0, 0.5, "cannot locate", *answer.table().cells[0][5:]),
         ("=", 2.0, 0.51, "cannot locate", *answer.table().cells[1][5:]),
     ]
-    robust = {"position_resolution_mm": Spread(20, 20, 50, 60)}
+    robust = {"position_resolution_mm": ObjectiveSpread(20, 20, 50, 60)}
     sliced = {"force_resolution_n": Bounds.of(0.55, "N"), "position_resolution_mm": Bounds.of(50, "mm")}
     one = Recommended("best force", answer.front[0], ties=(2,), robust=robust, sliced=sliced, slicer="Prusa 2")
     shown = list(text(replace(answer, recommended=(one,)).document()))

@@ -8,7 +8,7 @@ import pytest
 
 from sensorgen.design import design
 from sensorgen.export.slicers import curaengine, prusa
-from sensorgen.export.slicers.loads import Load
+from sensorgen.export.slicers.loads import ToolLoad
 from sensorgen.scene.geometry import meshes
 from sensorgen.workflows.build import build
 from sensorgen.workflows.moves import changed
@@ -76,7 +76,7 @@ def test_prusaslicer_prints_every_body_on_its_tool(
 @variants
 def test_curaengine_prints_every_body_on_its_tool(name, length_mm, tmp_path, cura_engine, record_property):
     variant = loaded(name, length_mm)
-    loads = {variant.tool(m): Load(design.material_files.load(m), source) for m, source in variant.used().items()}
+    loads = {variant.tool(m): ToolLoad(design.material_files.load(m), source) for m, source in variant.used().items()}
     settings = curaengine.engine_settings(variant.machine, variant.layers, loads)
     bodies = [
         (stl(tmp_path, variant, b), variant.machine.slicer_index(variant.tool(b.material)))

@@ -17,11 +17,13 @@ from sensorgen.core.files import reading
 from sensorgen.core.units import si
 
 MOST_BYTES = 4_000_000_000
+_TIME = re.compile(r"(t|time|timestamp)[ _(\[]*(s|ms|us|ns|min|h)?[)\]]?", re.IGNORECASE)
 _CROSSING = re.compile(r"r(\d+)c(\d+)")
 _TRUE = ("1", "1.0", "true")
 KEYS = ("siemens", "capacitance_f")
 REFERENCES = ("pressure_kpa", "force_n", "element", "day", "area_mm2")
 _KNOWN = (*KEYS, "reading", "time_s", "rest", "frequency_hz", *REFERENCES)
+_BESIDE = ("time_s", "frequency_hz", "day")
 _HDF = (".h5", ".hdf5", ".hdf")
 BINARY = (".npz", *_HDF)
 
@@ -35,7 +37,7 @@ class Frames:
     siemens : (k, m, n) array
         Readings [S]; nan where one is missing or saturated. Of capacitances alone the real part is nan.
     time_s : (k,) array
-        Of each frame; its number where none is known [s].
+        Of each frame; nan where none is known [s].
     rest : (k,) array of bool
         Frames with nothing on the array.
     frequency_hz : float
@@ -68,8 +70,7 @@ def read(path: Path, shape: tuple[int, int], frequency_hz: float | None) -> Fram
     ----------
     path : Path
         NPZ or HDF5 with ``siemens`` (frames, rows, columns), complex, or ``capacitance_f``, and perhaps ``time_s``,
-        ``rest``, ``frequency_hz``; or CSV with a row per frame, columns ``r1c1`` ... [F], and perhaps ``time_s`` and
-        ``rest``.
+        ``rest``, ``frequency_hz``; or CSV with a row per frame, columns ``r1c1`` ... [F], and perhaps the same.
     shape : (int, int)
         Rows and columns of the array.
     frequency_hz : float, optional
@@ -78,13 +79,15 @@ def read(path: Path, shape: tuple[int, int], frequency_hz: float | None) -> Fram
     Raises
     ------
     BadInput
-        A file that is neither, has frames of another size, or no frequency or another.
+        A file that is neither, has frames of another size, times that do not rise or are not ``time_s``, or no
+        frequency or another.
     """
     with reading(path):
         if path.stat().st_size > MOST_BYTES:
             raise BadInput(f"{path}: {path.stat().st_size / 1e9:.1f} GB; expected at most {MOST_BYTES / 1e9:g} GB")
         found, unused = numbers(path) if path.suffix in BINARY else _of_csv(path, shape)
     try:
+        _refuse_times(unused)
         return replace(_checked(found, shape, frequency_hz), unused=tuple(unused))
     except BadInput as error:
         raise error.within(str(path)) from None
@@ -105,14 +108,28 @@ def _checked(found: dict[str, np.ndarray], shape: tuple[int, int], frequency_hz:
     count = len(values)
     true = found.get("pressure_kpa", np.zeros(0))
     return Frames(
-        values.astype(complex), _each(found, "time_s", np.arange(float(count))),
+        values.astype(complex), rising(_each(found, "time_s", np.full(count, np.nan)).astype(float)),
         np.nan_to_num(_each(found, "rest", np.zeros(count)).astype(float)) != 0, hertz,
         true if true.shape == values.shape else None, day=float(np.ravel(found.get("day", np.nan))[0]),
     )  # fmt: skip
 
 
+def rising(time_s: Real) -> Real:
+    """Times of one recording, each later than the one before, or none at all; BadInput of others [s]."""
+    if not (np.diff(time_s) > 0).all() and not np.isnan(time_s).all():
+        raise BadInput("time_s does not rise from each frame to the next; expected seconds of one session")
+    return time_s
+
+
+def _refuse_times(unused: Sequence[str]) -> None:
+    """Refuse columns of time in another unit, or by another name."""
+    if wrong := next((name for name in unused if _TIME.fullmatch(name)), None):
+        raise BadInput(f"{wrong!r:.40} is not read; expected the time as time_s, in seconds")
+
+
 def _frequency(found: dict[str, np.ndarray], given: float | None) -> float:
-    own = found.get("frequency_hz", np.zeros(1)).ravel()
+    own = np.ravel(found.get("frequency_hz", np.zeros(1)))
+    own = np.unique(own[np.isfinite(own)])
     hertz = (float(own[0]) if own.size == 1 else 0.0) or given or 0.0
     if given and not math.isclose(hertz, given, rel_tol=1e-6):
         raise BadInput(f"frequency_hz is {si(hertz, 'Hz')}; expected {si(given, 'Hz')}, as given or of the readings")
@@ -144,10 +161,10 @@ def numbers(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
 def _of_hdf(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     from sensorgen.measure.recording import hdf
     from sensorgen.measure.recording.matfive import Split
-    from sensorgen.measure.recording.spool import Spool
+    from sensorgen.measure.recording.spool import FileSpool
 
     with within(str(path)):
-        found = hdf.variables(path, _KNOWN, Spool())
+        found = hdf.variables(path, _KNOWN, FileSpool())
     for key, value in found.items():
         values = value.real + 1j * value.imag if isinstance(value, Split) else np.asarray(value)
         if values.dtype.kind not in "bifuc":
@@ -179,10 +196,10 @@ def _of_csv(path: Path, shape: tuple[int, int]) -> tuple[dict[str, np.ndarray], 
     values = np.full((len(next(iter(columns.values()))), *shape), np.nan)
     for name, (i, j) in crossings.items():
         values[:, i, j] = column(columns[name], path)
-    found = {"capacitance_f": values} | {key: column(columns[key], path) for key in ("time_s",) if key in columns}
+    found = {"capacitance_f": values} | {key: column(columns[key], path) for key in _BESIDE if key in columns}
     if "rest" in columns:
         found["rest"] = marked(columns["rest"])
-    return found, sorted({*columns} - {*crossings, "time_s", "rest", ""})
+    return found, sorted({*columns} - {*crossings, *_BESIDE, "rest", ""})
 
 
 def marked(words: Sequence[str]) -> Mask:

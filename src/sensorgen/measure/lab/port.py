@@ -5,6 +5,8 @@ by then. Only the waiting for an answer lets a simulated clock pass, so that no 
 """
 
 import http.client
+import select
+import socket
 import urllib.parse
 import warnings
 from collections.abc import Iterator
@@ -17,6 +19,7 @@ from sensorgen.measure.lab.clock import Clock, RealClock
 from sensorgen.measure.lab.devices import DeviceFault
 from sensorgen.measure.virtual.plant import Simulator
 
+_TCP_S = 5.0  # until a device has answered
 _POLL_S = 0.005  # of the serial driver; half a period of the fastest control loop
 
 
@@ -116,6 +119,56 @@ class SerialPort:
         """Give the line back."""
         with suppress(OSError):
             self._line.close()
+
+
+class TcpPort:
+    """A line over TCP.
+
+    Parameters
+    ----------
+    address : str
+        ``tcp://10.0.0.5:7000``.
+
+    Raises
+    ------
+    BadInput
+        The address is none of TCP.
+    DeviceFault
+        Nothing answers there.
+    """
+
+    def __init__(self, address: str) -> None:
+        with suppress(ValueError):
+            parts = urllib.parse.urlsplit(address)
+            if parts.scheme == "tcp" and parts.hostname and parts.port:
+                self.address, self._received = address, bytearray()
+                with _faults(address):
+                    self._line = socket.create_connection((parts.hostname, parts.port), timeout=_TCP_S)
+                return
+        raise BadInput(f"address {address!r:.80}; expected one of TCP with its port, as tcp://10.0.0.5:7000")
+
+    def write(self, data: bytes) -> None:
+        """Send; DeviceFault if the line is cut."""
+        with _faults(self.address):
+            self._line.sendall(data)
+
+    def read_until(self, end: bytes, timeout_s: float) -> bytes:
+        """Received bytes up to and including an end, fewer when the time is over [s]."""
+        clock = RealClock()
+        until = clock.now() + timeout_s
+        with _faults(self.address):
+            while end not in self._received:
+                ready, _, _ = select.select([self._line], [], [], max(until - clock.now(), 0.0))
+                if not ready:
+                    break
+                if not (more := self._line.recv(1 << 16)):
+                    raise ConnectionError("closed by the device")
+                self._received += more
+        return _taken(self._received, end)
+
+    def close(self) -> None:
+        """Give the line back."""
+        self._line.close()
 
 
 class SimulatedPort:

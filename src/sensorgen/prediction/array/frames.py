@@ -13,12 +13,13 @@ from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.document import Column, Facts, Part, Table, comma_separated, to_json
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
+from sensorgen.prediction.array.elements import doubtful_time
 from sensorgen.prediction.array.model import PA_PER_KPA, ArrayModel
 from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayReadout, own_slopes
 from sensorgen.prediction.array.sessions import ArrayCalibration
 from sensorgen.prediction.array.study import DETECTED, DETERMINED
 from sensorgen.prediction.inverse.verdict import NORMAL_90
-from sensorgen.solvers.tracks import Readings, readings
+from sensorgen.solvers.tracks import CrossingReadings, readings
 
 SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration of each
 _STEPS = 25  # of Gauss-Newton with the slopes at rest
@@ -42,7 +43,7 @@ class PressureMaps:
     by : str
         Model that inverted the readings, and why.
     time_s : (k,) array
-        Of each frame [s].
+        Of each frame; nan where it is not known [s].
     pressure_kpa, sigma_kpa : (k, m, n) array
         Pressure on the surface and its standard error of noise and scatter alone; nan where it is not determined [kPa].
     calibration : ArrayCalibration or None
@@ -142,6 +143,9 @@ class PressureMaps:
             yield from self.model.shared()
             yield from self.model.beyond(self.peak_kpa)
         yield from (f"doubtful: {doubt}" for doubt in self.model.crossing.doubts)
+        if np.isnan(self.time_s).any():
+            yield "no time_s: times of the frames are not known"
+        yield from doubtful_time(self.time_s)
 
     def _names(self, k: int) -> str:
         """First crossings that a frame does not determine."""
@@ -204,11 +208,11 @@ class MapInverter:
                 f"{self.model.here.size} crossings by two terminals; expected at most {MOST_DENSE}: read it guarded"
             )
 
-    def read(self, capacitance_f: Real) -> Readings:
+    def read(self, capacitance_f: Real) -> CrossingReadings:
         """Readings of the network, with the shorts that the readings at rest show."""
         return self._network(capacitance_f, self.leaks_s)
 
-    def _network(self, capacitance_f: Real, leaks_s: Real) -> Readings:
+    def _network(self, capacitance_f: Real, leaks_s: Real) -> CrossingReadings:
         return readings(
             replace(self.model.tracks(capacitance_f), leak_s=leaks_s), self.readout.frequency_hz[0],
             readout=self.readout.kind, input_ohm=self.readout.input_ohm,
@@ -233,7 +237,7 @@ class MapInverter:
         return np.isfinite(self.rest_s.real) & self.alive, self.alive
 
     @cached_property
-    def nominal(self) -> Readings:
+    def nominal(self) -> CrossingReadings:
         """Readings of the array as predicted, at rest."""
         return self._network(self.model.capacitances(), np.zeros(self.model.here.shape))
 
@@ -377,9 +381,8 @@ class MapInverter:
         given = _known(sigma) & self.alive & np.isfinite(ratio) & self._same_sign(siemens)
         if calibration:
             by += f"; {calibration.law.form.words()} of each element, calibrated"
-            shape = ratio.shape
-            mean, half = calibration.of_ratio(ratio.reshape(shape[0], -1), time_s, calibration.counted(day))
-            pressure, sigma = PA_PER_KPA * mean.reshape(shape), PA_PER_KPA / NORMAL_90 * half.reshape(shape)
+            mean, half = calibration.of_ratio(ratio, time_s, calibration.counted(day))
+            pressure, sigma = PA_PER_KPA * mean, PA_PER_KPA / NORMAL_90 * half
         shown, error_kpa = (np.where(given, each / PA_PER_KPA, np.nan) for each in (pressure, sigma))
         return PressureMaps(self.model, by, time_s, shown, error_kpa, calibration)
 
