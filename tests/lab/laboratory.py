@@ -99,7 +99,7 @@ def outcome(folder: Path, faults: tuple[Planted, ...] = (), **changes: Any) -> t
 def verdict(found: run.RunResult, lab: Laboratory, what: str) -> list[str]:
     """What is unsafe about the end of a run, by the mechanism's own record; and what is missing in its report."""
     at, wrong = lab.mechanism, []
-    at.advance(lab.clock.now() + 30.0)
+    at.advance(lab.clock.now() + 10.0)
     known = "stage" in lab.rig.started  # before, the tip is as it was found
     if at.force_n > 0 or (known and at.tip_mm < 1.0):
         wrong.append(f"tip at {at.tip_mm:.2f} mm")

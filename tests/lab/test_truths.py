@@ -21,7 +21,7 @@ from sensorgen.prediction.calibration.materials import estimate, source_text
 MATERIALS = ("resistivity_ohm_m", "relative_permittivity", "youngs_modulus_pa")
 
 
-@pytest.fixture(scope="module", params=[10, pytest.param(60, marks=pytest.mark.nightly)], ids="of {}".format)
+@pytest.fixture(scope="module", params=[8, pytest.param(60, marks=pytest.mark.nightly)], ids="of {}".format)
 def outcomes(request):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

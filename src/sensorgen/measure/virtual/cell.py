@@ -26,7 +26,7 @@ _BULK = 1000.0  # Lame's first constant over the shear modulus at most: with the
 _ROUNDS = 40
 _SETTLED = 1e-7  # of the energy's fall, relative to the load's work
 _SMALLEST_STEP = 1e-2  # of a load step, before it is given up
-_GAUSS = 0.5 / np.sqrt(3)
+_GAUSS, _ADJUGATE = 0.5 / np.sqrt(3), np.array([[1, -1], [-1, 1]])  # signs of a matrix turned by half a turn
 _FLAT = 1e-9  # of the height: rows that are flatter have none
 _MOST_DIRECT = 15_000  # unknowns of a field that is solved by factors
 _RESIDUAL = 1e-8  # relative, of larger ones
@@ -281,7 +281,7 @@ class _Body:
         """Deformation gradients (e, 2^d, d, d) and their determinants (e, 2^d)."""
         moved = u.reshape(self.grid.fixed.shape)[self.grid.nodes]
         f = np.eye(moved.shape[-1]) + moved.swapaxes(1, 2)[:, None] @ self.grid.shapes[0]
-        return f, _determinants(f)
+        return f, np.linalg.det(f) if f.shape[-1] > 2 else f[..., 0, 0] * f[..., 1, 1] - f[..., 0, 1] * f[..., 1, 0]
 
     def energy(self, u: Real, pressure: float) -> float:
         """Of strain less the load's work; infinite where an element is turned inside out."""
@@ -306,7 +306,8 @@ class _Body:
         air = self.air[:, None]
         twice = np.where(air, _AIR_BULK * self.shear[:, None], (self.bulk * mean)[:, None] * j)  # by ln J, twice
         by_ln = np.where(air, self.shear[:, None] * (_AIR_BULK * np.log(j) - 1), twice - self.shear[:, None])
-        b = g @ _inverses(f, j)  # derivatives of ln J
+        inverse = np.linalg.inv(f) if d > 2 else f[..., ::-1, ::-1].swapaxes(2, 3) * _ADJUGATE / j[..., None, None]
+        b = g @ inverse  # derivatives of ln J
         stretch, flat = w * self.shear[:, None], b.reshape(elements, points, -1)
         force = (stretch[..., None, None] * (g @ f.swapaxes(2, 3)) + (w * by_ln)[..., None, None] * b).sum(1)
         turned = _products(w * by_ln, flat).reshape(elements, corners, d, corners, d).swapaxes(2, 4)
@@ -314,8 +315,7 @@ class _Body:
         k = k - turned.reshape(k.shape)
         volume = ((w * j)[:, None] @ flat)[:, 0]
         k = k + (self.bulk / w.sum(1))[:, None, None] * volume[:, :, None] * volume[:, None, :]
-        own = self.hourglass @ u[self.dofs][..., None]
-        return force.reshape(elements, -1) + own[..., 0], k + self.hourglass
+        return force.reshape(elements, -1) + (self.hourglass @ u[self.dofs][..., None])[..., 0], k + self.hourglass
 
     def settled(self, u: Real, pressure: float) -> Real | None:
         """Displacements in equilibrium, by Newton's method with a search along each step; None if there is none."""
@@ -347,19 +347,6 @@ class _Body:
             if fall < _SETTLED * work and share == 1.0:
                 return u
         return None
-
-
-def _determinants(of: Real) -> Real:
-    """Determinants of matrices (..., d, d); in the plane in a tenth of LAPACK's time."""
-    return of[..., 0, 0] * of[..., 1, 1] - of[..., 0, 1] * of[..., 1, 0] if of.shape[-1] == 2 else np.linalg.det(of)
-
-
-def _inverses(of: Real, determinants: Real) -> Real:
-    """Inverses of matrices (..., d, d) whose determinants are known."""
-    if of.shape[-1] > 2:
-        return np.linalg.inv(of)
-    adjugate = np.array([[of[..., 1, 1], -of[..., 0, 1]], [-of[..., 1, 0], of[..., 0, 0]]])
-    return np.moveaxis(adjugate / determinants, (0, 1), (-2, -1))
 
 
 def _products(weight: Real, of: Real) -> Real:
