@@ -28,7 +28,7 @@ from sensorgen.design.tip import EVEN, STIFF
 from sensorgen.scene.scene import Envelope, Fill, Scene
 
 if TYPE_CHECKING:
-    from sensorgen.design.arrays import Layout
+    from sensorgen.design.arrays import ArrayLayout
     from sensorgen.design.shape_files import Shape
 
 ARRAY = "array"  # shape of crossing tracks, with cells of another one
@@ -254,7 +254,7 @@ class Design(Strict):
         return borders.cut(scene, self.border) if self.border else scene
 
     @cached_property
-    def layout(self) -> "Layout | None":
+    def layout(self) -> "ArrayLayout | None":
         """Tracks of an array in plan; None of any other sensor."""
         if self.shape != ARRAY:
             return None

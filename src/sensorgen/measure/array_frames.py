@@ -166,10 +166,10 @@ def numbers(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
 def _of_hdf(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     from sensorgen.measure.recording import hdf
     from sensorgen.measure.recording.matfive import Split
-    from sensorgen.measure.recording.spool import Spool
+    from sensorgen.measure.recording.spool import FileSpool
 
     with within(str(path)):
-        found = hdf.variables(path, _KNOWN, Spool())
+        found = hdf.variables(path, _KNOWN, FileSpool())
     for key, value in found.items():
         values = value.real + 1j * value.imag if isinstance(value, Split) else np.asarray(value)
         if values.dtype.kind not in "bifuc":

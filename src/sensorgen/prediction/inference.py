@@ -129,15 +129,15 @@ def whitening(covariance: Real) -> Real:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
 
 
-def slopes(function: Callable[[Real], Real], at: Real) -> Real:
-    """Derivatives by p parameters (..., p): central differences of a function of points (2 p, p)."""
-    step = np.eye(len(at)) * STEP
+def slopes(function: Callable[[Real], Real], at: Real, which: Sequence[int] | slice = slice(None)) -> Real:
+    """Derivatives by p parameters, or some of them (..., p): central differences of a function of points (2 p, p)."""
+    step = np.eye(len(at))[which] * STEP
     more, less = np.split(function(np.concatenate([at + step, at - step])), 2)
     return np.moveaxis(more - less, 0, -1) / (2 * STEP)
 
 
 @dataclass
-class Fit(Samples):
+class LocalFit(Samples):
     """Sum of squares near points, for n samples of p parameters.
 
     Attributes
@@ -203,10 +203,10 @@ class LeastSquares(ABC):
     """First damping where a step failed, relative to the information."""
 
     @abstractmethod
-    def fit(self, at: Real, rows: Index) -> Fit:
+    def fit(self, at: Real, rows: Index) -> LocalFit:
         """Sum of squares of some samples at points."""
 
-    def step(self, fit: Fit, damping: Real) -> Real:
+    def step(self, fit: LocalFit, damping: Real) -> Real:
         """Damped step within reach and bounds (n, p)."""
         information = fit.information * (1 + damping[:, None, None] * np.eye(fit.at.shape[1]))
         step = self._reachable(_solved(information, fit.gradient))
@@ -226,12 +226,12 @@ class LeastSquares(ABC):
             return step
         return np.asarray(step * self.reach / np.maximum(self.reach, np.abs(step).max(1, keepdims=True)))
 
-    def done(self, fit: Fit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
+    def done(self, fit: LocalFit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
         """Samples of which this is the last step, by it and by its gain in the sum of squares."""
         return np.asarray(np.abs(step).max(1) < self.settled)
 
 
-def descend(problem: LeastSquares, start: Real) -> Fit:
+def descend(problem: LeastSquares, start: Real) -> LocalFit:
     """Least squares by damped Gauss-Newton (Levenberg and Marquardt), many samples together.
 
     A step that is short because it is strongly damped is not the last.

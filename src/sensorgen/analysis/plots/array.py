@@ -10,7 +10,7 @@ from sensorgen.analysis.plots.figure import GREY, Axis, Curve, Figure, Map, Pane
 from sensorgen.core.arrays import Real
 
 if TYPE_CHECKING:
-    from sensorgen.design.arrays import Layout
+    from sensorgen.design.arrays import ArrayLayout
     from sensorgen.prediction.array.frames import PressureMaps
     from sensorgen.prediction.array.study import ArrayStudy
 
@@ -76,7 +76,7 @@ def course(pressures: "PressureMaps", true: "Real", name: str, title: str) -> Fi
     return Figure(name, title, alt, {"": tuple(panels)}, columns=2)
 
 
-def panel(layout: "Layout", values: Real, label: str, title: str, most: float = nan) -> Panel:
+def panel(layout: "ArrayLayout", values: Real, label: str, title: str, most: float = nan) -> Panel:
     """One map of a value of every crossing, with the outline of the print."""
     import shapely
 

@@ -6,7 +6,7 @@ from math import nan
 from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison
-from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, Body, Curve, Figure, Panel
+from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, BodyTriangles, Curve, Figure, Panel
 from sensorgen.analysis.plots.pages import Drawing
 from sensorgen.checks.review import draw
 from sensorgen.core.document import Column, Table
@@ -109,11 +109,11 @@ def errors(card: Identifiability) -> tuple[Panel, Panel]:
     return panels[0], panels[1]
 
 
-def _bodies(design: Design) -> Iterator[Body]:
+def _bodies(design: Design) -> Iterator[BodyTriangles]:
     """The bodies of the sensor in use, as triangles."""
     for body in design.in_use.bodies:
         body_mesh = mesh(body)
-        yield Body(
+        yield BodyTriangles(
             body.name.replace("_", " "),
             body_mesh.vertices_mm,
             body_mesh.triangles,

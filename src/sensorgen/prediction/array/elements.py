@@ -266,7 +266,7 @@ def features(session: ArraySession, form: LawForm, scale: float, tare: "Real | N
 
 
 @dataclass(frozen=True, eq=False)
-class Law:
+class ElementLaw:
     """Law of every element, by the sessions that it was learnt of.
 
     Attributes
@@ -324,20 +324,20 @@ def responding(sums: Sequence[Sums]) -> Mask:
     return np.asarray((count == 0) | (explained > _RESPONDS * square))
 
 
-def learnt(sums: Sequence[Sums], form: LawForm, scale: float, alive: Mask) -> Law:
+def learnt(sums: Sequence[Sums], form: LawForm, scale: float, alive: Mask) -> ElementLaw:
     """Law of every element by empirical Bayes: EM over the print's mean, covariance and noise; dead ones left out."""
     day = float(np.mean([s.day for s in sums]))
     days = np.array([s.day for s in sums]) - day
     at, spread = _expected(sums, np.ones(len(days)), alive)
     if not np.ptp(days):
-        return Law(form, scale, at, spread, day, 0.0, 0.0, alive)
+        return ElementLaw(form, scale, at, spread, day, 0.0, 0.0, alive)
     rate, error = _drift(sums, days, at)
     if not form.drift:
-        return Law(form, scale, at, spread, day, 0.0, float(np.hypot(rate, error)), alive)
+        return ElementLaw(form, scale, at, spread, day, 0.0, float(np.hypot(rate, error)), alive)
     for _ in range(_ROUNDS):
         at, spread = _expected(sums, np.exp(rate * days), alive)
         rate, error = _drift(sums, days, at)
-    return Law(form, scale, at, spread, day, rate, error, alive)
+    return ElementLaw(form, scale, at, spread, day, rate, error, alive)
 
 
 def _drift(sums: Sequence[Sums], days: Real, at: Real) -> tuple[float, float]:

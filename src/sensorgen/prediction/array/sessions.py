@@ -20,7 +20,7 @@ from sensorgen.prediction.array.elements import (
     TARE_S,
     UNLOADED,
     ArraySession,
-    Law,
+    ElementLaw,
     LawForm,
     Past,
     Sums,
@@ -49,7 +49,7 @@ class ArrayCalibration:
 
     Attributes
     ----------
-    law : Law
+    law : ElementLaw
         Of every element.
     floor_kpa, share : float
         Error besides that of the parameters: constant [kPa], and relative to the pressure [-].
@@ -65,7 +65,7 @@ class ArrayCalibration:
         Of the elements; none where they are numbered.
     """
 
-    law: Law
+    law: ElementLaw
     floor_kpa: float
     share: float
     reach: float
@@ -166,7 +166,7 @@ def stored(path: Path) -> ArrayCalibration:
         with reading(path), np.load(path, allow_pickle=False) as data:
             powers, tau_s, drift, tared = data["form"].tolist()
             day, rate, unsure, floor, share, reach, common = data["numbers"].tolist()
-            law = Law(
+            law = ElementLaw(
                 LawForm(int(powers), tau_s, bool(drift), bool(tared)), float(data["scale"]), data["at"], data["spread"],
                 day, rate, unsure, data["alive"],
             )  # fmt: skip
@@ -189,13 +189,13 @@ def training(sessions: Sequence[ArraySession], held_out: int) -> list[ArraySessi
     return [session for k, session in enumerate(sessions) if k != held_out]
 
 
-def law_of(sessions: Sequence[ArraySession], form: LawForm) -> Law:
+def law_of(sessions: Sequence[ArraySession], form: LawForm) -> ElementLaw:
     """Law of every element by sessions, of a given form."""
     scale = scale_of(sessions, form)
     return _law([sums_of(session, form, scale) for session in sessions], form, scale)
 
 
-def _law(sums: Sequence[Sums], form: LawForm, scale: float) -> Law:
+def _law(sums: Sequence[Sums], form: LawForm, scale: float) -> ElementLaw:
     alive = responding(sums)
     if not alive.any():
         raise BadInput("no element's reading follows its reference; expected half of its variance or more of one")
@@ -243,7 +243,7 @@ def _left_out(sessions: Sequence[ArraySession], form: LawForm) -> float:
     return float(np.mean(found))
 
 
-def _error(own: Sums, law: Law) -> float:
+def _error(own: Sums, law: ElementLaw) -> float:
     at = np.exp(law.drift * (own.day - law.day)) * law.at
     if own.count.any():
         left = own.square - 2 * np.einsum("nq,nq->n", at, own.cross) + np.einsum("nq,nqr,nr->n", at, own.gram, at)
@@ -278,7 +278,7 @@ def calibrated(sessions: Sequence[ArraySession], form: "LawForm | None" = None) 
     return ArrayCalibration(law, floor, share, reach, common, tares, quiet, names)
 
 
-def _residuals(session: ArraySession, law: Law) -> tuple[Real, Real, Real]:
+def _residuals(session: ArraySession, law: ElementLaw) -> tuple[Real, Real, Real]:
     """Errors, pressures and standard errors by the parameters, of loaded frames evenly taken [kPa]."""
     mean, sigma = law.pressures(session)
     size = np.abs(session.pressure_kpa)
