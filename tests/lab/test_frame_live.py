@@ -144,6 +144,21 @@ def test_a_cut_line_ends_it_with_what_came(model, tmp_path):
     assert len(read(tmp_path / "f.csv", (2, 3), None).siemens) == 50
 
 
+def test_a_full_disk_is_a_fault(model):
+    clock = SimulatedClock()
+    feed = feed_of(walker(100.0), clock)
+    clock.wait_until(0.5)
+
+    class Full:
+        def add(self, *_):
+            raise OSError(28, "No space left on device")
+
+    feed.recorder = Full()
+    feed.run()
+    with pytest.raises(DeviceFault, match="recording: No space left on device"):
+        follow(feed, LiveMaps(model, ArrayReadout()), None, clock, 10.0)
+
+
 def shown(model, view, clock):
     """Feed of a walked array, of which the page has some frames."""
     readout = ArrayReadout()

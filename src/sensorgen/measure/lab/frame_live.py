@@ -15,7 +15,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import FrameMeter
+from sensorgen.measure.lab.devices import DeviceFault, FrameMeter
 from sensorgen.measure.lab.frame_recorder import FrameFile
 from sensorgen.measure.lab.live import LiveView
 
@@ -111,6 +111,8 @@ class FrameFeed:
             while not self._over.is_set():
                 if not self.step():
                     self.clock.wait_until(self.clock.now() + _IDLE_S)
+        except OSError as error:
+            self.fault = DeviceFault(f"recording: {error.strerror or error}; record on another disk")
         except Exception as error:  # raised where the frames are taken
             self.fault = error
 
