@@ -87,7 +87,7 @@ class Log:
     """
 
     def __init__(self, path: Path, *, create: bool = False) -> None:
-        self.path = path
+        self.path = path = Path(path)
         self._connection = database.connect(path, create=create)
 
     def __enter__(self) -> Self:
@@ -466,6 +466,18 @@ class Log:
         )
         found = next(self._rows(sql, [NAMES[type(entry)], entry.number]), None)
         return self._row(*found) if found else None
+
+    def conflicts(self) -> list[str]:
+        """Corrections that two machines have made of one row, of which none is withdrawn."""
+        sql = (
+            "SELECT row.number, other.number FROM record row, record other WHERE row.kind = ?1 AND row.number IS NOT "  # noqa: S608
+            f"NULL AND row.supersedes IS NOT NULL AND row.uid NOT IN ({_WITHDRAWN}) AND {_PREFERRED}"
+        )
+        return [
+            f"conflict: {word(kind)}s {row} and {other} correct the same row; {other} counts: withdraw one of the two"
+            for kind in (Reading, BenchRun)
+            for row, other in self._rows(sql, [NAMES[kind]])
+        ]
 
     def _with_print(self, entry: Reading | BenchRun, writer: "_Writer") -> Reading | BenchRun:
         """Entry with batch and design of the specimen's latest print."""
