@@ -137,6 +137,7 @@ def test_of_two_corrections_of_one_row_the_same_one_counts_everywhere_until_a_pe
     withdraw(b, "reading", next(r.number for r in b.readings(superseded=True) if r.uid == counts.uid), "typing error")
     withdraw(b, "reading", next(r.number for r in b.readings(superseded=True) if r.uid == other), "typing error")
     assert b.readings() == ()
+    assert b.conflicts() == []
     assert sound(a, b)
 
 
