@@ -328,7 +328,7 @@ class Design(Strict):
         for name, source in sorted(self.used().items()):
             stuff[name] = self.material(name).model_dump(exclude=_LIMITS) | {"source": source}
         return {
-            **self.model_dump(exclude={"name", "parameters", "printer", "quality", "waivers"} | self._plain()),
+            **self.model_dump(exclude={"name", "parameters", "printer", "quality"} | self._plain()),
             "parameters": self._decisive_parameters(),
             "materials_values": stuff,
             "printer_values": self.machine.model_dump(exclude=_LIMITS),
@@ -345,7 +345,7 @@ class Design(Strict):
         """Parts that have come later and are not used: without them the identities of older designs last."""
         usual = {
             "profile": Profile(), "tip": TipData(), "effects": Effects(), "own": {}, "geometry": None, "bodies": {},
-            "border": None, "leads": Leads(), "cell": None, "regions": {},
+            "border": None, "leads": Leads(), "cell": None, "regions": {}, "waivers": (),
         }  # fmt: skip
         return {key for key, value in usual.items() if getattr(self, key) == value}
 
@@ -357,7 +357,7 @@ class Design(Strict):
     def id(self) -> str:
         """Hash of all resolved parameters and material values; not of the design's name, nor of sensorgen's version."""
         data = _FIRST | self._lasting(self.resolved())
-        for key in ("own", "tip", "regions"):  # values of materials and machines are there without the words around
+        for key in ("own", "tip", "regions", "waivers"):  # what decides of them is in materials and machines
             data.pop(key, None)
         if self._shape_text is not None:
             data["shape_text"] = self._shape_text
