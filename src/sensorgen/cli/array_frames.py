@@ -34,8 +34,8 @@ def invert(design: "Design", task: "Task", frames: ArrayFrames, *, perfect: bool
         model, how, read_in.siemens, read_in.rest, read_in.time_s, frames.scatter, apart, read_in.unused,
         known(frames.calibration), read_in.day,
     )  # fmt: skip
-    if task.output or task.terminal:
-        _write(maps, task.output or "-")
+    if output := task.output or "-" * task.terminal:
+        _write(maps, output)
     if frames.plot is not None:
         from sensorgen.analysis.plots import array
 
@@ -43,7 +43,7 @@ def invert(design: "Design", task: "Task", frames: ArrayFrames, *, perfect: bool
         render.file(frames.plot / f"{design.name}-map.png", array.maps(maps, true), "wrote ")
     for piece in render.pieces(maps, render.form()):
         render.say(piece, nl=False, err=task.terminal)
-    if not (task.output or task.terminal):
+    if not output:
         render.say("--output FILE.npz writes the maps, FILE.csv force and centre of pressure of every frame")
     return 0
 
