@@ -165,7 +165,7 @@ def _numbers_of(words: np.ndarray, names: Sequence[str], count: int) -> np.ndarr
 
 def _of_csv(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     """Columns of a table, and the names of its elements."""
-    with csv_table.opened(path) as table:
+    with csv_table.opened(str(path)) as table:
         refuse_repeated(table.names, {})
         names = [name for name in table.names if name and name not in _OTHER]
         if not names:

@@ -19,7 +19,7 @@ from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayR
 from sensorgen.prediction.array.sessions import ArrayCalibration
 from sensorgen.prediction.array.study import DETECTED, DETERMINED
 from sensorgen.prediction.inverse.verdict import NORMAL_90
-from sensorgen.solvers.tracks import CrossingReadings, readings
+from sensorgen.solvers.tracks import CrossingReadings, Tracks, readings
 
 SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration of each
 _STEPS = 25  # of Gauss-Newton with the slopes at rest
@@ -213,7 +213,7 @@ class PressureMaps:
 
 
 @dataclass
-class Plan:
+class MapPlan:
     """Choice between C/C0 and the network, by the heaviest frame so far; changed by further frames of a recording.
 
     Attributes
@@ -274,9 +274,13 @@ class MapInverter:
 
     def _network(self, capacitance_f: Real, leaks_s: Real) -> CrossingReadings:
         return readings(
-            replace(self.model.tracks(capacitance_f), leak_s=leaks_s), self.readout.frequency_hz[0],
+            replace(self._tracks, capacitance_f=capacitance_f, leak_s=leaks_s), self.readout.frequency_hz[0],
             readout=self.readout.kind, input_ohm=self.readout.input_ohm,
         )  # fmt: skip
+
+    @cached_property
+    def _tracks(self) -> Tracks:
+        return self.model.tracks()
 
     @cached_property
     def leaks_s(self) -> Real:
@@ -418,13 +422,13 @@ class MapInverter:
         off = (np.abs(network - ratio) / self.error)[counted]
         return float(np.where(np.isnan(off), np.inf, off).max(initial=0.0))
 
-    def planned(self, siemens: Complex, plan: "Plan | None" = None) -> tuple[Real, Real, str]:
+    def planned(self, siemens: Complex, plan: "MapPlan | None" = None) -> tuple[Real, Real, str]:
         """Capacitance over that at rest (k, m, n), its error by noise (m, n), and by which model, and why.
 
         C/C0 where it agrees with the network in the heaviest frame, else the network. Of a plan that goes on, frames
         are compared that are heavier by a tenth than all before.
         """
-        ratio, error, plan = self.by_ratio(siemens), self.error, plan or Plan()
+        ratio, error, plan = self.by_ratio(siemens), self.error, plan or MapPlan()
         loads = np.nansum(np.where(self.alive, ratio - 1, 0), (1, 2))
         heaviest = int(loads.argmax())
         if not plan.network and loads[heaviest] > _HEAVIER * plan.load:
@@ -440,7 +444,7 @@ class MapInverter:
 
     def maps(
         self, siemens: Complex, time_s: Real, calibration: "ArrayCalibration | None" = None, day: float = nan,
-        plan: "Plan | None" = None, past: "Past | None" = None,
+        plan: "MapPlan | None" = None, past: "Past | None" = None,
     ) -> PressureMaps:  # fmt: skip
         """Pressure maps of frames, by the law of the cell, or of each element where they are calibrated."""
         ratio, error, by = self.planned(siemens, plan)
