@@ -85,6 +85,15 @@ def unpredicted(_cache):
         yield
 
 
+@pytest.fixture
+def at_rest(unpressed):
+    """No design is predicted under a load: for tests that look at capacitance, resistance and gap alone."""
+    import no_numbers
+
+    with no_numbers.at_rest():
+        yield
+
+
 @pytest.fixture(autouse=True, scope="module")
 def one_kernel():
     """build123d and NGSolve bring two versions of one CAD kernel, which crash together: tests load one or the other."""
@@ -126,6 +135,16 @@ def browser(program, _started, tmp_path_factory):
         _started.append(Page(chromium, tmp_path_factory.mktemp("chromium")))
     _started[-1].renew()
     return _started[-1]
+
+
+@pytest.fixture(scope="session")
+def forked():
+    """Run a command in a process of its own, see :class:`forks.Forks`."""
+    from forks import Forks
+
+    forks = Forks()
+    yield forks
+    forks.close()
 
 
 @pytest.fixture

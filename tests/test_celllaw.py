@@ -63,7 +63,7 @@ def test_a_cell_of_boxes_is_solved_in_three_dimensions(monkeypatch):
     from sensorgen.models import press3d
     from sensorgen.prediction import compression_law as celllaw
 
-    monkeypatch.setattr(press3d, "Pieces", partial(press3d.Pieces, 2))
+    monkeypatch.setattr(press3d, "BrickCounts", partial(press3d.BrickCounts, 2))
     monkeypatch.setattr(celllaw, "STRESS_PA", (0.0, 6e4))
     cell = make({"shape": "rect", "parameters": {"dielectric_mm": 0.1, "lower_height_mm": 0.30001}})
     assert "predict --compression solved" in law_of(cell, GAPS).doubts[0]

@@ -11,7 +11,7 @@ from sensorgen.design.design import make
 from sensorgen.prediction import compression as compressed
 from sensorgen.prediction import mesh_ladder
 from sensorgen.prediction.bodies import drawn
-from sensorgen.prediction.compression import Asked, BoundaryConditions
+from sensorgen.prediction.compression import BoundaryConditions, PressQuestion
 
 KNOWN = json.loads((Path(__file__).parent / "reference" / "contact.json").read_text())
 LOADS = (0, 2, 6, 10)  # of the reference's, a tenth of its kPa
@@ -26,7 +26,7 @@ def _own_cache(monkeypatch, tmp_path):
 def pressed(film, accuracy, loads=LOADS):
     design = make({"shape": "tri", "parameters": {"dielectric_mm": film}})
     stress = tuple(KNOWN[f"tri_d{film}"]["p_kPa"][k] for k in loads)
-    return compressed.answer(drawn(design), Asked(stress, BoundaryConditions(), accuracy=accuracy))
+    return compressed.answer(drawn(design), PressQuestion(stress, BoundaryConditions(), accuracy=accuracy))
 
 
 @needs_mesher

@@ -237,7 +237,7 @@ def decoded(values):
 
 
 def written(answer):
-    return pages.page("A <b>sensor</b> & more", ["some words"], [pages.Section(figures=tuple(figures(answer)))])
+    return pages.page("A <b>sensor</b> & more", ["some words"], [pages.PageSection(figures=tuple(figures(answer)))])
 
 
 def test_the_page_holds_the_response_and_its_script_once(answer):

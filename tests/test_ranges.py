@@ -19,6 +19,7 @@ from sensorgen.prediction import bodies, compression_law
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.inverse.forward import Forward, Scalar
 from sensorgen.prediction.narrowing import MULTIMETER, WEIGHT, WIDE
+from sensorgen.prediction.results import _change
 
 pytestmark = pytest.mark.usefixtures("shared_cache")
 EPS0 = 8.8541878128e-12
@@ -189,3 +190,8 @@ def test_first_screen_has_the_figures_of_a_bench():
     )  # of the worst top
     alone = found.force_resolution.upper / found.force_resolution.value
     assert alone <= force.upper / force.value < 1.5 * alone  # the range holds all tops
+
+
+def test_no_range_reads_0_to_0_percent():
+    said = [_change(Interval(*ends), 1.0) for ends in ((1.0, 1.0), (0.99998, 1.00002), (1.0, 1.2), (0.9, 1.0))]
+    assert said == ["none", "within 0.01 %", "0 to +20 %", "-10 to 0 %"]

@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording import Clock, Recording, Source, joined, joined_all, offset, rig
+from sensorgen.measure.recording import Recording, RecordingClock, Source, joined, joined_all, offset, rig
 from sensorgen.measure.recording.clock import rebuilt
 from sensorgen.measure.recording.samples import blank, sifted
 
@@ -17,7 +17,9 @@ END = MADE[-1][1] + 4
 
 
 def recording(run, skew=0.0, stamped=True):
-    clock = rebuilt(len(run.time_s), run.time_s, made.stamps(run.time_s, skew=skew)).clock if stamped else Clock()
+    clock = (
+        rebuilt(len(run.time_s), run.time_s, made.stamps(run.time_s, skew=skew)).clock if stamped else RecordingClock()
+    )
     z = run.impedance_ohm.copy()
     return Recording(run.time_s, made.TONES_HZ, z, blank(len(z)) | sifted(z), clock, Source("run.mat", "MATLAB 5"))
 

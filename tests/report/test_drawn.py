@@ -178,8 +178,13 @@ def test_a_table_with_columns_of_its_own_is_not_left_out(tmp_path):
 
 
 def test_errors_of_position_stand_in_millimetres_and_unknown_ones_are_empty():
-    known = SimpleNamespace(sigma_force_n=0.25, sigma_position_m=4e-3, correlation=-0.5, verdict="senses force")
-    lost = SimpleNamespace(sigma_force_n=0.25, sigma_position_m=None, correlation=None, verdict="no position")
+    bench = SimpleNamespace(sigma_force_n=0.5, sigma_position_m=8e-3, correlation=None)
+    known = SimpleNamespace(
+        sigma_force_n=0.25, sigma_position_m=4e-3, correlation=-0.5, verdict="senses force", calibrated=bench
+    )
+    lost = SimpleNamespace(
+        sigma_force_n=0.25, sigma_position_m=None, correlation=None, verdict="no position", calibrated=None
+    )
     cards = {"a": known, "b": lost, "c": None}
     predictions = {
         name: SimpleNamespace(prediction=SimpleNamespace(identifiability=card), reason="a short")
@@ -188,7 +193,7 @@ def test_errors_of_position_stand_in_millimetres_and_unknown_ones_are_empty():
     (table,) = identifiability(SimpleNamespace(predictions=predictions))
     assert table.columns[2].unit == "mm"
     assert list(table.cells) == [
-        ("a", 0.25, 4.0, -0.5, "senses force"),
-        ("b", 0.25, None, None, "no position"),
-        ("c", None, None, None, "a short"),
+        ("a", 0.25, 4.0, -0.5, 0.5, 8.0, "senses force"),
+        ("b", 0.25, None, None, None, None, "no position"),
+        ("c", None, None, None, None, None, "a short"),
     ]

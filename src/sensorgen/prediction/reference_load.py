@@ -18,7 +18,6 @@ from sensorgen.prediction.results import Changes, Term
 
 SOURCES = "sources"
 _STEPS = 4  # of Gauss and Newton, to a press that is misread
-_SETTLED = 1e-6  # of the force and of the length: a last step
 _PARALLEL = 1e-9  # of the larger direction, below which another one does not tell; of a press, what is rounding
 _MOST = 20.0  # force that a press is misread as, over its own [-]
 
@@ -26,7 +25,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-class Reading(NamedTuple):
+class LoadedImpedance(NamedTuple):
     """Impedance under the load, its derivatives by force and position, and that at rest; a value per frequency."""
 
     pressed: Complex
@@ -75,13 +74,13 @@ class ReferenceLoad:
         self._own = self._read(sensor)
         self._told = self._grades(sensor)
 
-    def _read(self, sensor: Sensor) -> Reading:
+    def _read(self, sensor: Sensor) -> LoadedImpedance:
         """Values of a sensor; of one whose values depend on the frequency, by that of each tone."""
         tones = [(sensor, self._frequency)]
         if isinstance(sensor, Dispersed):
             tones = [(sensor.at(f), np.array([f])) for f in self._frequency.tolist()]
         read = [(*s.response(f, *self.at), s.impedance(f, 0.0, self.at[1])) for s, f in tones]
-        return Reading(*(np.concatenate(parts) for parts in zip(*read, strict=True)))
+        return LoadedImpedance(*(np.concatenate(parts) for parts in zip(*read, strict=True)))
 
     def stress_pa(self) -> float:
         """Highest pressure under the tip [Pa]."""
@@ -113,25 +112,23 @@ class ReferenceLoad:
             found = found.max(Changes(*(factor * d for d in (*parts, slope, c, *press))))
         return found
 
-    def _misread(self, read: Reading) -> tuple[float, float]:
+    def _misread(self, read: LoadedImpedance) -> tuple[float, float]:
         """By how much force and position [N], [m] are wrong that the sensor's own model finds in a reading.
 
         Least squares of the logarithms, by Gauss-Newton steps that stay on the sensor and within its law.
         """
-        own, sought, scale = self._own, read.shift(), np.array([self.force_n, self.sensor.length_m])
+        force = self.force_n
+        own, sought, scale = self._own, read.shift(), np.array([force, self.sensor.length_m])
         at = np.array(self.at)
         for _ in range(_STEPS):
             by = np.column_stack([_parts(own.by_force / own.pressed), _parts(own.by_position / own.pressed)])
             step = np.linalg.lstsq(by * scale, sought - own.shift(), rcond=_PARALLEL)[0]
-            after = np.clip(at + step * scale, 0.0, [_MOST * self.force_n, self.sensor.length_m])
-            if (np.abs(after - at) <= _SETTLED * scale).all():
-                at = after
-                break
+            after = np.clip(at + step * scale, 0.0, [_MOST * force, self.sensor.length_m])
             try:
                 pressed = self.sensor.response(self._frequency, *after.tolist())
             except OutOfRange:
                 break
-            own, at = Reading(*pressed, own.rest), after
+            own, at = LoadedImpedance(*pressed, own.rest), after
         off = np.abs(at - np.array(self.at))
         off[off < _PARALLEL * scale] = 0.0
         return float(off[0]), float(off[1])

@@ -22,7 +22,7 @@ _SURE = 3.0  # standard deviations
 
 
 @dataclass(frozen=True)
-class Change:
+class RestChange:
     """Difference of a reading at rest from the one of the calibration.
 
     Attributes
@@ -87,7 +87,7 @@ class Baseline:
         if gain is None:
             self._covariance += by_parameter @ posterior.covariance @ by_parameter.T + rest_gain(model)
 
-    def change(self, z_ohm: Complex, noise: Real | float) -> Change:
+    def change(self, z_ohm: Complex, noise: Real | float) -> RestChange:
         """Difference of a reading at rest.
 
         Parameters
@@ -110,4 +110,4 @@ class Baseline:
             _SURE * hypot(session, float(variance[k, k]) ** 0.5) for k, session in enumerate((SESSION_C, SESSION_R))
         )
         other = float(left @ inverse @ left) > float(chi2_limit(np.array(max(len(kept) - 2, 0))))
-        return Change(float(found[0]), float(found[1]), usual_c, usual_r, other)
+        return RestChange(float(found[0]), float(found[1]), usual_c, usual_r, other)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.scene.sections import ROUNDING_MM
-from sensorgen.scene.unit_cell import Cell
+from sensorgen.scene.unit_cell import SectionCell
 
 Edge = tuple[int, int]
 Triangle = tuple[int, int, int]
@@ -41,7 +41,7 @@ class Triangles:
 
 
 @lru_cache(maxsize=16)  # a cell is solved with many permittivities
-def triangles(cell: Cell) -> Triangles:
+def triangles(cell: SectionCell) -> Triangles:
     """Triangulate the dielectric of a cell between its electrodes.
 
     Raises
@@ -64,7 +64,7 @@ def triangles(cell: Cell) -> Triangles:
     return mesh
 
 
-def insulated(cell: Cell) -> Triangles:
+def insulated(cell: SectionCell) -> Triangles:
     """Triangulate a cell in which bands of no material are insulators, no matter how far the field reaches.
 
     Raises
@@ -136,7 +136,7 @@ def edges_of(corners: Triangle) -> list[Edge]:
 _Found = list[tuple[Triangle, tuple[str, float]]]
 
 
-def _all(cell: Cell) -> tuple[NDArray[np.float64], _Found]:
+def _all(cell: SectionCell) -> tuple[NDArray[np.float64], _Found]:
     """All triangles of a cell, those of electrodes with "@top" or "@bottom" for a material."""
     ends = [cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)]
     levels = []  # heights at which anything meets the line between slice k - 1 and slice k
@@ -205,7 +205,9 @@ def _piece(found: _Found, beside: dict[int, list[int]], left: set[int]) -> tuple
     return piece, ends
 
 
-def _refuse_open(points: NDArray[np.float64], owners: dict[Edge, list[int]], inside: set[int], cell: Cell) -> None:
+def _refuse_open(
+    points: NDArray[np.float64], owners: dict[Edge, list[int]], inside: set[int], cell: SectionCell
+) -> None:
     """Refuse a field that would reach the box's floor or lid: the scene does not describe what is beyond them."""
     last = cell.slices[0].bands
     ends = (last[0].bottom_mm[0], last[-1].top_mm[0])
