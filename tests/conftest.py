@@ -1,12 +1,12 @@
 """What the tests have to say besides passing, a cache of its own for each, and the programs that some of them run."""
 
 import gc
+import itertools
 import os
 import shutil
 import signal
 import sys
 from contextlib import suppress
-from itertools import count
 from pathlib import Path
 
 import pytest
@@ -16,14 +16,13 @@ with suppress(ValueError):  # not in the main thread
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job would hand down a deaf ear
 
 
-_NUMBERS = count()
+NUMBERS = itertools.count()
 
 
-def _own_folders(monkeypatch, tmp_path_factory, cache):
+def _own_folders(monkeypatch, folder, cache=None):
     """Whatever the user, or another test, has kept is out of sight."""
-    # one folder, apart: `mktemp` looks at those of all tests before
-    own = tmp_path_factory.getbasetemp() / "own" / str(next(_NUMBERS))
-    own.mkdir(parents=True)
+    own = folder / str(next(NUMBERS))  # by its number: pytest would look at all those of ten thousand tests for each
+    own.mkdir()
     monkeypatch.setenv("SENSORGEN_CACHE", str(cache or own / "cache"))
     monkeypatch.setenv("SENSORGEN_LOG", str(own / "log.db"))
     monkeypatch.setenv("BROWSER", "true")  # opens nothing
@@ -41,19 +40,20 @@ def session_cache(tmp_path_factory):
 
 
 @pytest.fixture(autouse=True, scope="session")
-def _session(tmp_path_factory, session_cache):
-    """For fixtures of modules, which are made before those of a test."""
+def _folder(tmp_path_factory, session_cache):
+    """Folder with what is each test's own; fixtures of modules, which are made before those of a test, have one too."""
+    folder = tmp_path_factory.mktemp("own")
     with pytest.MonkeyPatch.context() as monkeypatch:
-        _own_folders(monkeypatch, tmp_path_factory, session_cache)
-        yield
+        _own_folders(monkeypatch, folder, session_cache)
+        yield folder
 
 
 @pytest.fixture(autouse=True)
-def _cache(request, monkeypatch, tmp_path_factory, session_cache):
+def _cache(request, monkeypatch, _folder, session_cache):
     """A test that patches, or is marked `own_cache`, neither reads nor keeps predictions of others."""
     patches = "monkeypatch" in request.node._fixtureinfo.argnames and "shared_cache" not in request.fixturenames
     own = patches or request.node.get_closest_marker("own_cache")
-    _own_folders(monkeypatch, tmp_path_factory, None if own else session_cache)
+    _own_folders(monkeypatch, _folder, None if own else session_cache)
 
 
 @pytest.fixture

@@ -205,9 +205,9 @@ def test_files_of_both_kinds_say_the_same(tmp_path, model):
     [
         ("f.csv", "r1c1,r9c1\n1,2\n", "columns r9c1; expected r1c1 to r5c6"),
         ("f.csv", "time_s\n1\n", "without any crossing"),
-        ("f.csv", "r1c1,r1c2\n1\n", "line 2: 1 values; expected 2"),
-        ("f.csv", "r1c1\nmany\n", "line 2: 'many' is no number"),
-        ("f.csv", "r1c1\n", "no frames"),
+        ("f.csv", "r1c1,r1c2\n1\n", "row 2: 1 cells, but the header has 2"),
+        ("f.csv", "r1c1\nmany\n", "row 2, column r1c1: 'many' is not a number"),
+        ("f.csv", "r1c1\n", "no rows below the header"),
         ("f.csv", "r1c1,r01c1\n1,2\n", "columns r1c1, r01c1 repeat"),
         ("f.csv", "rest,r1c1,rest\n1,2,0\n", "columns rest, rest repeat"),
         ("f.csv", "r0c1\n1\n", "columns r0c1; expected r1c1 to r5c6"),

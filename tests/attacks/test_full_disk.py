@@ -101,6 +101,49 @@ def test_a_folder_that_another_user_may_only_read(path):
         assert connection.execute("SELECT count(*) FROM record").fetchone()[0] >= 3
 
 
+@pytest.mark.skipif(os.name == "nt" or os.getuid() != 0, reason="only root can mount")
+def test_a_medium_that_is_read_only_shows_rows_of_the_write_ahead_log_too(path):
+    """As a copy of a killed program's log, without its index."""
+    script = (
+        'mount -t tmpfs none "$1" && cp "$2" "$1/log.db" && cp "$2-wal" "$1/log.db-wal" && mount -o remount,ro "$1" && '
+        '"$3" -m sensorgen log list --log "$1/log.db" && ! "$3" -m sensorgen log add "23 triX" --y 6 --log "$1/log.db"'
+    )
+    place = path.parent / "medium"
+    place.mkdir()
+    with Log(path) as log:
+        reader = sqlite3.connect(path)
+        reader.execute("BEGIN")
+        reader.execute("SELECT count(*) FROM record").fetchone()
+        log.add([reading(7)])
+        done = subprocess.run(
+            ["unshare", "-m", "sh", "-c", script, "sh", str(place), str(path), sys.executable],
+            capture_output=True, encoding="utf-8", check=False,
+        )  # fmt: skip
+        reader.close()
+    if "unshare" in done.stderr or "mount:" in done.stderr:
+        pytest.skip(done.stderr)
+    assert done.returncode == 0, done
+    assert "S7" in done.stdout
+    assert "its disk is full or read-only; nothing was logged" in done.stderr
+
+
+def test_rows_of_a_log_that_is_gone_do_not_get_into_a_new_one(path):
+    with Log(path) as log:
+        reader = sqlite3.connect(path)
+        reader.execute("BEGIN")
+        reader.execute("SELECT count(*) FROM record").fetchone()
+        log.add([reading(7)])
+        shutil.copy(f"{path}-wal", path.parent / "kept")
+        reader.close()
+    path.unlink()
+    shutil.copy(path.parent / "kept", f"{path}-wal")
+    with pytest.raises(Exception, match=r"log\.db-wal' is left of a log that was removed or renamed; move it"):
+        Log(path, create=True)
+    Path(f"{path}-wal").unlink()
+    with Log(path, create=True) as log:
+        assert log.readings() == ()
+
+
 def test_a_log_that_was_removed_takes_no_row_in_silence(path):
     with Log(path) as log:
         path.unlink()

@@ -34,7 +34,7 @@ def main() -> None:
         }
         print(json.dumps(places), flush=True)
         for _ in sys.stdin:
-            with serving.TURN:
+            with serving._TURN:
                 at.advance(clock.now())
                 state = {
                     "at": clock.now(), "tip_mm": at.tip_mm, "force_n": at.force_n, "motor_n": at.motor_n,

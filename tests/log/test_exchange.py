@@ -155,6 +155,16 @@ def test_any_text_comes_back_from_csv(words):
     assert list(exchange.from_csv(Reading, CsvTable("x", io.StringIO(text, newline="")))) == rows
 
 
+def test_a_terminal_obeys_no_cell_and_the_text_comes_back():
+    bad = "a\x1b[31m\x9b2J\u202eb\x07"
+    rows = [
+        Reading(uid="u", specimen="S", written="S", remark=word, doubts=(word,)) for word in (bad, f"'\"{bad}", "'\"a")
+    ]
+    text = "".join(exchange.csv_lines(Reading, rows))
+    assert not set("\x1b\x9b\u202e\x07") & set(text)
+    assert list(exchange.from_csv(Reading, CsvTable("x", io.StringIO(text, newline="")))) == rows
+
+
 @given(
     st.lists(st.floats(allow_nan=False), max_size=4).map(tuple),
     st.none() | st.booleans(),

@@ -38,11 +38,14 @@ class LineLayout:
         Width of all lines that run around a part [mm].
     infill : float
         Share of the rest that is filled [-].
+    pattern : str
+        Of a sparse infill, which is stripes here whatever it is.
     """
 
     line_mm: float
     walls_mm: float = 0.0
     infill: float = 1.0
+    pattern: str = "rectilinear"
 
 
 def lines(design: Design) -> dict[str, LineLayout]:
@@ -58,8 +61,12 @@ def lines(design: Design) -> dict[str, LineLayout]:
 
         line = design.profile.line_mm.get(name, design.machine.line_mm())
         walls = design.profile.wall_lines.get(name) or value("wall_lines", 1.0)
-        percent = design.infill.get(name, Infill()).percent or value("infill_percent", 100.0)
-        found[name] = LineLayout(line, walls * line, percent / 100.0)
+        infill = design.infill.get(name, Infill())
+        percent, pattern = (
+            infill.percent or value("infill_percent", 100.0),
+            infill.pattern or design.layers.infill_pattern,
+        )
+        found[name] = LineLayout(line, walls * line, percent / 100.0, pattern)
     return found
 
 

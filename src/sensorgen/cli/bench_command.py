@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from sensorgen.cli import bench_hysteresis, bench_live, bench_run, bench_sets, bench_show, render
+from sensorgen.cli import bench_array, bench_hysteresis, bench_live, bench_run, bench_sets, bench_show, render
 from sensorgen.cli.bench_opened import bench as command
 from sensorgen.cli.designs import of_design
 from sensorgen.core.errors import BadInput, OutOfRange
@@ -14,7 +14,7 @@ from sensorgen.core.options import Option
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
 
-__all__ = ["bench_hysteresis", "bench_live", "bench_run", "bench_sets", "bench_show", "command"]
+__all__ = ["bench_array", "bench_hysteresis", "bench_live", "bench_run", "bench_sets", "bench_show", "command"]
 Presses = Annotated[int, Option(kind=click.IntRange(1))]
 Repeats = Annotated[int, Option(kind=click.IntRange(0))]
 Forces = Annotated[tuple[float, ...], Option(typed="0,6N", zero=True)]

@@ -206,7 +206,10 @@ def _first_line(doc: str | None) -> str:
 def schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of the design file; the parameters depend on the shape."""
     made = design.Design.model_json_schema()
-    shapes = {file.name: _form(file).Params for file in packs.files("shapes")}
+    shapes = dict[str, type[Envelope]]()
+    for file in packs.files("shapes"):
+        with suppress(SensorgenError):  # not trusted, or damaged: the list of shapes says so
+            shapes[file.name] = _form(file).Params
     made["properties"]["shape"] |= {"anyOf": [{"enum": list(shapes)}, {"pattern": r"\.py$"}]}
     slots = made["$defs"]["Slots"]["properties"]
     slots["electrode"] = slots["top_electrode"] | {"description": "Both electrodes.", "default": None}

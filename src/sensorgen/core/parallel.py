@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
     from contextlib import AbstractContextManager
 
+_EXPECTED_CLUSTER = "expected a scheduler's address, as tls://10.0.0.5:8786, or its file"
 TRUST_CLUSTER = "SENSORGEN_TRUST_CLUSTER"  # environment variable: 1 for clusters without TLS
 CHUNK_S = 1.0  # sending work to a process takes a millisecond, to another computer ten
 # A process that is spawned looks for no modules in the working folder, and leaves the other cores to the others: one
@@ -369,7 +370,10 @@ def _check_private(address: str) -> None:
     from ipaddress import ip_address
     from urllib.parse import urlsplit
 
-    url = urlsplit(address if "://" in address else f"tcp://{address}")
+    try:
+        url = urlsplit(address if "://" in address else f"tcp://{address}")
+    except ValueError as error:
+        raise BadInput(f"--cluster {address}: {error}; {_EXPECTED_CLUSTER}") from None
     here = url.scheme == "inproc" or url.hostname == "localhost"
     with suppress(ValueError):
         here = here or ip_address(url.hostname or "").is_loopback
@@ -395,14 +399,18 @@ def _on_cluster(address: str) -> Iterator[Sequence[Lane]]:
     loggers = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in ("distributed", "asyncio")]
     for name in loggers:  # each has a level of its own
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what goes wrong is said once, by us
-    where = {"scheduler_file": address} if Path(address).is_file() else {"address": address}
-    _check_private(json.loads(Path(address).read_text("utf-8"))["address"] if "scheduler_file" in where else address)
+    where, scheduler = {"address": address}, address
+    if Path(address).is_file():
+        try:
+            where, scheduler = {"scheduler_file": address}, str(json.loads(Path(address).read_text("utf-8"))["address"])
+        except (OSError, ValueError, KeyError, TypeError):
+            raise BadInput(f"--cluster {address}: no scheduler's file; {_EXPECTED_CLUSTER}") from None
+    _check_private(scheduler)
     try:
         client = Client(**where, timeout=_CONNECT_S)
     except (OSError, ValueError, TimeoutError) as error:
         raise SensorgenError(
-            f"no Dask scheduler at {address!r} ({str(error).splitlines()[0]:.80}); expected its address, as "
-            "tls://10.0.0.5:8786, or its scheduler file"
+            f"no Dask scheduler at {address!r} ({str(error).splitlines()[0]:.80}); {_EXPECTED_CLUSTER}"
         ) from None
     try:
         threads = sum(client.nthreads().values())

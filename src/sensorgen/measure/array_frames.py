@@ -1,11 +1,10 @@
 """Frames of an array: files NPZ and CSV with a reading of every crossing, and which of them are at rest."""
 
-import csv
 import math
 import re
 import zipfile
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.files import reading
 from sensorgen.core.units import si
+from sensorgen.measure import csv_table
 
 MOST_BYTES = 4_000_000_000
 _TIME = re.compile(r"(t|time|timestamp)[ _(\[]*(s|ms|us|ns|min|h)?[)\]]?", re.IGNORECASE)
@@ -85,7 +85,9 @@ def read(path: Path, shape: tuple[int, int], frequency_hz: float | None) -> Fram
     with reading(path):
         if path.stat().st_size > MOST_BYTES:
             raise BadInput(f"{path}: {path.stat().st_size / 1e9:.1f} GB; expected at most {MOST_BYTES / 1e9:g} GB")
-        found, unused = numbers(path) if path.suffix in BINARY else _of_csv(path, shape)
+        if path.suffix not in BINARY:
+            return _joined(list(lots(str(path), shape, frequency_hz)))
+        found, unused = numbers(path)
     try:
         _refuse_times(unused)
         return replace(_checked(found, shape, frequency_hz), unused=tuple(unused))
@@ -173,33 +175,31 @@ def _of_hdf(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     return found, []
 
 
-def table(path: Path) -> dict[str, tuple[str, ...]]:
-    """Words of a table by the names of its columns."""
-    try:
-        rows = list(csv.reader(path.read_text("utf-8").splitlines()))
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise BadInput(f"{path}: no CSV table ({str(error)[:80]})") from None
-    if len(rows) < 2:
-        raise BadInput(f"{path}: no frames; expected a head with r1c1, r1c2 ... and a row for each frame")
-    for line, row in enumerate(rows[1:], 2):
-        if len(row) != len(rows[0]):
-            raise BadInput(f"{path}, line {line}: {len(row)} values; expected {len(rows[0])} as in the head")
-    names = [name.strip() for name in rows[0]]
-    refuse_repeated(names, {}, path)
-    return dict(zip(names, zip(*rows[1:], strict=True), strict=True))
+def lots(path: str, shape: tuple[int, int], frequency_hz: float | None) -> Iterator[Frames]:
+    """Frames of a table as they come, lot by lot; "-" is the standard input. Parameters and errors as :func:`read`."""
+    with csv_table.opened(path) as table, within(table.name):
+        names = table.names
+        crossings = _crossings(names, shape)
+        beside = [name for name in names if name in _BESIDE]
+        unused = tuple(sorted({*names} - {*crossings, *_BESIDE, "rest", ""}))
+        _refuse_times(unused)
+        numbers = [names.index(name) for name in (*crossings, *beside)]
+        rest = [k for k, name in enumerate(names) if name == "rest"]
+        last = np.empty(0)
+        for block in table.blocks(numbers, rest):
+            values = np.full((len(block.rows), *shape), np.nan)
+            values[:, *np.transpose(list(crossings.values()))] = block.numbers[:, : len(crossings)]
+            found = dict(zip(beside, block.numbers[:, len(crossings) :].T, strict=True)) | {"capacitance_f": values}
+            if rest:
+                found["rest"] = marked([word for (word,) in block.text])
+            lot = replace(_checked(found, shape, frequency_hz), unused=unused)
+            last, frequency_hz = rising(np.append(last, lot.time_s))[-1:], lot.frequency_hz
+            yield lot
 
 
-def _of_csv(path: Path, shape: tuple[int, int]) -> tuple[dict[str, np.ndarray], list[str]]:
-    """Numbers of a table by name, and the columns that are not read."""
-    columns = table(path)
-    crossings = _crossings(list(columns), shape, path)
-    values = np.full((len(next(iter(columns.values()))), *shape), np.nan)
-    for name, (i, j) in crossings.items():
-        values[:, i, j] = column(columns[name], path)
-    found = {"capacitance_f": values} | {key: column(columns[key], path) for key in _BESIDE if key in columns}
-    if "rest" in columns:
-        found["rest"] = marked(columns["rest"])
-    return found, sorted({*columns} - {*crossings, *_BESIDE, "rest", ""})
+def _joined(parts: Sequence[Frames]) -> Frames:
+    siemens, time_s, rest = (np.concatenate([getattr(p, key) for p in parts]) for key in ("siemens", "time_s", "rest"))
+    return replace(parts[0], siemens=siemens, time_s=time_s, rest=rest)
 
 
 def marked(words: Sequence[str]) -> Mask:
@@ -207,32 +207,19 @@ def marked(words: Sequence[str]) -> Mask:
     return np.array([word.strip().lower() in _TRUE for word in words])
 
 
-def _crossings(names: Sequence[str], shape: tuple[int, int], path: Path) -> dict[str, tuple[int, int]]:
+def _crossings(names: Sequence[str], shape: tuple[int, int]) -> dict[str, tuple[int, int]]:
     """Row and column of each name of a crossing."""
     found = {name: (int(m[1]) - 1, int(m[2]) - 1) for name in names if (m := _CROSSING.fullmatch(name))}
-    refuse_repeated(names, found, path)
+    refuse_repeated(names, found)
     wrong = [name for name, (i, j) in found.items() if not (0 <= i < shape[0] and 0 <= j < shape[1])]
     if wrong or not found:
         words = ", ".join(wrong[:3]) or "without any crossing"
-        raise BadInput(f"{path}: columns {words}; expected r1c1 to r{shape[0]}c{shape[1]} of this array")
+        raise BadInput(f"columns {words}; expected r1c1 to r{shape[0]}c{shape[1]} of this array")
     return found
 
 
-def refuse_repeated(names: Sequence[str], found: dict[str, tuple[int, int]], path: Path) -> None:
+def refuse_repeated(names: Sequence[str], found: dict[str, tuple[int, int]]) -> None:
     """Refuse names that repeat, and two of one crossing."""
     times = Counter(found.get(name, name) for name in names if name)
     if repeated := [name for name in names if times[found.get(name, name)] > 1]:
-        raise BadInput(f"{path}: columns {', '.join(repeated[:3])} repeat; expected each once")
-
-
-def column(words: Sequence[str], path: Path) -> Real:
-    """Numbers of a column; nan where a word is empty."""
-    return np.array([_number(word, path, line) for line, word in enumerate(words, 2)])
-
-
-def _number(word: str, path: Path, line: int) -> float:
-    """A number; nan where the word is empty."""
-    try:
-        return float(word) if word.strip() else np.nan
-    except ValueError:
-        raise BadInput(f"{path}, line {line}: {word!r:.30} is no number; leave it empty where none was read") from None
+        raise BadInput(f"columns {', '.join(repeated[:3])} repeat; expected each once")

@@ -14,7 +14,8 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.files import reading
-from sensorgen.measure.array_frames import BINARY, REFERENCES, column, marked, numbers, read, rising, table
+from sensorgen.measure import csv_table
+from sensorgen.measure.array_frames import BINARY, REFERENCES, marked, numbers, read, refuse_repeated, rising
 from sensorgen.prediction.array.elements import ArraySession
 from sensorgen.prediction.array.frames import at_rest, missing
 from sensorgen.prediction.array.model import ArrayModel
@@ -164,11 +165,17 @@ def _numbers_of(words: np.ndarray, names: Sequence[str], count: int) -> np.ndarr
 
 def _of_csv(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     """Columns of a table, and the names of its elements."""
-    words = table(path)
-    names = [name for name in words if name and name not in _OTHER]
-    if not names:
-        raise BadInput("no readings; expected a column for each element")
-    data: dict[str, np.ndarray] = {"reading": np.stack([column(words[name], path) for name in names], 1)}
-    for key in words.keys() & set(_OTHER):
-        data[key] = _WORDS[key](words[key]) if key in _WORDS else column(words[key], path)
+    with csv_table.opened(path) as table:
+        refuse_repeated(table.names, {})
+        names = [name for name in table.names if name and name not in _OTHER]
+        if not names:
+            raise BadInput("no readings; expected a column for each element")
+        beside = [*({*table.names} & {*_OTHER} - {*_WORDS})]
+        text = [*({*table.names} & {*_WORDS})]
+        at = table.names.index
+        blocks = list(table.blocks([*map(at, names), *map(at, beside)], [*map(at, text)]))
+    values = np.concatenate([block.numbers for block in blocks])
+    data = {"reading": values[:, : len(names)], **dict(zip(beside, values[:, len(names) :].T, strict=True))}
+    for k, name in enumerate(text):
+        data[name] = _WORDS[name]([row[k] for block in blocks for row in block.text])
     return data, names

@@ -297,6 +297,31 @@ def averaged(law: Compression, shares: Callable[[float], Real], last_pa: float) 
     return curve(f"{law.name}, averaged", law.source, stress.tolist(), [1.0, *ratio])
 
 
+def beyond(law: Compression, mean_pa: float, shares: Callable[[float], Real]) -> tuple[Compression, ...]:
+    """Bounds of a law up to the highest local pressure; the law alone where it reaches that far.
+
+    The rise of a cell whose gaps close flattens: it lies between none beyond the last point, and its last slope.
+
+    Parameters
+    ----------
+    law, shares
+        As of :func:`averaged`.
+    mean_pa : float
+        Mean pressure [Pa].
+    """
+    most_pa = float(max((shares(p) * p).max() for p in mean_pa * _NODES[1:]))
+    if isinstance(law, Plate) or most_pa <= REACH * law.stress_pa[-1]:
+        return (law,)
+    p, g, slope = (getattr(law, name)[-1] for name in ("stress_pa", "ratio", "slope_per_pa"))
+    return tuple(
+        replace(
+            law, stress_pa=(*law.stress_pa, most_pa), ratio=(*law.ratio, g + by * (most_pa - p)),
+            slope_per_pa=(*law.slope_per_pa[:-1], by, by),
+        )
+        for by in (0.0, slope)
+    )  # fmt: skip
+
+
 def curve_of(pressed: "Pressed", name: str = "solved") -> CapacitanceCurve:
     """The pressure law of a solved cell.
 

@@ -24,8 +24,9 @@ def permittivity(solid: float, share: float, pattern: str) -> Interval:
 
     .. math:: \left(\frac{\phi}{\varepsilon} + 1 - \phi\right)^{-1} \le \varepsilon_z \le \phi \varepsilon + 1 - \phi
 
-    (Wiener); upright walls reach the upper bound, and isotropic patterns lie between the bounds of Hashin and
-    Shtrikman, with n = 3 dimensions:
+    (Wiener); upright walls reach the upper bound. Isotropic patterns whose period is much less than the plate's
+    thickness lie between the bounds of Hashin and Shtrikman, with n = 3 dimensions; thinner plates of them are rather
+    upright walls:
 
     .. math:: 1 + \frac{\phi}{\frac{1}{\varepsilon - 1} + \frac{1 - \phi}{n}} \le \varepsilon_z \le
               \varepsilon + \frac{1 - \phi}{\frac{1}{1 - \varepsilon} + \frac{\phi}{n \varepsilon}}

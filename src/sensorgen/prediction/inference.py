@@ -129,9 +129,9 @@ def whitening(covariance: Real) -> Real:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
 
 
-def slopes(function: Callable[[Real], Real], at: Real) -> Real:
-    """Derivatives by p parameters (..., p): central differences of a function of points (2 p, p)."""
-    step = np.eye(len(at)) * STEP
+def slopes(function: Callable[[Real], Real], at: Real, which: Sequence[int] | slice = slice(None)) -> Real:
+    """Derivatives by p parameters, or some of them (..., p): central differences of a function of points (2 p, p)."""
+    step = np.eye(len(at))[which] * STEP
     more, less = np.split(function(np.concatenate([at + step, at - step])), 2)
     return np.moveaxis(more - less, 0, -1) / (2 * STEP)
 

@@ -275,11 +275,10 @@ def _scpi(name: str) -> Kind:
 def _frames() -> Kind:
     from sensorgen.measure.lab import frame_stream, port
 
-    def at(address: str, given: frame_stream.Settings, clock: Clock) -> Device:
-        line = port.TcpPort(address) if "://" in address else port.SerialPort(address, given.baud)
-        return frame_stream.FrameStream(line, clock)
+    def real(address: str, given: frame_stream.Settings, clock: Clock) -> Device:
+        return frame_stream.FrameStream(port.SerialPort(address, given.baud), clock)
 
-    return Kind("array", frame_stream.Settings, at)
+    return Kind("array", frame_stream.Settings, real)
 
 
 def _pymeasure(name: str) -> Kind:

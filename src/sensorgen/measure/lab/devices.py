@@ -244,13 +244,8 @@ class FrameMeter(Protocol):
         Of the readings, once identified [Hz].
     """
 
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
-
-    @property
-    def frequency_hz(self) -> float:
-        """Frequency of the readings [Hz]."""
+    shape: tuple[int, int]
+    frequency_hz: float
 
     def identify(self) -> Identity:
         """Ask what it is; :class:`WrongDevice` if it is another."""

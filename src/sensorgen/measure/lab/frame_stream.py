@@ -15,7 +15,7 @@ many frames.
 
 import re
 import zlib
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import nan
 
@@ -38,6 +38,7 @@ _SATURATED = "!"
 _CHARACTERS = 32  # of a value, at most
 _ASKED_S, _SILENT_S = 12.0, 2.0  # until a header, and between two frames
 _AT_ONCE = 64  # lines of one call
+_GAP_S = 1e-3  # before the first frame of a device that has begun anew
 
 
 class Settings(Strict):
@@ -77,11 +78,6 @@ class FrameForm:
         return cls(int(found[1]), int(found[2]), found[3], found[4], float(found[6]))
 
     @property
-    def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
-        return self.rows, self.columns
-
-    @property
     def count(self) -> int:
         """Values of a frame."""
         return self.rows * self.columns * (2 if self.form == "siemens" else 1)
@@ -103,24 +99,19 @@ class FrameForm:
         words = map(_word, (values / _PREFIXES[self.prefix]).ravel().tolist())
         return checked(",".join([str(counter), f"{time_s:.6f}", *words]))
 
-    def siemens(self, words: Iterable[str]) -> tuple[Complex, int]:
-        """Readings by the words of a frame, (m, n) [S], and how many are saturated."""
-        words = list(words)
-        values = np.array([_value(word) for word in words]) * _PREFIXES[self.prefix]
+    def siemens(self, words: Sequence[str]) -> Complex:
+        """Readings by the words of a frame, (m, n) [S]; nan where one is missing or saturated."""
+        values = _PREFIXES[self.prefix] * np.array([nan if word in ("", _SATURATED) else float(word) for word in words])
         if self.form == "siemens":
             found = values[0::2] + 1j * values[1::2]
         else:
             found = np.full(values.shape, complex(nan, nan))
             found.imag = 2 * np.pi * self.frequency_hz * values
-        return found.reshape(self.shape), words.count(_SATURATED)
+        return found.reshape(self.rows, self.columns)
 
 
 def _word(value: float) -> str:
     return f"{value:.7g}" if np.isfinite(value) else "" if np.isnan(value) else _SATURATED
-
-
-def _value(word: str) -> float:
-    return float(word) if word and word != _SATURATED else nan
 
 
 def checked(text: str) -> bytes:
@@ -157,44 +148,27 @@ class FrameStream:
     """
 
     def __init__(self, port: Port, clock: Clock) -> None:
-        self._port, self._clock = port, clock
-        self._rest = b""
-        self._form: FrameForm | None = None
+        self.shape, self.frequency_hz = (0, 0), nan
+        self._port, self._clock, self._form = port, clock, FrameForm(0, 0)
+        self._rest, self._longest = b"", 1 << 16
         self._counter, self._time_s, self._offset_s, self._heard_s = -1, nan, 0.0, clock.now()
-        self._longest = 1 << 16
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
-        return self._known().shape
-
-    @property
-    def frequency_hz(self) -> float:
-        """Frequency of the readings [Hz]."""
-        return self._known().frequency_hz
-
-    def _known(self) -> FrameForm:
-        if self._form is None:
-            self.identify()
-        if self._form is None:
-            raise WrongDevice(f"{self._port.address}: no header of frames")
-        return self._form
 
     def identify(self) -> Identity:
         """Ask for the header, and wait for it; WrongDevice where none comes."""
         self._port.write(QUESTION)
-        until, lines = self._clock.now() + _ASKED_S, 0
-        while self._form is None and (left := until - self._clock.now()) > 0:
+        until, lines, form = self._clock.now() + _ASKED_S, 0, None
+        while form is None and (left := until - self._clock.now()) > 0:
             for line in self._whole(self._port.read_until(b"\n", left)):
-                lines, self._form = lines + 1, FrameForm.of(unchecked(line) or "")
-        if self._form is None:
+                lines, form = lines + 1, FrameForm.of(unchecked(line) or "")
+        if form is None:
             received = f"{lines} lines, none of them a header with its checksum" if lines else "nothing"
             raise WrongDevice(
                 f"{self._port.address} sends {received}; expected 'sensorgen-frames 1 rows=...': check address, baud "
                 "and protocol"
             )
-        self._longest, self._heard_s = self._form.count * _CHARACTERS + 100, self._clock.now()
-        return Identity(f"array of {self._form.rows} x {self._form.columns}, {self._form.form}")
+        self._form, self.shape, self.frequency_hz = form, (form.rows, form.columns), form.frequency_hz
+        self._longest, self._heard_s = form.count * _CHARACTERS + 100, self._clock.now()
+        return Identity(f"array of {form.rows} x {form.columns}, {form.form}")
 
     def read(self) -> FrameLot:
         """Frames since the last call; none is an answer.
@@ -204,7 +178,7 @@ class FrameStream:
         DeviceFault
             Nothing has come for two seconds, a whole frame has another number of values, or the array changes.
         """
-        form, times, frames = self._known(), list[float](), list[Complex]()
+        times, frames = list[float](), list[Complex]()
         lost = damaged = saturated = 0
         for _ in range(_AT_ONCE):
             if not (part := self._port.read_until(b"\n", 0.0)):
@@ -215,46 +189,36 @@ class FrameStream:
                     damaged += 1
                     continue
                 self._heard_s = self._clock.now()
-                if self._repeated(text, form):
+                if FrameForm.of(text) == self._form:
                     continue
-                siemens, clipped = self._frame(text, form)
-                counter, time_s = int(text.partition(",")[0]), float(text.split(",", 2)[1])
-                lost += self._missing(counter, time_s)
+                missing, siemens, clipped = self._frame(text.split(","))
+                lost, saturated = lost + missing, saturated + clipped
                 times.append(self._time_s)
                 frames.append(siemens)
-                saturated += clipped
         if self._clock.now() - self._heard_s > _SILENT_S:
             heard = f"{damaged} damaged lines" if damaged else "nothing"
             raise DeviceFault(f"{self._port.address}: {heard} for {_SILENT_S:g} s; check cable, power and baud")
-        return FrameLot(np.array(times), np.array(frames).reshape(-1, *form.shape), lost, damaged, saturated)
+        return FrameLot(np.array(times), np.array(frames).reshape(-1, *self.shape), lost, damaged, saturated)
 
-    def _repeated(self, text: str, form: FrameForm) -> bool:
-        """Test whether a line is the header again; DeviceFault where it is another one."""
-        if not text.startswith("sensorgen-frames"):
-            return False
-        if FrameForm.of(text) != form:
-            raise DeviceFault(f"{self._port.address}: the array has changed to {text!r:.120}; begin again")
-        return True
-
-    def _frame(self, text: str, form: FrameForm) -> tuple[Complex, int]:
-        words = text.split(",")
+    def _frame(self, words: list[str]) -> tuple[int, Complex, int]:
+        """Number of frames missing before one, its readings, and how many are saturated."""
+        form = self._form
         if len(words) != form.count + 2:
             raise DeviceFault(
-                f"{self._port.address}: frame {words[0]!r:.20} has {len(words) - 2} values; expected {form.count} of "
-                f"{form.rows} x {form.columns} crossings"
+                f"{self._port.address}: {words[0]!r:.60} has {len(words) - 2} values; expected {form.count}, a frame "
+                f"of {form.rows} x {form.columns} crossings"
             )
         try:
-            return form.siemens(words[2:])
+            counter, time_s = int(words[0]), float(words[1]) + self._offset_s
+            siemens = form.siemens(words[2:])
         except ValueError as error:
             raise DeviceFault(f"{self._port.address}: frame {words[0]!r:.20}: {error}") from None
-
-    def _missing(self, counter: int, time_s: float) -> int:
-        """Frames missing before one; a device that has begun again goes on where it was."""
         missing = counter - self._counter - 1 if self._counter >= 0 else 0
-        if not time_s + self._offset_s > self._time_s and self._counter >= 0:
-            missing, self._offset_s = 0, self._time_s - time_s + 1e-3
-        self._counter, self._time_s = counter, time_s + self._offset_s
-        return max(missing, 0)
+        if time_s <= self._time_s:  # the device has begun anew: its frames go on where they were
+            missing, shift = 0, self._time_s - time_s + _GAP_S
+            self._offset_s, time_s = self._offset_s + shift, time_s + shift
+        self._counter, self._time_s = counter, time_s
+        return max(missing, 0), siemens, words.count(_SATURATED)
 
     def _whole(self, part: bytes) -> list[bytes]:
         """Lines that are complete; what is longer than any is dropped as damaged."""

@@ -5,8 +5,6 @@ by then. Only the waiting for an answer lets a simulated clock pass, so that no 
 """
 
 import http.client
-import select
-import socket
 import urllib.parse
 import warnings
 from collections.abc import Iterator
@@ -19,7 +17,7 @@ from sensorgen.measure.lab.clock import Clock, RealClock
 from sensorgen.measure.lab.devices import DeviceFault
 from sensorgen.measure.virtual.plant import Simulator
 
-_TCP_S = 5.0  # until a device has answered
+_BLOCK = 4096  # bytes: over TCP pyserial only knows that some wait
 _POLL_S = 0.005  # of the serial driver; half a period of the fastest control loop
 
 
@@ -71,12 +69,12 @@ def _faults(address: str, what: str = "connection to {} failed", *also: type[Exc
 
 
 class SerialPort:
-    """A serial line of this computer: 8 data bits, no parity, one stop bit, no flow control.
+    """A serial line of this computer: 8 data bits, no parity, one stop bit, no flow control; or one over TCP.
 
     Parameters
     ----------
     address : str
-        ``/dev/ttyUSB0``, ``COM3``.
+        ``/dev/ttyUSB0``, ``COM3``, ``socket://10.0.0.5:7000``.
     baud : int
         Bits per second.
 
@@ -94,9 +92,9 @@ class SerialPort:
         except ImportError:
             raise NotInstalled("serial lines need pyserial: pip install 'sensorgen[lab]'") from None
         self.address = address
-        self._received = bytearray()
+        self._received, self._least = bytearray(), _BLOCK if "://" in address else 1
         with _faults(address):
-            self._line = serial.Serial(address, baud, timeout=_POLL_S, write_timeout=1.0, exclusive=True)
+            self._line = serial.serial_for_url(address, baud, timeout=_POLL_S, write_timeout=1.0, exclusive=True)
 
     def write(self, data: bytes) -> None:
         """Send; DeviceFault if the line is cut."""
@@ -112,63 +110,13 @@ class SerialPort:
                 waiting = self._line.in_waiting
                 if not waiting and clock.now() >= until:
                     break
-                self._received += self._line.read(waiting or 1)
+                self._received += self._line.read(max(waiting, self._least))
         return _taken(self._received, end)
 
     def close(self) -> None:
         """Give the line back."""
         with suppress(OSError):
             self._line.close()
-
-
-class TcpPort:
-    """A line over TCP.
-
-    Parameters
-    ----------
-    address : str
-        ``tcp://10.0.0.5:7000``.
-
-    Raises
-    ------
-    BadInput
-        The address is none of TCP.
-    DeviceFault
-        Nothing answers there.
-    """
-
-    def __init__(self, address: str) -> None:
-        with suppress(ValueError):
-            parts = urllib.parse.urlsplit(address)
-            if parts.scheme == "tcp" and parts.hostname and parts.port:
-                self.address, self._received = address, bytearray()
-                with _faults(address):
-                    self._line = socket.create_connection((parts.hostname, parts.port), timeout=_TCP_S)
-                return
-        raise BadInput(f"address {address!r:.80}; expected one of TCP with its port, as tcp://10.0.0.5:7000")
-
-    def write(self, data: bytes) -> None:
-        """Send; DeviceFault if the line is cut."""
-        with _faults(self.address):
-            self._line.sendall(data)
-
-    def read_until(self, end: bytes, timeout_s: float) -> bytes:
-        """Received bytes up to and including an end, fewer when the time is over [s]."""
-        clock = RealClock()
-        until = clock.now() + timeout_s
-        with _faults(self.address):
-            while end not in self._received:
-                ready, _, _ = select.select([self._line], [], [], max(until - clock.now(), 0.0))
-                if not ready:
-                    break
-                if not (more := self._line.recv(1 << 16)):
-                    raise ConnectionError("closed by the device")
-                self._received += more
-        return _taken(self._received, end)
-
-    def close(self) -> None:
-        """Give the line back."""
-        self._line.close()
 
 
 class SimulatedPort:

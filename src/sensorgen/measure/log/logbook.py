@@ -87,7 +87,7 @@ class Log:
     """
 
     def __init__(self, path: Path, *, create: bool = False) -> None:
-        self.path = path
+        self.path = path = Path(path)
         self._connection = database.connect(path, create=create)
 
     def __enter__(self) -> Self:
@@ -466,6 +466,23 @@ class Log:
         )
         found = next(self._rows(sql, [NAMES[type(entry)], entry.number]), None)
         return self._row(*found) if found else None
+
+    def conflicts(self) -> list[str]:
+        """Corrections that two machines have made of one row, until the one that does not count is withdrawn."""
+        sql = (
+            "SELECT row.kind, row.content, row.number, row.logged_at, other.number FROM record row, record other "  # noqa: S608
+            f"WHERE row.kind = ?1 AND row.number IS NOT NULL AND row.supersedes IS NOT NULL AND {_PREFERRED}"
+        )
+        return [
+            f"conflict: {word(kind)}s {row[2]} and {other} correct the same row; {other} counts: withdraw one of the two"
+            for kind in (Reading, BenchRun)
+            for *row, other in self._rows(sql, [NAMES[kind]])
+            if not self._withdrawn(self._row(*row))
+        ]
+
+    def _withdrawn(self, entry: Entry) -> bool:
+        """Test whether a row, or its last correction, is withdrawn."""
+        return any(isinstance(later, Withdrawal) or self._withdrawn(later) for later in self.superseding(entry))
 
     def _with_print(self, entry: Reading | BenchRun, writer: "_Appender") -> Reading | BenchRun:
         """Entry with batch and design of the specimen's latest print."""

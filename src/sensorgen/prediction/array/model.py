@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from sensorgen.core.arrays import Real
+from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import BadInput, MissingValue
@@ -82,6 +82,33 @@ class ArrayModel:
     def here(self) -> np.ndarray:
         """Crossings that the outline has, (m, n)."""
         return np.array(self.layout.here)
+
+    @cached_property
+    def regions(self) -> dict[str, Mask]:
+        """Crossings whose middle lies in each region of the design, (m, n) of bool.
+
+        Raises
+        ------
+        BadInput
+            A region that is no area, or without a crossing.
+        """
+        import shapely
+
+        p, of, found = self.layout.params, self.layout, {}
+        (px, py), (m, n) = p.pitch, self.here.shape
+        x = np.array(of.x_mm) - of.x_mm[0] + (p.length_mm - (n - 1) * px) / 2  # from the outline's corner
+        y = np.array(of.y_mm) - of.y_mm[0] + (p.width_mm - (m - 1) * py) / 2
+        for name, corners in self.design.regions.items():
+            region = shapely.MultiPoint(corners) if {*map(len, corners)} == {2} else shapely.Point()
+            area = region.envelope if len(corners) == 2 else shapely.Polygon(corners) if len(corners) > 2 else region
+            inside = self.here & shapely.intersects_xy(area, x[None], y[:, None])
+            if not (area.is_valid and area.area and inside.any()):
+                raise BadInput(
+                    f"regions.{name}: no area with a crossing; expected two corners of a rectangle, or three or more "
+                    f"of a polygon, up to {p.length_mm:g}, {p.width_mm:g} mm"
+                )
+            found[name] = inside
+        return found
 
     @cached_property
     def capacitance(self) -> Bounds:

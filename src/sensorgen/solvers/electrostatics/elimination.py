@@ -170,7 +170,8 @@ def _sum(parts: list[_Joined], total: Whole) -> tuple[_Joined, int]:
     if len(parts) > 2 or len(np.unique(places[0])) < len(places[0]):
         matrix = added(len(ids), zip(places, (p.matrix for p in parts), strict=True))
     else:  # large, and each unknown once
-        matrix = np.zeros((len(ids),) * 2, np.result_type(*(p.matrix.dtype for p in parts)))
+        flat = np.zeros(len(ids) ** 2, np.result_type(*(p.matrix.dtype for p in parts)))
         for place, part in zip(places, parts, strict=True):
-            matrix[place[:, None], place] += part.matrix
+            flat[(place[:, None] * len(ids) + place).ravel()] += part.matrix.ravel()
+        matrix = flat.reshape(len(ids), len(ids))
     return _Joined(ids, matrix, seen), kept

@@ -6,6 +6,7 @@ from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
+from math import atan2, hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -275,13 +276,13 @@ def _is_better(a: _Point, b: _Point, c: _Point, d: _Point) -> bool:
 def _sine(a: _Point, b: _Point, c: _Point) -> float:
     """Of the angle at b, from a to c, above 0 where the three turn left."""
     (ux, uy), (vx, vy) = (b[0] - a[0], b[1] - a[1]), (c[0] - b[0], c[1] - b[1])
-    return float((ux * vy - uy * vx) / (np.hypot(ux, uy) * np.hypot(vx, vy)))
+    return (ux * vy - uy * vx) / (hypot(ux, uy) * hypot(vx, vy))
 
 
 def _angle(a: _Point, b: _Point, c: _Point) -> float:
     """At b, between a and c [rad]."""
     (ux, uy), (vx, vy) = (a[0] - b[0], a[1] - b[1]), (c[0] - b[0], c[1] - b[1])
-    return float(np.arctan2(abs(ux * vy - uy * vx), ux * vx + uy * vy))
+    return atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy)
 
 
 @dataclass(frozen=True)
