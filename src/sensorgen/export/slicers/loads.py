@@ -71,6 +71,11 @@ class Recipe:
         """Material and source."""
         return f"{self.material.name}@{self.source}" if self.source else self.material.name
 
+    @property
+    def slow_speed_mm_s(self) -> float:
+        """Slowest speed of layers that must cool [mm/s]."""
+        return min(10.0, self.speed_mm_s)
+
 
 def recipe(printer: Printer, quality: Quality, tool: int, load: ToolLoad) -> Recipe:
     """Look up a load's numbers and hold them against the printer's limits.
