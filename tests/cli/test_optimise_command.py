@@ -166,8 +166,7 @@ def test_discards_on_a_coarse_mesh_hold_or_are_taken_back(monkeypatch):
         }
 
     monkeypatch.setattr(ladder, "known", lying)
-    films = {"dielectric_mm": {"from": 0.1, "to": 0.4}}
-    search_ = found(parameters=films, objectives={"force_resolution_n": "minimise"})
+    search_ = found(objectives={"force_resolution_n": "minimise"})
     assert search_.largest > 1.5
     assert search_.margin > search_.largest
     assert not any(row.discarded == "dominated" for row in search_.rows if row.candidate.values["dielectric_mm"] == 0.4)

@@ -122,7 +122,7 @@ def test_a_log_that_may_only_be_read():
     try:
         with Log(path) as log:
             assert len(log.readings()) == 1
-            with pytest.raises(Unwritable, match=r"cannot write to the log .*readonly.* nothing was logged"):
+            with pytest.raises(Unwritable, match=r"cannot write to the log .*read-only; nothing was logged"):
                 log.add([reading("23 triX", "650")])
     finally:
         if root:

@@ -32,14 +32,13 @@ _STEP = log(1.12)  # from one width or period to the next, in logarithms
 _SHARES = (log(0.5), log(5.0))  # of its own value, that a width or a period may take, in logarithms
 _STIFFNESS = "stiffness_kpa_per_mm"
 _ACCURACY = 1e-2  # of a capacitance, relative
-_TRIES = 12  # between two widths
 _STEEPEST = 5.0  # power of a width or period that a capacitance may follow; steeper, lines come or go [-]
 _MOST_TRIED, _MOST_SOLVED = 250, 30  # designs whose gap, and whose capacitance is found, before it gives up
 _PERIODS = 4  # of a sensor by which prints are estimated
 _MOST_PRESSED = 12  # designs whose stiffness is found
 
 BodyOf = Callable[[Design], Body]
-_Changes = dict[Key, Value]
+_Changes, _End = dict[Key, Value], tuple[float, float]  # the latter: share, and ln of the capacitance over that asked
 
 
 @dataclass(frozen=True)
@@ -334,22 +333,19 @@ class _CompensationSearch:
             if here and before:
                 one, other = before[1].off(self.wanted), here.off(self.wanted)
                 if (one > 0) != (other > 0):
-                    return self._between(heights, key, start, ((before[0], one), (share, other))), abs(share)
+                    return self._between(heights, key, start, (before[0], one), (share, other)), abs(share)
                 if abs(other) > abs(one):  # the other way
                     break
             before = (share, here) if here else None
             share += way * (2 if here and abs(here.off(self.wanted)) > abs(3 * way) else 1)
         return None, inf
 
-    def _between(
-        self, heights: _Changes, key: Key, start: float, ends: tuple[tuple[float, float], tuple[float, float]]
-    ) -> CompensatedDesign | None:
-        """Regula falsi and halvings in turn from two shares with values of :meth:`Found.off`; None at a jump."""
-        low, high = ends
-        for k in range(_TRIES):
+    def _between(self, heights: _Changes, key: Key, start: float, low: _End, high: _End) -> CompensatedDesign | None:
+        """Regula falsi and halvings in turn, between values above and below the wanted one; None at a jump."""
+        for half in (False, True) * 6:
             if abs(high[1] - low[1]) > _STEEPEST * abs(high[0] - low[0]):
                 return None
-            share = low[0] + (high[0] - low[0]) * (0.5 if k % 2 else low[1] / (low[1] - high[1]))
+            share = low[0] + (high[0] - low[0]) * (0.5 if half else low[1] / (low[1] - high[1]))
             here = self._at(heights | {key: start * exp(share)})
             if here is None or abs(here.off(self.wanted)) <= WITHIN / 4:
                 return here
