@@ -15,7 +15,7 @@ from sensorgen.design.design import make
 from sensorgen.design.materials import Value
 from sensorgen.design.values import lead_ranges, material_value, spread
 from sensorgen.models.overlap import edge_fringe_f
-from sensorgen.prediction import bodies
+from sensorgen.prediction import bodies, compression_law
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.inverse.forward import Forward, Scalar
 from sensorgen.prediction.narrowing import MULTIMETER, WEIGHT, WIDE
@@ -76,8 +76,10 @@ def test_nothing_of_a_material_is_certain():
             assert bounds.value < bounds.material.upper or bounds.open == "upper"  # softer than the law reaches
 
 
-def test_a_conductor_without_a_ratio_senses_force():
-    """Filaflex has none: in the range, the plate that was taken in its place is not."""
+def test_a_conductor_without_a_ratio_senses_force(monkeypatch, tmp_path):
+    """Filaflex has none: in the range, the plate that was taken in its place is not. Pressed at three pressures."""
+    monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path))
+    monkeypatch.setattr(compression_law, "STRESS_PA", (0.0, 3e4, 6e4, 1.2e5))
     electrodes = dict.fromkeys(("top_electrode", "bottom_electrode"), "filaflex-conductive")
     design = make({"shape": "tri", "materials": electrodes, "tools": {"filaflex-conductive": 1}})
     assert material_value(design.material("filaflex-conductive"), "", "poisson_ratio").source == values.ASSUMED

@@ -29,10 +29,13 @@ def model():
 
 
 def test_law_and_load_of_the_cell(model):
-    """triX as printed rises by 7.1 % at 100 kPa on the cell; with air between, 64 of 100 mm2 carry the load."""
+    """triX as printed rises by 7.1 % at 100 kPa on the cell; with air between, 64 of 100 mm2 carry the load.
+
+    Of the whole capacitance 0.946 of it, as the fringe at the edges of the tracks rises less.
+    """
     assert model.load_factor == pytest.approx(100 / 64)
     ratio, slope = model.under(np.array([64e3, 64.1e3, 1e6, 1.1e6]))
-    assert ratio[0] == pytest.approx(1.0714, rel=2e-3)
+    assert ratio[0] - 1 == pytest.approx(0.946 * 0.0714, rel=1e-2)
     assert (ratio[1] - ratio[0]) / 100 == pytest.approx(slope[0], rel=1e-2)
     assert ratio[3] - ratio[2] == pytest.approx(1e5 * slope[2])
     pressure = np.array([-1e4, 0.0, 1e3, 5e4, 4e5])

@@ -138,7 +138,7 @@ def test_no_attack_succeeds(victims, user, monkeypatch, record_property):
         as_nobody = partial(subprocess.Popen, **NOBODY)
         monkeypatch.setattr(shape_files.subprocess, "Popen", as_nobody)
     shape_files.trust("zig", text())
-    process = shape_files._Process("zig", text())
+    process = shape_files._ShapeProcess("zig", text())
     success, tried = worked(process.about["about"])
     process.close()
     kinds = Counter(kind for kind, _ in tried.values())

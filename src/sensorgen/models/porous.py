@@ -10,7 +10,7 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.scene.overlay import parts
 from sensorgen.scene.scene import Scene
-from sensorgen.scene.sections import Column, Layer
+from sensorgen.scene.sections import Layer, SectionColumn
 
 SOURCE = "Wiener (1912), Gent & Lindley (1959), Hashin & Shtrikman (1962, 1963), Gibson & Ashby (1997)"
 COST = 0
@@ -178,7 +178,7 @@ def filling(scene: Scene, modulus_pa: Mapping[str, float]) -> Filling | None:
     return Filling(d, share, Interval(d * standing, d * flat))
 
 
-def _gap(column: Column) -> tuple[float, float] | None:
+def _gap(column: SectionColumn) -> tuple[float, float] | None:
     """Heights between the electrodes of a column [mm]; None where one is missing or slanted."""
     low = [one for one in column.layers if one.body.terminal == "bottom"]
     high = [one for one in column.layers if one.body.terminal == "top"]

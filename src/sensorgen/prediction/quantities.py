@@ -253,7 +253,7 @@ def _printed_otherwise(model: SensorModel, load: Load, query: Query) -> Iterator
     for rule in list(body.cells.scenes)[1:]:
         with suppress(SensorgenError):  # as of a short, which the prediction tells by itself
             other = body.printed_otherwise(rule)
-            rest = rest_state(other)
+            rest = rest_state(other, ranges=False)
             at_rest.append((rest.capacitance.value, other, rest))
     ends = {id(pick[1]): pick for pick in (_end(at_rest, least=True), _end(at_rest, least=False))}
     pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))

@@ -1,6 +1,6 @@
 """Maps over the outline of an array."""
 
-from math import nan
+from math import isnan, nan
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +10,7 @@ from sensorgen.analysis.plots.figure import GREY, Axis, Curve, Figure, Map, Pane
 from sensorgen.core.arrays import Real
 
 if TYPE_CHECKING:
-    from sensorgen.design.arrays import Layout
+    from sensorgen.design.arrays import ArrayLayout
     from sensorgen.prediction.array.frames import PressureMaps
     from sensorgen.prediction.array.study import ArrayStudy
 
@@ -41,7 +41,8 @@ def figure(pressures: "PressureMaps", true: "Real | None" = None, name: str = "m
     What is not determined is left white, never drawn as no pressure.
     """
     k, layout = pressures.heaviest(), pressures.model.layout
-    shown = {f"frame at {pressures.time_s[k]:g} s": pressures.pressure_kpa[k]}
+    time_s = float(pressures.time_s[k])
+    shown = {f"frame {k + 1}" if isnan(time_s) else f"frame at {time_s:g} s": pressures.pressure_kpa[k]}
     if true is not None:
         shown = {"true": np.where(pressures.model.here, true[k], np.nan)} | shown
     most = max(float(np.nanmax(values, initial=1.0)) for values in shown.values())
@@ -75,7 +76,7 @@ def course(pressures: "PressureMaps", true: "Real", name: str, title: str) -> Fi
     return Figure(name, title, alt, {"": tuple(panels)}, columns=2)
 
 
-def panel(layout: "Layout", values: Real, label: str, title: str, most: float = nan) -> Panel:
+def panel(layout: "ArrayLayout", values: Real, label: str, title: str, most: float = nan) -> Panel:
     """One map of a value of every crossing, with the outline of the print."""
     import shapely
 

@@ -17,7 +17,7 @@ from sensorgen.core import files as store
 from sensorgen.core.document import spreadsheet
 from sensorgen.core.errors import BadInput, MissingValue, Unwritable
 from sensorgen.core.records import shown
-from sensorgen.measure.csv_table import Table
+from sensorgen.measure.csv_table import CsvTable
 from sensorgen.measure.log import fields, files
 from sensorgen.measure.log.entries import (
     NAMES,
@@ -131,7 +131,7 @@ def csv_lines(kind: type[Entry], rows: Iterable[Entry]) -> Iterator[str]:
         yield target.getvalue()
 
 
-def from_csv(kind: type[Entry], table: Table) -> Iterator[Entry]:
+def from_csv(kind: type[Entry], table: CsvTable) -> Iterator[Entry]:
     """Rows of an exported CSV table.
 
     Raises

@@ -74,6 +74,14 @@ class ArrayStudy:
             ),
         )
         yield "crossing", f"{model.capacitance.words()} at rest, {self._rises()}"
+        edges = model.fringe
+        yield (
+            "fringe",
+            (
+                f"edges of the tracks are {100 * edges.share:.3g} % of its own area's capacitance "
+                f"({100 * edges.least:.2g} to {100 * edges.most:.2g} %); the rise is {edges.gain:.2f} of the cell's"
+            ),
+        )
         if model.load_factor != 1:
             yield "load", f"a cell carries {model.load_factor:.2f} times the pressure on the surface"
         ends = [wire.end_ohm for wire in model.wires()]
@@ -135,10 +143,7 @@ class ArrayStudy:
         if self.model.here.size > MOST_DENSE:
             yield f"above {MOST_DENSE} crossings each standard error is as if all other capacitances were known"
         yield from (f"doubtful: {doubt}" for doubt in self.model.crossing.doubts)
-        yield (
-            "left out: fringe between neighbouring tracks, spreading of the load by the cover, strays of the cable, "
-            "contact resistance"
-        )
+        yield "left out: strays of the cable, contact resistance"
 
     def record(self) -> dict[str, Any]:
         """Numbers by crossing, null outside the outline and where nothing is determined."""
