@@ -130,7 +130,7 @@ class Pressed:
     def some(self, which: Sequence[int]) -> "Pressed":
         """Some pressures of the curve."""
         values = {name: getattr(self, name) for name in _BY_LOAD}
-        rows = {
+        rows: dict[str, Any] = {
             k: v[which] if isinstance(v, np.ndarray) else tuple(v[i] for i in which)
             for k, v in values.items()
             if len(v)
