@@ -242,11 +242,10 @@ class Problem:
         pairs = self.project(found.u_m, stuck)
         for _ in range(self.updates):
             again = self.newton(found, pressure_pa, pairs, _ENOUGH)
-            if again is None and keeps and self.sound:
-                found = self.newton(found, pressure_pa, found.pairs, _ENOUGH)
-                break
             if again is None:
-                return None
+                stays = keeps and self.sound is not None
+                found = self.newton(found, pressure_pa, found.pairs, _ENOUGH) if stays else None
+                break
             found, pairs = again, self.project(again.u_m, stuck)
             depths = np.zeros((2, 1 + max(p.point.max(initial=0) for p in (found.pairs, pairs))))
             for depth, seen in zip(depths, (found.pairs, pairs), strict=True):
