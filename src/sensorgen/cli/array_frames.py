@@ -33,7 +33,7 @@ def invert(design: "Design", task: "Task", frames: ArrayFrames, *, perfect: bool
     known = None if frames.calibration is None else stored(frames.calibration)
     maps = inverted(
         model, how, read_in.siemens, read_in.rest, read_in.time_s, frames.scatter, apart, read_in.unused, known,
-        read_in.day,
+        read_in.day, not frames.cells,
     )  # fmt: skip
     if task.output:
         _write(maps, task.output)

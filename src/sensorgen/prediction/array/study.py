@@ -84,6 +84,14 @@ class ArrayStudy:
         )
         if model.load_factor != 1:
             yield "load", f"a cell carries {model.load_factor:.2f} times the pressure on the surface"
+        sheet, of = f" and {p.cover_mm:g} mm of {p.cover_mpa:g} MPa" if p.cover_mm else "", 100 * model.kernel
+        yield (
+            "cover",
+            (
+                f"of a press on one square its cell feels {of[0, 0]:.3g} %, each neighbour of the row {of[0, 1]:.2g} % "
+                f"and of the column {of[1, 0]:.2g} %, through columns, isolation{sheet} (loose layers on springs)"
+            ),
+        )
         ends = [wire.end_ohm for wire in model.wires()]
         yield (
             "tracks",
@@ -194,7 +202,7 @@ def study(
     tracks = faulty(model.tracks(model.capacitances(float(ratio))), faults, model.here)
     read = readout.read(tracks)
     prior = np.where(model.here, per_pa * FULL_SCALE_PA, 1e-6 * model.capacitance.value).ravel()
-    spread = covariance(information(read, readout), prior)
+    spread = covariance(_on_surface(information(read, readout), model), prior)
     variance = spread if spread.ndim == 1 else np.diag(spread)
     sigma = np.sqrt(variance).reshape(model.here.shape) / per_pa / PA_PER_KPA
     small = model.here.size <= MOST_DENSE
@@ -202,6 +210,13 @@ def study(
         model, readout, pressure_kpa, np.where(model.here, sigma, np.nan), crosstalk(read[0]) if small else None,
         tuple(faults),
     )  # fmt: skip
+
+
+def _on_surface(found: Real, model: ArrayModel) -> Real:
+    """Information on pressures on the surface by that on those that cells carry, (k, k), or each alone, (k,)."""
+    if found.ndim == 1:
+        return found / model.undone**2
+    return np.asarray(model.spread.T @ found @ model.spread)
 
 
 def _map(values: Real) -> list[list[float | None]]:
