@@ -11,6 +11,7 @@ from sensorgen.core.document import Cell, Column, Facts, Part, Table, to_json
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import si
 from sensorgen.prediction.array.model import PA_PER_KPA, ArrayModel
+from sensorgen.prediction.array.presses import PRESS_MM, PRESS_N, count, distance_mm
 from sensorgen.prediction.array.readout import (
     FULL_SCALE_PA,
     MOST_DENSE,
@@ -44,6 +45,8 @@ class ArrayStudy:
         Largest effect of another crossing at the lowest frequency [-]; None of large arrays.
     faults : tuple of str
         That the network has.
+    apart_mm : float
+        Distance from which two presses are told apart; infinite of none [mm].
     """
 
     model: ArrayModel
@@ -52,6 +55,7 @@ class ArrayStudy:
     sigma_kpa: Real
     crosstalk: "Real | None"
     faults: tuple[str, ...] = ()
+    apart_mm: float = np.inf
 
     @property
     def determined(self) -> Mask:
@@ -138,7 +142,14 @@ class ArrayStudy:
         yield Table("resolution", "", columns, tuple(rows))
         yield (
             f"(standard errors of one frame at {self.pressure_kpa:g} kPa, of noise alone; smallest press: "
-            f"{DETECTED:g} sigma on one crossing; two presses show apart from two pitches on)"
+            f"{DETECTED:g} sigma on one crossing)"
+        )
+        press = f"of {PRESS_N:g} N on {PRESS_MM:g} x {PRESS_MM:g} mm"
+        yield (
+            f"two presses {press} are told apart from {self.apart_mm:.3g} mm on, wherever they lie: "
+            f"{count(self.model, self.apart_mm)} at once"
+            if np.isfinite(self.apart_mm)
+            else f"two presses {press} are not told apart at every place, however far"
         )
         yield from self.model.shared()
         yield from self.model.beyond(np.array([self.pressure_kpa]))
@@ -167,6 +178,7 @@ class ArrayStudy:
             "sigma_kpa": _map(np.where(self.determined, self.sigma_kpa, np.nan)),
             "sigma_n": _map(np.where(self.determined, self.sigma_n, np.nan)),
             "crosstalk": None if self.crosstalk is None else _map(self.crosstalk),
+            "apart_mm": self.apart_mm if np.isfinite(self.apart_mm) else None,
             "frames_per_s": 1 / self.readout.frame_s(self.model),
             "faults": self.faults,
         }
@@ -202,13 +214,14 @@ def study(
     tracks = faulty(model.tracks(model.capacitances(float(ratio))), faults, model.here)
     read = readout.read(tracks)
     prior = np.where(model.here, per_pa * FULL_SCALE_PA, 1e-6 * model.capacitance.value).ravel()
-    spread = covariance(_on_surface(information(read, readout), model), prior)
+    known = _on_surface(information(read, readout), model)
+    spread = covariance(known, prior)
     variance = spread if spread.ndim == 1 else np.diag(spread)
     sigma = np.sqrt(variance).reshape(model.here.shape) / per_pa / PA_PER_KPA
     small = model.here.size <= MOST_DENSE
     return ArrayStudy(
         model, readout, pressure_kpa, np.where(model.here, sigma, np.nan), crosstalk(read[0]) if small else None,
-        tuple(faults),
+        tuple(faults), distance_mm(model, known * per_pa**2),
     )  # fmt: skip
 
 
