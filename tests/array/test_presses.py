@@ -32,7 +32,7 @@ def test_a_press_on_squares_has_its_force(model):
 
 @pytest.mark.parametrize("noise", [1e-3, 1e-2])
 def test_fitted_presses_are_as_far_apart_as_stated(model, noise):
-    """At the distance stated the fitted one errs by less than a third of it (standard deviation by the median); another network, fits of maps."""
+    """At the distance stated the fitted one errs by less than a third of it, by the median; another network solves."""
     readout = ArrayReadout(noise=noise)
     distance, draw = study(model, readout, 60.0).apart_mm, np.random.default_rng(1)
     x, y = model.layout.x_mm[4], model.layout.y_mm[3]

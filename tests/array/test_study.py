@@ -120,6 +120,15 @@ def test_what_a_fault_hides_is_not_determined(model):
     assert lead.determined[:, [0, 1, 3]].all()
 
 
+def test_crossings_outside_the_outline_tell_nothing():
+    """Their readings are leads' alone: noise relative to them would let a broken row's be known by them."""
+    corner = model_of("POLYGON ((0 0, 60 0, 60 20, 30 20, 30 40, 0 40, 0 0))")
+    assert not corner.here.all()
+    dark = study(corner, ArrayReadout(), 100.0, ["r1:3"]).determined
+    assert dark[0].tolist() == [True] * 3 + [False] * 3
+    assert dark[1:][corner.here[1:]].all()
+
+
 def test_an_outline_leaves_its_corner_out():
     corner = model_of("POLYGON ((0 0, 40 0, 40 20, 30 20, 30 30, 0 30, 0 0))")
     found = study(corner, ArrayReadout())

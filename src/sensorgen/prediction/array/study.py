@@ -47,6 +47,8 @@ class ArrayStudy:
         That the network has.
     apart_mm : float
         Distance from which two presses are told apart; infinite of none [mm].
+    short : float
+        Probability that a crossing is shorted, P(short) of its print [-].
     """
 
     model: ArrayModel
@@ -56,6 +58,7 @@ class ArrayStudy:
     crosstalk: "Real | None"
     faults: tuple[str, ...] = ()
     apart_mm: float = np.inf
+    short: float = 0.0
 
     @property
     def determined(self) -> Mask:
@@ -109,8 +112,21 @@ class ArrayStudy:
         noise = " and ".join([*([f"{readout.noise:.2g} of a reading"] if readout.noise else []),
                               *([si(readout.noise_s, "S")] if readout.noise_s else [])])  # fmt: skip
         yield "readout", f"{readout.kind}, {by}, {tones}, noise {noise}; {1 / readout.frame_s(model):.3g} frames/s"
+        if self.short:
+            yield (
+                "yield",
+                (
+                    f"{100 * self.whole:.3g} % of prints have no short at P(short) {self.short:g} of a crossing; "
+                    f"{count * self.short:.3g} are shorted on average"
+                ),
+            )
         if self.faults:
             yield "faults", f"{', '.join(self.faults)}: {self._lost()}"
+
+    @property
+    def whole(self) -> float:
+        """Probability that a print has no short, crossings by themselves [-]."""
+        return float((1 - self.short) ** self.model.here.sum())
 
     def _lost(self) -> str:
         dark = int((self.model.here & ~self.determined).sum())
@@ -181,6 +197,7 @@ class ArrayStudy:
             "apart_mm": self.apart_mm if np.isfinite(self.apart_mm) else None,
             "frames_per_s": 1 / self.readout.frame_s(self.model),
             "faults": self.faults,
+            "yield": self.whole if self.short else None,
         }
 
     def to_json(self) -> str:
@@ -189,7 +206,8 @@ class ArrayStudy:
 
 
 def study(
-    model: ArrayModel, readout: ArrayReadout, pressure_kpa: float = 100.0, faults: Sequence[str] = ()
+    model: ArrayModel, readout: ArrayReadout, pressure_kpa: float = 100.0, faults: Sequence[str] = (),
+    short: float = 0.0,
 ) -> ArrayStudy:  # fmt: skip
     """Resolution of an array under an even pressure.
 
@@ -201,6 +219,8 @@ def study(
         On the surface [kPa].
     faults : sequence of str
         As of :func:`sensorgen.prediction.array.readout.faulty`.
+    short : float
+        Probability that a crossing is shorted [-].
 
     Raises
     ------
@@ -211,17 +231,17 @@ def study(
         raise OutOfRange(f"a pressure of {pressure_kpa:g} kPa; expected 0 or more")
     ratio, slope = model.under(np.array(pressure_kpa * PA_PER_KPA))
     per_pa = model.capacitance.value * float(slope)
-    tracks = faulty(model.tracks(model.capacitances(float(ratio))), faults, model.here)
-    read = readout.read(tracks)
+    whole = model.tracks(model.capacitances(float(ratio)))
+    read = readout.read(faulty(whole, faults, model.here))
     prior = np.where(model.here, per_pa * FULL_SCALE_PA, 1e-6 * model.capacitance.value).ravel()
-    known = _on_surface(information(read, readout), model)
+    known = _on_surface(information(read, readout, model.here, readout.read(whole) if faults else None), model)
     spread = covariance(known, prior)
     variance = spread if spread.ndim == 1 else np.diag(spread)
     sigma = np.sqrt(variance).reshape(model.here.shape) / per_pa / PA_PER_KPA
     small = model.here.size <= MOST_DENSE
     return ArrayStudy(
         model, readout, pressure_kpa, np.where(model.here, sigma, np.nan), crosstalk(read[0]) if small else None,
-        tuple(faults), distance_mm(model, known * per_pa**2),
+        tuple(faults), distance_mm(model, known * per_pa**2), short,
     )  # fmt: skip
 
 
