@@ -11,9 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from sensorgen.core.findings import most_severe
 from sensorgen.design.design import Design, make
-from sensorgen.prediction.slices import reviewed
 from sensorgen.workflows.build import build
 from sensorgen.workflows.slice import slice_design
 from sensorgen.workflows.tiles import tiles
@@ -48,13 +46,14 @@ def measured(name: str, how: str) -> dict[str, object]:
         if slicer:
             made = slice_design(of, Path(folder), slicer, program=str(program), force=True)
             words = f"{made.slicer.name} {made.slicer.version}"
-            refused = most_severe([f for f in made.all_findings if f.severity == "error"], 1)
+            errors = [f for f in made.all_findings if f.severity == "error"]
         else:
-            build(of, Path(folder), force=True)
-            words, refused = "files", most_severe([f for f in reviewed(of).findings if f.severity == "error"], 1)
+            words = "files"
+            errors = [f for f in build(of, Path(folder), force=True).findings if f.severity == "error"]
     own, others = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return {
-        "of": words, "verdict": refused or "accepted", "own_s": round(own.ru_utime + own.ru_stime),
+        "of": words, "verdict": "; ".join(f.message for f in errors) or "accepted",
+        "own_s": round(own.ru_utime + own.ru_stime),
         "slicer_s": round(others.ru_utime + others.ru_stime),
         "gb": round(max(own.ru_maxrss, others.ru_maxrss) / 1e6, 2),
     }  # fmt: skip

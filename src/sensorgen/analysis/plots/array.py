@@ -114,5 +114,6 @@ def panel(layout: "Layout", values: Real, label: str, title: str, most: float = 
     ends = (Axis("x [mm]", low=x0 - edge, high=x1 + edge), Axis("y [mm]", low=y0 - edge, high=y1 + edge))
     drawn = Map(np.array(layout.x_mm), np.array(layout.y_mm), values, label, low=0.0, high=most)
     rings = shapely.get_rings(shapely.get_parts(layout.sensing))
-    outline = [Curve("line", "", *shapely.get_coordinates(ring).T, colour=GREY) for ring in rings]
+    ways = (shapely.get_coordinates(ring).T for ring in rings)
+    outline = [Curve("line", "", x, y, colour=GREY) for x, y in ways]
     return Panel((drawn, *outline), *ends, title=title, equal=True)

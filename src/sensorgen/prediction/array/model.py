@@ -102,7 +102,10 @@ class ArrayModel:
     @cached_property
     def fringe(self) -> Fringe:
         """Part of the edges of the tracks in the capacitance and in its rise."""
-        p, eps = self.layout.params, {part: self._permittivity(part) for part in ("film", "dielectric", "isolation")}
+        p, eps = self.layout.params, {
+            part: material_value(*self.design.slot(part), "relative_permittivity").value
+            for part in ("film", "dielectric", "isolation")
+        }  # fmt: skip
         gap = self.crossing.body.cells.first().size_mm[2] - 2 * p.electrode_mm
         film = getattr(self.design.crossing.params, "dielectric_mm", 0.0)
         area_m = p.column_mm * p.row_mm * M_PER_MM
@@ -116,13 +119,6 @@ class ArrayModel:
         }  # fmt: skip
         (px, py), heights = p.pitch, (film, gap - film, p.electrode_mm, p.isolation_mm, p.base_mm)
         return fringe(CrossingSection((p.column_mm, px - p.column_mm), (p.row_mm, py - p.row_mm), *heights, values))
-
-    def _permittivity(self, part: str) -> float:
-        """Relative permittivity of a part; of the dielectric where no source has it [-]."""
-        try:
-            return material_value(*self.design.slot(part), "relative_permittivity").value
-        except MissingValue:
-            return material_value(*self.design.slot("dielectric"), "relative_permittivity").value
 
     @property
     def pitch_area_m2(self) -> float:
@@ -166,21 +162,16 @@ class ArrayModel:
 
     @cached_property
     def cover(self) -> tuple[ElasticLayer, ...]:
-        """What lies on the cells, from below: columns and isolation as one layer, then a sheet."""
-        p, layers = self.layout.params, list[ElasticLayer]()
-        parts = (("top_electrode", p.electrode_mm), ("isolation", p.isolation_mm))
-        moduli = [self._mechanics(part) for part, _ in parts]
-        thick = p.electrode_mm + p.isolation_mm
-        mean, nu = (sum(size * of[k] for (_, size), of in zip(parts, moduli, strict=True)) / thick for k in (0, 1))
-        layers.append(ElasticLayer(thick * M_PER_MM, mean, nu))
-        if p.cover_mm:
-            layers.append(ElasticLayer(p.cover_mm * M_PER_MM, p.cover_mpa * PA_PER_MPA, _RUBBER))
-        return tuple(layers)
-
-    def _mechanics(self, part: str) -> tuple[float, float]:
-        """Young's modulus [Pa] and Poisson's ratio of a part [-]."""
-        of = self.design.slot(part)
-        return material_value(*of, "youngs_modulus_pa").value, material_value(*of, "poisson_ratio").value
+        """Layers on the cells, from below: columns and isolation as one, then a sheet."""
+        p = self.layout.params
+        parts = {"top_electrode": p.electrode_mm, "isolation": p.isolation_mm}
+        thick = sum(parts.values())
+        modulus, nu = (
+            sum(mm * material_value(*self.design.slot(part), of).value for part, mm in parts.items()) / thick
+            for of in ("youngs_modulus_pa", "poisson_ratio")
+        )
+        own = ElasticLayer(thick * M_PER_MM, modulus, nu)
+        return (own, ElasticLayer(p.cover_mm * M_PER_MM, p.cover_mpa * PA_PER_MPA, _RUBBER)) if p.cover_mm else (own,)
 
     @cached_property
     def kernel(self) -> Real:

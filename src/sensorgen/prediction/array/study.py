@@ -82,23 +82,19 @@ class ArrayStudy:
         )
         yield "crossing", f"{model.capacitance.words()} at rest, {self._rises()}"
         edges = model.fringe
-        yield (
-            "fringe",
-            (
-                f"edges of the tracks are {100 * edges.share:.3g} % of its own area's capacitance "
-                f"({100 * edges.least:.2g} to {100 * edges.most:.2g} %); the rise is {edges.gain:.2f} of the cell's"
-            ),
+        words = (
+            f"edges of the tracks are {100 * edges.share:.3g} % of its own area's capacitance "
+            f"({100 * edges.least:.2g} to {100 * edges.most:.2g} %); the rise is {edges.gain:.2f} of the cell's"
         )
+        yield "fringe", words
         if model.load_factor != 1:
             yield "load", f"a cell carries {model.load_factor:.2f} times the pressure on the surface"
         sheet, of = f" and {p.cover_mm:g} mm of {p.cover_mpa:g} MPa" if p.cover_mm else "", 100 * model.kernel
-        yield (
-            "cover",
-            (
-                f"of a press on one square its cell feels {of[0, 0]:.3g} %, each neighbour of the row {of[0, 1]:.2g} % "
-                f"and of the column {of[1, 0]:.2g} %, through columns, isolation{sheet} (loose layers on springs)"
-            ),
+        words = (
+            f"of a press on one square its cell feels {of[0, 0]:.3g} %, each neighbour of the row {of[0, 1]:.2g} % "
+            f"and of the column {of[1, 0]:.2g} %, through columns, isolation{sheet} (loose layers on springs)"
         )
+        yield "cover", words
         ends = [wire.end_ohm for wire in model.wires()]
         yield (
             "tracks",
@@ -113,13 +109,11 @@ class ArrayStudy:
                               *([si(readout.noise_s, "S")] if readout.noise_s else [])])  # fmt: skip
         yield "readout", f"{readout.kind}, {by}, {tones}, noise {noise}; {1 / readout.frame_s(model):.3g} frames/s"
         if self.short:
-            yield (
-                "yield",
-                (
-                    f"{100 * self.whole:.3g} % of prints have no short at P(short) {self.short:g} of a crossing; "
-                    f"{count * self.short:.3g} are shorted on average"
-                ),
+            words = (
+                f"{100 * self.whole:.3g} % of prints have no short at P(short) {self.short:g} of a crossing; "
+                f"{count * self.short:.3g} are shorted on average"
             )
+            yield "yield", words
         if self.faults:
             yield "faults", f"{', '.join(self.faults)}: {self._lost()}"
 
