@@ -156,7 +156,9 @@ def main() -> None:
         print(rows[-1], flush=True)
     scene = make({"shape": "pillar", "parameters": {"length_mm": 1.25, "width_mm": 1.25}}).in_use
     stress = [0.0, 2.5e4, 5e4]
-    fine, coarse = (press3d.press(press3d.cell(scene), SOLIDS, stress, EPS, fineness=press3d.Pieces(n)) for n in (3, 2))
+    fine, coarse = (
+        press3d.press(press3d.cell(scene), SOLIDS, stress, EPS, fineness=press3d.BrickCounts(n)) for n in (3, 2)
+    )
     boxes = press3d.limit(fine, coarse, 3)
     rows.append(("pillar", float(boxes.found.displacement_m[2]), float(boxes.rise_f_per_m2[2]), *rings(scene, 5e4)))
     lines = [

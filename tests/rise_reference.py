@@ -8,7 +8,7 @@ import numpy as np
 from sensorgen.design.design import make
 from sensorgen.design.tip import Tip
 from sensorgen.prediction.compression_law import STRESS_PA, case_of
-from sensorgen.prediction.mesh_ladder import Piece, drawn, estimated
+from sensorgen.prediction.mesh_ladder import PressedPiece, drawn, estimated
 from sensorgen.scene.scene import Body, Prism, Scene
 from sensorgen.solvers.contact.cell import BLOCK
 
@@ -36,7 +36,7 @@ def case(entry):
             for b in entry["print"]["bodies"]
             if b["name"] != BLOCK  # the references' own, which the top adds again
         )
-        piece = Piece(Scene(bodies, tuple(entry["print"]["size_mm"])), entry["print"]["period_mm"])
+        piece = PressedPiece(Scene(bodies, tuple(entry["print"]["size_mm"])), entry["print"]["period_mm"])
     return case_of(design, piece, "press2d", Tip(block=entry["top"]))
 
 

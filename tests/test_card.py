@@ -178,7 +178,7 @@ def test_bounds_are_met_by_fits_to_noisy_readings():
             d = (sensor.impedance(tones, *(p * scale)) - read) / size
             return np.concatenate([d.real, d.imag])
 
-        fits.append(least_squares(misfit, truth / scale, xtol=1e-10).x * scale)
+        fits.append(least_squares(misfit, truth / scale, method="lm", xtol=1e-10).x * scale)
     found = setup(sensor, noise=noise, force=4.0, place=0.04).bounds()
     scatter = np.std(fits, axis=0)
     assert scatter[0] == pytest.approx(float(found.force_n), rel=0.1)

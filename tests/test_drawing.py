@@ -17,10 +17,10 @@ from sensorgen.core.findings import Finding
 from sensorgen.design import shapes
 from sensorgen.scene.drawing import markers, panels, svg
 from sensorgen.scene.drawing.dimensions import beside
-from sensorgen.scene.drawing.paper import Frame, fitted, spread, width, wrapped
+from sensorgen.scene.drawing.paper import ViewFrame, fitted, spread, width, wrapped
 from sensorgen.scene.drawing.view import Measure, nearest, period, views
 from sensorgen.scene.scene import Body, Fill, Point, Prism, Scene, area_mm2, box
-from sensorgen.scene.sections import Column, Section, columns
+from sensorgen.scene.sections import Section, SectionColumn, columns
 
 SHAPES = registry.names(shapes)
 NIGHTLY = pytest.mark.nightly
@@ -86,7 +86,7 @@ def words(page: ET.Element) -> list[str]:
     return [element.text or "" for element in page.iterfind(".//s:text", NS)]
 
 
-def area_until(row: list[Column], end_mm: float) -> dict[str, float]:
+def area_until(row: list[SectionColumn], end_mm: float) -> dict[str, float]:
     """Area of each material from 0 to ``end_mm``, by columns: without any clipping of outlines [mm2]."""
     total: dict[str, float] = {}
     for column in row:
@@ -450,6 +450,6 @@ def test_scales_are_customary() -> None:
 def test_a_value_that_fits_beside_its_dimension_has_no_leader(high_mm: Point, leaders: int) -> None:
     """By the only slanted lines there are: ends of dimensions run across, dimensions upright."""
     lane = [Measure(0.0, high_mm[0]), Measure(high_mm[0], high_mm[1])]
-    svg = f"<g>{''.join(beside(Frame(50.0, 100.0, 90.0, 20.0, 10.0, 10.0), [lane]))}</g>"
+    svg = f"<g>{''.join(beside(ViewFrame(50.0, 100.0, 90.0, 20.0, 10.0, 10.0), [lane]))}</g>"
     lines = [{k: float(each.get(k, "")) for k in ("x1", "y1", "x2", "y2")} for each in ET.fromstring(svg).iter("line")]
     assert sum(each["x1"] - each["x2"] == pytest.approx(2.2) for each in lines) == leaders

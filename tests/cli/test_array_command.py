@@ -23,8 +23,8 @@ def test_it_says_what_is_resolved(run, file):
     said = run("array", file, "--frequencies", "10kHz", "--fault", "c3:0")
     assert said.code == 0, said.err
     for words in ("3 rows x 4 columns, 12 crossings", "+10.6 % at 100 kPa", "guarded, through 50 ohm, 10 kHz",
-                  "3 of 12 crossings are not determined", "extrapolated: 100 kPa exceeds 64 kPa", "edges of the tracks are 21.3 %",
-                  "contact resistance"):  # fmt: skip
+                  "3 of 12 crossings are not determined", "extrapolated: 100 kPa exceeds 64 kPa",
+                  "edges of the tracks are 21.3 %", "contact resistance"):  # fmt: skip
         assert words in said.words
     assert "share a factor 0.15 to 1.6: stiffness by its sources" in said.words
     data = json.loads(run("array", file, "--json", "--pressure", "50").out)

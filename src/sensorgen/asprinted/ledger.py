@@ -17,7 +17,7 @@ from sensorgen.asprinted.beads import Beads
 from sensorgen.checks import estimate
 from sensorgen.core.arrays import Mask, Real
 from sensorgen.design.design import Design
-from sensorgen.export.gcode.found import Found
+from sensorgen.export.gcode.found import GcodeFinding
 from sensorgen.scene.layers import LayerRegions, Region, drawn, narrow_mm, parts
 
 PITCH_MM = 0.1
@@ -88,7 +88,7 @@ def sampled(design: Design, off: float) -> tuple[LayerRegions, ...]:
     return drawn(scene, tuple(z + shift for z in design.layers.boundaries_mm(scene.size_mm[2])))
 
 
-def check(design: Design, lines: Beads) -> Iterator[Found]:
+def check(design: Design, lines: Beads) -> Iterator[GcodeFinding]:
     """Findings about the deposit of a piece.
 
     Parameters
@@ -371,7 +371,7 @@ _ADVICE = {
 }
 
 
-def _merged(faults: Iterable[Disagreement]) -> Iterator[Found]:
+def _merged(faults: Iterable[Disagreement]) -> Iterator[GcodeFinding]:
     """One finding for the same fault in neighbouring layers, with the worst of them."""
     order = sorted(faults, key=lambda fault: (fault.rule, fault.subject, fault.layer))
     for (rule, _), same in groupby(order, lambda fault: (fault.rule, fault.subject)):
@@ -383,4 +383,4 @@ def _merged(faults: Iterable[Disagreement]) -> Iterator[Found]:
             message = f"{worst.message} {where}, at x {worst.at_mm[0]:g}, y {worst.at_mm[1]:g} mm from the corner"
             severity = "warning" if rule == "support" else "error"
             number = min(some, key=lambda fault: fault.line).line
-            yield Found(rule, severity, number if number < _NOWHERE else 1, message, _ADVICE[rule], len(some))
+            yield GcodeFinding(rule, severity, number if number < _NOWHERE else 1, message, _ADVICE[rule], len(some))

@@ -182,7 +182,7 @@ class Params(Envelope):
 
 
 @dataclass(frozen=True)
-class Track:
+class ArrayTrack:
     """A row or column with its lead.
 
     Attributes
@@ -214,14 +214,14 @@ class Track:
 
 
 @dataclass(frozen=True)
-class Layout:
+class ArrayLayout:
     """Tracks of an array in plan, in the coordinates of its scene.
 
     Attributes
     ----------
     params : Params
         Of the array.
-    rows, columns : tuple of Track
+    rows, columns : tuple of ArrayTrack
         From below, from the left.
     x_mm, y_mm : tuple of float
         Middles of all columns and rows [mm].
@@ -232,8 +232,8 @@ class Layout:
     """
 
     params: Params
-    rows: tuple[Track, ...]
-    columns: tuple[Track, ...]
+    rows: tuple[ArrayTrack, ...]
+    columns: tuple[ArrayTrack, ...]
     x_mm: tuple[float, ...]
     y_mm: tuple[float, ...]
     size_mm: Point
@@ -247,7 +247,7 @@ class Layout:
         rows, columns = ([self.plan(track) for track in tracks] for tracks in (self.rows, self.columns))
         return shapely.union_all(rows), shapely.union_all(columns)
 
-    def plan(self, track: Track) -> "shapely.Geometry":
+    def plan(self, track: ArrayTrack) -> "shapely.Geometry":
         """One track with its lead and pad [mm]."""
         import shapely
 
@@ -261,7 +261,7 @@ class Layout:
         """Pads of the rows and of the columns [mm]."""
         import shapely
 
-        def united(tracks: tuple[Track, ...]) -> "shapely.Geometry":
+        def united(tracks: tuple[ArrayTrack, ...]) -> "shapely.Geometry":
             return shapely.union_all([shapely.box(t.pad[0], t.pad[2], t.pad[1], t.pad[3]) for t in tracks])
 
         return united(self.rows), united(self.columns)
@@ -363,7 +363,7 @@ class Layout:
             found += [dots for k in sorted(chosen) for dots in self._name(tracks[k])]
         return shapely.set_precision(shapely.union_all(found), 1e-6)
 
-    def _name(self, track: Track) -> "Iterator[shapely.Polygon]":
+    def _name(self, track: ArrayTrack) -> "Iterator[shapely.Polygon]":
         """Rows of dots of a track's name, turned by a quarter, to be read from the right [mm]."""
         import shapely
 
@@ -398,7 +398,7 @@ def _way(a: Point, b: Point, half: float) -> "shapely.Geometry":
 
 
 @lru_cache(maxsize=16)
-def layout(p: Params, outline: str | None = None) -> Layout:
+def layout(p: Params, outline: str | None = None) -> ArrayLayout:
     """Tracks of an array.
 
     Parameters
@@ -427,7 +427,7 @@ def layout(p: Params, outline: str | None = None) -> Layout:
     fan = ceil(len(columns) / 2) * q if q < px - SLIVER_MM else 0.0
     x0, y0 = rounded(len(rows) * q + 2 * edge), rounded(p.pad_mm + fan + edge)
     x, y = _middles(x0, px, n), _middles(y0, py, m)
-    made = Layout(p, (), (), x, y, (0.0, 0.0), tuple(map(tuple, here)))
+    made = ArrayLayout(p, (), (), x, y, (0.0, 0.0), tuple(map(tuple, here)))
     size = rounded(x[columns[-1]] + px / 2 + p.edge("rows")), rounded(y[rows[-1]] + py / 2 + p.edge("columns"))
     return replace(
         made,
@@ -462,20 +462,20 @@ def _inside(p: Params, outline: str | None) -> list[list[bool]]:
     return found
 
 
-def _row(of: Layout, i: int, order: int, x0: float) -> Track:
+def _row(of: ArrayLayout, i: int, order: int, x0: float) -> ArrayTrack:
     """A row; its lead turns down to its pad, that of the lowest row nearest to the columns."""
     p, across = of.params, [j for j, is_here in enumerate(of.here[i]) if is_here]
     half, y = p.row_mm / 2, of.y_mm[i]
     left, right = of.x_mm[across[0]] - p.column_mm / 2, of.x_mm[across[-1]] + p.column_mm / 2
     down = x0 - p.margin_mm - (order + 0.5) * p.connector_mm
     lead = tuple((rounded(a), rounded(b)) for a, b in ((left, y), (down, y), (down, 0.0)))
-    return Track(
+    return ArrayTrack(
         f"r{i + 1}", across[0], across[-1], _rounded(left, right, y - half, y + half), lead,
         _rounded(down - p.lead_mm / 2, down + p.lead_mm / 2, 0.0, p.pad_mm),
     )  # fmt: skip
 
 
-def _columns(of: Layout, columns: list[int], top_mm: float) -> Iterator[Track]:
+def _columns(of: ArrayLayout, columns: list[int], top_mm: float) -> Iterator[ArrayTrack]:
     """Columns; where pads are nearer to each other than columns, leads of both halves step towards the middle.
 
     The innermost steps highest, so that none crosses another.
@@ -494,7 +494,7 @@ def _columns(of: Layout, columns: list[int], top_mm: float) -> Iterator[Track]:
             level = top_mm - (inwards + 0.5) * q
             lead += [(x, level), (at, level)]
         lead += [(at, 0.0)]
-        yield Track(
+        yield ArrayTrack(
             f"c{j + 1}", run[0], run[-1], _rounded(x - half, x + half, bottom, top),
             tuple((rounded(a), rounded(b)) for a, b in lead),
             _rounded(at - p.lead_mm / 2, at + p.lead_mm / 2, 0.0, p.pad_mm),
@@ -556,12 +556,12 @@ def check_cell(params: Envelope, p: Params) -> None:
             )
 
 
-def scene(of: Layout, fill: Fill, strip: Any, params: Envelope) -> Scene:
+def scene(of: ArrayLayout, fill: Fill, strip: Any, params: Envelope) -> Scene:
     """Bodies of an array.
 
     Parameters
     ----------
-    of : Layout
+    of : ArrayLayout
         Its tracks.
     fill : Fill
         Materials.
@@ -647,7 +647,7 @@ class _GrowingBodies:
         """Add a region between two heights."""
         self.add(name, material, terminal, _plates(region, z0, z1))
 
-    def cover(self, of: Layout, material: str, region: "shapely.Geometry", z: _Levels) -> None:
+    def cover(self, of: ArrayLayout, material: str, region: "shapely.Geometry", z: _Levels) -> None:
         """Add the cover with its letters."""
         self.plates("isolation", material, region, z.cover, z.face)
         if of.params.labels == "raised":
@@ -679,7 +679,7 @@ class _GrowingBodies:
         return tuple(Body(name, material, tuple(pieces), terminal) for name, (material, pieces, terminal) in found)
 
 
-def _united(tracks: Iterable[Track]) -> "shapely.Geometry":
+def _united(tracks: Iterable[ArrayTrack]) -> "shapely.Geometry":
     """Tracks without leads [mm]."""
     import shapely
 
@@ -687,7 +687,7 @@ def _united(tracks: Iterable[Track]) -> "shapely.Geometry":
 
 
 def _strip(
-    of: Layout, track: Track, shape_scene: Any, fill: Fill, params: Envelope
+    of: ArrayLayout, track: ArrayTrack, shape_scene: Any, fill: Fill, params: Envelope
 ) -> Mapping[tuple[str, str, str], list[Piece]]:
     """Pieces of one column above the rows, by name, material and terminal of their body."""
     p, (x0, _, y0, y1) = of.params, track.body

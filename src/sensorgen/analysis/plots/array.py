@@ -1,6 +1,6 @@
 """Maps over the outline of an array."""
 
-from math import nan
+from math import isnan, nan
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +12,7 @@ from sensorgen.core.arrays import Real
 _MEDIANS = 3.0  # standard errors beyond this many medians have one colour
 
 if TYPE_CHECKING:
-    from sensorgen.design.arrays import Layout
+    from sensorgen.design.arrays import ArrayLayout
     from sensorgen.prediction.array.frames import PressureMaps
     from sensorgen.prediction.array.study import ArrayStudy
 
@@ -52,11 +52,11 @@ def page(study: "ArrayStudy", found: "PressureMaps", true: "Real") -> bytes:
         with_fault = again(study.model, study.readout, study.pressure_kpa, [*study.faults, fault])
         figures.append(resolution(with_fault, name, f"with the fault {fault}"))
     figures.append(figure(found, true, "foot", "a foot: simulated frame at its heaviest, true and recovered"))
-    sections = [pages.Section(figures=tuple(figures))]
+    sections = [pages.PageSection(figures=tuple(figures))]
     parts = list(study.document())
     words = [f"{key}: {value}" for part in parts if isinstance(part, Facts) for key, value in part.rows]
     words += [part for part in parts if isinstance(part, str) and part]
-    sections.append(pages.Section(parts=tuple(part for part in parts if isinstance(part, Table))))
+    sections.append(pages.PageSection(parts=tuple(part for part in parts if isinstance(part, Table))))
     return pages.page(f"Resolution of {study.model.design.name}", words, sections).encode()
 
 
@@ -71,7 +71,8 @@ def figure(pressures: "PressureMaps", true: "Real | None" = None, name: str = "m
     What is not determined is left white, never drawn as no pressure.
     """
     k, layout = pressures.heaviest(), pressures.model.layout
-    shown = {f"frame at {pressures.time_s[k]:g} s": pressures.pressure_kpa[k]}
+    time_s = float(pressures.time_s[k])
+    shown = {f"frame {k + 1}" if isnan(time_s) else f"frame at {time_s:g} s": pressures.pressure_kpa[k]}
     if true is not None:
         shown = {"true": np.where(pressures.model.here, true[k], np.nan)} | shown
     most = max(float(np.nanmax(values, initial=1.0)) for values in shown.values())
@@ -105,7 +106,7 @@ def course(pressures: "PressureMaps", true: "Real", name: str, title: str) -> Fi
     return Figure(name, title, alt, {"": tuple(panels)}, columns=2)
 
 
-def panel(layout: "Layout", values: Real, label: str, title: str, most: float = nan) -> Panel:
+def panel(layout: "ArrayLayout", values: Real, label: str, title: str, most: float = nan) -> Panel:
     """One map of a value of every crossing, with the outline of the sensing area."""
     import shapely
 

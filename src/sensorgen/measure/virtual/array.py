@@ -11,7 +11,7 @@ from io import BytesIO
 import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
-from sensorgen.design.arrays import Layout
+from sensorgen.design.arrays import ArrayLayout
 from sensorgen.prediction.array.model import ArrayModel
 from sensorgen.prediction.array.readout import ArrayReadout, faulty
 from sensorgen.solvers.tracks import Tracks
@@ -45,7 +45,7 @@ class WalkedStep:
     centre_mm: Real
 
 
-def foot(layout: Layout, fine: int = 1) -> Real:
+def foot(layout: ArrayLayout, fine: int = 1) -> Real:
     """A foot's map on an array: lobes of the heel, the metatarsals and the hallux, (m fine, n fine) [kPa].
 
     The longer side is the foot's. The peak is ``PEAK_KPA``; an even part brings the mean over the outline near
@@ -63,7 +63,7 @@ def foot(layout: Layout, fine: int = 1) -> Real:
     return np.where(here, np.maximum(shape, even), 0.0)
 
 
-def points(layout: Layout, fine: int) -> tuple[Real, Real]:
+def points(layout: ArrayLayout, fine: int) -> tuple[Real, Real]:
     """Middles of the parts of all squares along x and y [mm]."""
     parts = (np.arange(fine) + 0.5) / fine - 0.5
     sides = zip((layout.x_mm, layout.y_mm), layout.params.pitch, strict=True)
@@ -71,7 +71,7 @@ def points(layout: Layout, fine: int) -> tuple[Real, Real]:
     return x, y
 
 
-def walked(layout: Layout, fine: int = 1, frames: int = STEP) -> WalkedStep:
+def walked(layout: ArrayLayout, fine: int = 1, frames: int = STEP) -> WalkedStep:
     """One step from heel to toe."""
     whole, (x, y) = foot(layout, fine), points(layout, fine)
     along = np.broadcast_to((x - x[0]) / max(np.ptp(x), 1.0), whole.shape)

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from sensorgen.models.fem2d import narrowed
-from sensorgen.scene.unit_cell import Band, Cell, Slice
+from sensorgen.scene.unit_cell import Band, SectionCell, Slice
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.triangles import insulated
 
@@ -86,7 +86,7 @@ class CrossingSection:
                 track, track + space, [("", "bottom", self.electrode), *beside, ("solid", "", self.electrode), *top]
             ),
         )
-        mesh = insulated(Cell(slices, (1.0, 1.0)))
+        mesh = insulated(SectionCell(slices, (1.0, 1.0)))
         shares = [share for _, share in mesh.regions]
         c = fem.narrowest(narrowed(mesh, self.eps, lambda found: fem.whole(found, shares), _WIDTH))
         return c.middle() * sum(height / self.eps[name] for name, _, height in under) / track - 1

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from sensorgen.core.arrays import Real
+from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import BadInput, MissingValue
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
-from sensorgen.design.arrays import Layout, Track
+from sensorgen.design.arrays import ArrayLayout, ArrayTrack
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.values import material_value
-from sensorgen.models.compression import Curve
+from sensorgen.models.compression import CapacitanceCurve
 from sensorgen.prediction import bodies
 from sensorgen.prediction.array.fringe import CrossingSection, Fringe, fringe
 from sensorgen.prediction.error_budget import modulus_range
@@ -77,7 +77,7 @@ class ArrayModel:
     lead_ohm: tuple[float, float]
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> ArrayLayout:
         """Tracks in plan."""
         found = self.design.layout
         if found is None:
@@ -88,6 +88,33 @@ class ArrayModel:
     def here(self) -> np.ndarray:
         """Crossings that the outline has, (m, n)."""
         return np.array(self.layout.here)
+
+    @cached_property
+    def regions(self) -> dict[str, Mask]:
+        """Crossings whose middle lies in each region of the design, (m, n) of bool.
+
+        Raises
+        ------
+        BadInput
+            A region that is no area, or without a crossing.
+        """
+        import shapely
+
+        p, of, found = self.layout.params, self.layout, {}
+        (px, py), (m, n) = p.pitch, self.here.shape
+        x = np.array(of.x_mm) - of.x_mm[0] + (p.length_mm - (n - 1) * px) / 2  # from the outline's corner
+        y = np.array(of.y_mm) - of.y_mm[0] + (p.width_mm - (m - 1) * py) / 2
+        for name, corners in self.design.regions.items():
+            region = shapely.MultiPoint(corners) if {*map(len, corners)} == {2} else shapely.Point()
+            area = region.envelope if len(corners) == 2 else shapely.Polygon(corners) if len(corners) > 2 else region
+            inside = self.here & shapely.intersects_xy(area, x[None], y[:, None])
+            if not (area.is_valid and area.area and inside.any()):
+                raise BadInput(
+                    f"regions.{name}: no area with a crossing; expected two corners of a rectangle, or three or more "
+                    f"of a polygon, up to {p.length_mm:g}, {p.width_mm:g} mm"
+                )
+            found[name] = inside
+        return found
 
     @cached_property
     def capacitance(self) -> Bounds:
@@ -216,7 +243,7 @@ class ArrayModel:
     def known_pa(self) -> float:
         """Pressure on the surface up to which the law of the cell is known, further straight; infinite of a plate."""
         law = self.crossing.law.compression
-        return law.stress_pa[-1] / self.load_factor if isinstance(law, Curve) else float("inf")
+        return law.stress_pa[-1] / self.load_factor if isinstance(law, CapacitanceCurve) else float("inf")
 
     @cached_property
     def shared_factor(self) -> tuple[float, float]:
@@ -300,7 +327,7 @@ class ArrayModel:
             np.zeros(n, dtype=np.int64), self.crossing.lost.tan_delta, np.zeros((m, n)),
         )  # fmt: skip
 
-    def _stretches(self, track: Track, at_mm: Sequence[float]) -> tuple[Real, float]:
+    def _stretches(self, track: ArrayTrack, at_mm: Sequence[float]) -> tuple[Real, float]:
         """Resistances between crossings, infinite beyond the track's end, and from crossing 0 to the pad [ohm]."""
         start, per_track, per_lead = self._per_mm(track)
         ends = np.asarray(at_mm)
@@ -308,7 +335,7 @@ class ArrayModel:
         stretches = np.where(np.arange(1, len(ends)) <= track.last, np.diff(ohm), np.inf)
         return stretches, float(track.lead_length_mm * per_lead + ohm[0])
 
-    def _per_mm(self, track: Track) -> tuple[float, float, float]:
+    def _per_mm(self, track: ArrayTrack) -> tuple[float, float, float]:
         """Where a track begins along itself [mm], and resistances of track and lead per length [ohm/mm]."""
         p, is_row = self.layout.params, track.name.startswith("r")
         sheet, width = (self.row_ohm, p.row_mm) if is_row else (self.column_ohm, p.column_mm)
@@ -319,7 +346,7 @@ class ArrayModel:
         found = sorted([*self.layout.rows, *self.layout.columns], key=lambda t: t.pad[0])
         return tuple(self._wire(k, track) for k, track in enumerate(found, 1))
 
-    def _wire(self, number: int, track: Track) -> Wire:
+    def _wire(self, number: int, track: ArrayTrack) -> Wire:
         _, per_track, per_lead = self._per_mm(track)
         x0, x1, y0, y1 = track.body
         is_row = track.name.startswith("r")

@@ -9,7 +9,7 @@ import numpy as np
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.prediction.array.model import SHORT_OHM, ArrayModel
-from sensorgen.solvers.tracks import Readings, Tracks, readings
+from sensorgen.solvers.tracks import CrossingReadings, Tracks, readings
 from sensorgen.solvers.tracks import Readout as Kind
 
 MOST_DENSE = 2000  # crossings of which the information is a whole matrix; beyond, each crossing as if it were alone
@@ -50,7 +50,7 @@ class ArrayReadout:
         if not self.frequency_hz:
             raise OutOfRange("no frequency; expected one or more")
 
-    def read(self, tracks: Tracks) -> list[Readings]:
+    def read(self, tracks: Tracks) -> list[CrossingReadings]:
         """Readings of a network at each frequency."""
         return [readings(tracks, f, readout=self.kind, input_ohm=self.input_ohm) for f in self.frequency_hz]
 
@@ -70,7 +70,8 @@ class ArrayReadout:
 
 
 def information(
-    read: Sequence[Readings], readout: ArrayReadout, here: Mask, whole: "Sequence[Readings] | None" = None
+    read: Sequence[CrossingReadings], readout: ArrayReadout, here: Mask,
+    whole: "Sequence[CrossingReadings] | None" = None,
 ) -> Real:  # fmt: skip
     """Information of all readings on the capacitances, (m n, m n); beyond ``MOST_DENSE`` its diagonal, (m n,) [1/F2].
 
@@ -94,7 +95,7 @@ def information(
     return found
 
 
-def own_slopes(read: Readings) -> Complex:
+def own_slopes(read: CrossingReadings) -> Complex:
     """Slope of each reading by the capacitance of its own crossing, (m, n) [S/F]."""
     i, j = np.indices(read.siemens.shape)
     u, v = read.by_row[i, j, i], read.by_column[i, j, j]
@@ -116,7 +117,7 @@ def covariance(found: Real, prior_f: Real) -> Real:
     return np.asarray(1 / (found + before) if found.ndim == 1 else np.linalg.inv(found + np.diag(before)))
 
 
-def crosstalk(read: Readings) -> Real:
+def crosstalk(read: CrossingReadings) -> Real:
     """Largest effect of another crossing on each reading, relative to that of its own, (m, n) [-]."""
     found = np.empty(read.siemens.shape)
     own = np.abs(own_slopes(read))

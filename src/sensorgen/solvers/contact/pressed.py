@@ -11,7 +11,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.solvers.contact.boundary import CHOICES, BoundaryConditions
-from sensorgen.solvers.contact.mesh import Mesh
+from sensorgen.solvers.contact.mesh import TriangleMesh
 
 if TYPE_CHECKING:
     from sensorgen.solvers.contact.bricks import BrickMesh
@@ -37,7 +37,7 @@ _BY_LOAD = (
     "apex_m",
 )  # fmt: skip
 
-AnyMesh = TypeVar("AnyMesh", Mesh, "BrickMesh")
+AnyMesh = TypeVar("AnyMesh", TriangleMesh, "BrickMesh")
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class Pressed:
 
 
 @dataclass(frozen=True)
-class Run(Generic[AnyMesh]):
+class LoadSteps(Generic[AnyMesh]):
     """A problem on a mesh and its equilibria, load by load."""
 
     problem: "Problem"
@@ -150,12 +150,12 @@ def solve(
     longest: float,
     source: str,
     step: Callable[[float], None],
-) -> tuple[Pressed, Run[AnyMesh]]:
+) -> tuple[Pressed, LoadSteps[AnyMesh]]:
     """Press a mesh of triangles or bricks as far as it converges, and check the result.
 
     Parameters
     ----------
-    mesh : Mesh or BrickMesh
+    mesh : TriangleMesh or BrickMesh
         Of the solid parts of a cell.
     solids : sequence of Elastic
         Of each element.
@@ -180,7 +180,7 @@ def solve(
     moduli, ratios = np.array([[s.youngs_modulus_pa, s.poisson_ratio] for s in solids]).T
     softest, elements = float(moduli.min()), Elements(mesh, law(moduli, ratios))
     load, penalty, stick = top_load(mesh.points_m, *mesh.top()), penalty_pa(softest), boundary.contact == "stick"
-    if isinstance(mesh, Mesh):
+    if isinstance(mesh, TriangleMesh):
         faces, outline = faces_of(mesh), mesh.outline
 
         def sound(places_m: Real) -> bool:
@@ -202,7 +202,7 @@ def solve(
         if state.pressure_pa in stress_pa:
             step(state.pressure_pa)
     found = _checked(problem, every, stress_pa, source)
-    return found, Run(problem, mesh, [state for state in every if state.pressure_pa in stress_pa])
+    return found, LoadSteps(problem, mesh, [state for state in every if state.pressure_pa in stress_pa])
 
 
 def _checked(problem: "Problem", every: "Sequence[State]", stress_pa: Sequence[float], source: str) -> Pressed:
