@@ -32,7 +32,7 @@ def invert(design: "Design", task: "Task", frames: ArrayFrames, *, perfect: bool
     how = ArrayReadout(frames.readout, frames.input_ohm, (read_in.frequency_hz,), noise)  # type: ignore[arg-type]
     maps = inverted(
         model, how, read_in.siemens, read_in.rest, read_in.time_s, frames.scatter, apart, read_in.unused,
-        known(frames.calibration), read_in.day,
+        known(frames.calibration), read_in.day, not frames.cells,
     )  # fmt: skip
     if output := task.output or "-" * task.terminal:
         _write(maps, output)
