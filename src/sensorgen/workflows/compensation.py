@@ -38,7 +38,8 @@ _PERIODS = 4  # of a sensor by which prints are estimated
 _MOST_PRESSED = 12  # designs whose stiffness is found
 
 BodyOf = Callable[[Design], Body]
-_Changes, _End = dict[Key, Value], tuple[float, float]  # the latter: share, and ln of the capacitance over that asked
+_Changes = dict[Key, Value]
+_End = tuple[float, float]  # share, and ln of the capacitance over that asked
 
 
 @dataclass(frozen=True)

@@ -470,8 +470,8 @@ class Log:
     def conflicts(self) -> list[str]:
         """Corrections that two machines have made of one row, until the one that does not count is withdrawn."""
         sql = (
-            "SELECT row.kind, row.content, row.number, row.logged_at, other.number FROM record row, record other "  # noqa: S608
-            f"WHERE row.kind = ?1 AND row.number IS NOT NULL AND row.supersedes IS NOT NULL AND {_PREFERRED}"
+            "SELECT row.kind, row.content, row.number, row.logged_at, other.number "  # noqa: S608
+            f"FROM record row, record other WHERE row.kind = ?1 AND row.number IS NOT NULL AND row.supersedes IS NOT NULL AND {_PREFERRED}"
         )
         return [
             f"conflict: {word(kind)}s {row[2]} and {other} correct the same row; {other} counts: withdraw one of the two"
