@@ -32,10 +32,10 @@ STRESS_PA = 2e3
 SIZES_MM = (0.04, 0.02, 0.01)
 FINE = 0.5  # size of the rings' triangles over the usual one
 CELLS: Sequence[tuple[str, dict[str, float]]] = (
-    ("cone", {}),
+    ("cone", {"tip_mm": 0.5}),
     ("cone", {"tip_mm": 0.2}),
-    ("cone", {"period_mm": 2.0}),
-    ("pyramid", {}),
+    ("cone", {"tip_mm": 0.5, "period_mm": 2.0}),
+    ("pyramid", {"tip_mm": 0.5}),
 )
 HEAD = """# Round cells in place of square ones
 

@@ -132,8 +132,7 @@ def test_a_short_has_a_reason_in_place_of_numbers(shape):
     assert "the electrodes touch" in found.reason
 
 
-@pytest.mark.parametrize("shape", ["tri", "rect"])
-@pytest.mark.parametrize("support", ["bvoh", "pla"])
+@pytest.mark.parametrize(("shape", "support"), [("tri", "pla"), ("rect", "bvoh")])
 def test_support_is_dissolved_before_use(shape, support):
     """So it counts as air, and its own permittivity is never asked for."""
     bare, filled = (prediction(make({"shape": shape, "materials": m})) for m in ({}, {"support": support}))

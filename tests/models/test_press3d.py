@@ -409,7 +409,7 @@ def test_both_directions_of_the_strips_are_one():
 def test_what_does_not_converge_ends_with_the_last_load(monkeypatch):
     stepped = load.Problem.stepped
     monkeypatch.setattr(
-        load.Problem, "stepped", lambda self, s, p, before: stepped(self, s, p, before) if p < 1.5e4 else None
+        load.Problem, "stepped", lambda self, s, p, before, **_: stepped(self, s, p, before) if p < 1.5e4 else None
     )
     found = press3d.press(press3d.cell(rect()), solids(), [0.0, 1e4, 2e4], fineness=BrickCounts(1))
     assert (found.converged_pa, found.faults) == (1e4, ("converged up to 10 of 20 kPa",))

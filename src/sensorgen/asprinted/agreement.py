@@ -242,8 +242,8 @@ def _purged(design: Design, paths: Paths, changes: Sequence[ToolChange], piece: 
 
 
 def _plan(design: Design, layers: Sequence[LayerRegions]) -> shapely.Geometry:
-    """Area of the bed that the piece covers: its rectangle, unless it was drawn elsewhere or cut to a border."""
-    if design.border or design.geometry:
+    """Area of the bed that the piece covers: its rectangle, unless it was drawn elsewhere, cut, or has a ledge."""
+    if design.border or design.geometry or design.layout:
         return shapely.union_all([region for layer in layers for region in layer.regions.values()])
     return shapely.box(0.0, 0.0, *design.printed.size_mm[:2])
 

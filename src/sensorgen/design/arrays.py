@@ -71,6 +71,14 @@ class Params(Envelope):
     lead_mm: float = field(default=1.8, metadata={"help": "Width of leads and pads.", "range": (0.2, 50.0)})
     pad_mm: float = field(default=6.0, metadata={"help": "Length of the pads.", "range": (1.0, 50.0)})
     margin_mm: float = field(default=2.5, metadata={"help": "Edge around tracks and leads.", "range": (0.2, 50.0)})
+    cover_mm: float = field(
+        default=0.0,
+        metadata={"help": "Thickness of a sheet that lies on the print and is not printed; 0: none.",
+                  "range": (0.0, 50.0)},
+    )  # fmt: skip
+    cover_mpa: float = field(
+        default=3.0, metadata={"help": "Young's modulus of that sheet [MPa].", "range": (0.001, 1e5)}
+    )
     between: str = field(
         default="dielectric",
         metadata={"help": "Between columns above the film: solid dielectric, or air that carries no load.",
@@ -282,14 +290,18 @@ class ArrayLayout:
 
     @cached_property
     def footprint(self) -> "shapely.Geometry":
-        """The print [mm]: of an outline squares, tracks and leads with their edge, narrow notches filled."""
+        """The print [mm]: of an outline squares, tracks and leads with their edge, narrow notches filled.
+
+        Along the pads it is straight: in the inner corner of a strip as wide as the edge infill piles up.
+        """
         import shapely
 
         p, (rows, columns) = self.params, self.regions
         if all(map(all, self.here)):
             return shapely.box(0.0, 0.0, *self.size_mm)
         beside = max(p.margin_mm, p.hole_mm + 2 * WALL_MM + DOT_MM if p.hole_mm else 0.0)
-        field = shapely.box(0.0, 0.0, max(t.pad[1] for t in self.columns) + beside, p.pad_mm)
+        leads = max(x for t in self.columns for x, _ in t.lead) + p.lead_mm / 2 + p.margin_mm
+        field = shapely.box(0.0, 0.0, max(leads, max(t.pad[1] for t in self.columns) + beside), p.pad_mm)
         grown = shapely.union_all([self.sensing, rows, columns]).buffer(p.margin_mm, join_style="mitre") | field
         closed = grown.buffer(p.connector_mm, join_style="mitre").buffer(-p.connector_mm, join_style="mitre")
         whole = shapely.box(0.0, 0.0, *self.size_mm)

@@ -70,7 +70,8 @@ def read(path: Path, shape: tuple[int, int], frequency_hz: float | None) -> Fram
     ----------
     path : Path
         NPZ or HDF5 with ``siemens`` (frames, rows, columns), complex, or ``capacitance_f``, and perhaps ``time_s``,
-        ``rest``, ``frequency_hz``; or CSV with a row per frame, columns ``r1c1`` ... [F], and perhaps the same.
+        ``rest``, ``frequency_hz``; or CSV with a row per frame, columns ``r1c1`` ... [F], and perhaps the same; "-"
+        for that on the standard input.
     shape : (int, int)
         Rows and columns of the array.
     frequency_hz : float, optional
@@ -82,6 +83,8 @@ def read(path: Path, shape: tuple[int, int], frequency_hz: float | None) -> Fram
         A file that is neither, has frames of another size, times that do not rise or are not ``time_s``, or no
         frequency or another.
     """
+    if str(path) == "-":
+        return _joined(list(lots("-", shape, frequency_hz)))
     with reading(path):
         if path.stat().st_size > MOST_BYTES:
             raise BadInput(f"{path}: {path.stat().st_size / 1e9:.1f} GB; expected at most {MOST_BYTES / 1e9:g} GB")

@@ -7,6 +7,7 @@ design its frames, and the same names; ``element`` by number from 1, ``area_mm2`
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +83,9 @@ def of_frames(paths: Sequence[Path], model: ArrayModel, frequency_hz: "float | N
         inverter = at_rest(model, ArrayReadout(frequency_hz=(frames.frequency_hz,)), frames.siemens[frames.rest])
         ratio, _, _ = inverter.planned(missing(frames.siemens))
         ratio = np.where(inverter.alive, ratio, np.nan).reshape(len(ratio), -1)
-        found.append(session(path, k, area_mm2=model.pitch_area_m2 * 1e6, values=ratio - 1, names=names))
+        one = session(path, k, area_mm2=model.pitch_area_m2 * 1e6, values=ratio - 1, names=names)
+        carried = model.carried(np.nan_to_num(one.pressure_kpa)).reshape(one.pressure_kpa.shape)
+        found.append(replace(one, pressure_kpa=np.where(np.isfinite(one.pressure_kpa), carried, np.nan)))
         refuse_swapped(found[-1], (m, n))
     return found
 
@@ -165,7 +168,7 @@ def _numbers_of(words: np.ndarray, names: Sequence[str], count: int) -> np.ndarr
 
 def _of_csv(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     """Columns of a table, and the names of its elements."""
-    with csv_table.opened(path) as table:
+    with csv_table.opened(str(path)) as table:
         refuse_repeated(table.names, {})
         names = [name for name in table.names if name and name not in _OTHER]
         if not names:

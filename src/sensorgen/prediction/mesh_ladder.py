@@ -290,6 +290,7 @@ def estimated(
     coarse = found.first(1) if alone else pressed(case, some, level - 1, keep=keep).sound()
     if not alone and coarse.stress_pa[-1] < some[-1]:  # shorter steps
         coarse = pressed(case, [float(p) for p in found.stress_pa], level - 1, keep=keep).sound()
+    coarse = coarse.some(np.flatnonzero(np.isin(coarse.stress_pa, found.stress_pa)).tolist())
     return (_limit if case.model == "press3d" else _errors)(case, found, coarse, level)
 
 

@@ -275,10 +275,10 @@ def _scpi(name: str) -> Kind:
 def _frames() -> Kind:
     from sensorgen.measure.lab import frame_stream, port
 
-    def real(address: str, given: frame_stream.Settings, clock: Clock) -> Device:
+    def real(address: str, given: frame_stream.StreamSettings, clock: Clock) -> Device:
         return frame_stream.FrameStream(port.SerialPort(address, given.baud), clock)
 
-    return Kind("array", frame_stream.Settings, real)
+    return Kind("array", frame_stream.StreamSettings, real)
 
 
 def _pymeasure(name: str) -> Kind:

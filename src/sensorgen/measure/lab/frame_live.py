@@ -15,8 +15,8 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import FrameMeter
-from sensorgen.measure.lab.frame_recorder import Recorder
+from sensorgen.measure.lab.devices import DeviceFault, FrameMeter
+from sensorgen.measure.lab.frame_recorder import FrameFile
 from sensorgen.measure.lab.live import LiveView
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class FrameFeed:
         Identified.
     clock : Clock
         By which it waits.
-    recorder : Recorder, optional
+    recorder : FrameFile, optional
         Of every frame while ``recording``.
     paused : bool
         True while nothing is inverted and shown; recording goes on.
@@ -53,7 +53,7 @@ class FrameFeed:
 
     meter: FrameMeter
     clock: Clock
-    recorder: "Recorder | None" = None
+    recorder: "FrameFile | None" = None
     unloaded_s: float = 0.0
     recording: bool = True
     paused: bool = False
@@ -111,6 +111,8 @@ class FrameFeed:
             while not self._over.is_set():
                 if not self.step():
                     self.clock.wait_until(self.clock.now() + _IDLE_S)
+        except OSError as error:
+            self.fault = DeviceFault(f"recording: {error.strerror or error}; record on another disk")
         except Exception as error:  # raised where the frames are taken
             self.fault = error
 

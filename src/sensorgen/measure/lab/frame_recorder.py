@@ -15,7 +15,7 @@ _CHUNK = 64  # frames
 _COMPLEX = np.complex64  # seven digits, as of the stream
 
 
-class Recorder(Protocol):
+class FrameFile(Protocol):
     """File of frames."""
 
     def add(self, siemens: Complex, time_s: Real, rest: Mask) -> None:
@@ -25,7 +25,7 @@ class Recorder(Protocol):
         """Complete the file."""
 
 
-def recorder(path: Path, shape: tuple[int, int], frequency_hz: float) -> Recorder:
+def recorder(path: Path, shape: tuple[int, int], frequency_hz: float) -> FrameFile:
     """A new file of frames, of the kind that its name ends in.
 
     Raises

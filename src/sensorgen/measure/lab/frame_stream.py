@@ -41,7 +41,7 @@ _AT_ONCE = 64  # lines of one call
 _GAP_S = 1e-3  # before the first frame of a device that has begun anew
 
 
-class Settings(Strict):
+class StreamSettings(Strict):
     """Bits per second of a serial line; USB devices without a converter ignore it."""
 
     baud: int = 2_000_000

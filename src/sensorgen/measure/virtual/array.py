@@ -98,6 +98,8 @@ class VirtualArray:
         Its network at rest.
     rise : callable
         C/C0 - 1 of every crossing by the pressure that it feels, (m, n) [kPa].
+    spread : callable
+        Pressures that crossings carry under the cover by those on the surface, (k, m, n) [kPa].
     play : float
         By which unloading lags behind loading, half of it each way, over the largest pressure before [-].
     creep : float
@@ -110,6 +112,7 @@ class VirtualArray:
 
     tracks: Tracks
     rise: Callable[[Real], Real]
+    spread: Callable[[Real], Real]
     play: float = 0.0
     creep: float = 0.0
     creep_s: float = 100.0
@@ -119,6 +122,7 @@ class VirtualArray:
         self, pressure_kpa: Real, time_s: Real, readout: ArrayReadout, draw: np.random.Generator, day: float = 0.0
     ) -> Complex:
         """Frames under loads, (k, m, n), by the first frequency [S]."""
+        pressure_kpa = self.spread(pressure_kpa)
         found = np.empty(pressure_kpa.shape, complex)
         play = slow = most = np.zeros(pressure_kpa.shape[1:])
         for k, (load, elapsed) in enumerate(zip(pressure_kpa, np.diff(time_s, prepend=time_s[0]), strict=True)):
@@ -173,11 +177,11 @@ def printed(
         return np.asarray(gain * (model.under(kpa * 1e3)[0] - 1))
 
     if not own_law:
-        return VirtualArray(tracks, predicted, play, creep, drift=drift)
+        return VirtualArray(tracks, predicted, model.carried, play, creep, drift=drift)
     at_full = float(model.under(np.array(_FULL_KPA * 1e3))[0]) - 1
     power = 0.95 + 0.02 * draw.normal(size=shape)
     own = closing(gain * at_full / (1 + at_full) / stiffness, power)
-    return VirtualArray(tracks, own, play, creep, drift=drift)
+    return VirtualArray(tracks, own, model.carried, play, creep, drift=drift)
 
 
 def nodal(tracks: Tracks, capacitance_f: Real, readout: ArrayReadout) -> Complex:

@@ -19,7 +19,7 @@ from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayR
 from sensorgen.prediction.array.sessions import ArrayCalibration
 from sensorgen.prediction.array.study import DETECTED, DETERMINED
 from sensorgen.prediction.inverse.verdict import NORMAL_90
-from sensorgen.solvers.tracks import CrossingReadings, readings
+from sensorgen.solvers.tracks import CrossingReadings, Tracks, readings
 
 SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration of each
 _STEPS = 25  # of Gauss-Newton with the slopes at rest
@@ -64,6 +64,30 @@ class PressureMaps:
     sigma_kpa: Real
     calibration: "ArrayCalibration | None" = None
 
+    def on_surface(self) -> "PressureMaps":
+        """Maps of the pressure on the cover, its spread undone; what is not determined is as what lies around it.
+
+        Standard errors of more crossings than one matrix takes grow as those of an array without ends.
+        """
+        from scipy.sparse import csc_array, diags_array
+        from scipy.sparse.linalg import splu
+
+        spread, shape = self.model.spread, self.pressure_kpa.shape
+        pressure, sigma = (each.reshape(shape[0], -1).copy() for each in (self.pressure_kpa, self.sigma_kpa))
+        masks, which = np.unique(np.isfinite(pressure), axis=0, return_inverse=True)
+        for k, known in enumerate(masks):
+            own = csc_array(spread[known][:, known])
+            back = splu(csc_array(diags_array(spread[known].sum(1) / own.sum(1)) @ own))
+            at = np.ix_(which.ravel() == k, known)
+            pressure[at] = back.solve(pressure[at].T).T
+            if known.sum() > MOST_DENSE:
+                sigma[at] *= self.model.undone
+            else:
+                sigma[at] = np.sqrt(sigma[at] ** 2 @ (back.solve(np.eye(own.shape[0])) ** 2).T)
+        lost = ~_known(sigma * PA_PER_KPA)
+        pressure[lost] = sigma[lost] = nan
+        return replace(self, pressure_kpa=pressure.reshape(shape), sigma_kpa=sigma.reshape(shape))
+
     @cached_property
     def interval_kpa(self) -> tuple[Real, Real]:
         """Lower and upper end of 95 %, of 90 % with a calibration [kPa]."""
@@ -90,11 +114,14 @@ class PressureMaps:
 
     @cached_property
     def centre_mm(self) -> tuple[Real, Real]:
-        """Centre of pressure of all determined crossings, from the print's corner; nan where nothing is touched [mm].
+        """Centre of pressure of touched crossings and their neighbours, from the print's corner; nan of none [mm].
 
-        A threshold would leave light loads with a long arm out; noise of many unloaded crossings has a mean of 0.
+        Light loads lie beside heavier ones; farther off there is noise, with a long arm.
         """
-        weight = np.nan_to_num(self._newtons)
+        from scipy import ndimage
+
+        near = ndimage.binary_dilation(self.touched, np.ones((1, 3, 3)))
+        weight = np.where(near, np.nan_to_num(self._newtons), 0.0)
         total = np.where(self.touched.any((1, 2)), weight.sum((1, 2)), np.nan)
         layout = self.model.layout
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -213,7 +240,7 @@ class PressureMaps:
 
 
 @dataclass
-class Plan:
+class MapPlan:
     """Choice between C/C0 and the network, by the heaviest frame so far; changed by further frames of a recording.
 
     Attributes
@@ -274,9 +301,13 @@ class MapInverter:
 
     def _network(self, capacitance_f: Real, leaks_s: Real) -> CrossingReadings:
         return readings(
-            replace(self.model.tracks(capacitance_f), leak_s=leaks_s), self.readout.frequency_hz[0],
+            replace(self._tracks, capacitance_f=capacitance_f, leak_s=leaks_s), self.readout.frequency_hz[0],
             readout=self.readout.kind, input_ohm=self.readout.input_ohm,
         )  # fmt: skip
+
+    @cached_property
+    def _tracks(self) -> Tracks:
+        return self.model.tracks()
 
     @cached_property
     def leaks_s(self) -> Real:
@@ -418,13 +449,13 @@ class MapInverter:
         off = (np.abs(network - ratio) / self.error)[counted]
         return float(np.where(np.isnan(off), np.inf, off).max(initial=0.0))
 
-    def planned(self, siemens: Complex, plan: "Plan | None" = None) -> tuple[Real, Real, str]:
+    def planned(self, siemens: Complex, plan: "MapPlan | None" = None) -> tuple[Real, Real, str]:
         """Capacitance over that at rest (k, m, n), its error by noise (m, n), and by which model, and why.
 
         C/C0 where it agrees with the network in the heaviest frame, else the network. Of a plan that goes on, frames
         are compared that are heavier by a tenth than all before.
         """
-        ratio, error, plan = self.by_ratio(siemens), self.error, plan or Plan()
+        ratio, error, plan = self.by_ratio(siemens), self.error, plan or MapPlan()
         loads = np.nansum(np.where(self.alive, ratio - 1, 0), (1, 2))
         heaviest = int(loads.argmax())
         if not plan.network and loads[heaviest] > _HEAVIER * plan.load:
@@ -440,7 +471,7 @@ class MapInverter:
 
     def maps(
         self, siemens: Complex, time_s: Real, calibration: "ArrayCalibration | None" = None, day: float = nan,
-        plan: "Plan | None" = None, past: "Past | None" = None,
+        plan: "MapPlan | None" = None, past: "Past | None" = None,
     ) -> PressureMaps:  # fmt: skip
         """Pressure maps of frames, by the law of the cell, or of each element where they are calibrated."""
         ratio, error, by = self.planned(siemens, plan)
@@ -490,7 +521,7 @@ def at_rest(
 def inverted(
     model: ArrayModel, readout: ArrayReadout, siemens: Complex, rest: Mask, time_s: Real, scatter: float = SCATTER,
     apart: "Complex | None" = None, unused: Sequence[str] = (), calibration: "ArrayCalibration | None" = None,
-    day: float = nan,
+    day: float = nan, surface: bool = True,
 ) -> PressureMaps:  # fmt: skip
     """Pressure maps of a recording.
 
@@ -514,6 +545,8 @@ def inverted(
         Of each element.
     day : float
         Of the recording, as the calibration counts them [d].
+    surface : bool
+        Pressures on the cover; else those that cells carry under it.
 
     Raises
     ------
@@ -524,7 +557,8 @@ def inverted(
     loaded = ~rest
     if not loaded.any():
         raise BadInput("all frames are at rest; expected some under load")
-    return inverter.maps(missing(siemens)[loaded], time_s[loaded], calibration, day)
+    maps = inverter.maps(missing(siemens)[loaded], time_s[loaded], calibration, day)
+    return maps.on_surface() if surface else maps
 
 
 def missing(siemens: Complex) -> Complex:

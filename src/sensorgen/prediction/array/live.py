@@ -8,7 +8,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.prediction.array.elements import Past
-from sensorgen.prediction.array.frames import SCATTER, MapInverter, Plan, PressureMaps, at_rest, missing
+from sensorgen.prediction.array.frames import SCATTER, MapInverter, MapPlan, PressureMaps, at_rest, missing
 from sensorgen.prediction.array.model import ArrayModel
 from sensorgen.prediction.array.readout import ArrayReadout
 from sensorgen.prediction.array.sessions import ArrayCalibration
@@ -35,7 +35,7 @@ class LiveMaps:
         Of the recording, as the calibration counts them [d].
     newest : bool
         Where the network is needed, of the frames of a lot only the newest is inverted.
-    plan : Plan
+    plan : MapPlan
         Choice of the model.
     dropped : int
         Frames that were not inverted: for newer ones, or before any at rest.
@@ -47,7 +47,7 @@ class LiveMaps:
     calibration: "ArrayCalibration | None" = None
     day: float = nan
     newest: bool = False
-    plan: Plan = field(default_factory=Plan)
+    plan: MapPlan = field(default_factory=MapPlan)
     dropped: int = 0
     _past: Past = field(default_factory=Past)
     _rest: "deque[Complex]" = field(default_factory=lambda: deque(maxlen=_REST))
@@ -86,5 +86,5 @@ class LiveMaps:
         """Another reference: what was at rest before loaded frames is past."""
         if self._inverter is not None:
             self._rest.clear()
-            self._inverter, self.plan = None, Plan()
+            self._inverter, self.plan = None, MapPlan()
         self._rest.extend(frames)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -22,12 +22,18 @@ from sensorgen.prediction.array.fringe import CrossingSection, Fringe, fringe
 from sensorgen.prediction.error_budget import modulus_range
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.sensor_model import SensorModel
+from sensorgen.solvers.cover import ElasticLayer, kernel
 from sensorgen.solvers.tracks import Tracks
 
-PA_PER_KPA = 1e3
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+PA_PER_KPA, PA_PER_MPA = 1e3, 1e6
 USUAL_KPA = 90.0  # of 6 N on 8 x 8 mm
 _N_PER_KPA_MM2 = 1e-3
 _NEWTON = 12  # steps: the law is smooth and nearly straight
+_FELT = 1e-4  # of a pressure: less is not spread
+_RUBBER = 0.48  # Poisson's ratio of a sheet
 _FILM = 0.9  # of the reduced gap: a film that is more of it is the cell
 SHORT_OHM = 1e3  # of a shorted crossing: one bead of the electrodes' material across the film
 
@@ -123,7 +129,10 @@ class ArrayModel:
     @cached_property
     def fringe(self) -> Fringe:
         """Part of the edges of the tracks in the capacitance and in its rise."""
-        p, eps = self.layout.params, {part: self._permittivity(part) for part in ("film", "dielectric", "isolation")}
+        p, eps = self.layout.params, {
+            part: material_value(*self.design.slot(part), "relative_permittivity").value
+            for part in ("film", "dielectric", "isolation")
+        }  # fmt: skip
         gap = self.crossing.body.cells.first().size_mm[2] - 2 * p.electrode_mm
         film = getattr(self.design.crossing.params, "dielectric_mm", 0.0)
         area_m = p.column_mm * p.row_mm * M_PER_MM
@@ -138,13 +147,6 @@ class ArrayModel:
         (px, py), heights = p.pitch, (film, gap - film, p.electrode_mm, p.isolation_mm, p.base_mm)
         return fringe(CrossingSection((p.column_mm, px - p.column_mm), (p.row_mm, py - p.row_mm), *heights, values))
 
-    def _permittivity(self, part: str) -> float:
-        """Relative permittivity of a part; of the dielectric where no source has it [-]."""
-        try:
-            return material_value(*self.design.slot(part), "relative_permittivity").value
-        except MissingValue:
-            return material_value(*self.design.slot("dielectric"), "relative_permittivity").value
-
     @property
     def pitch_area_m2(self) -> float:
         """Area of the surface for each crossing [m2]."""
@@ -158,21 +160,84 @@ class ArrayModel:
         Springs side by side under a stiff cover: the cells, and the solid dielectric between them; with air between,
         the cells carry all.
         """
-        p = self.layout.params
-        share = p.column_mm * p.row_mm / (p.pitch[0] * p.pitch[1])
-        scene, law = self.crossing.body.cells.first(), self.crossing.law.compression
-        if p.between == "air":
+        share = self._share
+        if self.layout.params.between == "air":
             return 1 / share
         if getattr(self.design.crossing.params, "period_mm", None) is None:
             return 1.0  # a plate like what is between the tracks
-        height_m = (scene.size_mm[2] - 2 * p.electrode_mm) * M_PER_MM
-        material, source = self.design.slot("dielectric")
         try:
-            wall = material.value("youngs_modulus_pa", source).value / height_m
-            cell = law.foundation_stiffness_pa_per_m(height_m)
+            cell, wall = self._springs
         except MissingValue:
             return 1.0
         return cell / (share * cell + (1 - share) * wall)
+
+    @property
+    def _share(self) -> float:
+        """Share of the surface that crossings are [-]."""
+        p = self.layout.params
+        return p.column_mm * p.row_mm / (p.pitch[0] * p.pitch[1])
+
+    @cached_property
+    def _springs(self) -> tuple[float, float]:
+        """Stiffness of cells, and of what is between them, per area [Pa/m]."""
+        p = self.layout.params
+        height_m = (self.crossing.body.cells.first().size_mm[2] - 2 * p.electrode_mm) * M_PER_MM
+        cell = self.crossing.law.compression.foundation_stiffness_pa_per_m(height_m)
+        if p.between == "air":
+            return cell, 0.0
+        return cell, material_value(*self.design.slot("dielectric"), "youngs_modulus_pa").value / height_m
+
+    @cached_property
+    def cover(self) -> tuple[ElasticLayer, ...]:
+        """Layers on the cells, from below: columns and isolation as one, then a sheet."""
+        p = self.layout.params
+        parts = {"top_electrode": p.electrode_mm, "isolation": p.isolation_mm}
+        thick = sum(parts.values())
+        modulus, nu = (
+            sum(mm * material_value(*self.design.slot(part), of).value for part, mm in parts.items()) / thick
+            for of in ("youngs_modulus_pa", "poisson_ratio")
+        )
+        own = ElasticLayer(thick * M_PER_MM, modulus, nu)
+        return (own, ElasticLayer(p.cover_mm * M_PER_MM, p.cover_mpa * PA_PER_MPA, _RUBBER)) if p.cover_mm else (own,)
+
+    @cached_property
+    def kernel(self) -> Real:
+        """Pressure that squares carry for 1 on that at (0, 0), by rows and columns; of unknown moduli there alone."""
+        (px, py), alone = self.layout.params.pitch, np.zeros((2, 2))
+        alone[0, 0] = 1.0
+        try:
+            cell, wall = self._springs
+            return kernel(self.cover, self._share * cell + (1 - self._share) * wall, (py * M_PER_MM, px * M_PER_MM))
+        except MissingValue:
+            return alone
+
+    @cached_property
+    def spread(self) -> "csr_array":
+        """Pressures that crossings carry by those on the surface of each, (m n, m n); nothing lies beside the array."""
+        from scipy.sparse import csr_array
+
+        of, here = self.kernel, self.here
+        i, j = np.nonzero(here)
+        (m, n), reach = here.shape, len(of) // 2
+        rows, columns, values = [np.flatnonzero(~here)], [np.flatnonzero(~here)], [np.ones(int((~here).sum()))]
+        for di, dj in np.argwhere(np.abs(of) > _FELT).tolist():
+            a, b = (i + (di + reach) % len(of) - reach), (j + (dj + reach) % len(of) - reach)
+            inside = (a >= 0) & (a < m) & (b >= 0) & (b < n)
+            inside[inside] = here[a[inside], b[inside]]
+            rows.append((a * n + b)[inside])
+            columns.append((i * n + j)[inside])
+            values.append(np.full(int(inside.sum()), of[di, dj]))
+        at = tuple(np.concatenate(each) for each in (rows, columns))
+        return csr_array((np.concatenate(values), at), shape=(m * n, m * n))
+
+    @property
+    def undone(self) -> float:
+        """Factor by which standard errors grow where the spread is undone, of an array without ends [-]."""
+        return float(np.sqrt(np.mean(np.abs(np.fft.fft2(self.kernel)) ** -2.0)))
+
+    def carried(self, pressure: Real) -> Real:
+        """Pressures that crossings carry by those on the surface, (k, m, n)."""
+        return np.asarray((self.spread @ pressure.reshape(len(pressure), -1).T).T.reshape(pressure.shape))
 
     @cached_property
     def known_pa(self) -> float:

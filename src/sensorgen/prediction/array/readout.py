@@ -54,7 +54,7 @@ class ArrayReadout:
         """Readings of a network at each frequency."""
         return [readings(tracks, f, readout=self.kind, input_ohm=self.input_ohm) for f in self.frequency_hz]
 
-    def sigma_s(self, siemens: Complex) -> Real:
+    def sigma_s(self, siemens: Complex | Real) -> Real:
         """Standard deviation of real and imaginary parts [S]; infinite of readings that are nothing."""
         sigma = np.hypot(self.noise * np.abs(siemens), self.noise_s)
         return np.where(np.abs(siemens) > 0, sigma, np.inf)
@@ -69,21 +69,28 @@ class ArrayReadout:
         return float((_TAUS * tau + _PERIODS / min(self.frequency_hz)) * (m if self.kind == "guarded" else m * n))
 
 
-def information(read: Sequence[CrossingReadings], readout: ArrayReadout) -> Real:
+def information(
+    read: Sequence[CrossingReadings], readout: ArrayReadout, here: Mask,
+    whole: "Sequence[CrossingReadings] | None" = None,
+) -> Real:  # fmt: skip
     """Information of all readings on the capacitances, (m n, m n); beyond ``MOST_DENSE`` its diagonal, (m n,) [1/F2].
 
-    The diagonal is that of each crossing by its own reading: what others contribute and take is left out.
+    The diagonal is that of each crossing by its own reading: what others contribute and take is left out. Noise is not
+    less than that of the ``whole`` array, and crossings outside the outline are not read: their readings are nearly
+    nothing, and noise relative to that would be, too.
     """
+    both = zip(read, whole or read, strict=True)
+    sizes = [np.where(here, np.maximum(np.abs(one.siemens), np.abs(of.siemens)), 0.0) for one, of in both]
     m, n = read[0].siemens.shape
     if m * n > MOST_DENSE:
         total = np.zeros((m, n))
-        for one in read:
-            own = np.abs(own_slopes(one)) / readout.sigma_s(one.siemens)
+        for one, size in zip(read, sizes, strict=True):
+            own = np.abs(own_slopes(one)) / readout.sigma_s(size)
             total += own**2
         return total.ravel()
     found = np.zeros((m * n, m * n))
-    for one in read:
-        slopes = one.matrix() / readout.sigma_s(one.siemens).reshape(-1, 1)
+    for one, size in zip(read, sizes, strict=True):
+        slopes = one.matrix() / readout.sigma_s(size).reshape(-1, 1)
         found += slopes.real.T @ slopes.real + slopes.imag.T @ slopes.imag
     return found
 

@@ -47,12 +47,12 @@ class Mesh:
         return np.asarray(np.cross(b - a, c - a))
 
     def area_mm2(self) -> float:
-        """Area of its surface [mm2]."""
+        """Area of the surface [mm2]."""
         some = (Mesh(self.vertices_mm, part) for part in self._parts())
         return sum(float(np.linalg.norm(part.normals_mm2(), axis=1).sum()) / 2 for part in some)
 
     def _parts(self) -> Iterator[NDArray[np.int32]]:
-        """Its triangles, so many at once that a sum over them takes little memory."""
+        """Triangles, so many at once that a sum over them takes little memory."""
         return (self.triangles[k : k + _AT_ONCE] for k in range(0, len(self.triangles), _AT_ONCE))
 
     def edges(self) -> Whole:

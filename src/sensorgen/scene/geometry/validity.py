@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Whole
 from sensorgen.scene.geometry.meshes import CHORD_MM, Mesh
@@ -87,13 +88,12 @@ def _two_manifold(mesh: Mesh) -> bool:
     return bool(np.all(np.diff(there) > 0) and np.array_equal(there, back))
 
 
-def _keys(triangles: Whole, count: int) -> Whole:
+def _keys(triangles: NDArray[np.int32], count: int) -> Whole:
     """Number of each directed edge of triangles of ``count`` corners, sorted."""
-    keys = np.empty((3, len(triangles)), np.int64)
-    for key, start, end in zip(keys, (0, 1, 2), (1, 2, 0), strict=True):
+    keys: Whole = np.empty(3 * len(triangles), np.int64)
+    for key, start, end in zip(np.split(keys, 3), (0, 1, 2), (1, 2, 0), strict=True):
         np.multiply(triangles[:, end], count, out=key, dtype=np.int64)
         key += triangles[:, start]
-    keys = keys.ravel()
     keys.sort()
     return keys
 

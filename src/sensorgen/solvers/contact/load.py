@@ -20,7 +20,7 @@ _STILL = 1e-10  # a step so much shorter than the displacement is rounding: nu n
 _MOST_STEPS = 15
 _LEAST_J = 0.05  # a step may not compress an element below this share of its volume at once [-]
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # of Newton's step
-_MOST_CUTS = 4  # failed load steps in all before a cell is given up
+_MOST_CUTS, _MORE_CUTS = 4, 4  # failed load steps in all before partners may stay; then before a cell is given up
 _FLAT = 1e-3  # gaps that differ by less than this share of their side close at once [-]
 _DEEPEST = 0.1  # initial penetration of a part that is lowered, over the length of a side [-]
 _ROUNDING = 1e-9
@@ -224,8 +224,14 @@ class Problem:
         inside_out = self.elements.volume_ratio(u, inner).min() <= _LEAST_J
         return state if inside_out else replace(state, u_m=u, inner=inner)
 
-    def stepped(self, state: State, pressure_pa: float, before: State) -> State | None:
-        """One load step: solve, update the contact pairs and solve again, until they are settled or often enough."""
+    def stepped(
+        self, state: State, pressure_pa: float, before: State, *, keeps: bool = False
+    ) -> State | None:  # fmt: skip
+        """One load step: solve, update the contact pairs and solve again, until they are settled or often enough.
+
+        With ``keeps`` the pairs of a problem with a test of its places stay where new ones have no equilibrium, as
+        where a face slides off an edge.
+        """
         start = self.extrapolated(state, before, pressure_pa)
         starts = [start] if start is state else [start, state]
         tries = (self.newton(start, pressure_pa, state.pairs, _NEARLY) for start in starts)
@@ -237,14 +243,16 @@ class Problem:
         for _ in range(self.updates):
             again = self.newton(found, pressure_pa, pairs, _ENOUGH)
             if again is None:
-                return None
+                stays = keeps and self.sound is not None
+                found = self.newton(found, pressure_pa, found.pairs, _ENOUGH) if stays else None
+                break
             found, pairs = again, self.project(again.u_m, stuck)
             depths = np.zeros((2, 1 + max(p.point.max(initial=0) for p in (found.pairs, pairs))))
             for depth, seen in zip(depths, (found.pairs, pairs), strict=True):
                 depth[seen.point] = np.maximum(-self.gaps(seen, found.u_m), 0.0) / seen.length_m
             if np.ptp(depths, axis=0).max() < self.settled:
                 break
-        return found if self.sound is None or self.sound(self.places(found.u_m)) else None
+        return found if found and (self.sound is None or self.sound(self.places(found.u_m))) else None
 
     def _stuck(self, before: Real, state: State) -> FacePairs:
         """Pairs that touch now and stick from where they first did, between the displacements before and those now."""
@@ -267,11 +275,11 @@ def curve(problem: Problem, pressures_pa: Sequence[float], longest_pa: float) ->
         while state.pressure_pa < target:
             left = target - state.pressure_pa
             aim = target if left < step * (1 + _ROUNDING) else state.pressure_pa + step
-            reached = problem.stepped(state, aim, before)
+            reached = problem.stepped(state, aim, before, keeps=cuts >= _MOST_CUTS)
             if reached is not None:
                 before, state, step = state, reached, min(2 * step, longest_pa)
                 yield state
                 continue
             cuts, step = cuts + 1, min(step, left) / 2
-            if cuts > _MOST_CUTS:
+            if cuts > _MOST_CUTS + _MORE_CUTS:
                 return
