@@ -203,13 +203,13 @@ def report(asked):
     reading, card = tables["readings"][0], tables["identifiability"][0]
     words = next(variant["words"] for section in sections for variant in section["variants"])
     said = re.search(r"capacitance ([^;]+? \(.+?\))", words)
-    position_mm = card["standard error of position"]
+    position_mm = card["error of position, perfect model"]
     position_m = None if position_mm is None else position_mm * 1e-3
     return Answer(
         {
             "capacitance": {"words": said[1]} if said else None,
             "resistance": _scaled(1.0, {"from": reading["predicted from"], "to": reading["predicted to"]}),
-            "resolution": _scaled(1.0, {"force": card["standard error of force"], "position": position_m}),
+            "resolution": _scaled(1.0, {"force": card["error of force, perfect model"], "position": position_m}),
         }
     )
 
