@@ -252,8 +252,10 @@ def _cut(slices: list[Slice], low: float, high: float) -> list[Slice]:
     """The slices between two places."""
     first = bisect_right(slices, low + ROUNDING_MM, key=lambda s: s.right_mm)
     last = bisect_left(slices, high - ROUNDING_MM, key=lambda s: s.left_mm)
-    pieces = ((s, max(s.left_mm, low), min(s.right_mm, high)) for s in slices[first:last])
-    return [s.between(a, b) for s, a, b in pieces if b - a > ROUNDING_MM]
+    inside = [s for s in slices[first:last] if s.right_mm - s.left_mm > ROUNDING_MM]
+    for end in (0, -1) if inside else ():
+        inside[end] = inside[end].between(max(inside[end].left_mm, low), min(inside[end].right_mm, high))
+    return inside
 
 
 def _folded(slices: list[Slice], low: float, high: float) -> Iterator[Slice]:
