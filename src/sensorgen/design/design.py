@@ -349,7 +349,11 @@ class Design(Strict):
     def id(self) -> str:
         """Hash of all resolved parameters and material values; not of the design's name, nor of sensorgen's version."""
         data = _FIRST | self._lasting(self.resolved())
-        for key in ("own", "tip", "waivers"):  # values of materials and machines are there without the words around them
+        for key in (
+            "own",
+            "tip",
+            "waivers",
+        ):  # values of materials and machines are there without the words around them
             data.pop(key, None)
         if self._shape_text is not None:
             data["shape_text"] = self._shape_text
