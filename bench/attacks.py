@@ -2,6 +2,9 @@
 
 Each kind is a set of tests whose judge is not the code under attack: files and sockets of the victim, another program's
 reading of the log, the record of the simulated mechanism. A test that fails is a success of its attack.
+
+On aarch64 a trusted shape was tried by hand: Debian's kernel 6.1 in QEMU, 57 attempts as root and 57 as nobody, 0
+successes; unconfined, 55 of the 57 work there.
 """
 
 import subprocess

@@ -33,7 +33,7 @@ def texts(place: Path) -> Iterator[str]:
     SystemExit
         No advisories there.
     """
-    if place.is_file():
+    if zipfile.is_zipfile(place):
         with zipfile.ZipFile(place) as archive:
             yield from (archive.read(name).decode() for name in archive.namelist())
     elif (place / "vulns").is_dir():

@@ -65,5 +65,7 @@ def test_an_advisory_is_about_its_versions_alone(audit, place, version, affected
 
 
 def test_a_place_without_advisories_is_refused(audit, tmp_path):
-    with pytest.raises(SystemExit, match="no advisories; expected"):
-        audit.advisories(tmp_path, {"pillow"})
+    (tmp_path / "all.zip").write_text("a page that says: not found")
+    for place in (tmp_path, tmp_path / "all.zip"):
+        with pytest.raises(SystemExit, match="no advisories; expected"):
+            audit.advisories(place, {"pillow"})

@@ -201,3 +201,12 @@ def test_a_cluster_on_a_network_needs_tls(address, refused, monkeypatch, tmp_pat
         monkeypatch.delenv(parallel.TRUST_CLUSTER)
         with pytest.raises(BadInput, match="without TLS"):
             list(in_parallel(divmod, [(7, 2)], 1, cluster=str(file)))
+
+
+@pytest.mark.parametrize("content", ["tcp://[localhost", '{"id": 1}', "no JSON", "[]"])
+def test_what_is_no_address_of_a_cluster_is_one_line(content, tmp_path):
+    pytest.importorskip("distributed")
+    file = tmp_path / "scheduler.json"
+    file.write_text(content)
+    with pytest.raises(BadInput, match="expected a scheduler's address, as tls://"):
+        list(in_parallel(divmod, [(7, 2)], 1, cluster=content if "://" in content else str(file)))

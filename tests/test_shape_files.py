@@ -70,9 +70,9 @@ def test_a_shapes_own_refusal_keeps_its_words():
 
 def test_it_runs_once_for_each_set_of_parameters(monkeypatch):
     asked = []
-    ask = shape_files._Process.ask
+    ask = shape_files._ShapeProcess.ask
     monkeypatch.setattr(
-        shape_files._Process, "ask", lambda self, question: asked.append(question) or ask(self, question)
+        shape_files._ShapeProcess, "ask", lambda self, question: asked.append(question) or ask(self, question)
     )
     text = TEMPLATE + "\n# once\n"
     for _ in range(3):
@@ -133,6 +133,11 @@ def test_what_a_shape_does_wrong_is_one_line_with_its_place(short, code, expecte
     assert not list(tmp_path.iterdir())
 
 
+def test_modules_that_numpy_imports_late_are_there():
+    form = shape(inside("import numpy as np\nassert np.random.default_rng(1).integers(9) >= 0\nnp.fft.fft([1, 2])"))
+    assert form.scene(form.Params(), Fill()).bodies
+
+
 def test_numpy_and_shapely_are_there_if_the_file_names_them():
     form = shape(inside("import numpy\nimport shapely\nassert numpy.linalg.det(numpy.eye(2)) == 1\n"
                         "assert shapely.box(0, 0, 1, 1).area == 1"))  # fmt: skip
@@ -175,6 +180,12 @@ WRONG = [
     ("@dataclass(frozen=True)", "@staticmethod", "AttributeError|TypeError|no dataclass|has no"),
     ("return self.length_mm / self.period_mm", "return -1", "cells.. is -1; expected a number above 0"),
     ("return self.length_mm / self.period_mm", "return 'many'", "cells.. is 'many'; expected a number above 0"),
+    (
+        '"range": (0.05, 5.0)})\n    film',
+        '"range": (0, 10**400)})\n    film',
+        "parameter height_mm has no range; write",
+    ),
+    ('"range": (0.5, 50.0)', '"choices": ("4", "4\\x1b[2J")', "is not among its choices, or one cannot be printed"),
     ("return self.length_mm / self.period_mm", "return 1e30", "1e.30 cells of the pattern"),
 ]
 

@@ -1,9 +1,7 @@
 """A log on a full or read-only file system is read like any other; what cannot be logged is said."""
 
 import os
-import resource
 import shutil
-import signal
 import sqlite3
 import subprocess
 import sys
@@ -30,22 +28,8 @@ def path(tmp_path):
     return path
 
 
-def full():
-    """No file may grow, as on a full disk."""
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-
-
-def sensorgen(*words, **how):
-    # a pipe: the limit of files does not concern it; it would truncate bytecode
-    env = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
-    return subprocess.run(
-        [sys.executable, "-m", "sensorgen", *words], capture_output=True, encoding="utf-8", check=False, env=env, **how
-    )
-
-
 @pytest.mark.parametrize("unmerged", [False, True], ids=["checkpointed", "rows in the write-ahead log"])
-def test_a_full_disk_lets_read_and_says_what_is_not_logged(path, unmerged):
+def test_a_full_disk_lets_read_and_says_what_is_not_logged(path, unmerged, forked, tmp_path):
     if unmerged:  # as a killed program leaves it: the last row is in the write-ahead log alone
         copy = path.parent / "copy"
         copy.mkdir()
@@ -63,14 +47,14 @@ def test_a_full_disk_lets_read_and_says_what_is_not_logged(path, unmerged):
             assert without.execute("SELECT count(*) FROM record WHERE specimen = 'S7'").fetchone() == (0,)
     expected = ["S0", "S1", "S2", *(["S7"] if unmerged else [])]
     for command in COMMANDS:
-        done = sensorgen("log", command, "--log", str(path), preexec_fn=full)
-        assert (done.returncode, done.stderr) == (0, ""), done
+        done = forked("log", command, "--log", path, cwd=tmp_path, FSIZE=0)
+        assert (done.code, done.err) == (0, ""), done
         if command == "list":
-            assert [name for name in (*expected, "S8") if name in done.stdout] == expected
-    done = sensorgen("log", "add", "23 triX", "--y", "680", "--log", str(path), preexec_fn=full)
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "nothing was logged" in done.stderr, done.stderr
+            assert [name for name in (*expected, "S8") if name in done.out] == expected
+    done = forked("log", "add", "23 triX", "--y", "680", "--log", path, cwd=tmp_path, FSIZE=0)
+    assert done.code == 2
+    assert done.err.count("\n") == 1
+    assert "nothing was logged" in done.err, done.err
 
 
 @pytest.mark.skipif(os.name == "nt" or os.getuid() != 0, reason="only root can mount, and become another user")
@@ -115,6 +99,49 @@ def test_a_folder_that_another_user_may_only_read(path):
     assert sorted(each.name for each in path.parent.glob("log*")) == ["log.db"]
     with closing(sqlite3.connect(path)) as connection:
         assert connection.execute("SELECT count(*) FROM record").fetchone()[0] >= 3
+
+
+@pytest.mark.skipif(os.name == "nt" or os.getuid() != 0, reason="only root can mount")
+def test_a_medium_that_is_read_only_shows_rows_of_the_write_ahead_log_too(path):
+    """As a copy of a killed program's log, without its index."""
+    script = (
+        'mount -t tmpfs none "$1" && cp "$2" "$1/log.db" && cp "$2-wal" "$1/log.db-wal" && mount -o remount,ro "$1" && '
+        '"$3" -m sensorgen log list --log "$1/log.db" && ! "$3" -m sensorgen log add "23 triX" --y 6 --log "$1/log.db"'
+    )
+    place = path.parent / "medium"
+    place.mkdir()
+    with Log(path) as log:
+        reader = sqlite3.connect(path)
+        reader.execute("BEGIN")
+        reader.execute("SELECT count(*) FROM record").fetchone()
+        log.add([reading(7)])
+        done = subprocess.run(
+            ["unshare", "-m", "sh", "-c", script, "sh", str(place), str(path), sys.executable],
+            capture_output=True, encoding="utf-8", check=False,
+        )  # fmt: skip
+        reader.close()
+    if "unshare" in done.stderr or "mount:" in done.stderr:
+        pytest.skip(done.stderr)
+    assert done.returncode == 0, done
+    assert "S7" in done.stdout
+    assert "its disk is full or read-only; nothing was logged" in done.stderr
+
+
+def test_rows_of_a_log_that_is_gone_do_not_get_into_a_new_one(path):
+    with Log(path) as log:
+        reader = sqlite3.connect(path)
+        reader.execute("BEGIN")
+        reader.execute("SELECT count(*) FROM record").fetchone()
+        log.add([reading(7)])
+        shutil.copy(f"{path}-wal", path.parent / "kept")
+        reader.close()
+    path.unlink()
+    shutil.copy(path.parent / "kept", f"{path}-wal")
+    with pytest.raises(Exception, match=r"log\.db-wal' is left of a log that was removed or renamed; move it"):
+        Log(path, create=True)
+    Path(f"{path}-wal").unlink()
+    with Log(path, create=True) as log:
+        assert log.readings() == ()
 
 
 def test_a_log_that_was_removed_takes_no_row_in_silence(path):

@@ -5,6 +5,7 @@ import os
 import platform
 import select
 import socket
+import struct
 import subprocess
 import sys
 from collections import Counter
@@ -15,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from sensorgen.core import confine
+from sensorgen.core.errors import BadInput
 from sensorgen.design import shape_files
 
 ATTACKS = (Path(__file__).parent / "shape_attacks.py").read_text("utf-8")
@@ -114,6 +116,33 @@ def landlock():
     return ctypes.CDLL(None).syscall(444, None, 0, 1) >= 1
 
 
+@linux
+def test_a_kernel_that_confines_nothing_runs_nothing(monkeypatch, tmp_path):
+    """By a filter that refuses to set filters."""
+    number = {"x86_64": 157, "aarch64": 167}[platform.machine()]
+    code = [(0x20, 0, 0, 0), (0x15, 0, 3, number), (0x20, 0, 0, 16), (0x15, 0, 1, 22), (6, 0, 0, 0x00050016),
+            (6, 0, 0, 0x7FFF0000)]  # fmt: skip
+    program = b"".join(struct.pack("HBBI", *each) for each in code)
+    refuse = (
+        "import ctypes, os, struct, sys\n"
+        f"code = ctypes.create_string_buffer({program!r}, {len(program)})\n"
+        f"filters = ctypes.create_string_buffer(struct.pack('HxxxxxxQ', {len(code)}, ctypes.addressof(code)))\n"
+        "one, zero = ctypes.c_ulong(1), ctypes.c_ulong(0)\n"
+        "assert ctypes.CDLL(None).prctl(38, one, zero, zero, zero) == 0\n"
+        "assert ctypes.CDLL(None).prctl(22, ctypes.c_ulong(2), filters, zero, zero) == 0\n"
+        "os.execv(sys.argv[1], sys.argv[1:])\n"
+    )
+    start = subprocess.Popen
+    monkeypatch.setattr(
+        shape_files.subprocess, "Popen", lambda words, **how: start([sys.executable, "-c", refuse, *words], **how)
+    )
+    text = f"open({str(tmp_path / 'ran')!r}, 'w')\n"
+    shape_files.trust("zig", text)
+    with pytest.raises(BadInput, match=r"zig.py: did not run, since this kernel does not confine it .*seccomp"):
+        shape_files._ShapeProcess("zig", text)
+    assert not (tmp_path / "ran").exists()
+
+
 def interpreter_of_all():
     """An interpreter that every user of this machine may run; None without one."""
     old = "import sys; sys.exit(sys.version_info < (3, 11))"
@@ -138,7 +167,7 @@ def test_no_attack_succeeds(victims, user, monkeypatch, record_property):
         as_nobody = partial(subprocess.Popen, **NOBODY)
         monkeypatch.setattr(shape_files.subprocess, "Popen", as_nobody)
     shape_files.trust("zig", text())
-    process = shape_files._Process("zig", text())
+    process = shape_files._ShapeProcess("zig", text())
     success, tried = worked(process.about["about"])
     process.close()
     kinds = Counter(kind for kind, _ in tried.values())

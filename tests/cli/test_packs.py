@@ -425,6 +425,23 @@ def test_nothing_of_a_strangers_folder_runs_unasked(run, words, monkeypatch):
     assert "sensorgen pack trust shapes/zig.py" in both
 
 
+def test_a_strangers_text_moves_no_terminal_in_the_help_and_takes_none_of_its_options(run):
+    text = (
+        (TEMPLATES / "shape.py")
+        .read_text("utf-8")
+        .replace("height_mm", "help")
+        .replace("Height of", "a\\x1b[2J\\u202eb")
+    )
+    Path("shapes").mkdir()
+    Path("shapes/zig.py").write_text(text + '\n__doc__ = "Zig.\\x1b]0;owned\\x07\\x9b31m\\u202e"\n', "utf-8")
+    Path("shapes/other.py").write_text(text, "utf-8")
+    run("pack", "trust", "shapes/zig.py")
+    said = run("check", "zig", "--help")
+    assert "--shape-help" in said.out
+    assert not set("\x1b\x07\x9b\u202e") & set(said.out)
+    assert "zig" in run("schema", "design").out  # without the one that is not trusted
+
+
 def test_a_design_that_brings_its_shape_is_trusted_by_its_file(run):
     text = (TEMPLATES / "shape.py").read_text("utf-8")
     Path("brought.yaml").write_text(json.dumps({"shape": "zig", "own": {"shapes": {"zig": text}}}), "utf-8")
@@ -632,6 +649,7 @@ def test_the_commands_of_the_page(run, here):
     assert run("check", "design.yaml").code == 0
 
 
+@pytest.mark.usefixtures("at_rest", "shared_cache")
 def test_a_synced_log_is_reported_where_its_shape_is_not_trusted(run, here, monkeypatch):
     """Nothing of it runs; the report is of all else, and names what to trust, by the file's own SHA-256."""
     shape = put(here, "shape", "zig")
@@ -656,6 +674,7 @@ def test_a_synced_log_is_reported_where_its_shape_is_not_trusted(run, here, monk
     assert "another version of sensorgen" not in Path("r.md").read_text("utf-8")
 
 
+@pytest.mark.usefixtures("at_rest", "shared_cache")
 def test_a_synced_log_is_reported_whole_once_its_shape_is_trusted(run, here, monkeypatch):
     shape = put(here, "shape", "zig")
     Path("z.yaml").write_text("shape: zig\n", "utf-8")

@@ -130,11 +130,14 @@ def test_of_two_corrections_of_one_row_the_same_one_counts_everywhere_until_a_pe
         said = " ".join(document.text(listing.details(log, [rows[lines[other]]]).document()))
         expected = f"row {rows[lines[counts.uid]].number}, from another machine, corrects the same row and counts"
         assert expected in " ".join(said.split())
+        expected = f"conflict: readings {rows[lines[other]].number} and {rows[lines[counts.uid]].number} correct the"
+        assert [note[: len(expected)] for note in listing.listing(log).notes[:-3]] == [expected]
         with pytest.raises(BadInput, match="was corrected before"):
             log.add([reading("23 triX", "652", supersedes=lines[other])])
     withdraw(b, "reading", next(r.number for r in b.readings(superseded=True) if r.uid == counts.uid), "typing error")
     withdraw(b, "reading", next(r.number for r in b.readings(superseded=True) if r.uid == other), "typing error")
     assert b.readings() == ()
+    assert b.conflicts() == []
     assert sound(a, b)
 
 
@@ -151,7 +154,9 @@ def test_withdrawing_the_correction_that_counts_lets_the_other_one_count(machine
     lost = next(r for r in b.entries(Reading, replaced=True) if r.uid not in (old.uid, counts.uid))
     with pytest.raises(BadInput, match=f"row {lost.number} is out of use: row {counts.number}, from another machine"):
         b.add([reading("23 triX", "670", supersedes=lost.uid)])
+    assert len(b.conflicts()) == len(sync.sync(b, tmp_path / "share").notes) == 1
     withdraw(b, "reading", counts.number, "typing error")
+    assert b.conflicts() == []
     for log in (b, a):
         sync.sync(log, tmp_path / "share")
         assert [row.uid for row in log.readings()] == [lost.uid]

@@ -2,7 +2,6 @@
 
 import importlib
 import os
-import re
 import signal
 import sys
 import warnings
@@ -14,6 +13,7 @@ from typing import Any, NoReturn
 import click
 
 from sensorgen.core.errors import SensorgenError, Unprintable, nearest
+from sensorgen.core.terminal import harmless
 from sensorgen.core.version import __version__
 
 SECTIONS = {  # what each command is for, here so that --help imports none of them
@@ -69,25 +69,6 @@ _ELSEWHERE = {  # options of other programs, and where the quantity is here
     "--layer-height": ": the print quality has it; take another with --quality (sensorgen list qualities), or your own "
     "(sensorgen new quality NAME).",
 }
-_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
-
-
-def harmless(text: str) -> str:
-    r"""Text of strangers without characters that a terminal obeys, as colours, titles, and changes of direction.
-
-    >>> harmless("a\x1b]0;title\x07b\tc\n")
-    'a]0;titleb\tc\n'
-    """
-    return _CONTROL.sub("", text)
-
-
-def escaped(text: str) -> str:
-    r"""Escape a text for JSON, where nothing of it may be lost.
-
-    >>> escaped('"a\u202eb"' + "\n")
-    '"a\\u202eb"\n'
-    """
-    return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 class _Lazy(click.Group):

@@ -89,7 +89,8 @@ class DesignGroup(FirstWord):
             return max(ended(self.work(part, **arguments(self.work, own))) for part in parts)
 
         others = [*options_of(DesignOptions), *self.own]
-        params = _parameter_options(module.Params, {word for other in others for word in other.opts}) if module else []
+        taken = {"--help", *(word for other in others for word in other.opts)}
+        params = _parameter_options(module.Params, taken) if module else []
         about = _about(module)
         return click.Command(
             name,

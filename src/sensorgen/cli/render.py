@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, escaped, harmless, show
+from sensorgen.cli import FOUND_ERRORS, show
 from sensorgen.core.errors import BadInput
+from sensorgen.core.terminal import escaped, harmless
 
 if TYPE_CHECKING:
     from sensorgen.core.document import Documented, Part

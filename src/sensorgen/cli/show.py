@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import click
 
-from sensorgen.cli import harmless
+from sensorgen.core.terminal import harmless
 from sensorgen.core.units import si
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from functools import partial
+from itertools import starmap
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
     from contextlib import AbstractContextManager
 
+_EXPECTED_CLUSTER = "expected a scheduler's address, as tls://10.0.0.5:8786, or its file"
 TRUST_CLUSTER = "SENSORGEN_TRUST_CLUSTER"  # environment variable: 1 for clusters without TLS
 CHUNK_S = 1.0  # sending work to a process takes a millisecond, to another computer ten
 # A process that is spawned looks for no modules in the working folder, and leaves the other cores to the others: one
@@ -68,7 +70,7 @@ def in_parallel(
         A process ended before its result; a cluster that cannot be reached; whatever ``work`` raises.
     """
     if min(jobs, len(inputs)) < 2 and not (cluster and inputs):
-        yield from ((k, work(*each)) for k, each in enumerate(inputs))
+        yield from enumerate(starmap(work, inputs))
         return
     from concurrent.futures import FIRST_COMPLETED, wait
 
@@ -79,10 +81,10 @@ def in_parallel(
         while todo or again or running:
             while free and (todo or again):
                 alone = opened[0].shared and (todo or running)  # a chunk that killed waits until others are safe
-                if not todo and alone:
+                in_time = int(CHUNK_S * done / spent) if spent else 1
+                chunk = again.popleft() if again and not alone else _taken(todo, in_time, len(opened))
+                if not chunk.numbers:
                     break
-                size = min(int(CHUNK_S * done / spent) if spent else 1, len(todo) // (2 * len(opened)))
-                chunk = again.popleft() if again and not alone else _taken(todo, size)
                 lane = free.pop()
                 running[lane.submit(work, [inputs[k] for k in chunk.numbers])] = lane, chunk
             yield from ready  # after the lanes have got work: what is done with a result takes time
@@ -97,19 +99,25 @@ def in_parallel(
                 except lane.deadly:
                     lane.renew()
                     again.extend(chunk.after_death())
-                    if not chunk.after_death():
-                        if lost is None:
-                            raise SensorgenError(_DIED) from None
-                        ready.append((chunk.numbers[0], lost(chunk.numbers[0], _DIED)))
+                    ready.extend(_losses(chunk, lost))
                     continue
                 spent, done = spent + seconds, done + len(results)
                 ready.extend(zip(chunk.numbers, results, strict=True))
         yield from ready
 
 
-def _taken(todo: deque[int], size: int) -> "_Chunk":
-    """The next works, one at least."""
-    return _Chunk(tuple(todo.popleft() for _ in range(max(1, size))))
+def _losses(chunk: "_Chunk", lost: Lost[Result] | None) -> Iterator[tuple[int, Result]]:
+    """Number and result of a work that is not sent again; an error where no result stands for it."""
+    if not chunk.after_death():
+        if lost is None:
+            raise SensorgenError(_DIED) from None
+        yield chunk.numbers[0], lost(chunk.numbers[0], _DIED)
+
+
+def _taken(todo: deque[int], most: int, lanes: int) -> "_Chunk":
+    """The next works, few enough that each lane gets two more chunks; none where none is left."""
+    size = min(len(todo), max(1, min(most, len(todo) // (2 * lanes))))
+    return _Chunk(tuple(todo.popleft() for _ in range(size)))
 
 
 def remembered(
@@ -362,7 +370,10 @@ def _check_private(address: str) -> None:
     from ipaddress import ip_address
     from urllib.parse import urlsplit
 
-    url = urlsplit(address if "://" in address else f"tcp://{address}")
+    try:
+        url = urlsplit(address if "://" in address else f"tcp://{address}")
+    except ValueError as error:
+        raise BadInput(f"--cluster {address}: {error}; {_EXPECTED_CLUSTER}") from None
     here = url.scheme == "inproc" or url.hostname == "localhost"
     with suppress(ValueError):
         here = here or ip_address(url.hostname or "").is_loopback
@@ -388,14 +399,18 @@ def _on_cluster(address: str) -> Iterator[Sequence[Lane]]:
     loggers = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in ("distributed", "asyncio")]
     for name in loggers:  # each has a level of its own
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what goes wrong is said once, by us
-    where = {"scheduler_file": address} if Path(address).is_file() else {"address": address}
-    _check_private(json.loads(Path(address).read_text("utf-8"))["address"] if "scheduler_file" in where else address)
+    where, scheduler = {"address": address}, address
+    if Path(address).is_file():
+        try:
+            where, scheduler = {"scheduler_file": address}, str(json.loads(Path(address).read_text("utf-8"))["address"])
+        except (OSError, ValueError, KeyError, TypeError):
+            raise BadInput(f"--cluster {address}: no scheduler's file; {_EXPECTED_CLUSTER}") from None
+    _check_private(scheduler)
     try:
         client = Client(**where, timeout=_CONNECT_S)
     except (OSError, ValueError, TimeoutError) as error:
         raise SensorgenError(
-            f"no Dask scheduler at {address!r} ({str(error).splitlines()[0]:.80}); expected its address, as "
-            "tls://10.0.0.5:8786, or its scheduler file"
+            f"no Dask scheduler at {address!r} ({str(error).splitlines()[0]:.80}); {_EXPECTED_CLUSTER}"
         ) from None
     try:
         threads = sum(client.nthreads().values())

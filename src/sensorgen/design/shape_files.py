@@ -27,6 +27,7 @@ from sensorgen.core import cache as answers
 from sensorgen.core import files
 from sensorgen.core.errors import BadInput, OutOfRange, Unwritable
 from sensorgen.core.records import problem
+from sensorgen.core.terminal import harmless
 from sensorgen.design import packs, shape_process
 from sensorgen.scene.polyhedra import Loft, Polyhedron
 from sensorgen.scene.revolved import Revolved
@@ -98,7 +99,7 @@ def varies(name: str, text: str, fill: Mapping[str, str]) -> bool:
     """
     made = []
     for _ in range(2):
-        process = _Process(name, text)
+        process = _ShapeProcess(name, text)
         try:
             defaults = {str(field["name"]): field["default"] for field in process.about["fields"]}
             question = {"parameters": defaults, "fill": fill}
@@ -145,7 +146,7 @@ class _Foreign:
         self._name, self._text = name, text
         reply = self._ask({})
         try:
-            self.__doc__ = str(reply["about"])[:4000]
+            self.__doc__ = harmless(str(reply["about"])[:4000])
             self.SHORT = _short(name, reply)
             parameters = _fields(name, reply)
         except (AttributeError, KeyError, TypeError, ValueError):
@@ -225,20 +226,21 @@ def _fields(name: str, reply: Mapping[str, Any]) -> list[tuple[str, type, Any]]:
         raise BadInput(f"{name}.py: Params has no {sorted(missing)[0]}; expected a dataclass derived from Envelope")
     for field in reply["fields"]:
         key, default, about = str(field["name"]), field["default"], dict(field["metadata"])
+        about["help"] = harmless(about["help"]) if isinstance(about.get("help"), str) else ""
         where = f"{name}.py: parameter {key[:60]}"
         if not _NAME.fullmatch(key):
             raise BadInput(f"{where}: expected a name of small letters, digits and '_'")
-        if not isinstance(about.get("help"), str) or not about["help"]:
+        if not about["help"]:
             raise BadInput(f"{where} has no help; write metadata={{'help': ..., 'range': (low, high)}}")
         if choices := about.get("choices"):
-            if default not in choices or not all(isinstance(each, str) for each in choices):
-                raise BadInput(f"{where}: default {default!r:.40} is not among its choices")
+            if default not in choices or not all(isinstance(each, str) and each.isprintable() for each in choices):
+                raise BadInput(f"{where}: default {default!r:.40} is not among its choices, or one cannot be printed")
             about["choices"] = tuple(choices)
         else:
             try:
                 low, high = (float(end) for end in about["range"])
                 sound = math.isfinite(high - low) and low <= float(default) <= high
-            except (KeyError, TypeError, ValueError):
+            except (KeyError, TypeError, ValueError, OverflowError):
                 raise BadInput(f"{where} has no range; write metadata={{'help': ..., 'range': (low, high)}}") from None
             if not sound:
                 raise BadInput(f"{where}: default {default!r:.40} is outside its range {low:g} to {high:g}")
@@ -280,7 +282,7 @@ def _check_body(where: str, body: Body, size_mm: tuple[float, float, float], nam
                 raise BadInput(f"{where}: {low:g} to {high:g} mm along {axis}; expected within 0 to {size:g} mm")
 
 
-class _Process:
+class _ShapeProcess:
     """The process that runs one shape's file."""
 
     def __init__(self, name: str, text: str) -> None:
@@ -296,9 +298,13 @@ class _Process:
             0
         )  # lines: one for each question, or an endless answer would fill the memory
         threading.Thread(target=_read, args=(self._process.stdout, self._wanted, self._lines), daemon=True).start()
-        self.about = self._exchange({
-            "name": name, "text": text, "seconds": SECONDS, "memory_bytes": MEMORY_BYTES, "libraries": _libraries(),
-        })  # fmt: skip
+        try:
+            self.about = self._exchange({
+                "name": name, "text": text, "seconds": SECONDS, "memory_bytes": MEMORY_BYTES, "libraries": _libraries(),
+            })  # fmt: skip
+        except BaseException:
+            self.close()
+            raise
 
     def ask(self, question: Mapping[str, Any]) -> Any:
         """The answer to a question; to an empty one, what the file says of itself."""
@@ -347,11 +353,11 @@ class _Process:
         return self._process.wait()
 
 
-_RUNNING: dict[tuple[str, str], _Process] = {}
+_RUNNING: dict[tuple[str, str], _ShapeProcess] = {}
 _MOST = 4  # processes at once
 
 
-def _process(name: str, text: str) -> _Process:
+def _process(name: str, text: str) -> _ShapeProcess:
     key = name, text
     if key not in _RUNNING:
         if len(_RUNNING) >= _MOST:
@@ -360,7 +366,7 @@ def _process(name: str, text: str) -> _Process:
             import atexit
 
             atexit.register(close)
-        made = _Process(name, text)
+        made = _ShapeProcess(name, text)
         _RUNNING[key] = made
     return _RUNNING[key]
 

@@ -25,10 +25,10 @@ with suppress(ImportError):  # Windows
 LIBRARIES = ("numpy", "shapely")  # of others, that a shape may import
 _MODULES = (
     *LIBRARIES, "array", "bisect", "cmath", "collections", "copy", "dataclasses", "decimal", "enum", "fractions",
-    "functools", "hashlib", "heapq", "itertools", "json", "math", "numbers", "numpy.linalg", "numpy.random", "operator",
-    "random", "re", "statistics", "string", "struct", "textwrap", "time", "typing", "sensorgen.scene.array",
-    "sensorgen.scene.layers", "sensorgen.scene.polyhedra", "sensorgen.scene.revolved", "sensorgen.scene.triangles",
-    "sensorgen.scene.sections", "sensorgen.scene.strips",
+    "functools", "hashlib", "heapq", "itertools", "json", "math", "numbers", "numpy.fft", "numpy.polynomial",
+    "numpy.random", "operator", "random", "re", "statistics", "string", "struct", "textwrap", "time", "typing",
+    "sensorgen.scene.array", "sensorgen.scene.layers", "sensorgen.scene.polyhedra", "sensorgen.scene.revolved",
+    "sensorgen.scene.triangles", "sensorgen.scene.sections", "sensorgen.scene.strips",
 )  # fmt: skip
 
 
@@ -89,16 +89,22 @@ def _answer(module: ModuleType, question: Mapping[str, Any]) -> Any:
     return dataclasses.asdict(made)
 
 
-def _limit(memory_bytes: int) -> None:
+def _limit(memory_bytes: int, file: str) -> None:
     """Limit memory; forbid files, network and other processes, as far as the system can."""
     from sensorgen.core import confine
+    from sensorgen.core.errors import SensorgenError
 
     limits = {"AS": memory_bytes, "FSIZE": 0, "NPROC": 0, "CORE": 0} | ({} if confine.available() else {"NOFILE": 0})
     for name, most in limits.items():
         with suppress(OSError, ValueError, AttributeError):
             resource.setrlimit(getattr(resource, f"RLIMIT_{name}"), (most, most))
-    if confine.available():
-        confine.confine()
+    try:
+        if confine.available():
+            confine.confine()
+    except OSError as error:
+        raise SensorgenError(
+            f"{file}: did not run, since this kernel does not confine it ({error}); expected one with seccomp"
+        ) from None
 
 
 def _import(text: str, libraries: list[str]) -> None:
@@ -107,7 +113,7 @@ def _import(text: str, libraries: list[str]) -> None:
     sys.path += libraries
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # a thread that exists already would not be confined
     for name in _MODULES:
-        if re.search(rf"\b{re.escape(name)}\b", text):
+        if all(re.search(rf"\b{part}\b", text) for part in name.split(".")):  # also as np.random
             with suppress(ImportError):  # the file's own import says so
                 import_module(name)
     os.environ.clear()
@@ -154,7 +160,6 @@ def main() -> None:
     file = f"{first['name']}.py"
     if hasattr(signal, "SIGXCPU"):
         signal.signal(signal.SIGXCPU, _stop)
-    _limit(first["memory_bytes"])
 
     def reply(work: Callable[[], Any]) -> Any:
         try:
@@ -176,6 +181,7 @@ def main() -> None:
     module: list[ModuleType] = []
 
     def begin() -> Any:
+        _limit(first["memory_bytes"], file)
         module.append(module_of(first["name"], first["text"]))
         return described(module[0])
 

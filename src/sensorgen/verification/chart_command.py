@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import click
 
-from sensorgen.cli import escaped, render, show
+from sensorgen.cli import render, show
 from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import arguments, options_of
 from sensorgen.cli.designs import DesignGroup
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.core.options import Option
+from sensorgen.core.terminal import escaped
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design

@@ -18,11 +18,11 @@ from pydantic import Field
 from sensorgen.core.errors import BadInput, NotInstalled, UnknownName
 from sensorgen.core.records import Line, Strict, checked
 from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import PYMEASURE, Actuator, ImpedanceMeter, Meter, Role, Stage
+from sensorgen.measure.lab.devices import PYMEASURE, Actuator, FrameMeter, ImpedanceMeter, Meter, Role, Stage
 from sensorgen.measure.virtual.plant import Plant
 
 GROUP = "sensorgen.devices"
-Device = Actuator | Stage | ImpedanceMeter | Meter
+Device = Actuator | Stage | ImpedanceMeter | Meter | FrameMeter
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ def _smac() -> Kind:
     from sensorgen.measure.virtual.smac import SmacController
 
     return _at_port(
-        "actuator", smac.Settings, smac.Actuator, lambda address, _: port.SerialPort(address, smac.BAUD),
+        "actuator", smac.Settings, smac.SmacActuator, lambda address, _: port.SerialPort(address, smac.BAUD),
         lambda plant, given: SmacController(
             plant, newton_per_unit=given.newton_per_unit, mm_per_count=given.mm_per_count
         ),
@@ -263,13 +263,22 @@ def _scpi(name: str) -> Kind:
     if model:
         return _at_port(
             "impedance", lcr_meter.Settings, lambda line, clock, given: lcr_meter.LcrMeter(line, clock, model, given),
-            at, lambda plant, _: scpi.LcrMeter(plant, name),
+            at, lambda plant, _: scpi.SimulatedLcrMeter(plant, name),
         )  # fmt: skip
     key = {"hp-34401a": "34401A", "keithley-2000": "MODEL 2000"}[name]
     return _at_port(
         "meter", NoSettings, lambda line, *_: multimeter.Multimeter(line, {key: multimeter.KNOWN[key]}), at,
-        lambda plant, _: scpi.Multimeter(plant, name),
+        lambda plant, _: scpi.SimulatedMultimeter(plant, name),
     )  # fmt: skip
+
+
+def _frames() -> Kind:
+    from sensorgen.measure.lab import frame_stream, port
+
+    def real(address: str, given: frame_stream.StreamSettings, clock: Clock) -> Device:
+        return frame_stream.FrameStream(port.SerialPort(address, given.baud), clock)
+
+    return Kind("array", frame_stream.StreamSettings, real)
 
 
 def _pymeasure(name: str) -> Kind:
@@ -283,5 +292,6 @@ _KINDS: dict[str, Callable[[], Kind]] = {
     "smac-lcc10": _smac,
     "reprapfirmware": _reprap,
     "handyscope-hs5": _handyscope,
+    "frame-stream": _frames,
     **{name: partial(_scpi, name) for name in ("hp-4284a", "keysight-e4980a", "hp-34401a", "keithley-2000")},
 }

@@ -5,8 +5,10 @@ linked there, so that two programs that start together share one log, and a kill
 """
 
 import os
+import shutil
 import sqlite3
 import struct
+import tempfile
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
@@ -86,9 +88,30 @@ def _opened_as_possible(path: Path) -> sqlite3.Connection:
     except sqlite3.Error as error:
         if not writable or _code(error) not in _UNWRITABLE:
             raise
-    if wal.exists() and wal.stat().st_size:  # its index, for which a full disk has no room, is kept in memory
+    if not (wal.exists() and wal.stat().st_size):
+        return _opened(path, "immutable=1")
+    try:  # its index, for which a full disk has no room, is kept in memory
         return _opened(path, "mode=rw", "locking_mode = EXCLUSIVE")
-    return _opened(path, "immutable=1")
+    except sqlite3.Error as error:
+        if _code(error) not in _UNWRITABLE:
+            raise
+    return _copied(path, wal)
+
+
+def _copied(path: Path, wal: Path) -> sqlite3.Connection:
+    """Connection to a copy in memory, with the rows of a write-ahead log on a medium that cannot be written."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "log.db"
+        for source, place in ((path, copy), (wal, Path(f"{copy}-wal"))):
+            shutil.copyfile(source, place)
+        with closing(sqlite3.connect(copy)) as merged:
+            connection = sqlite3.connect(":memory:", isolation_level=None, factory=_Connection)
+            merged.backup(connection)
+    connection.file = path.stat()
+    _migrate(connection, path)
+    _check_tables(connection, path)
+    connection.execute("PRAGMA query_only = ON")
+    return connection
 
 
 def _opened(path: Path, mode: str, *pragmas: str) -> sqlite3.Connection:
@@ -157,7 +180,8 @@ def _translated(error: sqlite3.Error, path: str) -> SensorgenError:
     if code in _BUSY:
         return Unwritable(f"another program has locked the log {path!r}; nothing was logged, try again")
     if code in _UNWRITABLE:
-        return Unwritable(f"cannot write to the log {path!r}: {error}; nothing was logged")
+        why = "its disk is full or read-only" if code == sqlite3.SQLITE_READONLY else error
+        return Unwritable(f"cannot write to the log {path!r}: {why}; nothing was logged")
     if code == sqlite3.SQLITE_CONSTRAINT:
         return BadInput(f"the log {path!r} does not accept this row: {error}")
     return _damaged(path, str(error))
@@ -187,6 +211,12 @@ def _create(path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     remove_stale_parts(path.parent)
     part = part_of(path)
+    left = Path(f"{path}-wal")  # SQLite would write its rows into the new log
+    if left.exists() and not os.path.lexists(path):
+        raise BadInput(
+            f"{str(left)!r} is left of a log that was removed or renamed; move it to where that log is, under its "
+            f"name and '-wal', or remove it"
+        )
     try:
         with part.open("wb") as file:
             file.write(_empty())

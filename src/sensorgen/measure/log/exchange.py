@@ -1,11 +1,13 @@
 """Export the log as CSV or Parquet, and read an export back exactly.
 
 Spreadsheets run text that begins with ``=``, ``+``, ``-`` or ``@``. Such text gets a leading apostrophe, and so does
-text that begins with an apostrophe: the import removes one, so that every text comes back unchanged.
+text that begins with an apostrophe: the import removes one, so that every text comes back unchanged. Text that a
+terminal would obey is JSON behind an apostrophe.
 """
 
 import csv
 import io
+import json
 import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -17,7 +19,8 @@ from sensorgen.core import files as store
 from sensorgen.core.document import spreadsheet
 from sensorgen.core.errors import BadInput, MissingValue, Unwritable
 from sensorgen.core.records import shown
-from sensorgen.measure.csv_table import Table
+from sensorgen.core.terminal import escaped, harmless
+from sensorgen.measure.csv_table import CsvTable
 from sensorgen.measure.log import fields, files
 from sensorgen.measure.log.entries import (
     NAMES,
@@ -127,11 +130,16 @@ def csv_lines(kind: type[Entry], rows: Iterable[Entry]) -> Iterator[str]:
         target.seek(0)
         target.truncate()
         cells = ((getattr(entry, name), annotation) for name, annotation in wanted.items())
-        writer.writerow([spreadsheet(value) if annotation is str else to_cell(value) for value, annotation in cells])
+        writer.writerow([_text(value) if annotation is str else escaped(to_cell(value)) for value, annotation in cells])
         yield target.getvalue()
 
 
-def from_csv(kind: type[Entry], table: Table) -> Iterator[Entry]:
+def _text(words: str) -> str:
+    """Text as a cell; as JSON behind an apostrophe where it has characters that a terminal obeys."""
+    return spreadsheet(words) if harmless(words) == words else f"'{escaped(json.dumps(words, ensure_ascii=False))}"
+
+
+def from_csv(kind: type[Entry], table: CsvTable) -> Iterator[Entry]:
     """Rows of an exported CSV table.
 
     Raises
@@ -141,7 +149,9 @@ def from_csv(kind: type[Entry], table: Table) -> Iterator[Entry]:
     """
 
     def convert(annotation: Any, cell: str) -> Value:
-        return from_cell(annotation, cell.removeprefix("'") if annotation is str else cell)
+        if annotation is str:
+            cell = json.loads(cell[1:]) if cell.startswith("'\"") else cell.removeprefix("'")
+        return from_cell(annotation, cell)
 
     for number, cells in table.text_rows():
         values = dict(zip(table.names, cells, strict=True))

@@ -72,7 +72,7 @@ def listing(log: Log, iteration: int | None = None, last: int | None = None) -> 
     more = [f"the latest {last} are shown; --all shows all"] if last is not None and len(readings) >= last else []
     records, head = log.head()
     chain = [f"{records} records, head {head[:16]}"] if records else []
-    return Listing(readings, recordings, (total, *more, *chain, str(log.path)))
+    return Listing(readings, recordings, (*log.conflicts(), total, *more, *chain, str(log.path)))
 
 
 @dataclass(frozen=True)

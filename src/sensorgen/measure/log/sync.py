@@ -75,7 +75,7 @@ def sync(log: Log, place: Path) -> Synced:
     with _opened(place, create=True) as folder:
         received, there = _pull(log, folder, notes)
         sent = _push(log, folder, there)
-    return Synced(str(place), received, sent, log.head()[1], tuple(notes))
+    return Synced(str(place), received, sent, log.head()[1], (*notes, *log.conflicts()))
 
 
 def backup(log: Log, place: Path) -> Synced:
