@@ -16,8 +16,8 @@ from slicers import NEWER, RESULTS
 PROGRAMS = (("prusa", ""), ("prusa", str(NEWER / "prusa-slicer")), ("cura", ""), ("cura", str(NEWER / "CuraEngine")))
 HEAD = """# Shapes at their default sizes through slicers
 
-By `bench/slicer_shapes.py`, 100 x 10 mm, printer diabase-h5, quality fine. Accepted: the check of the G-code, against
-the design too, has no error. Else the number of errors, and the first.
+By `bench/slicer_shapes.py`, 100 x 10 mm, printer diabase-h5, quality fine, or as the file has it. Accepted: the check
+of the G-code, against the design too, has no error. Else the number of errors, and the first.
 
 `tri` keeps the sharp apexes of the thesis by default. Where their first layer is cut they are 0.1 mm wide, a quarter of
 the nozzle: three slicers leave them out, and Arachne with a `min_feature_size` of 15 % prints 3.4 times their volume,

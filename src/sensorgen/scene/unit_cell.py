@@ -5,11 +5,12 @@ a sensor of 100 mm is solved as half a period. The pattern is thought to go on b
 no fringe arises there; a section without such planes is continued by its own mirror image instead.
 """
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 from itertools import pairwise
+from math import floor
 
 import numpy as np
 
@@ -249,15 +250,19 @@ def _agree(piece: Slice, place: Slice) -> bool:
 
 def _cut(slices: list[Slice], low: float, high: float) -> list[Slice]:
     """The slices between two places."""
-    pieces = ((s, max(s.left_mm, low), min(s.right_mm, high)) for s in slices)
-    return [s.between(a, b) for s, a, b in pieces if b - a > ROUNDING_MM]
+    first = bisect_right(slices, low + ROUNDING_MM, key=lambda s: s.right_mm)
+    last = bisect_left(slices, high - ROUNDING_MM, key=lambda s: s.left_mm)
+    inside = [s for s in slices[first:last] if s.right_mm - s.left_mm > ROUNDING_MM]
+    for end in (0, -1) if inside else ():
+        inside[end] = inside[end].between(max(inside[end].left_mm, low), min(inside[end].right_mm, high))
+    return inside
 
 
 def _folded(slices: list[Slice], low: float, high: float) -> Iterator[Slice]:
     """Every piece of the section, mirrored until it lies between two places."""
     width = high - low
     for s in slices:
-        first, last = (int(np.floor((x - low) / width)) for x in (s.left_mm + ROUNDING_MM, s.right_mm - ROUNDING_MM))
+        first, last = (floor((x - low) / width) for x in (s.left_mm + ROUNDING_MM, s.right_mm - ROUNDING_MM))
         for k in range(first, last + 1):
             start = low + k * width
             for piece in _cut([s], start, start + width):

@@ -34,8 +34,8 @@ def _groups(result: Optimised) -> dict[str, tuple[str, list[Chosen]]]:
     front = {c.number for c in result.front}
     others = [c for c in result.designs if c.numbers and (c.violated or c.number not in front)]
     return {
-        "leads": (BLUE, [c for c in result.front if c.leads]),
-        "on the front by its interval": (ORANGE, [c for c in result.front if not c.leads]),
+        "no best values are better": (BLUE, [c for c in result.front if c.leads]),
+        "perhaps as good, by its range": (ORANGE, [c for c in result.front if not c.leads]),
         "evaluated": (GREY, [c for c in others if not c.violated]),
         "violates a constraint": (PINK, [c for c in others if c.violated]),
     }

@@ -185,6 +185,11 @@ class Optimised(Displayed):
     def document(self) -> Iterator[Part]:
         """The proof, what was discarded, the front, and the designs to print."""
         yield self.proof()
+        if {"force_resolution_n", "position_resolution_mm"} & set(self.objectives):
+            yield (
+                "resolutions: standard errors of a sensor exactly as predicted; after 30 known presses they are larger "
+                "(objectives force_calibrated_n, position_calibrated_mm)"
+            )
         yield from self.remarks
         yield ""
         if self.reasons:
@@ -214,7 +219,7 @@ class Optimised(Displayed):
         )  # fmt: skip
         return Table(
             "front",
-            "Front, as printed: > leads by best values, = ties with a leading one, the others overlap",
+            "Front, as printed: > no best values are better, = as good within ranges, others: perhaps, by their range",
             columns,
             tuple(cells),
         )
