@@ -91,7 +91,7 @@ def test_no_room_for_a_new_log_or_a_raw_file(tmp_path):
     rows = "".join(f"{k},-{k},{k}\n" for k in range(1, 40_000))
     (tmp_path / "run.csv").write_text(f"re_ohm_1kHz,im_ohm_1kHz,time_s\n{rows}")
     done = command(tmp_path / "log.db", "bench", "23 triX", tmp_path / "run.csv", limit=200_000)
-    assert_told(done, "cannot keep", "File too large")
+    assert_told(done, "cannot write", "File too large")
     assert [p for p in (tmp_path / "log.db.files").rglob("*") if p.is_file()] == []
 
 
@@ -131,7 +131,7 @@ def test_a_log_that_may_only_be_read():
     try:
         with Log(path) as log:
             assert len(log.readings()) == 1
-            with pytest.raises(Unwritable, match=r"cannot write to the log .*readonly.* nothing was logged"):
+            with pytest.raises(Unwritable, match=r"cannot write to the log .*read-only; nothing was logged"):
                 log.add([reading("23 triX", "650")])
     finally:
         if root:

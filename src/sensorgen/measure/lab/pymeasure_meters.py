@@ -18,11 +18,12 @@ from typing import Any
 import numpy as np
 
 from sensorgen.core.arrays import Real
-from sensorgen.core.errors import NotInstalled, OutOfRange, SensorgenError, UnknownName
+from sensorgen.core.errors import NotInstalled, OutOfRange, UnknownName
 from sensorgen.core.records import Line, Strict
 from sensorgen.measure.lab import scpi
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import PYMEASURE, DeviceFault, Identity, Readings, Role, WrongDevice
+from sensorgen.measure.lab.port import faults
 
 _HP = ("agilent", "hewlett-packard", "hp", "keysight")
 _FUNCTION = {2: "RES", 4: "FRES"}
@@ -31,7 +32,7 @@ _OVERLOAD_OHM = 9.9e9  # 9.9999E9 of the 3478A, 9.9E37 of SCPI; beyond the range
 _LOWEST_V = 0.005  # rms
 
 
-class Settings(Strict):
+class PyMeasureSettings(Strict):
     """Settings of a meter: its model in the answer to ``*IDN?``; the number in the name of its class if not given."""
 
     model: Line = ""
@@ -81,7 +82,9 @@ def _way(kind: Any, wires: int) -> tuple[dict[str, str], str]:
     return {}, next((name for name in _READS[wires] if hasattr(kind, name)), "")
 
 
-def meter(name: str) -> tuple[Role, Callable[[Any, Settings, Clock], "Multimeter | LcrMeter"]]:
+def meter(
+    name: str,
+) -> tuple[Role, Callable[[Any, PyMeasureSettings, Clock], "PyMeasureMultimeter | PyMeasureLcrMeter"]]:
     """Role of a meter, and its driver by address, settings and clock; it connects when it is asked what it is.
 
     Raises
@@ -92,7 +95,7 @@ def meter(name: str) -> tuple[Role, Callable[[Any, Settings, Clock], "Multimeter
     if name not in roles():
         raise UnknownName("meter of PyMeasure", name, roles())
     role, kind = roles()[name]
-    return role, partial(LcrMeter if role == "impedance" else Multimeter, kind)
+    return role, partial(PyMeasureLcrMeter if role == "impedance" else PyMeasureMultimeter, kind)
 
 
 class _Meter:
@@ -115,7 +118,7 @@ class _Meter:
         Model and full answer to ``*IDN?``, once identified.
     """
 
-    def __init__(self, kind: Any, address: Any, settings: Settings, clock: Clock) -> None:
+    def __init__(self, kind: Any, address: Any, settings: PyMeasureSettings, clock: Clock) -> None:
         self.name = ""
         self._kind, self._address, self._settings, self._clock = kind, address, settings, clock
         self._open = ExitStack()
@@ -175,20 +178,13 @@ class _Meter:
 
     @contextmanager
     def _faults(self) -> Iterator[None]:
-        """Translate errors of PyMeasure to DeviceFault."""
-        try:
-            with warnings.catch_warnings(action="ignore"):
-                yield
-        except SensorgenError:
-            raise
-        except Exception as error:  # of PyMeasure, PyVISA or the VISA library, each of many kinds
-            reason = " ".join(str(error).split()) or type(error).__name__
-            raise DeviceFault(
-                f"{self._kind.__name__} at {self._address}: {reason:.200}; check address, cable and power"
-            ) from None
+        """Translate errors of PyMeasure, PyVISA or the VISA library, each of many kinds, to DeviceFault."""
+        where = f"{self._kind.__name__} at {self._address}"
+        with warnings.catch_warnings(action="ignore"), faults(where, "{}", Exception):
+            yield
 
 
-class Multimeter(_Meter):
+class PyMeasureMultimeter(_Meter):
     """A multimeter; a :class:`sensorgen.measure.lab.devices.Meter`."""
 
     def resistance(self, *, wires: int) -> str:
@@ -219,7 +215,7 @@ class Multimeter(_Meter):
         return f"{ohm:+.8E}" if abs(ohm) < _OVERLOAD_OHM else "+9.90000000E+37"
 
 
-class LcrMeter(_Meter):
+class PyMeasureLcrMeter(_Meter):
     """An LCR meter, one frequency after the other; a :class:`sensorgen.measure.lab.devices.ImpedanceMeter`."""
 
     def start(self, tones_hz: Real, voltage_v: float) -> None:
