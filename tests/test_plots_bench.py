@@ -10,7 +10,7 @@ import pytest
 
 from sensorgen.analysis.plots import recordings as bench
 from sensorgen.analysis.plots.figure import thinned
-from sensorgen.measure.recording import Recording, SampleClock, Source
+from sensorgen.measure.recording import Clock, Recording, Source
 from sensorgen.measure.recording.samples import blank
 from sensorgen.measure.signal import lowpass, presses
 from sensorgen.measure.signal.schedule import Plan
@@ -22,7 +22,7 @@ def run():
     truth = made.run(made.presses(12), rate_hz=35, tones_hz=tones)
     every = np.ones(len(truth.time_s), bool)
     recording = Recording(
-        truth.time_s, tones, truth.impedance_ohm, blank(len(every)), SampleClock(), Source("", "", rate_hz=35)
+        truth.time_s, tones, truth.impedance_ohm, blank(len(every)), Clock(), Source("", "", rate_hz=35)
     )
     pairs = presses.pairs(truth.time_s, truth.impedance_ohm, every, presses.by_force(truth.time_s, truth.force_n),
                           truth.force_n, truth.position_mm)  # fmt: skip

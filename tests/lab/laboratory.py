@@ -9,10 +9,10 @@ from typing import Any
 from sensorgen.design.design import make
 from sensorgen.measure.lab import catalogue, experiment, run
 from sensorgen.measure.lab.clock import SimulatedClock
-from sensorgen.measure.lab.safety import RunDevices
+from sensorgen.measure.lab.safety import Rig
 from sensorgen.measure.log import Log
 from sensorgen.measure.virtual import mechanics
-from sensorgen.measure.virtual.faults import FAULTS, FaultSchedule, Planted
+from sensorgen.measure.virtual.faults import FAULTS, Planted, Schedule
 from sensorgen.measure.virtual.specimen import Specimen, drawn
 
 LIMIT_N = 7.0
@@ -35,10 +35,10 @@ def asked(**changes: Any) -> experiment.Experiment:
     return experiment.parse({"specimen": "24 SX60", "plan": PLAN, "approach": quick} | changes)
 
 
-class Watched(FaultSchedule):
+class Watched(Schedule):
     """Faults, and when they struck and the tip was last down."""
 
-    def __init__(self, planted: tuple[Planted, ...], mechanism: mechanics.RigMechanism) -> None:
+    def __init__(self, planted: tuple[Planted, ...], mechanism: mechanics.Rig) -> None:
         super().__init__(planted)
         self._mechanism, self.struck_s, self.last_down_s = mechanism, inf, -inf
         self._planted = len(planted)
@@ -60,8 +60,8 @@ class Laboratory:
     """Devices with their simulators."""
 
     clock: SimulatedClock
-    mechanism: mechanics.RigMechanism
-    rig: RunDevices
+    mechanism: mechanics.Rig
+    rig: Rig
     simulators: dict[str, Any]
     watched: Watched
 
@@ -69,7 +69,7 @@ class Laboratory:
 def laboratory(faults: tuple[Planted, ...] = (), **changes: float) -> Laboratory:
     """A new one, with faults planted."""
     clock = SimulatedClock()
-    at = mechanics.RigMechanism(specimen(), mechanics.Mechanics(**{"force_limit_n": LIMIT_N} | changes))
+    at = mechanics.Rig(specimen(), mechanics.Mechanics(**{"force_limit_n": LIMIT_N} | changes))
     at.planted = watched = Watched(faults, at)
     settings = {"weight_n": at.mechanics.weight_n, "friction_n": at.mechanics.friction_n}
     made = {
@@ -84,7 +84,7 @@ def laboratory(faults: tuple[Planted, ...] = (), **changes: float) -> Laboratory
             target = {"rig": at, "analyser": made["impedance"].simulator}
             target |= {role: made[role].simulator for role in ("actuator", "stage")}
             target[FAULTS[each.what].strikes].fault = FAULTS[each.what].sets
-    rig = RunDevices(**{role: each.driver for role, each in made.items()})
+    rig = Rig(**{role: each.driver for role, each in made.items()})
     return Laboratory(clock, at, rig, {role: each.simulator for role, each in made.items()}, watched)
 
 

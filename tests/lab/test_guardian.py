@@ -74,8 +74,8 @@ def test_the_stage_is_raised_where_the_actuator_fails(quick):
 
 
 def test_orders_are_read_as_they_were_written(tmp_path):
-    orders = guardian.RescueOrders(devices=DEVICES, dead_man_s=1.5, folder=str(tmp_path))
-    assert guardian.RescueOrders.model_validate_json(orders.model_dump_json()) == orders
+    orders = guardian.Orders(devices=DEVICES, dead_man_s=1.5, folder=str(tmp_path))
+    assert guardian.Orders.model_validate_json(orders.model_dump_json()) == orders
 
 
 def _report(folder):
@@ -91,7 +91,7 @@ def _report(folder):
 ])  # fmt: skip
 def test_it_lifts_when_the_pipe_closes_while_it_is_armed(tmp_path, armed, released, rescues, roles):
     devices = {role: Device(kind="smac-lcc10", address=str(tmp_path / "none")) for role in roles}
-    watcher = guardian.Guardian(guardian.RescueOrders(devices=devices, dead_man_s=5.0, folder=str(tmp_path)))
+    watcher = guardian.Guardian(guardian.Orders(devices=devices, dead_man_s=5.0, folder=str(tmp_path)))
     if armed:
         watcher.arm()
         watcher.beat()
@@ -107,7 +107,7 @@ def test_it_lifts_when_the_pipe_closes_while_it_is_armed(tmp_path, armed, releas
 
 
 def test_a_dead_guardian_is_noticed(tmp_path):
-    watcher = guardian.Guardian(guardian.RescueOrders(devices={}, dead_man_s=5.0, folder=str(tmp_path)))
+    watcher = guardian.Guardian(guardian.Orders(devices={}, dead_man_s=5.0, folder=str(tmp_path)))
     os.kill(watcher.pid, signal.SIGKILL)
     watcher._process.wait(10)
     with pytest.raises(DeviceFault, match="guardian: it has died"):

@@ -24,9 +24,9 @@ class Lab:
 
     def __init__(self, model="hp-4284a", aperture="SHOR"):
         self.clock, self.plant = SimulatedClock(), SpringPlant()
-        self.instrument = scpi.SimulatedLcrMeter(self.plant, model)
+        self.instrument = scpi.LcrMeter(self.plant, model)
         port = SimulatedPort(self.instrument, self.clock)
-        self.meter = lcr_meter.LcrMeter(port, self.clock, MODELS[model], lcr_meter.LcrSettings(aperture=aperture))
+        self.meter = lcr_meter.LcrMeter(port, self.clock, MODELS[model], lcr_meter.Settings(aperture=aperture))
 
     def run(self, seconds):
         """Read at 100 Hz; everything that came."""
@@ -163,7 +163,7 @@ def _sim(monkeypatch):
 def test_an_analyser_of_pyvisa_sim():
     clock = SimulatedClock()
     meter = lcr_meter.LcrMeter(
-        VisaPort("GPIB0::17::INSTR"), clock, lcr_meter.HP_4284A, lcr_meter.LcrSettings(aperture="SHOR")
+        VisaPort("GPIB0::17::INSTR"), clock, lcr_meter.HP_4284A, lcr_meter.Settings(aperture="SHOR")
     )
     assert meter.identify().serial == "2940J01234"
     meter.start(TONES, 1.0)
@@ -183,9 +183,9 @@ def test_an_analyser_on_a_tcp_socket(monkeypatch):
     monkeypatch.setenv("PYVISA_LIBRARY", "@py")
     clock, plant = RealClock(), SpringPlant()
     plant.time_s = clock.now()
-    instrument = scpi.SimulatedLcrMeter(plant)
+    instrument = scpi.LcrMeter(plant)
     with tcp_server(instrument, clock) as address:
-        meter = lcr_meter.LcrMeter(VisaPort(address), clock, lcr_meter.HP_4284A, lcr_meter.LcrSettings(aperture="SHOR"))
+        meter = lcr_meter.LcrMeter(VisaPort(address), clock, lcr_meter.HP_4284A, lcr_meter.Settings(aperture="SHOR"))
         meter.start(TONES, 1.0)
         rows = []
         while len(rows) < 4:
@@ -201,7 +201,7 @@ def test_an_analyser_on_a_tcp_socket(monkeypatch):
 @pytest.mark.parametrize(("model", "name"), [("hp-34401a", "HP 34401A"), ("keithley-2000", "Keithley 2000")])
 def test_a_simulated_multimeter(model, name):
     clock, plant = SimulatedClock(), SpringPlant()
-    instrument = scpi.SimulatedMultimeter(plant, model)
+    instrument = scpi.Multimeter(plant, model)
     meter = multimeter.Multimeter(SimulatedPort(instrument, clock))
     assert meter.identify().model == name
     assert float(meter.resistance(wires=4)) == 650
@@ -213,7 +213,7 @@ def test_a_simulated_multimeter(model, name):
 
 @pytest.mark.parametrize("fault", ["silent", "hung", "garbage", "identity", "truncated", "cut", "error"])
 def test_a_planted_fault_of_a_multimeter_is_seen(fault):
-    instrument = scpi.SimulatedMultimeter(SpringPlant())
+    instrument = scpi.Multimeter(SpringPlant())
     meter = multimeter.Multimeter(SimulatedPort(instrument, SimulatedClock()))
     if fault not in ("identity", "cut"):
         meter.identify()

@@ -16,16 +16,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.measure.virtual import blank as virtual
 from sensorgen.measure.virtual.bricks import bricks
-from sensorgen.measure.virtual.cell import (
-    AIR,
-    EPSILON_0,
-    CellBricks,
-    CellRaster,
-    Solid,
-    capacitance,
-    conductance,
-    pressed,
-)
+from sensorgen.measure.virtual.cell import AIR, EPSILON_0, Bricks, Raster, Solid, capacitance, conductance, pressed
 from sensorgen.measure.virtual.specimen import Specimen
 from sensorgen.scene.scene import Body, Scene, box
 
@@ -61,7 +52,7 @@ def extrapolated(coarse, fine):
 def bar(material, electrode):
     """Bricks of 0.5 x 0.4 x 1.2 mm, of layers upwards."""
     x, y, z = np.linspace(0, 0.5e-3, 3), np.linspace(0, 0.4e-3, 4), np.array([0, 0.3, 0.5, 0.9, 1.2]) * 1e-3
-    return CellBricks(x, y, z, *(np.broadcast_to(of, (2, 3, 4)).copy() for of in (material, electrode)))
+    return Bricks(x, y, z, *(np.broadcast_to(of, (2, 3, 4)).copy() for of in (material, electrode)))
 
 
 def quarter():
@@ -93,7 +84,7 @@ def test_a_large_field_is_solved_by_iterations_to_the_same():
     x, z = np.linspace(0, 1e-3, 31), np.linspace(0, 1.2e-3, 31)
     electrode = np.zeros((30, 30, 30), int)
     electrode[..., 0], electrode[..., -1] = 1, 2
-    large = CellBricks(x, x, z, np.where(electrode, 2, 1), electrode)
+    large = Bricks(x, x, z, np.where(electrode, 2, 1), electrode)
     found = capacitance(large, EPS, large.grid.at_m)
     assert found == pytest.approx(EPSILON_0 * 4.68 * 1e-6 / (28 * 0.04e-3), rel=1e-6)
 
@@ -109,8 +100,8 @@ def test_bricks_of_one_section_are_that_section():
     material[:, 1], material[2:, 2] = 1, 0
     electrode[:, 0], electrode[material == 2] = 1, 2
     electrode[:, 0] = 1
-    flat = CellRaster(x, np.tile(z[:, None], len(x)), material.T, electrode.T, False)
-    deep = CellBricks(x, y, z, material[:, None], electrode[:, None])
+    flat = Raster(x, np.tile(z[:, None], len(x)), material.T, electrode.T, False)
+    deep = Bricks(x, y, z, material[:, None], electrode[:, None])
     loads = [0.0, 1e4, 2e5]
     two, three = pressed(flat, SOLIDS, loads), pressed(deep, SOLIDS, loads)
     assert three.sink_m == pytest.approx(two.sink_m, rel=1e-6)

@@ -11,7 +11,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
 from sensorgen.measure.virtual import blank as tables
 from sensorgen.measure.virtual.blank import blank, tracks
-from sensorgen.measure.virtual.cell import AIR, EPSILON_0, CellRaster, Solid, capacitance, conductance, pressed
+from sensorgen.measure.virtual.cell import AIR, EPSILON_0, Raster, Solid, capacitance, conductance, pressed
 from sensorgen.measure.virtual.section import raster
 from sensorgen.measure.virtual.specimen import Specimen, Truth, decades, drawn
 
@@ -33,7 +33,7 @@ def plate(nx=3, *, gap=False):
     z = np.array([0, 0.3, 0.5, 0.7, 0.9, 1.2]) * 1e-3
     material = np.array([2, 1, 0 if gap else 1, 1, 2])[:, None] * np.ones((1, nx), int)
     electrode = np.array([1, 0, 0, 0, 2])[:, None] * np.ones((1, nx), int)
-    return CellRaster(np.linspace(0, 1e-3, nx + 1), np.tile(z[:, None], nx + 1), material, electrode, False)
+    return Raster(np.linspace(0, 1e-3, nx + 1), np.tile(z[:, None], nx + 1), material, electrode, False)
 
 
 def test_a_plate_has_the_capacitance_of_one():

@@ -14,7 +14,7 @@ from sensorgen.core.options import Option
 if TYPE_CHECKING:
     from sensorgen.core.document import Documented
     from sensorgen.measure.recording.samples import Real
-    from sensorgen.measure.signal.presses import Deltas
+    from sensorgen.measure.signal.presses import Pairs
 
 
 @command(
@@ -58,7 +58,7 @@ def _sets(
     return of_sets(tones, sets, [str(name) for name in (output, plot) if name])
 
 
-def _read(what: tuple[str, ...], rigs: tuple[Path | None, ...], opening: Opening) -> "tuple[Real, dict[str, Deltas]]":
+def _read(what: tuple[str, ...], rigs: tuple[Path | None, ...], opening: Opening) -> "tuple[Real, dict[str, Pairs]]":
     """Tones that all sets share, and presses by the names of the sets."""
     import numpy as np
 
@@ -76,7 +76,7 @@ def _read(what: tuple[str, ...], rigs: tuple[Path | None, ...], opening: Opening
     return np.asarray(tones), sets
 
 
-def _table(sets: "Mapping[str, Deltas]", tones_hz: "Real", *, together: bool) -> bytes:
+def _table(sets: "Mapping[str, Pairs]", tones_hz: "Real", *, together: bool) -> bytes:
     """CSV with a row for each press of each set, on their scale."""
     import csv
     import io

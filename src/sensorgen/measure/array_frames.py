@@ -1,10 +1,11 @@
 """Frames of an array: files NPZ and CSV with a reading of every crossing, and which of them are at rest."""
 
+import csv
 import math
 import re
 import zipfile
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,7 +15,6 @@ from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.files import reading
 from sensorgen.core.units import si
-from sensorgen.measure import csv_table
 
 MOST_BYTES = 4_000_000_000
 _CROSSING = re.compile(r"r(\d+)c(\d+)")
@@ -144,10 +144,10 @@ def numbers(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
 def _of_hdf(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     from sensorgen.measure.recording import hdf
     from sensorgen.measure.recording.matfive import Split
-    from sensorgen.measure.recording.spool import Swap
+    from sensorgen.measure.recording.spool import Spool
 
     with within(str(path)):
-        found = hdf.variables(path, _KNOWN, Swap())
+        found = hdf.variables(path, _KNOWN, Spool())
     for key, value in found.items():
         values = value.real + 1j * value.imag if isinstance(value, Split) else np.asarray(value)
         if values.dtype.kind not in "bifuc":
@@ -156,32 +156,36 @@ def _of_hdf(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     return found, []
 
 
-def table(path: Path, is_number: Callable[[str], bool]) -> dict[str, np.ndarray]:
-    """Columns of a table by their names: numbers, nan where a cell is empty, or words."""
-    with csv_table.opened(path) as source:
-        refuse_repeated(source.names, {}, path)
-        numbers = [k for k, name in enumerate(source.names) if is_number(name)]
-        words = [k for k, name in enumerate(source.names) if not is_number(name)]
-        blocks = list(source.blocks(numbers, words))
-    values = np.concatenate([block.numbers for block in blocks])
-    text = np.array([row for block in blocks for row in block.text]).reshape(len(values), -1)
-    return {source.names[k]: of[:, i] for at, of in ((numbers, values), (words, text)) for i, k in enumerate(at)}
+def table(path: Path) -> dict[str, tuple[str, ...]]:
+    """Words of a table by the names of its columns."""
+    try:
+        rows = list(csv.reader(path.read_text("utf-8").splitlines()))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise BadInput(f"{path}: no CSV table ({str(error)[:80]})") from None
+    if len(rows) < 2:
+        raise BadInput(f"{path}: no frames; expected a head with r1c1, r1c2 ... and a row for each frame")
+    for line, row in enumerate(rows[1:], 2):
+        if len(row) != len(rows[0]):
+            raise BadInput(f"{path}, line {line}: {len(row)} values; expected {len(rows[0])} as in the head")
+    names = [name.strip() for name in rows[0]]
+    refuse_repeated(names, {}, path)
+    return dict(zip(names, zip(*rows[1:], strict=True), strict=True))
 
 
 def _of_csv(path: Path, shape: tuple[int, int]) -> tuple[dict[str, np.ndarray], list[str]]:
     """Numbers of a table by name, and the columns that are not read."""
-    columns = table(path, lambda name: name == "time_s" or _CROSSING.fullmatch(name) is not None)
+    columns = table(path)
     crossings = _crossings(list(columns), shape, path)
     values = np.full((len(next(iter(columns.values()))), *shape), np.nan)
     for name, (i, j) in crossings.items():
-        values[:, i, j] = columns[name]
-    found = {"capacitance_f": values} | {key: columns[key] for key in ("time_s",) if key in columns}
+        values[:, i, j] = column(columns[name], path)
+    found = {"capacitance_f": values} | {key: column(columns[key], path) for key in ("time_s",) if key in columns}
     if "rest" in columns:
         found["rest"] = marked(columns["rest"])
     return found, sorted({*columns} - {*crossings, "time_s", "rest", ""})
 
 
-def marked(words: Iterable[str]) -> Mask:
+def marked(words: Sequence[str]) -> Mask:
     """Frames with a mark of 1 or true."""
     return np.array([word.strip().lower() in _TRUE for word in words])
 
@@ -202,3 +206,16 @@ def refuse_repeated(names: Sequence[str], found: dict[str, tuple[int, int]], pat
     times = Counter(found.get(name, name) for name in names if name)
     if repeated := [name for name in names if times[found.get(name, name)] > 1]:
         raise BadInput(f"{path}: columns {', '.join(repeated[:3])} repeat; expected each once")
+
+
+def column(words: Sequence[str], path: Path) -> Real:
+    """Numbers of a column; nan where a word is empty."""
+    return np.array([_number(word, path, line) for line, word in enumerate(words, 2)])
+
+
+def _number(word: str, path: Path, line: int) -> float:
+    """A number; nan where the word is empty."""
+    try:
+        return float(word) if word.strip() else np.nan
+    except ValueError:
+        raise BadInput(f"{path}, line {line}: {word!r:.30} is no number; leave it empty where none was read") from None

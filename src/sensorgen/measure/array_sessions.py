@@ -6,7 +6,7 @@ CSV: ``time_s``, a column for each element, and the load: ``pressure_kpa`` of al
 design its frames, and the same names; ``element`` by number from 1, ``area_mm2`` of one.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +14,14 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.files import reading
-from sensorgen.measure.array_frames import BINARY, REFERENCES, marked, numbers, read, table
+from sensorgen.measure.array_frames import BINARY, REFERENCES, column, marked, numbers, read, table
 from sensorgen.prediction.array.elements import ArraySession
 from sensorgen.prediction.array.frames import at_rest, missing
 from sensorgen.prediction.array.model import ArrayModel
 from sensorgen.prediction.array.readout import ArrayReadout
 
 _OTHER = ("time_s", "rest", *REFERENCES)
-_WORDS = ("rest", "element")
+_WORDS: Mapping[str, Callable[[Sequence[str]], np.ndarray]] = {"rest": marked, "element": np.array}
 _AREA_MM2 = 100.0
 _MOST = 0.5  # of the presses on a track
 _N_PER_KPA_MM2 = 1e-3
@@ -164,11 +164,11 @@ def _numbers_of(words: np.ndarray, names: Sequence[str], count: int) -> np.ndarr
 
 def _of_csv(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     """Columns of a table, and the names of its elements."""
-    columns = table(path, lambda name: bool(name) and name not in _WORDS)
-    names = [name for name in columns if name and name not in _OTHER]
+    words = table(path)
+    names = [name for name in words if name and name not in _OTHER]
     if not names:
         raise BadInput("no readings; expected a column for each element")
-    data = {key: columns[key] for key in _OTHER if key in columns}
-    if "rest" in data:
-        data["rest"] = marked(data["rest"])
-    return data | {"reading": np.stack([columns[name] for name in names], 1)}, names
+    data: dict[str, np.ndarray] = {"reading": np.stack([column(words[name], path) for name in names], 1)}
+    for key in words.keys() & set(_OTHER):
+        data[key] = _WORDS[key](words[key]) if key in _WORDS else column(words[key], path)
+    return data, names

@@ -24,7 +24,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.files import reading
 
 BLOCK_ROWS = 1 << 14
-LONGEST_LINE = 1 << 20
+LONGEST_LINE = 1 << 18
 _BLOCK_CHARACTERS = 1 << 21  # of a block: rows may be long
 _MOST_LINES = 200  # of one row, whose cells may have line feeds
 SAME_NAMES: Mapping[str, str] = {}
@@ -74,7 +74,7 @@ class Waiting:
 
 
 @dataclass(frozen=True)
-class TableBlock:
+class Block:
     """Consecutive rows of a table.
 
     Attributes
@@ -132,7 +132,7 @@ class Table:
     def blocks(
         self, numbers: Sequence[int], text: Sequence[int] = (), size: int = BLOCK_ROWS, *, dates: Collection[int] = (),
         truncated: bool = False,
-    ) -> Iterator[TableBlock]:  # fmt: skip
+    ) -> Iterator[Block]:  # fmt: skip
         """Rows, up to ``size`` at a time.
 
         Parameters
@@ -190,7 +190,7 @@ class Table:
 
     def _block(
         self, rows: list[int], lines: list[str], numbers: Sequence[int], text: Sequence[int], dates: Collection[int]
-    ) -> TableBlock:
+    ) -> Block:
         simple = all(line.count(self._separator) == len(self.names) - 1 and '"' not in line for line in lines)
         values = self._converted_at_once(lines, numbers) if simple else None
         if values is None:
@@ -205,7 +205,7 @@ class Table:
                     values[k, at] = number(cells[k][column], decimal_comma=comma, date=column in dates)
                 except BadInput as error:
                     raise error.within(f"{self.name}, row {rows[k]}, column {self.names[column]}") from None
-        return TableBlock(rows, values, [[line[at] for at in text] for line in cells])
+        return Block(rows, values, [[line[at] for at in text] for line in cells])
 
     def _converted_at_once(self, lines: list[str], numbers: Sequence[int]) -> NDArray[np.float64] | None:
         """All numbers of a block, or None where a cell is empty, no number, or infinite."""

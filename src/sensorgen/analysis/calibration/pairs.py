@@ -14,7 +14,7 @@ from sensorgen.measure.log import BenchRun, Log
 from sensorgen.measure.log.bench import read_again
 from sensorgen.measure.recording import joined_all
 from sensorgen.measure.recording.samples import Recording
-from sensorgen.measure.signal.presses import Deltas
+from sensorgen.measure.signal.presses import Pairs
 from sensorgen.measure.signal.run import processed
 from sensorgen.prediction.calibration.fitting import Data
 from sensorgen.prediction.calibration.rest import checked
@@ -65,7 +65,7 @@ class _Run:
     """Tones of a recording, its known presses, and its mean reading at rest with that one's relative error."""
 
     tones_hz: Real
-    pairs: Deltas | None
+    pairs: Pairs | None
     rest_ohm: Complex
     noise: Real
 
@@ -98,7 +98,7 @@ def nothing_recorded() -> Data:
     return Data.unread(no_presses(), np.zeros(m), rest_noise=np.full(m, _UNKNOWN))
 
 
-def _rest(recording: Recording, pairs: Deltas | None) -> tuple[Complex, Real]:
+def _rest(recording: Recording, pairs: Pairs | None) -> tuple[Complex, Real]:
     """Mean reading with nothing on the sensor, and its relative standard error."""
     z = pairs.before_ohm if pairs else recording.impedance_ohm[recording.valid()]
     if not len(z):

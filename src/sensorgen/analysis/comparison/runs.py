@@ -59,7 +59,7 @@ class Run:
     rest_ohm: Complex
     rest_error_ohm: Complex
     noise_ohm: Complex
-    pairs: presses.Deltas | None
+    pairs: presses.Pairs | None
     notes: tuple[str, ...]
 
     @property

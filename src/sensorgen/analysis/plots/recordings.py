@@ -30,7 +30,7 @@ from sensorgen.analysis.plots.pages import Section, page
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.recording.samples import Complex, Real
 from sensorgen.measure.signal.hysteresis import Hysteresis
-from sensorgen.measure.signal.presses import Deltas
+from sensorgen.measure.signal.presses import Pairs
 from sensorgen.measure.signal.schedule import Step
 from sensorgen.measure.signal.surfaces import Surface, normalised, surface
 
@@ -62,7 +62,7 @@ class Run:
     raw_ohm: Complex
     filtered_s: Real
     filtered_ohm: Complex
-    pairs: Deltas | None
+    pairs: Pairs | None
 
 
 def series(run: Run, key: str = "time") -> Figure:
@@ -93,7 +93,7 @@ def _line(name: str, time_s: Real, values: Real, colour: str) -> Curve:
     return Curve("line", name, time_s[at], values[at], colour=colour)
 
 
-def difference_surface(pairs: Deltas, part: str) -> Surface:
+def difference_surface(pairs: Pairs, part: str) -> Surface:
     """Change of "resistance" or "reactance" by the loads, over force and position [ohm]."""
     return surface(pairs.force_n, pairs.position_mm, getattr(pairs.difference_ohm, PARTS[part][1]))
 
@@ -122,7 +122,7 @@ def differences(run: Run, part: str, key: str = "") -> Figure:
 
 
 def compared(
-    runs: Mapping[str, Deltas], tones_hz: Real, *, together: bool = False, key: str = "normalised", left_out: str = ""
+    runs: Mapping[str, Pairs], tones_hz: Real, *, together: bool = False, key: str = "normalised", left_out: str = ""
 ) -> Figure:
     """Differences of several recordings on one scale from 0 to 1, over force, R and X at each frequency.
 
@@ -216,7 +216,7 @@ def surfaces(run: Run, part: str) -> bytes:
     return static.png(differences(run, part))
 
 
-def normalised_differences(runs: Mapping[str, Deltas], tones_hz: Real, *, together: bool = False) -> bytes:
+def normalised_differences(runs: Mapping[str, Pairs], tones_hz: Real, *, together: bool = False) -> bytes:
     """Differences of several recordings on one scale from 0 to 1, as PNG."""
     return static.png(compared(runs, tones_hz, together=together))
 

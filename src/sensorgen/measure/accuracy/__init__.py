@@ -42,7 +42,7 @@ class Range:
 
 
 @dataclass(frozen=True)
-class ErrorBand:
+class Band:
     """Limits of error of an LCR meter in a band of frequencies.
 
     Attributes
@@ -89,7 +89,7 @@ class Instrument:
     source: str
     ranges: tuple[Range, ...] = ()
     leads_ohm: float = 0.0
-    bands: tuple[ErrorBand, ...] = ()
+    bands: tuple[Band, ...] = ()
     least_ohm: float = 0.0
     most_ohm: float = math.inf
 
@@ -257,7 +257,7 @@ def _instrument(data: dict[str, Any]) -> Instrument:
     if not data["name"].split() or not isinstance(data["source"], str):
         raise ValueError
     ranges = tuple(Range(ohm, percent / 100, of / 100) for ohm, percent, of in data.get("ranges", ()))
-    bands = tuple(ErrorBand(low, high, percent / 100, zs, yo) for low, high, percent, zs, yo in data.get("bands", ()))
+    bands = tuple(Band(low, high, percent / 100, zs, yo) for low, high, percent, zs, yo in data.get("bands", ()))
     plain = {name: data[name] for name in ("leads_ohm", "least_ohm", "most_ohm") if name in data}
     return Instrument(data["name"], tuple(data.get("also", ())), data["source"], ranges, bands=bands, **plain)
 

@@ -210,7 +210,7 @@ def _smac() -> Kind:
     from sensorgen.measure.virtual.smac import SmacController
 
     return _at_port(
-        "actuator", smac.SmacSettings, smac.SmacActuator, lambda address, _: port.SerialPort(address, smac.BAUD),
+        "actuator", smac.Settings, smac.Actuator, lambda address, _: port.SerialPort(address, smac.BAUD),
         lambda plant, given: SmacController(
             plant, newton_per_unit=given.newton_per_unit, mm_per_count=given.mm_per_count
         ),
@@ -221,12 +221,12 @@ def _reprap() -> Kind:
     from sensorgen.measure.lab import port, reprap
     from sensorgen.measure.virtual.reprap import RepRapFirmware
 
-    def at(address: str, given: reprap.RepRapSettings) -> port.HttpPort | port.SerialPort:
+    def at(address: str, given: reprap.Settings) -> port.HttpPort | port.SerialPort:
         return port.HttpPort(address) if "://" in address else port.SerialPort(address, given.baud)
 
     return _at_port(
         "stage",
-        reprap.RepRapSettings,
+        reprap.Settings,
         reprap.stage,
         at,
         lambda plant, given: RepRapFirmware(plant, password=given.password),
@@ -261,13 +261,13 @@ def _scpi(name: str) -> Kind:
     model = {"hp-4284a": lcr_meter.HP_4284A, "keysight-e4980a": lcr_meter.E4980A}.get(name)
     if model:
         return _at_port(
-            "impedance", lcr_meter.LcrSettings, lambda line, clock, of: lcr_meter.LcrMeter(line, clock, model, of), at,
-            lambda plant, _: scpi.SimulatedLcrMeter(plant, name),
+            "impedance", lcr_meter.Settings, lambda line, clock, of: lcr_meter.LcrMeter(line, clock, model, of), at,
+            lambda plant, _: scpi.LcrMeter(plant, name),
         )  # fmt: skip
     key = {"hp-34401a": "34401A", "keithley-2000": "MODEL 2000"}[name]
     return _at_port(
         "meter", Strict, lambda line, *_: multimeter.Multimeter(line, {key: multimeter.KNOWN[key]}), at,
-        lambda plant, _: scpi.SimulatedMultimeter(plant, name),
+        lambda plant, _: scpi.Multimeter(plant, name),
     )  # fmt: skip
 
 
@@ -275,7 +275,7 @@ def _pymeasure(name: str) -> Kind:
     from sensorgen.measure.lab import pymeasure_meters
 
     role, driver = pymeasure_meters.meter(name)
-    return Kind(role, pymeasure_meters.PyMeasureSettings, driver)
+    return Kind(role, pymeasure_meters.Settings, driver)
 
 
 _KINDS: dict[str, Callable[[], Kind]] = {

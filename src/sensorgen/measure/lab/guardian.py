@@ -37,7 +37,7 @@ _UP_S, _RAISE_S = 1.5, 20.0  # that the piston, and the stage after a move that 
 _STALL = 2.0  # of the guardian itself, in its own periods: a stalled judge judges nobody
 
 
-class RescueOrders(Strict):
+class Orders(Strict):
     """Orders of a guardian.
 
     Attributes
@@ -69,7 +69,7 @@ class Guardian:
         It does not start.
     """
 
-    def __init__(self, orders: RescueOrders) -> None:
+    def __init__(self, orders: Orders) -> None:
         self._process = subprocess.Popen(
             [sys.executable, "-m", "sensorgen.measure.lab.guardian"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             bufsize=0, start_new_session=True,
@@ -142,7 +142,7 @@ class Guardian:
             raise DeviceFault(f"guardian: it has died or hangs ({error.strerror})") from None
 
 
-def watch(orders: RescueOrders, run: int) -> str:
+def watch(orders: Orders, run: int) -> str:
     """Wait for signs of life on the standard input until they end; why the tip has to be lifted, or "".
 
     Parameters
@@ -264,7 +264,7 @@ def main() -> None:
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         if number := getattr(signal, name, None):
             signal.signal(number, signal.SIG_IGN)
-    orders = RescueOrders.model_validate_json(_line())
+    orders = Orders.model_validate_json(_line())
     rigs.check(orders.devices)  # imports the drivers, so that nothing has to be imported when it counts
     os.write(1, _ALIVE)
     os.set_blocking(1, False)

@@ -56,7 +56,7 @@ E4980A = Model("E4980A", 2e6, {"SHOR": (0.016, 9), "MED": (0.1, 9), "LONG": (0.2
 LOWEST_HZ, LOWEST_V, HIGHEST_V = 20.0, 0.005, 2.0  # rms, without the option of 20 V
 
 
-class LcrSettings(Strict):
+class Settings(Strict):
     """Settings of the measurement.
 
     Attributes
@@ -83,9 +83,9 @@ class LcrMeter(scpi.ScpiInstrument):
         How it measures.
     """
 
-    def __init__(self, port: Port, clock: Clock, model: Model, settings: LcrSettings | None = None) -> None:
+    def __init__(self, port: Port, clock: Clock, model: Model, settings: Settings | None = None) -> None:
         super().__init__(port, _ANSWER_S)
-        self.model, self.settings, self._clock = model, settings or LcrSettings(), clock
+        self.model, self.settings, self._clock = model, settings or Settings(), clock
         self._tones_hz: Real = np.empty(0)
         self._next = 0
         self._begin_s = math.nan

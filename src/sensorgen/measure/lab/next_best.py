@@ -10,7 +10,7 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import M_PER_MM
 from sensorgen.measure.lab.experiment import Next
-from sensorgen.measure.lab.plans import Choice, PressReading
+from sensorgen.measure.lab.plans import Choice, Pressed
 from sensorgen.prediction.calibration.fitting import NOISE, Data, Posterior, by_rest, calibrated
 from sensorgen.prediction.calibration.next_press import NextPress, Range
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, unknown
@@ -33,7 +33,7 @@ class ByModel:
 
     model: SpecimenModel
 
-    def __call__(self, part: Next, pressed: Sequence[PressReading], rest_ohm: Complex) -> Choice:
+    def __call__(self, part: Next, pressed: Sequence[Pressed], rest_ohm: Complex) -> Choice:
         """The best next press.
 
         Parameters
@@ -66,7 +66,7 @@ class ByModel:
         press = unknown(np.array([force_n]), np.array([place_mm * M_PER_MM]))
         return np.asarray(rest_ohm * np.exp(self.model.ratio(np.zeros(len(self.model.names)), press)[0]))
 
-    def _known(self, pressed: Sequence[PressReading], rest_ohm: Complex) -> Posterior:
+    def _known(self, pressed: Sequence[Pressed], rest_ohm: Complex) -> Posterior:
         if not pressed:
             return by_rest(self.model, np.log(rest_ohm), _LEAST, NOISE)
         steps = [press.step for press in pressed]

@@ -18,7 +18,7 @@ _TRAVEL_S = 8.0  # to another place, about: a part of the rest
 
 
 @dataclass(frozen=True)
-class PressStep:
+class Step:
     """One press.
 
     Attributes
@@ -66,7 +66,7 @@ class PressStep:
 
 
 @dataclass(frozen=True, eq=False)
-class PressReading:
+class Pressed:
     """A press that was done.
 
     Attributes
@@ -79,7 +79,7 @@ class PressReading:
         Standard error of their ratio, of its real and imaginary part [-].
     """
 
-    step: PressStep
+    step: Step
     before_ohm: Complex
     pressed_ohm: Complex
     noise: Real
@@ -106,27 +106,27 @@ class Choice:
     interval: float = inf
 
 
-NextPress = Callable[[Next, Sequence[PressReading], Complex], Choice]
+NextPress = Callable[[Next, Sequence[Pressed], Complex], Choice]
 """The best next press, by the part of the plan that asks, all presses so far, and the mean at rest (m,) [ohm]."""
 
 
-def steps(experiment: Experiment, length_mm: float) -> list[PressStep]:
+def steps(experiment: Experiment, length_mm: float) -> list[Step]:
     """All presses of an experiment on a specimen of a length [mm]."""
     places = experiment.places_mm(length_mm)
-    found: list[PressStep] = []
+    found: list[Step] = []
     for k, part in enumerate(experiment.plan):
         for step in _presses(part.content, experiment, places):
             found.append(replace(step, number=len(found) + 1, part=k, kind=part.kind))
     return found
 
 
-def seconds(planned: Sequence[PressStep], longest_hold_s: float = 30.0) -> float:
+def seconds(planned: Sequence[Step], longest_hold_s: float = 30.0) -> float:
     """About how long a plan takes; one chosen during the run is taken as held for a third of the longest [s]."""
     chosen = longest_hold_s / 3 + AVERAGED_S
     return sum(max(step.rest_s, _TRAVEL_S) + _LANDING_S + (step.seconds if step.course else chosen) for step in planned)
 
 
-def chosen(step: PressStep, choice: Choice, approach: Approach) -> PressStep:
+def chosen(step: Step, choice: Choice, approach: Approach) -> Step:
     """A step with what was chosen for it."""
     made = _press(approach, choice.position_mm, choice.force_n, choice.peak_n, choice.hold_s, step.rest_s)
     return replace(made, number=step.number, part=step.part, kind=step.kind)
@@ -134,7 +134,7 @@ def chosen(step: PressStep, choice: Choice, approach: Approach) -> PressStep:
 
 def _presses(
     part: Random | Ramp | Hold | Sine | Sweep | Next, experiment: Experiment, places: tuple[float, float]
-) -> Iterator[PressStep]:
+) -> Iterator[Step]:
     approach = experiment.approach
     match part:
         case Random():
@@ -157,7 +157,7 @@ def _presses(
                 yield _step(nan, (), part.rest_s, nan)
 
 
-def _random(part: Random, approach: Approach, places: tuple[float, float]) -> Iterator[PressStep]:
+def _random(part: Random, approach: Approach, places: tuple[float, float]) -> Iterator[Step]:
     """Forces and places of a seeded plan; holds even in their logarithm, and a share reached from a higher force."""
     plan = Plan(part.seed, part.presses, part.force_n, places, 1.0, 0.0, part.repeats).steps()
     rng = np.random.default_rng([part.seed, 1])
@@ -170,9 +170,7 @@ def _random(part: Random, approach: Approach, places: tuple[float, float]) -> It
         yield _press(approach, press.position_mm, press.force_n, round(peak, 3), hold, part.rest_s)
 
 
-def _press(
-    approach: Approach, place_mm: float, force_n: float, peak_n: float, hold_s: float, rest_s: float
-) -> PressStep:
+def _press(approach: Approach, place_mm: float, force_n: float, peak_n: float, hold_s: float, rest_s: float) -> Step:
     """Up to a force, over a higher one if there is one, hold, average, and down."""
     course = [(0.0, approach.contact_n)]
     if peak_n > force_n:
@@ -188,12 +186,12 @@ def _extend(course: list[tuple[float, float]], approach: Approach, force_n: floa
     course += [(there_s, force_n), (there_s + stay_s, force_n)]
 
 
-def _swing(part: Sine, approach: Approach) -> PressStep:
+def _swing(part: Sine, approach: Approach) -> Step:
     course = [(0.0, approach.contact_n)]
     _extend(course, approach, part.mean_n, part.cycles / part.frequency_hz)
     step = _step(part.position_mm, tuple(course), part.rest_s, part.mean_n + part.amplitude_n)
     return replace(step, wave=(part.amplitude_n, part.frequency_hz))
 
 
-def _step(place_mm: float, course: tuple[tuple[float, float], ...], rest_s: float, force_n: float) -> PressStep:
-    return PressStep(0, 0, "", place_mm, course, rest_s, force_n, force_n, 0.0)
+def _step(place_mm: float, course: tuple[tuple[float, float], ...], rest_s: float, force_n: float) -> Step:
+    return Step(0, 0, "", place_mm, course, rest_s, force_n, force_n, 0.0)

@@ -32,7 +32,7 @@ _OVERLOAD_OHM = 9.9e9  # 9.9999E9 of the 3478A, 9.9E37 of SCPI; beyond the range
 _LOWEST_V = 0.005  # rms
 
 
-class PyMeasureSettings(Strict):
+class Settings(Strict):
     """Settings of a meter: its model in the answer to ``*IDN?``; the number in the name of its class if not given."""
 
     model: Line = ""
@@ -84,7 +84,7 @@ def _way(kind: Any, wires: int) -> tuple[dict[str, str], str]:
 
 def meter(
     name: str,
-) -> tuple[Role, Callable[[Any, PyMeasureSettings, Clock], "PyMeasureMultimeter | PyMeasureLcrMeter"]]:
+) -> tuple[Role, Callable[[Any, Settings, Clock], "Multimeter | LcrMeter"]]:
     """Role of a meter, and its driver by address, settings and clock; it connects when it is asked what it is.
 
     Raises
@@ -95,7 +95,7 @@ def meter(
     if name not in roles():
         raise UnknownName("meter of PyMeasure", name, roles())
     role, kind = roles()[name]
-    return role, partial(PyMeasureLcrMeter if role == "impedance" else PyMeasureMultimeter, kind)
+    return role, partial(LcrMeter if role == "impedance" else Multimeter, kind)
 
 
 class _Meter:
@@ -118,7 +118,7 @@ class _Meter:
         Model and full answer to ``*IDN?``, once identified.
     """
 
-    def __init__(self, kind: Any, address: Any, settings: PyMeasureSettings, clock: Clock) -> None:
+    def __init__(self, kind: Any, address: Any, settings: Settings, clock: Clock) -> None:
         self.name = ""
         self._kind, self._address, self._settings, self._clock = kind, address, settings, clock
         self._open = ExitStack()
@@ -184,7 +184,7 @@ class _Meter:
             yield
 
 
-class PyMeasureMultimeter(_Meter):
+class Multimeter(_Meter):
     """A multimeter; a :class:`sensorgen.measure.lab.devices.Meter`."""
 
     def resistance(self, *, wires: int) -> str:
@@ -215,7 +215,7 @@ class PyMeasureMultimeter(_Meter):
         return f"{ohm:+.8E}" if abs(ohm) < _OVERLOAD_OHM else "+9.90000000E+37"
 
 
-class PyMeasureLcrMeter(_Meter):
+class LcrMeter(_Meter):
     """An LCR meter, one frequency after the other; a :class:`sensorgen.measure.lab.devices.ImpedanceMeter`."""
 
     def start(self, tones_hz: Real, voltage_v: float) -> None:

@@ -90,7 +90,7 @@ class Appended:
         return Unwritable(f"cannot write to {str(self._path)!r}: {error.strerror or error}; make room on the disk")
 
 
-class DiskSync:
+class Synced:
     """Brings files to the disk every half second, beside the run, which does not wait for it."""
 
     def __init__(self, files: Sequence[Appended]) -> None:
@@ -135,7 +135,7 @@ class Recorder:
         self.impedance.write(",".join(["time_s", "stamp_s", *names, "clipped", "valid"]) + "\n")
         self.rig.write(_RIG)
         self.journal = Journal(folder / JOURNAL, clock)
-        self._synced = DiskSync((self.impedance, self.rig, self.journal.file))
+        self._synced = Synced((self.impedance, self.rig, self.journal.file))
 
     def readings(self, found: Readings) -> None:
         """Append impedances that came just now."""

@@ -36,7 +36,7 @@ _REACHED_MM = 0.02
 _PERIOD_S = 0.05  # between two questions over HTTP
 
 
-class RepRapSettings(Strict):
+class Settings(Strict):
     """Settings of a gantry.
 
     Attributes
@@ -85,7 +85,7 @@ class Report:
     axes_mm: tuple[float, ...]
 
 
-class RepRapLink(Protocol):
+class Link(Protocol):
     """A way to the firmware."""
 
     address: str
@@ -321,7 +321,7 @@ class WebLink:
         return found
 
 
-class RepRapStage:
+class Stage:
     """Driver of the gantry.
 
     Parameters
@@ -334,8 +334,8 @@ class RepRapStage:
         Of this gantry.
     """
 
-    def __init__(self, link: RepRapLink, clock: Clock, settings: RepRapSettings | None = None) -> None:
-        self.settings = settings or RepRapSettings()
+    def __init__(self, link: Link, clock: Clock, settings: Settings | None = None) -> None:
+        self.settings = settings or Settings()
         self._link, self._clock = link, clock
         self._known = False
         self._goal_mm: dict[str, float] = {}
@@ -432,11 +432,11 @@ class RepRapStage:
         self._link.send("G90", f"G1 {axis}{position_mm:.3f} F{60 * speed_mm_s:.1f}")
 
 
-def stage(port: Any, clock: Clock, settings: RepRapSettings) -> RepRapStage:
+def stage(port: Any, clock: Clock, settings: Settings) -> Stage:
     """Driver at a serial line or an address of HTTP."""
     web = isinstance(port, HttpPort)
-    link: RepRapLink = WebLink(port, clock, settings.password) if web else SerialLink(port, clock)
-    return RepRapStage(link, clock, settings)
+    link: Link = WebLink(port, clock, settings.password) if web else SerialLink(port, clock)
+    return Stage(link, clock, settings)
 
 
 def _result(text: str, address: str) -> object:

@@ -13,15 +13,15 @@ from sensorgen.measure.lab import recorder, rigs
 from sensorgen.measure.lab.background import Background
 from sensorgen.measure.lab.clock import Clock, RealClock, SimulatedClock
 from sensorgen.measure.lab.experiment import Experiment
-from sensorgen.measure.lab.guardian import Guardian, RescueOrders
+from sensorgen.measure.lab.guardian import Guardian, Orders
 from sensorgen.measure.lab.live import LiveText, LiveView, Sample
 from sensorgen.measure.lab.next_best import ByModel
 from sensorgen.measure.lab.run import Confirm, RunResult, design_of, planned, run
-from sensorgen.measure.lab.safety import RunDevices
+from sensorgen.measure.lab.safety import Rig
 
 if TYPE_CHECKING:
     from sensorgen.measure.log import Log
-    from sensorgen.measure.virtual.mechanics import RigMechanism
+    from sensorgen.measure.virtual.mechanics import Rig as Mechanism
     from sensorgen.prediction.calibration.specimen import SpecimenModel
 
 
@@ -118,7 +118,7 @@ class Session:
     ----------
     url : str
         Address of the page; "" without one.
-    mechanism : RigMechanism or None
+    mechanism : Rig or None
         Of a simulated run: what was really done to the specimen.
 
     Raises
@@ -139,7 +139,7 @@ class Session:
             self._clock = replace(self._clock, epoch_s=RealClock().epoch())
         needed = page or any(part.kind == "next" for part in experiment.plan)
         self._model = ByModel(model(_design(experiment, log), experiment)) if needed and model else None
-        self.mechanism: RigMechanism | None = None
+        self.mechanism: Mechanism | None = None
         self.url, views = "", list[LiveView | LiveText]()
         if page:
             view = self._stack.enter_context(LiveView(plan.summary(), experiment.readout.tones_hz))
@@ -155,7 +155,7 @@ class Session:
             self._stack.close()
             raise
 
-    def _devices(self, experiment: Experiment) -> RunDevices:
+    def _devices(self, experiment: Experiment) -> Rig:
         if self._asked.simulated:
             rig, self.mechanism = rigs.simulated(experiment, _design(experiment, self._log), self._clock)
             return rig
@@ -179,7 +179,7 @@ class Session:
         if not asked.simulated and experiment.devices:
             devices = {"actuator": experiment.devices.actuator, "stage": experiment.devices.stage}
             guardian = self._stack.enter_context(
-                Guardian(RescueOrders(devices=devices, dead_man_s=experiment.limits.dead_man_s, folder=str(folder)))
+                Guardian(Orders(devices=devices, dead_man_s=experiment.limits.dead_man_s, folder=str(folder)))
             )
         return run(
             experiment, clock=self._clock, log=self._log, rig=self._rig, simulated=asked.simulated, view=self._views,

@@ -67,7 +67,7 @@ _ERRORS = {
 }  # fmt: skip
 
 
-class SmacSettings(Strict):
+class Settings(Strict):
     """Settings of an actuator.
 
     Attributes
@@ -123,7 +123,7 @@ class _State:
     count: int = 0
 
 
-class SmacActuator:
+class Actuator:
     """Driver of the actuator; its zero is the encoder's index at the upper end.
 
     Until homing has ended, :meth:`read` gives the whole stroke as position, so that the tip does not count as lifted.
@@ -138,8 +138,8 @@ class SmacActuator:
         Of this actuator.
     """
 
-    def __init__(self, port: Port, clock: Clock, settings: SmacSettings | None = None) -> None:
-        self.settings = settings or SmacSettings()
+    def __init__(self, port: Port, clock: Clock, settings: Settings | None = None) -> None:
+        self.settings = settings or Settings()
         self._port, self._clock = port, clock
         self._state = _State()
         self._confirm: list[tuple[int, int]] = []
@@ -469,7 +469,7 @@ class SmacActuator:
         raise DeviceFault(f"{asked} sends status words only")
 
 
-def _raising(settings: SmacSettings) -> list[tuple[int, int]]:
+def _raising(settings: Settings) -> list[tuple[int, int]]:
     """Error reset, motor on, and force upwards; switching on clears the set-points, so that the force comes last."""
     words = [(_CONTROL, word) for word in (_OFF, _RESET, _OFF, _READY, _ON)]
     return [(_MODE, _BY_FORCE), *words, (_FORCE, settings.lifting())]

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 MOST_BYTES = 64_000_000
 
 
-class _PlatePiece(Strict, extra="ignore"):
+class _Piece(Strict, extra="ignore"):
     """One specimen on the bed; version 0.1.0 has its prediction in ``expected``."""
 
     design_id: str = Field(min_length=1)
@@ -48,7 +48,7 @@ class _Slicer(Strict, extra="ignore"):
 class _Record(Strict, extra="ignore"):
     """The parts of ``batch.json`` that are logged."""
 
-    specimens: dict[str, _PlatePiece]
+    specimens: dict[str, _Piece]
     designs: dict[str, _Design] = Field(default_factory=dict)
     predictions: dict[str, dict[str, Any]] | None = None
     batch: str | None = None
@@ -81,7 +81,7 @@ def rows(path: Path, file: RawFile) -> Iterator[Entry]:
         yield from dict.fromkeys(pieces)  # copies of one design share a prediction
 
 
-def _piece(batch: str, name: str, piece: _PlatePiece, record: _Record) -> Iterator[Entry]:
+def _piece(batch: str, name: str, piece: _Piece, record: _Record) -> Iterator[Entry]:
     of = notes.specimen(name)
     yield Print(
         **vars(of), uid=f"{batch} {of.specimen}", batch_uid=batch, design_id=piece.design_id, design=piece.design

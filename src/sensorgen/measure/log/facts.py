@@ -53,7 +53,7 @@ class LockIn:
 
 
 @dataclass(frozen=True)
-class RigCounts:
+class Rig:
     """Log of the rig beside a recording.
 
     Attributes
@@ -89,7 +89,7 @@ class RigCounts:
 
 
 @dataclass(frozen=True)
-class RecordingFacts:
+class Facts:
     """Summary of a recording.
 
     Attributes
@@ -105,7 +105,7 @@ class RecordingFacts:
     lockins: tuple[LockIn, ...] = ()
     columns: dict[str, str] = field(default_factory=dict)
     rig_columns: dict[str, str] = field(default_factory=dict)
-    rig: RigCounts | None = None
+    rig: Rig | None = None
 
     def words(self) -> Iterator[tuple[str, str]]:
         """Lock-ins and rig, for people."""
@@ -118,12 +118,12 @@ class RecordingFacts:
 _CLOCK = ("offset_s", "offset_error_s", "skew", "skew_error", "explained")
 
 
-def to_json(facts: RecordingFacts) -> str:
+def to_json(facts: Facts) -> str:
     """Facts as JSON."""
     return str(_adapter().dump_json(facts, exclude_none=facts.rig is None).decode())
 
 
-def from_json(text: str) -> RecordingFacts:
+def from_json(text: str) -> Facts:
     """Facts of a logged recording.
 
     Raises
@@ -136,7 +136,7 @@ def from_json(text: str) -> RecordingFacts:
     from sensorgen.core.records import problem
 
     try:
-        facts: RecordingFacts = _adapter().validate_json(text)
+        facts: Facts = _adapter().validate_json(text)
     except ValidationError as error:
         raise BadInput(f"the facts of a recording are damaged: {problem(error, _plain(text))}") from None
     return facts
@@ -153,12 +153,12 @@ def _plain(text: str) -> Any:
 def _adapter() -> Any:
     from pydantic import TypeAdapter
 
-    return TypeAdapter(RecordingFacts)
+    return TypeAdapter(Facts)
 
 
 def summarised(
     parts: "Iterable[tuple[Recording, ...]]", columns: dict[str, str], rig: "RigLog | None", rig_columns: dict[str, str]
-) -> RecordingFacts:
+) -> Facts:
     """Facts of recordings, part after part, joined with the rig's log if there is one and the recording shows how."""
     from sensorgen.measure.recording import joined_all
 
@@ -177,8 +177,8 @@ def summarised(
         for one in map(lockin, marked):
             lockins[one.lockin] = _longer(lockins[one.lockin], one) if one.lockin in lockins else one
     if rig and beside is None and fault:  # as of a sensor with a hole, which does not respond to the force
-        beside = RigCounts(len(rig.time_s), int(rig.error.sum()), clocks=f"not joined with the rig: {fault}")
-    return RecordingFacts(tuple(lockins.values()), dict(columns), dict(rig_columns), beside)
+        beside = Rig(len(rig.time_s), int(rig.error.sum()), clocks=f"not joined with the rig: {fault}")
+    return Facts(tuple(lockins.values()), dict(columns), dict(rig_columns), beside)
 
 
 def _longer(before: LockIn, part: LockIn) -> LockIn:
@@ -187,12 +187,12 @@ def _longer(before: LockIn, part: LockIn) -> LockIn:
     return replace(before, counts=counts, seconds=part.seconds, notes=(*before.notes, *part.notes))
 
 
-def _with_rig(before: RigCounts | None, first: "Joined", rig: "RigLog") -> RigCounts:
+def _with_rig(before: Rig | None, first: "Joined", rig: "RigLog") -> Rig:
     samples = first.recording.counts()["rig error"]
     if before:
         return replace(before, samples=before.samples + samples)
     numbers: dict[str, Any] = {name: _known(getattr(first, name)) for name in _CLOCK}
-    return RigCounts(**rig.counts(), samples=samples, clocks=first.clock_text(), notes=first.notes, **numbers)
+    return Rig(**rig.counts(), samples=samples, clocks=first.clock_text(), notes=first.notes, **numbers)
 
 
 def lockin(recording: "Recording") -> LockIn:

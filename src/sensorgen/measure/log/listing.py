@@ -25,7 +25,7 @@ _RECORDING = tuple(map(Column, ("no.", "specimen", "recording", "remark")))
 
 
 @dataclass(frozen=True)
-class LogListing:
+class Listing:
     """The latest readings and recordings of a log; ``notes`` has the numbers of all rows, and the log's file."""
 
     readings: tuple[Reading, ...]
@@ -53,7 +53,7 @@ class LogListing:
         yield from self.notes
 
 
-def listing(log: Log, iteration: int | None = None, last: int | None = None) -> LogListing:
+def listing(log: Log, iteration: int | None = None, last: int | None = None) -> Listing:
     """Readings and recordings, the latest last; those that a later one corrects are left out.
 
     Parameters
@@ -72,7 +72,7 @@ def listing(log: Log, iteration: int | None = None, last: int | None = None) -> 
     more = [f"the latest {last} are shown; --all shows all"] if last is not None and len(readings) >= last else []
     records, head = log.head()
     chain = [f"{records} records, head {head[:16]}"] if records else []
-    return LogListing(readings, recordings, (*log.conflicts(), total, *more, *chain, str(log.path)))
+    return Listing(readings, recordings, (*log.conflicts(), total, *more, *chain, str(log.path)))
 
 
 @dataclass(frozen=True)

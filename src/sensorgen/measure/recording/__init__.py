@@ -3,9 +3,9 @@
 from sensorgen.measure.recording.files import parts, read, read_all
 from sensorgen.measure.recording.join import Joined, joined, joined_all
 from sensorgen.measure.recording.rig import RigLog, rig
-from sensorgen.measure.recording.samples import MARKS, Recording, SampleClock, Source
+from sensorgen.measure.recording.samples import MARKS, Clock, Recording, Source
 
 __all__ = [
-    "MARKS", "Joined", "Recording", "RigLog", "SampleClock", "Source", "joined", "joined_all", "parts", "read",
-    "read_all", "rig",
+    "MARKS", "Clock", "Joined", "Recording", "RigLog", "Source", "joined", "joined_all", "parts", "read", "read_all",
+    "rig",
 ]  # fmt: skip

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import BadInput, within
-from sensorgen.measure.recording.spool import Swap
+from sensorgen.measure.recording.spool import Spool
 
 _HEADER = 128
 _DEEPEST = 12
@@ -72,7 +72,7 @@ class _Element(NamedTuple):
     offset: int
 
 
-def variables(content: bytes | memoryview, wanted: Collection[str], spool: Swap) -> dict[str, Any]:
+def variables(content: bytes | memoryview, wanted: Collection[str], spool: Spool) -> dict[str, Any]:
     """Read variables of a file.
 
     Parameters
@@ -165,7 +165,7 @@ def _elements(data: memoryview, order: str, offset: int) -> Iterator[_Element]:
         at = after
 
 
-def _unpacked(element: _Element, order: str, spool: Swap) -> _Element:
+def _unpacked(element: _Element, order: str, spool: Spool) -> _Element:
     blocks = _inflated(element)
     begin = next(blocks, b"")
     if len(begin) < 8:

@@ -54,7 +54,7 @@ def sifted(impedance_ohm: Complex) -> dict[str, Bools]:
 
 
 @dataclass(frozen=True)
-class SampleClock:
+class Clock:
     """Relation of a recording's time to real time: ``epoch_s + (1 + skew) time_s``.
 
     Attributes
@@ -141,7 +141,7 @@ class Recording:
     tones_hz: Real
     impedance_ohm: Complex
     marks: Mapping[str, Bools]
-    clock: SampleClock
+    clock: Clock
     source: Source = field(default=Source("", ""))
 
     @property

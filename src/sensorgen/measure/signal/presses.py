@@ -110,7 +110,7 @@ def _returning(edges: list[tuple[int, int]], before: Real, after: Real, width: i
 
 
 @dataclass(frozen=True, eq=False)
-class Deltas:
+class Pairs:
     """Readings before and under each press, a row per press and a column per frequency.
 
     Attributes
@@ -149,7 +149,7 @@ class Deltas:
 def pairs(
     time_s: Real, impedance_ohm: Complex, valid: Bools, presses: list[Press], force_n: Real, position_mm: Real,
     window_s: float = WINDOW_S, guard_s: float = GUARD_S,
-) -> Deltas:  # fmt: skip
+) -> Pairs:  # fmt: skip
     """Average the readings before and under each press.
 
     Parameters
@@ -202,7 +202,7 @@ def pairs(
     if not rows:
         raise BadInput(f"{len(presses)} presses, none with {_LEAST} readings before and under it; expected some")
     start, force, position, unloaded, loaded, error, samples, peak, hold = map(np.array, zip(*rows, strict=True))
-    return Deltas(
+    return Pairs(
         start, force, position, unloaded, loaded, loaded - unloaded, error, samples, peak, hold, tuple(left_out)
     )  # fmt: skip
 

@@ -12,7 +12,7 @@ from sensorgen.measure.log import facts
 from sensorgen.measure.recording import RigLog
 from sensorgen.measure.recording.samples import Complex, Real
 from sensorgen.measure.signal.hysteresis import Hysteresis, Ways
-from sensorgen.measure.signal.presses import Deltas
+from sensorgen.measure.signal.presses import Pairs
 from sensorgen.measure.signal.run import Processed
 
 Values = tuple[float, ...]
@@ -123,7 +123,7 @@ class RecordingResult:
         lockin = facts.LockIn(self.tones_hz, self.counts, self.seconds, self.program, lockin=self.lockin)
         rig: Iterable[tuple[str, str]] = [("rig", "no log: forces and positions are not known")]
         if self.rig:
-            rig = facts.RigCounts(self.rig["rows"], self.rig["errors"]).words()
+            rig = facts.Rig(self.rig["rows"], self.rig["errors"]).words()
         rows = [*lockin.words(), *rig, *(("", note) for note in self.notes)]
         if self.drift is not None:
             rows.append(("drift", f"{self.drift:.2%} of Z over the run, fitted to the rest, taken out of the presses"))
@@ -208,7 +208,7 @@ def _at_rest(worked: Processed) -> Iterator[RestResult]:
         yield RestResult(frequency_hz, mean.real, mean.imag, noise_re, noise_im, c)
 
 
-def _press(pairs: Deltas, i: int) -> PressResult:
+def _press(pairs: Pairs, i: int) -> PressResult:
     force_n, position_mm = (None if isnan(v) else float(v) for v in (pairs.force_n[i], pairs.position_mm[i]))
     found: list[Complex] = [pairs.before_ohm[i], pairs.pressed_ohm[i], pairs.difference_ohm[i], pairs.error_ohm[i]]
     parts = (_values(part) for z in found for part in (z.real, z.imag))
@@ -306,7 +306,7 @@ def _range(values: tuple[Values, ...], k: int) -> tuple[float, float]:
     return min(column), max(column)
 
 
-def of_sets(tones_hz: Real, sets: Mapping[str, Deltas], files: Iterable[str] = ()) -> SetsResult:
+def of_sets(tones_hz: Real, sets: Mapping[str, Pairs], files: Iterable[str] = ()) -> SetsResult:
     """The result for recordings by name, and files that were written of them."""
     found = {
         name: SetResult(

@@ -38,7 +38,7 @@ class Processed:
     filtered_s: Real
     filtered_ohm: Complex
     drift: drift.Drift | None
-    pairs: presses.Deltas | None
+    pairs: presses.Pairs | None
     by_force: bool
     notes: tuple[str, ...]
 

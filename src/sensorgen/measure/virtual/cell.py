@@ -45,7 +45,7 @@ AIR = Solid(0.0, 0.0, 1.00059)
 
 
 @dataclass(frozen=True, eq=False)
-class CellGrid:
+class Grid:
     """Elements of a section (d = 2) or of a whole cell (d = 3); those of no area are left out.
 
     Attributes
@@ -76,7 +76,7 @@ class CellGrid:
 
 
 @dataclass(frozen=True, eq=False)
-class CellRaster:
+class Raster:
     """A section as a grid of columns, each of them cut into as many rows.
 
     Attributes
@@ -100,7 +100,7 @@ class CellRaster:
     repeats: bool
 
     @cached_property
-    def grid(self) -> CellGrid:
+    def grid(self) -> Grid:
         """Elements of the cell."""
         z = self.z_m
         rise = np.diff(z, axis=0) > _FLAT * np.ptp(z)
@@ -117,11 +117,11 @@ class CellRaster:
         at = np.stack([np.broadcast_to(self.x_m, z.shape), z], -1)
         kept = (rise[:, 1:] | rise[:, :-1]).T.ravel()
         of = self.material.T.ravel()[kept], self.electrode.T.ravel()[kept]
-        return CellGrid(_at_corners(number.T, 2)[kept], _at_corners(at.swapaxes(0, 1), 2)[kept], *of, fixed, top)
+        return Grid(_at_corners(number.T, 2)[kept], _at_corners(at.swapaxes(0, 1), 2)[kept], *of, fixed, top)
 
 
 @dataclass(frozen=True, eq=False)
-class CellBricks:
+class Bricks:
     """A cell as bricks between mirrors, of planes square to x, y and z.
 
     Attributes
@@ -129,7 +129,7 @@ class CellBricks:
     x_m, y_m, z_m : (nx + 1,), (ny + 1,), (nz + 1,) array
         Places of the planes [m].
     material, electrode : (nx, ny, nz) array
-        As of :class:`CellRaster`.
+        As of :class:`Raster`.
     """
 
     x_m: Real
@@ -139,7 +139,7 @@ class CellBricks:
     electrode: Whole
 
     @cached_property
-    def grid(self) -> CellGrid:
+    def grid(self) -> Grid:
         """Elements of the cell."""
         at = np.stack(np.meshgrid(self.x_m, self.y_m, self.z_m, indexing="ij"), -1)
         number = np.arange(at[..., 0].size).reshape(at.shape[:3])
@@ -148,7 +148,7 @@ class CellBricks:
         fixed[number[[0, -1]], 0] = fixed[number[:, [0, -1]], 1] = True
         top[number[..., -1]] = np.outer(_shares(self.x_m), _shares(self.y_m))
         of = self.material.ravel(), self.electrode.ravel()
-        return CellGrid(_at_corners(number, 3), _at_corners(at, 3), *of, fixed, top)
+        return Grid(_at_corners(number, 3), _at_corners(at, 3), *of, fixed, top)
 
 
 def _shares(at_m: Real) -> Real:
@@ -192,7 +192,7 @@ def gradients(at_m: Real) -> tuple[Real, Real]:
 
 
 @dataclass(frozen=True, eq=False)
-class PressedCell:
+class Pressed:
     """A cell under a series of pressures.
 
     Attributes
@@ -211,8 +211,8 @@ class PressedCell:
 
 
 def pressed(
-    raster: CellRaster | CellBricks, solids: Sequence[Solid], pressure_pa: Sequence[float], least: int | None = None
-) -> PressedCell:
+    raster: Raster | Bricks, solids: Sequence[Solid], pressure_pa: Sequence[float], least: int | None = None
+) -> Pressed:
     """Press the top of a cell that stands on a fixed base; its width stays.
 
     Parameters
@@ -253,13 +253,13 @@ def pressed(
             break
         sinks.append(float(body.load @ u) / float(grid.top_m.sum()))
         places.append(grid.at_m + u.reshape(grid.fixed.shape)[grid.nodes])
-    return PressedCell(np.array(pressure_pa[: len(sinks)], float), np.array(sinks), np.array(places))
+    return Pressed(np.array(pressure_pa[: len(sinks)], float), np.array(sinks), np.array(places))
 
 
 class _Body:
     """Energy of a cell by its displacements, of a section per depth, and its derivatives."""
 
-    def __init__(self, grid: CellGrid, solids: Sequence[Solid]) -> None:
+    def __init__(self, grid: Grid, solids: Sequence[Solid]) -> None:
         self.grid = grid
         self.air: Mask = grid.material == 0
         shear = np.array([0.0] + [s.modulus_pa / 2 / (1 + s.poisson) for s in solids[1:]])
@@ -378,7 +378,7 @@ def _twists(at_m: Real) -> Real:
     return _each_way(np.asarray(found), dimensions)
 
 
-def capacitance(raster: CellRaster | CellBricks, permittivity: Sequence[float], place_m: Real) -> float:
+def capacitance(raster: Raster | Bricks, permittivity: Sequence[float], place_m: Real) -> float:
     """Between the electrodes, of a section per depth [F/m], of bricks [F].
 
     Parameters
@@ -397,7 +397,7 @@ def capacitance(raster: CellRaster | CellBricks, permittivity: Sequence[float], 
     return _flux(_potentials(grid)[grid.nodes[inside]], eps[:, None] * np.abs(size), by)
 
 
-def conductance(raster: CellRaster | CellBricks, electrode: int) -> float:
+def conductance(raster: Raster | Bricks, electrode: int) -> float:
     """Of an electrode from the lowest x to the highest, per conductivity: of a section per depth [-], of bricks [m]."""
     grid = raster.grid
     inside = grid.electrode == electrode
@@ -435,7 +435,7 @@ def _solved(matrix: Any, right: Real) -> Real:
     return np.asarray(found)
 
 
-def _potentials(grid: CellGrid) -> Whole:
+def _potentials(grid: Grid) -> Whole:
     """Number of each node's unknown: -1 at the bottom terminal, -2 at the top one; one in a piece that floats."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components

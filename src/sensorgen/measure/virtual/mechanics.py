@@ -8,7 +8,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.virtual.faults import FaultSchedule
+from sensorgen.measure.virtual.faults import Schedule
 from sensorgen.measure.virtual.specimen import Line, Specimen
 
 STEP_S = 2e-3  # of the mechanism
@@ -115,7 +115,7 @@ class _Axis:
 
 
 @dataclass
-class RigMechanism:
+class Rig:
     """A :class:`sensorgen.measure.virtual.plant.Plant`.
 
     Attributes
@@ -151,7 +151,7 @@ class RigMechanism:
     peak_n: float = 0.0
     fault: str = ""
     violations: list[Violation] = field(default_factory=list)
-    planted: FaultSchedule | None = None
+    planted: Schedule | None = None
 
     def __post_init__(self) -> None:
         """At rest, raised."""

@@ -8,8 +8,8 @@ from pydantic import Field, model_validator
 from sensorgen.core.errors import UnknownName
 from sensorgen.core.records import Strict
 from sensorgen.design.design import Design
-from sensorgen.measure.virtual.faults import FaultSchedule, Planted
-from sensorgen.measure.virtual.mechanics import Mechanics, RigMechanism
+from sensorgen.measure.virtual.faults import Planted, Schedule
+from sensorgen.measure.virtual.mechanics import Mechanics, Rig
 from sensorgen.measure.virtual.specimen import Specimen, Truth, drawn
 
 Waves = Annotated[tuple[float, ...], Field(strict=False)]
@@ -51,7 +51,7 @@ class VirtualSpecimen(Strict):
         return self
 
 
-def rig_of(settings: VirtualSpecimen, design: Design, tip_m: float) -> RigMechanism:
+def rig_of(settings: VirtualSpecimen, design: Design, tip_m: float) -> Rig:
     """The simulated rig of an experiment, with its faults planted.
 
     Parameters
@@ -70,6 +70,6 @@ def rig_of(settings: VirtualSpecimen, design: Design, tip_m: float) -> RigMechan
     """
     changes: dict[str, Any] = dict(settings.truth)
     specimen = Specimen(design, replace(drawn(design, settings.seed), **changes), tip_m)
-    rig = RigMechanism(specimen, Mechanics(**settings.rig), settings.seed, settings.noise)
-    rig.planted = FaultSchedule(settings.faults)
+    rig = Rig(specimen, Mechanics(**settings.rig), settings.seed, settings.noise)
+    rig.planted = Schedule(settings.faults)
     return rig

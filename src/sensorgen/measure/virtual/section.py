@@ -9,7 +9,7 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
-from sensorgen.measure.virtual.cell import CellRaster
+from sensorgen.measure.virtual.cell import Raster
 from sensorgen.scene.scene import FLOATING, Body, Scene
 from sensorgen.scene.sections import Column, Section, columns, sections
 
@@ -29,7 +29,7 @@ def section_of(scene: Scene) -> Section | None:
     return found[0] if len(found) == 1 else None
 
 
-def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM) -> CellRaster:
+def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM) -> Raster:
     """A scene's section as elements.
 
     Parameters
@@ -68,7 +68,7 @@ def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM)
             kinds = _kinds(column, ends, share, materials)
             material.append(kinds[0])
             electrode.append(kinds[1])
-    return CellRaster(
+    return Raster(
         np.array(x) * M_PER_MM, np.array(z).T * M_PER_MM, np.array(material).T, np.array(electrode).T,
         scene.repeats[across],
     )  # fmt: skip
