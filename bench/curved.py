@@ -18,7 +18,7 @@ import ngsolve as ng
 from sensorgen.scene.polyhedra import Loft
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Piece, Prism, box
-from sensorgen.solvers.electrostatics.round_bodies import LEVELS, Cell, solved
+from sensorgen.solvers.electrostatics.round_bodies import LEVELS, RoundCell, solved
 from sensorgen.solvers.electrostatics.round_mesh import mesh_of, solid
 
 FILM, HIGH, HALF = 0.1, 0.5, 0.5
@@ -49,7 +49,7 @@ def pattern(name: str, low: float) -> Piece:
     return bodies[name]()
 
 
-def cell(name: str, gap: float, *, metal: bool) -> Cell:
+def cell(name: str, gap: float, *, metal: bool) -> RoundCell:
     """A quarter of a cell of 2 mm by 2 mm."""
     roof = FILM + gap + HIGH
     plates = (
@@ -58,10 +58,10 @@ def cell(name: str, gap: float, *, metal: bool) -> Cell:
         (box(-2, 2, -2, 2, 0, FILM), 2),
     )
     body = (pattern(name, FILM + gap), 1 if metal else 3)
-    return Cell((0, 0, -0.1), (1, 1, roof + 0.1), (*plates, body), 2, EPS)
+    return RoundCell((0, 0, -0.1), (1, 1, roof + 0.1), (*plates, body), 2, EPS)
 
 
-def plain(one: Cell, order: int, longest: float) -> float:
+def plain(one: RoundCell, order: int, longest: float) -> float:
     """From above: a potential on curved tetrahedra of one size, as NGSolve's tutorials have it."""
     (x0, y0, _), (x1, y1, _), roof = one.low_mm, one.high_mm, one.high_mm[2] - 0.1
     whole = occ.Box((x0, y0, 0), (x1, y1, roof))

@@ -24,7 +24,7 @@ def solved(layers: int, order: int) -> dict[str, float]:
     """One mesh, and what it took."""
     from sensorgen.models import fem3d
 
-    fem3d.MESHES = (fem3d.MeshLevel(layers, order, order - 1, 0.0),)
+    fem3d.MESHES = (fem3d.BoxMeshLevel(layers, order, order - 1, 0.0),)
     return asked(2.0, 2.0, 1e-9) | {"layers": layers, "order": order}
 
 

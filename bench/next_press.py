@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from sensorgen.prediction.calibration.coverage import coverage_of
 from sensorgen.prediction.calibration.fitting import Data, calibrated
 from sensorgen.prediction.calibration.inversion import Inverter
-from sensorgen.prediction.calibration.next_press import AIMS, VALUES, NextPress, Range
+from sensorgen.prediction.calibration.next_press import AIMS, VALUES, NextPress, PossiblePresses
 from sensorgen.prediction.calibration.specimen import Presses
 from virtual_specimen import LENGTH_M, drawn, measured, session
 from virtual_specimen.adapter import LIMIT_N, data, specimen_model
@@ -43,7 +43,7 @@ def chosen(model, truth, aim, seed):
     first = data(session(truth, 1, seed), truth)
     known = first.rows(np.arange(0))
     found, rng = [calibrated(model, known)], np.random.default_rng(seed)
-    within = Range(FORCE_N, (tip / 2, LENGTH_M - tip / 2), HOLD_S)
+    within = PossiblePresses(FORCE_N, (tip / 2, LENGTH_M - tip / 2), HOLD_S)
     chooser = NextPress(model, within, first.noise[0], aim)
     for _ in range(CHOSEN):
         press = chooser.best(found[-1])

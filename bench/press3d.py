@@ -17,7 +17,7 @@ from matplotlib.collections import LineCollection
 
 from sensorgen.design.design import make
 from sensorgen.models import press2d, press3d
-from sensorgen.models.press3d import BoundaryConditions, Elastic, Pieces
+from sensorgen.models.press3d import BoundaryConditions, BrickCounts, Elastic
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.contact import element
 
@@ -94,7 +94,9 @@ def as_data(found, seconds):
 def strips(film_mm, pieces, loads, base="bonded", period="fixed", top="even"):
     """The cell of rect at even steps up to 100 kPa."""
     stresses = np.linspace(0, 1e5, loads).tolist()
-    return press3d.press(rect(film_mm), SOLIDS, stresses, EPS, BoundaryConditions(base, period, top), Pieces(pieces))
+    return press3d.press(
+        rect(film_mm), SOLIDS, stresses, EPS, BoundaryConditions(base, period, top), BrickCounts(pieces)
+    )
 
 
 @kept
@@ -104,7 +106,7 @@ def feet(name, contact, pieces):
     if not pieces:
         finest = press2d.Fineness().finer().finer()
         return press2d.press(press2d.cell(SCENES[name], 2.0), SOLIDS, FEET, EPS, held, finest)
-    return press3d.press(press3d.cell(SCENES[name]), SOLIDS, FEET, EPS, held, Pieces(pieces))
+    return press3d.press(press3d.cell(SCENES[name]), SOLIDS, FEET, EPS, held, BrickCounts(pieces))
 
 
 @kept
@@ -113,7 +115,7 @@ def narrow(pieces):
     widths = {"air_width_mm": 0.02, "etpu_width_mm": 0.98, "x60_width_mm": 0.98}
     cell = press3d.cell(make({"shape": "rect", "parameters": {"dielectric_mm": 0.1} | widths}).in_use)
     soft = SOLIDS | {"x60": Elastic(1e6, 0.4999)}
-    return press3d.press(cell, soft, list(NARROW), EPS, BoundaryConditions(), Pieces(pieces))
+    return press3d.press(cell, soft, list(NARROW), EPS, BoundaryConditions(), BrickCounts(pieces))
 
 
 def rises(data, side):
@@ -243,8 +245,8 @@ def picture(name, cell, stress, pieces, enlarged):
 
 def main():
     lines = ["# Boxes under pressure", "", "Made by `bench/press3d.py`.", ""]
-    picture("feet", press3d.cell(SCENES["cog"]), FEET, Pieces(2), 1)
-    picture("rect", rect(), (0.0, 1e5), Pieces(2), 10)
+    picture("feet", press3d.cell(SCENES["cog"]), FEET, BrickCounts(2), 1)
+    picture("rect", rect(), (0.0, 1e5), BrickCounts(2), 10)
     for table in (mesh_table, feet_table, held_table, narrow_table):
         lines += table()
     (HERE / "results" / "press3d.md").write_text("\n".join(lines) + "\n")

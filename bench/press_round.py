@@ -32,10 +32,10 @@ STRESS_PA = 2e3
 SIZES_MM = (0.04, 0.02, 0.01)
 FINE = 0.5  # size of the rings' triangles over the usual one
 CELLS: Sequence[tuple[str, dict[str, float]]] = (
-    ("cone", {}),
+    ("cone", {"tip_mm": 0.5}),
     ("cone", {"tip_mm": 0.2}),
-    ("cone", {"period_mm": 2.0}),
-    ("pyramid", {}),
+    ("cone", {"tip_mm": 0.5, "period_mm": 2.0}),
+    ("pyramid", {"tip_mm": 0.5}),
 )
 HEAD = """# Round cells in place of square ones
 
@@ -156,7 +156,9 @@ def main() -> None:
         print(rows[-1], flush=True)
     scene = make({"shape": "pillar", "parameters": {"length_mm": 1.25, "width_mm": 1.25}}).in_use
     stress = [0.0, 2.5e4, 5e4]
-    fine, coarse = (press3d.press(press3d.cell(scene), SOLIDS, stress, EPS, fineness=press3d.Pieces(n)) for n in (3, 2))
+    fine, coarse = (
+        press3d.press(press3d.cell(scene), SOLIDS, stress, EPS, fineness=press3d.BrickCounts(n)) for n in (3, 2)
+    )
     boxes = press3d.limit(fine, coarse, 3)
     rows.append(("pillar", float(boxes.found.displacement_m[2]), float(boxes.rise_f_per_m2[2]), *rings(scene, 5e4)))
     lines = [

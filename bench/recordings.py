@@ -299,7 +299,7 @@ def pulls(of, z, noise, plan):
 def pictures(run, pairs):
     one = run.recording
     valid = one.valid()
-    shown = plots.Run(
+    shown = plots.DrawnRecording(
         "synthetic run of known truth", made.TONES_HZ, one.time_s[valid], one.impedance_ohm[valid],
         *lowpass.filtered(one), pairs,
     )  # fmt: skip

@@ -17,7 +17,7 @@ from matplotlib import pyplot as plt
 
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import line
-from sensorgen.models.sheet import BY, Contact, Patch, Sheet, impedance, solve
+from sensorgen.models.sheet import BY, Contact, Sheet, SheetPatch, impedance, solve
 
 RESULTS = Path(__file__).parent / "results"
 CELLS = (10, 20, 40, 80)
@@ -35,8 +35,8 @@ def pair(x, y):
 EDGE = [(FILM.edge("top", "left"), FILM.edge("bottom", "left"))]
 PADS = [pair(x, y) for x in ((0.0, 0.01), (0.09, 0.1)) for y in ((0.0, 0.01), (0.09, 0.1))]
 CROSSED = [(FILM.edge("top", "left"), FILM.edge("bottom", "front"))]
-PRESS = Patch(0.0413, 0.0, 0.02, 0.1, 1.2)
-SPOT = Patch(0.0413, 0.0227, 0.02, 0.02, 1.2)
+PRESS = SheetPatch(0.0413, 0.0, 0.02, 0.1, 1.2)
+SPOT = SheetPatch(0.0413, 0.0227, 0.02, 0.02, 1.2)
 
 
 def exact_line():

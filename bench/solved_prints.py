@@ -21,7 +21,7 @@ from sensorgen.design.design import Design, make
 from sensorgen.design.tip import EVEN, STIFF, Tip
 from sensorgen.prediction.bodies import WALLS, estimated, of_file
 from sensorgen.prediction.compression_law import case_of, content, solved
-from sensorgen.prediction.mesh_ladder import COARSEST, USUAL, Piece, drawn, model_of, pressed
+from sensorgen.prediction.mesh_ladder import COARSEST, USUAL, PressedPiece, drawn, model_of, pressed
 from sensorgen.prediction.print_files import at_hand
 from sensorgen.prediction.sensor_model import piece
 
@@ -78,7 +78,7 @@ def main() -> None:
     FILE.write_text(HEAD + "".join(found.values()), "utf-8")
 
 
-def with_tops(entry: str, design: Design, cell: Piece) -> str:
+def with_tops(entry: str, design: Design, cell: PressedPiece) -> str:
     """A cell's entry with the changes of its rise under a stiff plate and a block."""
     tips = {"stiff": Tip(block=STIFF), "block": Tip()}
     missing = {key: tip for key, tip in tips.items() if f"    {key}: " not in entry}
@@ -91,7 +91,7 @@ def with_tops(entry: str, design: Design, cell: Piece) -> str:
     return entry
 
 
-def rises(design: Design, cell: Piece, tip: Tip, stress_pa: Sequence[float], level: int) -> Real:
+def rises(design: Design, cell: PressedPiece, tip: Tip, stress_pa: Sequence[float], level: int) -> Real:
     """Rise of the capacitance at each pressure but the first [F/m2]; NaN where unknown."""
     found = pressed(case_of(design, cell, model_of(cell), tip), stress_pa, level)
     values = [c.middle() if c else np.nan for c in found.capacitance_f_per_m2]
@@ -112,7 +112,7 @@ def prototypes() -> None:
         CELLS.write_text(text, "utf-8")
 
 
-def cells(design: Design, walls: str) -> Iterator[tuple[str, Piece]]:
+def cells(design: Design, walls: str) -> Iterator[tuple[str, PressedPiece]]:
     """The printed cell; by Arachne's walls, which are the likeliest, and by G-code with other films too."""
     body = of_file(design, at_hand(design, None, walls)[0]) if walls == "prusa" else estimated(design, walls)
     yield "", piece(body)
@@ -122,7 +122,7 @@ def cells(design: Design, walls: str) -> Iterator[tuple[str, Piece]]:
     if walls in ("arachne", "prusa") and film:
         for sign, scene in (("-", film.thinner), ("+", film.thicker)):
             if scene:
-                yield f" {sign} {film.error_mm:g}", Piece(scene, body.cells.period_mm)
+                yield f" {sign} {film.error_mm:g}", PressedPiece(scene, body.cells.period_mm)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,8 @@
 
 All of one print: cell, sheet resistances and law of compression are those of an array's crossing; lines are its rows. A
 line is read at eight tones, presses are patches of even pressure; errors are Cramer-Rao bounds with the prior of an
-unknown place (its length over sqrt(12)) and of an unknown force (its own size). Writes ``results/wires.md``.
+unknown place (its length over sqrt(12)) and of an unknown force (its own size); crossing tracks by one frame of the
+network, wherever presses lie. Writes ``results/wires.md``.
 """
 
 import resource
@@ -15,6 +16,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.design.design import make
 from sensorgen.models.line import cascade
 from sensorgen.prediction.array.model import ArrayModel, array_model
+from sensorgen.prediction.array.presses import count as presses_at
 from sensorgen.prediction.array.readout import ArrayReadout
 from sensorgen.prediction.array.study import study
 
@@ -94,8 +96,7 @@ def table() -> list[str]:
     worst = float(np.nanmax(found.sigma_kpa))
     rows.append(
         f"| {m} x {n} crossing tracks | {m + n} | {p.pitch[0] / 12**0.5:.2g} mm "
-        f"| {2 * p.pitch[0]:g} mm (two pitches, assumed) "
-        f"| {m * n}, each to {worst:.2g} kPa |"
+        f"| {found.apart_mm:g} mm | {presses_at(model, found.apart_mm)} of {m * n}, each to {worst:.2g} kPa |"
     )
     return rows
 

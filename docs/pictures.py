@@ -14,8 +14,8 @@ from sensorgen.asprinted import printed as prints
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.design.design import make
 from sensorgen.export import slicing
-from sensorgen.models.sheet import Patch, Sheet, contact_sets, localise
-from sensorgen.models.stack import Body
+from sensorgen.models.sheet import Sheet, SheetPatch, contact_sets, localise
+from sensorgen.models.stack import GroundTie
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.double_layer.designs import press_at, stacked
 from sensorgen.prediction.double_layer.touching import WIRINGS, Touching
@@ -51,7 +51,7 @@ def bounds_on_a_sheet() -> None:
     """Resolution of position on a sheet of 100 x 100 mm and 5 ohm m under 6 N, by contacts."""
     film = Sheet(0.1, 0.1, (5.0 / 3e-4,) * 2, EPS0_F_PER_M * 4.68 / 6e-4)
     factor = 1 / (1 - 0.05)
-    press, per_newton = Patch(0.0, 0.0, 0.02, 0.02, factor), {"capacitance_factor": factor**2 * 0.05 / 6}
+    press, per_newton = SheetPatch(0.0, 0.0, 0.02, 0.02, factor), {"capacitance_factor": factor**2 * 0.05 / 6}
     ports = contact_sets(film)
     tones = np.array(TONES_HZ)
     bounds = {name: localise(film, pairs, tones, press, per_newton, places=7) for name, pairs in ports.items()}
@@ -65,7 +65,7 @@ def touch() -> None:
     for axes, (title, data, law) in zip(drawn.subplots(1, 2, sharey=True), SENSORS.values(), strict=True):
         found = stacked(make(data), law)
         press = press_at(found, 6.0, 0.045)
-        touching = Touching(found.own, found.isolation_eps_r, np.array(TONES_HZ), press, 1e-3, Body())
+        touching = Touching(found.own, found.isolation_eps_r, np.array(TONES_HZ), press, 1e-3, GroundTie())
         for wiring in WIRINGS:
             axes.loglog(thickness_mm, [abs(touching.force_n(mm, wiring)) for mm in thickness_mm], label=wiring.words)
         axes.axhline(0.1, color="0.5", lw=0.8, ls="--")

@@ -139,11 +139,17 @@ def page(rows: list[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def outside() -> str:
+    """Why numbers lie outside, as far as it is known."""
+    devices = yaml.safe_load(FACTS.read_text("utf-8"))["devices"]
+    return "".join(f"\nOutside, {d['name']}: {d['outside']}\n" for d in devices if "outside" in d)
+
+
 def main() -> None:
     """Write the page."""
     with tempfile.TemporaryDirectory() as place:
         rows = [*published(Path(place)), *table_d1(Path(place))]
-    (DOCS / "validation.md").write_text(page(rows), "utf-8")
+    (DOCS / "validation.md").write_text(page(rows) + outside(), "utf-8")
 
 
 if __name__ == "__main__":

@@ -71,9 +71,10 @@ def pages() -> list[Path]:
 def survey() -> list[Place]:
     """Every retired word of the repository."""
     retired = words()
+    any_of_them = re.compile("|".join(word.pattern.pattern for word in retired), re.IGNORECASE)
     found: list[Place] = []
     for path in sorted((ROOT / "src").rglob("*.py")):
-        for node in messages(ast.parse(path.read_text("utf-8"))):
+        for node in filter(lambda node: any_of_them.search(node.value), messages(ast.parse(path.read_text("utf-8")))):
             found += places(str(node.value), path.relative_to(ROOT).as_posix(), node.lineno, retired)
     for path in pages():
         plain = CODE.sub(lambda code: re.sub(r"[^\n]", " ", code[0]), path.read_text("utf-8"))

@@ -1,6 +1,7 @@
 """What the tests have to say besides passing, a cache of its own for each, and the programs that some of them run."""
 
 import gc
+import itertools
 import os
 import shutil
 import signal
@@ -15,10 +16,14 @@ with suppress(ValueError):  # not in the main thread
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job would hand down a deaf ear
 
 
-def _own_folders(monkeypatch, tmp_path_factory, cache):
+NUMBERS = itertools.count()
+
+
+def _own_folders(monkeypatch, folder, cache=None):
     """Whatever the user, or another test, has kept is out of sight."""
-    monkeypatch.setenv("SENSORGEN_CACHE", str(cache))
-    own = tmp_path_factory.mktemp("own")  # one folder: those of ten thousand tests take time to make and to remove
+    own = folder / str(next(NUMBERS))  # by its number: pytest would look at all those of ten thousand tests for each
+    own.mkdir()
+    monkeypatch.setenv("SENSORGEN_CACHE", str(cache or own / "cache"))
     monkeypatch.setenv("SENSORGEN_LOG", str(own / "log.db"))
     monkeypatch.setenv("BROWSER", "true")  # opens nothing
     monkeypatch.setenv("SENSORGEN_BUDGET", "0")  # changes of designs are tried by the tests of that alone
@@ -35,19 +40,20 @@ def session_cache(tmp_path_factory):
 
 
 @pytest.fixture(autouse=True, scope="session")
-def _session(tmp_path_factory, session_cache):
-    """For fixtures of modules, which are made before those of a test."""
+def _folder(tmp_path_factory, session_cache):
+    """Folder with what is each test's own; fixtures of modules, which are made before those of a test, have one too."""
+    folder = tmp_path_factory.mktemp("own")
     with pytest.MonkeyPatch.context() as monkeypatch:
-        _own_folders(monkeypatch, tmp_path_factory, session_cache)
-        yield
+        _own_folders(monkeypatch, folder, session_cache)
+        yield folder
 
 
 @pytest.fixture(autouse=True)
-def _cache(request, monkeypatch, tmp_path_factory, session_cache):
+def _cache(request, monkeypatch, _folder, session_cache):
     """A test that patches, or is marked `own_cache`, neither reads nor keeps predictions of others."""
     patches = "monkeypatch" in request.node._fixtureinfo.argnames and "shared_cache" not in request.fixturenames
     own = patches or request.node.get_closest_marker("own_cache")
-    _own_folders(monkeypatch, tmp_path_factory, tmp_path_factory.mktemp("cache") if own else session_cache)
+    _own_folders(monkeypatch, _folder, None if own else session_cache)
 
 
 @pytest.fixture
@@ -76,6 +82,15 @@ def unpredicted(_cache):
     import no_numbers
 
     with no_numbers.unpredicted():
+        yield
+
+
+@pytest.fixture
+def at_rest(unpressed):
+    """No design is predicted under a load: for tests that look at capacitance, resistance and gap alone."""
+    import no_numbers
+
+    with no_numbers.at_rest():
         yield
 
 
@@ -120,6 +135,16 @@ def browser(program, _started, tmp_path_factory):
         _started.append(Page(chromium, tmp_path_factory.mktemp("chromium")))
     _started[-1].renew()
     return _started[-1]
+
+
+@pytest.fixture(scope="session")
+def forked():
+    """Run a command in a process of its own, see :class:`forks.Forks`."""
+    from forks import Forks
+
+    forks = Forks()
+    yield forks
+    forks.close()
 
 
 @pytest.fixture

@@ -9,6 +9,11 @@ from sensorgen.cli import main
 
 def run(folder, *words):
     """Exit code and standard output of a command in a folder."""
+    return run_all(folder, *words)[:2]
+
+
+def run_all(folder, *words):
+    """Exit code, standard output and errors of a command in a folder."""
     argv, out, err = sys.argv, io.StringIO(), io.StringIO()
     sys.argv = ["sensorgen", *words]
     try:
@@ -16,6 +21,6 @@ def run(folder, *words):
             main()
     except SystemExit as left:
         assert "Traceback" not in err.getvalue()
-        return left.code, out.getvalue()
+        return left.code, out.getvalue(), err.getvalue()
     finally:
         sys.argv = argv

@@ -27,15 +27,22 @@ def unpredicted():
 
 
 @contextmanager
+def at_rest(folder="at-rest"):
+    """Capacitance and resistance as ever, nothing under a load."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(quantities, "_at_load", lambda found, *_: found)
+        patch.setenv("SENSORGEN_CACHE", str(Path(os.environ["SENSORGEN_CACHE"]) / folder))
+        yield
+
+
+@contextmanager
 def roughly_at_rest():
-    """Resistance as ever, capacitance to a tenth, nothing under a load; for readings of a multimeter."""
+    """Resistance as ever, capacitance as closed forms have it, nothing under a load; for readings of a multimeter."""
     from sensorgen.prediction import capacitance, planning, rest_state
 
-    with pytest.MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch, at_rest("rough"):
         for name in ("PLANE", "SPATIAL", "OPEN"):
-            patch.setattr(capacitance, name, 0.1)
-        patch.setattr(rest_state, "PLANE", 0.1)
-        patch.setattr(planning, "ACCURACY", 0.1)
-        patch.setattr(quantities, "_at_load", lambda found, *_: found)
-        patch.setenv("SENSORGEN_CACHE", str(Path(os.environ["SENSORGEN_CACHE"]) / "rough"))
+            patch.setattr(capacitance, name, 10.0)
+        patch.setattr(rest_state, "PLANE", 10.0)
+        patch.setattr(planning, "ACCURACY", 10.0)
         yield

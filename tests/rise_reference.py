@@ -1,4 +1,4 @@
-"""Scenes of tests/reference/rise.json, and the default mesh's rise of the capacitance beside their references."""
+"""Scenes of tests/reference/rise.json and of programs in 3D, and the default mesh's rise of C beside them."""
 
 import json
 from pathlib import Path
@@ -8,7 +8,7 @@ import numpy as np
 from sensorgen.design.design import make
 from sensorgen.design.tip import Tip
 from sensorgen.prediction.compression_law import STRESS_PA, case_of
-from sensorgen.prediction.mesh_ladder import Piece, drawn, estimated
+from sensorgen.prediction.mesh_ladder import PressedPiece, drawn, estimated, model_of
 from sensorgen.scene.scene import Body, Prism, Scene
 from sensorgen.solvers.contact.cell import BLOCK
 
@@ -26,9 +26,28 @@ def of_another_program():
     return [own[other["scene"]] | {"rise_nf_per_m2": other["rise_nf_per_m2"]} for other in found]
 
 
+def in_3d():
+    """Entries that NGSolve solved in 3D: round cells of bench/press_round.py, rect of bench/rect_rise.py."""
+    plain = {"quality": "fine", "walls": "", "top": "even", "print": None}
+    found = json.loads(FILE.with_name("round_rise.json").read_text("utf-8"))
+    rows = [plain | {"material_values": found["material_values"]} | cell for cell in found["cells"]]
+    rect = json.loads(FILE.with_name("rect_rise.json").read_text("utf-8"))
+    for cell in rect["cells"]:
+        sizes = {name: value for name, value in cell.items() if name != "meshes"}
+        params = make({"shape": "rect", "parameters": sizes}).params
+        area_m2 = params.period_mm**2 * 1e-6
+        best = cell["meshes"][-1]
+        rise = 1e9 * best["rise"] * best["capacitance_f"] / area_m2
+        rows.append(
+            plain | {"shape": "rect", "parameters": sizes, "rise_nf_per_m2": [[rect["pressure_pa"] / 1e3, rise]]}
+        )
+    return rows
+
+
 def case(entry):
     """The scene of an entry under its top: the stored print, or the drawing of its parameters."""
-    design = make({"shape": "tri", "quality": entry["quality"], "parameters": entry["parameters"]})
+    keys = {"quality", "parameters", "material_values", "shape"} & set(entry)
+    design = make({"shape": "tri"} | {key: entry[key] for key in keys})
     piece = drawn(design)
     if entry["print"]:
         bodies = tuple(
@@ -36,8 +55,8 @@ def case(entry):
             for b in entry["print"]["bodies"]
             if b["name"] != BLOCK  # the references' own, which the top adds again
         )
-        piece = Piece(Scene(bodies, tuple(entry["print"]["size_mm"])), entry["print"]["period_mm"])
-    return case_of(design, piece, "press2d", Tip(block=entry["top"]))
+        piece = PressedPiece(Scene(bodies, tuple(entry["print"]["size_mm"])), entry["print"]["period_mm"])
+    return case_of(design, piece, model_of(piece), Tip(block=entry["top"]))
 
 
 def _tuples(piece):
@@ -46,7 +65,9 @@ def _tuples(piece):
 
 def compared(entry):
     """Errors of the default mesh at the reference's pressures, and the stated ones, over the rise [-]."""
-    found = estimated(case(entry), STRESS_PA, sound=True)
+    kpa = entry["rise_nf_per_m2"][0][0]
+    loads = STRESS_PA if len(entry["rise_nf_per_m2"]) > 1 else (0.0, 1e3 * kpa, 2e3 * kpa)
+    found = estimated(case(entry), loads, sound=True)
     pairs_by_pa = zip(found.rise_f_per_m2, found.rise_error_f_per_m2, strict=True)
     known = dict(zip(found.found.stress_pa.tolist(), pairs_by_pa, strict=True))
     pairs = [

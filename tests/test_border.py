@@ -10,7 +10,7 @@ import shapely
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
 from sensorgen.prediction import bodies
-from sensorgen.prediction.capacitance_answer import Asked, answer
+from sensorgen.prediction.capacitance_answer import CapacitanceQuestion, answer
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.scene.border import share
 from sensorgen.scene.geometry import meshes, outline_files, validity
@@ -157,7 +157,7 @@ def test_capacitance_is_the_share_of_the_cells(tmp_path):
     exact = 8.8541878128e-12 * eps * math.pi * 14 * 9 * 1e-6 / 0.6e-3
     assert plate.value == pytest.approx(exact, rel=2e-3, abs=0.0)
     assert plate.model.lower < exact < plate.model.upper
-    cell = answer(body, Asked())
+    cell = answer(body, CapacitanceQuestion())
     assert cell.lower_f_per_m2 * cell.area_m2 < exact < cell.upper_f_per_m2 * cell.area_m2
     assert (cell.reached, cell.relative_width > cell.accuracy) == (True, True)
     assert "is inside the border" in cell.doubts[0]

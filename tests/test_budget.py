@@ -1,5 +1,6 @@
 """The error budget: each term against what can be said of it without the budget."""
 
+from functools import cache
 from math import exp
 from types import SimpleNamespace
 
@@ -34,8 +35,15 @@ def budget(model, tones=TONES, force=6.0, accuracy=None):
     return error_budget(model, Load(tuple(tones), force, 0.05), accuracy)
 
 
+@cache
+def usual(shape):
+    """The sensor of a shape as it is."""
+    return sensor_of(make({"shape": shape}))
+
+
 def found(shape, accuracy=None, force=6.0, tones=TONES, design=None, **how):
-    return budget(sensor_of(make({"shape": shape} | (design or {})), **how), tones, force, accuracy)
+    model = sensor_of(make({"shape": shape} | (design or {})), **how) if design or how else usual(shape)
+    return budget(model, tones, force, accuracy)
 
 
 def lines(got):

@@ -50,8 +50,16 @@ def test_every_promised_file_is_there(whole):
 
 
 def test_rebuilt_it_is_the_same_to_the_byte(whole, tmp_path):
-    again = build(design.make(TRI), tmp_path)
-    assert contents(again.folder) == contents(whole.folder)
+    """Without STEP, which tests/geometry/test_cad.py writes in two processes."""
+    again, first = (contents(built.folder) for built in (build(design.make(TRI), tmp_path, cad=False), whole))
+    del first["trix-d0.2.step"]
+    sealed = [json.loads(files.pop("manifest.json")) for files in (again, first)]
+    for kept in sealed:
+        kept["files"].pop("trix-d0.2.step", None)
+        del kept["sha256"]
+        kept["versions"].pop("build123d", None)
+    assert again == first
+    assert sealed[0] == sealed[1]
 
 
 def test_manifest_has_the_hash_of_every_other_file(whole):

@@ -165,7 +165,7 @@ def test_what_changes_nothing_is_not_advised():
 def test_a_change_has_to_help_by_a_twentieth(monkeypatch):
     """Position rules here, and its error is proportional to the noise."""
     for factor, helps in ((0.94, True), (0.96, False), (1.1, False)):
-        louder = changes.Change("noise", "", "", lambda s, k=factor: replace(s, noise=k * s.noise))
+        louder = changes.Remedy("noise", "", "", lambda s, k=factor: replace(s, noise=k * s.noise))
         monkeypatch.setattr(changes, "CHANGES", (louder,))
         assert bool(helped(setup())) is helps
 

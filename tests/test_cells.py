@@ -8,12 +8,12 @@ from sensorgen.design.shapes import reference, tri
 from sensorgen.scene import unit_cell as cells
 from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
 from sensorgen.scene.sections import ROUNDING_MM, columns, sections
-from sensorgen.scene.unit_cell import Cell, cell
+from sensorgen.scene.unit_cell import SectionCell, cell
 
 HEIGHT_MM = 1.4
 
 
-def found(scene: Scene) -> Cell:
+def found(scene: Scene) -> SectionCell:
     return cell(sections(scene)[0], scene.size_mm[2])
 
 
@@ -25,7 +25,7 @@ def ridges(length_mm: float, *places: tuple[float, float, float, str]) -> Scene:
     return Scene((low, *solid, high), (length_mm, 1.0, HEIGHT_MM))
 
 
-def areas(cell_found: Cell) -> dict[str, float]:
+def areas(cell_found: SectionCell) -> dict[str, float]:
     """Of each material over the whole sensor, by the shares [mm2]."""
     total: dict[str, float] = defaultdict(float)
     for here, share in zip(cell_found.slices, cell_found.shares, strict=True):
@@ -49,7 +49,7 @@ def _shoelace(outline) -> float:
     return sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(outline, (*outline[1:], outline[0]), strict=True)) / 2
 
 
-def width_mm(cell_found: Cell) -> float:
+def width_mm(cell_found: SectionCell) -> float:
     return cell_found.slices[-1].right_mm - cell_found.slices[0].left_mm
 
 

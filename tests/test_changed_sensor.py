@@ -64,7 +64,12 @@ def test_the_ladder_under_a_press_a_hand_and_a_hole():
     assert 1 / strip.impedance([press], 0.0, hand=True)[0] == pytest.approx(expected, rel=1e-6)
 
 
-@pytest.mark.parametrize("name", CHANGES)
+EACH_TIME = ("sound", "second press of 2 N at 20 mm", "rest read under 1 N", "trace broken at 50 mm")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in EACH_TIME else [pytest.mark.nightly]) for name in CHANGES]
+)
 def test_a_changed_sensor_is_covered_or_not_called_ok(model, specimens, name):
     """A cut of bench/coverage.py: intervals of answered readings, force alone or not, or hardly any are answered."""
     answered, held, plain = [], [], 0.0
@@ -167,7 +172,7 @@ def test_presses_near_an_end_may_lie_in_the_interval(model, specimens):
     assert np.mean(held) > 0.8
 
 
-@pytest.mark.parametrize("name", ["sound", "1.4 x softer (aged)"])
+@pytest.mark.parametrize("name", [pytest.param("sound", marks=pytest.mark.nightly), "1.4 x softer (aged)"])
 def test_a_recheck_narrows_the_interval_again(model, specimens, name):
     widths, held = [], []
     for seed, (strip, known, posterior) in enumerate(specimens):

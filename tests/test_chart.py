@@ -30,7 +30,7 @@ from sensorgen.verification.chart import blocks, cells, exact, lines, membrane, 
 from sensorgen.verification.chart import measured as measured_in
 from sensorgen.verification.chart import plot as pictures
 from sensorgen.verification.chart.cells import STANDARD
-from sensorgen.verification.chart.measured import Point, with_front
+from sensorgen.verification.chart.measured import ChartPoint, with_front
 
 REFERENCE = Path(__file__).parent / "reference"
 
@@ -44,7 +44,7 @@ def _timed_once():
 
 
 def point(seconds, error, model="m", bounded=True, scene="s"):
-    return Point(scene, model, error, seconds, "", bounded, None, 1.0, 1.1)
+    return ChartPoint(scene, model, error, seconds, "", bounded, None, 1.0, 1.1)
 
 
 @given(st.lists(st.tuples(st.integers(1, 6), st.integers(1, 6)), min_size=1, max_size=12))

@@ -11,7 +11,7 @@ from sensorgen.design.design import make
 from sensorgen.prediction import compression as compressed
 from sensorgen.prediction import mesh_ladder
 from sensorgen.prediction.bodies import drawn
-from sensorgen.prediction.compression import Asked, BoundaryConditions
+from sensorgen.prediction.compression import BoundaryConditions, PressQuestion
 
 KNOWN = json.loads((Path(__file__).parent / "reference" / "contact.json").read_text())
 LOADS = (0, 2, 6, 10)  # of the reference's, a tenth of its kPa
@@ -26,22 +26,23 @@ def _own_cache(monkeypatch, tmp_path):
 def pressed(film, accuracy, loads=LOADS):
     design = make({"shape": "tri", "parameters": {"dielectric_mm": film}})
     stress = tuple(KNOWN[f"tri_d{film}"]["p_kPa"][k] for k in loads)
-    return compressed.answer(drawn(design), Asked(stress, BoundaryConditions(), accuracy=accuracy))
+    return compressed.answer(drawn(design), PressQuestion(stress, BoundaryConditions(), accuracy=accuracy))
 
 
 @needs_mesher
 @pytest.mark.parametrize(
-    ("film", "accuracy"), [(0.2, 5e-2), *(pytest.param(0.1, k, marks=pytest.mark.nightly) for k in (5e-2, 1.2e-2))]
+    ("film", "accuracy", "loads"),
+    [(0.2, 5e-2, LOADS[:3]), *(pytest.param(0.1, k, LOADS, marks=pytest.mark.nightly) for k in (5e-2, 1.2e-2))],
 )
-def test_the_bounds_hold_the_reference_at_every_load(film, accuracy):
-    found = pressed(film, accuracy)
+def test_the_bounds_hold_the_reference_at_every_load(film, accuracy, loads):
+    found = pressed(film, accuracy, loads)
     known = KNOWN[f"tri_d{film}"]
     assert found.reached
-    for k, low, high in zip(LOADS, found.lower_f_per_m2, found.upper_f_per_m2, strict=True):
+    for k, low, high in zip(loads, found.lower_f_per_m2, found.upper_f_per_m2, strict=True):
         truth = known["C0_exact_pF_per_m"] + known["dC_pF_per_m"][k]
         assert 2e9 * low < truth < 2e9 * high  # pF per metre of depth and period of 2 mm
-    down = np.abs(np.array(found.displacement_um) - np.array(known["uy_um"])[list(LOADS)])
-    off = np.abs(2e9 * np.array(found.rise_f_per_m2) - np.array(known["dC_pF_per_m"])[list(LOADS)])
+    down = np.abs(np.array(found.displacement_um) - np.array(known["uy_um"])[list(loads)])
+    off = np.abs(2e9 * np.array(found.rise_f_per_m2) - np.array(known["dC_pF_per_m"])[list(loads)])
     assert (down <= found.displacement_error_um).all()
     assert (off <= 2e9 * np.array(found.rise_error_f_per_m2)).all()
     assert 0 < found.largest_displacement_error < found.largest_rise_error <= accuracy

@@ -171,6 +171,7 @@ def test_absent_programs_say_so(monkeypatch, unpressed):
     assert "which is not independent" in found._repr_html_()
 
 
+@pytest.mark.nightly
 def test_the_whole_prediction():
     """The thesis's cell: two other programs have its rise, and a third one its capacitance."""
     body = bodies.drawn(make({"shape": "tri", "parameters": {"dielectric_mm": 0.1}}))

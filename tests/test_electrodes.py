@@ -36,7 +36,7 @@ def test_a_drawing_has_its_cogs(along, share):
 @pytest.mark.parametrize("shape", ["tri", "rect", "reference"])
 def test_line_model_and_prediction_have_the_same_resistance(shape):
     body = drawn(design(shape))
-    found = evaluate(body, keep=False)
+    found = evaluate(body)
     both = sum(r.value for r in found.resistance.values())
     model, _ = sensor_model(body)
     assert model.sensor.resistance_ohm() == pytest.approx(both, rel=1e-12)

@@ -5,9 +5,11 @@ import pytest
 from drawn_sensor import sensor_of
 from scipy.optimize import least_squares
 
+import tilted_layer
+from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.models import pressure
-from sensorgen.models.compression import Plate, averaged
+from sensorgen.models.compression import Plate, averaged, beyond, curve
 from sensorgen.prediction.error_budget import error_budget
 from sensorgen.prediction.query import TONES_HZ, Load
 
@@ -143,3 +145,38 @@ def test_what_alone_turns_a_verdict_is_named():
     """Drift of 10 % in C since the rest reading is more than any press of a stiff plate: no force is told."""
     assert terms(temperature_k=50, permittivity_per_k=2e-3)["permittivity, temperature"].turns == "both"
     assert terms(temperature_k=1e-3)["permittivity, temperature"].turns == ""
+
+
+W, K, SLOPE, MEAN_PA = 0.01, 2.7e9, np.tan(np.radians(2)), 6e4  # tri 0.2: 36.4 um at 100 kPa
+
+
+def test_a_tip_held_at_an_angle_presses_as_by_finite_elements():
+    """On a thin electrode as the closed form has it; a thick one carries further, towards an even pressure."""
+    closed = MEAN_PA * pressure.tilted(SLOPE * W * K, MEAN_PA)
+    share, thin = tilted_layer.pressure(W, 2e-5, 22e6, K, SLOPE, MEAN_PA)
+    assert thin.max() == pytest.approx(closed.max(), rel=0.01)
+    assert share @ (thin > 0.01 * MEAN_PA) == pytest.approx(np.mean(closed > 0), abs=0.02)
+    share, thick = tilted_layer.pressure(W, 7.4e-4, 22e6, K, SLOPE, MEAN_PA)
+    for power in (0.5, 2.0):  # rises that flatten and that steepen
+        ends = sorted([MEAN_PA**power, np.mean(closed**power)])
+        assert ends[0] < share @ np.clip(thick, 0, None) ** power < ends[1]
+
+
+def test_beyond_a_cell_the_rise_lies_between_none_and_the_last_slope():
+    flattens = curve("sqrt", "", [0.0, 1e4, 2e4, 3e4], [1, *(1 + 1e-3 * np.sqrt([1e4, 2e4, 3e4]))])
+    shares = pressure.tilted(SLOPE * W * K, MEAN_PA)
+    with pytest.raises(OutOfRange):
+        averaged(flattens, lambda _: shares, MEAN_PA)
+    least, most = (
+        averaged(law, lambda _: shares, MEAN_PA).ratio[-2] - 1 for law in beyond(flattens, MEAN_PA, lambda _: shares)
+    )
+    assert least < np.mean(1e-3 * np.sqrt(shares * MEAN_PA)) < most
+
+
+def test_a_tilted_stiff_tip_is_a_row_with_a_range():
+    design = make({"shape": "tri", "tip": {"block": "stiff"}})
+    terms = {t.name: t for t in error_budget(sensor_of(design), Load(TONES_HZ, FORCE_N, PLACE_M)).terms}
+    tilted = terms["tip tilted"]
+    assert (tilted.at_least, tilted.source) == (True, "guess")
+    assert tilted.changes.force_n > 0.1
+    assert "beyond" in tilted.what

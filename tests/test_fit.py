@@ -13,7 +13,7 @@ from drawn_sensor import sensor_of
 from scipy import stats
 
 from no_numbers import roughly_at_rest
-from sensorgen.analysis.comparison.allowed import Allowed
+from sensorgen.analysis.comparison.allowed import AllowedValues
 from sensorgen.analysis.comparison.moved import Movable
 from sensorgen.analysis.fit import Fit, Fitted, Untold, fit, text
 from sensorgen.analysis.fit.fitting import held_back
@@ -77,11 +77,11 @@ def test_a_known_resistivity_and_leak_come_back(tmp_path):
 
 
 def test_the_interval_of_a_resistivity_is_as_wide_as_the_bounds_and_the_scatter():
-    same = [Allowed(math.log(0.03), math.log(0.06), math.nan)] * 9
+    same = [AllowedValues(math.log(0.03), math.log(0.06), math.nan)] * 9
     found = resistivity(same, "etpu")
     assert (found.value, found.low, found.high) == pytest.approx((math.sqrt(0.03 * 0.06), 0.03, 0.06))
     ends = [0.02, 0.025, 0.03, 0.035, 0.04, 0.05, 0.06]
-    scattered = [Allowed(math.log(v), math.log(v), math.nan) for v in ends]
+    scattered = [AllowedValues(math.log(v), math.log(v), math.nan) for v in ends]
     wide = resistivity(scattered, "etpu")
     assert wide.value == pytest.approx(statistics.median(ends))
     reach = stats.t.ppf(0.975, 6) * statistics.stdev(map(math.log, ends)) * math.sqrt(8 / 7)  # of one more print
@@ -90,7 +90,7 @@ def test_the_interval_of_a_resistivity_is_as_wide_as_the_bounds_and_the_scatter(
 
 
 def test_leaks_that_differ_by_decades_are_no_property():
-    found = leak([Allowed(0.0, 0.0, math.log(10.0**k)) for k in range(-3, 4)], "x60", 1)
+    found = leak([AllowedValues(0.0, 0.0, math.log(10.0**k)) for k in range(-3, 4)], "x60", 1)
     assert isinstance(found, Untold)
     assert "no property of x60" in found.why
 

@@ -50,7 +50,8 @@ def prisms():
 
 TRUTHS = [  # sensor, design, specimen, which body, and how many forces and positions at least are told
     pytest.param(plate, ["reference"], "30 SX60 1", [], (20, 1), id="plate"),
-    pytest.param(prisms, ["tri", "--dielectric", "0.2"], "30 triX .2mm 1", ["--drawn"], (20, 15), id="prisms"),
+    pytest.param(prisms, ["tri", "--dielectric", "0.2"], "30 triX .2mm 1", ["--drawn"], (20, 15), id="prisms",
+                 marks=pytest.mark.nightly),
 ]  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """The notebooks of the gallery run as they stand, and a notebook's results show themselves."""
 
+import atexit
 import re
 from pathlib import Path
 
@@ -17,6 +18,7 @@ pytestmark = pytest.mark.usefixtures("shared_cache")
 NOTEBOOKS = [
     pytest.param(path, id=path.stem, marks=[pytest.mark.nightly] if path.stem in SLOW else [])
     for path in sorted(GALLERY.glob("*.py"))
+    if path.stem != "readings_to_report"  # runs in a kernel
 ]
 
 
@@ -25,16 +27,43 @@ def test_notebooks_use_names_that_there_are():
     assert "slice_design" in used <= set(sg.__all__)
 
 
+def cells(notebook):
+    """Head and text of each cell."""
+    for cell in re.split(r"^# %% ?", notebook.read_text("utf-8"), flags=re.MULTILINE)[1:]:
+        head, _, body = cell.partition("\n")
+        yield head, body.strip()
+
+
 @pytest.mark.parametrize("notebook", NOTEBOOKS)
-def test_a_notebook_runs(notebook, tmp_path):
+def test_a_notebook_runs(notebook, tmp_path, monkeypatch):
+    """By IPython in this process, each cell by itself; one by a kernel is below."""
+    pytest.importorskip("IPython")
+    from IPython.core.interactiveshell import InteractiveShell
+    from IPython.utils.capture import capture_output
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
+    shell = InteractiveShell()
+    try:
+        with capture_output() as shown:
+            for head, body in cells(notebook):
+                if head != "[markdown]":
+                    shell.run_cell(body).raise_error()
+    finally:
+        shell.atexit_operations()
+        atexit.unregister(shell.atexit_operations)
+        shell.restore_sys_module_state()
+    assert shown.outputs or shown.stdout, "the notebook shows nothing"
+
+
+def test_a_notebook_runs_in_a_kernel(tmp_path):
     nbformat = pytest.importorskip("nbformat")
     from nbclient import NotebookClient
 
     book = nbformat.v4.new_notebook()
-    for cell in re.split(r"^# %% ?", notebook.read_text("utf-8"), flags=re.MULTILINE)[1:]:
-        head, _, body = cell.partition("\n")
+    for head, body in cells(GALLERY / "readings_to_report.py"):
         make = nbformat.v4.new_markdown_cell if head == "[markdown]" else nbformat.v4.new_code_cell
-        book.cells.append(make(body.strip()))
+        book.cells.append(make(body))
     NotebookClient(book, timeout=600, resources={"metadata": {"path": str(tmp_path)}}).execute()
     assert any(cell.get("outputs") for cell in book.cells), "the notebook shows nothing"
 

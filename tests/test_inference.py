@@ -6,7 +6,7 @@ from scipy.optimize import least_squares
 from scipy.stats import multivariate_normal
 
 from sensorgen.prediction import inference
-from sensorgen.prediction.inference import Fit, LeastSquares, Normal, Parameter
+from sensorgen.prediction.inference import LeastSquares, LocalFit, Normal, Parameter
 
 TIMES = np.linspace(0.1, 3.0, 20)
 
@@ -22,7 +22,7 @@ class Decay(LeastSquares):
     def fit(self, at, rows):
         curve = at[:, :1] * np.exp(-at[:, 1:] * TIMES)
         slope = np.stack([np.exp(-at[:, 1:] * TIMES), -TIMES * curve], 1)
-        return Fit.of(at, (self.data[rows] - curve) / 0.01, slope / 0.01)
+        return LocalFit.of(at, (self.data[rows] - curve) / 0.01, slope / 0.01)
 
 
 def normal(seed, p=4):
@@ -54,13 +54,39 @@ def test_a_step_too_far_is_damped():
     assert inference.descend(problem, start).at[0] == pytest.approx([1.9, 0.3], abs=1e-6)
 
 
+def test_no_step_along_a_bound_is_longer_than_the_reach():
+    problem = Decay(np.zeros((1, len(TIMES))))
+    problem.bound, problem.reach = 1.0, 0.5
+    far = LocalFit(np.array([[0.0, 0.9]]), np.zeros(1), np.eye(2)[None], np.array([[40.0, 50.0]]))
+    step = problem.step(far, np.zeros(1))
+    assert step[0] == pytest.approx([0.5, 0.1 * 0.5 / 40], rel=0.1)
+
+
+class Stubborn(LeastSquares):
+    """A parabola whose first three trials fail, as beyond a kink: damped steps are short, and not the last."""
+
+    settled = 1e-2
+
+    def __init__(self):
+        self.trials = 0
+
+    def fit(self, at, rows):
+        self.trials += 1
+        fit = LocalFit.of(at, 1.0 - at, np.ones((len(at), 1, 1)))
+        return LocalFit(fit.at, fit.chi2 + (100.0 if 1 < self.trials < 6 else 0.0), fit.information, fit.gradient)
+
+
+def test_a_step_that_damping_makes_short_is_not_the_last():
+    assert inference.descend(Stubborn(), np.zeros((1, 1))).at[0, 0] == pytest.approx(1.0, abs=1e-2)
+
+
 def test_evidence_of_a_linear_model_is_the_density_of_its_data():
     rng = np.random.default_rng(2)
     slope, prior, noise = rng.normal(size=(6, 3)), normal(3, 3), np.diag(rng.uniform(0.5, 2.0, 6))
     data = rng.normal(size=6)
     root = inference.whitening(noise)
     at = rng.normal(size=(1, 3))
-    fit = Fit.of(at, (root @ (data - slope @ at[0]))[None], (root @ slope).T[None]).with_prior(
+    fit = LocalFit.of(at, (root @ (data - slope @ at[0]))[None], (root @ slope).T[None]).with_prior(
         prior.at, prior.information
     )
     known = np.linalg.slogdet(prior.covariance)[1] + np.linalg.slogdet(2 * np.pi * noise)[1]
@@ -73,8 +99,8 @@ def test_evidence_of_a_linear_model_is_the_density_of_its_data():
 def test_fits_of_two_parts_of_the_data_add_up():
     rng = np.random.default_rng(4)
     at, residual, slope = rng.normal(size=(2, 3)), rng.normal(size=(2, 8)), rng.normal(size=(2, 3, 8))
-    whole = Fit.of(at, residual, slope)
-    both = Fit.of(at, residual[:, :5], slope[..., :5]) + Fit.of(at, residual[:, 5:], slope[..., 5:])
+    whole = LocalFit.of(at, residual, slope)
+    both = LocalFit.of(at, residual[:, :5], slope[..., :5]) + LocalFit.of(at, residual[:, 5:], slope[..., 5:])
     for name in ("at", "chi2", "information", "gradient"):
         assert getattr(both, name) == pytest.approx(getattr(whole, name))
 

@@ -16,12 +16,13 @@ ALL = [
 
 
 def test_one_default_at_most_and_never_an_implausible_one():
+    known = materials.citations()
     for name, quantity, values in ALL:
         defaults = [v for v in values if v.default]
         assert len(defaults) <= 1, (name, quantity)
         assert not any(v.implausible for v in defaults), (name, quantity)
         assert len({v.source for v in values}) == len(values), (name, quantity)
-        assert all(v.source in materials.citations() for v in values), (name, quantity)
+        assert all(v.source in known for v in values), (name, quantity)
         assert all((math.isfinite(v.value) and v.value >= 0) or not v.default for v in values), (name, quantity)
         assert all(v.note for v in values if v.implausible), (name, quantity)
 

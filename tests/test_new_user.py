@@ -9,7 +9,11 @@ from pathlib import Path
 
 import pytest
 
-UNPRESSED = "import runpy, sys; sys.modules['netgen'] = None; runpy.run_module('sensorgen', run_name='__main__')"
+UNPRESSED = (  # by the package of the wheel, not by that of the repository
+    "import os, runpy, sys; sys.modules['netgen'] = None; import sensorgen; "
+    "assert sensorgen.__file__.startswith(os.environ['PYTHONPATH']), sensorgen.__file__; "
+    "runpy.run_module('sensorgen', run_name='__main__')"
+)
 ROOT = Path(__file__).parents[1]
 HERE = Path(__file__).parent
 DESIGN = """\
@@ -27,7 +31,9 @@ def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
     build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
     subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
-    zipfile.ZipFile(next(folder.glob("*.whl"))).extractall(folder / "site")
+    (wheel,) = folder.glob("*.whl")
+    zipfile.ZipFile(wheel).extractall(folder / "site")
+    assert {p.name for p in (folder / "site").iterdir() if p.suffix != ".dist-info"} == {"sensorgen"}
     return folder / "site"
 
 

@@ -5,13 +5,13 @@ import pytest
 
 from sensorgen.core.errors import BadInput
 from sensorgen.prediction.calibration.fitting import Data, calibrated, covariances, prior
-from sensorgen.prediction.calibration.next_press import VALUES, NextPress, Range
+from sensorgen.prediction.calibration.next_press import VALUES, NextPress, PossiblePresses
 from sensorgen.prediction.calibration.specimen import Presses
 from virtual_specimen import LENGTH_M, drawn, measured, session
 from virtual_specimen.adapter import data, specimen_model
 
 NOISE = np.full(7, 1e-3)
-EVERYWHERE = Range((0.1, 6.0), (2.5e-3, LENGTH_M - 2.5e-3), (0.3, 30.0))
+EVERYWHERE = PossiblePresses((0.1, 6.0), (2.5e-3, LENGTH_M - 2.5e-3), (0.3, 30.0))
 
 
 @pytest.fixture(scope="module")
@@ -87,8 +87,9 @@ def test_a_third_of_the_presses_is_enough(model):
 
 
 @pytest.mark.parametrize("wrong", [
-    lambda model: NextPress(model, EVERYWHERE, NOISE, "everything"), lambda _: Range((0.0, 6.0), (0, 1), (1, 2)),
-    lambda _: Range((2.0, 1.0), (0, 1), (1, 2)), lambda _: Range((1.0, 2.0), (0, np.inf), (1, 2)),
+    lambda model: NextPress(model, EVERYWHERE, NOISE, "everything"),
+    lambda _: PossiblePresses((0.0, 6.0), (0, 1), (1, 2)),
+    lambda _: PossiblePresses((2.0, 1.0), (0, 1), (1, 2)), lambda _: PossiblePresses((1.0, 2.0), (0, np.inf), (1, 2)),
 ])  # fmt: skip
 def test_wrong_input_is_refused(model, wrong):
     with pytest.raises(BadInput, match="expected"):

@@ -7,9 +7,13 @@ import pytest
 
 from sensorgen.core.document import to_json
 from sensorgen.core.errors import BadInput, SensorgenError
-from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, run_until_within
+from sensorgen.prediction.plan import Level, Plan, PlanCandidate, cheapest, run_until_within
 
-RUNGS = (Candidate("none", passed_over="it knows no gaps"), Candidate("coarse", 0.1, 1.0), Candidate("fine", 0.01, 5.0))
+RUNGS = (
+    PlanCandidate("none", passed_over="it knows no gaps"),
+    PlanCandidate("coarse", 0.1, 1.0),
+    PlanCandidate("fine", 0.01, 5.0),
+)
 
 
 def level(allowed, *, candidates=RUNGS):
@@ -36,7 +40,7 @@ def test_the_first_that_should_do_is_chosen_or_the_one_that_should_come_nearest(
 
 
 def test_one_that_was_never_measured_is_tried_and_one_that_cannot_speak_is_not():
-    assert cheapest((Candidate("new"), *RUNGS), 1e-9) == "new"
+    assert cheapest((PlanCandidate("new"), *RUNGS), 1e-9) == "new"
     assert cheapest(RUNGS[:1], 1.0) == ""
 
 
@@ -58,7 +62,7 @@ def test_the_nearest_is_taken_where_none_is_near_enough():
     """Here the finer mesh does worse, as meshes may."""
     models = Models(coarse=0.02, fine=0.03)
     found, came = run_until_within(
-        level(0.015, candidates=(*RUNGS[:2], Candidate("fine", 0.2, 5.0))), models.find, float
+        level(0.015, candidates=(*RUNGS[:2], PlanCandidate("fine", 0.2, 5.0))), models.find, float
     )
     assert (found, models.asked, came.chosen) == (0.02, ["coarse", "fine"], "coarse")
 
@@ -84,7 +88,7 @@ def test_what_is_just_near_enough_will_do():
 
 def test_of_coarser_ones_the_finest_is_asked_first():
     models = Models(coarse=0.08, fine=0.06, finest=BadInput("does not converge"))
-    candidates = (*RUNGS, Candidate("finest", 0.001, 9.0))
+    candidates = (*RUNGS, PlanCandidate("finest", 0.001, 9.0))
     assert run_until_within(level(0.002, candidates=candidates), models.find, float)[0] == 0.06
     assert models.asked == ["finest", "fine"]
 
@@ -96,7 +100,7 @@ def test_what_the_last_one_said_is_raised_where_none_can_answer():
 
 
 def test_an_unknown_error_is_null_in_json():
-    candidates = (Candidate("a", math.inf, 0.0, width=math.inf), Candidate("b", 0.1, 1.0, width=0.2))
+    candidates = (PlanCandidate("a", math.inf, 0.0, width=math.inf), PlanCandidate("b", 0.1, 1.0, width=0.2))
     data = json.loads(to_json(Plan(0.1, "C", (level(0.1, candidates=candidates),), math.inf)))
     assert data["width"] is None
     first, second = data["levels"][0]["candidates"]

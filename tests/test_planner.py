@@ -58,7 +58,7 @@ class Fake:
             model.WIDTH = 1e-3
         self.models[name] = model
         if points:
-            self.expected[name] = expectations.Measured("plate", "bands", 3, 1.0, list(points))
+            self.expected[name] = expectations.MeasuredCost("plate", "bands", 3, 1.0, list(points))
 
     @property
     def names(self):
@@ -270,7 +270,7 @@ def test_time_grows_with_the_parts_of_a_cell(fake):
     assert expectations.expected("mid", one, 1e-3) == expectations.expected("mid", many, 1e-3)
     assert expectations.expected("other", PLATE, 1e-3) == (None, None)
     strips = make({"shape": "rect"}).in_use  # no bands: three cross-sections
-    fake.expected["boxed"] = expectations.Measured("rect", "boxes", 21, 2.0, [(1e-3, 1.0)])
+    fake.expected["boxed"] = expectations.MeasuredCost("rect", "boxes", 21, 2.0, [(1e-3, 1.0)])
     assert expectations.expected("boxed", strips, 1e-3) == (1e-3, 1.0)
     shorted = make({"shape": "rect", "parameters": {"dielectric_mm": 0.0}}).in_use
     assert expectations.expected("boxed", shorted, 1e-3) == (1e-3, 1.0)

@@ -15,7 +15,7 @@ import pytest
 from drawn_sensor import sensor_of
 
 from sensorgen.analysis import plots
-from sensorgen.analysis.plots import libraries, pages, static
+from sensorgen.analysis.plots import identifiability, libraries, pages, static
 from sensorgen.analysis.plots.figure import Map, frequency, scale
 from sensorgen.analysis.plots.response import (
     LARGEST,
@@ -160,11 +160,14 @@ def test_all_files_and_the_same_bytes_every_time(sensor, again):
         if name.endswith(".png"):
             assert b"Software" not in content
             assert b"tIME" not in content
+    figure = shown(quantity(response(sensor, TONES[:1], FORCES, AT), "resistance"))
+    assert size_of(first["resistance.png"])[0] == round(figure.get_figwidth() * figure.dpi)
 
 
 def test_seven_tones_fit_in_1200_pixels(sensor):
     seven = response(sensor, [k * 1e4 for k in range(1, 8)], FORCES, AT)
-    assert {size_of(static.png(of))[0] for of in (quantity(seven, "resistance"), inverse(seven, "force"))} == {1200}
+    drawn = [shown(of) for of in (quantity(seven, "resistance"), inverse(seven, "force"))]
+    assert [round(of.get_figwidth() * of.dpi) for of in drawn] == [1200, 1200]
 
 
 def shown(figure):
@@ -211,8 +214,12 @@ def test_inverse_maps_lie_over_r_and_x(answer, of, values):
 def test_a_sensor_that_a_press_does_not_move_is_drawn_too():
     """Bare conductors: R is 0 throughout, and no colour scale or contour may trip over it."""
     flat = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.0, 0.0), 7e-10, unconfined(6e6))
-    for _, content in plots.files(flat, (1e3,), (0.0, 1.0), (20.0, 80.0)):
-        assert content
+    of = response(flat, (1e3,), (0.0, 1.0), (20.0, 80.0))
+    assert static.png(identifiability.figure(flat, (1e3,), force_n=1.0))
+    for figure in figures(of):
+        assert figure.key not in ("resistance", "inverse-force") or static.png(figure)
+        assert shown(figure).axes
+    assert written(of)
 
 
 def test_a_missing_library_is_named(monkeypatch):
@@ -230,7 +237,7 @@ def decoded(values):
 
 
 def written(answer):
-    return pages.page("A <b>sensor</b> & more", ["some words"], [pages.Section(figures=tuple(figures(answer)))])
+    return pages.page("A <b>sensor</b> & more", ["some words"], [pages.PageSection(figures=tuple(figures(answer)))])
 
 
 def test_the_page_holds_the_response_and_its_script_once(answer):

@@ -15,10 +15,11 @@ from sensorgen.design.design import make
 from sensorgen.design.materials import Value
 from sensorgen.design.values import lead_ranges, material_value, spread
 from sensorgen.models.overlap import edge_fringe_f
-from sensorgen.prediction import bodies
+from sensorgen.prediction import bodies, compression_law
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.inverse.forward import Forward, Scalar
 from sensorgen.prediction.narrowing import MULTIMETER, WEIGHT, WIDE
+from sensorgen.prediction.results import _change
 
 pytestmark = pytest.mark.usefixtures("shared_cache")
 EPS0 = 8.8541878128e-12
@@ -75,8 +76,10 @@ def test_nothing_of_a_material_is_certain():
             assert bounds.value < bounds.material.upper or bounds.open == "upper"  # softer than the law reaches
 
 
-def test_a_conductor_without_a_ratio_senses_force():
-    """Filaflex has none: in the range, the plate that was taken in its place is not."""
+def test_a_conductor_without_a_ratio_senses_force(monkeypatch, tmp_path):
+    """Filaflex has none: in the range, the plate that was taken in its place is not. Pressed at three pressures."""
+    monkeypatch.setenv("SENSORGEN_CACHE", str(tmp_path))
+    monkeypatch.setattr(compression_law, "STRESS_PA", (0.0, 3e4, 6e4, 1.2e5))
     electrodes = dict.fromkeys(("top_electrode", "bottom_electrode"), "filaflex-conductive")
     design = make({"shape": "tri", "materials": electrodes, "tools": {"filaflex-conductive": 1}})
     assert material_value(design.material("filaflex-conductive"), "", "poisson_ratio").source == values.ASSUMED
@@ -187,3 +190,8 @@ def test_first_screen_has_the_figures_of_a_bench():
     )  # of the worst top
     alone = found.force_resolution.upper / found.force_resolution.value
     assert alone <= force.upper / force.value < 1.5 * alone  # the range holds all tops
+
+
+def test_no_range_reads_0_to_0_percent():
+    said = [_change(Interval(*ends), 1.0) for ends in ((1.0, 1.0), (0.99998, 1.00002), (1.0, 1.2), (0.9, 1.0))]
+    assert said == ["none", "within 0.01 %", "0 to +20 %", "-10 to 0 %"]

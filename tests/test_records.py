@@ -13,7 +13,7 @@ from sensorgen.design import materials, packs, printer
 from sensorgen.design.design import make
 from sensorgen.measure import accuracy
 from sensorgen.measure.log import facts
-from sensorgen.workflows.batch.plan import Plan
+from sensorgen.workflows.batch.plan import BatchPlan
 from sensorgen.workflows.optimise.target import Target
 
 TEMPLATES = Path(packs.__file__).parent / "templates"
@@ -74,7 +74,7 @@ READERS = {
     "quality": lambda data: printer.load_quality("q", as_text(data)),
     "instrument": lambda data: accuracy.parse(as_text(data), "i.yaml"),
     "target": lambda data: checked(Target, data),
-    "plan": lambda data: checked(Plan, data),
+    "plan": lambda data: checked(BatchPlan, data),
     "design": lambda data: make(data),
 }
 PLAN = {"iteration": 1, "printer": "diabase-h5", "designs": [{"design": {"shape": "tri"}, "copies": 2}]}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rise_reference import compared, of_another_program, scenes
+from rise_reference import compared, in_3d, of_another_program, scenes
 
 
 @pytest.mark.parametrize("entry", [
@@ -17,6 +17,15 @@ def test_the_stated_error_holds(entry):
     assert np.median(stated / abs(errors)) < 5
 
 
+@pytest.mark.parametrize("entry", [
+    pytest.param(e, id=f"{e['shape']} {k}", marks=() if k == 1 else pytest.mark.nightly) for k, e in enumerate(in_3d())
+])  # fmt: skip
+def test_the_stated_error_holds_in_3d(entry):
+    """Round cells and crossed strips, by NGSolve on the square cell."""
+    errors, stated = compared(entry)
+    assert (abs(errors) < stated).all()
+
+
 def test_references_of_our_own_meshes_agree_with_another_program():
     for entry in of_another_program():
         (own,) = [known for known in scenes() if known | {"rise_nf_per_m2": 0} == entry | {"rise_nf_per_m2": 0}]
@@ -26,6 +35,6 @@ def test_references_of_our_own_meshes_agree_with_another_program():
 
 @pytest.mark.nightly
 def test_stated_errors_hold_in_95_percent_and_are_three_times_the_error_in_the_median():
-    errors, stated = np.concatenate([compared(entry) for entry in scenes()], axis=1)
+    errors, stated = np.concatenate([compared(entry) for entry in (*scenes(), *in_3d())], axis=1)
     assert np.mean(abs(errors) <= stated) >= 0.95
     assert np.median(stated / abs(errors)) <= 3

@@ -70,9 +70,9 @@ def test_a_shapes_own_refusal_keeps_its_words():
 
 def test_it_runs_once_for_each_set_of_parameters(monkeypatch):
     asked = []
-    ask = shape_files._Process.ask
+    ask = shape_files._ShapeProcess.ask
     monkeypatch.setattr(
-        shape_files._Process, "ask", lambda self, question: asked.append(question) or ask(self, question)
+        shape_files._ShapeProcess, "ask", lambda self, question: asked.append(question) or ask(self, question)
     )
     text = TEMPLATE + "\n# once\n"
     for _ in range(3):

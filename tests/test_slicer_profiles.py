@@ -17,7 +17,7 @@ from sensorgen.design import materials
 from sensorgen.design.printer import Printer, load_printer, load_quality, printer_names, quality_names
 from sensorgen.design.tower import MARGIN_MM, tower
 from sensorgen.export.slicers import cura, curaengine, orca, prusa, versions
-from sensorgen.export.slicers.loads import Load, recipes
+from sensorgen.export.slicers.loads import ToolLoad, recipes
 from sensorgen.export.slicers.run import run
 
 FINE = load_quality("fine")
@@ -28,11 +28,11 @@ both_printers = pytest.mark.parametrize(
 both_qualities = pytest.mark.parametrize("quality", [load_quality(n) for n in quality_names()], ids=lambda q: q.name)
 
 
-def usual(printer: Printer, **override: object) -> dict[int, Load]:
+def usual(printer: Printer, **override: object) -> dict[int, ToolLoad]:
     """Electrodes and dielectric on the printer's usual tools; ``override`` is for the dielectric."""
     return {
-        printer.default_tools["etpu"]: Load(materials.load("etpu")),
-        printer.default_tools["x60"]: Load(materials.load("x60"), **override),
+        printer.default_tools["etpu"]: ToolLoad(materials.load("etpu")),
+        printer.default_tools["x60"]: ToolLoad(materials.load("x60"), **override),
     }
 
 
@@ -70,28 +70,28 @@ def values(text: str) -> dict[str, str]:
 )
 def test_beyond_the_printer_is_refused(prints, says):
     with pytest.raises(OutOfRange, match=says):
-        prusa.profile(DIABASE, FINE, {3: Load(changed("etpu", **prints))})
+        prusa.profile(DIABASE, FINE, {3: ToolLoad(changed("etpu", **prints))})
 
 
 def test_a_hotter_printer_takes_what_another_refuses():
-    hot = {0: Load(changed("etpu", nozzle_temperature_c=260.0))}
+    hot = {0: ToolLoad(changed("etpu", nozzle_temperature_c=260.0))}
     assert "temperature = 260,0,0,0,0" in prusa.profile(load_printer("prusa-xl5"), FINE, hot)
 
 
 def test_missing_print_value_is_named_with_its_tool():
     with pytest.raises(MissingValue, match=r"tool 3: air has no default .*add it under 'print'"):
-        recipes(DIABASE, FINE, {3: Load(materials.load("air"))})
+        recipes(DIABASE, FINE, {3: ToolLoad(materials.load("air"))})
 
 
 @pytest.mark.parametrize(
     ("loads", "error", "says"),
     [
         ({}, BadInput, "no tool is loaded"),
-        ({6: Load(materials.load("etpu"))}, BadInput, r"no tool 6; its tools are \[1, 2, 3, 4, 5\]"),
-        ({3: Load(materials.load("etpu"), infill_percent=0)}, OutOfRange, r"infill \[%\] is 0; expected 1 to 100"),
-        ({3: Load(materials.load("etpu"), infill_pattern="gird")}, UnknownName, "did you mean 'grid'"),
+        ({6: ToolLoad(materials.load("etpu"))}, BadInput, r"no tool 6; its tools are \[1, 2, 3, 4, 5\]"),
+        ({3: ToolLoad(materials.load("etpu"), infill_percent=0)}, OutOfRange, r"infill \[%\] is 0; expected 1 to 100"),
+        ({3: ToolLoad(materials.load("etpu"), infill_pattern="gird")}, UnknownName, "did you mean 'grid'"),
         (
-            {3: Load(materials.load("etpu")), 4: Load(changed("x60", bed_temperature_c=60.0))},
+            {3: ToolLoad(materials.load("etpu")), 4: ToolLoad(changed("x60", bed_temperature_c=60.0))},
             BadInput,
             "one bed, two temperatures: etpu on tool 3 75 C, x60 on tool 4 60 C",
         ),
@@ -108,7 +108,7 @@ def test_layers_thinner_than_the_printer_are_refused():
 
 
 def test_the_named_source_counts_and_the_default_fills_in():
-    made = recipes(DIABASE, FINE, {4: Load(materials.load("x60"), source="thesis-4.1")})
+    made = recipes(DIABASE, FINE, {4: ToolLoad(materials.load("x60"), source="thesis-4.1")})
     assert (made[3].nozzle_c, made[3].bed_c) == (230.0, 75.0)
 
 
@@ -163,7 +163,7 @@ def test_prusa_nothing_changes_the_drawing():
 
 
 def test_prusa_takes_what_is_safe_for_all_and_bodies_carry_their_own():
-    loads = {3: Load(materials.load("etpu")), 4: Load(changed("x60", speed_mm_s=40.0), "", 80.0, "grid")}
+    loads = {3: ToolLoad(materials.load("etpu")), 4: ToolLoad(changed("x60", speed_mm_s=40.0), "", 80.0, "grid")}
     found = ini(prusa.profile(DIABASE, FINE, loads))
     assert (found["fill_density"], found["fill_pattern"], found["perimeter_speed"]) == ("100%", "rectilinear", "20")
     own = prusa.volume_settings(DIABASE, FINE, 4, loads[4])
@@ -172,14 +172,14 @@ def test_prusa_takes_what_is_safe_for_all_and_bodies_carry_their_own():
 
 
 def test_prusa_full_infill_has_no_pattern():
-    own = prusa.volume_settings(DIABASE, FINE, 4, Load(materials.load("x60"), infill_pattern="honeycomb"))
+    own = prusa.volume_settings(DIABASE, FINE, 4, ToolLoad(materials.load("x60"), infill_pattern="honeycomb"))
     assert (own["fill_density"], own["fill_pattern"]) == ("100%", "rectilinear")
 
 
 def test_two_tools_and_one_tool_are_enough():
     two = DIABASE.model_copy(update={"tool_numbers": (7, 9), "default_tools": {"etpu": 9, "x60": 7}})
     assert ini(prusa.profile(two, FINE, usual(two)))["temperature"] == "230,210"
-    alone = prusa.profile(two, FINE, {9: Load(materials.load("etpu"))})
+    alone = prusa.profile(two, FINE, {9: ToolLoad(materials.load("etpu"))})
     assert (ini(alone)["temperature"], ini(alone)["wipe_tower"]) == ("0,210", "0")
     assert json.loads(cura.profiles(two, FINE, usual(two))["definitions/diabase-h5.def.json"])["metadata"][
         "machine_extruder_trains"
@@ -222,12 +222,15 @@ def test_cura_material_is_well_formed_and_says_what_the_recipe_says():
 
 
 def test_cura_density_that_no_source_gives_is_left_out():
-    files = cura.profiles(DIABASE, FINE, {5: Load(materials.load("bvoh"))})
+    files = cura.profiles(DIABASE, FINE, {5: ToolLoad(materials.load("bvoh"))})
     assert "<density>" not in files["materials/sensorgen_bvoh.xml.fdm_material"]
 
 
 def test_cura_keeps_two_infills_of_one_material_apart():
-    loads = {3: Load(materials.load("x60")), 4: Load(materials.load("x60"), infill_percent=80.0, infill_pattern="grid")}
+    loads = {
+        3: ToolLoad(materials.load("x60")),
+        4: ToolLoad(materials.load("x60"), infill_percent=80.0, infill_pattern="grid"),
+    }
     own = "quality/diabase-h5/diabase-h5_fine_sensorgen_x60"
     files = cura.profiles(DIABASE, FINE, loads)
     assert values(files[f"{own}.inst.cfg"])["infill_sparse_density"] == "100"
@@ -257,7 +260,7 @@ def test_profiles_are_the_same_each_time_and_without_leftovers(printer, quality)
 
 
 def test_a_version_renames_drops_adds_and_translates():
-    change = versions.Change(
+    change = versions.VersionChange(
         title="2",
         source="here",
         dropped=("a",),

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from sensorgen.core.errors import BadInput
 from sensorgen.design import design
-from sensorgen.design.specimen_name import MAX_LETTERS, Specimen, design_of, named, parse
+from sensorgen.design.specimen_name import MAX_LETTERS, SpecimenName, design_of, named, parse
 
 HERE = Path(__file__).parent
 DESIGNS = HERE.parent / "designs"
@@ -134,7 +134,7 @@ def test_any_text_is_read_or_refused(text):
 
 
 NAMES = st.builds(
-    Specimen,
+    SpecimenName,
     iteration=st.one_of(st.none(), st.integers(0, 9999)),
     shape=st.just("tri"),
     axes=st.sampled_from(["X", "Y", ""]),

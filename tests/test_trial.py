@@ -7,7 +7,6 @@ import pytest
 from pydantic import TypeAdapter
 
 from sensorgen.checks.review import review
-from sensorgen.core import cache
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.document import text, to_json
 from sensorgen.core.errors import OutOfRange
@@ -24,8 +23,7 @@ from sensorgen.workflows.trial import Numbers, Trial, trial
 
 
 @pytest.fixture(autouse=True)
-def _own_cache(tmp_path, monkeypatch):
-    monkeypatch.setenv(cache.PLACE, str(tmp_path / "cache"))
+def _own_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 

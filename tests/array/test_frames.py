@@ -136,7 +136,7 @@ def test_readings_of_no_capacitance_are_no_numbers(model):
     farad = model.capacitance.value
     for wrong, words in (
         (frames.conj(), "median imaginary part is -"),
-        (frames * 1e12, f"predicted .*{farad * 1e12:.2g}.* pF"),
+        (frames * 1e12, f"predicted .*{farad * 1e12:.3g}.* pF"),
         (frames.real + 0j, "0 S"),
         (frames * np.nan, "is none, predicted"),
     ):
@@ -153,7 +153,7 @@ def test_what_does_not_settle_is_counted(model, monkeypatch):
     assert f"{dark} values left out that 1 steps" in found.by
 
 
-@pytest.mark.parametrize("noise_s", [1e-9, 2e-7])
+@pytest.mark.parametrize("noise_s", [1e-9, 3e-7])
 def test_not_determined_is_one_thing_here_and_in_a_study(model, noise_s):
     readout, flat = ArrayReadout(noise=0.0, noise_s=noise_s), np.full((1, 5, 6), 1e3)
     known = study(model, readout, 1.0).determined
@@ -205,13 +205,16 @@ def test_files_of_both_kinds_say_the_same(tmp_path, model):
     [
         ("f.csv", "r1c1,r9c1\n1,2\n", "columns r9c1; expected r1c1 to r5c6"),
         ("f.csv", "time_s\n1\n", "without any crossing"),
-        ("f.csv", "r1c1,r1c2\n1\n", "line 2: 1 values; expected 2"),
-        ("f.csv", "r1c1\nmany\n", "line 2: 'many' is no number"),
-        ("f.csv", "r1c1\n", "no frames"),
+        ("f.csv", "r1c1,r1c2\n1\n", "row 2: 1 cells, but the header has 2"),
+        ("f.csv", "r1c1\nmany\n", "row 2, column r1c1: 'many' is not a number"),
+        ("f.csv", "r1c1\n", "no rows below the header"),
         ("f.csv", "r1c1,r01c1\n1,2\n", "columns r1c1, r01c1 repeat"),
         ("f.csv", "rest,r1c1,rest\n1,2,0\n", "columns rest, rest repeat"),
         ("f.csv", "r0c1\n1\n", "columns r0c1; expected r1c1 to r5c6"),
         ("f.csv", "r1c1\n1e-12\n", "no frequency of the readings"),
+        ("f.csv", "time_ms,frequency_hz,r1c1\n0,1e4,1e-12\n", "'time_ms' is not read; expected the time as time_s"),
+        ("f.csv", "time_s,frequency_hz,r1c1\n1,1e4,1e-12\n0,1e4,1e-12\n", "time_s does not rise"),
+        ("f.csv", "frequency_hz,r1c1\n1e4,1e-12\n2e4,1e-12\n", "no frequency of the readings"),
         ("f.npz", "text", "no NPZ file"),
         ("f.npz", {"siemens": np.ones((2, 6, 5))}, "siemens is 2 x 6 x 5; expected frames x 5 rows x 6 columns"),
         ("f.npz", {"other": np.ones(2)}, "no readings; expected siemens or capacitance_f"),
@@ -228,6 +231,19 @@ def test_no_frames_are_an_error(tmp_path, name, content, words):
         path.write_text(content)
     with pytest.raises(BadInput, match=words):
         read(path, (5, 6), None)
+
+
+def test_a_table_has_its_frequency_and_day_and_no_time_is_no_number(tmp_path, model):
+    (tmp_path / "f.csv").write_text("frequency_hz,day,r1c1\n1e4,3,1e-12\n1e4,3,1e-12\n")
+    found = read(tmp_path / "f.csv", (5, 6), None)
+    assert (found.frequency_hz, found.day) == (1e4, 3.0)
+    assert np.isnan(found.time_s).all()
+    assert found.siemens[0, 0, 0].imag == pytest.approx(2 * np.pi * 1e4 * 1e-12)
+    readout = ArrayReadout()
+    untimed = inverted(model, readout, frames_of(model, readout), np.arange(5) < 3, np.full(5, np.nan))
+    assert "no time_s: times of the frames are not known" in "\n".join(document.text(untimed.document()))
+    assert untimed.table().cells[0][0] is None
+    assert plots.maps(untimed)[:4] == b"\x89PNG"
 
 
 def test_a_file_at_rest_gives_what_it_marks_and_its_own_frequency(tmp_path):

@@ -11,7 +11,7 @@ from sensorgen.core import document
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.array_sessions import refuse_swapped, session
 from sensorgen.prediction.array import sessions as calibration
-from sensorgen.prediction.array.elements import ArraySession, LawForm, lagged
+from sensorgen.prediction.array.elements import ArraySession, LawForm, Past, doubtful_time, lagged
 from sensorgen.prediction.array.sessions import calibrated, law_of, stored, study
 
 PRINT = Insole(elements=20, bad=6, minutes=4.0, rate_hz=1.0)
@@ -139,6 +139,41 @@ def test_memory_is_the_exponential():
     assert lagged(np.ones((4, 1)), time_s, 4.0)[:, 0] == pytest.approx(1 - np.exp(-time_s / 4.0))
 
 
+def test_memory_keeps_the_last_reading_where_one_is_missing_and_goes_on_in_the_next_lot():
+    time_s, x = np.arange(8.0), np.full((8, 1), 3.0)
+    whole = lagged(x, time_s, 4.0)
+    x[3:5] = np.nan
+    assert lagged(x, time_s, 4.0) == pytest.approx(whole)
+    past = Past()
+    lots = [lagged(x[part], time_s[part], 4.0, past) for part in (slice(0, 4), slice(4, 5), slice(5, 8))]
+    assert np.concatenate(lots) == pytest.approx(whole)
+
+
+def test_elements_are_matched_by_their_names(days, all_days):
+    names = tuple("abcdefghijklmnopqrst")
+    named = [replace(one, names=names) for one in days[:3]]
+    turned = replace(
+        named[1], names=names[::-1], reading=days[1].reading[:, ::-1], pressure_kpa=days[1].pressure_kpa[:, ::-1]
+    )
+    one, other = (study(each).calibration for each in (named, [named[0], turned, named[2]]))
+    assert one.law.at == pytest.approx(other.law.at, rel=1e-6)
+    assert one.names == names
+    with pytest.raises(BadInput, match="u is an element here or in the calibration alone"):
+        turned.matched(("u", *names[1:]))
+    with pytest.raises(BadInput, match=r"20 elements, a, b \.\.\.; expected 20, r1c1 to r4c5"):
+        one.of_ratio(np.ones((1, 4, 5)), np.zeros(1), 0.0)
+    memory = replace(all_days.calibration, names=())
+    with pytest.raises(BadInput, match="no time_s of the frames"):
+        memory.of_ratio(np.ones((1, 4, 5)), np.full(1, np.nan), 0.0)
+
+
+def test_time_that_looks_like_milliseconds_is_doubtful(days):
+    slow = replace(days[0], time_s=days[0].time_s * 1000)
+    assert any("a frame every 1000 s; expected time_s in seconds" in line for line in doubtful_time(slow.time_s))
+    assert not list(doubtful_time(days[0].time_s))
+    assert "doubtful: a frame every 1000 s" in "\n".join(document.text(study([slow]).document()))
+
+
 def test_tare_is_of_marked_or_nothing_and_a_standing_load_is_none(days):
     one = days[0]
     assert one.time_s[one.unloaded].max() == 20  # seconds, by the bladder
@@ -190,7 +225,14 @@ def test_files_of_every_reference(tmp_path):
     plate = session(table(tmp_path / "f.csv", ["time_s", "heel", "toe", "force_n"], [(0, 1, 2, 0), (1, 1, 3, 5)]), 1)
     assert np.isnan(plate.pressure_kpa).all()
     assert plate.force_n.tolist() == [0, 5]
-    np.savez(tmp_path / "n.npz", reading=np.ones((2, 3, 4)), pressure_kpa=[0.0, 5.0], element=[0, 12], area_mm2=20.0)
+    np.savez(
+        tmp_path / "n.npz",
+        reading=np.ones((2, 3, 4)),
+        time_s=[0, 1],
+        pressure_kpa=[0.0, 5.0],
+        element=[0, 12],
+        area_mm2=20.0,
+    )
     packed = session(tmp_path / "n.npz", 2)
     assert packed.reading.shape == (2, 12)
     assert np.nan_to_num(packed.pressure_kpa[1]).tolist() == [0] * 11 + [5]
@@ -201,7 +243,13 @@ def test_files_of_every_reference(tmp_path):
     [
         (["time_s", "a", "force_n"], [(1, 2, 3), (0, 2, 3)], "time_s does not rise"),
         (["time_s", "pressure_kpa"], [(0, 1)], "no readings; expected a column for each element"),
-        (["a", "element", "force_n"], [(1, "b", 3)], "element 'b'; expected a name of a column, or 1 to 1"),
+        (["a", "force_n"], [(2, 3)], "no time_s; expected the seconds of each frame"),
+        (["time_ms", "a", "force_n"], [(0, 2, 3), (10, 2, 3)], "no time_s"),
+        (
+            ["time_s", "a", "element", "force_n"],
+            [(0, 1, "b", 3)],
+            "element 'b'; expected a name of a column, or 1 to 1",
+        ),
     ],
 )
 def test_no_session_is_an_error(tmp_path, head, rows, words):
@@ -253,5 +301,17 @@ def test_commands_calibrate_and_invert_any_array(tmp_path):
     found = np.genfromtxt(lines[1:], delimiter=",")[:, 1::2]
     assert np.nanmedian(np.abs(found - later[3][:, None])) < 15
     assert np.isnan(found).all(0).sum() == 2
+    rows = [[t, 3.0, *("" if k == 7 else v for k, v in enumerate(c))] for t, c in zip(later[1], later[2], strict=True)]
+    table(tmp_path / "l.csv", ["time_s", "day", *"hgfedcba"], [[*row[:2], *row[:1:-1]] for row in rows])
+    rest = (later[3] == 0).astype(int)
+    words = (tmp_path / "l.csv").read_text().splitlines()
+    (tmp_path / "l.csv").write_text("\n".join(f"{w},{r}" for w, r in zip(words, ["rest", *rest], strict=True)) + "\n")
+    assert run(tmp_path, "invert", "c.npz", "l.csv", "-o", "q.csv")[0] == 0
+    head, *lines = (tmp_path / "q.csv").read_text().splitlines()
+    assert head.startswith("time_s,p_a_kpa,half_a_kpa,p_b_kpa")
+    again = np.genfromtxt(lines, delimiter=",")[:, 1::2]
+    assert np.isnan(again[:, 7]).all()
+    assert again[:, :7] == pytest.approx(found[:, :7], nan_ok=True)
     assert run(tmp_path, "calibrate", "0.csv", "S1")[0] == 2
+    assert run(tmp_path, "calibrate", *files, "--frequency", "10kHz")[0] == 2
     assert run(tmp_path, "invert", "later.npz", "later.npz")[0] == 2

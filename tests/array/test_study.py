@@ -29,10 +29,13 @@ def model():
 
 
 def test_law_and_load_of_the_cell(model):
-    """triX as printed rises by 7.1 % at 100 kPa on the cell; with air between, 64 of 100 mm2 carry the load."""
+    """triX as printed rises by 7.1 % at 100 kPa on the cell; with air between, 64 of 100 mm2 carry the load.
+
+    Of the whole capacitance 0.946 of it, as the fringe at the edges of the tracks rises less.
+    """
     assert model.load_factor == pytest.approx(100 / 64)
     ratio, slope = model.under(np.array([64e3, 64.1e3, 1e6, 1.1e6]))
-    assert ratio[0] == pytest.approx(1.0714, rel=2e-3)
+    assert ratio[0] - 1 == pytest.approx(0.946 * 0.0714, rel=1e-2)
     assert (ratio[1] - ratio[0]) / 100 == pytest.approx(slope[0], rel=1e-2)
     assert ratio[3] - ratio[2] == pytest.approx(1e5 * slope[2])
     pressure = np.array([-1e4, 0.0, 1e3, 5e4, 4e5])
@@ -64,10 +67,12 @@ def test_solid_between_the_tracks_carries_most_of_the_load():
 
 
 def test_guarded_at_a_low_frequency_each_reading_is_its_crossing(model):
-    """I = j w C: noise of 0.1 % of the imaginary part is 0.1 % of C."""
+    """I = j w C: noise of 0.1 % of the imaginary part is 0.1 % of C; undoing the cover's spread makes it more."""
     ratio, slope = model.under(np.array(50e3))
     found = study(model, ArrayReadout(frequency_hz=(100.0,)), 50.0)
-    assert found.sigma_kpa == pytest.approx(np.full((3, 4), float(1e-3 * ratio / slope / 1e3)), rel=1e-3)
+    undone = np.sqrt((np.linalg.inv(model.spread.toarray()) ** 2).sum(1)).reshape(3, 4)
+    assert 1.03 < undone.min() < undone.max() < 1.15
+    assert found.sigma_kpa == pytest.approx(undone * float(1e-3 * ratio / slope / 1e3), rel=1e-3)
     assert found.sigma_n == pytest.approx(found.sigma_kpa * 0.1)  # 100 mm2
     assert found.crosstalk.max() < 1e-3
     four = study(model, ArrayReadout(frequency_hz=(100.0, 101.0, 102.0, 103.0)), 50.0)
@@ -93,6 +98,7 @@ def test_another_network_has_the_same_information_and_crosstalk(model, kind):
         slopes[:, k] = ((read(at + change) - read(at - change)) / (2 * step)).ravel()
     sigma = np.hypot(2e-3 * np.abs(read(at)), 1e-10).reshape(-1, 1)
     rows = np.vstack([(slopes / sigma).real, (slopes / sigma).imag])
+    rows = rows @ model.spread.toarray()
     farad = np.sqrt(np.diag(np.linalg.inv(rows.T @ rows)))
     expected = farad / (model.capacitance.value * float(slope)) / 1e3
     assert found.sigma_kpa.ravel() == pytest.approx(expected, rel=1e-2)
@@ -112,6 +118,15 @@ def test_what_a_fault_hides_is_not_determined(model):
     lead = study(model, ArrayReadout(), 100.0, ["c3:0"])
     assert not lead.determined[:, 2].any()
     assert lead.determined[:, [0, 1, 3]].all()
+
+
+def test_crossings_outside_the_outline_tell_nothing():
+    """Their readings are leads' alone: noise relative to them would let a broken row's be known by them."""
+    corner = model_of("POLYGON ((0 0, 60 0, 60 20, 30 20, 30 40, 0 40, 0 0))")
+    assert not corner.here.all()
+    dark = study(corner, ArrayReadout(), 100.0, ["r1:3"]).determined
+    assert dark[0].tolist() == [True] * 3 + [False] * 3
+    assert dark[1:][corner.here[1:]].all()
 
 
 def test_an_outline_leaves_its_corner_out():

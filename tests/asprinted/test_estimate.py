@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from sensorgen.asprinted import window
-from sensorgen.checks.estimate import Lines, layers, lines
+from sensorgen.checks.estimate import LineLayout, layers, lines
 from sensorgen.core.errors import UnknownName
 from sensorgen.design import design
 from sensorgen.models import columns, fem2d
@@ -270,7 +270,7 @@ def test_the_cell_of_a_print_is_one_period(film_mm):
 
 def test_a_sparse_part_has_its_walls_and_its_share():
     body = Body("plate", "x60", (box(0, 20, 0, 20, 0, 0.1), box(0, 20, 0, 20, 0.1, 0.2)))
-    scene, laid = Scene((body,), (20.0, 20.0, 0.2)), {"x60": Lines(0.5, 1.0, 0.4)}
+    scene, laid = Scene((body,), (20.0, 20.0, 0.2)), {"x60": LineLayout(0.5, 1.0, 0.4)}
     made = layers(scene, tri().machine, tri().layers, "cura-gaps", laid, (0.0, 0.5))
     for layer in made:
         assert layer.region("plate").area == pytest.approx(20 * (2 + 0.4 * 18), rel=0.02)
@@ -291,4 +291,4 @@ def test_lines_of_the_design_decide_what_vanishes():
 def test_cura_5_prints_a_quarter_of_a_line(line, printed):
     """CuraEngine 5.0 prints tips of 0.1 mm with lines of 0.4 mm, and not with its usual ones of 0.44 mm."""
     tip = Scene((Body("tip", "x60", (box(1, 1.1, 0, 6, 0, 0.1),)),), (6.0, 6.0, 0.1))
-    assert bool(layers(tip, tri().machine, tri().layers, "cura-5", {"x60": Lines(line)})[0].regions) is printed
+    assert bool(layers(tip, tri().machine, tri().layers, "cura-5", {"x60": LineLayout(line)})[0].regions) is printed

@@ -16,7 +16,7 @@ from scipy.stats import beta
 
 from sensorgen.analysis.shorts import chance, elsewhere, risk, series, verdicts
 from sensorgen.asprinted.beads import Beads
-from sensorgen.asprinted.pinholes import Film, draws, findings, opened, pinholes, through
+from sensorgen.asprinted.pinholes import CoveredFilm, draws, findings, opened, pinholes, through
 from sensorgen.design.design import make
 from sensorgen.export.gcode import paths
 from sensorgen.measure.log import Log, importing
@@ -36,7 +36,7 @@ def lines(spacing, width, height=0.1, along_x=True, left_out=()):
 
 
 def film(*layers):
-    return Film(PLAN, tuple(range(1, len(layers) + 1)), (0.0, 0.1 * len(layers)), layers)
+    return CoveredFilm(PLAN, tuple(range(1, len(layers) + 1)), (0.0, 0.1 * len(layers)), layers)
 
 
 def test_slits_of_parallel_lines_by_hand():

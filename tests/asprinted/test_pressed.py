@@ -14,7 +14,7 @@ from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.prediction import compression as compressed
 from sensorgen.prediction import compression_law as celllaw
 from sensorgen.prediction.bodies import drawn, estimated, sliced
-from sensorgen.prediction.compression import Asked
+from sensorgen.prediction.compression import PressQuestion
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import build_sensor, piece
 from sensorgen.scene.scene import Body, Prism, Scene, rectangle
@@ -70,7 +70,7 @@ def built(widths, film=0.1):
 
 
 def answered(body, *kpa, tip=None):
-    return compressed.answer(body, Asked((0.0, *kpa), BoundaryConditions(), tip=tip))
+    return compressed.answer(body, PressQuestion((0.0, *kpa), BoundaryConditions(), tip=tip))
 
 
 @needs_mesher
@@ -138,7 +138,7 @@ def test_feet_that_land_are_told_of():
 
 def test_crossed_strips_are_pressed_in_three_dimensions(monkeypatch):
     """On one brick per box: printed strips of 0.68 mm in place of 0.70 give way a little more than drawn."""
-    monkeypatch.setattr(press3d, "Pieces", partial(press3d.Pieces, 1))
+    monkeypatch.setattr(press3d, "BrickCounts", partial(press3d.BrickCounts, 1))
     design = small("rect")
     found, sharp = answered(estimated(design, "arachne"), 100.0), answered(drawn(design), 100.0)
     assert (found.model, found.faults) == ("press3d", ())

@@ -17,7 +17,7 @@ from sensorgen.prediction.bodies import sliced
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.scene.layers import drawn
 from sensorgen.scene.scene import area_mm2
-from sensorgen.solvers.network.nodes import Lines
+from sensorgen.solvers.network.nodes import StraightLines
 
 from .conftest import small
 
@@ -235,7 +235,7 @@ def electrode_lines(design, lines, end):
     start, stop = ((p - middle) * 1e-3 for p in (found.start_mm, found.end_mm))
     meets = np.append(False, (np.abs(start[1:] - stop[:-1]) < 1e-7).all(1))
     meets[1:] &= found.layer[1:] == found.layer[:-1]
-    return Lines(start, stop, found.width_mm * 1e-3, found.height_mm * 1e-3, found.layer, meets)
+    return StraightLines(start, stop, found.width_mm * 1e-3, found.height_mm * 1e-3, found.layer, meets)
 
 
 @pytest.mark.parametrize("degrees", [pytest.param("0", marks=pytest.mark.nightly), "90"])

@@ -72,7 +72,7 @@ def test_every_layer_uses_what_is_deposited(sliced, shape, slicer):
 
 
 @pytest.mark.parametrize("slicer", PROGRAMS)
-@pytest.mark.parametrize("shape", ["cone", "pyramid", "pillar"])
+@pytest.mark.parametrize("shape", ["bump", "cone", "pyramid", "pillar"])
 def test_every_tip_of_the_default_is_printed(sliced, shape, slicer):
     """Tips of 0.5 mm came out at 0.4 of their area by CuraEngine 4.13, and their next layer not at all by 5.0."""
     design, lines, _ = sliced(shape, slicer)

@@ -3,19 +3,10 @@
 import os
 import subprocess
 import sys
-from dataclasses import dataclass
+
+from forks import Done
 
 ADDRESSES = 2 << 30  # bytes: libraries and files on the disk count, too
-
-
-@dataclass
-class Done:
-    """Exit code, what it said, largest resident memory [bytes]."""
-
-    code: int
-    out: str
-    err: str
-    resident: int
 
 
 LAUNCH = """

@@ -1,7 +1,7 @@
 """Damaged files of every kind to every reader: ``python fuzz.py [--count N] [--seed N] [KIND ...]``.
 
 Each file may be read, or refused with a message of ours, in 2 GB of addresses and half a minute of processor; anything
-else is a fault. Every kind has a process of its own, which a fault ends and which is started again after it.
+else is a fault. A fault ends the process, and another one goes on after it.
 """
 
 import argparse
@@ -124,21 +124,24 @@ def late(*_):
     raise TimeoutError(f"more than {SECONDS} s")
 
 
-def work(kind, numbers, seed, folder, results):
-    """Files of one kind, one after the other."""
+def work(jobs, seed, folder, results):
+    """Files by kind and number, one after the other, each with its place in ``jobs``."""
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESSES, ADDRESSES))
     signal.signal(signal.SIGALRM, late)
     folder = Path(folder)
     os.chdir(folder)
-    read, suffix = samples(folder)[kind]
-    content = (folder / f"whole.{kind}").read_bytes()
-    (folder / f"whole{suffix}").write_bytes(content)
-    read(folder / f"whole{suffix}")
-    for number in numbers:
-        results.put((number, "begun", ""))
+    readers = samples(folder)
+    contents = {kind: (folder / f"whole.{kind}").read_bytes() for kind, _ in jobs}
+    for kind, content in contents.items():
+        read, suffix = readers[kind]
+        (folder / f"whole{suffix}").write_bytes(content)
+        read(folder / f"whole{suffix}")
+    for place, (kind, number) in enumerate(jobs):
+        results.put((place, "begun", ""))
+        read, suffix = readers[kind]
         file = folder / f"damaged{number}{suffix}"
-        file.write_bytes(damage.mutated(content, random.Random(f"{seed} {kind} {number}")))
-        results.put((number, *outcome(read, file)))
+        file.write_bytes(damage.mutated(contents[kind], random.Random(f"{seed} {kind} {number}")))
+        results.put((place, *outcome(read, file)))
         file.unlink()
     status = Path("/proc/self/status")  # getrusage counts the parent's memory too
     peak = int(re.search(r"VmHWM:\s+(\d+)", status.read_text(encoding="utf-8"))[1]) >> 10 if status.exists() else 0
@@ -148,30 +151,34 @@ def work(kind, numbers, seed, folder, results):
 KINDS = ("mat", "packed", "hdf5", "csv", "rig", "invert", "gcode", "printer", "quality", "plan", "design")
 
 
-def fuzz(kind, count, seed):
-    """Number of files by what came of them, the faults, and the largest memory [MB]."""
-    spawn, found, faults, peak, begin = multiprocessing.get_context("spawn"), Counter(), [], 0, 0
-    while begin < count:
+def fuzz(jobs, seed):
+    """Number of files by kind and what came of them, the faults, and the largest memory [MB]."""
+    spawn, peak, begin = multiprocessing.get_context("spawn"), 0, 0
+    found = {kind: Counter() for kind, _ in jobs}
+    faults = {kind: [] for kind in found}
+    while begin < len(jobs):
         with tempfile.TemporaryDirectory() as folder:
-            results = spawn.SimpleQueue()
-            process = spawn.Process(target=work, args=(kind, range(begin, count), seed, folder, results))
+            results, left, first = spawn.SimpleQueue(), jobs[begin:], begin
+            process = spawn.Process(target=work, args=(left, seed, folder, results))
             process.start()
             while process.is_alive() or not results.empty():
                 if not results.empty():
-                    number, what, said = results.get()
+                    place, what, said = results.get()
+                    kind, number = left[place]
                     if what == "peak":
                         peak = max(peak, int(said))
                     elif what == "begun":
-                        begin = number + 1
+                        begin = first + place + 1
                     else:
-                        found[what] += 1
-                        faults += [f"{kind} {number}: {said}"] if what == "fault" else []
+                        found[kind][what] += 1
+                        faults[kind] += [f"{kind} {number}: {said}"] if what == "fault" else []
                 else:
                     process.join(0.01)
         if process.exitcode:
-            found["fault"] += 1
-            faults.append(f"{kind} {begin - 1}: the process ended with {process.exitcode}")
-    return {"kind": kind, **found, "resident_mb": peak, "faults": faults}
+            kind, number = jobs[begin - 1]
+            found[kind]["fault"] += 1
+            faults[kind].append(f"{kind} {number}: the process ended with {process.exitcode}")
+    return {kind: {"kind": kind, **found[kind], "resident_mb": peak, "faults": faults[kind]} for kind in found}
 
 
 def main():
@@ -183,7 +190,7 @@ def main():
     given = options.parse_args()
     bad = False
     for kind in given.kinds or KINDS:
-        result = fuzz(kind, given.count, given.seed)
+        result = fuzz([(kind, number) for number in range(given.count)], given.seed)[kind]
         bad |= bool(result["faults"])
         print(json.dumps(result), flush=True)
     return int(bad)

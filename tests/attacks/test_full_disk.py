@@ -1,9 +1,7 @@
 """A log on a full or read-only file system is read like any other; what cannot be logged is said."""
 
 import os
-import resource
 import shutil
-import signal
 import sqlite3
 import subprocess
 import sys
@@ -30,22 +28,8 @@ def path(tmp_path):
     return path
 
 
-def full():
-    """No file may grow, as on a full disk."""
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-
-
-def sensorgen(*words, **how):
-    # a pipe: the limit of files does not concern it; it would truncate bytecode
-    env = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
-    return subprocess.run(
-        [sys.executable, "-m", "sensorgen", *words], capture_output=True, encoding="utf-8", check=False, env=env, **how
-    )
-
-
 @pytest.mark.parametrize("unmerged", [False, True], ids=["checkpointed", "rows in the write-ahead log"])
-def test_a_full_disk_lets_read_and_says_what_is_not_logged(path, unmerged):
+def test_a_full_disk_lets_read_and_says_what_is_not_logged(path, unmerged, forked, tmp_path):
     if unmerged:  # as a killed program leaves it: the last row is in the write-ahead log alone
         copy = path.parent / "copy"
         copy.mkdir()
@@ -63,14 +47,14 @@ def test_a_full_disk_lets_read_and_says_what_is_not_logged(path, unmerged):
             assert without.execute("SELECT count(*) FROM record WHERE specimen = 'S7'").fetchone() == (0,)
     expected = ["S0", "S1", "S2", *(["S7"] if unmerged else [])]
     for command in COMMANDS:
-        done = sensorgen("log", command, "--log", str(path), preexec_fn=full)
-        assert (done.returncode, done.stderr) == (0, ""), done
+        done = forked("log", command, "--log", path, cwd=tmp_path, FSIZE=0)
+        assert (done.code, done.err) == (0, ""), done
         if command == "list":
-            assert [name for name in (*expected, "S8") if name in done.stdout] == expected
-    done = sensorgen("log", "add", "23 triX", "--y", "680", "--log", str(path), preexec_fn=full)
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "nothing was logged" in done.stderr, done.stderr
+            assert [name for name in (*expected, "S8") if name in done.out] == expected
+    done = forked("log", "add", "23 triX", "--y", "680", "--log", path, cwd=tmp_path, FSIZE=0)
+    assert done.code == 2
+    assert done.err.count("\n") == 1
+    assert "nothing was logged" in done.err, done.err
 
 
 @pytest.mark.skipif(os.name == "nt" or os.getuid() != 0, reason="only root can mount, and become another user")

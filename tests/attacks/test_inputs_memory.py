@@ -6,7 +6,7 @@ import zlib
 import h5py
 import numpy as np
 import pytest
-from child import refused, run
+from child import ADDRESSES, refused
 
 MOST = 512 << 20  # bytes, resident
 HEAD = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
@@ -30,23 +30,23 @@ def csv(path, time_s, z):
 
 
 @pytest.mark.parametrize("days", [7])
-def test_a_pause_costs_no_memory(tmp_path, days):
+def test_a_pause_costs_no_memory(forked, tmp_path, days):
     t, z = readings(5000)
     file = csv(tmp_path / "pause.csv", np.concatenate([t[:2500], t[2500:] + days * DAY_S]), z)
-    assert "2 parts" in refused(run("bench", "show", file, cwd=tmp_path))
+    assert "2 parts" in refused(forked("bench", "show", file, cwd=tmp_path, AS=ADDRESSES))
     for part in (1, 2):
-        done = run("bench", "show", file, "--part", part, cwd=tmp_path)
+        done = forked("bench", "show", file, "--part", part, cwd=tmp_path, AS=ADDRESSES)
         assert (done.code, done.err) == (0, "")
         assert f"part {part}, from" in done.out
         assert done.resident < MOST
     assert f"after a pause of {days * DAY_S + 1 / 140:.6g} s" in " ".join(done.out.split())
 
 
-def test_an_hour_in_steps_of_a_nanosecond_is_refused(tmp_path):
+def test_an_hour_in_steps_of_a_nanosecond_is_refused(forked, tmp_path):
     t = np.cumsum(np.where(np.arange(3000) % 2, 1e-9, 500.0))
     rows = [f"{a!r},1,1" for a in t.tolist()]
     (tmp_path / "odd.csv").write_text("time_s,re_ohm_1kHz,im_ohm_1kHz\n" + "\n".join(rows) + "\n")
-    done = run("bench", "show", tmp_path / "odd.csv", cwd=tmp_path)
+    done = forked("bench", "show", tmp_path / "odd.csv", cwd=tmp_path, AS=ADDRESSES)
     assert done.resident < MOST
     assert done.code in (0, 2)
     assert "Traceback" not in done.err
@@ -87,20 +87,22 @@ def zeros(count):
     ],
     ids=["packed", "declared", "cells", "text", "axes"],
 )  # fmt: skip
-def test_matlab_bombs_are_refused(tmp_path, pieces, said):
+def test_matlab_bombs_are_refused(forked, tmp_path, pieces, said):
     content = b"".join(pieces) if isinstance(pieces, list) else packed(pieces)
     (tmp_path / "bomb.mat").write_bytes(HEAD + content)
-    done = run("bench", "show", tmp_path / "bomb.mat", cwd=tmp_path)
+    done = forked("bench", "show", tmp_path / "bomb.mat", cwd=tmp_path, AS=ADDRESSES)
     assert said in refused(done)
     assert done.resident < MOST
 
 
-def test_packed_variables_that_nobody_asked_for_stay_packed(tmp_path):
+def test_packed_variables_that_nobody_asked_for_stay_packed(forked, tmp_path):
     junk = packed(
         [struct.pack("<II", 14, 0xFFFFFF), matrix(b"junk", (1, 1 << 21), struct.pack("<II", 9, 1 << 24)), b"\0" * 99]
     )
     (tmp_path / "junk.mat").write_bytes(HEAD + junk * 1000)
-    assert "impedance_data is missing" in refused(run("bench", "show", tmp_path / "junk.mat", cwd=tmp_path))
+    assert "impedance_data is missing" in refused(
+        forked("bench", "show", tmp_path / "junk.mat", cwd=tmp_path, AS=ADDRESSES)
+    )
 
 
 def bomb(path, what):
@@ -126,14 +128,14 @@ def bomb(path, what):
     [("zeros", "4 GB unpacked"), ("packed", "no measurement"), ("chunk", "expected chunks up to 64 MB"),
      ("references", "impedance_data is a list of 1000"), ("texts", "no measurement|texts")],
 )  # fmt: skip
-def test_hdf5_bombs_are_refused(tmp_path, what, said):
+def test_hdf5_bombs_are_refused(forked, tmp_path, what, said):
     bomb(tmp_path / "bomb.h5", what)
-    done = run("bench", "show", tmp_path / "bomb.h5", cwd=tmp_path)
+    done = forked("bench", "show", tmp_path / "bomb.h5", cwd=tmp_path, AS=ADDRESSES)
     assert any(word in refused(done) for word in said.split("|")), done.err
     assert done.resident < MOST
 
 
-def test_long_rows_are_read_in_small_blocks(tmp_path):
+def test_long_rows_are_read_in_small_blocks(forked, tmp_path):
     """Each of a quarter of a megabyte, as many as the block has rows."""
     names = ",".join(f"x{k}" for k in range(40_000))
     row = "1," * 40_000
@@ -141,18 +143,18 @@ def test_long_rows_are_read_in_small_blocks(tmp_path):
         file.write(f"time_s,re_ohm_1kHz,im_ohm_1kHz,{names}\n")
         for k in range(600):
             file.write(f"{k},1,{k % 7},{row[:-1]}\n")
-    done = run("bench", "show", tmp_path / "wide.csv", cwd=tmp_path)
+    done = forked("bench", "show", tmp_path / "wide.csv", cwd=tmp_path, AS=ADDRESSES)
     assert done.code in (0, 2), done.err
     assert "Traceback" not in done.err
     assert done.resident < MOST
 
 
-def test_aliases_and_depths_of_yaml_are_refused(tmp_path):
+def test_aliases_and_depths_of_yaml_are_refused(forked, tmp_path):
     levels = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"]
     levels += [f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 10)}]" for k in range(1, 12)]
     for name, text in (("laughs", "\n".join(levels)), ("deep", "a: " + "[" * 40_000), ("wide", "a: [" + "1," * 60_000)):
         (tmp_path / f"{name}.yaml").write_text(text)
         for words in (("check",), ("batch",)):
-            done = run(*words, tmp_path / f"{name}.yaml", cwd=tmp_path)
+            done = forked(*words, tmp_path / f"{name}.yaml", cwd=tmp_path, AS=ADDRESSES)
             refused(done)
             assert done.resident < MOST

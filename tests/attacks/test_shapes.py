@@ -141,7 +141,7 @@ def test_a_kernel_that_confines_nothing_runs_nothing(monkeypatch, tmp_path):
     with pytest.raises(
         BadInput, match=r"zig.py: Unconfined: did not run, since this kernel does not confine it .*seccomp"
     ):
-        shape_files._Process("zig", text)
+        shape_files._ShapeProcess("zig", text)
     assert not (tmp_path / "ran").exists()
 
 
@@ -169,7 +169,7 @@ def test_no_attack_succeeds(victims, user, monkeypatch, record_property):
         as_nobody = partial(subprocess.Popen, **NOBODY)
         monkeypatch.setattr(shape_files.subprocess, "Popen", as_nobody)
     shape_files.trust("zig", text())
-    process = shape_files._Process("zig", text())
+    process = shape_files._ShapeProcess("zig", text())
     success, tried = worked(process.about["about"])
     process.close()
     kinds = Counter(kind for kind, _ in tried.values())

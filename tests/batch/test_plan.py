@@ -14,7 +14,7 @@ from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownN
 from sensorgen.design import design
 from sensorgen.workflows.batch import arranged
 from sensorgen.workflows.batch.pieces import pieces, shuffled, tools
-from sensorgen.workflows.batch.plan import Item, Plan, load
+from sensorgen.workflows.batch.plan import BatchPlan, Item, load
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "docs" / "examples" / "film-study.yaml"
@@ -196,7 +196,7 @@ def test_the_page_shows_the_example_and_every_key_of_a_plan():
     page = (ROOT / "docs" / "batch.md").read_text("utf-8")
     shown = page.partition("```yaml\n")[2].partition("```")[0]
     assert EXAMPLE.read_text("utf-8").partition("\n")[2] == shown
-    assert not [key for key in Plan.model_fields if f"`{key}`" not in page]
+    assert not [key for key in BatchPlan.model_fields if f"`{key}`" not in page]
 
 
 SCALARS = st.one_of(
@@ -204,7 +204,7 @@ SCALARS = st.one_of(
     st.sampled_from(["tri", "rect", "reference", "prusa", "cura", "column", "packed", "etpu", "x60", "../x.yaml"]),
 )  # fmt: skip
 KEYS = st.one_of(
-    st.sampled_from([*Plan.model_fields, *Item.model_fields, "spacing_mm", "lot", "hours"]), st.text(max_size=5)
+    st.sampled_from([*BatchPlan.model_fields, *Item.model_fields, "spacing_mm", "lot", "hours"]), st.text(max_size=5)
 )
 TREES = st.recursive(
     SCALARS,

@@ -12,7 +12,7 @@ from sensorgen.core.errors import MissingValue
 from sensorgen.design.design import make
 from sensorgen.design.specimen_name import named, parse
 from sensorgen.workflows.batch import sheet
-from sensorgen.workflows.batch.pieces import Piece, pieces
+from sensorgen.workflows.batch.pieces import PrintPiece, pieces
 from sensorgen.workflows.batch.plan import load
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "film-study.yaml"
@@ -60,7 +60,7 @@ def test_every_code_reads_as_its_label_says():
 def test_the_page_needs_nothing_else_and_holds_text_as_text():
     design = make({"shape": "tri"}).model_copy(update={"name": "<b>&"})
     page = sheet.page(
-        [sheet.Label.of(Piece(named(design, 26, 1), design, design.id()), "a", 1)], '<script>alert("x")</script>'
+        [sheet.Label.of(PrintPiece(named(design, 26, 1), design, design.id()), "a", 1)], '<script>alert("x")</script>'
     )
     assert "<script" not in page
     assert "<i>" not in sheet.page([sheet.Label("<i>26", "<i>b", "<i>c", "<i>d", 1)], "a")

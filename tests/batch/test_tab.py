@@ -5,7 +5,7 @@ import pytest
 
 from sensorgen.core.errors import BadInput
 from sensorgen.design import design
-from sensorgen.design.specimen_name import Specimen, parse
+from sensorgen.design.specimen_name import SpecimenName, parse
 from sensorgen.scene import lettering
 from sensorgen.scene.geometry import meshes
 from sensorgen.workflows.batch import arranged, tab
@@ -104,7 +104,7 @@ def test_every_name_of_the_grammar_can_be_written():
     for shape in ("tri", "rect", "reference", "double"):
         for slicing in ("", "fine", "x fine", "xtrafine"):
             axes = {"tri": "Y", "rect": "XY"}.get(shape, "")
-            name = Specimen(1234567890 % 9999, shape, axes, 0.123457, 9876, slicing, "m").name
+            name = SpecimenName(1234567890 % 9999, shape, axes, 0.123457, 9876, slicing, "m").name
             assert tab.bodies(sensor, parse(name).name)
 
 

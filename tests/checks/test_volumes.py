@@ -3,7 +3,7 @@
 import pytest
 import shapely
 
-from sensorgen.checks.volumes import Row, findings, rows
+from sensorgen.checks.volumes import LayerVolume, findings, rows
 from sensorgen.design.design import make
 from sensorgen.scene.layers import drawn
 from sensorgen.scene.scene import Body, Scene, box
@@ -61,5 +61,5 @@ def test_lost_support_is_no_error(material, severity):
     """It is washed out in the end: what it would have held up is another rule's."""
     name = "support" if material == "bvoh" else "film"
     scene = Scene((Body(name, material, (box(0, 1, 0, 1, 0, 0.1),)),), (1.0, 1.0, 0.1))
-    row = Row(name, 1, 0.0, 0.1, 0.1, 0.0, 1, 1, 0, (0.0, 0.0))
+    row = LayerVolume(name, 1, 0.0, 0.1, 0.1, 0.0, 1, 1, 0, (0.0, 0.0))
     assert [f.severity for f in findings([row], scene)] == [severity]

@@ -95,6 +95,17 @@ def real(start):
 
 
 @pytest.fixture
+def fork(forked, tmp_path):
+    """As ``real``, of a process whose begin and modules are not the point: a fork of one that has loaded them."""
+
+    def call(*words, before="pass"):
+        done = forked(*words, cwd=tmp_path, before=before, env={"COLUMNS": "80"})
+        return Said(done.code, done.out, done.err)
+
+    return call
+
+
+@pytest.fixture
 def loaded(tmp_path):
     """Run commands one after another in one fresh interpreter; exit code of each, and all modules loaded by then."""
 

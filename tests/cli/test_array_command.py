@@ -22,9 +22,9 @@ def file(tmp_path):
 def test_it_says_what_is_resolved(run, file):
     said = run("array", file, "--frequencies", "10kHz", "--fault", "c3:0")
     assert said.code == 0, said.err
-    for words in ("3 rows x 4 columns, 12 crossings", "+11.2 % at 100 kPa", "guarded, through 50 ohm, 10 kHz",
-                  "3 of 12 crossings are not determined", "extrapolated: 100 kPa exceeds 64 kPa", "left out: fringe",
-                  "contact resistance"):  # fmt: skip
+    for words in ("3 rows x 4 columns, 12 crossings", "+10.6 % at 100 kPa", "guarded, through 50 ohm, 10 kHz",
+                  "3 of 12 crossings are not determined", "extrapolated: 100 kPa exceeds 64 kPa",
+                  "edges of the tracks are 21.3 %", "contact resistance"):  # fmt: skip
         assert words in said.words
     assert "share a factor 0.15 to 1.6: stiffness by its sources" in said.words
     data = json.loads(run("array", file, "--json", "--pressure", "50").out)
@@ -34,9 +34,12 @@ def test_it_says_what_is_resolved(run, file):
 
 
 def test_a_virtual_step_is_inverted(run, file, tmp_path):
-    said = run("array", file, "--simulate", "step.npz", "--plot", ".")
+    said = run("array", file, "--simulate", "step.npz", "--plot", ".", "--p-short", "1%")
     assert said.code == 0, said.err
     assert (tmp_path / "a-array.png").is_file()
+    assert "88.6 % of prints have no short at P(short) 0.01 of a crossing" in said.words  # 0.99^12
+    page = (tmp_path / "a-array.html").read_text()
+    assert all(words in page for words in ("Resolution of a", "r2:2", "r2c2", "a foot", "told apart"))
     said = run("invert", file, "step.npz", "-o", "maps.npz", "--plot", ".")
     assert said.code == 0, said.err
     assert "60, inverted by" in said.words

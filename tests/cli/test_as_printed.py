@@ -17,6 +17,7 @@ def predicted(run, *words):
     return json.loads(run("predict", *words, "--json").out)
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_predict_shows_the_print_beside_the_drawing(run):
     said = run("predict", *SMALL, "--dielectric", "0.1", "--walls", "classic")
     assert (said.code, said.err) == (0, "")
@@ -25,6 +26,7 @@ def test_predict_shows_the_print_beside_the_drawing(run):
     assert " ".join(gap.split()) == "electrode gap 0.1 mm 0.3 mm (0.28 to 0.32)"
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_the_drawing_alone(run):
     said = run("predict", *SMALL, "--drawn")
     assert "printed" not in said.out.splitlines()[1]
@@ -53,6 +55,7 @@ def test_a_sliced_file_of_this_very_design_is_the_body(tmp_path):
     assert default_body(design, tmp_path).kind == "estimated"
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_a_plate_prints_as_drawn(run):
     found = predicted(run, "reference", "--size", "12x8")
     assert found["gap"]["value"] == pytest.approx(6e-4) == found["drawn"]["gap"]["value"]
@@ -66,6 +69,7 @@ def test_the_gap_is_that_of_any_two_electrodes(run):
     assert found["reason"].count("more than two electrodes") == 1  # the same reason of all models once
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_all_walls_are_in_the_range_of_the_print(run):
     found = predicted(run, *SMALL, "--dielectric", "0.1")["gap"]
     design = make({"shape": "tri", "parameters": {"length_mm": 12, "width_mm": 8, "dielectric_mm": 0.1}})
@@ -135,6 +139,7 @@ def test_the_drawing_has_printed_outlines_and_rule_7(run):
     assert "7-printed" in printed
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_a_build_is_compensated(run, contents, tmp_path):
     said = run("build", *SMALL, "--dielectric", "0.2", "--no-cad", "--compensate", "print", "--force")
     assert said.code in (0, 1)
@@ -146,10 +151,12 @@ def test_a_build_is_compensated(run, contents, tmp_path):
     assert (found["compensated"][0]["before"], found["compensated"][0]["after"]) == (0.0, 0.2)
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_nothing_to_compensate(run):
     assert "nothing to change" in run("build", "reference", "--size", "12x8", "--no-cad", "--compensate", "print").err
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_the_print_by_any_file(run, program, tmp_path):
     program("prusa-slicer", "prusa-slicer")
     words = [*SMALL, "--dielectric", "0.1"]

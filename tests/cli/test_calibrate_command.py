@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sensorgen.analysis import calibration
+import in_process
 from sensorgen.measure.log import Log, binding
 from sensorgen.measure.log.bench import log_recording
-from sensorgen.prediction.bodies import drawn as drawn_body
 from virtual_specimen import TONES_HZ, drawn, recorded, session, write_csv
 
 DESIGN = "shape: tri\nname: mine\nparameters:\n  dielectric_mm: 0.2\n"
@@ -20,7 +19,7 @@ TRUTH = drawn(3)
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A log with a specimen of an own design and one run of known presses, and one that is calibrated, too."""
+    """A log with a specimen of an own design and one run of known presses, and a calibrated one, with its page."""
     folder = tmp_path_factory.mktemp("bench")
     (folder / "mine.yaml").write_text(DESIGN)
     recorded(TRUTH, folder, 24, 1)
@@ -28,9 +27,12 @@ def made(tmp_path_factory):
         binding.bind(log, ["S1"], str(folder / "mine.yaml"))
         log_recording(log, "S1", folder / "run-lcr.csv", folder / "run-rig.csv")
     shutil.copytree(folder, folder / "calibrated")
-    with Log(folder / "calibrated" / "log.db") as log:
-        one = calibration.calibrate(log, ["S1"], calibration.Bench(tip_m=5e-3), body_of=drawn_body)
-        log.add(calibration.rows(log, [one[0].calibration]))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SENSORGEN_LOG", str(folder / "calibrated" / "log.db"))
+        words = ("calibrate", "S1", "--tip", "5mm", "--drawn", "--page", "cal.html", "--source", "s1.yaml")
+        code, said = in_process.run(folder / "calibrated", *words)
+    assert code == 0
+    (folder / "calibrated" / "said.txt").write_text(said, "utf-8")
     return folder
 
 
@@ -59,7 +61,9 @@ def told_before():
 def alone(bench, told_before):
     """The record of a calibration by known presses alone, which no test changes."""
     if not told_before:
-        told_before |= json.loads(bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--dry-run", "--json").out)
+        said = bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--dry-run", "--json")
+        assert (said.code, said.err) == (0, "")
+        told_before |= json.loads(said.out)
     return told_before
 
 
@@ -87,17 +91,20 @@ def covered(found, name, unit):
     return ((low <= true) & (true <= high)).mean()
 
 
-def test_from_files_of_the_bench_to_force_and_place(bench, tmp_path):
-    said = bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--page", "cal.html")
-    assert (said.code, said.err) == (0, "")
-    assert "S1, design mine: calibrated by 24 known presses" in said.words
-    assert "of 24 forces and" in said.words
-    page = (tmp_path / "cal.html").read_text()
+def said_by_calibrate(folder):
+    return " ".join((folder / "calibrated" / "said.txt").read_text("utf-8").split())
+
+
+def test_from_files_of_the_bench_to_force_and_place(after, tmp_path):
+    said = said_by_calibrate(tmp_path)
+    assert "S1, design mine: calibrated by 24 known presses" in said
+    assert "of 24 forces and" in said
+    page = (tmp_path / "calibrated" / "cal.html").read_text()
     assert all(
         words in page for words in ("Calibration of S1", "each press found again from the others", "what was learnt")
     )
     unseen(tmp_path / "m.csv")
-    said = bench("invert", "S1", "m.csv", "-o", "o.csv")
+    said = after("invert", "S1", "m.csv", "-o", "o.csv")
     assert (said.code, said.err) == (0, "")
     assert "S1: 100 readings under load (100 at rest)" in said.words
     found = rows(tmp_path / "o.csv")
@@ -287,11 +294,10 @@ def test_readings_that_no_specimen_has_are_named(bench):
 
 
 def test_values_of_materials_are_told_and_become_a_source(bench, alone, tmp_path):
-    said = bench("calibrate", "S1", "--tip", "5mm", "--drawn", "--source", "s1.yaml", "--dry-run")
-    assert (said.code, said.err) == (0, "")
-    assert "material values of this specimen, 95 %" in said.words
-    assert "x60: " not in said.words
-    text = (tmp_path / "s1.yaml").read_text("utf-8")
+    said = said_by_calibrate(tmp_path)
+    assert "material values of this specimen, 95 %" in said
+    assert "x60: " not in said
+    text = (tmp_path / "calibrated" / "s1.yaml").read_text("utf-8")
     assert "resistivity_ohm_m: {value: " in text
     found = alone["materials"]
     assert [one["quantity"] for one in found] == ["resistivity_ohm_m", "relative_permittivity", "youngs_modulus_pa"]

@@ -96,7 +96,7 @@ def test_boxes_are_pressed_in_three_dimensions(run, monkeypatch):
     """On one brick per box: within 8 % of the solution, and below the bound of springs."""
     from sensorgen.models import press3d
 
-    monkeypatch.setattr(press3d, "Pieces", partial(press3d.Pieces, 1))
+    monkeypatch.setattr(press3d, "BrickCounts", partial(press3d.BrickCounts, 1))
     found = json.loads(run("compress", "rect", "--drawn", "--dielectric", "0.1", "--stress", "100", "--json").out)
     assert (found["model"], found["converged_kpa"], found["faults"]) == ("press3d", 100.0, [])
     assert found["displacement_um"][1] == pytest.approx(6.56, rel=0.08)

@@ -383,7 +383,7 @@ def test_designs_that_do_not_fit_their_bodies_are_refused(run, plates, change, l
         make(load(Path("a.yaml")).model_dump(mode="json") | change)
 
 
-@pytest.mark.usefixtures("shared_kernel")
+@pytest.mark.usefixtures("shared_kernel", "at_rest")
 def test_rounded_corners_cost_the_resistance_alone(run, models):
     """Of the plate without its corners; the electrodes reach no end face, which is said, with its exit code."""
     assert run("import", models / "rounded.step", "--map", "pad=x60@1", "--map", "*=etpu@2").code == 0
@@ -397,7 +397,7 @@ def test_rounded_corners_cost_the_resistance_alone(run, models):
     assert "capacitance" in text and "no resistance: the" in text  # noqa: PT018
 
 
-@pytest.mark.usefixtures("shared_kernel", "unpressed")
+@pytest.mark.usefixtures("shared_kernel", "unpressed", "at_rest")
 def test_the_whole_walk_in_an_empty_folder(run, models, program):
     """From a STEP of another program to a sliced print, with commands alone."""
     program("prusa-slicer", "prusa-slicer")
@@ -425,7 +425,7 @@ ELLIPSE = (
 )
 
 
-@pytest.mark.usefixtures("unpressed")
+@pytest.mark.usefixtures("unpressed", "at_rest")
 def test_a_sensor_cut_to_an_outline_is_sliced_and_predicted(run, program):
     """The skirt follows the outline into the corners of its box, which is no collision."""
     program("prusa-slicer", "prusa-slicer")

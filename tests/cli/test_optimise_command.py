@@ -21,7 +21,7 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import Query
 from sensorgen.workflows.optimise import ladder, recommend, result
-from sensorgen.workflows.optimise.result import Recommended, Spread
+from sensorgen.workflows.optimise.result import ObjectiveSpread, Recommended
 from sensorgen.workflows.optimise.sample import _objectives, sample
 from sensorgen.workflows.optimise.search import Row, Searched, search
 from sensorgen.workflows.optimise.space import MOST, Candidate, candidates, space
@@ -50,6 +50,7 @@ def found(**changes):
     return search(wanted, candidates(wanted))
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_the_front_is_that_of_a_plain_loop():
     """Every plate evaluated by itself, each pair of them compared."""
     values = {}
@@ -69,6 +70,7 @@ def test_the_front_is_that_of_a_plain_loop():
     assert len(search_.evaluated) + sum(bool(row.discarded) for row in search_.rows) == 6
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_a_planted_optimum_is_found():
     """The film whose plate capacitor is nearest to a capacitance, by the closed form."""
     films = [k / 10 for k in range(1, 13)]
@@ -108,6 +110,7 @@ def test_sensitivity_on_the_coarse_mesh_is_that_of_a_bonded_plate():
     assert of.lower == of.upper == pytest.approx(((1 - low) / (1 - high) - 1) / 900, rel=0.04)
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_limits_are_proven_before_anything_is_evaluated():
     search_ = found(limits={"capacitance_pf": {"most": 150}})
     assert {row.candidate.values["dielectric_mm"] for row in search_.evaluated} <= {0.3, 0.4}
@@ -135,6 +138,7 @@ def test_of_the_nearest_design_the_numbers_are_told():
     assert re.search(r"violates limit force_resolution_n \(.*capacitance_pf \d", words)
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_a_search_that_is_stopped_goes_on_where_it_was(monkeypatch):
     wanted, tried = target(parameters={"dielectric_mm": {"from": 0.1, "to": 0.4}}), []
     trial = ladder.trial
@@ -157,7 +161,9 @@ def test_discards_on_a_coarse_mesh_hold_or_are_taken_back(monkeypatch):
 
     def lying(design, query, solve):
         film = design.params.dielectric_mm
-        return {"force_resolution_n": ladder.Known(film if film != 0.4 else 9.0, film if film != 0.4 else 9.0, False)}
+        return {
+            "force_resolution_n": ladder.EarlyNumber(film if film != 0.4 else 9.0, film if film != 0.4 else 9.0, False)
+        }
 
     monkeypatch.setattr(ladder, "known", lying)
     search_ = found(objectives={"force_resolution_n": "minimise"})
@@ -206,6 +212,7 @@ def test_a_bad_target_is_one_line(changes, error, words):
     assert "\n" not in str(said.value)
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_a_length_in_the_plane_is_varied_in_half_lines():
     """C of plates is proportional to their length: the planted one of the half lines from 40 to 41 mm is found."""
     line_mm = make({"shape": "reference"}).machine.line_mm()
@@ -291,7 +298,7 @@ def test_ties_and_what_cannot_be_sensed_are_shown(plate):
         (">", 1.0, 0.5, "cannot locate", *answer.table().cells[0][5:]),
         ("=", 2.0, 0.51, "cannot locate", *answer.table().cells[1][5:]),
     ]
-    robust = {"position_resolution_mm": Spread(20, 20, 50, 60)}
+    robust = {"position_resolution_mm": ObjectiveSpread(20, 20, 50, 60)}
     sliced = {"force_resolution_n": Bounds.of(0.55, "N"), "position_resolution_mm": Bounds.of(50, "mm")}
     one = Recommended("best force", answer.front[0], ties=(2,), robust=robust, sliced=sliced, slicer="Prusa 2")
     shown = list(text(replace(answer, recommended=(one,)).document()))
@@ -310,6 +317,7 @@ def test_a_huge_space_is_refused_with_its_size():
         candidates(target(parameters=parameters))
 
 
+@pytest.mark.usefixtures("at_rest")
 @pytest.mark.parametrize("counts", [(6, 4), pytest.param((72, 48), marks=pytest.mark.nightly)])
 def test_a_sample_of_a_huge_space_proves_nothing(counts):
     """Millions of plates; of those that were tried the one with the best C is the best, by the plate capacitor."""
@@ -337,6 +345,7 @@ def test_a_sample_of_a_huge_space_proves_nothing(counts):
     assert f"nothing is proven: of {counts[0]} designs tried of" in result.result("plates", first).proof()
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_a_sample_of_a_small_space_is_the_space():
     pytest.importorskip("optuna")
     wanted = target()
@@ -355,6 +364,7 @@ def test_the_example_of_the_page_is_a_target(tmp_path):
     assert load(Path(__file__).parents[2] / "bench" / "best-tri.yaml").refuse_warnings == ("2-film",)
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_the_best_are_built_and_the_page_needs_nothing_else(tmp_path, run):
     (tmp_path / "plates.yaml").write_text(json.dumps(PLATES))
     said = run("optimise", "plates.yaml", "--no-gcode", "--jobs", "1")

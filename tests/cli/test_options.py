@@ -232,9 +232,9 @@ def test_waived_findings_do_not_stop_a_build(run, tmp_path):
 
 
 def test_a_share_may_be_given_in_percent():
-    from sensorgen.cli.words import Share
+    from sensorgen.cli.words import ShownShare
     from sensorgen.core.errors import BadInput
 
-    assert Share().convert("20%", None, None) == Share().convert("0.2", None, None) == 0.2
+    assert ShownShare().convert("20%", None, None) == ShownShare().convert("0.2", None, None) == 0.2
     with pytest.raises(BadInput, match=r"expected 0\.2 or 20%"):
-        Share().convert("much", None, None)
+        ShownShare().convert("much", None, None)

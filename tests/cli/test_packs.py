@@ -649,6 +649,7 @@ def test_the_commands_of_the_page(run, here):
     assert run("check", "design.yaml").code == 0
 
 
+@pytest.mark.usefixtures("at_rest", "shared_cache")
 def test_a_synced_log_is_reported_where_its_shape_is_not_trusted(run, here, monkeypatch):
     """Nothing of it runs; the report is of all else, and names what to trust, by the file's own SHA-256."""
     shape = put(here, "shape", "zig")
@@ -673,6 +674,7 @@ def test_a_synced_log_is_reported_where_its_shape_is_not_trusted(run, here, monk
     assert "another version of sensorgen" not in Path("r.md").read_text("utf-8")
 
 
+@pytest.mark.usefixtures("at_rest", "shared_cache")
 def test_a_synced_log_is_reported_whole_once_its_shape_is_trusted(run, here, monkeypatch):
     shape = put(here, "shape", "zig")
     Path("z.yaml").write_text("shape: zig\n", "utf-8")

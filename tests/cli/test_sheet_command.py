@@ -10,7 +10,7 @@ import pytest
 
 from sensorgen.cli import show
 from sensorgen.core.document import text
-from sensorgen.models.sheet import Patch, Sheet
+from sensorgen.models.sheet import Sheet, SheetPatch
 from sensorgen.prediction.sheet_study import SheetStudy
 
 WORDS = ("sheet", "reference", "--size", "60x60", "--frequencies", "100kHz,1MHz")
@@ -149,6 +149,8 @@ def test_columns_stay_apart_whatever_the_errors(length_m, words):
         best_tones=lambda: np.array([0]), located=lambda: 1.0, verdict=lambda: "",
     )  # fmt: skip
     sheet = Sheet(0.1, 0.1, (450.0, 450.0), 7e-8)
-    found = SheetStudy(sheet, Patch(0.0, 0.0, 0.01, 0.01, 1.1), {}, {"two-edges": found, "b": found}, 6.0, 1e-3, ())
+    found = SheetStudy(
+        sheet, SheetPatch(0.0, 0.0, 0.01, 0.01, 1.1), {}, {"two-edges": found, "b": found}, 6.0, 1e-3, ()
+    )
     row = next(line for line in text(found.document()) if line.startswith("two-edges  "))
     assert re.split("  +", row) == ["two-edges", "∞", words, words, "100", "100 kHz"]

@@ -6,8 +6,8 @@ import pytest
 
 from sensorgen.verification import thesis
 from sensorgen.verification.thesis.items import chapter
-from sensorgen.verification.thesis.reproduced import Row, row
-from sensorgen.verification.thesis.verdicts import UNEXPLAINED, Verdict
+from sensorgen.verification.thesis.reproduced import ReproducedItem, row
+from sensorgen.verification.thesis.verdicts import UNEXPLAINED, ItemVerdict
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def test_a_format_alone(run, few, tmp_path):
 
 
 def test_what_nobody_can_explain_is_told_and_ends_with_1(run, few, monkeypatch):
-    bad = Row("C", "equation", few[0].item, few[0].parts, Verdict(UNEXPLAINED, "(off: C 3 % more)"))
+    bad = ReproducedItem("C", "equation", few[0].item, few[0].parts, ItemVerdict(UNEXPLAINED, "(off: C 3 % more)"))
     monkeypatch.setattr(thesis, "rows", lambda _: [bad, *few[1:]])
     said = run("thesis")
     assert said.code == 1

@@ -15,7 +15,6 @@ import pytest
 SIZE = {"length_mm": 6.0, "width_mm": 6.0}
 BUILD = ("build", "tri", "--size", "6x6", "--no-cad", "--force", "--name", "x")  # forced, as a print of tri loses tips
 OLD, NEW = ("--period", "2"), ("--period", "2.5")
-NO_BYTECODE = {"PYTHONDONTWRITEBYTECODE": "1"}  # that a limit on sizes would truncate, for whoever imports it later
 pytestmark = pytest.mark.usefixtures("shared_cache")  # what is written counts, not how it is found
 
 
@@ -151,19 +150,19 @@ def test_disk_full(run, disk, contents, both):
 
 @pytest.mark.skipif(os.name == "nt", reason="no file size limits on Windows")
 @pytest.mark.parametrize("limit", [0, 3_000])
-def test_a_write_that_breaks_off(real, built, contents, both, limit):
+def test_a_write_that_breaks_off(fork, built, contents, both, limit):
     """As on a full disk, but without needing one: no file may grow beyond the limit."""
     before = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))"
-    said = real(*BUILD, *NEW, before=before, **NO_BYTECODE)
+    said = fork(*BUILD, *NEW, before=before)
     assert said.code == 2
     assert said.line == "sensorgen: cannot write to 'out/x': File too large; name another place with --out"
     assert contents(built) == {f"x/{name}": content for name, content in both[0].items()}
 
 
-def test_drawing_breaks_off(real, tmp_path):
+def test_drawing_breaks_off(fork, tmp_path):
     (tmp_path / "a.svg").write_text("mine")
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))"
-    said = real("draw", "tri", "--size", "6x6", "-o", "a.svg", before=limit, **NO_BYTECODE)
+    said = fork("draw", "tri", "--size", "6x6", "-o", "a.svg", before=limit)
     assert said.line == "sensorgen: cannot write 'a.svg': File too large"
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("a.svg", "mine")]
 
@@ -208,7 +207,7 @@ def writing(process, out):
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("name", SIGNALS)
 @pytest.mark.parametrize("turns", [1, pytest.param(16, marks=pytest.mark.nightly)])
-def test_interrupted_while_writing(start, real, built, contents, both, name, turns):
+def test_interrupted_while_writing(start, fork, built, contents, both, name, turns):
     rng = random.Random(name)
     for turn in range(turns):
         process = start(*BUILD, *(NEW, OLD)[turn % 2])
@@ -225,7 +224,7 @@ def test_interrupted_while_writing(start, real, built, contents, both, name, tur
             assert done or err.strip().endswith("; no file is half-written")
             assert err.strip().count("\n") == 0
     if name == "SIGKILL":
-        assert real(*BUILD, *NEW).code == 0
+        assert fork(*BUILD, *NEW).code == 0
         assert contents(built) == {f"x/{name}": content for name, content in both[1].items()}  # leftovers are swept
 
 
@@ -242,25 +241,21 @@ exec("")"""
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("turn", [10, *(pytest.param(turn, marks=pytest.mark.nightly) for turn in (0, 23))])
-def test_killed_between_two_renames(start, real, built, contents, both, turn):
+def test_killed_between_two_renames(fork, built, contents, both, turn):
     before = AT_RENAME.format(turn=turn, name="SIGKILL")
-    process = start(*BUILD, *NEW, before=f"exec({before!r})")
-    process.communicate()
-    assert process.returncode == -9
+    assert fork(*BUILD, *NEW, before=f"exec({before!r})").code == -9
     found = contents(built / "x")
     assert_whole(found, both)
     assert found["manifest.json"] == both[0]["manifest.json"]  # the last to be replaced
-    assert real(*BUILD, *NEW).code == 0
+    assert fork(*BUILD, *NEW).code == 0
     assert contents(built) == {f"x/{name}": content for name, content in both[1].items()}
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("name", [pytest.param("SIGINT", marks=pytest.mark.nightly), "SIGTERM"])
-def test_an_interruption_between_two_renames_waits_for_the_last(start, built, contents, both, name):
+def test_an_interruption_between_two_renames_waits_for_the_last(fork, built, contents, both, name):
     before = AT_RENAME.format(turn=5, name=name)
-    process = start(*BUILD, *NEW, before=f"exec({before!r})")
-    process.communicate()
-    assert process.returncode == SIGNALS[name]
+    assert fork(*BUILD, *NEW, before=f"exec({before!r})").code == SIGNALS[name]
     assert contents(built) == {f"x/{name}": content for name, content in both[1].items()}
 
 
@@ -290,9 +285,9 @@ exec("")"""
         pytest.param("SIGTERM", "stopped", "RuntimeError", marks=pytest.mark.nightly),
     ],
 )
-def test_an_interruption_of_which_a_library_makes_an_error(real, built, contents, both, name, said, error):
+def test_an_interruption_of_which_a_library_makes_an_error(fork, built, contents, both, name, said, error):
     before = WITHIN_A_LIBRARY.format(name=name, error=error)
-    left = real(*BUILD, *NEW, before=f"exec({before!r})")
+    left = fork(*BUILD, *NEW, before=f"exec({before!r})")
     assert (left.code, left.line) == (SIGNALS[name], f"sensorgen: {said}; no file is half-written")
     assert contents(built) == {f"x/{name}": content for name, content in both[0].items()}
 

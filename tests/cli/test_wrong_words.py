@@ -166,9 +166,9 @@ def test_strict_makes_a_warning_fatal(run, tmp_path):
 
 
 @pytest.mark.parametrize("command", ["build", "check", "draw", "predict"])
-def test_no_traceback_in_a_process_of_its_own(real, command):
+def test_no_traceback_in_a_process_of_its_own(fork, command):
     for words in (["trj"], ["tri", "--period", "-2"], ["tri", "--name", "a\nb"], ["/dev/zero"]):
-        said = real(command, *words)
+        said = fork(command, *words)
         assert said.code == 2
         assert said.line
 

@@ -12,7 +12,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
 from sensorgen.design.printer import load_printer
 from sensorgen.export.gcode.check import check
-from sensorgen.export.gcode.crossings import Lines, crossings
+from sensorgen.export.gcode.crossings import PrintedLines, crossings
 from sensorgen.export.gcode.drags import drags, lift
 from sensorgen.export.gcode.motion import follow
 
@@ -256,6 +256,6 @@ def test_insulation_reaches_to_the_nearest_electrode_above_or_below(z_mm, left_m
     """Electrodes from 0 to 0.1 mm and from 0.8 to 1 mm, in layers of 0.1 mm; beside them there is none."""
     tops = np.array([0.1, 0.9, 1.0])
     ends, none = (np.array([[x, 0.0]] * 3) for x in (0.0, 9.0)), np.zeros(3, np.int64)
-    lines, layers = Lines(*ends, tops, np.full(3, 0.5), none, none), np.arange(1, 11) / 10
+    lines, layers = PrintedLines(*ends, tops, np.full(3, 0.5), none, none), np.arange(1, 11) / 10
     left = strands._insulation(np.array([[5.0, 0.0, z_mm], [5.0, 3.0, z_mm]]), lines, layers)
     assert left == pytest.approx([left_mm, np.inf])

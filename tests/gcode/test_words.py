@@ -2,7 +2,7 @@
 
 import pytest
 
-from sensorgen.export.gcode.words import Command, Line, parse
+from sensorgen.export.gcode.words import Command, GcodeLine, parse
 
 
 def commands(text: str) -> list[tuple[str, dict[str, str]]]:
@@ -65,7 +65,7 @@ def test_numbers_of_words():
 
 def test_remarks_are_kept():
     assert parse("G1 X1 ;TYPE:Skirt").remark == "TYPE:Skirt"
-    assert parse("(hello)") == Line((), "hello")
+    assert parse("(hello)") == GcodeLine((), "hello")
     assert parse("T1").commands == (Command("T1"),)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sensorgen.measure.lab.devices import DeviceFault, Extension, Identity, Place, Readings
-from sensorgen.measure.lab.safety import Rig
+from sensorgen.measure.lab.safety import RunDevices
 
 CONTACT_MM, STIFF_N_MM, RAISED_MM, SPEED_MM_S = 20.0, 50.0, 30.0, 40.0
 STEP_S, STROKE_MM = 0.002, 40.0
@@ -211,7 +211,7 @@ class FakeImpedance(_Device):
         self._message("stop")
 
 
-def fake_rig(clock, plant: Mechanism | None = None) -> tuple[Rig, Mechanism]:
+def fake_rig(clock, plant: Mechanism | None = None) -> tuple[RunDevices, Mechanism]:
     """Devices on one mechanism."""
     plant = plant or Mechanism()
-    return Rig(FakeActuator(plant, clock), FakeStage(plant, clock), FakeImpedance(plant, clock)), plant
+    return RunDevices(FakeActuator(plant, clock), FakeStage(plant, clock), FakeImpedance(plant, clock)), plant

@@ -81,7 +81,7 @@ class Started:
     def events(self, kind: str) -> list[dict[str, Any]]:
         """Of the journal, so far."""
         try:
-            return list(recorder.Run.read(self.folder).of(kind))
+            return list(recorder.RunFolder.read(self.folder).of(kind))
         except Exception:
             return []
 

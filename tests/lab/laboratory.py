@@ -9,11 +9,11 @@ from typing import Any
 from sensorgen.design.design import make
 from sensorgen.measure.lab import catalogue, experiment, run
 from sensorgen.measure.lab.clock import SimulatedClock
-from sensorgen.measure.lab.safety import Rig
+from sensorgen.measure.lab.safety import RunDevices
 from sensorgen.measure.log import Log
 from sensorgen.measure.virtual import mechanics
-from sensorgen.measure.virtual.faults import FAULTS, Planted, Schedule
-from sensorgen.measure.virtual.specimen import Specimen, drawn
+from sensorgen.measure.virtual.faults import FAULTS, FaultSchedule, Planted
+from sensorgen.measure.virtual.specimen import PressedSpecimen, drawn
 
 LIMIT_N = 7.0
 PLAN = [
@@ -23,10 +23,10 @@ PLAN = [
 
 
 @cache
-def specimen() -> Specimen:
+def specimen() -> PressedSpecimen:
     """Solved once."""
     design = make({"shape": "reference"})
-    return Specimen(design, drawn(design, 1))
+    return PressedSpecimen(design, drawn(design, 1))
 
 
 def asked(**changes: Any) -> experiment.Experiment:
@@ -35,10 +35,10 @@ def asked(**changes: Any) -> experiment.Experiment:
     return experiment.parse({"specimen": "24 SX60", "plan": PLAN, "approach": quick} | changes)
 
 
-class Watched(Schedule):
+class Watched(FaultSchedule):
     """Faults, and when they struck and the tip was last down."""
 
-    def __init__(self, planted: tuple[Planted, ...], mechanism: mechanics.Rig) -> None:
+    def __init__(self, planted: tuple[Planted, ...], mechanism: mechanics.VirtualRig) -> None:
         super().__init__(planted)
         self._mechanism, self.struck_s, self.last_down_s = mechanism, inf, -inf
         self._planted = len(planted)
@@ -60,8 +60,8 @@ class Laboratory:
     """Devices with their simulators."""
 
     clock: SimulatedClock
-    mechanism: mechanics.Rig
-    rig: Rig
+    mechanism: mechanics.VirtualRig
+    rig: RunDevices
     simulators: dict[str, Any]
     watched: Watched
 
@@ -69,7 +69,7 @@ class Laboratory:
 def laboratory(faults: tuple[Planted, ...] = (), **changes: float) -> Laboratory:
     """A new one, with faults planted."""
     clock = SimulatedClock()
-    at = mechanics.Rig(specimen(), mechanics.Mechanics(**{"force_limit_n": LIMIT_N} | changes))
+    at = mechanics.VirtualRig(specimen(), mechanics.Mechanics(**{"force_limit_n": LIMIT_N} | changes))
     at.planted = watched = Watched(faults, at)
     settings = {"weight_n": at.mechanics.weight_n, "friction_n": at.mechanics.friction_n}
     made = {
@@ -84,7 +84,7 @@ def laboratory(faults: tuple[Planted, ...] = (), **changes: float) -> Laboratory
             target = {"rig": at, "analyser": made["impedance"].simulator}
             target |= {role: made[role].simulator for role in ("actuator", "stage")}
             target[FAULTS[each.what].strikes].fault = FAULTS[each.what].sets
-    rig = Rig(**{role: each.driver for role, each in made.items()})
+    rig = RunDevices(**{role: each.driver for role, each in made.items()})
     return Laboratory(clock, at, rig, {role: each.simulator for role, each in made.items()}, watched)
 
 
@@ -99,7 +99,7 @@ def outcome(folder: Path, faults: tuple[Planted, ...] = (), **changes: Any) -> t
 def verdict(found: run.RunResult, lab: Laboratory, what: str) -> list[str]:
     """What is unsafe about the end of a run, by the mechanism's own record; and what is missing in its report."""
     at, wrong = lab.mechanism, []
-    at.advance(lab.clock.now() + 30.0)
+    at.advance(lab.clock.now() + 10.0)
     known = "stage" in lab.rig.started  # before, the tip is as it was found
     if at.force_n > 0 or (known and at.tip_mm < 1.0):
         wrong.append(f"tip at {at.tip_mm:.2f} mm")

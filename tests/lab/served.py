@@ -15,7 +15,7 @@ from laboratory import LIMIT_N, specimen
 from sensorgen.measure.lab.clock import RealClock
 from sensorgen.measure.virtual import mechanics, reprap
 from sensorgen.measure.virtual.reprap import RepRapFirmware
-from sensorgen.measure.virtual.scpi import LcrMeter
+from sensorgen.measure.virtual.scpi import SimulatedLcrMeter
 from sensorgen.measure.virtual.smac import SmacController
 
 DOWN_MM = 1.0
@@ -24,8 +24,8 @@ DOWN_MM = 1.0
 def main() -> None:
     reprap._HOMING_MM_S = 200.0  # so that a run begins to press sooner
     clock = RealClock()
-    at = mechanics.Rig(specimen(), mechanics.Mechanics(force_limit_n=LIMIT_N), time_s=clock.now())
-    actuator, stage, meter = SmacController(at), RepRapFirmware(at), LcrMeter(at, "hp-4284a")
+    at = mechanics.VirtualRig(specimen(), mechanics.Mechanics(force_limit_n=LIMIT_N), time_s=clock.now())
+    actuator, stage, meter = SmacController(at), RepRapFirmware(at), SimulatedLcrMeter(at, "hp-4284a")
     with ExitStack() as stack:
         places = {
             "actuator": stack.enter_context(serving.pseudo_terminal(actuator, clock)),

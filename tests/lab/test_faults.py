@@ -3,10 +3,17 @@
 import pytest
 from laboratory import HARMLESS, KINDS, MOMENTS, Planted, laboratory, outcome, verdict
 
+from sensorgen.measure.lab import press
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.bench import read_again
 
 _QUESTIONS = (b"M115", b"32 R 0x1000", b"32 R 0x11018", b"32 R 0x21018", b"32 R 0x31018", b"32 R 0x41018")
+
+
+@pytest.fixture(autouse=True)
+def _short_moves(monkeypatch):
+    """No move takes ten seconds here: of a stage that sticks, more need not be waited for."""
+    monkeypatch.setattr(press, "_TRAVEL_S", 10.0)
 
 
 def _cases():

@@ -7,9 +7,9 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.records import checked
 from sensorgen.design.design import make
 from sensorgen.measure.virtual.faults import FAULTS
-from sensorgen.measure.virtual.mechanics import OPEN_OHM, Mechanics, Rig
+from sensorgen.measure.virtual.mechanics import OPEN_OHM, Mechanics, VirtualRig
 from sensorgen.measure.virtual.rig import VirtualSpecimen, rig_of
-from sensorgen.measure.virtual.specimen import Specimen, Truth, drawn
+from sensorgen.measure.virtual.specimen import PressedSpecimen, Truth, drawn
 
 DESIGN = make({"shape": "reference"})
 TONES_HZ = np.array([1.1e3, 99.7e3])
@@ -17,7 +17,7 @@ TONES_HZ = np.array([1.1e3, 99.7e3])
 
 def rig(truth=None, **mechanics):
     """Above the middle of a specimen, at working height, motor on, limit 8 N."""
-    found = Rig(Specimen(DESIGN, truth or Truth()), Mechanics(**mechanics))
+    found = VirtualRig(PressedSpecimen(DESIGN, truth or Truth()), Mechanics(**mechanics))
     found.switch(on=True)
     found.limit(8.0)
     found.seek(0.0, 50.0, 1.0)
@@ -167,7 +167,7 @@ def test_creep_goes_with_the_logarithm_of_time_and_hysteresis_with_the_peak(cree
 
 def test_drift_is_as_wide_as_said_and_the_same_by_its_seed():
     truth = Truth(drift_c=2e-3, drift_s=0.5)
-    one, again, other = (Rig(Specimen(DESIGN, truth), seed=seed) for seed in (1, 1, 2))
+    one, again, other = (VirtualRig(PressedSpecimen(DESIGN, truth), seed=seed) for seed in (1, 1, 2))
     c = []
     for k in range(300):
         for each in (one, again, other):
@@ -190,7 +190,7 @@ def test_steps_of_any_size_lead_to_the_same_place():
 
 def test_the_multimeter_reads_the_bottom_electrode():
     """Resistivity, length, width and thickness by hand, without the leads where four wires are used."""
-    found = Rig(Specimen(DESIGN, Truth(lead_ohm=30.0)))
+    found = VirtualRig(PressedSpecimen(DESIGN, Truth(lead_ohm=30.0)))
     assert found.resistance(wires=4) == pytest.approx(0.042 * 0.1 / (10e-3 * 0.3e-3), rel=1e-6)
     assert found.resistance(wires=2) - found.resistance(wires=4) == pytest.approx(30.0)
 
@@ -236,7 +236,7 @@ def test_a_fault_waits_for_its_force_and_strikes_the_simulator_that_is_attached(
 @pytest.mark.parametrize(("fault", "seen"), [
     ("rig power loss", lambda r: r.force_n == pytest.approx(0.7, abs=0.02)),
     ("rig jammed", lambda r: 0.0 < r.extension_mm < 25.0), ("rig stage moves", lambda r: r.axis("x")[0] > 5.0),
-    ("rig short", lambda r: r.specimen and abs(Rig.impedance(r, TONES_HZ)[0]) < 1e7),
+    ("rig short", lambda r: r.specimen and abs(VirtualRig.impedance(r, TONES_HZ)[0]) < 1e7),
 ])  # fmt: skip
 def test_each_fault_of_the_rig_does_what_it_says(fault, seen):
     found = planted({"what": fault, "at_s": 0.5})

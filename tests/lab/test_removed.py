@@ -66,4 +66,4 @@ def test_a_removed_folder_is_an_error_and_the_readings_are_in_the_log(tmp_path, 
     assert len(found.rows) == 1
     with Log(path) as log:
         assert presses(log).force_n[0] == pytest.approx(4.0, abs=0.05)
-    assert recorder.Run.read(recorder.home(path) / found.folder.rpartition("/")[2]).attempts == 1
+    assert recorder.RunFolder.read(recorder.home(path) / found.folder.rpartition("/")[2]).attempts == 1

@@ -48,7 +48,7 @@ class Lab:
             link = reprap.WebLink(
                 SimulatedWeb(self.firmware, self.clock), self.clock, settings.get("password", "reprap")
             )
-        self.stage = reprap.Stage(link, self.clock, reprap.Settings(**settings))
+        self.stage = reprap.RepRapStage(link, self.clock, reprap.Settings(**settings))
 
     def run(self, seconds):
         """Read at 20 Hz; the last place."""
@@ -147,7 +147,7 @@ def test_answers_to_a_program_that_has_died_are_not_those_to_this_one():
     lab = Lab("serial").home()
     lab.stage.move(100.0, 10.0)
     lab.firmware.exchange(b'M409 K"state.status"\nG28\nM409 K"state.status"\n', lab.clock.now())
-    stage = reprap.Stage(reprap.SerialLink(SimulatedPort(lab.firmware, lab.clock), lab.clock), lab.clock)
+    stage = reprap.RepRapStage(reprap.SerialLink(SimulatedPort(lab.firmware, lab.clock), lab.clock), lab.clock)
     for _ in range(3):
         with pytest.raises(DeviceFault, match="asked M115, answers"):
             stage.identify()
@@ -168,7 +168,7 @@ def test_older_firmware_has_no_object_model():
             return "FIRMWARE_NAME: RepRapFirmware for Duet FIRMWARE_VERSION: 1.26 ELECTRONICS: Duet 0.6"
 
     with pytest.raises(WrongDevice, match="expected RepRapFirmware 3 or later"):
-        reprap.Stage(Old(), SimulatedClock()).identify()
+        reprap.RepRapStage(Old(), SimulatedClock()).identify()
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -289,7 +289,7 @@ def test_the_same_bytes_over_a_pseudo_terminal():
     with pseudo_terminal(RepRapFirmware(plant), clock) as path:
         link = reprap.SerialLink(SerialPort(path, reprap.BAUD), clock)
         settings = reprap.Settings(clearance_mm=0.5, lift_mm_s=50)
-        stage = reprap.Stage(link, clock, settings)
+        stage = reprap.RepRapStage(link, clock, settings)
         stage.start()
         while stage.read().moving:
             pass
@@ -306,7 +306,7 @@ def test_the_same_requests_over_http():
     firmware = RepRapFirmware(plant)
     with http_server(firmware, clock) as address:
         settings = reprap.Settings(clearance_mm=0.5, lift_mm_s=50)
-        stage = reprap.Stage(reprap.WebLink(HttpPort(address), clock, "reprap"), clock, settings)
+        stage = reprap.RepRapStage(reprap.WebLink(HttpPort(address), clock, "reprap"), clock, settings)
         stage.start()
         while stage.read().moving:
             clock.wait_until(clock.now() + 0.02)

@@ -93,7 +93,9 @@ def test_abort_ends_with_the_tip_up_and_resume_does_the_rest(tmp_path):
     assert (again.end, again.done) == ("done", 2)
     with Log(tmp_path / "log.db") as log:
         assert [row.source[-5] for row in log.recordings()] == ["1", "2"]
-    steps = [each["step"] for each in recorder.Run.read(recorder.home(tmp_path / "log.db") / again.folder).of("done")]
+    steps = [
+        each["step"] for each in recorder.RunFolder.read(recorder.home(tmp_path / "log.db") / again.folder).of("done")
+    ]
     assert steps == [1, 2]
 
 

@@ -24,7 +24,7 @@ class Lab:
 
     def __init__(self, model="hp-4284a", aperture="SHOR"):
         self.clock, self.plant = SimulatedClock(), SpringPlant()
-        self.instrument = scpi.LcrMeter(self.plant, model)
+        self.instrument = scpi.SimulatedLcrMeter(self.plant, model)
         port = SimulatedPort(self.instrument, self.clock)
         self.meter = lcr_meter.LcrMeter(port, self.clock, MODELS[model], lcr_meter.Settings(aperture=aperture))
 
@@ -183,7 +183,7 @@ def test_an_analyser_on_a_tcp_socket(monkeypatch):
     monkeypatch.setenv("PYVISA_LIBRARY", "@py")
     clock, plant = RealClock(), SpringPlant()
     plant.time_s = clock.now()
-    instrument = scpi.LcrMeter(plant)
+    instrument = scpi.SimulatedLcrMeter(plant)
     with tcp_server(instrument, clock) as address:
         meter = lcr_meter.LcrMeter(VisaPort(address), clock, lcr_meter.HP_4284A, lcr_meter.Settings(aperture="SHOR"))
         meter.start(TONES, 1.0)
@@ -201,7 +201,7 @@ def test_an_analyser_on_a_tcp_socket(monkeypatch):
 @pytest.mark.parametrize(("model", "name"), [("hp-34401a", "HP 34401A"), ("keithley-2000", "Keithley 2000")])
 def test_a_simulated_multimeter(model, name):
     clock, plant = SimulatedClock(), SpringPlant()
-    instrument = scpi.Multimeter(plant, model)
+    instrument = scpi.SimulatedMultimeter(plant, model)
     meter = multimeter.Multimeter(SimulatedPort(instrument, clock))
     assert meter.identify().model == name
     assert float(meter.resistance(wires=4)) == 650
@@ -213,7 +213,7 @@ def test_a_simulated_multimeter(model, name):
 
 @pytest.mark.parametrize("fault", ["silent", "hung", "garbage", "identity", "truncated", "cut", "error"])
 def test_a_planted_fault_of_a_multimeter_is_seen(fault):
-    instrument = scpi.Multimeter(SpringPlant())
+    instrument = scpi.SimulatedMultimeter(SpringPlant())
     meter = multimeter.Multimeter(SimulatedPort(instrument, SimulatedClock()))
     if fault not in ("identity", "cut"):
         meter.identify()

@@ -24,7 +24,7 @@ class Lab:
         self.clock, self.plant = SimulatedClock(), SpringPlant()
         self.controller = SmacController(self.plant)
         port = SimulatedPort(self.controller, self.clock)
-        self.actuator = smac.Actuator(port, self.clock, smac.Settings(**settings))
+        self.actuator = smac.SmacActuator(port, self.clock, smac.Settings(**settings))
 
     def run(self, seconds):
         """Read at 100 Hz; the last reading."""
@@ -68,7 +68,7 @@ def test_messages_are_those_of_the_note_serial():
     """SMAC's note "Serial Connect to PC/PLC": 0 R 0x6064, answer 0x20 W 0x6064 1234, motor off 0 W 0x6040 6."""
     clock = SimulatedClock()
     wire = Wire(b"0x20 W 0x6077 123\r", b"0x20 W 0x6064 998\r", b"0x20 W 0x6041 567\r")
-    actuator = smac.Actuator(wire, clock, smac.Settings())
+    actuator = smac.SmacActuator(wire, clock, smac.Settings())
     reading = actuator.read()
     assert wire.sent == b"32 R 0x6077\r32 R 0x6064\r32 R 0x6041\r"
     assert reading.force_n == pytest.approx(123 * 0.0167 + 0.9)
@@ -80,7 +80,7 @@ def test_messages_are_those_of_the_note_serial():
 def test_values_may_be_hexadecimal_and_signed():
     """Programming guide 2.3.3: 0x02 W 0x6063 0x2130; object 0x2000 sub-index 4 chooses the base."""
     wire = Wire(b"0x20 W 0x6077 0xFFCA\r", b"0x20 W 0x006064 0xFFFFFFFE\r", b"\n0x20 W 0x6041 0x0237\r")
-    reading = smac.Actuator(wire, SimulatedClock()).read()
+    reading = smac.SmacActuator(wire, SimulatedClock()).read()
     assert reading.force_n == pytest.approx(-54 * 0.0167 + 0.9)
 
 
@@ -282,7 +282,7 @@ def test_another_process_lifts_from_any_state_on_a_line_opened_anew(state):
         lab.actuator.off()
     if state == "error":
         lab.controller.fault = "error"
-    other = smac.Actuator(SimulatedPort(lab.controller, lab.clock), lab.clock)
+    other = smac.SmacActuator(SimulatedPort(lab.controller, lab.clock), lab.clock)
     other.lift()
     lab.clock.wait_until(lab.clock.now() + 1.5)
     lab.controller.exchange(b"", lab.clock.now())
@@ -303,9 +303,9 @@ def test_a_homing_that_does_not_end_is_a_fault():
 def test_messages_that_come_unasked_are_passed_over_and_errors_raised():
     """Programming guide: the status word is sent when it changes; note Reset Error: 0x11003 when an error occurs."""
     words = [b"0x20 W 0x6041 1591\r", b"0x20 W 0x6077 1\r", b"0x20 W 0x6064 2\r", b"0x20 W 0x6041 567\r"]
-    assert smac.Actuator(Wire(*words), SimulatedClock()).read().force_n == pytest.approx(0.9167)
+    assert smac.SmacActuator(Wire(*words), SimulatedClock()).read().force_n == pytest.approx(0.9167)
     with pytest.raises(DeviceFault, match=r"0x7306 \(encoder wire\)"):
-        smac.Actuator(Wire(b"0x20 W 0x11003 29446\r"), SimulatedClock()).read()
+        smac.SmacActuator(Wire(b"0x20 W 0x11003 29446\r"), SimulatedClock()).read()
 
 
 @pytest.mark.parametrize(
@@ -313,7 +313,7 @@ def test_messages_that_come_unasked_are_passed_over_and_errors_raised():
 )
 def test_garbage_is_no_value(line):
     with pytest.raises(DeviceFault, match=r"motor|expected"):
-        smac.Actuator(Wire(*9 * [line, b""]), SimulatedClock()).read()
+        smac.SmacActuator(Wire(*9 * [line, b""]), SimulatedClock()).read()
 
 
 def test_the_same_bytes_over_a_pseudo_terminal():
@@ -325,7 +325,7 @@ def test_the_same_bytes_over_a_pseudo_terminal():
     plant.time_s = clock.now()
     controller = SmacController(plant)
     with pseudo_terminal(controller, clock) as path:
-        actuator = smac.Actuator(SerialPort(path, smac.BAUD), clock, smac.Settings(timeout_s=5.0))
+        actuator = smac.SmacActuator(SerialPort(path, smac.BAUD), clock, smac.Settings(timeout_s=5.0))
         assert actuator.identify().serial == "4711"
         actuator.start(6.0)
         while actuator.read().position_mm > 1:
@@ -334,7 +334,7 @@ def test_the_same_bytes_over_a_pseudo_terminal():
         while plant.force_n < 1.9:
             actuator.read()
         actuator.close()
-        again = smac.Actuator(SerialPort(path, smac.BAUD), clock)
+        again = smac.SmacActuator(SerialPort(path, smac.BAUD), clock)
         again.lift()
         while plant.extension_mm:
             pass

@@ -16,8 +16,17 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.measure.virtual import blank as virtual
 from sensorgen.measure.virtual.bricks import bricks
-from sensorgen.measure.virtual.cell import AIR, EPSILON_0, Bricks, Raster, Solid, capacitance, conductance, pressed
-from sensorgen.measure.virtual.specimen import Specimen
+from sensorgen.measure.virtual.cell import (
+    AIR,
+    EPSILON_0,
+    CellBricks,
+    SectionRaster,
+    Solid,
+    capacitance,
+    conductance,
+    pressed,
+)
+from sensorgen.measure.virtual.specimen import PressedSpecimen
 from sensorgen.scene.scene import Body, Scene, box
 
 REFERENCE = Path(__file__).parents[1] / "reference"
@@ -52,7 +61,7 @@ def extrapolated(coarse, fine):
 def bar(material, electrode):
     """Bricks of 0.5 x 0.4 x 1.2 mm, of layers upwards."""
     x, y, z = np.linspace(0, 0.5e-3, 3), np.linspace(0, 0.4e-3, 4), np.array([0, 0.3, 0.5, 0.9, 1.2]) * 1e-3
-    return Bricks(x, y, z, *(np.broadcast_to(of, (2, 3, 4)).copy() for of in (material, electrode)))
+    return CellBricks(x, y, z, *(np.broadcast_to(of, (2, 3, 4)).copy() for of in (material, electrode)))
 
 
 def quarter():
@@ -84,7 +93,7 @@ def test_a_large_field_is_solved_by_iterations_to_the_same():
     x, z = np.linspace(0, 1e-3, 31), np.linspace(0, 1.2e-3, 31)
     electrode = np.zeros((30, 30, 30), int)
     electrode[..., 0], electrode[..., -1] = 1, 2
-    large = Bricks(x, x, z, np.where(electrode, 2, 1), electrode)
+    large = CellBricks(x, x, z, np.where(electrode, 2, 1), electrode)
     found = capacitance(large, EPS, large.grid.at_m)
     assert found == pytest.approx(EPSILON_0 * 4.68 * 1e-6 / (28 * 0.04e-3), rel=1e-6)
 
@@ -100,8 +109,8 @@ def test_bricks_of_one_section_are_that_section():
     material[:, 1], material[2:, 2] = 1, 0
     electrode[:, 0], electrode[material == 2] = 1, 2
     electrode[:, 0] = 1
-    flat = Raster(x, np.tile(z[:, None], len(x)), material.T, electrode.T, False)
-    deep = Bricks(x, y, z, material[:, None], electrode[:, None])
+    flat = SectionRaster(x, np.tile(z[:, None], len(x)), material.T, electrode.T, False)
+    deep = CellBricks(x, y, z, material[:, None], electrode[:, None])
     loads = [0.0, 1e4, 2e5]
     two, three = pressed(flat, SOLIDS, loads), pressed(deep, SOLIDS, loads)
     assert three.sink_m == pytest.approx(two.sink_m, rel=1e-6)
@@ -170,7 +179,7 @@ def test_rect_sinks_and_rises_as_in_another_program():
 
 def test_patterns_without_mirrors_are_refused():
     with pytest.raises(OutOfRange, match="pattern without mirrors; expected strips along or across the sensor"):
-        _ = Specimen(make({"shape": "rect", "parameters": {"angle_deg": 60}})).capacitance_f_per_m
+        _ = PressedSpecimen(make({"shape": "rect", "parameters": {"angle_deg": 60}})).capacitance_f_per_m
 
 
 def test_cells_of_too_many_faces_are_refused():
@@ -182,7 +191,7 @@ def test_cells_of_too_many_faces_are_refused():
 @pytest.mark.nightly
 def test_a_very_soft_dielectric_is_pressed_as_far_as_it_bears(coarse):
     soft = make({**TRI, "material_values": {"x60": {"youngs_modulus_pa": 2e6}}})
-    specimen = Specimen(soft)
+    specimen = PressedSpecimen(soft)
     pressure, rise = specimen.blank.rise(0.0, 0.0)
     assert 3.5e4 <= pressure[-1] < 4e5
     assert (np.diff(rise) > 0).all()

@@ -11,9 +11,9 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
 from sensorgen.measure.virtual import blank as tables
 from sensorgen.measure.virtual.blank import blank, tracks
-from sensorgen.measure.virtual.cell import AIR, EPSILON_0, Raster, Solid, capacitance, conductance, pressed
+from sensorgen.measure.virtual.cell import AIR, EPSILON_0, SectionRaster, Solid, capacitance, conductance, pressed
 from sensorgen.measure.virtual.section import raster
-from sensorgen.measure.virtual.specimen import Specimen, Truth, decades, drawn
+from sensorgen.measure.virtual.specimen import PressedSpecimen, Truth, decades, drawn
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 TONES_HZ = np.array([1.1e3, 10.1e3, 99.7e3])
@@ -25,7 +25,7 @@ SOLIDS = [AIR, X60, ETPU]
 
 @pytest.fixture(scope="module")
 def tri():
-    return Specimen(make(TRI))
+    return PressedSpecimen(make(TRI))
 
 
 def plate(nx=3, *, gap=False):
@@ -33,7 +33,7 @@ def plate(nx=3, *, gap=False):
     z = np.array([0, 0.3, 0.5, 0.7, 0.9, 1.2]) * 1e-3
     material = np.array([2, 1, 0 if gap else 1, 1, 2])[:, None] * np.ones((1, nx), int)
     electrode = np.array([1, 0, 0, 0, 2])[:, None] * np.ones((1, nx), int)
-    return Raster(np.linspace(0, 1e-3, nx + 1), np.tile(z[:, None], nx + 1), material, electrode, False)
+    return SectionRaster(np.linspace(0, 1e-3, nx + 1), np.tile(z[:, None], nx + 1), material, electrode, False)
 
 
 def test_a_plate_has_the_capacitance_of_one():
@@ -213,7 +213,7 @@ def test_a_source_with_a_range_decides_how_they_are_drawn(tmp_path, monkeypatch)
     design = make({**TRI, "materials": {"dielectric": "x60@ours"}})
     moduli = np.array([drawn(design, seed).modulus for seed in range(400)])
     assert np.mean(np.abs(moduli) < np.log(2)) == pytest.approx(0.95, abs=0.03)
-    assert Specimen(design, Truth(modulus=0.1)).values()["youngs_modulus_pa"] == pytest.approx(2e6 * np.exp(0.1))
+    assert PressedSpecimen(design, Truth(modulus=0.1)).values()["youngs_modulus_pa"] == pytest.approx(2e6 * np.exp(0.1))
 
 
 @pytest.mark.parametrize("bad", [{"leak": -1.0}, {"creep": np.nan}, {"drift_s": 0.0}, {"short_share": 2.0}])

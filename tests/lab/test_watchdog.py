@@ -79,7 +79,7 @@ def test_a_whole_run_is_not_disturbed_and_leaves_no_watchdog_behind(tmp_path):
 def test_a_computer_that_slept_finds_the_tip_up_and_ends_the_run():
     clock, plant = SimulatedClock(), SpringPlant(extension_mm=5.0)
     controller = SmacController(plant)
-    actuator = smac.Actuator(SimulatedPort(controller, clock), clock)
+    actuator = smac.SmacActuator(SimulatedPort(controller, clock), clock)
     actuator.watch(1.5)
     actuator.start(6.0)
     for _ in range(100):
@@ -112,16 +112,16 @@ def test_commands_are_coded_as_in_the_makers_file():
 def test_the_program_is_written_once_and_nobody_elses_is_replaced():
     clock, plant = SimulatedClock(), SpringPlant()
     controller = SmacController(plant)
-    smac.Actuator(SimulatedPort(controller, clock), clock).watch(1.5)
+    smac.SmacActuator(SimulatedPort(controller, clock), clock).watch(1.5)
     writes = sum(b"W 0x32C05" in line for line in controller.heard)
     assert writes == 9
-    smac.Actuator(SimulatedPort(controller, clock), clock).watch(1.5)
+    smac.SmacActuator(SimulatedPort(controller, clock), clock).watch(1.5)
     assert sum(b"W 0x32C05" in line for line in controller.heard) == writes  # its memory wears
-    smac.Actuator(SimulatedPort(controller, clock), clock, smac.Settings(weight_n=2.0)).watch(1.5)
+    smac.SmacActuator(SimulatedPort(controller, clock), clock, smac.Settings(weight_n=2.0)).watch(1.5)
     assert sum(b"W 0x32C05" in line for line in controller.heard) == 2 * writes
     controller._macros[59, 0] = 0x0D2C0240000007D0
     with pytest.raises(DeviceFault, match="macro 59 has another program"):
-        smac.Actuator(SimulatedPort(controller, clock), clock).watch(1.5)
+        smac.SmacActuator(SimulatedPort(controller, clock), clock).watch(1.5)
 
 
 def test_an_actuator_that_cannot_watch_is_refused_above_a_newton(tmp_path):

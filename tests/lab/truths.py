@@ -7,7 +7,7 @@ import numpy as np
 
 from sensorgen.analysis.calibration import Bench, spread_of
 from sensorgen.design.design import make
-from sensorgen.measure.virtual.specimen import Specimen, decades, drawn
+from sensorgen.measure.virtual.specimen import PressedSpecimen, decades, drawn
 from sensorgen.prediction import bodies
 from sensorgen.prediction.calibration.coverage import inside
 from sensorgen.prediction.calibration.fitting import Data, calibrated
@@ -91,7 +91,7 @@ def _drift(time_s, forgotten_s, rng):
 def outcome(seed):
     """One random specimen, from press to verdict."""
     expected, to_material = model()
-    specimen = Specimen(make(DESIGN), drawn(make(DESIGN), seed), TIP_M)
+    specimen = PressedSpecimen(make(DESIGN), drawn(make(DESIGN), seed), TIP_M)
     data = session(specimen, KNOWN + NEW, seed)
     which = np.random.default_rng([seed, 3]).permutation(KNOWN + NEW)
     posterior = calibrated(expected, data.rows(np.sort(which[:KNOWN])))

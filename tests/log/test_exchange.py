@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sensorgen.core.errors import BadInput, MissingValue, Unwritable
-from sensorgen.measure.csv_table import Table
+from sensorgen.measure.csv_table import CsvTable
 from sensorgen.measure.log import (
     Batch,
     BenchRun,
@@ -152,7 +152,7 @@ def test_any_text_comes_back_from_csv(words):
         for k, word in enumerate(words)
     ]
     text = "".join(exchange.csv_lines(Reading, rows))
-    assert list(exchange.from_csv(Reading, Table("x", io.StringIO(text, newline="")))) == rows
+    assert list(exchange.from_csv(Reading, CsvTable("x", io.StringIO(text, newline="")))) == rows
 
 
 def test_a_terminal_obeys_no_cell_and_the_text_comes_back():
@@ -162,7 +162,7 @@ def test_a_terminal_obeys_no_cell_and_the_text_comes_back():
     ]
     text = "".join(exchange.csv_lines(Reading, rows))
     assert not set("\x1b\x9b\u202e\x07") & set(text)
-    assert list(exchange.from_csv(Reading, Table("x", io.StringIO(text, newline="")))) == rows
+    assert list(exchange.from_csv(Reading, CsvTable("x", io.StringIO(text, newline="")))) == rows
 
 
 @given(

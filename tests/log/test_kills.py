@@ -43,34 +43,25 @@ def test_files_that_were_tampered_with(tmp_path):
         assert found[f"{name} refused"] > 20
 
 
-FULL = """
-import resource, sys
-from pathlib import Path
-from sensorgen.cli import main
-limit = int(sys.argv.pop(1))
-resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-main()
-"""
+@pytest.fixture
+def command(forked, tmp_path):
+    """Run a command beside a log, whose files may grow up to a limit [bytes]."""
 
+    def run(path, *words, limit):
+        return forked("log", *words, "--log", path, cwd=tmp_path, FSIZE=limit)
 
-def command(path, *words, limit):
-    return subprocess.run(
-        [sys.executable, "-c", FULL, str(limit), "log", *map(str, words), "--log", path],
-        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},  # the limit would truncate bytecode
-        capture_output=True,
-        encoding="utf-8",
-    )
+    return run
 
 
 def assert_told(done, *said):
-    assert done.returncode == 2, done.stderr
-    assert done.stderr.count("\n") == 1
-    assert "Traceback" not in done.stderr
-    assert any(word in done.stderr for word in said), done.stderr
+    assert done.code == 2, done.err
+    assert done.err.count("\n") == 1
+    assert "Traceback" not in done.err
+    assert any(word in done.err for word in said), done.err
 
 
 @pytest.mark.parametrize("room", [0, 8, 40])
-def test_a_full_disk_is_told_and_costs_nothing(tmp_path, room):
+def test_a_full_disk_is_told_and_costs_nothing(tmp_path, room, command):
     path = tmp_path / "log.db"
     with Log(path, create=True) as log:
         log.add([reading("23 triX", "650")])
@@ -79,10 +70,10 @@ def test_a_full_disk_is_told_and_costs_nothing(tmp_path, room):
     with Log(path) as log:
         assert log.readings() == before
         assert list(verify.faults(log)) == []
-    assert "69 of 69" in command(path, "import", "--thesis", limit=1 << 30).stdout
+    assert "69 of 69" in command(path, "import", "--thesis", limit=1 << 30).out
 
 
-def test_no_room_for_a_new_log_or_a_raw_file(tmp_path):
+def test_no_room_for_a_new_log_or_a_raw_file(tmp_path, command):
     done = command(tmp_path / "log.db", "import", "--thesis", limit=10_000)
     assert_told(done, "cannot use the log", "File too large")
     assert list(tmp_path.iterdir()) == []

@@ -103,6 +103,7 @@ def test_two_machines_with_two_designs_under_one_name_are_told_and_left_out(tmp_
         assert any("withdraw one of the prints" in why for _, why in found.left_out)
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_an_own_design_is_never_compared_with_the_thesis_design_of_a_similar_name(log, own):
     """As a newcomer's sensor was: predicted as trix-d0.3, for its shape and film."""
     binding.bind(log, ["1 triX .3mm 1 fine"], str(own), iteration=1)
@@ -125,6 +126,7 @@ def test_a_print_whose_design_the_log_lacks_is_not_taken_for_what_its_name_stand
             "predict its file") in found.left_out  # fmt: skip
 
 
+@pytest.mark.usefixtures("at_rest")
 def test_two_designs_of_one_name_stay_apart(log, own, tmp_path):
     (tmp_path / "b").mkdir()
     (tmp_path / "b" / "mysensor.yaml").write_text(OWN.replace("120", "60"))

@@ -13,7 +13,7 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import fem2d, fem3d
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.electrostatics import bounds
-from sensorgen.solvers.electrostatics.cones import Cone, Layout, ring_corners
+from sensorgen.solvers.electrostatics.cones import Cone, RingLayout, ring_corners
 from sensorgen.solvers.electrostatics.elimination import Block, least
 from sensorgen.solvers.electrostatics.plane import Plane
 from sensorgen.solvers.electrostatics.polynomials import SIDES, condensed, crossed
@@ -159,7 +159,7 @@ def test_a_corner_holds_the_energy_of_its_own_power(ratio):
         along = weight * (gradient[0] * half[0] + gradient[1] * half[1])
         rim += [(along * legendre.Legendre.basis(k - 1)(s)).sum() * np.sqrt(k - 0.5) for k in range(2, order + 1)]
     ends = [field(spokes[k][:, None])[0][0] for k in (1, 2)]
-    layout = Layout.of(3, False, (True, False), order)
+    layout = RingLayout.of(3, False, (True, False), order)
     tips = np.stack([np.zeros((2, 2)), spokes[:-1], spokes[1:]], axis=1)
     weights = np.array([1.0, ratio])[:, None, None]
     rings = condensed(ring_corners(tips), order).reshape(2, 2, 3 * order, 3 * order) * weights[:, None]
@@ -187,7 +187,7 @@ def test_values_inside_a_cone_have_its_energy():
         tips = np.stack([np.zeros((sectors, 2)), ring[:sectors], ring[1 : sectors + 1]], axis=1)
         eps = random.uniform(1, 5, sectors)[:, None, None]
         rings = condensed(ring_corners(tips), order).reshape(sectors, 2, 12, 12) * eps[:, None]
-        cone = Cone.of(Layout.of(len(spokes), closed, ends, order), rings, condensed(tips, order) * eps, 3)
+        cone = Cone.of(RingLayout.of(len(spokes), closed, ends, order), rings, condensed(tips, order) * eps, 3)
         values = random.normal(size=len(cone.matrix))
         in_rings, at_tip = cone.inside(values)
         assert in_rings.shape[:3] == (8, sectors, 2)

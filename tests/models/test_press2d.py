@@ -1,6 +1,7 @@
 """Cells under pressure against curves that others solved, and their symmetries and balances."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -135,7 +136,7 @@ def test_too_much_is_told_with_the_last_load(monkeypatch):
     """Nothing above 15 kPa is allowed to converge: what was reached is told, and nothing is made up beyond it."""
     stepped = load.Problem.stepped
     monkeypatch.setattr(
-        load.Problem, "stepped", lambda self, s, p, before: stepped(self, s, p, before) if p < 1.5e4 else None
+        load.Problem, "stepped", lambda self, s, p, before, **_: stepped(self, s, p, before) if p < 1.5e4 else None
     )
     found = press2d.press(tri(), solids(), [0.0, 1e4, 2e4], fineness=Fineness(0.005, 0.2, 0.3))
     assert found.converged_pa == 1e4
@@ -145,11 +146,29 @@ def test_too_much_is_told_with_the_last_load(monkeypatch):
         curve_of(found)
 
 
+def test_partners_stay_where_new_ones_have_no_equilibrium(monkeypatch):
+    """Made to find none above 15 kPa: the curve goes on, as without that fault."""
+    newton, sizes = load.Problem.newton, Fineness(0.005, 0.2, 0.3)
+    known = press2d.press(tri(), solids(), [0.0, 1e4, 2e4], fineness=sizes)
+
+    def none_of_new(self, state, pressure_pa, pairs, enough):
+        return (
+            None
+            if pressure_pa > 1.5e4 and pairs is not state.pairs
+            else newton(self, state, pressure_pa, pairs, enough)
+        )
+
+    monkeypatch.setattr(load.Problem, "newton", none_of_new)
+    found = press2d.press(tri(), solids(), [0.0, 1e4, 2e4], fineness=sizes)
+    assert found.faults == ()
+    assert found.displacement_m == pytest.approx(known.displacement_m, rel=0.01)
+
+
 def test_coarser_triangles_take_over_where_finer_ones_fail(monkeypatch):
     """Made to fail at first: the answer is that of coarser triangles from there on, and says so."""
     stepped = load.Problem.stepped
 
-    def fine_fail(self, state, pressure, before):
+    def fine_fail(self, state, pressure, before, **_):
         fine = self.elements.mesh.lengths_m().min() < 2e-6
         return None if fine and pressure > 1.5e4 else stepped(self, state, pressure, before)
 
@@ -172,6 +191,19 @@ def test_the_sound_part_ends_before_the_first_failed_check(check, bad):
     given = pressed.Pressed(STRESSES[:4], STRESSES[:4], known, (), fall_m=0.0, faults=("bad",), **values)
     found = given.sound()
     assert (found.converged_pa, found.faults, found.capacitance_f_per_m2) == (STRESSES[1], (), known[:2])
+
+
+def test_a_pressure_whose_outlines_were_not_meshed_is_left_out_where_a_later_one_is_known():
+    c = [Interval(k, k) for k in (1.0, 2.0, 3.0, 4.0)]
+    zero, one = np.zeros(4), np.ones(4)
+    given = pressed.Pressed(
+        STRESSES[:4], STRESSES[:4], (c[0], None, c[2], c[3]), (True,) * 4, one, zero, zero, 0.0, ("bad",)
+    )  # fmt: skip
+    found = given.sound()
+    assert (found.capacitance_f_per_m2, found.faults, found.carried) == ((c[0], c[2], c[3]), (), (True,) * 3)
+    assert found.stress_pa.tolist() == [STRESSES[k] for k in (0, 2, 3)]
+    squeezed = replace(given, volume_ratio=np.array([1.0, 0.1, 1.0, 1.0]))
+    assert squeezed.sound() == squeezed  # no two before it
 
 
 def test_the_sound_part_ends_where_the_capacitance_is_unknown_or_falls():

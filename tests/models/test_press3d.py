@@ -14,7 +14,7 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.design.design import make
 from sensorgen.models import fem2d, fem3d, press2d, press3d, springs
 from sensorgen.models.compression import curve_of
-from sensorgen.models.press3d import BoundaryConditions, Elastic, Pieces
+from sensorgen.models.press3d import BoundaryConditions, BrickCounts, Elastic
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.contact import (
     air,
@@ -27,11 +27,11 @@ from sensorgen.solvers.contact import (
 )
 from sensorgen.solvers.contact.bricks import Bricks, mesh_of
 from sensorgen.solvers.contact.cell import Region
-from sensorgen.solvers.contact.mapped_field import Orders
+from sensorgen.solvers.contact.mapped_field import FieldOrders
 
 EPS = {"x60": 4.68, "air": 1.00059}
 REGIONS = (Region("air", ""), Region("x60", ""), Region("etpu", "bottom"), Region("etpu", "top"))
-COARSE = Pieces(2, 0.5)
+COARSE = BrickCounts(2, 0.5)
 
 
 def solids(nu=0.4999, x60=6e6, etpu=22e6):
@@ -60,7 +60,9 @@ def test_a_block_follows_the_closed_form(nu, period):
     """Homogeneous neo-Hookean block: stretch a across in both directions, b along the load; at a third of E."""
     block = boxes(((0, 0.3, 1), (0, 0.6, 1), (0, 0.2, 1)), np.ones((2, 2, 2), int))
     mu, lam = 6e6 / (2 * (1 + nu)), np.inf if nu == 0.5 else 6e6 * nu / ((1 + nu) * (1 - 2 * nu))
-    found = press3d.press(block, solids(nu), [0.0, 1e6, 2e6], None, BoundaryConditions("sliding", period), Pieces(1))
+    found = press3d.press(
+        block, solids(nu), [0.0, 1e6, 2e6], None, BoundaryConditions("sliding", period), BrickCounts(1)
+    )
 
     def across(b):  # nothing pulls sideways: mu a - mu / a + lam (J - 1) J / a = 0
         if period == "fixed":
@@ -111,20 +113,20 @@ def test_a_bonded_strip_does_not_lock(thick, stiffer):
     fill[-1] = 0
     block = boxes((x, (0, 0.1), np.linspace(0, thick / 2, 4)), fill)
     stress = 1e-4 * stiffer * 6e6
-    found = press3d.press(block, solids(0.5), [0.0, stress], None, BoundaryConditions(top="rigid"), Pieces(1))
+    found = press3d.press(block, solids(0.5), [0.0, stress], None, BoundaryConditions(top="rigid"), BrickCounts(1))
     strain = found.displacement_m[-1] / (thick / 2 * 1e-3)
     assert stress / strain / 6e6 == pytest.approx(stiffer, rel=0.02)
 
 
 def test_a_plate_between_mirrors_is_confined_and_a_free_one_widens():
     plate = press3d.cell(make({"shape": "reference"}).in_use)
-    found = press3d.press(plate, solids(), [0.0, 1e5], EPS, fineness=Pieces(1))
+    found = press3d.press(plate, solids(), [0.0, 1e5], EPS, fineness=BrickCounts(1))
     confined = {k: s.youngs_modulus_pa * (1 - 0.4999) / (1.4999 * 2e-4) for k, s in solids().items()}
     assert found.displacement_m[-1] == pytest.approx(1e5 * 0.6e-3 * sum(1 / m for m in confined.values()), rel=1e-4)
     assert found.capacitance_f_per_m2[0].middle() == pytest.approx(0.27625066e-12 / 4e-6, rel=1e-6, abs=0)
     rise = found.capacitance_f_per_m2[1].middle() / found.capacitance_f_per_m2[0].middle() - 1
     assert rise == pytest.approx(1e5 / confined["x60"], rel=1e-3)
-    loose = press3d.press(plate, solids(), [0.0, 1e3], EPS, BoundaryConditions("sliding", "free"), Pieces(1))
+    loose = press3d.press(plate, solids(), [0.0, 1e3], EPS, BoundaryConditions("sliding", "free"), BrickCounts(1))
     rise = loose.capacitance_f_per_m2[1].middle() / loose.capacitance_f_per_m2[0].middle() - 1
     biaxial = {k: s.youngs_modulus_pa / (1 - 0.4999) for k, s in solids().items()}  # all layers widen alike
     wide = 1e3 * 0.4999 * sum(1.2e-3 / 2 / 0.5001 for _ in range(2)) / sum(0.6e-3 * m for m in biaxial.values())
@@ -147,7 +149,11 @@ def test_rect_is_softer_than_solid_stiffer_than_springs_and_work_is_stored(press
 
 def test_bounds_hold_the_reference_and_close_in():
     widths = []
-    for fineness, orders in ((Pieces(2, 0.4), Orders(2, 1)), (Pieces(2, 0.4), Orders()), (Pieces(3, 0.3), Orders())):
+    for fineness, orders in (
+        (BrickCounts(2, 0.4), FieldOrders(2, 1)),
+        (BrickCounts(2, 0.4), FieldOrders()),
+        (BrickCounts(3, 0.3), FieldOrders()),
+    ):
         bricks = press3d.cell(rect()).cut(fineness.pieces, fineness.shrink)
         found = unmoved(bricks, orders).times(4e-6)
         assert found.lower < 0.812343e-12 < found.upper  # by two other solvers, to 2.6e-5
@@ -157,7 +163,7 @@ def test_bounds_hold_the_reference_and_close_in():
 
 def unmoved(bricks, orders):
     mesh = mesh_of(bricks, np.ones(bricks.fill.shape, bool))
-    return mapped_field.Field(mesh, EPS, orders).capacitance(np.zeros(3 * len(mesh.points_m)))
+    return mapped_field.MappedField(mesh, EPS, orders).capacitance(np.zeros(3 * len(mesh.points_m)))
 
 
 def test_a_thinner_film_by_displacement_is_one_by_drawing():
@@ -166,7 +172,7 @@ def test_a_thinner_film_by_displacement_is_one_by_drawing():
     mesh = mesh_of(bricks, np.ones(bricks.fill.shape, bool))
     u = np.zeros((len(mesh.points_m), 3))
     u[:, 2] = -20e-6 * np.clip((mesh.points_m[:, 2] - 0.3e-3) / 0.1e-3, 0, 1)
-    moved = mapped_field.Field(mesh, EPS, Orders()).capacitance(u.ravel())
+    moved = mapped_field.MappedField(mesh, EPS, FieldOrders()).capacitance(u.ravel())
     drawn = fem3d.capacitance(rect(0.08), EPS, 1e-2).times(1 / 1e-3)
     assert max(moved.lower, drawn.lower) < min(moved.upper, drawn.upper)
     assert moved.middle() == pytest.approx(drawn.middle(), rel=4e-3)
@@ -180,13 +186,13 @@ def test_bounds_from_the_factors_of_an_earlier_load_hold_those_of_new_ones(monke
     u[:, 2] = -20e-6 * np.clip((mesh.points_m[:, 2] - 0.3e-3) / 0.1e-3, 0, 1)
     for small in (1e-2, 1e-7):
         monkeypatch.setattr(mapped_field, "_SMALL", small)
-        cell = mapped_field.Field(mesh, EPS, Orders())
+        cell = mapped_field.MappedField(mesh, EPS, FieldOrders())
         cell.capacitance(0 * u.ravel())
         made = {name: kept.factors for name, kept in cell.systems.items()}
         for share in (0.5, 1.0, -1.0):
             found = cell.capacitance(share * u.ravel())
             monkeypatch.setattr(mapped_field, "_SMALL", 1e-12)
-            new = mapped_field.Field(mesh, EPS, Orders()).capacitance(share * u.ravel())
+            new = mapped_field.MappedField(mesh, EPS, FieldOrders()).capacitance(share * u.ravel())
             monkeypatch.setattr(mapped_field, "_SMALL", small)
             assert new.lower * (1 - 2 * small) < found.lower <= new.lower * (1 + 1e-12)
             assert new.upper * (1 - 1e-12) <= found.upper < new.upper * (1 + 2 * small)
@@ -204,13 +210,13 @@ def test_where_a_plates_inner_places_go_does_not_matter():
     u = 1e-3 * np.column_stack([0.08 * bump, -0.05 * bump, 0.07 * bump])
     exact = 8.8541878128e-12 * 4.68 / 0.6e-3
     widths = []
-    for orders in (Orders(2, 1), Orders(4, 3)):
-        found = mapped_field.Field(mesh, EPS, orders).capacitance(u.ravel())
+    for orders in (FieldOrders(2, 1), FieldOrders(4, 3)):
+        found = mapped_field.MappedField(mesh, EPS, orders).capacitance(u.ravel())
         assert found.lower < exact < found.upper
         widths.append(found.width())
     assert widths[1] < 0.02 * widths[0]
     with pytest.raises(mapped_field.Folded):
-        mapped_field.Field(mesh, EPS, Orders(2, 1)).capacitance(12 * u.ravel())
+        mapped_field.MappedField(mesh, EPS, FieldOrders(2, 1)).capacitance(12 * u.ravel())
 
 
 def stairs(*widths, lift=0.0, film=0.1):
@@ -242,7 +248,7 @@ def test_a_foot_that_has_landed_and_widened_is_one_drawn_so(slid_mm):
     moved[above, 0] = 1e-3 * np.interp(x[above], [0.5, 0.7, 1.5], [0.0, slid_mm, 0.0])
     moved[above, 2] = -2e-5
     u = air.AirMap(whole, solid).displacements_m(moved, 1e-4)
-    found = mapped_field.Field(whole, EPS, Orders()).capacitance(u)
+    found = mapped_field.MappedField(whole, EPS, FieldOrders()).capacitance(u)
     drawn = fem2d.capacitance(stairs(0.2 + slid_mm), EPS, 1e-5).times(1 / 32e-6)
     assert found.width() < 2e-3
     assert found.lower < drawn.upper * (1 + 1e-4)
@@ -254,7 +260,7 @@ def test_stairs_as_boxes_are_stairs_as_a_cross_section(lift):
     """Bars along y are pressed alike by both models, bonded or falling onto the film and slipping on it."""
     scene, stress = stairs(0.2, 0.3, lift=lift), [0.0, 1e4, 2e4]
     flat = press2d.press(press2d.cell(scene, 2.0), solids(), stress, EPS)
-    solid = press3d.press(press3d.cell(scene), solids(), stress, EPS, fineness=Pieces(2, 0.4))
+    solid = press3d.press(press3d.cell(scene), solids(), stress, EPS, fineness=BrickCounts(2, 0.4))
     assert flat.faults == solid.faults == ()
     assert solid.fall_m == pytest.approx(lift * 1e-3, rel=1e-9)
     own = [f.displacement_m[1:] - f.fall_m for f in (flat, solid)]
@@ -270,7 +276,7 @@ def test_the_side_of_a_foot_that_rolls_onto_the_film_touches_it():
     """A soft foot bulges over the film that it is bonded to: faces that were square as drawn meet."""
     soft, stress = solids(x60=1e6), [0.0, 5e4, 1e5]
     flat = press2d.press(press2d.cell(stairs(0.3, 0.3), 2.0), soft, stress)
-    solid = press3d.press(press3d.cell(stairs(0.3, 0.3)), soft, stress, fineness=Pieces(3, 0.3))
+    solid = press3d.press(press3d.cell(stairs(0.3, 0.3)), soft, stress, fineness=BrickCounts(3, 0.3))
     assert flat.faults == solid.faults == ()
     assert "faces of gaps touch, without friction" in solid.doubts
     assert solid.displacement_m[1:] == pytest.approx(flat.displacement_m[1:], rel=0.04)  # 0.046 where they overlap
@@ -283,7 +289,7 @@ def test_feet_that_stick_are_stiffer_by_as_much_as_in_a_cross_section():
     for kind in ("frictionless", "stick"):
         held = BoundaryConditions(contact=kind)
         flat = press2d.press(press2d.cell(scene, 2.0), solids(), stress, EPS, held, press2d.Fineness().finer())
-        solid = press3d.press(press3d.cell(scene), solids(), stress, EPS, held, Pieces(2, 0.4))
+        solid = press3d.press(press3d.cell(scene), solids(), stress, EPS, held, BrickCounts(2, 0.4))
         assert flat.faults == solid.faults == ()
         assert abs(solid.imbalance[-1]) < 2e-3
         moved[kind] = flat, solid
@@ -301,7 +307,7 @@ def test_upright_walls_hold_each_other_apart():
     soft = {"x60": Elastic(6e6, 0.49), "etpu": Elastic(1e9, 0.3)}
     fill = np.array([[[2, 1, 3]], [[2, 0, 3]], [[2, 2, 3]]])
     cell = boxes(((0, 0.4, 0.402, 0.5), (0, 0.2), (0, 0.1, 0.5, 0.6)), fill)
-    found = press3d.press(cell, soft, [0.0, 2e5, 4e5, 6e5, 8e5], None, fineness=Pieces(2, 0.6))
+    found = press3d.press(cell, soft, [0.0, 2e5, 4e5, 6e5, 8e5], None, fineness=BrickCounts(2, 0.6))
     assert found.faults == ()
     assert "faces of gaps touch" in found.doubts[-1]
     slopes = np.diff(found.displacement_m)
@@ -364,7 +370,7 @@ def test_a_block_that_bulges_to_a_mirror_meets_its_image():
     stress = [0.0, 1e5, 2e5, 3e5]
     twice = boxes(((0, 0.4, 0.404, 0.804), (0, 0.2), (0, 0.1, 0.5, 0.6)), [[[2, 1, 3]], [[2, 0, 3]], [[2, 1, 3]]])
     once = boxes(((0, 0.4, 0.402), (0, 0.2), (0, 0.1, 0.5, 0.6)), [[[2, 1, 3]], [[2, 0, 3]]])
-    both, half = (press3d.press(cell, soft, stress, None, fineness=Pieces(2, 0.6)) for cell in (twice, once))
+    both, half = (press3d.press(cell, soft, stress, None, fineness=BrickCounts(2, 0.6)) for cell in (twice, once))
     assert both.faults == half.faults == ()
     assert half.displacement_m == pytest.approx(both.displacement_m, rel=2e-3, abs=1e-15)
     moved = np.diff(half.displacement_m)
@@ -382,11 +388,11 @@ def test_gaps_are_runs_of_air_between_solids_along_each_axis():
 
 def test_moduli_scale_and_incompressible_is_the_limit():
     cell = press3d.cell(rect())
-    one = press3d.press(cell, solids(), [0.0, 2e4], fineness=Pieces(1))
-    five = press3d.press(cell, solids(x60=30e6, etpu=110e6), [0.0, 1e5], fineness=Pieces(1))
+    one = press3d.press(cell, solids(), [0.0, 2e4], fineness=BrickCounts(1))
+    five = press3d.press(cell, solids(x60=30e6, etpu=110e6), [0.0, 1e5], fineness=BrickCounts(1))
     assert five.displacement_m == pytest.approx(one.displacement_m, rel=1e-5, abs=1e-15)
     moved = [
-        press3d.press(cell, solids(nu), [0.0, 2e4], fineness=Pieces(1)).displacement_m[-1]
+        press3d.press(cell, solids(nu), [0.0, 2e4], fineness=BrickCounts(1)).displacement_m[-1]
         for nu in (0.4999, 0.49999, 0.5)
     ]
     assert moved[0] > moved[1] > moved[2] > 0.995 * moved[0]
@@ -394,7 +400,7 @@ def test_moduli_scale_and_incompressible_is_the_limit():
 
 def test_both_directions_of_the_strips_are_one():
     moved = [
-        press3d.press(press3d.cell(rect(along=way)), solids(), [0.0, 5e4], fineness=Pieces(1)).displacement_m[-1]
+        press3d.press(press3d.cell(rect(along=way)), solids(), [0.0, 5e4], fineness=BrickCounts(1)).displacement_m[-1]
         for way in ("xy", "yx")
     ]
     assert moved[0] == pytest.approx(moved[1], rel=1e-6)
@@ -403,9 +409,9 @@ def test_both_directions_of_the_strips_are_one():
 def test_what_does_not_converge_ends_with_the_last_load(monkeypatch):
     stepped = load.Problem.stepped
     monkeypatch.setattr(
-        load.Problem, "stepped", lambda self, s, p, before: stepped(self, s, p, before) if p < 1.5e4 else None
+        load.Problem, "stepped", lambda self, s, p, before, **_: stepped(self, s, p, before) if p < 1.5e4 else None
     )
-    found = press3d.press(press3d.cell(rect()), solids(), [0.0, 1e4, 2e4], fineness=Pieces(1))
+    found = press3d.press(press3d.cell(rect()), solids(), [0.0, 1e4, 2e4], fineness=BrickCounts(1))
     assert (found.converged_pa, found.faults) == (1e4, ("converged up to 10 of 20 kPa",))
     with pytest.raises(OutOfRange, match="not to be trusted"):
         curve_of(found)
@@ -422,13 +428,13 @@ def test_what_is_wrong_is_refused():
         press3d.press(press3d.cell(rect()), solids(), [0.0, 1.0], boundary=BoundaryConditions(base="glued"))
     touching = boxes(((0, 1), (0, 1), (0, 1, 2, 3)), [[[2, 3, 1]]])
     with pytest.raises(BadInput, match="no dielectric lies between"):
-        unmoved(touching, Orders())
+        unmoved(touching, FieldOrders())
     shorted = boxes(((0, 1, 2), (0, 1), (0, 1, 2, 3)), [[[2, 1, 3]], [[2, 3, 3]]])
     with pytest.raises(OutOfRange, match="electrodes touch"):
-        unmoved(shorted, Orders())
+        unmoved(shorted, FieldOrders())
     open_ended = boxes(((0, 1, 2), (0, 1), (0, 1, 2, 3)), [[[2, 1, 3]], [[2, 1, 1]]])
     with pytest.raises(BadInput, match="does not cover"):
-        unmoved(open_ended, Orders())
+        unmoved(open_ended, FieldOrders())
 
 
 def test_many_boxes_are_cut_into_fewer_pieces_and_that_is_said(monkeypatch):
@@ -501,7 +507,7 @@ def test_the_stated_rise_holds_that_of_a_second_program():
     sizes = {name: value for name, value in case.items() if name != "meshes"}
     bricks = press3d.cell(make({"shape": "rect", "parameters": sizes}).in_use)
     fine, coarse = (
-        press3d.press(bricks, solids(), [0.0, reference["pressure_pa"]], EPS, None, Pieces(n)) for n in (3, 2)
+        press3d.press(bricks, solids(), [0.0, reference["pressure_pa"]], EPS, None, BrickCounts(n)) for n in (3, 2)
     )
     found = press3d.limit(fine, coarse, 3)
     rest, apart = found.found.capacitance_f_per_m2[0], abs(exact["rise"] - case["meshes"][0]["rise"])

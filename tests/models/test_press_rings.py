@@ -9,7 +9,7 @@ from sensorgen.models import fem2d, press2d
 from sensorgen.models.press2d import Fineness
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.contact import mesh, plane_field, rings, wedge
-from sensorgen.solvers.contact.cell import OUTSIDE, Cell, Region
+from sensorgen.solvers.contact.cell import OUTSIDE, ContactCell, Region
 
 EPS = {"x60": 4.68, "air": 1.00059}
 LEVELS = (Fineness(), Fineness().finer())
@@ -80,7 +80,7 @@ def test_a_blunt_corner_at_a_mirror_is_a_notch_and_where_two_solids_meet_there_i
         ((0.0, 0.6), (0.0, 0.8)): (OUTSIDE, 2),
     }
     solids = (Region("x60", ""), Region("etpu", "top"))
-    assert rings.notches(Cell(edges, solids, 0.0, 1.0, mirrored=True)) == [(0.0, 0.3)]
+    assert rings.notches(ContactCell(edges, solids, 0.0, 1.0, mirrored=True)) == [(0.0, 0.3)]
 
 
 def test_stairs_are_near_their_limit_on_the_mesh_that_is_used():

@@ -106,7 +106,9 @@ def test_a_pyramid_with_upright_walls_is_the_box_of_the_model_in_3d():
     assert {p.span("z") for p in top.pieces} == {p.span("z") for p in walls.pieces}
     stress = [0.0, 2.5e4, 5e4]
     round_one = press_round.press(Scene((*bodies, walls), boxes.size_mm), SOLIDS, stress, EPS)
-    fine, coarse = (press3d.press(press3d.cell(boxes), SOLIDS, stress, EPS, fineness=press3d.Pieces(n)) for n in (3, 2))
+    fine, coarse = (
+        press3d.press(press3d.cell(boxes), SOLIDS, stress, EPS, fineness=press3d.BrickCounts(n)) for n in (3, 2)
+    )
     deep = press3d.limit(fine, coarse, 3)
     rise = np.diff([c.middle() for c in round_one.capacitance_f_per_m2])[0]
     assert round_one.displacement_m[1:] == pytest.approx(deep.found.displacement_m[1:], rel=0.03)

@@ -18,7 +18,7 @@ from sensorgen.scene.scene import FLOATING, Body, Fill, Prism, Scene, box, round
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.bounds import Unsolved
 from sensorgen.solvers.electrostatics.enclosed import enclosing
-from sensorgen.solvers.electrostatics.prisms import Layers, Mesh, solved
+from sensorgen.solvers.electrostatics.prisms import LayerCell, PrismMesh, solved
 
 if importlib.util.find_spec("ngsolve") is None:
     pytest.skip("NGSolve is not installed", allow_module_level=True)
@@ -173,11 +173,11 @@ def test_slivers_are_refused_not_believed():
     """Outlines 2e-7 mm apart on a grid that resolves them: the flux no longer balances."""
     full = shapely.box(0, 0, 2, 2)
     nearly = [shapely.box(0.5 - k * 2e-7, 0.5, 1.5 + k * 3e-7, 1.5 + k * 1e-7) for k in range(3)]
-    layers = Layers(
+    layers = LayerCell(
         (2.0, 2.0), np.array([0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6]),
         [{0: full}, {2: full}, *({1: n} for n in nearly), {1: full}], 2, [4.68, 1.0],
     )  # fmt: skip
-    mesh = Mesh.of(layers, (0.2, 0.05), 1e-8)
+    mesh = PrismMesh.of(layers, (0.2, 0.05), 1e-8)
     with pytest.raises(Unsolved, match="energy and charges differ"):
         solved(mesh, mesh, 3, np.zeros(1))
 
@@ -203,14 +203,14 @@ def test_rounded_outlines_enclose_the_exact_ones(kind):
     discs = [shapely.Polygon(post(0.0131, -0.0077, 0.4 - k * 0.004, corners=8, turn=0.3)) for k in range(3)]
     discs = [shapely.intersection(disc, full) for disc in discs]
     regions = [{0: full}, {2: full}, *({kind: disc} for disc in discs), {1: full}]
-    cell = Layers((1.0, 1.0), np.arange(7) / 10, regions, 2, [4.68, 1.0])
+    cell = LayerCell((1.0, 1.0), np.arange(7) / 10, regions, 2, [4.68, 1.0])
     beside, far = (0.2, 0.04), 0.15
-    exact = Mesh.of(cell, beside, 1e-6, far)
+    exact = PrismMesh.of(cell, beside, 1e-6, far)
     exact = solved(exact, exact, 2, np.zeros(1))
     ends = [enclosing(cell, 3e-3, far, 0.005, outwards=way) for way in (False, True)]
     if kind == 1:
         assert all(end.regions[3] == end.regions[4] != end.regions[2] for end in ends)
-    inner, outer = (Mesh.of(end, beside, 3e-3, far) for end in ends)
+    inner, outer = (PrismMesh.of(end, beside, 3e-3, far) for end in ends)
     found, swapped = solved(inner, outer, 2, np.zeros(1)), solved(outer, inner, 2, np.zeros(1))
     assert exact.lower / 1.04 < found.lower < exact.lower
     assert exact.upper < found.upper < exact.upper * 1.04
@@ -221,8 +221,8 @@ def test_rounded_outlines_enclose_the_exact_ones(kind):
 def test_outlines_of_all_ranks_move_one_way():
     """So that no slit opens between a conductor and the dielectric beside it."""
     full, half = shapely.box(0, 0, 2, 2), shapely.box(0, 0, 1, 2)
-    cell = Layers((2.0, 2.0), np.array([0, 0.1, 0.2, 0.3]), [{0: full}, {1: half, 2: full - half}, {1: full}], 2,
-                  [4.68, 1.0])  # fmt: skip
+    cell = LayerCell((2.0, 2.0), np.array([0, 0.1, 0.2, 0.3]), [{0: full}, {1: half, 2: full - half}, {1: full}], 2,
+                     [4.68, 1.0])  # fmt: skip
     for outwards in (False, True):
         layer = enclosing(cell, 1e-2, 1.0, 0.0, outwards=outwards).regions[1]
         assert layer[1].area == pytest.approx(2 + (0.03 if outwards else -0.03))
@@ -231,7 +231,7 @@ def test_outlines_of_all_ranks_move_one_way():
 
 def test_conductors_nearer_than_the_grid_are_refused():
     full, one, other = shapely.box(0, 0, 2, 2), shapely.box(0.5, 0.5, 1, 1.5), shapely.box(1.001, 0.5, 1.5, 1.5)
-    cell = Layers((2.0, 2.0), np.array([0, 0.1, 0.2, 0.3]), [{0: full}, {2: one, 3: other}, {1: full}], 4, [1.0])
+    cell = LayerCell((2.0, 2.0), np.array([0, 0.1, 0.2, 0.3]), [{0: full}, {2: one, 3: other}, {1: full}], 4, [1.0])
     with pytest.raises(Unsolved, match="nearer than the grid"):
         enclosing(cell, 1e-3, 0.1, 0.0, outwards=True)
 

@@ -19,7 +19,7 @@ from sensorgen.solvers.electrostatics.bounds import whole
 if importlib.util.find_spec("ngsolve") is None:
     pytest.skip("NGSolve is not installed", allow_module_level=True)
 
-from sensorgen.solvers.electrostatics.round_bodies import Cell, bounds
+from sensorgen.solvers.electrostatics.round_bodies import RoundCell, bounds
 
 QUARTER = tan(pi / 8)  # bulge of a quarter of a circle
 EPS_MM = EPS0_F_PER_M * M_PER_MM
@@ -42,7 +42,7 @@ def shell(inner, outer):
 
 def spheres(*pieces, permittivity=(1.0,)):
     """A quarter of bodies in a ball of 1 mm."""
-    return Cell((0, 0, -1.2), (1.2, 1.2, 1.2), ((cavity(1.0), 0), *pieces), 2, permittivity)
+    return RoundCell((0, 0, -1.2), (1.2, 1.2, 1.2), ((cavity(1.0), 0), *pieces), 2, permittivity)
 
 
 def narrowest(cell, width):
@@ -82,7 +82,7 @@ def pressed(pattern, film=0.1, gap=0.05, high=0.5, metal=True):
         (box(-2, 2, -2, 2, roof, roof + 0.1), 1),
         (box(-2, 2, -2, 2, 0, film), 2),
     )
-    return Cell((0, 0, -0.1), (1, 1, roof + 0.1), (*plates, (pattern, 1 if metal else 3)), 2, (3.0, 2.5, 1.0))
+    return RoundCell((0, 0, -0.1), (1, 1, roof + 0.1), (*plates, (pattern, 1 if metal else 3)), 2, (3.0, 2.5, 1.0))
 
 
 def scene_of(cell):
@@ -153,7 +153,7 @@ def test_a_cone_in_a_tin_is_that_of_its_plane(tip):
     """Finite elements in radius and height, two orders that agree to 1e-5, share neither mesh nor bounds with these."""
     tin = Revolved(0, 0, ((0, -0.3), (4, -0.3), (4, 1.3), (0, 1.3), (0, 0.9), (0.8, 0.9), (0.8, 0), (0, 0)))
     profile = ((0, 0.2), (tip, 0.2), (0.5, 0.7), (0, 0.7)) if tip else ((0, 0.2), (0.5, 0.7), (0, 0.7))
-    cell = Cell((0, 0, -0.2), (1, 1, 1.1), ((tin, 0), (Revolved(0, 0, profile), 1)), 2, (1.0,))
+    cell = RoundCell((0, 0, -0.2), (1, 1, 1.1), ((tin, 0), (Revolved(0, 0, profile), 1)), 2, (1.0,))
     coarse, exact = (axial(profile, order) / 4 for order in (3, 4))
     assert exact == pytest.approx(coarse, rel=1e-5)
     found = narrowest(cell, 1e-3)

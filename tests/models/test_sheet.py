@@ -10,7 +10,7 @@ from line_cases import PLATE
 
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import line, sheet
-from sensorgen.models.sheet import BY, Contact, Patch, Sheet, impedance, solve
+from sensorgen.models.sheet import BY, Contact, Sheet, SheetPatch, impedance, solve
 
 TONES = np.array([1e-3, 1.1e3, 99.7e3, 1e6])
 C = EPS0_F_PER_M * PLATE["eps_r"] / PLATE["film_m"]
@@ -22,7 +22,7 @@ STRIP = Sheet(
 )
 PAIR = (STRIP.edge("top", "left"), STRIP.edge("bottom", "left"))
 SQUARE = Sheet(0.1, 0.08, (450.0, 700.0), 7e-8, tan_delta=0.02, leak_s_per_m2=1e-6)
-TIP = Patch(0.0213, 0.0371, 0.015, 0.022, 1.3, (1.2, 1.1))
+TIP = SheetPatch(0.0213, 0.0371, 0.015, 0.022, 1.3, (1.2, 1.1))
 
 
 def pad(side, x, y, size=0.01):
@@ -47,7 +47,7 @@ def strip_press(x, factor, s_n):
         "top_piezoresistance_per_n": s_n,
         "bottom_piezoresistance_per_n": s_n,
     }
-    return inputs, Patch(x, 0.0, PLATE["tip_m"], PLATE["width_m"], factor, (1 + s_n * force,) * 2)
+    return inputs, SheetPatch(x, 0.0, PLATE["tip_m"], PLATE["width_m"], factor, (1 + s_n * force,) * 2)
 
 
 def rates(errors):
@@ -154,11 +154,11 @@ def test_a_rectangle_between_opposite_edges_is_its_squares():
 @pytest.mark.parametrize("x", [0.0, 0.0213, 0.08, 0.085])
 def test_a_band_of_other_resistance_is_in_series(x):
     ends = SQUARE.edge("top", "left"), SQUARE.edge("top", "right")
-    press = Patch(x, 0.0, 0.015, 0.08, 1.0, (3.0, 1.0))
+    press = SheetPatch(x, 0.0, 0.015, 0.08, 1.0, (3.0, 1.0))
     squares = (0.1 + 2.0 * 0.015) / 0.08
     z = impedance(SQUARE, [ends], 0.0, press, cells=80)[0, 0, 0].real
     assert z == pytest.approx(450.0 * squares, rel=2e-3)
-    beside = Patch(0.0, x * 0.5, 0.1, 0.015, 1.0, (3.0, 1.0))  # along the current: in parallel
+    beside = SheetPatch(0.0, x * 0.5, 0.1, 0.015, 1.0, (3.0, 1.0))  # along the current: in parallel
     z = impedance(SQUARE, [ends], 0.0, beside, cells=40)[0, 0, 0].real
     assert z == pytest.approx(450.0 * 0.1 / (0.065 + 0.015 / 3), rel=2e-4)
 
@@ -166,7 +166,7 @@ def test_a_band_of_other_resistance_is_in_series(x):
 @pytest.mark.parametrize("x", [0.0, 0.0995])
 def test_a_band_narrower_than_half_a_cell_at_an_end_still_counts(x):
     ends = SQUARE.edge("top", "left"), SQUARE.edge("top", "right")
-    press = Patch(x, 0.0, 0.0005, 0.08, 1.0, (3.0, 1.0))
+    press = SheetPatch(x, 0.0, 0.0005, 0.08, 1.0, (3.0, 1.0))
     z = impedance(SQUARE, [ends], 0.0, press, cells=10)[0, 0, 0].real
     loose = impedance(SQUARE, [ends], 0.0, cells=10)[0, 0, 0].real
     assert z - loose == pytest.approx(450.0 * 2 * 0.0005 / 0.08, rel=0.2)
@@ -272,7 +272,7 @@ def test_derivatives_follow_the_impedance_in_two_dimensions(name):
 def test_a_light_press_anywhere_reads_the_squared_voltage_of_the_film(size):
     """First order in the press: dZ/dk = -j omega C'' times the integral of u^2, which is one-dimensional."""
     x, y, hertz = 0.0213, 0.0031, 99.7e3
-    got = solve(STRIP, [PAIR], hertz, Patch(x, y, *size), of=["capacitance_factor"], cells=80)
+    got = solve(STRIP, [PAIR], hertz, SheetPatch(x, y, *size), of=["capacitance_factor"], cells=80)
     r = sum(STRIP.sheet_resistance_ohm) / STRIP.width_m
     gamma = mpmath.sqrt(r * 2j * mpmath.pi * hertz * C * STRIP.width_m)
     z = mpmath.sqrt(r / (2j * mpmath.pi * hertz * C * STRIP.width_m)) / mpmath.tanh(gamma * STRIP.length_m)
@@ -300,7 +300,7 @@ def test_facing_contacts_are_folded_to_the_same_numbers():
 def test_an_array_of_capacitances_is_what_a_patch_on_its_steps_makes():
     cells = np.full((10, 8), 7e-8)
     cells[2:5, 3:4] *= 1.3
-    patch = Patch(0.02, 0.03, 0.03, 0.01, 1.3)
+    patch = SheetPatch(0.02, 0.03, 0.03, 0.01, 1.3)
     z = impedance(replace(SQUARE, capacitance_f_per_m2=cells), MIXED, 1e5, cells=23)
     assert z == pytest.approx(impedance(SQUARE, MIXED, 1e5, patch, cells=23), rel=1e-12)
     lumpy = replace(SQUARE, capacitance_f_per_m2=np.outer(np.arange(1, 8), np.arange(2, 7)) * 1e-8)
@@ -346,6 +346,6 @@ def test_the_depth_is_that_of_the_line():
     y = 3.0 + 2j * np.pi * 1e5 * C
     assert sheet.depth_m(film, 1e5) == pytest.approx(1 / abs(y * sum(STRIP.sheet_resistance_ohm)) ** 0.5)
     assert sheet.depth_m(STRIP, 0.0) == np.inf
-    assert sheet.depth_m(STRIP, 1e5, Patch(0, 0, 0.01, 0.01, 4.0, (4.0, 4.0))) == pytest.approx(
+    assert sheet.depth_m(STRIP, 1e5, SheetPatch(0, 0, 0.01, 0.01, 4.0, (4.0, 4.0))) == pytest.approx(
         sheet.depth_m(STRIP, 1e5) / 4
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
-from sensorgen.models.sheet import Contact, Patch, Sheet, impedance, solve
+from sensorgen.models.sheet import Contact, Sheet, SheetPatch, impedance, solve
 
 FILM = Sheet(0.1, 0.05, (450.0, 700.0), 7e-8)
 PORT = (FILM.edge("top", "left"), FILM.edge("bottom", "left"))
@@ -25,7 +25,7 @@ def test_no_frequency_and_no_leak():
         1 / (1e-3 * 0.1 * 0.05) + 1150 * 2 / 3, rel=1e-5
     )
     with pytest.raises(OutOfRange, match="infinite"):
-        solve(FILM, [PORT], [1e3, 0.0], Patch(0, 0, 0.01, 0.01, 1.1), of=["x_m"], cells=10)
+        solve(FILM, [PORT], [1e3, 0.0], SheetPatch(0, 0, 0.01, 0.01, 1.1), of=["x_m"], cells=10)
 
 
 def test_no_film_at_all_is_the_same():
@@ -118,17 +118,17 @@ def test_one_contact_may_serve_two_ports():
         (lambda: replace(FILM, tan_delta=float("nan")), OutOfRange, "tan_delta"),
         (lambda: replace(FILM, capacitance_f_per_m2=np.array([[1e-8, -1e-8]])), OutOfRange, "capacitance"),
         (lambda: replace(FILM, capacitance_f_per_m2=np.array([1e-8, 1e-8])), BadInput, "array"),
-        (lambda: Patch(0, 0, 0.0, 0.01), OutOfRange, "length_m of the patch has to be above 0"),
-        (lambda: Patch(0, -0.01, 0.01, 0.01), OutOfRange, "y_m of the patch"),
-        (lambda: Patch(0, 0, 0.01, 0.01, 1.0, (0.0, 1.0)), OutOfRange, "resistance_factor"),
-        (lambda: impedance(FILM, [PORT], 1e3, Patch(0.095, 0, 0.01, 0.01)), OutOfRange, "beyond the sheet"),
+        (lambda: SheetPatch(0, 0, 0.0, 0.01), OutOfRange, "length_m of the patch has to be above 0"),
+        (lambda: SheetPatch(0, -0.01, 0.01, 0.01), OutOfRange, "y_m of the patch"),
+        (lambda: SheetPatch(0, 0, 0.01, 0.01, 1.0, (0.0, 1.0)), OutOfRange, "resistance_factor"),
+        (lambda: impedance(FILM, [PORT], 1e3, SheetPatch(0.095, 0, 0.01, 0.01)), OutOfRange, "beyond the sheet"),
         (lambda: impedance(FILM, [PORT], -1.0), OutOfRange, "not -1"),
         (lambda: impedance(FILM, [PORT], [1e3, float("nan")]), OutOfRange, "not nan"),
         (lambda: impedance(FILM, [PORT], "1kHz"), BadInput, "Hz"),
         (lambda: impedance(FILM, [PORT], []), BadInput, "Hz"),
         (lambda: impedance(FILM, [PORT], 1e3, cells=0), OutOfRange, "one cell"),
         (lambda: solve(FILM, [PORT], 1e3, of=["x_m"]), OutOfRange, "needs a patch"),
-        (lambda: solve(FILM, [PORT], 1e3, Patch(0, 0, 0.01, 0.01), of=["x"]), UnknownName, "x_m"),
+        (lambda: solve(FILM, [PORT], 1e3, SheetPatch(0, 0, 0.01, 0.01), of=["x"]), UnknownName, "x_m"),
     ],
 )
 def test_bad_input_is_named(make, error, words):
@@ -138,7 +138,7 @@ def test_bad_input_is_named(make, error, words):
 
 @pytest.mark.parametrize("size", [(0.1, 0.05), (1e-7, 1e-7), (0.1, 1e-9)])
 def test_patches_of_any_size(size):
-    press = Patch(0.1 - size[0], 0.05 - size[1], *size, 2.0, (3.0, 3.0))
+    press = SheetPatch(0.1 - size[0], 0.05 - size[1], *size, 2.0, (3.0, 3.0))
     found = solve(FILM, [PORT], [1e3, 1e5], press, of=["x_m", "y_m", "capacitance_factor"], cells=10)
     loose = impedance(FILM, [PORT], [1e3, 1e5], cells=10)
     assert all(np.isfinite(value).all() for value in found.by.values())

@@ -9,7 +9,7 @@ from drawn_sensor import sensor_of
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.models.compression import unconfined
-from sensorgen.models.stack import Body, Film, Press, Stack, Track
+from sensorgen.models.stack import Film, GroundTie, Press, Stack, Track
 from sensorgen.prediction.double_layer import study
 from sensorgen.prediction.double_layer.designs import halves, press_at, stack_of, stacked
 from sensorgen.prediction.double_layer.differencing import bounds
@@ -58,7 +58,7 @@ def test_a_stiff_second_film_takes_the_drift_away():
 
 
 def touching(stack=TWINS):
-    return Touching(stack, 4.68, TONES, PRESS, 1e-3, Body())
+    return Touching(stack, 4.68, TONES, PRESS, 1e-3, GroundTie())
 
 
 def test_bare_and_isolated_touches_are_capacitors_in_a_row():
@@ -160,7 +160,7 @@ def test_the_table_of_what_a_touch_does():
         if row[0]:
             design, law = next(designs)
             found = stacked(make(design), law)
-            of = Touching(found.own, found.isolation_eps_r, TONES, press_at(found, 6.0, 0.045), 1e-3, Body())
+            of = Touching(found.own, found.isolation_eps_r, TONES, press_at(found, 6.0, 0.045), 1e-3, GroundTie())
         assert row[1] == wiring.words
         for cell, thickness in zip(row[2:6], (0.0, 0.1, 0.5, 1.0), strict=True):
             shift, force = (float(part.split()[0]) for part in cell.split(","))

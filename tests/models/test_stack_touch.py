@@ -5,7 +5,7 @@ import pytest
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models.compression import unconfined
-from sensorgen.models.stack import Body, Film, Press, Stack, Touch, Track
+from sensorgen.models.stack import Film, GroundTie, Press, Stack, Touch, Track
 
 FIRM = unconfined(6e6).capacitive_strain
 SINGLE = Stack(0.1, 0.01, (Track(67e3), Track(23e3)), (Film(7e-10, FIRM),))
@@ -22,7 +22,7 @@ def parallel(*parts):
 @pytest.mark.parametrize("isolation", [4.1e-9, np.inf])
 def test_on_perfect_electrodes_it_is_a_few_capacitors(isolation):
     """Film, isolation and body in a row: at the driven top in parallel to the film, at ground without effect."""
-    omega, body = 2 * np.pi * TONES, Body(1500.0, 100e-12)
+    omega, body = 2 * np.pi * TONES, GroundTie(1500.0, 100e-12)
     film = 1 / (1j * omega * 7e-11)
     contact = 0.0 if np.isinf(isolation) else 1 / (1j * omega * isolation * 0.01)
     aside = contact + 1500.0 + 1 / (1j * omega * 100e-12)
@@ -35,7 +35,7 @@ def test_on_perfect_electrodes_it_is_a_few_capacitors(isolation):
 
 def test_a_bridge_reads_the_same_both_ways_round():
     """Reciprocity of the transfer admittance."""
-    one, other = (SINGLE.touched(TONES, TOUCH, Body(), *ends) for ends in ((1, 0), (0, 1)))
+    one, other = (SINGLE.touched(TONES, TOUCH, GroundTie(), *ends) for ends in ((1, 0), (0, 1)))
     assert one == pytest.approx(other, rel=1e-13)
     assert one.real == pytest.approx(other.real, rel=1e-10)
     assert abs(one - SINGLE.impedance(TONES)[..., 0, 0]).min() > 0
@@ -43,7 +43,7 @@ def test_a_bridge_reads_the_same_both_ways_round():
 
 def test_what_hardly_couples_changes_nothing():
     unaware = SINGLE.impedance(TONES, Press(0.0, 0.03, 0.01))[..., 0, 0]
-    for touch, body in (TOUCH._replace(isolation_f_per_m=1e-30), Body()), (TOUCH, Body(1e20, 1e-10)):
+    for touch, body in (TOUCH._replace(isolation_f_per_m=1e-30), GroundTie()), (TOUCH, GroundTie(1e20, 1e-10)):
         for bridge in (False, True):
             found = SINGLE.touched(TONES, touch, body, 1, 0, bridge)
             assert found == pytest.approx(unaware, rel=1e-9)
@@ -52,8 +52,8 @@ def test_what_hardly_couples_changes_nothing():
 
 @pytest.mark.parametrize(
     ("f", "touch", "body"),
-    [(0.0, TOUCH, Body()), (1e3, TOUCH._replace(isolation_f_per_m=0.0), Body()), (1e3, TOUCH, Body(0.0)),
-     (1e3, TOUCH, Body(1.0, 0.0)), (float("nan"), TOUCH, Body())],
+    [(0.0, TOUCH, GroundTie()), (1e3, TOUCH._replace(isolation_f_per_m=0.0), GroundTie()), (1e3, TOUCH, GroundTie(0.0)),
+     (1e3, TOUCH, GroundTie(1.0, 0.0)), (float("nan"), TOUCH, GroundTie())],
 )  # fmt: skip
 def test_it_refuses_what_does_not_touch(f, touch, body):
     with pytest.raises(OutOfRange, match="a touch needs"):
@@ -104,17 +104,17 @@ def ladder(f, stack, touch, body, driven, low, bridge, cells):
 def test_it_is_what_kirchhoff_says(stack, bridge, turned, f):
     n = len(stack.films)
     ends = (n - 1, n) if turned else (n, n - 1)
-    found = complex(stack.touched(f, TOUCH, Body(), *ends, bridge))
-    expected = kirchhoff(f, stack, TOUCH, Body(), *ends, bridge)
+    found = complex(stack.touched(f, TOUCH, GroundTie(), *ends, bridge))
+    expected = kirchhoff(f, stack, TOUCH, GroundTie(), *ends, bridge)
     assert abs(found - expected) < 2e-5 * abs(expected)
     assert abs(found.real - expected.real) < 2e-4 * abs(expected.real)
 
 
 def test_an_outer_pair_is_read_over_the_middle():
-    found = complex(DOUBLE.touched(1e5, TOUCH, Body(), 2, 0, bridge=False))
-    assert found == pytest.approx(kirchhoff(1e5, DOUBLE, TOUCH, Body(), 2, 0, False), rel=2e-5)
+    found = complex(DOUBLE.touched(1e5, TOUCH, GroundTie(), 2, 0, bridge=False))
+    assert found == pytest.approx(kirchhoff(1e5, DOUBLE, TOUCH, GroundTie(), 2, 0, False), rel=2e-5)
 
 
 def test_a_press_under_the_touch_counts():
-    found = IDEAL.touched(TONES, Touch(0.03, 0.01, 1e-30, 6.0), Body(), 1, 0)
+    found = IDEAL.touched(TONES, Touch(0.03, 0.01, 1e-30, 6.0), GroundTie(), 1, 0)
     assert found == pytest.approx(1 / (2j * np.pi * TONES * (7e-11 * 0.9 + 7e-12 / 0.99)), rel=1e-12)

@@ -7,7 +7,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.models import traxels
 from sensorgen.solvers.network import band
 from sensorgen.solvers.network import links as links
-from sensorgen.solvers.network.nodes import Lines, Nodes
+from sensorgen.solvers.network.nodes import Nodes, StraightLines
 from sensorgen.verification.chart.rectilinear import plate
 
 RHO, W, H = 0.2, 0.42e-3, 0.1e-3
@@ -22,7 +22,7 @@ def strips(n, along):
     if along == "y":
         start, end = start[:, ::-1], end[:, ::-1]
     full = np.ones(n)
-    return Lines(start, end, full * W, full * H, np.zeros(n, np.int64), np.zeros(n, bool))
+    return StraightLines(start, end, full * W, full * H, np.zeros(n, np.int64), np.zeros(n, bool))
 
 
 def ratio(lines, contact, ends=ENDS, area=None):
@@ -55,7 +55,7 @@ def test_across_lines_each_contact_adds_its_own(contact):
 
 def test_lines_of_two_layers_that_cross():
     """One line along x over one along y: the current goes up through their common square alone."""
-    lines = Lines(
+    lines = StraightLines(
         np.array([[-5e-3, 0.0], [0.0, -5e-3], [0.0, 3e-3]]), np.array([[0.0, 0.0], [0.0, 5e-3], [5e-3, 3e-3]]),
         np.full(3, W), np.full(3, H), np.array([0, 1, 0]), np.zeros(3, bool),
     )  # fmt: skip
@@ -71,7 +71,7 @@ def test_lines_of_two_layers_that_cross():
 def test_lines_that_cross_aslant_share_a_longer_place():
     """As before, the upper line at 45 degrees: each common place is a parallelogram."""
     way = 5e-3 / np.sqrt(2)
-    lines = Lines(
+    lines = StraightLines(
         np.array([[-9e-3, 0.0], [-way, -way], [3e-3, 3e-3]]), np.array([[0.0, 0.0], [2 * way, 2 * way], [12e-3, 3e-3]]),
         np.full(3, W), np.full(3, H), np.array([0, 1, 0]), np.zeros(3, bool),
     )  # fmt: skip
@@ -105,7 +105,7 @@ def test_a_piece_counts_the_same_wherever_it_stands_in_the_file():
     """After very many others that touch nothing: what is left of a number's digits still tells its nodes apart."""
     plated, n = plate(20.0, 5.0, W * 1e3, H * 1e3, [0, 90]), 100_000
     aside = np.stack([np.zeros(n), 1.0 + 1e-3 * np.arange(n)], axis=1)
-    both = Lines(
+    both = StraightLines(
         np.concatenate([aside, plated.start_m]), np.concatenate([aside + np.array([1e-3, 0.0]), plated.end_m]),
         np.append(np.full(n, W), plated.width_m), np.append(np.full(n, H), plated.height_m),
         np.append(np.zeros(n, np.int64), plated.layer), np.append(np.zeros(n, bool), plated.joined),

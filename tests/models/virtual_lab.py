@@ -18,7 +18,7 @@ from scipy.sparse.linalg import spsolve
 from sensorgen.analysis.characterise import catalogue
 from sensorgen.analysis.characterise.posterior import Observation
 from sensorgen.models import traxels
-from sensorgen.solvers.network.nodes import Lines
+from sensorgen.solvers.network.nodes import StraightLines
 from sensorgen.verification.chart.rectilinear import plate as lines_of
 
 EPS0 = 8.8541878128e-12
@@ -77,7 +77,7 @@ def network_ratio(share, flow, degrees, width_mm):
     if degrees is not None:
         return aligned_ratio(share, flow, degrees, width_mm)
     lines = lines_of(16.0, width_mm, LINE_MM, LAYER_MM, [45.0, 135.0])
-    thin = Lines(lines.start_m, lines.end_m, lines.width_m * flow, lines.height_m, lines.layer, lines.joined)
+    thin = StraightLines(lines.start_m, lines.end_m, lines.width_m * flow, lines.height_m, lines.layer, lines.joined)
     area = width_mm * 1e-3 * LAYER_MM * 1e-3 * 2
     return traxels.resistance(thin, 1.0, share * LINE_MM * 1e-3, (-5e-3, 5e-3), area).ratio
 
@@ -294,7 +294,7 @@ def measured(coupon, truth, meters, rng):
         if size.measured:
             actual[size.key] = size.drawn * (1 + rng.normal(0, 0.01)) + rng.normal(0, 0.03)
             read = actual[size.key] + rng.normal(0, meters.calipers_mm)
-            sizes.append(catalogue.Size(size.key, read, meters.calipers_mm, measured=True))
+            sizes.append(catalogue.CouponSize(size.key, read, meters.calipers_mm, measured=True))
         else:
             sizes.append(size)
     found = _true(coupon, actual, truth, rng)

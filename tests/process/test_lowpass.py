@@ -6,7 +6,7 @@ import pytest
 from scipy import signal
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.measure.recording import Clock, Recording, Source
+from sensorgen.measure.recording import Recording, RecordingClock, Source
 from sensorgen.measure.recording.samples import blank
 from sensorgen.measure.signal import lowpass
 from sensorgen.measure.signal.lowpass import CUTOFF_HZ, Live
@@ -105,7 +105,7 @@ def test_a_recording_with_gaps_is_bridged_when_short_and_blank_when_long():
     keep = ~((time > 20) & (time < 20.5)) & ~((time > 40) & (time < 45))
     time = time[keep]
     z = (50 + 10 * np.sin(2 * np.pi * 0.02 * time) + 5j)[:, None]
-    made_of = Recording(time, np.array([1e3]), z, blank(len(time)), Clock(), Source("", "", rate_hz=RATE))
+    made_of = Recording(time, np.array([1e3]), z, blank(len(time)), RecordingClock(), Source("", "", rate_hz=RATE))
     grid, found = lowpass.filtered(made_of)
     np.testing.assert_allclose(np.diff(grid), 1 / RATE, rtol=1e-9)
     gap = (grid > 40.01) & (grid < 44.99)
@@ -130,7 +130,7 @@ def test_a_cut_off_beyond_half_the_rate_is_refused():
             Live(RATE, cutoff)
     run = made.run(made.presses(1))
     few = Recording(
-        run.time_s[:1], made.TONES_HZ, run.impedance_ohm[:1], blank(1), Clock(), Source("", "", rate_hz=RATE)
+        run.time_s[:1], made.TONES_HZ, run.impedance_ohm[:1], blank(1), RecordingClock(), Source("", "", rate_hz=RATE)
     )
     with pytest.raises(OutOfRange, match="1 valid samples"):
         lowpass.filtered(few)

@@ -9,9 +9,9 @@ from scipy import stats
 
 from sensorgen.core.document import comma_separated
 from sensorgen.core.errors import OutOfRange
-from sensorgen.measure.signal.schedule import Plan, schedule
+from sensorgen.measure.signal.schedule import RunPlan, schedule
 
-PLAN = Plan(7, 400, (0.0, 6.0), (5.0, 95.0), 4.0, 6.0, repeats=1)
+PLAN = RunPlan(7, 400, (0.0, 6.0), (5.0, 95.0), 4.0, 6.0, repeats=1)
 
 
 def table(plan):
@@ -21,8 +21,8 @@ def table(plan):
 
 def test_the_same_seed_is_the_same_plan_and_another_is_another():
     assert PLAN.steps() == PLAN.steps()
-    assert table(PLAN) == table(Plan(7, 400, (0.0, 6.0), (5.0, 95.0), 4.0, 6.0, repeats=1))
-    assert Plan(8, 400, (0.0, 6.0), (5.0, 95.0), 4.0, 6.0).steps()[0] != PLAN.steps()[0]
+    assert table(PLAN) == table(RunPlan(7, 400, (0.0, 6.0), (5.0, 95.0), 4.0, 6.0, repeats=1))
+    assert RunPlan(8, 400, (0.0, 6.0), (5.0, 95.0), 4.0, 6.0).steps()[0] != PLAN.steps()[0]
 
 
 def test_forces_and_positions_are_even_within_limits_and_independent():
@@ -66,4 +66,4 @@ def test_csv_says_all_of_it():
 )  # fmt: skip
 def test_what_no_rig_can_run_is_refused(change):
     with pytest.raises(OutOfRange, match="expected"):
-        Plan(**(vars(PLAN) | change))
+        RunPlan(**(vars(PLAN) | change))

@@ -110,7 +110,7 @@ def test_random_data(count):
     many(count)(given(st.dictionaries(KEYS, NESTED, max_size=5) | NESTED)(makes_sense_or_says_why))()
 
 
-@counts(150, 600)
+@counts(100, 600)
 def test_random_changes_of_a_valid_design(count):
     many(count)(given(mutants())(makes_sense_or_says_why))()
 
@@ -178,7 +178,7 @@ def command(monkeypatch, capsys, tmp_path):
     return run
 
 
-@counts(25, 400)
+@counts(15, 400)
 def test_random_command_lines(count, command, request):
     """The few are not pressed: that takes seconds for each design that is valid."""
     if count < 100:

@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording import Clock, Recording, Source, joined, joined_all, offset, rig
+from sensorgen.measure.recording import Recording, RecordingClock, Source, joined, joined_all, offset, rig
 from sensorgen.measure.recording.clock import rebuilt
 from sensorgen.measure.recording.samples import blank, sifted
 
@@ -17,7 +17,9 @@ END = MADE[-1][1] + 4
 
 
 def recording(run, skew=0.0, stamped=True):
-    clock = rebuilt(len(run.time_s), run.time_s, made.stamps(run.time_s, skew=skew)).clock if stamped else Clock()
+    clock = (
+        rebuilt(len(run.time_s), run.time_s, made.stamps(run.time_s, skew=skew)).clock if stamped else RecordingClock()
+    )
     z = run.impedance_ohm.copy()
     return Recording(run.time_s, made.TONES_HZ, z, blank(len(z)) | sifted(z), clock, Source("run.mat", "MATLAB 5"))
 
@@ -131,6 +133,11 @@ def test_a_sensor_that_does_not_answer_leaves_the_clocks_as_they_are(tmp_path, r
 
     with pytest.raises(BadInput, match="too little to find the offset"):
         joined(recording(dead, stamped=False), log)
+
+
+def test_clocks_that_both_count_from_0_and_clocks_far_apart(tmp_path, run):
+    noise = np.random.default_rng(0).standard_normal((len(run.time_s), 7))
+    dead = replace(run, impedance_ohm=41 * np.exp(1e-3 * noise + 0j))
     shown, *others = made.rig_rows(MADE)
     same = rig(made.write_rig(tmp_path / "same.csv", [shown - made.EPOCH_S, *others]))
     assert "assumed to agree" in joined(recording(dead, stamped=False), same).clock_text()  # both count from 0
@@ -179,9 +186,7 @@ def test_errors_of_weights_hold_for_noise_that_hangs_together():
     model = np.column_stack([np.ones_like(t), np.sin(5 * t), t**2])
     found, said = [], []
     for _ in range(300):
-        white, noise = rng.standard_normal(1500), np.zeros(1500)
-        for k in range(1, 1500):
-            noise[k] = 0.7 * noise[k - 1] + white[k]
+        noise = lfilter([1], [1, -0.7], rng.standard_normal(1500))
         weights = np.linalg.lstsq(model, noise, rcond=None)[0]
         found.append(weights[-2:])
         said.append(np.sqrt(np.diag(offset._covariance(model, noise - model @ weights))))

@@ -142,7 +142,7 @@ def test_triangles_along_the_length_have_less_resistance(of_thesis, by_hand):
 @pytest.mark.parametrize(("shorted", "said"), [(6, "; no significant difference"), (5, "; a significant difference")])
 def test_of_two_questions_each_has_to_be_twice_as_sure(shorted, said, tmp_path):
     """6 and 5 of 10 against 12 of 12: p = 0.029 and 0.010, of which the first would do if only one thing were asked."""
-    with Log(tmp_path / "log.db", create=True) as log:
+    with Log(tmp_path / "log.db", create=True) as log, roughly_at_rest():
         first = [notes.reading(f"40 triX .1mm {k + 1}", "700", "30" if k < shorted else "OL") for k in range(10)]
         log.add(first + [notes.reading(f"40 triX .2mm {k + 1}", "700", "30") for k in range(12)])
         found = of_iteration(log, 40)
@@ -180,7 +180,7 @@ def test_more_readings_than_are_drawn_and_listed(tmp_path, monkeypatch, shared_c
     """Of so many only what a browser can bear is drawn and listed, and it says so; the files for programs hold all."""
     monkeypatch.setattr(document, "MOST_ROWS", 50)
     monkeypatch.setattr(electrodes, "MOST_ROWS", 40)
-    with Log(tmp_path / "log.db", create=True) as log:
+    with Log(tmp_path / "log.db", create=True) as log, roughly_at_rest():
         names = [f"40 {shape} .1mm {k + 1}" for k in range(60) for shape in ("triX", "triY")]
         log.add([notes.reading(n, f"{700 + k}", "30" if k % 3 else "OL") for k, n in enumerate(names)])
         made = report(log, 40)
@@ -441,8 +441,8 @@ def test_figures_as_files(of_recorded):
     wanted = [c for c in of_recorded.figures if c.key in ("residuals", "reactance-1-1")]
     assert len(wanted) == 2
     for chart in (dataclasses.replace(c, choices=dict(list(c.choices.items())[:2])) for c in wanted):
-        first, second = dict(files(chart)), dict(files(chart))
-        assert first == second
+        first = dict(files(chart))
+        assert dict(itertools.islice(files(chart), 2)).items() <= first.items()  # the same bytes again
         assert len(first) == 2 * len(chart.choices)
         for name, content in first.items():
             assert content.startswith(b"\x89PNG" if name.endswith("png") else b"<?xml")

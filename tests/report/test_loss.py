@@ -7,7 +7,7 @@ import pytest
 
 from sensorgen.analysis.comparison.expected import predicted
 from sensorgen.design.design import make
-from sensorgen.measure.virtual.specimen import Line, Specimen, drawn
+from sensorgen.measure.virtual.specimen import PressedSpecimen, VirtualLine, drawn
 from sensorgen.prediction import bodies
 
 # the plain plate of the thesis: 100 x 10 mm, 4.68, 0.6 mm, two electrodes of 0.3 mm and 0.07 ohm m
@@ -68,6 +68,6 @@ def test_no_virtual_specimen_is_flagged_by_its_r():
     tones_hz = np.array([row.frequency_hz for row in rows])
     outside = np.zeros(len(rows), int)
     for seed in range(40):
-        z = Line(Specimen(design, drawn(design, seed)), tones_hz).impedance(0.0, (0.05, 0.05))
+        z = VirtualLine(PressedSpecimen(design, drawn(design, seed)), tones_hz).impedance(0.0, (0.05, 0.05))
         outside += [not row.re.lower <= of.real <= row.re.upper for row, of in zip(rows, z, strict=True)]
     assert outside.max() <= 2  # of 40, as 95 % ranges are left: 15 with a film without loss

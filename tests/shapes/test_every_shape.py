@@ -15,6 +15,7 @@ import pytest
 
 from sensorgen.checks.review import review
 from sensorgen.core import plugins as registry
+from sensorgen.core.errors import OutOfRange
 from sensorgen.design import shapes
 from sensorgen.design.design import make
 from sensorgen.scene.geometry import meshes, validity
@@ -81,9 +82,24 @@ def test_it_imports_the_scene_and_the_standard_library_only(name):
 
 
 def test_its_defaults_pass_the_checks(name):
-    shorter = {"length_mm": 20.0} if name in ("bump", "cone") else {}  # 640 round bodies take ten seconds
+    shorter = {"length_mm": 20.0} if name in ("bump", "cone", "pyramid") else {}  # 640 round bodies take ten seconds
     design = make({"shape": name, "printer": "diabase-h5", "quality": "fine", "parameters": shorter})
     assert review(design).errors() == []
+
+
+@pytest.mark.parametrize("tip_mm", [0.0, 0.3, 0.58])
+def test_a_bump_is_a_zone_of_a_sphere(tip_mm):
+    """Volume by the closed form for a zone between two parallel planes."""
+    params = {"length_mm": 1.25, "width_mm": 1.25, "root_mm": 1.0, "height_mm": 0.4, "tip_mm": tip_mm}
+    scene = make({"shape": "bump", "parameters": params}).drawn
+    (bump,) = (piece for body in scene.bodies for piece in body.pieces if piece.is_round())
+    assert bump.volume_mm3() == pytest.approx(np.pi * 0.4 / 6 * (3 * 0.5**2 + 3 * (tip_mm / 2) ** 2 + 0.4**2))
+
+
+@pytest.mark.parametrize(("tip_mm", "height_mm"), [(1.0, 0.1), (0.6, 0.41)])
+def test_no_bump_is_more_than_half_a_sphere(tip_mm, height_mm):
+    with pytest.raises(OutOfRange, match="expected"):
+        make({"shape": "bump", "parameters": {"root_mm": 1.0, "tip_mm": tip_mm, "height_mm": height_mm}})
 
 
 def test_with_support_its_volumes_add_up_to_the_envelope(shape):

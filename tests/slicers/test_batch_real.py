@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from no_numbers import nothing
+from no_numbers import nothing, roughly_at_rest
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.design import design
@@ -49,14 +49,15 @@ LINE_MM = 0.44
 
 @pytest.fixture(scope="module")
 def without_press(tmp_path_factory):
-    """Makes a batch whose predictions press no cross-section, which no test here looks at; they are kept for all."""
+    """Makes a batch whose predictions are rough, without a load; they are kept for all."""
     cache = str(tmp_path_factory.mktemp("unpressed"))
 
     def run(plan, out, **more):
         with pytest.MonkeyPatch.context() as patch:
             patch.setitem(sys.modules, "netgen", None)
             patch.setenv("SENSORGEN_CACHE", cache)
-            return make(plan, out, **more)
+            with roughly_at_rest():
+                return make(plan, out, **more)
 
     return run
 

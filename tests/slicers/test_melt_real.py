@@ -8,7 +8,7 @@ import pytest
 
 from sensorgen.design.design import make
 from sensorgen.export import slicing
-from sensorgen.export.slicers.loads import Load, recipe
+from sensorgen.export.slicers.loads import ToolLoad, recipe
 
 ROOT = Path(__file__).parents[2]
 FINE = (ROOT / "slicer_profiles/qualities/fine.yaml").read_text("utf-8")
@@ -48,7 +48,7 @@ def test_layers_of_0_2_mm_by_a_nozzle_of_0_6_mm(slicer, program, tmp_path):
 def test_speed_is_lowered_where_lines_are_thicker_still():
     design = thick(0.5)
     for tool, load in slicing.plate_loads([slicing.alone(design)]).items():
-        assert isinstance(load, Load)
+        assert isinstance(load, ToolLoad)
         done = recipe(design.machine, design.layers, tool, load)
         assert done.speed_mm_s * 0.5 * done.line_mm == pytest.approx(0.95 * MOST_MM3_S)
     usual = make({"shape": "reference"})

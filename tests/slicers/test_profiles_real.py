@@ -19,7 +19,7 @@ from sensorgen.design import materials
 from sensorgen.design.printer import Printer, load_printer, load_quality, printer_names, quality_names
 from sensorgen.design.tower import tower
 from sensorgen.export.slicers import cura, curaengine, prusa, versions
-from sensorgen.export.slicers.loads import Load
+from sensorgen.export.slicers.loads import ToolLoad
 
 DIABASE = load_printer("diabase-h5")
 FINE = load_quality("fine")
@@ -95,10 +95,10 @@ def write_3mf(path: Path, bodies: list[tuple[Corners, int, dict[str, str]]]) -> 
     return path
 
 
-def usual(printer: Printer, **dielectric: object) -> dict[int, Load]:
+def usual(printer: Printer, **dielectric: object) -> dict[int, ToolLoad]:
     return {
-        printer.default_tools["etpu"]: Load(materials.load("etpu")),
-        printer.default_tools["x60"]: Load(materials.load("x60"), **dielectric),
+        printer.default_tools["etpu"]: ToolLoad(materials.load("etpu")),
+        printer.default_tools["x60"]: ToolLoad(materials.load("x60"), **dielectric),
     }
 
 
@@ -189,8 +189,8 @@ def test_prusa_prints_each_box_with_its_tool(prusa_slicer, printer, quality, tmp
 
 
 def test_prusa_bodies_carry_their_infill_walls_and_speed(prusa_slicer, tmp_path):
-    thin = Load(materials.load("x60"), infill_percent=50.0)
-    loads = {3: Load(materials.load("etpu")), 4: thin}
+    thin = ToolLoad(materials.load("x60"), infill_percent=50.0)
+    loads = {3: ToolLoad(materials.load("etpu")), 4: thin}
     own = prusa.volume_settings(DIABASE, FINE, 4, thin) | {"external_perimeter_speed": "12"}
     # A film of two layers between electrodes: nothing of it is skin, so its share of infill counts in full.
     bodies = [(box(0, 0.6), 3, {}), (box(0.6, 0.8), 4, own), (box(0.8, 1.4), 3, {})]
@@ -216,14 +216,14 @@ def test_prusa_keeps_gaps_and_joins_what_touches(prusa_slicer, tmp_path, gap_mm,
         [(x if x < 0 else -gap_mm / 2, y, z) for x, y, z in box(0, STEP_MM)],
         [(x if x > 0 else gap_mm / 2, y, z) for x, y, z in box(0, STEP_MM)],
     ]
-    load = {3: Load(materials.load("etpu"))}
+    load = {3: ToolLoad(materials.load("etpu"))}
     result = slice_with_prusa(DIABASE, FINE, load, [(half, 3, {}) for half in halves], tmp_path)
     layers = round(STEP_MM / FINE.layer_mm)
     assert result.read_text().count(";TYPE:External perimeter") == islands * layers
 
 
 def test_prusa_single_tool_needs_no_tower(prusa_slicer, tmp_path):
-    result = slice_with_prusa(DIABASE, FINE, {4: Load(materials.load("x60"))}, [(box(0, STEP_MM), 4, {})], tmp_path)
+    result = slice_with_prusa(DIABASE, FINE, {4: ToolLoad(materials.load("x60"))}, [(box(0, STEP_MM), 4, {})], tmp_path)
     found = read(result, DIABASE)
     assert found.tools == (3,)
     assert not any(kind == "wipe tower" for _, kind in found.volume_mm3)

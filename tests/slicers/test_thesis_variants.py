@@ -1,4 +1,4 @@
-"""Every printable variant of the thesis through both real slicers, in full size: one of each shape, others nightly."""
+"""Each variant of the thesis through both real slicers: one of each shape, 20 mm long; nightly, all whole."""
 
 from pathlib import Path
 
@@ -8,20 +8,26 @@ import pytest
 
 from sensorgen.design import design
 from sensorgen.export.slicers import curaengine, prusa
-from sensorgen.export.slicers.loads import Load
+from sensorgen.export.slicers.loads import ToolLoad
 from sensorgen.scene.geometry import meshes
 from sensorgen.workflows.build import build
+from sensorgen.workflows.moves import changed
 
 DESIGNS = Path(__file__).parents[2] / "designs"
 VARIANTS = sorted(p.relative_to(DESIGNS).as_posix() for p in DESIGNS.rglob("*.yaml") if not p.stem.endswith("-d0"))
 ONE_OF_EACH_SHAPE = ("reference.yaml", "23/sqyx-d0.1.yaml", "23/trix-d0.2.yaml")
 variants = pytest.mark.parametrize(
-    "name", [pytest.param(v, marks=() if v in ONE_OF_EACH_SHAPE else pytest.mark.nightly) for v in VARIANTS]
+    ("name", "length_mm"),
+    [*((v, 20.0) for v in ONE_OF_EACH_SHAPE), *(pytest.param(v, 100.0, marks=pytest.mark.nightly) for v in VARIANTS)],
 )
 TOOLS = {2, 3}  # the lab's tools 3 and 4 as a slicer counts
 # Printed over solid volume. A slicer may lose or inflate a layer, but not the sensor; what it does to each
 # layer is a question of its own.
 SOUND = (0.93, 1.07)
+
+
+def loaded(name, length_mm):
+    return changed(design.load(DESIGNS / name), {("parameters", "length_mm"): length_mm})
 
 
 def solid_mm3(variant):
@@ -51,8 +57,10 @@ def test_all_printable_variants_are_here():
 
 
 @variants
-def test_prusaslicer_prints_every_body_on_its_tool(name, tmp_path, prusa_slicer, record_property, unpredicted):
-    variant = design.load(DESIGNS / name)
+def test_prusaslicer_prints_every_body_on_its_tool(
+    name, length_mm, tmp_path, prusa_slicer, record_property, unpredicted
+):
+    variant = loaded(name, length_mm)
     folder = build(variant, tmp_path, cad=False).folder
     out = tmp_path / "print.gcode"
     prusa.slice_3mf(folder / f"{variant.name}.prusa.3mf", folder / "profiles/prusa/diabase-h5-fine.ini", out)
@@ -66,9 +74,9 @@ def test_prusaslicer_prints_every_body_on_its_tool(name, tmp_path, prusa_slicer,
 
 
 @variants
-def test_curaengine_prints_every_body_on_its_tool(name, tmp_path, cura_engine, record_property):
-    variant = design.load(DESIGNS / name)
-    loads = {variant.tool(m): Load(design.material_files.load(m), source) for m, source in variant.used().items()}
+def test_curaengine_prints_every_body_on_its_tool(name, length_mm, tmp_path, cura_engine, record_property):
+    variant = loaded(name, length_mm)
+    loads = {variant.tool(m): ToolLoad(design.material_files.load(m), source) for m, source in variant.used().items()}
     settings = curaengine.engine_settings(variant.machine, variant.layers, loads)
     bodies = [
         (stl(tmp_path, variant, b), variant.machine.slicer_index(variant.tool(b.material)))

@@ -9,7 +9,7 @@ import pytest
 from sensorgen.core import plugins as registry
 from sensorgen.core.errors import BadInput
 from sensorgen.verification.thesis import checks
-from sensorgen.verification.thesis.items import CHAPTERS, Item, chapter
+from sensorgen.verification.thesis.items import CHAPTERS, ThesisItem, chapter
 
 # Counted in the thesis, chapter by chapter: the last number of each kind. 2.7, 3.6 and 6.24 are counted though the
 # copy at hand lacks their captions or numbers, and 3.55 though nothing stands beside it.
@@ -70,4 +70,4 @@ def test_a_check_is_a_module_and_a_function(check):
     from sensorgen.core.records import checked
 
     with pytest.raises(BadInput, match="check"):
-        checked(Item, {"number": "1.1", "says": "x", "check": check})
+        checked(ThesisItem, {"number": "1.1", "says": "x", "check": check})

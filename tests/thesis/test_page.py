@@ -8,9 +8,9 @@ from html.parser import HTMLParser
 import pytest
 
 from sensorgen.verification import thesis
-from sensorgen.verification.thesis.items import Item
-from sensorgen.verification.thesis.reproduced import Row
-from sensorgen.verification.thesis.verdicts import AGREES, Part, Verdict
+from sensorgen.verification.thesis.items import ThesisItem
+from sensorgen.verification.thesis.reproduced import ReproducedItem
+from sensorgen.verification.thesis.verdicts import AGREES, ItemPart, ItemVerdict
 
 VOID = {"meta", "input", "link"}
 
@@ -70,8 +70,8 @@ def test_the_page_can_be_read_aloud(page):
 
 def test_words_stay_text():
     bad = "<script>alert(1)</script> | & `code`"
-    item = Item(number="9.9", says=bad, check="line.current", erratum=bad)
-    made = [Row("2", "equation", item, (Part(bad, bad, 1.0, 1.0),), Verdict(AGREES, bad))]
+    item = ThesisItem(number="9.9", says=bad, check="line.current", erratum=bad)
+    made = [ReproducedItem("2", "equation", item, (ItemPart(bad, bad, 1.0, 1.0),), ItemVerdict(AGREES, bad))]
     found = thesis.html(made)
     assert "<script>alert" not in found
     assert "&lt;script&gt;alert(1)&lt;/script&gt; | &amp; <code>code</code>" in found

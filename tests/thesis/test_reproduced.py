@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from sensorgen.verification import thesis
-from sensorgen.verification.thesis.items import Item
-from sensorgen.verification.thesis.reproduced import Row, row
+from sensorgen.verification.thesis.items import ThesisItem
+from sensorgen.verification.thesis.reproduced import ReproducedItem, row
 from sensorgen.verification.thesis.verdicts import (
     DIFFERS,
     JUDGED,
@@ -18,7 +18,7 @@ from sensorgen.verification.thesis.verdicts import (
     NOT_COVERED,
     TRANSCRIBED,
     UNEXPLAINED,
-    Part,
+    ItemPart,
     compared,
 )
 
@@ -122,7 +122,7 @@ def test_a_missing_solver_leaves_uncovered_and_any_other_refusal_is_unexplained(
     from sensorgen.core.errors import MissingValue, OutOfRange
     from sensorgen.verification.thesis.checks import triangles
 
-    item = Item(number="3.35", says="x", check="triangles.whole", because="y", off={"x": 1.0}, within=0.1)
+    item = ThesisItem(number="3.35", says="x", check="triangles.whole", because="y", off={"x": 1.0}, within=0.1)
     for error, expected in ((MissingValue("no solver"), NOT_COVERED), (OutOfRange("strain"), UNEXPLAINED)):
 
         def refuse(_, error=error):
@@ -141,7 +141,11 @@ def test_json_holds_every_value(rows):
     by = {(d["kind"], d["number"]): d for d in data}
     z = by["equation", "B.53"]["parts"][0]
     assert z["printed"] == pytest.approx(z["ours"])
-    nowhere = [Row("2", "equation", rows[0].item, (Part("x", "m", [1.0, 2.0], [1.0, float("nan")]),), rows[0].verdict)]
+    nowhere = [
+        ReproducedItem(
+            "2", "equation", rows[0].item, (ItemPart("x", "m", [1.0, 2.0], [1.0, float("nan")]),), rows[0].verdict
+        )
+    ]
     assert thesis.plain(nowhere)[0]["parts"][0]["printed"] == [1.0, None]
     pair = by["equation", "2.20"]["parts"][0]
     assert pair["printed"][1] == 0

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from sensorgen.verification.thesis import shown
-from sensorgen.verification.thesis.items import Item
+from sensorgen.verification.thesis.items import ThesisItem
 from sensorgen.verification.thesis.verdicts import (
     DIFFERS,
     MISPRINT,
     TRANSCRIBED,
     UNEXPLAINED,
-    Part,
+    ItemPart,
     digits,
     judged,
     share,
@@ -18,11 +18,11 @@ from sensorgen.verification.thesis.verdicts import (
 
 
 def expected_of(**announced):
-    return Item(number="1.1", says="It says something.", **announced)
+    return ThesisItem(number="1.1", says="It says something.", **announced)
 
 
 def part(printed, ours=1.0, corrected=None, name="x", **more):
-    return Part(name, "m", ours, printed, corrected, **more)
+    return ItemPart(name, "m", ours, printed, corrected, **more)
 
 
 def word(*parts, **expected):
@@ -99,7 +99,7 @@ def test_distances():
     assert part(1e-9, ours=0.0).off() == np.inf
     assert part(0.0, ours=0.0).off() == 0
     assert part(None).off() == 0
-    assert Part("x", "", 5, 2 + 3).off() == 0
+    assert ItemPart("x", "", 5, 2 + 3).off() == 0
 
 
 @pytest.mark.parametrize(("off", "said"), [(0.5, "0 digits"), (0.09, "1 digit"), (9e-10, "9 digits or more")])

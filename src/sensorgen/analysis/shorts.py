@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from sensorgen.analysis.plots.figure import ORANGE, Axis, Curve, Figure, Map, Panel
 from sensorgen.asprinted.beads import beads
-from sensorgen.asprinted.pinholes import Film, Pinholes, draws, films, opened, pinholes, through
+from sensorgen.asprinted.pinholes import CoveredFilm, Pinholes, draws, films, opened, pinholes, through
 from sensorgen.asprinted.registration import placed
 from sensorgen.core.document import Facts, Part
 from sensorgen.core.errors import BadInput
@@ -248,7 +248,7 @@ def chance(
     return Chance(float((weight * probability).sum() / weight.sum()), float(low), float(high))
 
 
-def picture(name: str, thin: Sequence[Film]) -> Figure:
+def picture(name: str, thin: Sequence[CoveredFilm]) -> Figure:
     """Where films are weakest: what their layers leave open with lines a little narrower than the file says."""
     panels = []
     for film in thin:

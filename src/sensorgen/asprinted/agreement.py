@@ -15,8 +15,8 @@ from sensorgen.asprinted.registration import connected, pieces
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.design.design import Design
 from sensorgen.design.tower import PRIME_MM3
-from sensorgen.export.gcode.found import Found
-from sensorgen.export.gcode.moves import NO_TOOL, Change, Motion
+from sensorgen.export.gcode.found import GcodeFinding
+from sensorgen.export.gcode.moves import NO_TOOL, Motion, ToolChange
 from sensorgen.export.gcode.paths import NOT_MODEL, Paths
 from sensorgen.scene.layers import LayerRegions, Region
 from sensorgen.scene.scene import Point
@@ -40,7 +40,7 @@ def check(
     alone: bool = False,
     piece: str = "",
     lines: Beads | None = None,
-) -> list[Found]:
+) -> list[GcodeFinding]:
     """Disagreements with the design, as findings about lines of the file.
 
     Parameters
@@ -64,7 +64,7 @@ def check(
     return [replace(f, message=f"{piece}: {f.message}") for f in found] if piece else found
 
 
-def check_motion(design: Design, motion: Motion) -> list[Found]:
+def check_motion(design: Design, motion: Motion) -> list[GcodeFinding]:
     """Disagreements of a file that prints the design at any place, once or more often, alone or with others.
 
     Raises
@@ -72,7 +72,7 @@ def check_motion(design: Design, motion: Motion) -> list[Found]:
     BadInput
         It does not print this design; see :func:`sensorgen.asprinted.registration.pieces`.
     """
-    places, found = pieces(design, motion), list[Found]()
+    places, found = pieces(design, motion), list[GcodeFinding]()
     for number, place in enumerate(places, 1):
         x, y = place.bed_mm
         name = f"piece {number} of {len(places)}, at x {x:.4g}, y {y:.4g} mm" if len(places) > 1 else ""
@@ -82,7 +82,7 @@ def check_motion(design: Design, motion: Motion) -> list[Found]:
 
 def _of_piece(
     design: Design, paths: Paths, motion: Motion, centre_mm: Point, alone: bool, lines: Beads | None
-) -> list[Found]:  # fmt: skip
+) -> list[GcodeFinding]:  # fmt: skip
     corner = np.array(centre_mm) - np.array(design.printed.size_mm[:2]) / 2
     ends = [p[:, :2] - corner for p in (paths.start_mm, paths.end_mm)]
     inside = ((ends[0] + ends[1]) / 2 > -design.machine.line_mm() / 4).all(1)
@@ -95,7 +95,7 @@ def _of_piece(
         off = np.maximum(-way, way - np.array(design.printed.size_mm[:2])).clip(0.0)
         message = f"nothing is printed at the place of {design.name}; the nearest line is "
         message += f"{float(np.hypot(*off.T).min()):.3g} mm away" if model.any() else "not there at all"
-        return [Found("place", "error", 1, message, "slice this design")]
+        return [GcodeFinding("place", "error", 1, message, "slice this design")]
     lines, layers = lines or beads(design, paths, centre_mm, cut=not alone), ledger.sampled(design, 0.0)
     return [
         *_heights(design, paths, piece),
@@ -115,7 +115,7 @@ def _line(number: Whole, rows: Mask) -> tuple[int, int]:
     return int(lines[0]), len(lines)
 
 
-def _heights(design: Design, paths: Paths, piece: Mask) -> Iterator[Found]:
+def _heights(design: Design, paths: Paths, piece: Mask) -> Iterator[GcodeFinding]:
     """The first layer is as high as the design's, and every line lies in a layer, in order."""
     tops = np.array(design.layers.boundaries_mm(design.printed.size_mm[2]))[1:]
     first_mm, layer_mm = design.layers.first_layer_mm, design.layers.layer_mm
@@ -124,7 +124,9 @@ def _heights(design: Design, paths: Paths, piece: Mask) -> Iterator[Found]:
     if abs(lowest - first_mm) > LEVEL_MM:
         number, count = _line(paths.number, piece & (z == lowest))
         message = f"the lowest line lies at Z {lowest:g} mm; the first layer of {design.name} is {first_mm:g} mm"
-        yield Found("first-layer", "error", number, message, "set the first layer's height, and no offset of Z", count)
+        yield GcodeFinding(
+            "first-layer", "error", number, message, "set the first layer's height, and no offset of Z", count
+        )
     near = np.searchsorted((tops[1:] + tops[:-1]) / 2, z)  # the layer whose top is nearest
     slanted = np.abs(paths.start_mm[:, 2] - z) > LEVEL_MM
     between = piece & ((np.abs(z - tops[near]) > LEVEL_MM) | slanted)
@@ -134,16 +136,16 @@ def _heights(design: Design, paths: Paths, piece: Mask) -> Iterator[Found]:
         message = (
             f"lines at Z {worst:g} mm lie in no layer of {design.name}: {first_mm:g} mm, then every {layer_mm:g} mm"
         )
-        yield Found("layers", "error", number, message, "slice with this design's layers", count)
+        yield GcodeFinding("layers", "error", number, message, "slice with this design's layers", count)
     order = near[piece & ~between]
     if (np.diff(order) < 0).any():
         back = paths.number[piece & ~between][1:][np.diff(order) < 0]
         message = f"a layer of {design.name} is printed after one that lies higher"
-        yield Found("layers", "error", int(back[0]), message, "print layer by layer", len(back))
+        yield GcodeFinding("layers", "error", int(back[0]), message, "print layer by layer", len(back))
     yield from _missing(design, paths, piece & ~between, near, tops)
 
 
-def _missing(design: Design, paths: Paths, rows: Mask, near: Whole, tops: Real) -> Iterator[Found]:
+def _missing(design: Design, paths: Paths, rows: Mask, near: Whole, tops: Real) -> Iterator[GcodeFinding]:
     """No layer is without a line; ``near`` is the layer of each line, and ``rows`` are those that lie in one."""
     there = np.zeros(len(tops), bool)
     there[near[rows]] = True
@@ -164,7 +166,7 @@ def _missing(design: Design, paths: Paths, rows: Mask, near: Whole, tops: Real) 
             which = f"layer {layers[0] + 1}" + (f" to {layers[-1] + 1}" if len(layers) > 1 else "")
             what = f"nothing of {design.name} is printed up to Z {tops[layers[-1]]:g} mm"
             message = f"{which} of {len(tops)} is missing: {what}"
-            yield Found("layers", severity, int(after.max(initial=1)), message, advice, len(layers))
+            yield GcodeFinding("layers", severity, int(after.max(initial=1)), message, advice, len(layers))
 
 
 @lru_cache(maxsize=256)
@@ -174,7 +176,7 @@ def _wide(region: Region, width_mm: float) -> Region:
     return region.buffer(-half, join_style="mitre").buffer(half, join_style="mitre")
 
 
-def _shifts(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Iterator[Found]:
+def _shifts(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Iterator[GcodeFinding]:
     """Each tool prints at its place in the piece: it spans what is drawn of its material."""
     size, beyond = np.array(design.printed.size_mm[:2]), design.machine.line_mm() / 4
     both = np.stack([lines.start_mm, lines.end_mm])
@@ -189,10 +191,12 @@ def _shifts(design: Design, lines: Beads, layers: Sequence[LayerRegions]) -> Ite
         if np.abs(shift).max() > SHIFTED * design.machine.line_mm():
             message = f"what tool {tool} prints is shifted by x {shift[0]:.2g}, y {shift[1]:.2g} mm against the drawing"
             number = int(lines.number[rows][0])
-            yield Found("place", "error", number, message, "slice without offsets of tools, or set them on the printer")
+            yield GcodeFinding(
+                "place", "error", number, message, "slice without offsets of tools, or set them on the printer"
+            )
 
 
-def _widths(design: Design, lines: Beads) -> Iterator[Found]:
+def _widths(design: Design, lines: Beads) -> Iterator[GcodeFinding]:
     """No line is far wider than the nozzle lays, or far thinner."""
     line = design.machine.line_mm()
     length = np.hypot(*(lines.end_mm - lines.start_mm).T)
@@ -210,10 +214,12 @@ def _widths(design: Design, lines: Beads) -> Iterator[Found]:
             message = (
                 f"a line is {width:.2g} mm {what}; lines of a {design.machine.nozzle_mm:g} mm nozzle are {line:g} mm"
             )
-            yield Found("width", "error", number, message, "check E, the filament's diameter and the flow", count)
+            yield GcodeFinding(
+                "width", "error", number, message, "check E, the filament's diameter and the flow", count
+            )
 
 
-def _purged(design: Design, paths: Paths, changes: Sequence[Change], piece: Mask) -> Iterator[Found]:
+def _purged(design: Design, paths: Paths, changes: Sequence[ToolChange], piece: Mask) -> Iterator[GcodeFinding]:
     """Between taking a tool and its first line of the piece, it fills its nozzle elsewhere."""
     volume = paths.volume_mm3(design.machine.filament_mm)
     missing: dict[int, list[tuple[int, float]]] = {}
@@ -232,17 +238,17 @@ def _purged(design: Design, paths: Paths, changes: Sequence[Change], piece: Mask
         message = (
             f"tool {tool} prints {given:.3g} mm3 elsewhere before its first line; {PURGED_MM3:g} mm3 fill its nozzle"
         )
-        yield Found("purge", "error", number, message, "use a prime tower", len(found))
+        yield GcodeFinding("purge", "error", number, message, "use a prime tower", len(found))
 
 
 def _plan(design: Design, layers: Sequence[LayerRegions]) -> shapely.Geometry:
-    """Area of the bed that the piece covers: its rectangle, unless it was drawn elsewhere or cut to a border."""
-    if design.border or design.geometry:
+    """Area of the bed that the piece covers: its rectangle, unless it was drawn elsewhere, cut, or has a ledge."""
+    if design.border or design.geometry or design.layout:
         return shapely.union_all([region for layer in layers for region in layer.regions.values()])
     return shapely.box(0.0, 0.0, *design.printed.size_mm[:2])
 
 
-def _floating(design: Design, paths: Paths, outside: Mask) -> Iterator[Found]:
+def _floating(design: Design, paths: Paths, outside: Mask) -> Iterator[GcodeFinding]:
     """Lines beside the piece, as those of a tower, stand on the bed."""
     rows = np.flatnonzero(outside & (paths.length_mm() > 0))
     if not len(rows):
@@ -259,12 +265,12 @@ def _floating(design: Design, paths: Paths, outside: Mask) -> Iterator[Found]:
         row = int(rows[air][0])
         x, y = paths.end_mm[row, :2]
         message = f"lines are printed in air at x {x:.4g}, y {y:.4g} mm, beside the sensor"
-        yield Found("clear", "error", int(paths.number[row]), message, "leave them out", int(air.sum()))
+        yield GcodeFinding("clear", "error", int(paths.number[row]), message, "leave them out", int(air.sum()))
 
 
 def _beside(
     paths: Paths, ends: list[Real], plan: shapely.Geometry, stray: Mask, waste: Mask
-) -> Iterator[Found]:  # fmt: skip
+) -> Iterator[GcodeFinding]:  # fmt: skip
     """Tower and skirt keep clear of the piece, and nothing else is printed beside it."""
     support = np.array([kind.startswith(_SUPPORT) for kind in paths.kinds])[paths.kind]
     low, high = np.minimum(*ends), np.maximum(*ends)
@@ -275,9 +281,11 @@ def _beside(
     if near.any():
         number, count = _line(paths.number, near)
         kinds = ", ".join(sorted({paths.kinds[kind] for kind in paths.kind[near].tolist()}))
-        yield Found("clear", "error", number, f"lines of {kinds} cross the sensor", "move them away from it", count)
+        yield GcodeFinding(
+            "clear", "error", number, f"lines of {kinds} cross the sensor", "move them away from it", count
+        )
     if stray.any():
         number, count = _line(paths.number, stray)
         x, y = paths.end_mm[stray][0, :2]
         message = f"lines that belong to no body are printed at x {x:g}, y {y:g} mm"
-        yield Found("clear", "error", number, message, "leave them out, or print them as skirt or tower", count)
+        yield GcodeFinding("clear", "error", number, message, "leave them out, or print them as skirt or tower", count)

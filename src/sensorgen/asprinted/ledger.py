@@ -17,7 +17,7 @@ from sensorgen.asprinted.beads import Beads
 from sensorgen.checks import estimate
 from sensorgen.core.arrays import Mask, Real
 from sensorgen.design.design import Design
-from sensorgen.export.gcode.found import Found
+from sensorgen.export.gcode.found import GcodeFinding
 from sensorgen.scene.layers import LayerRegions, Region, drawn, narrow_mm, parts
 
 PITCH_MM = 0.1
@@ -31,7 +31,7 @@ _FACE = 0.15  # change of a body's area with the height of the sample, that mean
 _WHOLE, _OF_STRIPS, _OF_PARTS, _CLASSIC = (0.9, 1.1), (0.9, 1.12), (0.75, 1.4), (0.9, 1.75)
 _OPEN, _HOLE_LINES = 0.3, 2.0  # filled share of a window a line wide in a hole; least area, in line widths squared
 _PILED, _PILE_LINES = 1.7, 5.0  # as above, where lines lie upon each other
-_LOCAL = ((4.5, -0.25, 0.3), (2.3, -0.45, 0.65))  # window in lines, and shares of a layer by which a tool may be off
+_LOCAL = ((4.5, -0.25, 0.35), (2.3, -0.45, 0.7))  # window in lines, and shares of a layer by which a tool may be off
 _STRIPS = ((4.5, -0.15, 0.2), (2.3, -0.33, 0.45))  # as above, in layers of strips
 _FOREIGN_LINES = 1.0  # area that a tool may fill further than a line from its material, in line widths squared
 _UNSUPPORTED, _ALONE = 0.2, 0.8  # filled share of the layer below that supports a line; share of a tool's lines
@@ -88,7 +88,7 @@ def sampled(design: Design, off: float) -> tuple[LayerRegions, ...]:
     return drawn(scene, tuple(z + shift for z in design.layers.boundaries_mm(scene.size_mm[2])))
 
 
-def check(design: Design, lines: Beads) -> Iterator[Found]:
+def check(design: Design, lines: Beads) -> Iterator[GcodeFinding]:
     """Findings about the deposit of a piece.
 
     Parameters
@@ -371,7 +371,7 @@ _ADVICE = {
 }
 
 
-def _merged(faults: Iterable[Disagreement]) -> Iterator[Found]:
+def _merged(faults: Iterable[Disagreement]) -> Iterator[GcodeFinding]:
     """One finding for the same fault in neighbouring layers, with the worst of them."""
     order = sorted(faults, key=lambda fault: (fault.rule, fault.subject, fault.layer))
     for (rule, _), same in groupby(order, lambda fault: (fault.rule, fault.subject)):
@@ -383,4 +383,4 @@ def _merged(faults: Iterable[Disagreement]) -> Iterator[Found]:
             message = f"{worst.message} {where}, at x {worst.at_mm[0]:g}, y {worst.at_mm[1]:g} mm from the corner"
             severity = "warning" if rule == "support" else "error"
             number = min(some, key=lambda fault: fault.line).line
-            yield Found(rule, severity, number if number < _NOWHERE else 1, message, _ADVICE[rule], len(some))
+            yield GcodeFinding(rule, severity, number if number < _NOWHERE else 1, message, _ADVICE[rule], len(some))

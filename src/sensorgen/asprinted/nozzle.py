@@ -10,7 +10,7 @@ from sensorgen.core.errors import MissingValue
 from sensorgen.design.design import Design
 from sensorgen.export.gcode.crossings import CONTACT_MM, crossings
 from sensorgen.export.gcode.drags import habits, retracted
-from sensorgen.export.gcode.found import Found
+from sensorgen.export.gcode.found import GcodeFinding
 from sensorgen.export.gcode.moves import Motion
 from sensorgen.export.gcode.paths import tools_of
 from sensorgen.export.gcode.timing import seconds
@@ -27,7 +27,7 @@ _FAN_FROM, _FAN = 4, 0.4  # layers without fan, of usual profiles; share of the 
 DRAGGED_MM = 100.0  # of each 1000 mm2: unretracted travel in contact; files of slicers have up to 70
 
 
-def check(design: Design, motion: Motion, lines: Beads) -> Iterator[Found]:
+def check(design: Design, motion: Motion, lines: Beads) -> Iterator[GcodeFinding]:
     """Findings about the nozzle while it prints a piece.
 
     Parameters
@@ -56,7 +56,9 @@ def check(design: Design, motion: Motion, lines: Beads) -> Iterator[Found]:
     if fast.any():
         speed = float(motion.feed_mm_min[fast].max()) / 60
         message = f"the first layer is printed at {speed:g} mm/s; at most {FIRST_LAYER_MM_S:g} mm/s adhere"
-        yield Found("speed", "error", _first(motion, fast), message, "print the first layer slower", int(fast.sum()))
+        yield GcodeFinding(
+            "speed", "error", _first(motion, fast), message, "print the first layer slower", int(fast.sum())
+        )
     yield from _drags(design, motion, tool, piece)
 
 
@@ -83,7 +85,7 @@ def _still(motion: Motion, usual_mm: float) -> Real:
 
 def _balance(
     design: Design, motion: Motion, mine: Mask, piece: Mask, tool: int, material: str
-) -> Iterator[Found]:  # fmt: skip
+) -> Iterator[GcodeFinding]:  # fmt: skip
     """Melt in the nozzle where a line begins is that where the one before it ended."""
     usual_mm = _value(design, material, "retraction_mm")
     at = np.cumsum(np.where(mine, _still(motion, usual_mm or 1.0), 0.0))
@@ -101,18 +103,18 @@ def _balance(
         what = "more" if worst > 0 else "less"
         message = f"{abs(worst):.2g} mm of filament {what} are pushed than drawn back before a line of tool {tool}"
         advice = f"balance retraction and prime of each travel within {BALANCE_MM:g} mm"
-        yield Found("melt", "error", _first(motion, here[wrong]), message, advice, int(wrong.sum()))
+        yield GcodeFinding("melt", "error", _first(motion, here[wrong]), message, advice, int(wrong.sum()))
     in_lines, total = float(motion.extruded_mm[here].sum()), float(mine_off[~wrong].sum())
     if not -_LOSS * in_lines <= total <= _GAIN * in_lines:
         message = (
             f"tool {tool}: primes exceed retractions by {total:.3g} mm of filament; its lines have {in_lines:.3g} mm"
         )
-        yield Found("melt", "error", _first(motion, here), message, "prime as much as is drawn back")
+        yield GcodeFinding("melt", "error", _first(motion, here), message, "prime as much as is drawn back")
     if usual_mm:
         yield from _retraction(design, motion, mine, tool, usual_mm)
 
 
-def _retraction(design: Design, motion: Motion, mine: Mask, tool: int, usual_mm: float) -> Iterator[Found]:
+def _retraction(design: Design, motion: Motion, mine: Mask, tool: int, usual_mm: float) -> Iterator[GcodeFinding]:
     """Filament is drawn back before travels, about as far as the material needs."""
     length_mm = habits(motion).get(float(tool), (0.0, 0.0))[0]
     least, most = (share * usual_mm for share in _RETRACTION)
@@ -125,10 +127,10 @@ def _retraction(design: Design, motion: Motion, mine: Mask, tool: int, usual_mm:
         how_mm = 0.0 if never else length_mm
         message = f"tool {tool} draws {how_mm:g} mm back before travels; its material needs {usual_mm:g} mm"
         advice = f"retract {least:.2g} to {most:.2g} mm"
-        yield Found("melt", "error", _first(motion, rows), message, advice, int(rows.sum()))
+        yield GcodeFinding("melt", "error", _first(motion, rows), message, advice, int(rows.sum()))
 
 
-def _fan(design: Design, motion: Motion, rows: Mask, tool: int, material: str) -> Iterator[Found]:
+def _fan(design: Design, motion: Motion, rows: Mask, tool: int, material: str) -> Iterator[GcodeFinding]:
     """The fan on the part runs where every source of the material advises it."""
     fan, least = design.machine.control.layer_fan, design.material(material).print_range("fan_percent", 0.0)[0]
     if fan is None or not 0 < least <= 100:
@@ -144,10 +146,10 @@ def _fan(design: Design, motion: Motion, rows: Mask, tool: int, material: str) -
             f"tool {tool} prints {material} with the fan at {level[wrong].min():.0f} %; its sources advise {least:g} %"
         )
         advice = f"switch the fan on (M106 P{fan} S255)"
-        yield Found("fan", "error", _first(motion, wrong), message, advice, int(wrong.sum()))
+        yield GcodeFinding("fan", "error", _first(motion, wrong), message, advice, int(wrong.sum()))
 
 
-def _dwell(motion: Motion, design: Design, printing: Mask, piece: Mask) -> Iterator[Found]:
+def _dwell(motion: Motion, design: Design, printing: Mask, piece: Mask) -> Iterator[GcodeFinding]:
     """The nozzle never stands long, and hardly on the part."""
     rows = np.flatnonzero(printing)
     if not len(rows):
@@ -167,7 +169,7 @@ def _dwell(motion: Motion, design: Design, printing: Mask, piece: Mask) -> Itera
         message = (
             f"the nozzle stands for {wait:.3g} s; at most {DWELL_S:g} s in all, and {DWELL_ON_PART_S:g} s on the part"
         )
-        yield Found("dwell", "error", int(motion.number[row]), message, "leave the wait out", len(waits))
+        yield GcodeFinding("dwell", "error", int(motion.number[row]), message, "leave the wait out", len(waits))
 
 
 def _waits(motion: Motion) -> Iterator[tuple[int, float]]:
@@ -177,7 +179,7 @@ def _waits(motion: Motion) -> Iterator[tuple[int, float]]:
             yield event.row - 1, (event.command.number("S") or 0.0) + (event.command.number("P") or 0.0) / 1000
 
 
-def _drags(design: Design, motion: Motion, tool: Whole, piece: Mask) -> Iterator[Found]:
+def _drags(design: Design, motion: Motion, tool: Whole, piece: Mask) -> Iterator[GcodeFinding]:
     """Travel in contact with what another tool has printed of the piece, without retraction."""
     if motion.length_mm.max() > _FAR_MM:
         return  # beyond reach, which another rule says
@@ -196,4 +198,4 @@ def _drags(design: Design, motion: Motion, tool: Whole, piece: Mask) -> Iterator
             )
             advice = f"retract or lift; at most {most_mm:.0f} mm"
             rows = np.unique(found.row[mine])
-            yield Found("drag", "error", _first(motion, rows), message, advice, len(rows))
+            yield GcodeFinding("drag", "error", _first(motion, rows), message, advice, len(rows))

@@ -33,7 +33,7 @@ MOST_LAYERS = 2  # of a film that a slice is searched for
 
 
 @dataclass(frozen=True, eq=False)
-class Film:
+class CoveredFilm:
     """Layers that dielectrics cover from edge to edge, between electrodes.
 
     Attributes
@@ -55,7 +55,7 @@ class Film:
 
 
 @dataclass(frozen=True)
-class Row:
+class OpenPlaces:
     """Open places of a film at one width of its lines."""
 
     film: Annotated[str, Column("film")]
@@ -78,12 +78,12 @@ class Pinholes:
     ----------
     design : str
         Name of the design.
-    rows : tuple of Row
+    rows : tuple of OpenPlaces
         By film and width.
     """
 
     design: str
-    rows: tuple[Row, ...]
+    rows: tuple[OpenPlaces, ...]
 
     def document(self) -> Iterator[Part]:
         """The table."""
@@ -95,7 +95,7 @@ class Pinholes:
         )
 
 
-def films(design: Design, lines: Beads) -> list[Film]:
+def films(design: Design, lines: Beads) -> list[CoveredFilm]:
     """The films of a print: runs of layers that dielectrics cover, with electrodes of other terminals beyond them."""
     scene = design.printed
     terminal = np.array([body.terminal for body in scene.bodies])
@@ -114,11 +114,11 @@ def films(design: Design, lines: Beads) -> list[Film]:
         margin = design.machine.line_mm() / 2
         inside = shapely.box(margin, margin, scene.size_mm[0] - margin, scene.size_mm[1] - margin)
         span = plates[layers[0]].bottom_mm, plates[layers[-1]].top_mm
-        found.append(Film(inside, tuple(k + 1 for k in layers), span, tuple(own)))
+        found.append(CoveredFilm(inside, tuple(k + 1 for k in layers), span, tuple(own)))
     return found
 
 
-def opened(film: Film, widths: Sequence[float], shifts_mm: Sequence[Point] = ()) -> list[Region]:
+def opened(film: CoveredFilm, widths: Sequence[float], shifts_mm: Sequence[Point] = ()) -> list[Region]:
     """Openings of each layer of a film, its lines as wide as a share of what the file says, and shifted [mm]."""
     found = []
     for k, (lines, width) in enumerate(zip(film.lines, widths, strict=True)):
@@ -183,13 +183,13 @@ def of_lines(design: Design, lines: Beads, *, widths: Sequence[float], most_laye
     return Pinholes(design.name, tuple(_row(film, width) for film in found for width in widths))
 
 
-def _row(film: Film, width: float) -> Row:
+def _row(film: CoveredFilm, width: float) -> OpenPlaces:
     layers = opened(film, [width] * len(film.lines))
     holes = sorted(through(layers), key=lambda hole: hole.area)
     plan, area = film.plan.area, sum(hole.area for hole in holes)
     edge = [hole for hole in holes if hole.distance(film.plan.exterior) < _EDGE_MM]
     at = shapely.point_on_surface(holes[-1]) if holes else None
-    return Row(
+    return OpenPlaces(
         f"{film.span_mm[0]:g} to {film.span_mm[1]:g} mm", len(film.lines), width,
         100 * max(layer.area for layer in layers) / plan, 100 * area / plan, len(holes),
         100 * len(edge) / len(holes) if holes else None, holes[-1].area if holes else 0.0,
@@ -214,7 +214,7 @@ def findings(found: Pinholes) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def draws(film: Film, count: int, seed: int = 23) -> Real:
+def draws(film: CoveredFilm, count: int, seed: int = 23) -> Real:
     """Through-holes in prints whose layers differ in width by up to 5 % and are shifted by ``SHIFT_MM``, (count,)."""
     rng = np.random.default_rng(seed)
     found = []

@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 
 from sensorgen.checks import estimate, volumes
-from sensorgen.checks.volumes import Row
+from sensorgen.checks.volumes import LayerVolume
 from sensorgen.core.errors import BadInput
 from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Cell:
+class PrintCell:
     """The unit cell of a print.
 
     Attributes
@@ -75,7 +75,7 @@ class Printed:
         return next(iter(self.layers.values()))
 
     @cached_property
-    def cells(self) -> dict[str, Cell]:
+    def cells(self) -> dict[str, PrintCell]:
         """The unit cell by every convention."""
         from sensorgen.asprinted.window import Window, inside, window
         from sensorgen.scene.slabs import is_open
@@ -101,7 +101,7 @@ class Printed:
         return {name: found.remarks() for name, found in self._connected.items()}
 
     @property
-    def cell(self) -> Cell:
+    def cell(self) -> PrintCell:
         """The unit cell by the first convention."""
         return next(iter(self.cells.values()))
 
@@ -112,7 +112,7 @@ class Printed:
         return min(gaps), max(gaps)
 
     @cached_property
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[LayerVolume]:
         """Printed and drawn volume per body and layer."""
         lines, scene, extruded = self.lines, self.design.printed, None
         if lines is not None:
@@ -201,7 +201,7 @@ def nominal(design: Design, paths: "Paths", slicer: str = "", centre_mm: Point |
     return Printed(design, provenance, {first: printed_layers(design, lines, first)}, lines)
 
 
-def cell(design: Design, layers: Sequence[LayerRegions], bodies: Sequence[Body], plan: "Window") -> Cell:
+def cell(design: Design, layers: Sequence[LayerRegions], bodies: Sequence[Body], plan: "Window") -> PrintCell:
     """The unit cell of printed layers.
 
     Parameters
@@ -228,7 +228,7 @@ def cell(design: Design, layers: Sequence[LayerRegions], bodies: Sequence[Body],
         found = found.turned_over()
     kept = replace(found, bodies=tuple(b for b in found.bodies if not b.is_support()))
     smaller = kept.stretched(1.0 - design.shrinkage) if design.shrinkage else kept
-    return Cell(smaller, scene.size_mm[0] * scene.size_mm[1] / plan.area_mm2())
+    return PrintCell(smaller, scene.size_mm[0] * scene.size_mm[1] / plan.area_mm2())
 
 
 def gap_mm(scene: Scene) -> float:

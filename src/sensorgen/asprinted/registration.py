@@ -20,7 +20,7 @@ WITHIN_MM = 0.8  # by which a piece may be larger or smaller than the design: wa
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class PlacedPiece:
     """A piece of a design in a file, whose lines are turned to the design's own directions.
 
     Attributes
@@ -41,7 +41,7 @@ class Placed:
     copies: int
 
 
-def placed(design: Design, source: Source) -> Placed:
+def placed(design: Design, source: Source) -> PlacedPiece:
     """The first piece of a design in a file of G-code.
 
     Parameters
@@ -59,7 +59,7 @@ def placed(design: Design, source: Source) -> Placed:
     return pieces(design, follow(source, design.machine.control.prime_macro))[0]
 
 
-def pieces(design: Design, motion: Motion) -> list[Placed]:
+def pieces(design: Design, motion: Motion) -> list[PlacedPiece]:
     """All pieces of a design in a file of G-code, straight and turned by 90 degrees.
 
     Parameters
@@ -99,7 +99,9 @@ def pieces(design: Design, motion: Motion) -> list[Placed]:
     turned = paths if straight[fits].all() else _turned(paths)
     for box, is_straight in ((box, straight[k]) for k, box in enumerate(boxes) if fits[k]):
         x, y = (float(v) for v in box.mean(0))
-        found.append(Placed(paths if is_straight else turned, (x, y) if is_straight else (y, -x), (x, y), sum(fits)))
+        found.append(
+            PlacedPiece(paths if is_straight else turned, (x, y) if is_straight else (y, -x), (x, y), sum(fits))
+        )
     return found
 
 

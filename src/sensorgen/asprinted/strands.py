@@ -12,7 +12,7 @@ from sensorgen.asprinted.registration import placed
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.design.design import Design
-from sensorgen.export.gcode.crossings import CONTACT_MM, Lines, crossings, printed_lines
+from sensorgen.export.gcode.crossings import CONTACT_MM, PrintedLines, crossings, printed_lines
 from sensorgen.export.gcode.drags import Drags, summed
 from sensorgen.export.gcode.files import Source, text_of
 from sensorgen.export.gcode.motion import follow
@@ -106,7 +106,7 @@ def drags(design: Design, source: Source) -> DesignDrags:
     return DesignDrags(**vars(summed(motion, found, machine)), strands=tuple(strands))
 
 
-def _insulation(place_mm: Real, lines: Lines, tops_mm: Real) -> Real:
+def _insulation(place_mm: Real, lines: PrintedLines, tops_mm: Real) -> Real:
     """Height between places and lines straight above or below, of layers with some tops; infinite without any [mm]."""
     found = np.full(len(place_mm), np.inf)
     if not len(lines.tool) or not len(place_mm):

@@ -106,22 +106,10 @@ def _period(
     end, wide = size_mm[axis], size_mm[1 - axis]
     patterned = [layer for layer in layers if layer.along != "xy"[axis]]
     if all(layer.along for layer in patterned):
-        # The pattern of strips as slices of one level band each, named by all that stands there
-        regions = list({region for layer in patterned for region in layer.regions.values()})
-        places = np.unique(np.append(shapely.get_coordinates(regions)[:, axis], [0.0, end]))
-        # A face sampled just below leaves slivers: their middle is where the drawing's mirrors see the edge. An edge so
-        # near to the sensor's end is where the other periods have it, and the end is there too.
-        groups = np.split(places, np.flatnonzero(np.diff(places) > SLIVER_MM) + 1)
-        places = np.array([groups[0][-1], *(group.mean() for group in groups[1:-1]), groups[-1][0]])
-        middles = (places[:-1] + places[1:]) / 2
-        x, y = (middles, wide / 2) if axis == 0 else (wide / 2, middles)
-        looks = np.array([shapely.contains_xy(region, x, y) for region in regions], dtype=bool)
-        bands = [
-            (Band(look.tobytes().hex(), "", (0.0, 0.0), (1.0, 1.0)),) for look in looks.T.reshape(len(middles), -1)
-        ]
-        strips = [Slice(a, b, band) for (a, b), band in zip(pairwise(places.tolist()), bands, strict=True)]
-        piece = affordable(tuple(strips)).slices
-        low, width, shifts = piece[0].left_mm, piece[-1].right_mm - piece[0].left_mm, False
+        low, high = _of_strips(
+            list({region for layer in patterned for region in layer.regions.values()}), size_mm, axis
+        )
+        width, shifts = high - low, False
     else:
         found = repeat([region for layer in patterned for region in layer.regions.values()], size_mm, axis)
         low, shifts = found.low_mm, found.shifts
@@ -139,6 +127,24 @@ def _period(
 
     start = min(inside, key=lambda s: (crossed(s), abs(s + width - end / 2)))
     return (start, start + 2 * width), shifts
+
+
+def _of_strips(regions: Sequence[Region], size_mm: Sequence[float], axis: int) -> Point:
+    """Ends of the cell of strips square to an axis, between mirrors [mm]."""
+    end, wide = size_mm[axis], size_mm[1 - axis]
+    places = np.unique(np.append(shapely.get_coordinates(regions)[:, axis], [0.0, end]))
+    # A face sampled just below leaves slivers: their middle is where the drawing's mirrors see the edge. An edge so
+    # near to the sensor's end is where the other periods have it, and the end is there too.
+    groups = np.split(places, np.flatnonzero(np.diff(places) > SLIVER_MM) + 1)
+    places = np.array([groups[0][-1], *(group.mean() for group in groups[1:-1]), groups[-1][0]])
+    middles = (places[:-1] + places[1:]) / 2
+    x, y = (middles, wide / 2) if axis == 0 else (wide / 2, middles)
+    looks = np.array([shapely.contains_xy(region, x, y) for region in regions], dtype=bool)
+    # Slices of one level band each, named by all that stands there
+    bands = [(Band(look.tobytes().hex(), "", (0.0, 0.0), (1.0, 1.0)),) for look in looks.T.reshape(len(middles), -1)]
+    strips = [Slice(a, b, band) for (a, b), band in zip(pairwise(places.tolist()), bands, strict=True)]
+    piece = affordable(tuple(strips)).slices
+    return piece[0].left_mm, piece[-1].right_mm
 
 
 def cut(layers: Sequence[LayerRegions], to: Window) -> list[LayerRegions]:

@@ -27,7 +27,7 @@ Shift = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Lines:
+class LineLayout:
     """Layout of a material's lines.
 
     Attributes
@@ -38,14 +38,17 @@ class Lines:
         Width of all lines that run around a part [mm].
     infill : float
         Share of the rest that is filled [-].
+    pattern : str
+        Of a sparse infill, which is stripes here whatever it is.
     """
 
     line_mm: float
     walls_mm: float = 0.0
     infill: float = 1.0
+    pattern: str = "rectilinear"
 
 
-def lines(design: Design) -> dict[str, Lines]:
+def lines(design: Design) -> dict[str, LineLayout]:
     """Layout of the lines of each material of a design, as far as its print settings are known."""
     found = {}
     for name, source in design.used().items():
@@ -58,8 +61,12 @@ def lines(design: Design) -> dict[str, Lines]:
 
         line = design.profile.line_mm.get(name, design.machine.line_mm())
         walls = design.profile.wall_lines.get(name) or value("wall_lines", 1.0)
-        percent = design.infill.get(name, Infill()).percent or value("infill_percent", 100.0)
-        found[name] = Lines(line, walls * line, percent / 100.0)
+        infill = design.infill.get(name, Infill())
+        percent, pattern = (
+            infill.percent or value("infill_percent", 100.0),
+            infill.pattern or design.layers.infill_pattern,
+        )
+        found[name] = LineLayout(line, walls * line, percent / 100.0, pattern)
     return found
 
 
@@ -110,7 +117,7 @@ def layers(
     printer: Printer,
     quality: Quality,
     walls: str = "arachne",
-    laid: Mapping[str, Lines] | None = None,
+    laid: Mapping[str, LineLayout] | None = None,
     shift: Shift | None = None,
 ) -> list[LayerRegions]:
     """Printed part of every layer.
@@ -123,7 +130,7 @@ def layers(
         What prints it.
     walls : str
         One of ``RULES``.
-    laid : mapping of str to Lines, optional
+    laid : mapping of str to LineLayout, optional
         Material to its lines; solid ones of the printer's width if not given.
     shift : (float, float), optional
         How far the infill of odd and of even layers lies aside, in pitches [-]; so that lines of two layers meet as
@@ -166,7 +173,7 @@ def layers(
     return found
 
 
-def _sparse(region: Region, lines: Lines, line_mm: float, way: str, shift: float) -> Region:
+def _sparse(region: Region, lines: LineLayout, line_mm: float, way: str, shift: float) -> Region:
     """A region with stripes of air along ``way`` from edge to edge, within its walls, by a share of the pitch aside."""
     x0, y0, x1, y1 = shapely.bounds(parts(region)).T
     wall = lines.walls_mm
@@ -186,7 +193,7 @@ def _sparse(region: Region, lines: Lines, line_mm: float, way: str, shift: float
 
 
 def _printed(
-    layer: LayerRegions, scene: Scene, printer: Printer, wide: Rule, laid: Mapping[str, Lines]
+    layer: LayerRegions, scene: Scene, printer: Printer, wide: Rule, laid: Mapping[str, LineLayout]
 ) -> dict[str, Region]:
     """Regions that walls make of a layer; a place that two bodies swell into goes to the one that is printed first."""
     length, width, _ = scene.size_mm

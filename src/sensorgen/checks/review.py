@@ -103,7 +103,7 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "") -> Revi
 
 def advised(finding: Finding, parameters: list[str]) -> Finding:
     """A finding whose advice names parameters that the shape has."""
-    wider = [name for name in parameters if name == "period_mm" or name.endswith("_width_mm")]
+    wider = [name for name in parameters if name in ("period_mm", "tip_mm") or name.endswith("_width_mm")]
     if finding.rule in _WIDENED and finding.severity != "info" and wider:
         what, comma, more = finding.advice.partition(",")
         return replace(finding, advice=f"{what} (increase {' or '.join(wider)}){comma}{more}")

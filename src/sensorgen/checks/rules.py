@@ -26,7 +26,7 @@ def findings(
     quality: Quality,
     gap_mm: float,
     walls: str = "arachne",
-    laid: Mapping[str, estimate.Lines] | None = None,
+    laid: Mapping[str, estimate.LineLayout] | None = None,
 ) -> list[Finding]:
     """All findings about a scene, the most severe first.
 
@@ -40,7 +40,7 @@ def findings(
         Smallest distance of the electrodes, exact [mm].
     walls : str
         Of the slicer, one of :data:`sensorgen.checks.estimate.RULES`.
-    laid : mapping of str to Lines, optional
+    laid : mapping of str to LineLayout, optional
         Material to its lines; solid ones of the printer's width if not given.
     """
     slices = Slices(scene, quality)

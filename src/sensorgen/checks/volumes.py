@@ -18,7 +18,7 @@ _LEAST = 1e-6  # of the sensor's plan, in one layer: less is rounding
 
 
 @dataclass(frozen=True)
-class Row:
+class LayerVolume:
     """One body in one layer.
 
     Attributes
@@ -62,7 +62,7 @@ class Row:
         return self.printed_mm3 > self.exact_mm3
 
 
-def table(rows: Sequence[Row]) -> Table:
+def table(rows: Sequence[LayerVolume]) -> Table:
     """Printed over drawn volume of every body, layer by layer from the top."""
     bodies = list(dict.fromkeys(row.body for row in rows))
     cells = {(row.layer, row.body): _cell(row) for row in rows}
@@ -75,7 +75,7 @@ def table(rows: Sequence[Row]) -> Table:
     )  # fmt: skip
 
 
-def _cell(row: Row) -> str:
+def _cell(row: LayerVolume) -> str:
     lost = f" -{row.vanished}" if row.vanished else ""
     fused = f" +{row.fused}" if row.fused else ""
     return f"{'extra' if row.ratio is None else format(row.ratio, '.2f')}{lost}{fused}"
@@ -83,7 +83,7 @@ def _cell(row: Row) -> str:
 
 def rows(
     scene: Scene, printed: Sequence[LayerRegions], volumes_mm3: Mapping[tuple[int, str], float] | None = None
-) -> list[Row]:
+) -> list[LayerVolume]:
     """Rows for all bodies and layers in which something is drawn or printed, from the bed up.
 
     Parameters
@@ -110,7 +110,9 @@ def rows(
                 x0, y0, x1, y1 = plan[lost[0] if lost else 0].bounds if plan else (0.0, 0.0, 0.0, 0.0)
                 place = (x0, (y0 + y1) / 2) if meant.along == "x" else ((x0 + x1) / 2, y0)
                 counts = len(plan), len(lost), merged
-                found.append(Row(body.name, number + 1, meant.bottom_mm, meant.top_mm, exact, volume, *counts, place))
+                found.append(
+                    LayerVolume(body.name, number + 1, meant.bottom_mm, meant.top_mm, exact, volume, *counts, place)
+                )
     return found
 
 
@@ -138,12 +140,12 @@ def _lost(plan: Sequence[Region], made: Sequence[Region]) -> tuple[list[int], in
     return lost, int((met - 1).clip(0).sum())
 
 
-def findings(found: Iterable[Row], scene: Scene) -> list[Finding]:
+def findings(found: Iterable[LayerVolume], scene: Scene) -> list[Finding]:
     """Rule 7: an error where a sampled body is not printed at all, else a warning outside ``LOW`` to ``HIGH``.
 
     Parameters
     ----------
-    found : iterable of Row
+    found : iterable of LayerVolume
         Of one print.
     scene : Scene
         The sensor on its bed.
@@ -152,7 +154,7 @@ def findings(found: Iterable[Row], scene: Scene) -> list[Finding]:
     return [finding for body in scene.bodies for finding in _of_body(body, [r for r in outside if r.body == body.name])]
 
 
-def _of_body(body: Body, outside: Sequence[Row]) -> Iterator[Finding]:
+def _of_body(body: Body, outside: Sequence[LayerVolume]) -> Iterator[Finding]:
     """One finding for neighbouring layers with the same fault."""
     numbered = list(enumerate(outside))
     for (_, fault, _), group in groupby(numbered, key=lambda p: (p[1].layer - p[0], _fault(p[1]), p[1].grown)):
@@ -173,7 +175,7 @@ def _of_body(body: Body, outside: Sequence[Row]) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _fault(row: Row) -> str:
+def _fault(row: LayerVolume) -> str:
     """Fate of a body that is absent from a layer; "" where it is there."""
     if row.printed_mm3 > 0:
         return ""

@@ -20,6 +20,8 @@ class ArrayOptions:
     ----------
     array : DESIGN.yaml
         Of an array's frames: its design, so that C/C0 is calibrated.
+    frequency_hz
+        Of an array's frames, where their file has none.
     calibration : FILE.npz
         Of an array: write the calibration there.
     by_first
@@ -27,6 +29,7 @@ class ArrayOptions:
     """
 
     array: Path | None = None
+    frequency_hz: float | None = None
     calibration: Path | None = None
     by_first: bool = False
 
@@ -46,12 +49,14 @@ def calibrate(files: Sequence[str], how: ArrayOptions) -> int:
     from sensorgen.prediction.array.sessions import study
 
     if how.array is None:
+        if how.frequency_hz is not None:
+            raise BadInput("--frequency is of an array's frames; expected --array DESIGN.yaml beside it")
         sessions = [session(Path(file), k) for k, file in enumerate(files)]
     else:
         from sensorgen.design.design import load
         from sensorgen.prediction.array.model import array_model
 
-        sessions = of_frames([Path(file) for file in files], array_model(load(how.array)))
+        sessions = of_frames([Path(file) for file in files], array_model(load(how.array)), how.frequency_hz)
     studied = study(sessions, by_first=how.by_first)
     if how.calibration is not None:
         store.replace(how.calibration, studied.calibration.npz())
@@ -77,13 +82,14 @@ def invert(calibration: str, task: Task) -> int:
     measured, output, known = task.measured, task.output, stored(Path(calibration))
     of = session(Path(measured), nan)
     with within(measured):
-        of = replace(of, day=known.counted(of.day))
+        of = replace(of.matched(known.names), day=known.counted(of.day))
     if of.reading.shape[1] != len(known.law.alive):
         raise BadInput(f"{measured}: {of.reading.shape[1]} elements; expected {len(known.law.alive)}, as calibrated")
     free = of.unloaded if of.rest.any() else known.recognised(of)
-    tare = np.nanmean(of.reading[free], 0)
+    tare = replace(of, rest=free).tare
     mean, half = known.pressures(of, tare)
-    names = [f"{part}_{k + 1}_kpa" for k in range(mean.shape[1]) for part in ("p", "half")]
+    elements = known.names or range(1, mean.shape[1] + 1)
+    names = [f"{part}_{element}_kpa" for element in elements for part in ("p", "half")]
     both = np.stack([mean, half], -1).reshape(len(mean), -1)
     cells = [[None if v != v else v for v in row] for row in np.column_stack([of.time_s, both]).tolist()]
     columns = tuple(Column(name, key=name) for name in ("time_s", *names))

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from sensorgen.cli.inversion_task import Task
     from sensorgen.design.design import Design
     from sensorgen.prediction.array.frames import PressureMaps
+    from sensorgen.prediction.array.sessions import ArrayCalibration
 
 
 def invert(design: "Design", task: "Task", frames: ArrayFrames, *, perfect: bool, law: str) -> int:
@@ -19,7 +20,6 @@ def invert(design: "Design", task: "Task", frames: ArrayFrames, *, perfect: bool
     from sensorgen.prediction.array.frames import inverted
     from sensorgen.prediction.array.model import array_model
     from sensorgen.prediction.array.readout import ArrayReadout
-    from sensorgen.prediction.array.sessions import stored
     from sensorgen.prediction.query import NOISE
 
     _refuse(task, perfect=perfect, law=law)
@@ -30,23 +30,29 @@ def invert(design: "Design", task: "Task", frames: ArrayFrames, *, perfect: bool
     apart = read(Path(task.rest_file), shape, read_in.frequency_hz).at_rest() if task.rest_file else None
     noise = NOISE if task.noise is None else task.noise
     how = ArrayReadout(frames.readout, frames.input_ohm, (read_in.frequency_hz,), noise)  # type: ignore[arg-type]
-    known = None if frames.calibration is None else stored(frames.calibration)
     maps = inverted(
-        model, how, read_in.siemens, read_in.rest, read_in.time_s, frames.scatter, apart, read_in.unused, known,
-        read_in.day,
+        model, how, read_in.siemens, read_in.rest, read_in.time_s, frames.scatter, apart, read_in.unused,
+        known(frames.calibration), read_in.day, not frames.cells,
     )  # fmt: skip
-    if task.output:
-        _write(maps, task.output)
+    if output := task.output or "-" * task.terminal:
+        _write(maps, output)
     if frames.plot is not None:
         from sensorgen.analysis.plots import array
 
         true = None if read_in.pressure_kpa is None else read_in.pressure_kpa[~read_in.rest]
         render.file(frames.plot / f"{design.name}-map.png", array.maps(maps, true), "wrote ")
     for piece in render.pieces(maps, render.form()):
-        render.say(piece, nl=False, err=task.output == "-")
-    if not task.output:
+        render.say(piece, nl=False, err=task.terminal)
+    if not output:
         render.say("--output FILE.npz writes the maps, FILE.csv force and centre of pressure of every frame")
     return 0
+
+
+def known(calibration: Path | None) -> "ArrayCalibration | None":
+    """Calibration of a file, where there is one."""
+    from sensorgen.prediction.array.sessions import stored
+
+    return stored(calibration) if calibration else None
 
 
 def _refuse(task: "Task", *, perfect: bool, law: str) -> None:

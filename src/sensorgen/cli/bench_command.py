@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from sensorgen.cli import bench_hysteresis, bench_live, bench_run, bench_sets, bench_show, render
+from sensorgen.cli import bench_array, bench_hysteresis, bench_live, bench_run, bench_sets, bench_show, render
 from sensorgen.cli.bench_opened import bench as command
 from sensorgen.cli.designs import of_design
 from sensorgen.core.errors import BadInput, OutOfRange
@@ -14,7 +14,7 @@ from sensorgen.core.options import Option
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
 
-__all__ = ["bench_hysteresis", "bench_live", "bench_run", "bench_sets", "bench_show", "command"]
+__all__ = ["bench_array", "bench_hysteresis", "bench_live", "bench_run", "bench_sets", "bench_show", "command"]
 Presses = Annotated[int, Option(kind=click.IntRange(1))]
 Repeats = Annotated[int, Option(kind=click.IntRange(0))]
 Forces = Annotated[tuple[float, ...], Option(typed="0,6N", zero=True)]
@@ -55,7 +55,7 @@ def _plan(
         Draw the plan.
     """
     from sensorgen.core import files
-    from sensorgen.measure.signal.schedule import Plan, schedule
+    from sensorgen.measure.signal.schedule import RunPlan, schedule
 
     if len(force_n) != 2:
         raise BadInput(f"--force: {len(force_n)} values; expected the least and the largest, as in 0,6N")
@@ -65,7 +65,7 @@ def _plan(
     if tip_mm > length:
         raise OutOfRange(f"--tip {tip_mm:g} mm is longer than the sensor, {length:g} mm; expected a shorter one")
     where = (tip_mm / 2, length - tip_mm / 2)
-    plan = schedule(Plan(seed, presses, (force_n[0], force_n[1]), where, dwell_s, rest_s, repeats), design.name)
+    plan = schedule(RunPlan(seed, presses, (force_n[0], force_n[1]), where, dwell_s, rest_s, repeats), design.name)
     if picture:
         from sensorgen.analysis.plots import recordings
 

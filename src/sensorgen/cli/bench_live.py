@@ -11,7 +11,7 @@ from sensorgen.core import units
 from sensorgen.core.options import Option
 
 if TYPE_CHECKING:
-    from sensorgen.measure.readings import Block, Readings
+    from sensorgen.measure.readings import FileRows, Readings
     from sensorgen.measure.recording.samples import Complex
 
 Rate = Annotated[float, Option(more={"required": True})]
@@ -46,7 +46,7 @@ def _header(source: "Readings") -> str:
     return ",".join([*map(_cell, source.kept), *(f"{part}_ohm_{f}" for f in tones for part in ("re", "im"))])
 
 
-def _rows(block: "Block", smooth: "Complex") -> Iterator[str]:
+def _rows(block: "FileRows", smooth: "Complex") -> Iterator[str]:
     for kept, row in zip(block.kept, smooth.tolist(), strict=True):
         parts = (f"{part:.12g}" if isfinite(z.real) else "" for z in row for part in (z.real, z.imag))
         yield ",".join([*map(_cell, kept), *parts]) + "\n"

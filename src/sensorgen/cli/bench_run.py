@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from sensorgen.design.design import Design
     from sensorgen.measure.lab.devices import Identity
     from sensorgen.measure.lab.experiment import Experiment
-    from sensorgen.measure.lab.run import Planned
+    from sensorgen.measure.lab.run import PlannedRun
     from sensorgen.prediction.calibration.specimen import SpecimenModel
 
 
@@ -114,7 +114,7 @@ def _model(design: "Design", experiment: "Experiment") -> "SpecimenModel":
     return SpecimenModel(predicted.sensor, tones, spread_of(predicted, Bench(tip_m)))
 
 
-def _confirmed(plan: "Planned", identities: "Mapping[str, Identity]", *, yes: bool) -> bool:
+def _confirmed(plan: "PlannedRun", identities: "Mapping[str, Identity]", *, yes: bool) -> bool:
     """Print who is there and what is planned; whether the rig may move."""
     for role, who in identities.items():
         render.say(f"{role}: {who.model} {who.serial} {who.firmware}", err=True)

@@ -106,8 +106,10 @@ def _drawn(processed: "Processed", name: str, folder: Path) -> list[str]:
         name = f"{name}, drift taken out"
         raw = processed.drift.removed(one.time_s[valid], raw)
         smooth = processed.drift.removed(processed.filtered_s, smooth)
-    run = recordings.Run(name, one.tones_hz, one.time_s[valid], raw, processed.filtered_s, smooth, processed.pairs)
-    files: dict[str, Callable[[recordings.Run], bytes]] = {"time.png": recordings.over_time}
+    run = recordings.DrawnRecording(
+        name, one.tones_hz, one.time_s[valid], raw, processed.filtered_s, smooth, processed.pairs
+    )
+    files: dict[str, Callable[[recordings.DrawnRecording], bytes]] = {"time.png": recordings.over_time}
     if processed.by_force:
         files |= {f"{part}.png": partial(recordings.surfaces, part=part) for part in recordings.PARTS}
         files["run.html"] = lambda of: recordings.html(of).encode()

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from sensorgen.design.body import Body
     from sensorgen.design.design import Design
     from sensorgen.prediction.slices import PrintReview
-    from sensorgen.workflows.compensation import Change
+    from sensorgen.workflows.compensation import Adjustment
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ Compensate = Annotated[
 
 def compensated(
     design: "Design", word: str, walls: str, slicer: str = "", program: str = "",
-) -> "tuple[Design, list[Change]]":  # fmt: skip
+) -> "tuple[Design, list[Adjustment]]":  # fmt: skip
     """The design to print, and what was changed; by a real slicer's prints where one is named, else by the estimate."""
     if not word:
         return design, []

@@ -21,7 +21,8 @@ _OF_SPECIMENS = {
     "source": "--source",
     "dry_run": "--dry-run",
 }
-_OF_ARRAYS = {"array": "--array", "calibration": "--calibration", "by_first": "--by-first"}
+_OF_ARRAYS = {"array": "--array", "calibration": "--calibration", "by_first": "--by-first",
+              "frequency_hz": "--frequency"}  # fmt: skip
 Recordings = Annotated[tuple[int, ...], Option(kind=click.IntRange(1))]
 
 

@@ -17,7 +17,7 @@ from sensorgen.scene.scene import Envelope
 
 
 @dataclass(frozen=True)
-class Entry:
+class ListEntry:
     """Entry of a list: in one sentence, its parameters or values, a line each, and where it comes from."""
 
     about: str
@@ -40,7 +40,7 @@ class Entry:
 class Catalogue:
     """Names of one kind, with what they stand for."""
 
-    entries: dict[str, Entry]
+    entries: dict[str, ListEntry]
 
     def to_json(self) -> str:
         """The entries by their names."""
@@ -56,18 +56,18 @@ class Catalogue:
                 yield Facts(tuple(("  ", value) for value in entry.values), hang=4)
 
 
-def _of_packs(kind: Kind, entry: Callable[[packs.File], Entry]) -> Catalogue:
+def _of_packs(kind: Kind, entry: Callable[[packs.File], ListEntry]) -> Catalogue:
     """Every file of a kind by its name; one that is damaged says so, and hides no other."""
-    entries: dict[str, Entry] = {}
+    entries: dict[str, ListEntry] = {}
     for file in packs.files(kind):
         try:
             made = entry(file)
         except SensorgenError as error:
-            made = Entry(f"cannot be used: {error}")
+            made = ListEntry(f"cannot be used: {error}")
         version = ""
         with suppress(SensorgenError):
             version = file.pack.version
-        origin = Entry(made.about, made.values, file.pack.name, version, file.pack.where, str(file.path))
+        origin = ListEntry(made.about, made.values, file.pack.name, version, file.pack.where, str(file.path))
         entries.setdefault(file.name, origin)
     return Catalogue(dict(sorted(entries.items())))
 
@@ -81,11 +81,11 @@ def _form(file: packs.File) -> shape_files.Shape:
     return design.shape(file.name) if file.pack.where == "shipped" else shape_files.load(file.name, file.text())
 
 
-def _shape(file: packs.File) -> Entry:
+def _shape(file: packs.File) -> ListEntry:
     if file.pack.where != "shipped" and not shape_files.is_trusted(file.text()):
-        return Entry(f"not trusted: did not run; read it, then: sensorgen pack trust {file.path}")
+        return ListEntry(f"not trusted: did not run; read it, then: sensorgen pack trust {file.path}")
     module = _form(file)
-    return Entry(_first_line(module.__doc__), tuple(f"{f.name}: {_said(f)}" for f in fields(module.Params)))
+    return ListEntry(_first_line(module.__doc__), tuple(f"{f.name}: {_said(f)}" for f in fields(module.Params)))
 
 
 def _said(field: Field[Any]) -> str:
@@ -101,10 +101,10 @@ def materials() -> Catalogue:
     return _of_packs("materials", _material)
 
 
-def _material(file: packs.File) -> Entry:
+def _material(file: packs.File) -> ListEntry:
     texts: material_files.Texts = {} if file.pack.where == "shipped" else {"materials": {file.name: file.text()}}
     m = material_files.load(file.name, packs.source_names(), texts)
-    return Entry(f"{m.title}: {m.about}", tuple(_values(m)))
+    return ListEntry(f"{m.title}: {m.about}", tuple(_values(m)))
 
 
 def _values(material: material_files.Material) -> Iterator[str]:
@@ -124,10 +124,10 @@ def _text(file: packs.File) -> str | None:
     return None if file.pack.where == "shipped" else file.text()
 
 
-def _printer(p: printer.Printer) -> Entry:
+def _printer(p: printer.Printer) -> ListEntry:
     bed = f"bed {p.bed_mm[0]:g} x {p.bed_mm[1]:g} mm, height {p.height_mm:g} mm, nozzle {p.nozzle_mm:g} mm"
     tools = ", ".join(f"{material} on {tool}" for material, tool in p.default_tools.items())
-    return Entry(
+    return ListEntry(
         p.title,
         (
             bed,
@@ -143,17 +143,17 @@ def qualities() -> Catalogue:
     return _of_packs("qualities", lambda file: _quality(printer.load_quality(file.name, _text(file))))
 
 
-def _quality(q: printer.Quality) -> Entry:
-    return Entry(q.title, (f"layers {q.layer_mm:g} mm, first {q.first_layer_mm:g} mm",))
+def _quality(q: printer.Quality) -> ListEntry:
+    return ListEntry(q.title, (f"layers {q.layer_mm:g} mm, first {q.first_layer_mm:g} mm",))
 
 
 def instruments() -> Catalogue:
     """Instruments with the source of their accuracy."""
     from sensorgen.measure import accuracy
 
-    def entry(file: packs.File) -> Entry:
+    def entry(file: packs.File) -> ListEntry:
         made = accuracy.parse(file.text(), f"{file.name}.yaml")
-        return Entry(made.name, (f"source: {made.source}",))
+        return ListEntry(made.name, (f"source: {made.source}",))
 
     return _of_packs("instruments", entry)
 
@@ -162,12 +162,12 @@ def devices() -> Catalogue:
     """Kinds of devices that a run drives, those of other packages and of PyMeasure included."""
     from sensorgen.measure.lab import catalogue
 
-    return Catalogue({name: Entry(about) for name, about in catalogue.listed().items()})
+    return Catalogue({name: ListEntry(about) for name, about in catalogue.listed().items()})
 
 
 def all_packs() -> Catalogue:
     """Packs with the number of files of each kind."""
-    entries: dict[str, Entry] = {}
+    entries: dict[str, ListEntry] = {}
     for pack in packs.everywhere():
         counts = {kind: len(pack.names(kind)) for kind in packs.SINGULAR}
         files = ", ".join(f"{n} {packs.SINGULAR[kind] if n == 1 else kind}" for kind, n in counts.items() if n)
@@ -177,24 +177,26 @@ def all_packs() -> Catalogue:
     return Catalogue(entries)
 
 
-def _pack(pack: packs.Pack, files: str) -> Entry:
+def _pack(pack: packs.Pack, files: str) -> ListEntry:
     try:
         about, version = pack.manifest.about, pack.version
     except SensorgenError as error:
         about, version = f"cannot be used: {error}", ""
     values = (files,) if about else ()
-    return Entry(about or files, values, pack.name, version, pack.where, str(pack.folder))
+    return ListEntry(about or files, values, pack.name, version, pack.where, str(pack.folder))
 
 
 def models() -> Catalogue:
     """Models with their cost and source."""
     entries = {name: registry.load(model_files, name) for name in model_files.names()}
-    return Catalogue({k: Entry(_first_line(m.__doc__), (f"cost {m.COST}; {m.SOURCE}",)) for k, m in entries.items()})
+    return Catalogue(
+        {k: ListEntry(_first_line(m.__doc__), (f"cost {m.COST}; {m.SOURCE}",)) for k, m in entries.items()}
+    )
 
 
 def sources() -> Catalogue:
     """References behind the names of the sources."""
-    return Catalogue({name: Entry(where) for name, where in material_files.citations().items()})
+    return Catalogue({name: ListEntry(where) for name, where in material_files.citations().items()})
 
 
 def _first_line(doc: str | None) -> str:

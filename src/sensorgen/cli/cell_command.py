@@ -45,7 +45,7 @@ def command(
     from sensorgen.prediction import capacitance_answer as cell
 
     options.refuse_explain(explain, many=bool(sweeping.sweep))
-    asked = cell.Asked(accuracy, model, not no_cache, frequency_hz)
+    asked = cell.CapacitanceQuestion(accuracy, model, not no_cache, frequency_hz)
     if model.startswith(FORMULA):
         if explain:
             raise BadInput(f"--explain: {model} is asked alone, there is no plan; leave out --model")

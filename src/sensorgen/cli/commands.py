@@ -22,7 +22,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from sensorgen.cli import render
-from sensorgen.cli.words import KINDS, OneOf, Value, Values
+from sensorgen.cli.words import KINDS, OneOf, ShownValue, Values
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.core.options import Argument, Option, Without
@@ -160,7 +160,7 @@ def _quantity(name: str, plain: Any, stated: Option, *, many: bool) -> Values | 
         return None
     if many:
         return Values(quantity, zero=stated.zero)
-    return Value(quantity, zero=stated.zero, unit=unit[1] if unit else quantity.name)
+    return ShownValue(quantity, zero=stated.zero, unit=unit[1] if unit else quantity.name)
 
 
 def _type(plain: Any, stated: Any) -> Any:

@@ -16,7 +16,7 @@ from sensorgen.core.options import Option
 
 if TYPE_CHECKING:
     from sensorgen.design.design import Design
-    from sensorgen.prediction.compression import Asked
+    from sensorgen.prediction.compression import PressQuestion
 
 MODELS = ("press2d", "press3d", "press_round", "springs", "unconfined", "bonded", "infill")
 
@@ -53,11 +53,11 @@ class PressOptions:
         if self.accuracy is not None and self.check_mesh:
             raise BadInput("--accuracy and --check-mesh at once; the first checks the mesh too, expected one of them")
 
-    def asked(self) -> "Asked":
+    def asked(self) -> "PressQuestion":
         """The question as the solvers take it."""
         from sensorgen.prediction import compression
 
-        return compression.Asked(
+        return compression.PressQuestion(
             compression.stresses_kpa(self.stress), compression.boundary(self.sides, contact=self.contact), self.model,
             self.accuracy or inf, check_mesh=self.check_mesh, keep=not self.no_cache, sides=self.sides,
         )  # fmt: skip

@@ -67,7 +67,7 @@ def _listed(assembly: Any, folder: Path, drawing: Path | None) -> int:
     from sensorgen.core import files
     from sensorgen.workflows.importing import listing, reading
 
-    listed = listing.Listing.of(assembly, folder)
+    listed = listing.BodyListing.of(assembly, folder)
     render.deliver(listed)
     if assembly.errors:
         first, where = assembly.errors[0], "nothing is imported"

@@ -21,7 +21,7 @@ from sensorgen.design import shapes
 if TYPE_CHECKING:
     from sensorgen.core.document import Documented
     from sensorgen.design.design import Design
-    from sensorgen.measure.readings import Block, Readings
+    from sensorgen.measure.readings import FileRows, Readings
     from sensorgen.prediction.calibration.baseline import Baseline
     from sensorgen.prediction.calibration.inversion import Inverter
     from sensorgen.prediction.query import Query
@@ -68,7 +68,7 @@ class _ByRatio:
             )
         apart, at_s = _at_rest(task.rest_file, self.tones_hz) if task.rest_file else (None, np.nan)
         self.rest = Rest(apart, at_s, sensor.baseline)
-        self.summary = answers.Summary()
+        self.summary = answers.CalibratedSummary()
         self.made: _Made | None = None
         self._by_scatter, self._doubted = False, 0
 
@@ -77,7 +77,7 @@ class _ByRatio:
 
         return answers.header([_TIME] * (_TIME in self.source.numbers) + self.source.kept)
 
-    def rows(self, block: "Block") -> str:
+    def rows(self, block: "FileRows") -> str:
         """Rows of a block of readings; its readings at rest are the reference of those after them."""
         from sensorgen.prediction.calibration import answers
         from sensorgen.prediction.calibration.inversion import doubt_rest, nothing
@@ -135,7 +135,7 @@ class _Perfect:
 
         return answers.header(self.source.kept)
 
-    def rows(self, block: "Block") -> str:
+    def rows(self, block: "FileRows") -> str:
         """Rows of the readings under load of a block."""
         from sensorgen.prediction.inverse import answers
 
@@ -149,7 +149,7 @@ class _Perfect:
         return self.summary.result()
 
 
-def _beside(source: "Readings", block: "Block") -> tuple[Any, Any]:
+def _beside(source: "Readings", block: "FileRows") -> tuple[Any, Any]:
     """Mask of the rows at rest, and the time of each [s]."""
     columns = dict(zip(source.numbers, block.numbers.T, strict=True))
     nothing = np.full(len(block.rows), np.nan)

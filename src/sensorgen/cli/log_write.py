@@ -93,7 +93,7 @@ class AlternatingCurrent:
 
 
 @dataclass(frozen=True)
-class Meter:
+class VisaMeter:
     """Meter that is read over VISA.
 
     Attributes
@@ -214,7 +214,7 @@ def _specimen(
 @command("add", *FORMS, group=log, short="Log what meters show of one specimen.")
 def _add(
     specimen: str, *, y_words: str = "", z_words: str = "", ac: AlternatingCurrent, design: str = "",
-    about: Circumstances, meter: Meter, row: OfRow,
+    about: Circumstances, meter: VisaMeter, row: OfRow,
 ) -> None:  # fmt: skip
     """Log what meters show of one specimen: DC resistances, and AC quantities between its electrodes.
 
@@ -263,7 +263,7 @@ def _bind(file: LogFile, specimen: str, design: str) -> None:
 
 
 def _log_reading(
-    log: "Log", specimen: str, dc: tuple[str, str], typed: dict[str, Words], about: Circumstances, meter: Meter,
+    log: "Log", specimen: str, dc: tuple[str, str], typed: dict[str, Words], about: Circumstances, meter: VisaMeter,
     row: OfRow, *, mega: bool,
 ) -> None:  # fmt: skip
     """Log a reading with its photo."""

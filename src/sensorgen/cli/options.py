@@ -82,6 +82,8 @@ class ArrayFrames:
         Of an array: by 'sensorgen calibrate'.
     plot : DIR
         Of an array: write its heaviest map there.
+    cells
+        Of an array: pressures that cells carry under the cover; else on it, its spread of the load undone.
     """
 
     readout: Readout = "guarded"
@@ -90,6 +92,7 @@ class ArrayFrames:
     scatter: Annotated[float, Option(kind="share", typed="5%")] = 0.05
     calibration: Path | None = None
     plot: Path | None = None
+    cells: bool = False
 
 
 @dataclass(frozen=True)

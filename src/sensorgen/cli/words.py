@@ -78,7 +78,7 @@ class Values(Word):
         return numbers
 
 
-class Value(Values):
+class ShownValue(Values):
     """One number of a quantity."""
 
     def __init__(self, quantity: units.Quantity, *, zero: bool, unit: str) -> None:
@@ -94,7 +94,7 @@ class Value(Values):
         return float(numbers[0])
 
 
-class Share(Word):
+class ShownShare(Word):
     """A share of one, also in percent."""
 
     name = "share"
@@ -107,7 +107,7 @@ class Share(Word):
             raise BadInput(f"{text!r} is not a share; expected 0.2 or 20%") from None
 
 
-class ProperShare(Share):
+class ProperShare(ShownShare):
     """A share that is neither nothing nor all."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
@@ -168,7 +168,7 @@ class Png(Word):
 
 
 KINDS: dict[str, Word] = {  # by the names that annotations have for them
-    "length": Length(), "share": Share(), "proper share": ProperShare(), "ratio": Ratio(),
+    "length": Length(), "share": ShownShare(), "proper share": ProperShare(), "ratio": Ratio(),
     "seconds": Ratio("seconds above 0"), "tip": TipWords(), "pad": Pad(), "png": Png(),
 }  # fmt: skip
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from functools import partial
+from itertools import starmap
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
@@ -70,7 +71,7 @@ def in_parallel(
         A process ended before its result; a cluster that cannot be reached; whatever ``work`` raises.
     """
     if min(jobs, len(inputs)) < 2 and not (cluster and inputs):
-        yield from ((k, work(*each)) for k, each in enumerate(inputs))
+        yield from enumerate(starmap(work, inputs))
         return
     from concurrent.futures import FIRST_COMPLETED, wait
 
@@ -81,10 +82,10 @@ def in_parallel(
         while todo or again or running:
             while free and (todo or again):
                 alone = opened[0].shared and (todo or running)  # a chunk that killed waits until others are safe
-                if not todo and alone:
+                in_time = int(CHUNK_S * done / spent) if spent else 1
+                chunk = again.popleft() if again and not alone else _taken(todo, in_time, len(opened))
+                if not chunk.numbers:
                     break
-                size = min(int(CHUNK_S * done / spent) if spent else 1, len(todo) // (2 * len(opened)))
-                chunk = again.popleft() if again and not alone else _taken(todo, size)
                 lane = free.pop()
                 running[lane.submit(work, [inputs[k] for k in chunk.numbers])] = lane, chunk
             yield from ready  # after the lanes have got work: what is done with a result takes time
@@ -99,19 +100,25 @@ def in_parallel(
                 except lane.deadly:
                     lane.renew()
                     again.extend(chunk.after_death())
-                    if not chunk.after_death():
-                        if lost is None:
-                            raise SensorgenError(_DIED) from None
-                        ready.append((chunk.numbers[0], lost(chunk.numbers[0], _DIED)))
+                    ready.extend(_losses(chunk, lost))
                     continue
                 spent, done = spent + seconds, done + len(results)
                 ready.extend(zip(chunk.numbers, results, strict=True))
         yield from ready
 
 
-def _taken(todo: deque[int], size: int) -> "_Chunk":
-    """The next works, one at least."""
-    return _Chunk(tuple(todo.popleft() for _ in range(max(1, size))))
+def _losses(chunk: "_Chunk", lost: Lost[Result] | None) -> Iterator[tuple[int, Result]]:
+    """Number and result of a work that is not sent again; an error where no result stands for it."""
+    if not chunk.after_death():
+        if lost is None:
+            raise SensorgenError(_DIED) from None
+        yield chunk.numbers[0], lost(chunk.numbers[0], _DIED)
+
+
+def _taken(todo: deque[int], most: int, lanes: int) -> "_Chunk":
+    """The next works, few enough that each lane gets two more chunks; none where none is left."""
+    size = min(len(todo), max(1, min(most, len(todo) // (2 * lanes))))
+    return _Chunk(tuple(todo.popleft() for _ in range(size)))
 
 
 def remembered(

@@ -71,6 +71,14 @@ class Params(Envelope):
     lead_mm: float = field(default=1.8, metadata={"help": "Width of leads and pads.", "range": (0.2, 50.0)})
     pad_mm: float = field(default=6.0, metadata={"help": "Length of the pads.", "range": (1.0, 50.0)})
     margin_mm: float = field(default=2.5, metadata={"help": "Edge around tracks and leads.", "range": (0.2, 50.0)})
+    cover_mm: float = field(
+        default=0.0,
+        metadata={"help": "Thickness of a sheet that lies on the print and is not printed; 0: none.",
+                  "range": (0.0, 50.0)},
+    )  # fmt: skip
+    cover_mpa: float = field(
+        default=3.0, metadata={"help": "Young's modulus of that sheet [MPa].", "range": (0.001, 1e5)}
+    )
     between: str = field(
         default="dielectric",
         metadata={"help": "Between columns above the film: solid dielectric, or air that carries no load.",
@@ -174,7 +182,7 @@ class Params(Envelope):
 
 
 @dataclass(frozen=True)
-class Track:
+class ArrayTrack:
     """A row or column with its lead.
 
     Attributes
@@ -206,14 +214,14 @@ class Track:
 
 
 @dataclass(frozen=True)
-class Layout:
+class ArrayLayout:
     """Tracks of an array in plan, in the coordinates of its scene.
 
     Attributes
     ----------
     params : Params
         Of the array.
-    rows, columns : tuple of Track
+    rows, columns : tuple of ArrayTrack
         From below, from the left.
     x_mm, y_mm : tuple of float
         Middles of all columns and rows [mm].
@@ -224,8 +232,8 @@ class Layout:
     """
 
     params: Params
-    rows: tuple[Track, ...]
-    columns: tuple[Track, ...]
+    rows: tuple[ArrayTrack, ...]
+    columns: tuple[ArrayTrack, ...]
     x_mm: tuple[float, ...]
     y_mm: tuple[float, ...]
     size_mm: Point
@@ -239,7 +247,7 @@ class Layout:
         rows, columns = ([self.plan(track) for track in tracks] for tracks in (self.rows, self.columns))
         return shapely.union_all(rows), shapely.union_all(columns)
 
-    def plan(self, track: Track) -> "shapely.Geometry":
+    def plan(self, track: ArrayTrack) -> "shapely.Geometry":
         """One track with its lead and pad [mm]."""
         import shapely
 
@@ -253,7 +261,7 @@ class Layout:
         """Pads of the rows and of the columns [mm]."""
         import shapely
 
-        def united(tracks: tuple[Track, ...]) -> "shapely.Geometry":
+        def united(tracks: tuple[ArrayTrack, ...]) -> "shapely.Geometry":
             return shapely.union_all([shapely.box(t.pad[0], t.pad[2], t.pad[1], t.pad[3]) for t in tracks])
 
         return united(self.rows), united(self.columns)
@@ -282,14 +290,18 @@ class Layout:
 
     @cached_property
     def footprint(self) -> "shapely.Geometry":
-        """The print [mm]: of an outline squares, tracks and leads with their edge, narrow notches filled."""
+        """The print [mm]: of an outline squares, tracks and leads with their edge, narrow notches filled.
+
+        Along the pads it is straight: in the inner corner of a strip as wide as the edge infill piles up.
+        """
         import shapely
 
         p, (rows, columns) = self.params, self.regions
         if all(map(all, self.here)):
             return shapely.box(0.0, 0.0, *self.size_mm)
         beside = max(p.margin_mm, p.hole_mm + 2 * WALL_MM + DOT_MM if p.hole_mm else 0.0)
-        field = shapely.box(0.0, 0.0, max(t.pad[1] for t in self.columns) + beside, p.pad_mm)
+        leads = max(x for t in self.columns for x, _ in t.lead) + p.lead_mm / 2 + p.margin_mm
+        field = shapely.box(0.0, 0.0, max(leads, max(t.pad[1] for t in self.columns) + beside), p.pad_mm)
         grown = shapely.union_all([self.sensing, rows, columns]).buffer(p.margin_mm, join_style="mitre") | field
         closed = grown.buffer(p.connector_mm, join_style="mitre").buffer(-p.connector_mm, join_style="mitre")
         whole = shapely.box(0.0, 0.0, *self.size_mm)
@@ -351,7 +363,7 @@ class Layout:
             found += [dots for k in sorted(chosen) for dots in self._name(tracks[k])]
         return shapely.set_precision(shapely.union_all(found), 1e-6)
 
-    def _name(self, track: Track) -> "Iterator[shapely.Polygon]":
+    def _name(self, track: ArrayTrack) -> "Iterator[shapely.Polygon]":
         """Rows of dots of a track's name, turned by a quarter, to be read from the right [mm]."""
         import shapely
 
@@ -386,7 +398,7 @@ def _way(a: Point, b: Point, half: float) -> "shapely.Geometry":
 
 
 @lru_cache(maxsize=16)
-def layout(p: Params, outline: str | None = None) -> Layout:
+def layout(p: Params, outline: str | None = None) -> ArrayLayout:
     """Tracks of an array.
 
     Parameters
@@ -415,7 +427,7 @@ def layout(p: Params, outline: str | None = None) -> Layout:
     fan = ceil(len(columns) / 2) * q if q < px - SLIVER_MM else 0.0
     x0, y0 = rounded(len(rows) * q + 2 * edge), rounded(p.pad_mm + fan + edge)
     x, y = _middles(x0, px, n), _middles(y0, py, m)
-    made = Layout(p, (), (), x, y, (0.0, 0.0), tuple(map(tuple, here)))
+    made = ArrayLayout(p, (), (), x, y, (0.0, 0.0), tuple(map(tuple, here)))
     size = rounded(x[columns[-1]] + px / 2 + p.edge("rows")), rounded(y[rows[-1]] + py / 2 + p.edge("columns"))
     return replace(
         made,
@@ -450,20 +462,20 @@ def _inside(p: Params, outline: str | None) -> list[list[bool]]:
     return found
 
 
-def _row(of: Layout, i: int, order: int, x0: float) -> Track:
+def _row(of: ArrayLayout, i: int, order: int, x0: float) -> ArrayTrack:
     """A row; its lead turns down to its pad, that of the lowest row nearest to the columns."""
     p, across = of.params, [j for j, is_here in enumerate(of.here[i]) if is_here]
     half, y = p.row_mm / 2, of.y_mm[i]
     left, right = of.x_mm[across[0]] - p.column_mm / 2, of.x_mm[across[-1]] + p.column_mm / 2
     down = x0 - p.margin_mm - (order + 0.5) * p.connector_mm
     lead = tuple((rounded(a), rounded(b)) for a, b in ((left, y), (down, y), (down, 0.0)))
-    return Track(
+    return ArrayTrack(
         f"r{i + 1}", across[0], across[-1], _rounded(left, right, y - half, y + half), lead,
         _rounded(down - p.lead_mm / 2, down + p.lead_mm / 2, 0.0, p.pad_mm),
     )  # fmt: skip
 
 
-def _columns(of: Layout, columns: list[int], top_mm: float) -> Iterator[Track]:
+def _columns(of: ArrayLayout, columns: list[int], top_mm: float) -> Iterator[ArrayTrack]:
     """Columns; where pads are nearer to each other than columns, leads of both halves step towards the middle.
 
     The innermost steps highest, so that none crosses another.
@@ -482,7 +494,7 @@ def _columns(of: Layout, columns: list[int], top_mm: float) -> Iterator[Track]:
             level = top_mm - (inwards + 0.5) * q
             lead += [(x, level), (at, level)]
         lead += [(at, 0.0)]
-        yield Track(
+        yield ArrayTrack(
             f"c{j + 1}", run[0], run[-1], _rounded(x - half, x + half, bottom, top),
             tuple((rounded(a), rounded(b)) for a, b in lead),
             _rounded(at - p.lead_mm / 2, at + p.lead_mm / 2, 0.0, p.pad_mm),
@@ -544,12 +556,12 @@ def check_cell(params: Envelope, p: Params) -> None:
             )
 
 
-def scene(of: Layout, fill: Fill, strip: Any, params: Envelope) -> Scene:
+def scene(of: ArrayLayout, fill: Fill, strip: Any, params: Envelope) -> Scene:
     """Bodies of an array.
 
     Parameters
     ----------
-    of : Layout
+    of : ArrayLayout
         Its tracks.
     fill : Fill
         Materials.
@@ -635,7 +647,7 @@ class _GrowingBodies:
         """Add a region between two heights."""
         self.add(name, material, terminal, _plates(region, z0, z1))
 
-    def cover(self, of: Layout, material: str, region: "shapely.Geometry", z: _Levels) -> None:
+    def cover(self, of: ArrayLayout, material: str, region: "shapely.Geometry", z: _Levels) -> None:
         """Add the cover with its letters."""
         self.plates("isolation", material, region, z.cover, z.face)
         if of.params.labels == "raised":
@@ -667,7 +679,7 @@ class _GrowingBodies:
         return tuple(Body(name, material, tuple(pieces), terminal) for name, (material, pieces, terminal) in found)
 
 
-def _united(tracks: Iterable[Track]) -> "shapely.Geometry":
+def _united(tracks: Iterable[ArrayTrack]) -> "shapely.Geometry":
     """Tracks without leads [mm]."""
     import shapely
 
@@ -675,7 +687,7 @@ def _united(tracks: Iterable[Track]) -> "shapely.Geometry":
 
 
 def _strip(
-    of: Layout, track: Track, shape_scene: Any, fill: Fill, params: Envelope
+    of: ArrayLayout, track: ArrayTrack, shape_scene: Any, fill: Fill, params: Envelope
 ) -> Mapping[tuple[str, str, str], list[Piece]]:
     """Pieces of one column above the rows, by name, material and terminal of their body."""
     p, (x0, _, y0, y1) = of.params, track.body

@@ -13,7 +13,7 @@ DRAWN: Literal["drawn"] = "drawn"
 
 
 @dataclass(frozen=True)
-class Film:
+class FilmThickness:
     """Thickness of the film between the electrodes of a print.
 
     Attributes
@@ -48,7 +48,7 @@ class Cells:
         Extruded lines, where a tool path is known.
     remarks : mapping of str to tuple of str
         Where electrodes touch, and which conductors float, by the same rules.
-    film : Film or None
+    film : FilmThickness or None
         Of a print; None of a drawing, and where no film lies between the electrodes.
     count_error : float
         Of ``count``, relative, where a border cuts cells [-].
@@ -62,7 +62,7 @@ class Cells:
     gaps: Callable[[], Mapping[str, float]]
     tracks: Any = None
     remarks: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    film: Film | None = None
+    film: FilmThickness | None = None
     count_error: float = 0.0
     beside: tuple[tuple[Scene, float], ...] = ()
 

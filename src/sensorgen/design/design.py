@@ -28,7 +28,7 @@ from sensorgen.design.tip import EVEN, STIFF
 from sensorgen.scene.scene import Envelope, Fill, Scene
 
 if TYPE_CHECKING:
-    from sensorgen.design.arrays import Layout
+    from sensorgen.design.arrays import ArrayLayout
     from sensorgen.design.shape_files import Shape
 
 ARRAY = "array"  # shape of crossing tracks, with cells of another one
@@ -39,6 +39,9 @@ _NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]{0,98}[A-Za-z0-9])?")
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 
 Slot = Annotated[str, Field(pattern=r"^[a-z0-9-]+(@[a-z0-9.-]+)?$", examples=["x60", "x60@thesis-4.1"])]
+
+
+_Region = Annotated[str, Field(pattern="^[a-z][a-z0-9_]{0,30}$", examples=["heel"])]
 
 
 class SVG(str):
@@ -158,6 +161,11 @@ class Design(Strict):
         description="SVG or DXF file of the sensor's outline in plan, relative to the design's own file; or a foot by "
         "its EU size, as: foot 42 left.",
     )
+    regions: dict[_Region, list[list[float]]] = Field(
+        default={},
+        description="Of an array: named regions, corners in mm from the outline's own, two of a rectangle; a foot has "
+        "heel, midfoot, metatarsals, hallux and toes.",
+    )
 
     @field_validator("name")
     @classmethod
@@ -246,7 +254,7 @@ class Design(Strict):
         return borders.cut(scene, self.border) if self.border else scene
 
     @cached_property
-    def layout(self) -> "Layout | None":
+    def layout(self) -> "ArrayLayout | None":
         """Tracks of an array in plan; None of any other sensor."""
         if self.shape != ARRAY:
             return None
@@ -263,8 +271,8 @@ class Design(Strict):
 
         cell, params = self.cell or Cell(), self.layout.params
         others = self.model_dump(
-            exclude={"name", "shape", "parameters", "cell", "border", "waivers", "tip"}, exclude_defaults=True,
-            mode="json",
+            exclude={"name", "shape", "parameters", "cell", "border", "regions", "waivers", "tip"},
+            exclude_defaults=True, mode="json",
         )  # fmt: skip
         others["tip"] = arrays.crossing_tip(params, self.tip)
         own = arrays.cell_parameters(params, cell.shape, cell.parameters, self.layers.layer_mm)
@@ -320,7 +328,7 @@ class Design(Strict):
         for name, source in sorted(self.used().items()):
             stuff[name] = self.material(name).model_dump(exclude=_LIMITS) | {"source": source}
         return {
-            **self.model_dump(exclude={"name", "parameters", "printer", "quality", "waivers"} | self._plain()),
+            **self.model_dump(exclude={"name", "parameters", "printer", "quality"} | self._plain()),
             "parameters": self._decisive_parameters(),
             "materials_values": stuff,
             "printer_values": self.machine.model_dump(exclude=_LIMITS),
@@ -337,7 +345,7 @@ class Design(Strict):
         """Parts that have come later and are not used: without them the identities of older designs last."""
         usual = {
             "profile": Profile(), "tip": TipData(), "effects": Effects(), "own": {}, "geometry": None, "bodies": {},
-            "border": None, "leads": Leads(), "cell": None,
+            "border": None, "leads": Leads(), "cell": None, "regions": {}, "waivers": (),
         }  # fmt: skip
         return {key for key, value in usual.items() if getattr(self, key) == value}
 
@@ -349,7 +357,7 @@ class Design(Strict):
     def id(self) -> str:
         """Hash of all resolved parameters and material values; not of the design's name, nor of sensorgen's version."""
         data = _FIRST | self._lasting(self.resolved())
-        for key in ("own", "tip"):  # values of materials and machines are there without the words around them
+        for key in ("own", "tip", "regions", "waivers"):  # what decides of them is in materials and machines
             data.pop(key, None)
         if self._shape_text is not None:
             data["shape_text"] = self._shape_text
@@ -641,9 +649,10 @@ def _check_names(design: Design) -> None:
 
 
 def _refuse_cell(design: Design) -> None:
-    """Refuse a cell of a sensor that has no crossings."""
-    if design.cell and design.shape != ARRAY:
-        raise BadInput(f"cell: {design.shape} has no crossings; expected shape: {ARRAY}")
+    """Refuse a cell, or regions, of a sensor that has no crossings."""
+    for key in ("cell", "regions"):
+        if getattr(design, key) and design.shape != ARRAY:
+            raise BadInput(f"{key}: {design.shape} has no crossings; expected shape: {ARRAY}")
 
 
 def _one_source_each(design: Design) -> None:

@@ -26,6 +26,7 @@ ALLOWANCE_MM = 15.0
 SIZES = (15.0, 52.0)  # from a child's first shoe
 LENGTH_MM, BREADTH_MM, HEEL_MM, BALL_MM = 263.03, 98.87, 70.76, 194.75
 _HEEL_AT, _FIFTH_AT = 0.16, 0.63  # shares of the length: the widest of the heel, and the fifth toe's joint
+_HEEL_ENDS, _METATARSALS, _HALLUX_ENDS = 0.31, (0.51, 0.81), 0.13  # shares of the length; the hallux across
 _WORDS = re.compile(r"foot\s+(\S+)\s+(left|right)\s*")
 
 
@@ -63,6 +64,28 @@ def outline(text: str) -> Real | None:
     if words[2] == "right":
         found = found * [1, -1] + [0, found[:, 1].max()]
     return found.round(4)
+
+
+def regions(text: str) -> dict[str, list[list[float]]]:
+    """Rectangles of the outline's regions, two corners each [mm].
+
+    Metatarsals from 51 to 81 % of the length, toes beyond, as pressures in shoes are usually divided (Forghany et al.,
+    Journal of Foot and Ankle Research 11, 2018); the ends of heel and hallux are assumed.
+    """
+    corners = outline(text)
+    if corners is None:
+        return {}
+    length, breadth = corners.max(0).tolist()
+    heel, middle, toes = (share * length for share in (_HEEL_ENDS, *_METATARSALS))
+    hallux = _HALLUX_ENDS * length
+    hallux, least, most = (breadth - hallux, breadth, 0.0) if text.split()[-1] == "right" else (hallux, 0.0, breadth)
+    return {
+        "heel": [[0.0, 0.0], [heel, breadth]],
+        "midfoot": [[heel, 0.0], [middle, breadth]],
+        "metatarsals": [[middle, 0.0], [toes, breadth]],
+        "hallux": [[toes, least], [length, hallux]],
+        "toes": [[toes, hallux], [length, most]],
+    }
 
 
 def _left() -> Real:

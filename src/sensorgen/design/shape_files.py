@@ -99,7 +99,7 @@ def varies(name: str, text: str, fill: Mapping[str, str]) -> bool:
     """
     made = []
     for _ in range(2):
-        process = _Process(name, text)
+        process = _ShapeProcess(name, text)
         try:
             defaults = {str(field["name"]): field["default"] for field in process.about["fields"]}
             question = {"parameters": defaults, "fill": fill}
@@ -282,7 +282,7 @@ def _check_body(where: str, body: Body, size_mm: tuple[float, float, float], nam
                 raise BadInput(f"{where}: {low:g} to {high:g} mm along {axis}; expected within 0 to {size:g} mm")
 
 
-class _Process:
+class _ShapeProcess:
     """The process that runs one shape's file."""
 
     def __init__(self, name: str, text: str) -> None:
@@ -352,11 +352,11 @@ class _Process:
         return self._process.wait()
 
 
-_RUNNING: dict[tuple[str, str], _Process] = {}
+_RUNNING: dict[tuple[str, str], _ShapeProcess] = {}
 _MOST = 4  # processes at once
 
 
-def _process(name: str, text: str) -> _Process:
+def _process(name: str, text: str) -> _ShapeProcess:
     key = name, text
     if key not in _RUNNING:
         if len(_RUNNING) >= _MOST:
@@ -365,7 +365,7 @@ def _process(name: str, text: str) -> _Process:
             import atexit
 
             atexit.register(close)
-        made = _Process(name, text)
+        made = _ShapeProcess(name, text)
         _RUNNING[key] = made
     return _RUNNING[key]
 

@@ -47,7 +47,7 @@ _REST = {
 
 
 @dataclass(frozen=True)
-class Specimen:
+class SpecimenName:
     """One printed sensor, by its name.
 
     Attributes
@@ -98,7 +98,7 @@ class Specimen:
     def format(self) -> str:
         """The name in its normal form.
 
-        >>> Specimen(23, "tri", "Y", 0.2, 3).format()
+        >>> SpecimenName(23, "tri", "Y", 0.2, 3).format()
         '23 triY .2mm 3'
         """
         number = "" if self.iteration is None else str(self.iteration)
@@ -119,7 +119,7 @@ def _short(film_mm: float) -> str:
 
 
 @lru_cache(maxsize=1 << 14)
-def parse(text: str) -> Specimen:
+def parse(text: str) -> SpecimenName:
     """Read a specimen's name, misspelt ones too.
 
     Parameters
@@ -151,7 +151,7 @@ def parse(text: str) -> Specimen:
     film_mm, size_mm, more = _thickness(text, found.get("film"))
     slicing, read = _slicing(found.get("slicing"))
     place = found["place"]["letter"] if "place" in found else ""
-    return Specimen(
+    return SpecimenName(
         iteration=int(head["iteration"]) if head["iteration"] else None,
         shape=shape,
         axes=axes,
@@ -249,7 +249,7 @@ def _slicing(found: re.Match[str] | None) -> tuple[str, str]:
     return word, said
 
 
-def design_of(specimen: Specimen) -> Design | None:
+def design_of(specimen: SpecimenName) -> Design | None:
     """The design that a name stands for, everything else at its default; None where the name lacks it.
 
     >>> design_of(parse("23 triY .2mm x fine")).name
@@ -266,7 +266,7 @@ def design_of(specimen: Specimen) -> Design | None:
     return make({"shape": specimen.shape, "parameters": given, "quality": specimen.quality or "fine"})
 
 
-def named(design: Design, iteration: int, copy: int) -> Specimen:
+def named(design: Design, iteration: int, copy: int) -> SpecimenName:
     """The name of a copy of a design.
 
     Parameters
@@ -284,7 +284,7 @@ def named(design: Design, iteration: int, copy: int) -> Specimen:
     params = design.params
     usual = design.shape == "reference" and params.dielectric_mm == _PLATE_MM  # type: ignore[attr-defined]
     film_mm = 0.0 if usual else float(getattr(params, "dielectric_mm", 0.0))
-    return Specimen(
+    return SpecimenName(
         iteration=iteration,
         shape=design.shape,
         axes=str(getattr(params, "along", "")).upper(),

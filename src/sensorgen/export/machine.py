@@ -9,7 +9,7 @@ from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Finding
 from sensorgen.design.design import Design
 from sensorgen.design.printer import Printer, Quality
-from sensorgen.export.slicers.loads import Load, loads
+from sensorgen.export.slicers.loads import ToolLoad, loads
 
 RULE = "0-printer"
 _EMPTY = ("the file prints nothing", "no command for the bed: it stays as it is")  # of start and end code alone
@@ -25,14 +25,14 @@ def of_design(design: Design) -> list[Finding]:
     return [Finding(RULE, "error", design.machine.name, message, advice) for _, message, advice in found]
 
 
-def faults(machine: Printer, layers: Quality, loaded: Mapping[int, Load]) -> Iterator[tuple[str, str, str]]:
+def faults(machine: Printer, layers: Quality, loaded: Mapping[int, ToolLoad]) -> Iterator[tuple[str, str, str]]:
     """Rule, message and advice for everything that is wrong.
 
     Parameters
     ----------
     machine, layers : Printer, Quality
         Whose files were read.
-    loaded : mapping of int to Load
+    loaded : mapping of int to ToolLoad
         What each tool prints.
     """
     from sensorgen.export.gcode.check import check

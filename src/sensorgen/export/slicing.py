@@ -20,7 +20,7 @@ from sensorgen.export.gcode.motion import follow
 from sensorgen.export.gcode.paths import Paths, paths_of
 from sensorgen.export.gcode.ready import ready
 from sensorgen.export.slicers import PROGRAMS, SLICERS, TIME_LIMIT_S, TITLES, curaengine, prusa, stl, versions
-from sensorgen.export.slicers.loads import Load, loads
+from sensorgen.export.slicers.loads import ToolLoad, loads
 from sensorgen.export.slicers.run import Runner, find
 from sensorgen.export.threemf.part import part_of, parts_of
 from sensorgen.scene.geometry import meshes
@@ -195,7 +195,7 @@ def check(pieces: Sequence[Placed]) -> None:
     plate_loads(pieces)
 
 
-def plate_loads(pieces: Sequence[Placed]) -> dict[int, Load]:
+def plate_loads(pieces: Sequence[Placed]) -> dict[int, ToolLoad]:
     """Loads of a plate, by the printer's own tool number.
 
     Raises
@@ -203,7 +203,7 @@ def plate_loads(pieces: Sequence[Placed]) -> dict[int, Load]:
     BadInput
         Two pieces want different things of one tool.
     """
-    found: dict[int, Load] = {}
+    found: dict[int, ToolLoad] = {}
     for piece in pieces:
         for tool, load in loads(piece.design).items():
             if found.setdefault(tool, load) != load:

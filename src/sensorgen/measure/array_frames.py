@@ -1,11 +1,10 @@
 """Frames of an array: files NPZ and CSV with a reading of every crossing, and which of them are at rest."""
 
-import csv
 import math
 import re
 import zipfile
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,13 +14,16 @@ from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.files import reading
 from sensorgen.core.units import si
+from sensorgen.measure import csv_table
 
 MOST_BYTES = 4_000_000_000
+_TIME = re.compile(r"(t|time|timestamp)[ _(\[]*(s|ms|us|ns|min|h)?[)\]]?", re.IGNORECASE)
 _CROSSING = re.compile(r"r(\d+)c(\d+)")
 _TRUE = ("1", "1.0", "true")
 KEYS = ("siemens", "capacitance_f")
 REFERENCES = ("pressure_kpa", "force_n", "element", "day", "area_mm2")
 _KNOWN = (*KEYS, "reading", "time_s", "rest", "frequency_hz", *REFERENCES)
+_BESIDE = ("time_s", "frequency_hz", "day")
 _HDF = (".h5", ".hdf5", ".hdf")
 BINARY = (".npz", *_HDF)
 
@@ -35,7 +37,7 @@ class Frames:
     siemens : (k, m, n) array
         Readings [S]; nan where one is missing or saturated. Of capacitances alone the real part is nan.
     time_s : (k,) array
-        Of each frame; its number where none is known [s].
+        Of each frame; nan where none is known [s].
     rest : (k,) array of bool
         Frames with nothing on the array.
     frequency_hz : float
@@ -68,8 +70,8 @@ def read(path: Path, shape: tuple[int, int], frequency_hz: float | None) -> Fram
     ----------
     path : Path
         NPZ or HDF5 with ``siemens`` (frames, rows, columns), complex, or ``capacitance_f``, and perhaps ``time_s``,
-        ``rest``, ``frequency_hz``; or CSV with a row per frame, columns ``r1c1`` ... [F], and perhaps ``time_s`` and
-        ``rest``.
+        ``rest``, ``frequency_hz``; or CSV with a row per frame, columns ``r1c1`` ... [F], and perhaps the same; "-"
+        for that on the standard input.
     shape : (int, int)
         Rows and columns of the array.
     frequency_hz : float, optional
@@ -78,13 +80,19 @@ def read(path: Path, shape: tuple[int, int], frequency_hz: float | None) -> Fram
     Raises
     ------
     BadInput
-        A file that is neither, has frames of another size, or no frequency or another.
+        A file that is neither, has frames of another size, times that do not rise or are not ``time_s``, or no
+        frequency or another.
     """
+    if str(path) == "-":
+        return _joined(list(lots("-", shape, frequency_hz)))
     with reading(path):
         if path.stat().st_size > MOST_BYTES:
             raise BadInput(f"{path}: {path.stat().st_size / 1e9:.1f} GB; expected at most {MOST_BYTES / 1e9:g} GB")
-        found, unused = numbers(path) if path.suffix in BINARY else _of_csv(path, shape)
+        if path.suffix not in BINARY:
+            return _joined(list(lots(str(path), shape, frequency_hz)))
+        found, unused = numbers(path)
     try:
+        _refuse_times(unused)
         return replace(_checked(found, shape, frequency_hz), unused=tuple(unused))
     except BadInput as error:
         raise error.within(str(path)) from None
@@ -105,14 +113,28 @@ def _checked(found: dict[str, np.ndarray], shape: tuple[int, int], frequency_hz:
     count = len(values)
     true = found.get("pressure_kpa", np.zeros(0))
     return Frames(
-        values.astype(complex), _each(found, "time_s", np.arange(float(count))),
+        values.astype(complex), rising(_each(found, "time_s", np.full(count, np.nan)).astype(float)),
         np.nan_to_num(_each(found, "rest", np.zeros(count)).astype(float)) != 0, hertz,
         true if true.shape == values.shape else None, day=float(np.ravel(found.get("day", np.nan))[0]),
     )  # fmt: skip
 
 
+def rising(time_s: Real) -> Real:
+    """Times of one recording, each later than the one before, or none at all; BadInput of others [s]."""
+    if not (np.diff(time_s) > 0).all() and not np.isnan(time_s).all():
+        raise BadInput("time_s does not rise from each frame to the next; expected seconds of one session")
+    return time_s
+
+
+def _refuse_times(unused: Sequence[str]) -> None:
+    """Refuse columns of time in another unit, or by another name."""
+    if wrong := next((name for name in unused if _TIME.fullmatch(name)), None):
+        raise BadInput(f"{wrong!r:.40} is not read; expected the time as time_s, in seconds")
+
+
 def _frequency(found: dict[str, np.ndarray], given: float | None) -> float:
-    own = found.get("frequency_hz", np.zeros(1)).ravel()
+    own = np.ravel(found.get("frequency_hz", np.zeros(1)))
+    own = np.unique(own[np.isfinite(own)])
     hertz = (float(own[0]) if own.size == 1 else 0.0) or given or 0.0
     if given and not math.isclose(hertz, given, rel_tol=1e-6):
         raise BadInput(f"frequency_hz is {si(hertz, 'Hz')}; expected {si(given, 'Hz')}, as given or of the readings")
@@ -144,10 +166,10 @@ def numbers(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
 def _of_hdf(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     from sensorgen.measure.recording import hdf
     from sensorgen.measure.recording.matfive import Split
-    from sensorgen.measure.recording.spool import Spool
+    from sensorgen.measure.recording.spool import FileSpool
 
     with within(str(path)):
-        found = hdf.variables(path, _KNOWN, Spool())
+        found = hdf.variables(path, _KNOWN, FileSpool())
     for key, value in found.items():
         values = value.real + 1j * value.imag if isinstance(value, Split) else np.asarray(value)
         if values.dtype.kind not in "bifuc":
@@ -156,33 +178,31 @@ def _of_hdf(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     return found, []
 
 
-def table(path: Path) -> dict[str, tuple[str, ...]]:
-    """Words of a table by the names of its columns."""
-    try:
-        rows = list(csv.reader(path.read_text("utf-8").splitlines()))
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise BadInput(f"{path}: no CSV table ({str(error)[:80]})") from None
-    if len(rows) < 2:
-        raise BadInput(f"{path}: no frames; expected a head with r1c1, r1c2 ... and a row for each frame")
-    for line, row in enumerate(rows[1:], 2):
-        if len(row) != len(rows[0]):
-            raise BadInput(f"{path}, line {line}: {len(row)} values; expected {len(rows[0])} as in the head")
-    names = [name.strip() for name in rows[0]]
-    refuse_repeated(names, {}, path)
-    return dict(zip(names, zip(*rows[1:], strict=True), strict=True))
+def lots(path: str, shape: tuple[int, int], frequency_hz: float | None) -> Iterator[Frames]:
+    """Frames of a table as they come, lot by lot; "-" is the standard input. Parameters and errors as :func:`read`."""
+    with csv_table.opened(path) as table, within(table.name):
+        names = table.names
+        crossings = _crossings(names, shape)
+        beside = [name for name in names if name in _BESIDE]
+        unused = tuple(sorted({*names} - {*crossings, *_BESIDE, "rest", ""}))
+        _refuse_times(unused)
+        numbers = [names.index(name) for name in (*crossings, *beside)]
+        rest = [k for k, name in enumerate(names) if name == "rest"]
+        last = np.empty(0)
+        for block in table.blocks(numbers, rest):
+            values = np.full((len(block.rows), *shape), np.nan)
+            values[:, *np.transpose(list(crossings.values()))] = block.numbers[:, : len(crossings)]
+            found = dict(zip(beside, block.numbers[:, len(crossings) :].T, strict=True)) | {"capacitance_f": values}
+            if rest:
+                found["rest"] = marked([word for (word,) in block.text])
+            lot = replace(_checked(found, shape, frequency_hz), unused=unused)
+            last, frequency_hz = rising(np.append(last, lot.time_s))[-1:], lot.frequency_hz
+            yield lot
 
 
-def _of_csv(path: Path, shape: tuple[int, int]) -> tuple[dict[str, np.ndarray], list[str]]:
-    """Numbers of a table by name, and the columns that are not read."""
-    columns = table(path)
-    crossings = _crossings(list(columns), shape, path)
-    values = np.full((len(next(iter(columns.values()))), *shape), np.nan)
-    for name, (i, j) in crossings.items():
-        values[:, i, j] = column(columns[name], path)
-    found = {"capacitance_f": values} | {key: column(columns[key], path) for key in ("time_s",) if key in columns}
-    if "rest" in columns:
-        found["rest"] = marked(columns["rest"])
-    return found, sorted({*columns} - {*crossings, "time_s", "rest", ""})
+def _joined(parts: Sequence[Frames]) -> Frames:
+    siemens, time_s, rest = (np.concatenate([getattr(p, key) for p in parts]) for key in ("siemens", "time_s", "rest"))
+    return replace(parts[0], siemens=siemens, time_s=time_s, rest=rest)
 
 
 def marked(words: Sequence[str]) -> Mask:
@@ -190,32 +210,19 @@ def marked(words: Sequence[str]) -> Mask:
     return np.array([word.strip().lower() in _TRUE for word in words])
 
 
-def _crossings(names: Sequence[str], shape: tuple[int, int], path: Path) -> dict[str, tuple[int, int]]:
+def _crossings(names: Sequence[str], shape: tuple[int, int]) -> dict[str, tuple[int, int]]:
     """Row and column of each name of a crossing."""
     found = {name: (int(m[1]) - 1, int(m[2]) - 1) for name in names if (m := _CROSSING.fullmatch(name))}
-    refuse_repeated(names, found, path)
+    refuse_repeated(names, found)
     wrong = [name for name, (i, j) in found.items() if not (0 <= i < shape[0] and 0 <= j < shape[1])]
     if wrong or not found:
         words = ", ".join(wrong[:3]) or "without any crossing"
-        raise BadInput(f"{path}: columns {words}; expected r1c1 to r{shape[0]}c{shape[1]} of this array")
+        raise BadInput(f"columns {words}; expected r1c1 to r{shape[0]}c{shape[1]} of this array")
     return found
 
 
-def refuse_repeated(names: Sequence[str], found: dict[str, tuple[int, int]], path: Path) -> None:
+def refuse_repeated(names: Sequence[str], found: dict[str, tuple[int, int]]) -> None:
     """Refuse names that repeat, and two of one crossing."""
     times = Counter(found.get(name, name) for name in names if name)
     if repeated := [name for name in names if times[found.get(name, name)] > 1]:
-        raise BadInput(f"{path}: columns {', '.join(repeated[:3])} repeat; expected each once")
-
-
-def column(words: Sequence[str], path: Path) -> Real:
-    """Numbers of a column; nan where a word is empty."""
-    return np.array([_number(word, path, line) for line, word in enumerate(words, 2)])
-
-
-def _number(word: str, path: Path, line: int) -> float:
-    """A number; nan where the word is empty."""
-    try:
-        return float(word) if word.strip() else np.nan
-    except ValueError:
-        raise BadInput(f"{path}, line {line}: {word!r:.30} is no number; leave it empty where none was read") from None
+        raise BadInput(f"columns {', '.join(repeated[:3])} repeat; expected each once")

@@ -7,6 +7,7 @@ design its frames, and the same names; ``element`` by number from 1, ``area_mm2`
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +15,14 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.files import reading
-from sensorgen.measure.array_frames import BINARY, REFERENCES, column, marked, numbers, read, table
+from sensorgen.measure import csv_table
+from sensorgen.measure.array_frames import BINARY, REFERENCES, marked, numbers, read, refuse_repeated, rising
 from sensorgen.prediction.array.elements import ArraySession
 from sensorgen.prediction.array.frames import at_rest, missing
 from sensorgen.prediction.array.model import ArrayModel
 from sensorgen.prediction.array.readout import ArrayReadout
 
-_OTHER = ("time_s", "rest", *REFERENCES)
+_OTHER = ("time_s", "rest", "frequency_hz", *REFERENCES)
 _WORDS: Mapping[str, Callable[[Sequence[str]], np.ndarray]] = {"rest": marked, "element": np.array}
 _AREA_MM2 = 100.0
 _MOST = 0.5  # of the presses on a track
@@ -66,22 +68,24 @@ def session(
         return _session(path.stem, data, values, names, (number, area_mm2))
 
 
-def of_frames(paths: Sequence[Path], model: ArrayModel) -> list[ArraySession]:
+def of_frames(paths: Sequence[Path], model: ArrayModel, frequency_hz: "float | None" = None) -> list[ArraySession]:
     """Sessions of frames of an array with a design: C/C0 - 1 of its crossings, by the network where that counts.
 
     Raises
     ------
     BadInput
-        As :func:`session`; no frame at rest.
+        As :func:`session`; no frame at rest; no frequency in a file, where none is given [Hz].
     """
     m, n = model.here.shape
     names, found = [f"r{i + 1}c{j + 1}" for i, j in np.ndindex(m, n)], []
     for k, path in enumerate(paths):
-        frames = read(path, (m, n), None)
+        frames = read(path, (m, n), frequency_hz)
         inverter = at_rest(model, ArrayReadout(frequency_hz=(frames.frequency_hz,)), frames.siemens[frames.rest])
         ratio, _, _ = inverter.planned(missing(frames.siemens))
         ratio = np.where(inverter.alive, ratio, np.nan).reshape(len(ratio), -1)
-        found.append(session(path, k, area_mm2=model.pitch_area_m2 * 1e6, values=ratio - 1, names=names))
+        one = session(path, k, area_mm2=model.pitch_area_m2 * 1e6, values=ratio - 1, names=names)
+        carried = model.carried(np.nan_to_num(one.pressure_kpa)).reshape(one.pressure_kpa.shape)
+        found.append(replace(one, pressure_kpa=np.where(np.isfinite(one.pressure_kpa), carried, np.nan)))
         refuse_swapped(found[-1], (m, n))
     return found
 
@@ -117,6 +121,7 @@ def _session(
     name: str, data: Mapping[str, np.ndarray], values: Real, names: Sequence[str], default: tuple[float, float]
 ) -> ArraySession:  # fmt: skip
     count = len(values)
+    nothing = np.full(count, np.nan)
 
     def each(key: str, otherwise: Real) -> Real:
         found = np.asarray(data.get(key, otherwise))
@@ -124,13 +129,12 @@ def _session(
             raise BadInput(f"{key} has {found.size} values; expected one for each of {count} frames")
         return found if key == "pressure_kpa" else found.reshape(count)
 
-    time_s = each("time_s", np.arange(float(count))).astype(float)
-    if not (np.diff(time_s) > 0).all():
-        raise BadInput("time_s does not rise from each frame to the next; expected seconds of one session")
+    if "time_s" not in data:
+        raise BadInput("no time_s; expected the seconds of each frame: tare, memory and drift are by time")
+    time_s = rising(each("time_s", nothing).astype(float))
     area, day = (_one(data, key, usual) for key, usual in (("area_mm2", default[1]), ("day", default[0])))
     if not 0 < area < np.inf:
         raise BadInput(f"area_mm2 is {area:g}; expected the area of an element, above 0")
-    nothing = np.full(count, np.nan)
     force, pressure = each("force_n", nothing).astype(float), each("pressure_kpa", nothing).astype(float)
     if "element" in data:
         of = _numbers_of(each("element", nothing), names, values.shape[1])
@@ -142,7 +146,7 @@ def _session(
         raise BadInput(f"pressure_kpa has {pressure.size} values; expected one for each frame, or for each element too")
     pressure = np.broadcast_to(pressure.reshape(count, -1), values.shape)
     rest = np.nan_to_num(each("rest", np.zeros(count)).astype(float)) != 0
-    return ArraySession(name, day, time_s, values, rest, np.array(pressure), force, area)
+    return ArraySession(name, day, time_s, values, rest, np.array(pressure), force, area, tuple(names))
 
 
 def _one(data: Mapping[str, np.ndarray], key: str, usual: float) -> float:
@@ -164,11 +168,17 @@ def _numbers_of(words: np.ndarray, names: Sequence[str], count: int) -> np.ndarr
 
 def _of_csv(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     """Columns of a table, and the names of its elements."""
-    words = table(path)
-    names = [name for name in words if name and name not in _OTHER]
-    if not names:
-        raise BadInput("no readings; expected a column for each element")
-    data: dict[str, np.ndarray] = {"reading": np.stack([column(words[name], path) for name in names], 1)}
-    for key in words.keys() & set(_OTHER):
-        data[key] = _WORDS[key](words[key]) if key in _WORDS else column(words[key], path)
+    with csv_table.opened(str(path)) as table:
+        refuse_repeated(table.names, {})
+        names = [name for name in table.names if name and name not in _OTHER]
+        if not names:
+            raise BadInput("no readings; expected a column for each element")
+        beside = [*({*table.names} & {*_OTHER} - {*_WORDS})]
+        text = [*({*table.names} & {*_WORDS})]
+        at = table.names.index
+        blocks = list(table.blocks([*map(at, names), *map(at, beside)], [*map(at, text)]))
+    values = np.concatenate([block.numbers for block in blocks])
+    data = {"reading": values[:, : len(names)], **dict(zip(beside, values[:, len(names) :].T, strict=True))}
+    for k, name in enumerate(text):
+        data[name] = _WORDS[name]([row[k] for block in blocks for row in block.text])
     return data, names

@@ -30,7 +30,7 @@ _MOST_LINES = 200  # of one row, whose cells may have line feeds
 SAME_NAMES: Mapping[str, str] = {}
 
 
-class Lines(Protocol):
+class TextLines(Protocol):
     """Part of a text stream that a table needs."""
 
     def readline(self, limit: int, /) -> str:
@@ -74,7 +74,7 @@ class Waiting:
 
 
 @dataclass(frozen=True)
-class Block:
+class TableRows:
     """Consecutive rows of a table.
 
     Attributes
@@ -92,7 +92,7 @@ class Block:
     text: list[list[str]]
 
 
-class Table:
+class CsvTable:
     """A CSV table whose header has been read.
 
     Parameters
@@ -112,7 +112,7 @@ class Table:
         Whether an incomplete last row was dropped.
     """
 
-    def __init__(self, name: str, file: Lines, columns: Mapping[str, str] = SAME_NAMES) -> None:
+    def __init__(self, name: str, file: TextLines, columns: Mapping[str, str] = SAME_NAMES) -> None:
         self.name, self.truncated = name, False
         self._file, self._row = file, 0
         header = self._line()
@@ -132,7 +132,7 @@ class Table:
     def blocks(
         self, numbers: Sequence[int], text: Sequence[int] = (), size: int = BLOCK_ROWS, *, dates: Collection[int] = (),
         truncated: bool = False,
-    ) -> Iterator[Block]:  # fmt: skip
+    ) -> Iterator[TableRows]:  # fmt: skip
         """Rows, up to ``size`` at a time.
 
         Parameters
@@ -190,7 +190,7 @@ class Table:
 
     def _block(
         self, rows: list[int], lines: list[str], numbers: Sequence[int], text: Sequence[int], dates: Collection[int]
-    ) -> Block:
+    ) -> TableRows:
         simple = all(line.count(self._separator) == len(self.names) - 1 and '"' not in line for line in lines)
         values = self._converted_at_once(lines, numbers) if simple else None
         if values is None:
@@ -205,7 +205,7 @@ class Table:
                     values[k, at] = number(cells[k][column], decimal_comma=comma, date=column in dates)
                 except BadInput as error:
                     raise error.within(f"{self.name}, row {rows[k]}, column {self.names[column]}") from None
-        return Block(rows, values, [[line[at] for at in text] for line in cells])
+        return TableRows(rows, values, [[line[at] for at in text] for line in cells])
 
     def _converted_at_once(self, lines: list[str], numbers: Sequence[int]) -> NDArray[np.float64] | None:
         """All numbers of a block, or None where a cell is empty, no number, or infinite."""
@@ -269,7 +269,7 @@ def miscounted(cells: Sequence[str], wanted: int, separator: str) -> str:
 
 
 @contextmanager
-def opened(path: Path | str, columns: Mapping[str, str] = SAME_NAMES) -> Iterator[Table]:
+def opened(path: Path | str, columns: Mapping[str, str] = SAME_NAMES) -> Iterator[CsvTable]:
     """Open a CSV file; "-" is the standard input.
 
     Raises
@@ -280,14 +280,14 @@ def opened(path: Path | str, columns: Mapping[str, str] = SAME_NAMES) -> Iterato
     if path == "-":
         if sys.stdin is None:
             raise BadInput("the standard input is closed; expected a CSV table there, or the name of a file")
-        yield Table("standard input", Waiting(sys.stdin.buffer), columns)
+        yield CsvTable("standard input", Waiting(sys.stdin.buffer), columns)
         return
     if Path(path).is_dir():
         raise BadInput(f"{path} is a folder; expected a CSV file")
     with reading(path):
         file = Path(path).open(encoding="utf-8-sig", errors="surrogateescape", newline="\n")  # noqa: SIM115 - below
     with file:
-        yield Table(str(path), file, columns)
+        yield CsvTable(str(path), file, columns)
 
 
 def listed(names: Sequence[str]) -> str:

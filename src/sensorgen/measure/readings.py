@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput, within
 from sensorgen.measure import csv_table, lcr
-from sensorgen.measure.csv_table import BLOCK_ROWS, SAME_NAMES, Table, listed
+from sensorgen.measure.csv_table import BLOCK_ROWS, SAME_NAMES, CsvTable, listed
 from sensorgen.measure.immittance import impedance, pair
 
 _IMPEDANCE = re.compile(r"(re|im)_ohm_(.*)", re.IGNORECASE)
@@ -25,7 +25,7 @@ _EXPECTED = "expected two columns per frequency, as re_ohm_1.1kHz and im_ohm_1.1
 
 
 @dataclass(frozen=True)
-class Block:
+class FileRows:
     """Consecutive rows of a file.
 
     Attributes
@@ -51,7 +51,7 @@ class Readings:
 
     Parameters
     ----------
-    table : Table
+    table : CsvTable
         The open file.
     beside : sequence of str
         Columns to give as numbers, where the file has them.
@@ -73,7 +73,7 @@ class Readings:
 
     dropped = 0
 
-    def __init__(self, table: Table, beside: Sequence[str] = (), *, newest: bool = False) -> None:
+    def __init__(self, table: CsvTable, beside: Sequence[str] = (), *, newest: bool = False) -> None:
         self._table, self._newest, names = table, newest, table.names
         for name in beside:
             if names.count(name) > 1:
@@ -87,24 +87,24 @@ class Readings:
         self.kept = [names[at] for at in self._others]
         self.numbers = [names[at] for at in self._beside]
 
-    def blocks(self, size: int = BLOCK_ROWS) -> Iterator[Block]:
-        """Rows, up to ``size`` at a time; errors as :meth:`sensorgen.measure.csv_table.Table.blocks`."""
+    def blocks(self, size: int = BLOCK_ROWS) -> Iterator[FileRows]:
+        """Rows, up to ``size`` at a time; errors as :meth:`sensorgen.measure.csv_table.CsvTable.blocks`."""
         m = len(self._re)
         columns = [*self._re.values(), *(self._im[f] for f in self._re), *self._beside]
         for block in self._table.blocks(columns, self._others, size):
             impedance = np.empty((len(block.rows), m), np.complex128)
             impedance.real, impedance.imag = block.numbers[:, :m], block.numbers[:, m : 2 * m]
-            found = Block(block.rows, impedance, block.text, block.numbers[:, 2 * m :])
+            found = FileRows(block.rows, impedance, block.text, block.numbers[:, 2 * m :])
             yield self._only_newest(found) if self._newest else found
 
-    def _only_newest(self, block: Block) -> Block:
+    def _only_newest(self, block: FileRows) -> FileRows:
         at_rest = [np.nan_to_num(block.numbers[:, k]) != 0 for k, name in enumerate(self.numbers) if name == REST]
         stays = at_rest[0] if at_rest else np.zeros(len(block.rows), bool)
         stays[np.flatnonzero(~stays)[-1:]] = True
         self.dropped += int(np.count_nonzero(~stays))
         rows = np.flatnonzero(stays).tolist()
         text = [block.kept[k] for k in rows]
-        return Block([block.rows[k] for k in rows], block.impedance_ohm[rows], text, block.numbers[rows])
+        return FileRows([block.rows[k] for k in rows], block.impedance_ohm[rows], text, block.numbers[rows])
 
 
 class LcrReadings(Readings):
@@ -142,13 +142,13 @@ class LcrReadings(Readings):
         if pair({one.quantity for one in table.readings}) is None:
             raise BadInput("no two quantities that determine an impedance; expected two, as Cp and D")
 
-    def blocks(self, size: int = BLOCK_ROWS) -> Iterator[Block]:
+    def blocks(self, size: int = BLOCK_ROWS) -> Iterator[FileRows]:
         """All sweeps, up to ``size`` at a time."""
         for start in range(0, len(self._sweeps), size):
             some = self._sweeps[start : start + size]
             z = [[impedance(sweep.get(f, {}), f) or np.nan for f in self.frequency_hz.tolist()] for sweep in some]
             rows = list(range(start + 1, start + len(some) + 1))
-            yield Block(rows, np.array(z, np.complex128), [[]] * len(some), np.empty((len(some), 0)))
+            yield FileRows(rows, np.array(z, np.complex128), [[]] * len(some), np.empty((len(some), 0)))
 
 
 @contextmanager

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
-from sensorgen.scene.overlay import Part, parts
+from sensorgen.scene.overlay import OverlayPart, parts
 from sensorgen.scene.scene import Scene
-from sensorgen.scene.sections import ROUNDING_MM, Column, Layer, sections
+from sensorgen.scene.sections import ROUNDING_MM, Layer, SectionColumn, sections
 from sensorgen.solvers.electrostatics.bounds import third_conductor
 from sensorgen.solvers.electrostatics.linear import energy as straight
 
@@ -133,7 +133,7 @@ class _Gap:
         return self.top_mm[0] - self.bottom_mm[0], self.top_mm[1] - self.bottom_mm[1]
 
 
-def _gap(cell: Column) -> _Gap | None:
+def _gap(cell: SectionColumn) -> _Gap | None:
     """The layers between the uppermost bottom electrode and the lowest top electrode above it."""
     floors = [k for k, layer in enumerate(cell.layers) if layer.body.terminal == "bottom"]
     roofs = [k for k, layer in enumerate(cell.layers) if layer.body.terminal == "top"]
@@ -203,7 +203,7 @@ class _Row:
     stacks: dict[int, _Stack]
 
     @classmethod
-    def of(cls, part: Part, permittivity: Mapping[str, float]) -> "_Row":
+    def of(cls, part: OverlayPart, permittivity: Mapping[str, float]) -> "_Row":
         stacks = {name: _stack(c, permittivity) for name, c in _distinct(part).items()}
         return cls(part.depth_mm, part.looks, stacks)
 
@@ -221,7 +221,7 @@ class _Row:
         return True
 
 
-def _distinct(part: Part) -> dict[int, Column]:
+def _distinct(part: OverlayPart) -> dict[int, SectionColumn]:
     """The columns of a part, the first of each look, by their number."""
     return {k: part.columns[k] for k in dict.fromkeys(part.looks)}
 
@@ -243,7 +243,7 @@ def _graded(left: float, right: float) -> tuple[NDArray[np.float64], NDArray[np.
     return (value - left) / (right - left), weight * value * span / (right - left)
 
 
-def _stack(cell: Column, permittivity: Mapping[str, float]) -> _Stack:
+def _stack(cell: SectionColumn, permittivity: Mapping[str, float]) -> _Stack:
     gap = _gap(cell)
     if gap is None:
         raise ValueError("an electrode does not cover the whole sensor: ask why_not_applicable() first")

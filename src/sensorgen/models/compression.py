@@ -77,7 +77,7 @@ class Plate:
 
 
 @dataclass(frozen=True)
-class Curve:
+class CapacitanceCurve:
     """Capacitance versus stress: monotone cubic Hermite interpolation between points.
 
     Attributes
@@ -148,7 +148,7 @@ class Curve:
             raise MissingValue(f"the curve {self.name!r} does not give the displacement of the top")
         return self.stress_pa[-1] / self.displacement_m
 
-    def scaled_modulus(self, factor: float) -> "Curve":
+    def scaled_modulus(self, factor: float) -> "CapacitanceCurve":
         """Cell with all Young's moduli multiplied by a factor: stresses scale."""
         return replace(
             self,
@@ -156,7 +156,7 @@ class Curve:
             slope_per_pa=tuple(m / factor for m in self.slope_per_pa),
         )
 
-    def scaled_rise(self, factor: float) -> "Curve":
+    def scaled_rise(self, factor: float) -> "CapacitanceCurve":
         """Curve with its rise C/C(0) - 1 multiplied by a factor."""
         return replace(
             self,
@@ -164,7 +164,7 @@ class Curve:
             slope_per_pa=tuple(m * factor for m in self.slope_per_pa),
         )
 
-    def under_block(self, *, usual: bool) -> "Curve":
+    def under_block(self, *, usual: bool) -> "CapacitanceCurve":
         """The cell under a block on its top; one that is not the usual lies between even pressure and stiff plate."""
         if not (usual and self.block_changes):
             half = self.stiff_change / 2
@@ -200,7 +200,7 @@ class Curve:
         return np.insert(p, 1, early), np.insert(r, 1, begun), np.concatenate([[first], slope, m[1:]])
 
 
-Compression = Plate | Curve
+Compression = Plate | CapacitanceCurve
 
 
 def unconfined(youngs_modulus_pa: float) -> Plate:
@@ -254,7 +254,7 @@ def symmetric(youngs_modulus_pa: float, poisson_ratio: float) -> Plate:
     return Plate("symmetric", f"no sideways expansion: {modulus / youngs_modulus_pa:.4g} E", modulus)
 
 
-def curve(name: str, source: str, stress_pa: Sequence[float], ratio: Sequence[float]) -> Curve:
+def curve(name: str, source: str, stress_pa: Sequence[float], ratio: Sequence[float]) -> CapacitanceCurve:
     """A curve through points, its slopes by the monotone rule of Fritsch and Butland.
 
     Parameters
@@ -272,10 +272,10 @@ def curve(name: str, source: str, stress_pa: Sequence[float], ratio: Sequence[fl
     p, g = np.asarray(stress_pa, float), np.asarray(ratio, float)
     if not (len(p) == len(g) > 1 and p[0] == 0 and g[0] == 1 and (np.diff(p) > 0).all() and (np.diff(g) > 0).all()):
         raise OutOfRange(f"{name}: expected stress from 0 and ratio C/C(0) from 1, two points or more, both rising")
-    return Curve(name, source, tuple(p.tolist()), tuple(g.tolist()), tuple(_slopes(p, g).tolist()))
+    return CapacitanceCurve(name, source, tuple(p.tolist()), tuple(g.tolist()), tuple(_slopes(p, g).tolist()))
 
 
-def averaged(law: Compression, shares: Callable[[float], Real], last_pa: float) -> Curve:
+def averaged(law: Compression, shares: Callable[[float], Real], last_pa: float) -> CapacitanceCurve:
     """The law of a sensor with uneven pressure over its width: parts beside each other, each at its own pressure.
 
     Parameters
@@ -297,7 +297,32 @@ def averaged(law: Compression, shares: Callable[[float], Real], last_pa: float) 
     return curve(f"{law.name}, averaged", law.source, stress.tolist(), [1.0, *ratio])
 
 
-def curve_of(pressed: "Pressed", name: str = "solved") -> Curve:
+def beyond(law: Compression, mean_pa: float, shares: Callable[[float], Real]) -> tuple[Compression, ...]:
+    """Bounds of a law up to the highest local pressure; the law alone where it reaches that far.
+
+    The rise of a cell whose gaps close flattens: it lies between none beyond the last point, and its last slope.
+
+    Parameters
+    ----------
+    law, shares
+        As of :func:`averaged`.
+    mean_pa : float
+        Mean pressure [Pa].
+    """
+    most_pa = float(max((shares(p) * p).max() for p in mean_pa * _NODES[1:]))
+    if isinstance(law, Plate) or most_pa <= REACH * law.stress_pa[-1]:
+        return (law,)
+    p, g, slope = (getattr(law, name)[-1] for name in ("stress_pa", "ratio", "slope_per_pa"))
+    return tuple(
+        replace(
+            law, stress_pa=(*law.stress_pa, most_pa), ratio=(*law.ratio, g + by * (most_pa - p)),
+            slope_per_pa=(*law.slope_per_pa[:-1], by, by),
+        )
+        for by in (0.0, slope)
+    )  # fmt: skip
+
+
+def curve_of(pressed: "Pressed", name: str = "solved") -> CapacitanceCurve:
     """The pressure law of a solved cell.
 
     Raises
@@ -326,7 +351,9 @@ def _slopes(p: Real, g: Real) -> Real:
     return np.array([max(ends[0], 0.0), *inner, max(ends[1], 0.0)])
 
 
-def solved(shape: str, parameters: Mapping[str, Any], youngs_modulus_pa: Mapping[str, float]) -> Curve | None:
+def solved(
+    shape: str, parameters: Mapping[str, Any], youngs_modulus_pa: Mapping[str, float]
+) -> CapacitanceCurve | None:
     """The stored curve of a cell, or None if this cell is not stored.
 
     Parameters
@@ -347,19 +374,19 @@ def solved(shape: str, parameters: Mapping[str, Any], youngs_modulus_pa: Mapping
     return None
 
 
-def solved_print(content: str, youngs_modulus_pa: Mapping[str, float]) -> Curve | None:
+def solved_print(content: str, youngs_modulus_pa: Mapping[str, float]) -> CapacitanceCurve | None:
     """The stored curve of a printed cell, by the identity of its cross-section, for the same moduli [Pa]; else None."""
     found = _read("solved_prints.yaml")
     cell = found["cells"].get(content)
     return _curve(found | cell, 1.0) if cell and found["youngs_modulus_pa"] == dict(youngs_modulus_pa) else None
 
 
-def prototype(shape: str) -> Curve:
+def prototype(shape: str) -> CapacitanceCurve:
     """The first stored curve of a shape, for films of ``PROTOTYPE_PA``: an estimate for similar cells."""
     return _curve(next(cell for cell in _cells()["cells"] if cell["shape"] == shape), 1.0)
 
 
-def _curve(cell: Mapping[str, Any], scale: float) -> Curve:
+def _curve(cell: Mapping[str, Any], scale: float) -> CapacitanceCurve:
     """A stored cell's curve, its moduli multiplied by a factor."""
     stress = [kpa * _PA_PER_KPA * scale for kpa in cell["stress_kpa"]]
     found = curve("solved", cell["source"], stress, [1 + percent / 100 for percent in cell["rise_percent"]])

@@ -19,7 +19,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.scene import Scene, area_mm2, content
 from sensorgen.scene.sections import ROUNDING_MM, Section, square_to
-from sensorgen.scene.unit_cell import Band, Cell, Slice, cell
+from sensorgen.scene.unit_cell import Band, SectionCell, Slice, cell
 
 SOURCE = "Dirichlet's and Thomson's principles for conduction; Rayleigh's cuts where no field is solved"
 COST = 2
@@ -169,7 +169,7 @@ def _in_plane(alone: Scene, section: Section, width: float) -> Iterator[Interval
             for a, b, name in ((2 * low - high, low, "bottom"), (high, 2 * high - low, "top"))]  # fmt: skip
     inner = [Slice(s.left_mm, s.right_mm, tuple(map(_conducting, s.bands))) for s in piece.slices]
     try:
-        mesh = insulated(Cell((ends[0], *inner, ends[1]), (1.0,) * (len(inner) + 2)))
+        mesh = insulated(SectionCell((ends[0], *inner, ends[1]), (1.0,) * (len(inner) + 2)))
     except ValueError:
         raise _interrupted(alone, section.across, "no piece of it reaches from end to end") from None
     cells = length / (high - low)

@@ -4,7 +4,7 @@ The part of a scene between its mirrors is solved by :mod:`sensorgen.solvers.ele
 finer meshes. Needs NGSolve. See docs/curved.md.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.util import find_spec
@@ -19,7 +19,7 @@ from sensorgen.scene.layers import Region
 from sensorgen.scene.repetition import Repeat, halved, repeat
 from sensorgen.scene.scene import SLIVER_MM, Piece, Scene
 from sensorgen.solvers.electrostatics import bounds as fem
-from sensorgen.solvers.electrostatics.round_bodies import Cell, bounds
+from sensorgen.solvers.electrostatics.round_bodies import RoundCell, bounds
 
 SOURCE = "Dirichlet's and Thomson's principles; curved tetrahedra, H1 and hybrid H(div) by NGSolve"
 COST = 3
@@ -66,7 +66,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     own, x, y = cell(scene)
     values = [float(permittivity[name]) for name in own.materials]
     shares = np.outer(x.shares, y.shares)
-    plan = Cell(
+    plan = RoundCell(
         own.low_mm,
         own.high_mm,
         own.pieces,
@@ -89,8 +89,8 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
 
 
 @dataclass(frozen=True)
-class Window:
-    """Pieces between the mirrors of a scene, as of :class:`Cell`, and the materials of its dielectrics."""
+class MirrorWindow:
+    """Pieces between the mirrors of a scene, as of :class:`RoundCell`, and the materials of its dielectrics."""
 
     low_mm: tuple[float, float, float]
     high_mm: tuple[float, float, float]
@@ -119,7 +119,7 @@ def _at(scene: Scene, z_mm: float) -> Iterator[Region]:
 
 
 @lru_cache(maxsize=8)
-def cell(scene: Scene) -> tuple[Window, Repeat, Repeat]:
+def cell(scene: Scene) -> tuple[MirrorWindow, Repeat, Repeat]:
     """The cell of a scene, and how it repeats along x and y.
 
     Raises
@@ -127,9 +127,7 @@ def cell(scene: Scene) -> tuple[Window, Repeat, Repeat]:
     ValueError
         An electrode is missing, the pattern has no mirrors, or the cell has too many bodies.
     """
-    spans = {end: [p.span("z") for b in scene.bodies if b.terminal == end for p in b.pieces] for end in _ENDS}
-    if missing := [end for end in _ENDS if not spans[end]]:
-        raise ValueError(f"the scene has no {missing[0]} electrode")
+    spans = {end: _heights(scene, end) for end in _ENDS}
     looks = list(_looks(scene))
     x, y = (repeat(looks, scene.size_mm[:2], axis) for axis in (0, 1))
     if x.shifts or y.shifts:
@@ -137,17 +135,26 @@ def cell(scene: Scene) -> tuple[Window, Repeat, Repeat]:
     x, y = halved((x, y), [shapely.clip_by_rect(r, x.low_mm, y.low_mm, x.high_mm, y.high_mm) for r in looks])
     low = (x.low_mm, y.low_mm, min(z for z, _ in spans["bottom"]))
     high = (x.high_mm, y.high_mm, max(z for _, z in spans["top"]))
-    near = [
-        (body, piece) for body in scene.bodies for piece in body.pieces
-        if all(piece.span(axis)[0] < end - SLIVER_MM and piece.span(axis)[1] > start + SLIVER_MM
-               for axis, start, end in zip("xyz", low, high, strict=True))
-    ]  # fmt: skip
+    near = [(body, piece) for body in scene.bodies for piece in body.pieces if _lies_in(piece, low, high)]
     if len(near) > _MOST:
         raise ValueError(f"its cell has {len(near)} bodies; at most {_MOST} are solved")
-    found = {body.material for body, _ in near if not body.terminal} - {"air"}
-    materials = (*sorted(found), "air")
-    kinds = [
-        _ENDS.index(body.terminal) if body.terminal else len(_ENDS) + materials.index(body.material) for body, _ in near
-    ]
+    materials = (*sorted({body.material for body, _ in near if not body.terminal} - {"air"}), "air")
+    kinds = [_ENDS.index(b.terminal) if b.terminal else len(_ENDS) + materials.index(b.material) for b, _ in near]
     pieces = tuple((piece, kind) for (_, piece), kind in zip(near, kinds, strict=True))
-    return Window(low, high, pieces, materials), x, y
+    return MirrorWindow(low, high, pieces, materials), x, y
+
+
+def _heights(scene: Scene, end: str) -> list[tuple[float, float]]:
+    """Bottom and top of each piece of an electrode [mm]; raises ValueError where it has none."""
+    spans = [piece.span("z") for body in scene.bodies if body.terminal == end for piece in body.pieces]
+    if not spans:
+        raise ValueError(f"the scene has no {end} electrode")
+    return spans
+
+
+def _lies_in(piece: Piece, low_mm: Sequence[float], high_mm: Sequence[float]) -> bool:
+    """True where a piece has a part within a box."""
+    return all(
+        piece.span(axis)[0] < end - SLIVER_MM and piece.span(axis)[1] > start + SLIVER_MM
+        for axis, start, end in zip("xyz", low_mm, high_mm, strict=True)
+    )

@@ -29,7 +29,7 @@ _MOST_UNKNOWNS = 600_000  # of a finer mesh: 4 GB
 Bounded = TypeVar("Bounded", Interval, Disc)
 
 
-class MeshLevel(NamedTuple):
+class BoxMeshLevel(NamedTuple):
     """Layers that shrink towards edges, orders of potential and flux, and width on rect with a film of 0.1 mm [-]."""
 
     layers: int
@@ -39,15 +39,15 @@ class MeshLevel(NamedTuple):
 
 
 MESHES = (  # each takes at most 3.4 times as long as the one before, on rect
-    MeshLevel(1, 3, 2, 3.4e-3),
-    MeshLevel(1, 4, 3, 1.3e-3),
-    MeshLevel(1, 5, 4, 7.2e-4),
-    MeshLevel(1, 6, 5, 4.6e-4),
-    MeshLevel(1, 7, 6, 3.3e-4),
-    MeshLevel(2, 5, 4, 1.4e-4),
-    MeshLevel(2, 6, 5, 6.6e-5),
-    MeshLevel(3, 6, 5, 2.2e-5),
-    MeshLevel(3, 7, 6, 9e-6),
+    BoxMeshLevel(1, 3, 2, 3.4e-3),
+    BoxMeshLevel(1, 4, 3, 1.3e-3),
+    BoxMeshLevel(1, 5, 4, 7.2e-4),
+    BoxMeshLevel(1, 6, 5, 4.6e-4),
+    BoxMeshLevel(1, 7, 6, 3.3e-4),
+    BoxMeshLevel(2, 5, 4, 1.4e-4),
+    BoxMeshLevel(2, 6, 5, 6.6e-5),
+    BoxMeshLevel(3, 6, 5, 2.2e-5),
+    BoxMeshLevel(3, 7, 6, 9e-6),
 )
 
 
@@ -87,7 +87,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
 
 def narrowed(
     bounds: Callable[[Pair], Bounded], coarse: Grid, values: Sequence[complex], width: float
-) -> Iterator[tuple[MeshLevel, Pair, Bounded]]:
+) -> Iterator[tuple[BoxMeshLevel, Pair, Bounded]]:
     """Bounds on meshes of a grid from coarse to fine, until they are narrow enough.
 
     Parameters

@@ -9,7 +9,7 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models import line
 from sensorgen.models.compression import Compression
-from sensorgen.models.pressure import Pieces, pieces, pressure_slope
+from sensorgen.models.pressure import TipPieces, pieces, pressure_slope
 from sensorgen.solvers.line.inputs import HIGHEST_OHM, far_load
 from sensorgen.solvers.line.slopes import Chain
 
@@ -18,7 +18,7 @@ COST = 0
 
 
 @dataclass(frozen=True)
-class Track:
+class RestLine:
     """A line without a press, per length.
 
     Attributes
@@ -46,7 +46,7 @@ class Track:
     far_end: str | float
 
 
-class Motion(NamedTuple):
+class ContactSlopes(NamedTuple):
     """Derivatives of the contact by force [per N] or position [per m]."""
 
     left: Real
@@ -58,7 +58,7 @@ class Motion(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Tip:
+class LineContact:
     """Contact of the tip with the line; arrays broadcast.
 
     Attributes
@@ -69,9 +69,9 @@ class Tip:
         Where it begins and how long it is [m].
     width_m : float
         Across the sensor [m].
-    pieces : Pieces
+    pieces : TipPieces
         How its pressure is spread.
-    by_force, by_position : Motion
+    by_force, by_position : ContactSlopes
         How all this moves.
     """
 
@@ -79,9 +79,9 @@ class Tip:
     left_m: Real
     length_m: Real
     width_m: float
-    pieces: Pieces
-    by_force: Motion
-    by_position: Motion
+    pieces: TipPieces
+    by_force: ContactSlopes
+    by_position: ContactSlopes
 
     def mean_pa(self) -> Real:
         """Mean pressure [Pa]."""
@@ -99,7 +99,7 @@ def resting(
     force_n: Real,
     position_m: Real,
     contact_m: tuple[Real, Real],
-) -> Tip:
+) -> LineContact:
     """A tip centred at a position, its contact cut at the ends of the line, and into pieces.
 
     Parameters
@@ -122,25 +122,25 @@ def resting(
     over = low < 0, high > line_m
     if not (over[0].any() or over[1].any()):
         still = np.zeros(cut_as[1])
-        by_force, by_position = Motion(-grows / 2, grows, still), Motion(np.ones(()), np.zeros(()), still)
-        return Tip(force_n, low, whole, width_m, pieces(*cut_as), by_force, by_position)
+        by_force, by_position = ContactSlopes(-grows / 2, grows, still), ContactSlopes(np.ones(()), np.zeros(()), still)
+        return LineContact(force_n, low, whole, width_m, pieces(*cut_as), by_force, by_position)
     left, right = np.where(over[0], 0.0, low), np.where(over[1], line_m, high)
     shares = -at / whole, (line_m - at) / whole  # where the line ends, from the middle of the tip
     ends = np.where(over[0], 0.5 + shares[0], 0.0), np.where(over[1], 0.5 + shares[1], 1.0)
 
-    def motion(edges: tuple[Real, Real], share_slopes: tuple[Real, Real]) -> Motion:
+    def motion(edges: tuple[Real, Real], share_slopes: tuple[Real, Real]) -> ContactSlopes:
         by_left, by_right = (np.where(o, 0.0, edge) for o, edge in zip(over, edges, strict=True))
         by_begin, by_end = (np.where(o, slope, 0.0) for o, slope in zip(over, share_slopes, strict=True))
-        return Motion(by_left, by_right - by_left, pressure_slope(*cut_as, ends, (by_begin, by_end)))
+        return ContactSlopes(by_left, by_right - by_left, pressure_slope(*cut_as, ends, (by_begin, by_end)))
 
     one = np.ones(())
     by_force = motion((-grows / 2, grows / 2), (-shares[0] * grows / whole, -shares[1] * grows / whole))
     by_position = motion((one, one), (-1 / whole, -1 / whole))
     length = np.where(over[0] | over[1], right - left, whole)
-    return Tip(force_n, left, length, width_m, pieces(*cut_as, ends), by_force, by_position)
+    return LineContact(force_n, left, length, width_m, pieces(*cut_as, ends), by_force, by_position)
 
 
-class _Piece(NamedTuple):
+class _PatchPiece(NamedTuple):
     """One piece of the patch, and its derivatives by force and position."""
 
     r_ohm_per_m: Real
@@ -151,12 +151,12 @@ class _Piece(NamedTuple):
     by_position: tuple[Real, Complex]
 
 
-def impedance(track: Track, tip: Tip, law: Compression, frequency_hz: Real) -> Complex:
+def impedance(track: RestLine, tip: LineContact, law: Compression, frequency_hz: Real) -> Complex:
     """Impedance at the contacts [ohm], in the broadcast shape.
 
     Parameters
     ----------
-    track, tip : Track, Tip
+    track, tip : RestLine, LineContact
         The line and what rests on it.
     law : Compression
         Capacitive strain of the film over pressure.
@@ -171,7 +171,9 @@ def impedance(track: Track, tip: Tip, law: Compression, frequency_hz: Real) -> C
     return line.cascade(*_sections(track, tip, _pieces(track, tip, law, frequency_hz), frequency_hz), track.far_end)
 
 
-def response(track: Track, tip: Tip, law: Compression, frequency_hz: Real) -> tuple[Complex, Complex, Complex]:
+def response(
+    track: RestLine, tip: LineContact, law: Compression, frequency_hz: Real
+) -> tuple[Complex, Complex, Complex]:
     """Impedance [ohm] and its exact derivatives by force [ohm/N] and position [ohm/m]; otherwise as :func:`impedance`.
 
     Notes
@@ -190,7 +192,9 @@ def response(track: Track, tip: Tip, law: Compression, frequency_hz: Real) -> tu
     return found[0], found[1], found[2]
 
 
-def _along(chain: Chain, pieces: list[_Piece], motion: Motion, matter: list[tuple[Real, Complex]]) -> Complex:
+def _along(
+    chain: Chain, pieces: list[_PatchPiece], motion: ContactSlopes, matter: list[tuple[Real, Complex]]
+) -> Complex:
     """Derivative of Z as the pieces move, grow, and change their matter."""
     found = np.zeros((), complex)
     moves, grows = np.any(motion.left), np.any(motion.length)
@@ -204,16 +208,16 @@ def _along(chain: Chain, pieces: list[_Piece], motion: Motion, matter: list[tupl
     return found
 
 
-def _unpressed(track: Track, frequency_hz: Real) -> Complex:
+def _unpressed(track: RestLine, frequency_hz: Real) -> Complex:
     return np.asarray(track.leak_s_per_m + _susceptance(track, frequency_hz))
 
 
-def _susceptance(track: Track, frequency_hz: Real) -> Complex:
+def _susceptance(track: RestLine, frequency_hz: Real) -> Complex:
     return np.asarray((track.tan_delta + 1j) * (2 * np.pi * frequency_hz * track.capacitance_f_per_m))
 
 
 def _sections(
-    track: Track, tip: Tip, pieces: list[_Piece], frequency_hz: Real
+    track: RestLine, tip: LineContact, pieces: list[_PatchPiece], frequency_hz: Real
 ) -> tuple[list[Real], list[Complex], list[Real]]:
     """Resistance and admittance per length, and length, from the contacts to the far end."""
     free, away = np.asarray(track.r_ohm_per_m), _unpressed(track, frequency_hz)
@@ -222,7 +226,7 @@ def _sections(
     return [free, *(p.r_ohm_per_m for p in pieces), free], [away, *(p.y_s_per_m for p in pieces), away], lengths
 
 
-def _pieces(track: Track, tip: Tip, law: Compression, frequency_hz: Real) -> list[_Piece]:
+def _pieces(track: RestLine, tip: LineContact, law: Compression, frequency_hz: Real) -> list[_PatchPiece]:
     mean = tip.mean_pa()
     film, away = _susceptance(track, frequency_hz), _unpressed(track, frequency_hz)
     found = []
@@ -234,7 +238,7 @@ def _pieces(track: Track, tip: Tip, law: Compression, frequency_hz: Real) -> lis
         thinned = film * (thinning / (1 - thinning))
         by_stress = film * (slope / (1 - thinning) ** 2)
         found.append(
-            _Piece(
+            _PatchPiece(
                 np.asarray(track.r_ohm_per_m + rise),
                 np.asarray(away + thinned),
                 float(share),
@@ -246,7 +250,9 @@ def _pieces(track: Track, tip: Tip, law: Compression, frequency_hz: Real) -> lis
     return found
 
 
-def _matter(track: Track, tip: Tip, k: int, by_stress: Complex, motion: Motion, newtons: float) -> tuple[Real, Complex]:
+def _matter(
+    track: RestLine, tip: LineContact, k: int, by_stress: Complex, motion: ContactSlopes, newtons: float
+) -> tuple[Real, Complex]:
     """Change of resistance and admittance of a piece as the tip moves, or as the force grows."""
     weight, moved, mean = tip.pieces.pressure[..., k], motion.pressure[..., k], tip.mean_pa()
     grown = newtons / (tip.width_m * tip.length_m) - mean * (motion.length / tip.length_m)

@@ -10,7 +10,7 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.scene.overlay import parts
 from sensorgen.scene.scene import Scene
-from sensorgen.scene.sections import Column, Layer
+from sensorgen.scene.sections import Layer, SectionColumn
 
 SOURCE = "Wiener (1912), Gent & Lindley (1959), Hashin & Shtrikman (1962, 1963), Gibson & Ashby (1997)"
 COST = 0
@@ -24,8 +24,9 @@ def permittivity(solid: float, share: float, pattern: str) -> Interval:
 
     .. math:: \left(\frac{\phi}{\varepsilon} + 1 - \phi\right)^{-1} \le \varepsilon_z \le \phi \varepsilon + 1 - \phi
 
-    (Wiener); upright walls reach the upper bound, and isotropic patterns lie between the bounds of Hashin and
-    Shtrikman, with n = 3 dimensions:
+    (Wiener); upright walls reach the upper bound. Isotropic patterns whose period is much less than the plate's
+    thickness lie between the bounds of Hashin and Shtrikman, with n = 3 dimensions; thinner plates of them are rather
+    upright walls:
 
     .. math:: 1 + \frac{\phi}{\frac{1}{\varepsilon - 1} + \frac{1 - \phi}{n}} \le \varepsilon_z \le
               \varepsilon + \frac{1 - \phi}{\frac{1}{1 - \varepsilon} + \frac{\phi}{n \varepsilon}}
@@ -177,7 +178,7 @@ def filling(scene: Scene, modulus_pa: Mapping[str, float]) -> Filling | None:
     return Filling(d, share, Interval(d * standing, d * flat))
 
 
-def _gap(column: Column) -> tuple[float, float] | None:
+def _gap(column: SectionColumn) -> tuple[float, float] | None:
     """Heights between the electrodes of a column [mm]; None where one is missing or slanted."""
     low = [one for one in column.layers if one.body.terminal == "bottom"]
     high = [one for one in column.layers if one.body.terminal == "top"]

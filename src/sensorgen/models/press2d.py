@@ -13,11 +13,20 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.contact.boundary import BoundaryConditions
-from sensorgen.solvers.contact.cell import Cell
+from sensorgen.solvers.contact.cell import ContactCell
 from sensorgen.solvers.contact.cell import cell_of as cell
-from sensorgen.solvers.contact.mesh import Fineness, Mesh, mesh_of, pinches
+from sensorgen.solvers.contact.mesh import Fineness, TriangleMesh, mesh_of, pinches
 from sensorgen.solvers.contact.mesher import Unmeshed
-from sensorgen.solvers.contact.pressed import Elastic, Pressed, Run, check, compared, joined, solve, with_capacitances
+from sensorgen.solvers.contact.pressed import (
+    Elastic,
+    LoadSteps,
+    Pressed,
+    check,
+    compared,
+    joined,
+    solve,
+    with_capacitances,
+)
 
 SOURCE = (
     "neo-Hookean plane strain, displacement with bubble and pressure (Crouzeix and Raviart 1973), penalty contact with "
@@ -39,7 +48,7 @@ _FOLDS_POWER = 0.85  # of their size
 
 
 def press(
-    cell: Cell,
+    cell: ContactCell,
     solids: Mapping[str, Elastic],
     stress_pa: Sequence[float],
     permittivity: Mapping[str, float] | None = None,
@@ -54,7 +63,7 @@ def press(
 
     Parameters
     ----------
-    cell : Cell
+    cell : ContactCell
         From :func:`cell`.
     solids : mapping of str to Elastic
         By material.
@@ -103,13 +112,13 @@ def press(
 
 
 def _solved(
-    cell: Cell,
+    cell: ContactCell,
     solids: Mapping[str, Elastic],
     stress_pa: Sequence[float],
     boundary: BoundaryConditions,
     fineness: Fineness,
     step: Callable[[float], None],
-) -> tuple[Pressed, Run[Mesh]]:
+) -> tuple[Pressed, LoadSteps[TriangleMesh]]:
     mesh = mesh_of(cell, fineness)
     materials = [cell.regions[k - 1].material for k in mesh.region.tolist()]
     longest = _STICKING_STEP if boundary.contact == "stick" else _STEP
@@ -121,7 +130,11 @@ def _solved(
 
 
 def _with_fields(
-    found: Pressed, cell: Cell, run: Run[Mesh], permittivity: Mapping[str, float], fineness: Fineness
+    found: Pressed,
+    cell: ContactCell,
+    run: LoadSteps[TriangleMesh],
+    permittivity: Mapping[str, float],
+    fineness: Fineness,
 ) -> Pressed:
     """Add the capacitance of the deformed outlines.
 
@@ -133,7 +146,7 @@ def _with_fields(
     mesh, sharp = run.mesh, bool(found.apex_m)
     share, rings = _SHARP_FIELD if sharp else _BLUNT_FIELD
 
-    def meshed(u_m: Real) -> Mesh | None:
+    def meshed(u_m: Real) -> TriangleMesh | None:
         outline = deformed.deformed(cell, mesh, run.problem.faces, u_m)
         if deformed.misfit(outline, mesh, u_m) > _MISFIT:
             return None
@@ -142,7 +155,7 @@ def _with_fields(
         except Unmeshed:
             return None
 
-    def bounds(field: Mesh | None) -> Interval | None:
+    def bounds(field: TriangleMesh | None) -> Interval | None:
         try:
             return plane_field.capacitance(cell, field, permittivity) if field else None
         except Unmeshed:

@@ -16,8 +16,8 @@ from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.solvers.contact.bricks import Bricks, bricks_of
-from sensorgen.solvers.contact.mapped_field import Orders
-from sensorgen.solvers.contact.pressed import Elastic, Pressed, Run, check, compared, solve, with_capacitances
+from sensorgen.solvers.contact.mapped_field import FieldOrders
+from sensorgen.solvers.contact.pressed import Elastic, LoadSteps, Pressed, check, compared, solve, with_capacitances
 
 if TYPE_CHECKING:
     from sensorgen.solvers.contact.bricks import BrickMesh
@@ -30,7 +30,15 @@ SOURCE = (
 COST = 3
 
 __all__ = [
-    "BoundaryConditions", "Elastic", "Limit", "Pieces", "Pressed", "cell", "compared", "limit", "press",
+    "BoundaryConditions",
+    "BrickCounts",
+    "Elastic",
+    "MeshLimit",
+    "Pressed",
+    "cell",
+    "compared",
+    "limit",
+    "press",
     "why_not_applicable",
 ]  # fmt: skip
 
@@ -42,16 +50,16 @@ _OPEN = (1e-4, 1e-3, 1e-2, 5e-2, 0.15)  # least height of a gap in the field ove
 
 
 @dataclass(frozen=True)
-class Pieces:
+class BrickCounts:
     """Into how many bricks every box is cut along each axis, how they shrink towards planes, and the field's orders."""
 
     pieces: int = 3
     shrink: float = 0.3
-    orders: Orders = field(default_factory=Orders)
+    orders: FieldOrders = field(default_factory=FieldOrders)
 
 
 @dataclass(frozen=True)
-class Limit:
+class MeshLimit:
     """Where two meshes lead (Richardson's extrapolation), and by how much that may be off: an estimate.
 
     Attributes
@@ -70,7 +78,7 @@ class Limit:
     rise_error_f_per_m2: Real
 
 
-def limit(fine: Pressed, coarse: Pressed, pieces: int) -> Limit:
+def limit(fine: Pressed, coarse: Pressed, pieces: int) -> MeshLimit:
     """Extrapolate displacement and rise from two meshes.
 
     Parameters
@@ -105,7 +113,7 @@ def limit(fine: Pressed, coarse: Pressed, pieces: int) -> Limit:
     )
     found = replace(fine, displacement_m=fine.displacement_m + ways[0], capacitance_f_per_m2=shifted)
     field = abs(np.diff(rises)[:, 0]) / 2
-    return Limit(found, errors[0], rises.mean(axis=1) + ways[1], errors[1] + field)
+    return MeshLimit(found, errors[0], rises.mean(axis=1) + ways[1], errors[1] + field)
 
 
 def why_not_applicable(scene: Scene) -> str | None:
@@ -138,7 +146,7 @@ def press(
     stress_pa: Sequence[float],
     permittivity: Mapping[str, float] | None = None,
     boundary: BoundaryConditions | None = None,
-    fineness: Pieces | None = None,
+    fineness: BrickCounts | None = None,
     step: Callable[[float], None] | None = None,
 ) -> Pressed:
     """Solve a cell under pressure on its top.
@@ -155,7 +163,7 @@ def press(
         Relative permittivity by material, with "air"; without it no capacitance is computed [-].
     boundary : BoundaryConditions, optional
         Base, period ("free": in both directions), top and contact.
-    fineness : Pieces, optional
+    fineness : BrickCounts, optional
         Of the mesh; fewer pieces, with a remark, where they would be too many.
     step : callable, optional
         Called with every pressure of ``stress_pa`` that is reached [Pa].
@@ -167,7 +175,7 @@ def press(
     BadInput
         A boundary condition is unknown, or an electrode does not cover the cell.
     """
-    boundary, wanted = boundary or BoundaryConditions(), fineness or Pieces()
+    boundary, wanted = boundary or BoundaryConditions(), fineness or BrickCounts()
     check(stress_pa, boundary)
     most = int((_MOST / max((bricks.fill > 0).sum(), 1)) ** (1 / 3))
     fineness = replace(wanted, pieces=min(wanted.pieces, max(most, 1)))
@@ -186,7 +194,7 @@ def _solved(
     stress_pa: Sequence[float],
     boundary: BoundaryConditions,
     step: Callable[[float], None],
-) -> "tuple[Pressed, Run[BrickMesh]]":
+) -> "tuple[Pressed, LoadSteps[BrickMesh]]":
     from sensorgen.solvers.contact.bricks import mesh_of
 
     mesh = mesh_of(cut, cut.fill > 0)
@@ -199,15 +207,17 @@ def _solved(
     return found, run
 
 
-def _with_fields(found: Pressed, run: "Run[BrickMesh]", permittivity: Mapping[str, float], orders: Orders) -> Pressed:
+def _with_fields(
+    found: Pressed, run: "LoadSteps[BrickMesh]", permittivity: Mapping[str, float], orders: FieldOrders
+) -> Pressed:
     """Add the capacitance of the deformed boxes; gaps that are shut are boundary open by a little."""
     from sensorgen.solvers.contact.air import AirMap
     from sensorgen.solvers.contact.bricks import mesh_of
-    from sensorgen.solvers.contact.mapped_field import Field, Folded
+    from sensorgen.solvers.contact.mapped_field import Folded, MappedField
 
     solid = run.mesh
     whole = mesh_of(solid.bricks, np.ones_like(solid.bricks.fill, dtype=np.bool_))
-    field, air = Field(whole, permittivity, orders), AirMap(whole, solid)
+    field, air = MappedField(whole, permittivity, orders), AirMap(whole, solid)
 
     def bounds(state: "State") -> Interval | None:
         moved = solid.all_nodes(state.u_m, state.inner.bubble)

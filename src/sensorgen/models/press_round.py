@@ -17,7 +17,7 @@ from sensorgen.models import curved, press2d
 from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness, Pressed
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Piece, Point, Scene
-from sensorgen.solvers.contact.cell import AIR, Cell, Region, partition
+from sensorgen.solvers.contact.cell import AIR, ContactCell, Region, partition
 from sensorgen.solvers.contact.mesh import grown
 from sensorgen.solvers.electrostatics.bounds import third_conductor
 from sensorgen.solvers.electrostatics.round_cell import ProfileEdge, profile
@@ -75,7 +75,7 @@ def press(
     return replace(found, source=SOURCE)
 
 
-def cell(scene: Scene, fineness: Fineness = USUAL) -> Cell:
+def cell(scene: Scene, fineness: Fineness = USUAL) -> ContactCell:
     """The cell of a scene as a section through its axis; arcs are chords that grow from the axis on.
 
     Raises

@@ -21,7 +21,7 @@ BLUNT_M = 1e-6  # a round tip touches over this length at least, so that no forc
 
 
 @dataclass(frozen=True)
-class Profile:
+class PressureProfile:
     """Pressure along a tip, symmetric.
 
     Attributes
@@ -46,16 +46,16 @@ def _hertz_share(place: Real) -> Real:
 
 
 _KNOWN = (
-    Profile("uniform", "flat tip, soft, or hard on a film much thinner than itself", lambda u: u, np.ones_like),
-    Profile("hertz", "round tip on a body much thicker than the contact is long: an ellipse", _hertz_share,
-            lambda u: 8 / np.pi * np.sqrt(u * (1 - u))),
-    Profile("parabola", "hard round tip on a thin layer, a bed of springs", lambda u: u * u * (3 - 2 * u),
-            lambda u: 6 * u * (1 - u)),
+    PressureProfile("uniform", "flat tip, soft, or hard on a film much thinner than itself", lambda u: u, np.ones_like),
+    PressureProfile("hertz", "round tip on a body much thicker than the contact is long: an ellipse", _hertz_share,
+                    lambda u: 8 / np.pi * np.sqrt(u * (1 - u))),
+    PressureProfile("parabola", "hard round tip on a thin layer, a bed of springs", lambda u: u * u * (3 - 2 * u),
+                    lambda u: 6 * u * (1 - u)),
 )  # fmt: skip
 PROFILES = tuple(profile.name for profile in _KNOWN)
 
 
-def profile(name: str) -> Profile:
+def profile(name: str) -> PressureProfile:
     """A profile by name.
 
     Raises
@@ -70,7 +70,7 @@ def profile(name: str) -> Profile:
 
 
 @dataclass(frozen=True)
-class Contact:
+class RoundContact:
     r"""Contact length of a round tip: :math:`l = c\,(F/W)^n`, up to the tip's own length.
 
     Attributes
@@ -101,7 +101,7 @@ class Contact:
         return np.clip(length, BLUNT_M, longest_m), np.where(grows, slope, 0.0)
 
 
-def hertz(radius_m: float, plane_modulus_pa: float) -> Contact:
+def hertz(radius_m: float, plane_modulus_pa: float) -> RoundContact:
     r"""A hard cylinder across a body that is much thicker than the contact is long.
 
     .. math:: l = 2 a = 4 \sqrt{\frac{F R}{\pi W E^*}}, \quad E^* = \frac{E}{1 - \nu^2}
@@ -127,10 +127,10 @@ def hertz(radius_m: float, plane_modulus_pa: float) -> Contact:
     0.7979
     """
     _refuse_none(radius_m, plane_modulus_pa)
-    return Contact(4 * float(np.sqrt(radius_m / (pi * plane_modulus_pa))), 1 / 2)
+    return RoundContact(4 * float(np.sqrt(radius_m / (pi * plane_modulus_pa))), 1 / 2)
 
 
-def bed(radius_m: float, stiffness_pa_per_m: float) -> Contact:
+def bed(radius_m: float, stiffness_pa_per_m: float) -> RoundContact:
     r"""A hard cylinder on a thin layer that deforms as a Winkler foundation, in proportion to the local pressure.
 
     .. math:: l = 2 a = 2 \sqrt[3]{\frac{3 F R}{2 W k}}, \quad p = \frac{k}{2 R} (a^2 - x^2)
@@ -156,7 +156,7 @@ def bed(radius_m: float, stiffness_pa_per_m: float) -> Contact:
     1.0627
     """
     _refuse_none(radius_m, stiffness_pa_per_m)
-    return Contact(2 * float(np.cbrt(1.5 * radius_m / stiffness_pa_per_m)), 1 / 3)
+    return RoundContact(2 * float(np.cbrt(1.5 * radius_m / stiffness_pa_per_m)), 1 / 3)
 
 
 def _refuse_none(radius_m: float, stiffness: float) -> None:
@@ -167,7 +167,7 @@ def _refuse_none(radius_m: float, stiffness: float) -> None:
 
 
 @dataclass(frozen=True)
-class Pieces:
+class TipPieces:
     """A tip, or the part of it that rests on a sensor, cut into pieces; the last axis counts them.
 
     Attributes
@@ -182,7 +182,7 @@ class Pieces:
     pressure: Real
 
 
-def pieces(name: str, count: int, ends: tuple[Real, Real] = (np.zeros(()), np.ones(()))) -> Pieces:
+def pieces(name: str, count: int, ends: tuple[Real, Real] = (np.zeros(()), np.ones(()))) -> TipPieces:
     r"""Cut a tip into pieces that are short towards its ends, where the pressure changes most.
 
     .. math:: w_k = \frac{G(u_{k+1}) - G(u_k)}{(G(b) - G(a))\,(t_{k+1} - t_k)}, \quad u_k = a + (b - a)\, t_k, \quad
@@ -218,7 +218,7 @@ def pieces(name: str, count: int, ends: tuple[Real, Real] = (np.zeros(()), np.on
     if count < 1:
         raise OutOfRange(f"{count} pieces of a tip; expected 1 or more")
     length, _, share, whole = _shares(name, count, ends)
-    return Pieces(length, np.diff(share) / (whole * length))
+    return TipPieces(length, np.diff(share) / (whole * length))
 
 
 def pressure_slope(name: str, count: int, ends: tuple[Real, Real], slopes: tuple[Real, Real]) -> Real:

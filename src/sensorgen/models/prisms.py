@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 from shapely.affinity import translate
 
-from sensorgen.core.arrays import Real
+from sensorgen.core.arrays import Real, Whole
 from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.connections import groups
@@ -27,7 +27,7 @@ from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene, seen_from_ab
 from sensorgen.scene.slabs import is_open, slabs
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.enclosed import enclosing
-from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, Layers, Mesh, plan, solved
+from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, LayerCell, PrismMesh, plan, solved
 
 SOURCE = "Dirichlet's and Thomson's principles; prisms of triangles, H1 and hybrid H(div) by NGSolve"
 COST = 3
@@ -119,7 +119,7 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
         raise failed
 
 
-def _meshes(cell: "_Cell", layers: Layers, beside_mm: Sequence[float]) -> tuple[Mesh, Mesh, bool]:
+def _meshes(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> tuple[PrismMesh, PrismMesh, bool]:
     """The mesh of a cell for the flux, that for the potential, and whether their outlines enclose the cell's.
 
     With air around it, the flux stays in that air, and the potential is constant beyond: a conductor that floats.
@@ -131,9 +131,9 @@ def _meshes(cell: "_Cell", layers: Layers, beside_mm: Sequence[float]) -> tuple[
     for times in _STRETCHED if is_sound else ():
         with suppress(fem.Unsolved):
             beside = [times * far for far in beside_mm]
-            exact = Mesh.of(layers, beside, _GRID_MM, far_mm)
+            exact = PrismMesh.of(layers, beside, _GRID_MM, far_mm)
             if exact.plan.slenderness_mm() > _SLENDER_MM:
-                other = Mesh.of(cell.inside_shell(layers), beside, _GRID_MM, far_mm) if cell.air_mm else exact
+                other = PrismMesh.of(cell.inside_shell(layers), beside, _GRID_MM, far_mm) if cell.air_mm else exact
                 return exact, other, False
     found = []
     for outwards, least_mm in ((False, _SLENDER_MM), (True, _SLENDER_MM / 10)):  # a potential bears more than a flux
@@ -142,7 +142,7 @@ def _meshes(cell: "_Cell", layers: Layers, beside_mm: Sequence[float]) -> tuple[
             near = enclosing(some, grid_mm, far_mm, loose_mm, outwards=outwards)
             if outwards and cell.air_mm:
                 near = cell.inside_shell(near)
-            mesh = Mesh.of(near, beside_mm, grid_mm, far_mm)
+            mesh = PrismMesh.of(near, beside_mm, grid_mm, far_mm)
             if mesh.plan.slenderness_mm() > least_mm:
                 break
         found.append(mesh)
@@ -186,7 +186,7 @@ class _Cell:
     open_sides: tuple[tuple[bool, bool], tuple[bool, bool]] = ((False, False), (False, False))
     outer: list[dict[int, Region]] | None = None
 
-    def inside_shell(self, layers: Layers) -> Layers:
+    def inside_shell(self, layers: LayerCell) -> LayerCell:
         """Layers of it in a shell that conducts and floats: any potential in there goes on as a constant outside."""
         (x0, x1), (y0, y1) = self.open_sides
         thick, (x, y) = _SHELL * self.air_mm, layers.size_mm
@@ -201,16 +201,16 @@ class _Cell:
         regions[0] = regions[-1] = {own: whole}
         return replace(layers, regions=regions, conductors=own + 1, in_shell=True)
 
-    def layers(self, permittivity: Sequence[float]) -> Layers:
+    def layers(self, permittivity: Sequence[float]) -> LayerCell:
         """For the solver."""
         size = (self.x.high_mm - self.x.low_mm, self.y.high_mm - self.y.low_mm)
         cuts = tuple((side.places_mm[1:-1] - side.low_mm).tolist() for side in (self.x, self.y))
         shifts = self.x.shifts, self.y.shifts
-        return Layers(
+        return LayerCell(
             size, np.array(self.heights_mm), self.regions, self.conductors, permittivity, shifts, (cuts[0], cuts[1])
         )
 
-    def shares(self, mesh: Mesh) -> np.ndarray:
+    def shares(self, mesh: PrismMesh) -> np.ndarray:
         """Number of times that each triangle of a mesh occurs in the sensor, beyond the least (t,)."""
         middle = mesh.plan.points_mm[mesh.plan.triangles].mean(1)
         found = np.ones(len(middle))
@@ -229,16 +229,29 @@ def _cell(scene: Scene) -> _Cell:
         raise ValueError(f"{slanted.name} is slanted or curved in elevation: its layers are no prisms")
     levels = np.unique(np.array([z for b in scene.bodies for p in b.pieces for z in p.span("z")]).round(9))
     levels = levels[np.append(True, np.diff(levels) > SLIVER_MM)]
-    parts = []
-    for low, high in pairwise(levels.tolist()):
-        middle = (low + high) / 2
-        outlines: dict[Body, list[shapely.Polygon]] = defaultdict(list)
-        for body in scene.bodies:
-            for p in body.pieces:
-                if p.span("z")[0] < middle < p.span("z")[1]:
-                    outlines[body].append(shapely.Polygon(seen_from_above(p)))
-        parts.append((low, high, {body: shapely.union_all(own) for body, own in outlines.items()}))
-    patterned = [region for *_, own in parts for region in own.values()]
+    layers = [(low, high, _outlines(scene, (low + high) / 2)) for low, high in pairwise(levels.tolist())]
+    patterned = [region for *_, own in layers for region in own.values()]
+    x, y = _sides(scene, patterned)
+    whole = shapely.box(x.low_mm, y.low_mm, x.high_mm, y.high_mm)
+    half = halved((x, y), [shapely.intersection(r, whole) for r in dict.fromkeys(patterned)])
+    try:
+        return _numbered(levels.tolist(), _within(layers, *half), *half)
+    except _Uncovered as error:
+        return _surrounded(scene, levels.tolist(), layers, x, y, error.gap_mm)
+
+
+def _outlines(scene: Scene, z_mm: float) -> dict[Body, Region]:
+    """Region of each body at a height, of upright pieces."""
+    outlines: dict[Body, list[shapely.Polygon]] = defaultdict(list)
+    for body in scene.bodies:
+        for p in body.pieces:
+            if p.span("z")[0] < z_mm < p.span("z")[1]:
+                outlines[body].append(shapely.Polygon(seen_from_above(p)))
+    return {body: shapely.union_all(own) for body, own in outlines.items()}
+
+
+def _sides(scene: Scene, patterned: Sequence[Region]) -> tuple[Repeat, Repeat]:
+    """The repeating part along x and y, by what its regions show, or of boxes by their planes."""
     if any(scene.repeats) or not all(p.is_box() for body in scene.bodies for p in body.pieces):
         x, y = (
             Repeat.of(0.0, scene.size_mm[axis], True, scene.size_mm[axis])
@@ -246,17 +259,11 @@ def _cell(scene: Scene) -> _Cell:
             else repeat(patterned, scene.size_mm, axis)
             for axis in (0, 1)
         )
-    else:  # the mirrors of :mod:`sensorgen.models.fem3d`
-        bodies = list(scene.bodies)
-        boxes = raster(scene, bodies.index, len(bodies), [(0.0, size) for size in scene.size_mm])
-        x = _mirrored(boxes.planes_mm[0], boxes.shares[:, 0])
-        y = _mirrored(boxes.planes_mm[1], boxes.shares[0] / boxes.shares[0, 0])
-    whole = shapely.box(x.low_mm, y.low_mm, x.high_mm, y.high_mm)
-    half = halved((x, y), [shapely.intersection(r, whole) for r in dict.fromkeys(patterned)])
-    try:
-        return _numbered(levels.tolist(), _within(parts, *half), *half)
-    except _Uncovered as error:
-        return _surrounded(scene, levels.tolist(), parts, x, y, error.gap_mm)
+        return x, y
+    bodies = list(scene.bodies)  # the mirrors of :mod:`sensorgen.models.fem3d`
+    boxes = raster(scene, bodies.index, len(bodies), [(0.0, size) for size in scene.size_mm])
+    y_shares = boxes.shares[0] / boxes.shares[0, 0]
+    return _mirrored(boxes.planes_mm[0], boxes.shares[:, 0]), _mirrored(boxes.planes_mm[1], y_shares)
 
 
 class _Uncovered(ValueError):
@@ -375,16 +382,8 @@ def _numbered(
     every = np.concatenate([shapely.transform(plans, lambda p, to=to: p + to) for to in images])
     one, other = shapely.STRtree(every).query(every, predicate="dwithin", distance=SLIVER_MM) % max(count, 1)
     near = abs(slab[one] - slab[other]) < 2
-    label = groups(count, one[near], other[near])
-    numbers: dict[int, int] = {}
-    for end, name in ((BOTTOM, "bottom"), (TOP, "top")):
-        for piece in {int(label[k]) for k, (_, terminal, _) in enumerate(pieces) if terminal == name}:
-            if numbers.setdefault(piece, end) != end:
-                raise ValueError("the electrodes touch: the capacitance grows without bound")
-    for piece in label.tolist():
-        numbers.setdefault(piece, len({*numbers.values(), BOTTOM, TOP}))
-    conductors = len({*numbers.values(), BOTTOM, TOP})
-    kinds = np.array([numbers[piece] for piece in label.tolist()])
+    kinds = _conductors(groups(count, one[near], other[near]).tolist(), [terminal for _, terminal, _ in pieces])
+    conductors = len({BOTTOM, TOP, *kinds.tolist()})
     uncovered = _uncovered(plans, kinds, sizes)
     low, high = int(slab[kinds == BOTTOM].min()), int(slab[kinds == TOP].max())
     if uncovered:  # the field leaves the electrodes
@@ -392,20 +391,36 @@ def _numbered(
     names = [*sorted({b.material for own in inside[low : high + 1] for b in own if not b.terminal} - {"air"}), "air"]
     regions = []
     for k in range(low, high + 1):
-        here = {
-            kind: shapely.union_all(plans[(slab == k) & (kinds == kind)])
-            for kind in np.unique(kinds[slab == k]).tolist()
-        }
-        for body, region in inside[k].items():
-            if not body.terminal and body.material != "air" and not region.is_empty:
-                kind = conductors + names.index(body.material)
-                here[kind] = shapely.union_all([here.get(kind, region), region])
-        regions.append(here)
+        here = kinds[slab == k]
+        metal = {kind: shapely.union_all(plans[slab == k][here == kind]) for kind in np.unique(here).tolist()}
+        regions.append(metal | _dielectrics(inside[k], conductors, names))
     heights = tuple(levels_mm[low : high + 2])
     gap_mm = _gap_mm(regions, heights, conductors)
     if uncovered and not air_mm:
         raise _Uncovered(uncovered, gap_mm)
     return _Cell(x, y, heights, regions, conductors, names, gap_mm, air_mm)
+
+
+def _dielectrics(own: Mapping[Body, Region], first: int, names: Sequence[str]) -> dict[int, Region]:
+    """Region of each dielectric of a layer, numbered by its material; air is left out."""
+    found: dict[int, Region] = {}
+    for body, region in own.items():
+        if not body.terminal and body.material != "air" and not region.is_empty:
+            kind = first + names.index(body.material)
+            found[kind] = shapely.union_all([found.get(kind, region), region])
+    return found
+
+
+def _conductors(connected: Sequence[int], terminals: Sequence[str]) -> Whole:
+    """Number of the conductor that each piece is a part of; raises ValueError where bottom and top are connected."""
+    numbers: dict[int, int] = {}
+    ends = {"bottom": BOTTOM, "top": TOP}
+    for piece, terminal in zip(connected, terminals, strict=True):
+        if terminal in ends and numbers.setdefault(piece, ends[terminal]) != ends[terminal]:
+            raise ValueError("the electrodes touch: the capacitance grows without bound")
+    for piece in connected:
+        numbers.setdefault(piece, len({*numbers.values(), BOTTOM, TOP}))
+    return np.array([numbers[piece] for piece in connected], int)
 
 
 def _uncovered(plans: np.ndarray, kinds: np.ndarray, sizes_mm: tuple[float, float]) -> str:

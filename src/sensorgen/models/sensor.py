@@ -14,7 +14,7 @@ from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models import line, line_tip
 from sensorgen.models.compression import Compression
-from sensorgen.models.pressure import Contact
+from sensorgen.models.pressure import RoundContact
 from sensorgen.solvers.line.inputs import in_range
 
 UNIFORM = "uniform"
@@ -56,7 +56,7 @@ class Sensor:
         Length of the tip along the sensor [m].
     profile : str
         Distribution of its pressure: one of :data:`sensorgen.models.pressure.PROFILES`.
-    contact : Contact or None
+    contact : RoundContact or None
         Growth of a round tip's contact with the force, up to ``tip_m``; None where all of the tip always touches.
     pieces : int
         Number of pieces that a tip whose pressure is not uniform is cut into.
@@ -80,7 +80,7 @@ class Sensor:
     compression: Compression
     tip_m: float = 0.01
     profile: str = UNIFORM
-    contact: Contact | None = None
+    contact: RoundContact | None = None
     pieces: int = PIECES
     tan_delta: float = 0.0
     leak_s_per_m: float = 0.0
@@ -166,7 +166,7 @@ class Sensor:
         length, by_load = self.contact.length_m(np.asarray(force_n, float) / self.width_m, self.tip_m)
         return length, by_load / self.width_m
 
-    def _tip(self, force_n: ArrayLike, position_m: ArrayLike) -> line_tip.Tip:
+    def _tip(self, force_n: ArrayLike, position_m: ArrayLike) -> line_tip.LineContact:
         """The tip in pieces, one if its pressure is uniform; the same ones wherever it lies whole on the sensor."""
         self.patch(position_m)  # refuses positions out of range
         force, pieces = in_range("force_n", force_n), 1 if self.profile == UNIFORM else self.pieces
@@ -186,10 +186,10 @@ class Sensor:
 
     def _pressed(
         self, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike
-    ) -> tuple[line_tip.Track, line_tip.Tip, Compression, Real]:
+    ) -> tuple[line_tip.RestLine, line_tip.LineContact, Compression, Real]:
         frequency, tip = in_range("frequency_hz", frequency_hz), self._tip(force_n, position_m)
         self.check_tracks(tip.highest_pa())
-        track = line_tip.Track(
+        track = line_tip.RestLine(
             self.length_m, *self.track_ohm_per_m(), self.capacitance_f_per_m, self.tan_delta, self.leak_s_per_m,
             self.far_end,
         )  # fmt: skip

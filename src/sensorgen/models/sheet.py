@@ -10,11 +10,21 @@ from numpy.typing import ArrayLike
 from sensorgen.core.arrays import Complex
 from sensorgen.core.errors import UnknownName
 from sensorgen.solvers.sheet.network import BY
-from sensorgen.solvers.sheet.parts import Contact, Patch, Port, Sheet
-from sensorgen.solvers.sheet.solve import Bounds, Solution, bounds, contact_sets, depth_m, solution
+from sensorgen.solvers.sheet.parts import Contact, Port, Sheet, SheetPatch
+from sensorgen.solvers.sheet.solve import PressErrors, Solution, bounds, contact_sets, depth_m, solution
 
 __all__ = [
-    "BY", "Bounds", "Contact", "Patch", "Port", "Sheet", "Solution", "contact_sets", "depth_m", "impedance", "localise",
+    "BY",
+    "Contact",
+    "Port",
+    "PressErrors",
+    "Sheet",
+    "SheetPatch",
+    "Solution",
+    "contact_sets",
+    "depth_m",
+    "impedance",
+    "localise",
     "solve",
 ]  # fmt: skip
 
@@ -23,7 +33,11 @@ COST = 2
 
 
 def impedance(
-    sheet: Sheet, ports: Sequence[Port], frequency_hz: ArrayLike, patch: Patch | None = None, cells: int | None = None
+    sheet: Sheet,
+    ports: Sequence[Port],
+    frequency_hz: ArrayLike,
+    patch: SheetPatch | None = None,
+    cells: int | None = None,
 ) -> Complex:
     r"""Impedance matrix between pairs of contacts.
 
@@ -39,7 +53,7 @@ def impedance(
         Current enters at the first contact of a pair and leaves at the second; both may be on one sheet.
     frequency_hz : float or (n,) array
         0 or more [Hz].
-    patch : Patch
+    patch : SheetPatch
         Pressed rectangle, if any.
     cells : int
         Cells along the longer side; the fewest of 10, 20, 40 ... with an estimated error under 1e-3 unless given [-].
@@ -77,7 +91,7 @@ def solve(
     sheet: Sheet,
     ports: Sequence[Port],
     frequency_hz: ArrayLike,
-    patch: Patch | None = None,
+    patch: SheetPatch | None = None,
     of: Iterable[str] = (),
     cells: int | None = None,
     accuracy: float = 1e-3,
@@ -122,7 +136,7 @@ def solve(
     --------
     >>> plate = Sheet(0.1, 0.1, (900.0, 900.0), 7e-8)
     >>> corner = tuple(Contact(side, (0.0, 0.01), (0.0, 0.01)) for side in ("top", "bottom"))
-    >>> press = Patch(0.02, 0.03, 0.02, 0.02, capacitance_factor=1.05)
+    >>> press = SheetPatch(0.02, 0.03, 0.02, 0.02, capacitance_factor=1.05)
     >>> found = solve(plate, [corner], [1e5], press, of=["x_m"])
     >>> found.cells, found.error < 1e-3, round(float(found.by["x_m"][0, 0, 0].real), 1)
     (80, True, 45.7)
@@ -134,12 +148,12 @@ def localise(
     sheet: Sheet,
     ports: Sequence[Port],
     frequency_hz: ArrayLike,
-    press: Patch,
+    press: SheetPatch,
     per_newton: Mapping[str, float],
     noise: float = 1e-3,
     places: int = 7,
     done: Callable[[int], object] | None = None,
-) -> Bounds:
+) -> PressErrors:
     r"""Cramer-Rao bounds of force, x and y of a press, anywhere on the sheet.
 
     .. math:: \mathrm{cov} \ge \Bigl(\sum_{f,p} \frac{\Re g\, \Re g^T + \Im g\, \Im g^T}{\nu^2}\Bigr)^{-1},
@@ -151,7 +165,7 @@ def localise(
         As of :func:`impedance`; each port is read by itself, the others are open.
     frequency_hz : float or (n,) array
         Frequencies that are read at every port, above 0 unless the film leaks [Hz].
-    press : Patch
+    press : SheetPatch
         Size of the tip, and its factors at the force in question; its place is not looked at.
     per_newton : dict of str to float
         Derivatives by force of the factors, by their names in ``BY`` [1/N].
@@ -183,7 +197,7 @@ def localise(
     One port and one frequency give two numbers, and the press has three unknowns:
 
     >>> film = Sheet(0.1, 0.1, (450.0, 450.0), 7e-8)
-    >>> tip = Patch(0.0, 0.0, 0.02, 0.02, capacitance_factor=1.05)
+    >>> tip = SheetPatch(0.0, 0.0, 0.02, 0.02, capacitance_factor=1.05)
     >>> found = localise(film, contact_sets(film)["one-edge"], [1e5], tip, {"capacitance_factor": 0.01}, places=1)
     >>> found.located(), [float(at) for at in found.sigma()[0, 0]]
     (0.0, [inf, inf, inf])

@@ -15,8 +15,8 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.solvers.line.inputs import check_fit, numbers, passive
 from sensorgen.solvers.multiline import (
-    Body,
-    Line,
+    GroundTie,
+    LineMatrices,
     Touch,
     diagonal,
     directions,
@@ -30,7 +30,16 @@ from sensorgen.solvers.multiline import (
 )
 
 __all__ = [
-    "Body", "Film", "Press", "Response", "Stack", "Touch", "Track", "admittance", "impedance", "port",
+    "Film",
+    "GroundTie",
+    "Press",
+    "Stack",
+    "StackResponse",
+    "Touch",
+    "Track",
+    "admittance",
+    "impedance",
+    "port",
     "standard_errors",
 ]  # fmt: skip
 
@@ -103,7 +112,7 @@ def admittance(
         raise BadInput("a stack of n films has n + 1 tracks, in every section")
     lengths = [passive("length", length) for length in length_m]
     check_fit("the stack's values", [*lengths, *(section[..., 0] for section in (*tracks, *films))])
-    lines = [Line(loops(r).astype(complex), diagonal(y)) for r, y in zip(tracks, films, strict=True)]
+    lines = [LineMatrices(loops(r).astype(complex), diagonal(y)) for r, y in zip(tracks, films, strict=True)]
     return march(lines, lengths)[0]
 
 
@@ -175,7 +184,7 @@ class Press(NamedTuple):
     length_m: ArrayLike = 0.01
 
 
-class Response(NamedTuple):
+class StackResponse(NamedTuple):
     """Impedance matrix and its derivatives, each (..., n, n)."""
 
     impedance_ohm: Complex
@@ -223,7 +232,7 @@ class Stack:
         return impedance(*self.sections(frequency_hz, press))
 
     def touched(
-        self, frequency_hz: ArrayLike, touch: Touch, body: Body, driven: int, low: int, bridge: bool = True
+        self, frequency_hz: ArrayLike, touch: Touch, body: GroundTie, driven: int, low: int, bridge: bool = True
     ) -> Complex:
         """Impedance that an instrument reads between two tracks while a body touches the top [ohm].
 
@@ -231,7 +240,7 @@ class Stack:
         ----------
         frequency_hz : float or array
             Frequencies, above 0 [Hz].
-        touch, body : Touch, Body
+        touch, body : Touch, GroundTie
             Where and through what it touches; how it is tied to the ground of the instrument.
         driven, low : int
             Track that the instrument drives, and track that it holds at ground, counted from 0 at the bottom.
@@ -283,7 +292,7 @@ class Stack:
         denser = [_turned(film, omega) * (s / (1 - s)) for film, s in zip(self.films, thinner, strict=True)]
         return [track.r_ohm_per_m * track.piezoresistance_per_pa * stress for track in self.tracks], denser
 
-    def response(self, frequency_hz: ArrayLike, press: Press) -> Response:
+    def response(self, frequency_hz: ArrayLike, press: Press) -> StackResponse:
         r"""Impedance matrix and its exact derivatives.
 
         A direction in which R and Y move is passed on through doubling and joining. By position, the patch moves as if
@@ -312,7 +321,7 @@ class Stack:
         deep = max(*(m.ndim for m in (*series, *shunt)), *(length.ndim + 2 for length in lengths))
         drifts = [[self._by_film(section, k) for k in range(len(self.films))] for section in y]
         lines = [
-            Line(s, d, by_shunt=directions(deep, 0.0, 0.0, *drift))
+            LineMatrices(s, d, by_shunt=directions(deep, 0.0, 0.0, *drift))
             for s, d, drift in zip(series, shunt, drifts, strict=True)
         ]
         omega = 2 * np.pi * np.asarray(frequency_hz, float)
@@ -320,7 +329,7 @@ class Stack:
         risen, denser = self._changes(omega, press)
         tilt = loops(_last(risen)) @ shunt[0] - series[0] @ diagonal(_last(denser))  # R_p Y_0 - R_0 Y_p
         still = len(self.films) * [0.0]
-        lines[1] = Line(
+        lines[1] = LineMatrices(
             series[1], shunt[1], directions(deep, by_series, 0.0, *still), directions(deep, by_shunt, 0.0, *drifts[1]),
             directions(deep, 0.0, tilt, *still),
         )  # fmt: skip
@@ -331,7 +340,7 @@ class Stack:
         by_force, by_position, *by_film = np.broadcast_to(
             -z @ by @ z, (by.shape[0], *np.broadcast_shapes(z.shape, by.shape[1:]))
         )
-        return Response(np.broadcast_to(z, by_force.shape), by_force, by_position, tuple(by_film))
+        return StackResponse(np.broadcast_to(z, by_force.shape), by_force, by_position, tuple(by_film))
 
     def _by_force(self, omega: Real, press: Press) -> tuple[Complex, Complex]:
         """Rise of R and Y under the tip per newton."""

@@ -19,7 +19,7 @@ import numpy as np
 from sensorgen.core.errors import OutOfRange
 from sensorgen.solvers.network import links as links
 from sensorgen.solvers.network.band import product
-from sensorgen.solvers.network.nodes import Lines, Nodes
+from sensorgen.solvers.network.nodes import Nodes, StraightLines
 
 SOURCE = "Lines as in Dijkshoorn et al., Sensors 2021, 21, 3710 (traxel model); network derived anew"
 COST = 2
@@ -43,13 +43,13 @@ class Resistance:
 
 
 def resistance(
-    lines: Lines, resistivity_ohm_m: float, contact_ohm_m2: float, ends_m: tuple[float, float], area_m2: float
+    lines: StraightLines, resistivity_ohm_m: float, contact_ohm_m2: float, ends_m: tuple[float, float], area_m2: float
 ) -> Resistance:
     """Resistance along x between two planes, beyond which the potential rises as in a solid.
 
     Parameters
     ----------
-    lines : Lines
+    lines : StraightLines
         All of one electrode.
     resistivity_ohm_m : float
         Bulk resistivity along a line [ohm m], above 0.

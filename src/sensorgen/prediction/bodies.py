@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from sensorgen.core.errors import BadInput
 from sensorgen.core.files import reading
-from sensorgen.design.body import DRAWN, Body, Cells, Film
+from sensorgen.design.body import DRAWN, Body, Cells, FilmThickness
 from sensorgen.design.design import Design, make
 from sensorgen.design.walls import WALLS
 from sensorgen.design.walls import rules as wall_rules
@@ -256,7 +256,7 @@ def _printed_cells(prints: "Mapping[str, Printed]") -> Cells:
     scenes = {name: cell.scene for name, cell in cells.items()}
     error_mm = printed.design.machine.tool_height_error_mm
     thicker = film.thicker(first.scene, error_mm)
-    changed = Film(error_mm, film.thicker(first.scene, -error_mm), thicker) if error_mm and thicker else None
+    changed = FilmThickness(error_mm, film.thicker(first.scene, -error_mm), thicker) if error_mm and thicker else None
     found = Cells(scenes, first.count, period, partial(_printed_gaps, scenes), printed.lines, remarks, changed)
     return _inside(printed.design, found) if printed.design.border else found
 

@@ -18,7 +18,7 @@ from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.design.body import Cells
 from sensorgen.models import capacitance_models
 from sensorgen.prediction.cost_model import expected, measured
-from sensorgen.prediction.plan import Candidate
+from sensorgen.prediction.plan import PlanCandidate
 from sensorgen.scene.scene import FLOATING, Scene, content
 from sensorgen.scene.sections import overlap, sections
 from sensorgen.scene.slabs import is_open
@@ -65,7 +65,7 @@ class Answer:
         Why other models do not apply to the scene.
     wanted : float
         How wide the interval might be, relative to its middle [-].
-    plan : tuple of Candidate
+    plan : tuple of PlanCandidate
         All models, in the order in which they were weighed.
     known : bool
         Whether the answer was known from before.
@@ -77,7 +77,7 @@ class Answer:
     capacitance_f: Interval
     refused: tuple[str, ...]
     wanted: float = inf
-    plan: tuple[Candidate, ...] = ()
+    plan: tuple[PlanCandidate, ...] = ()
     known: bool = False
     loss_f: Interval | None = None
 
@@ -181,7 +181,7 @@ def capacitance(
     return replace(_of_plain(found), known=known is not None)
 
 
-def weighed(scene: Scene, width: float = inf, model: str = "", lossy: bool = False) -> tuple[Candidate, ...]:
+def weighed(scene: Scene, width: float = inf, model: str = "", lossy: bool = False) -> tuple[PlanCandidate, ...]:
     """The plan before anything is asked: all models of capacitance in the order in which they would be.
 
     Parameters
@@ -196,18 +196,18 @@ def weighed(scene: Scene, width: float = inf, model: str = "", lossy: bool = Fal
     return tuple(replace(c, passed_over=c.passed_over or _unfit(c, scene, kind)) for c in plan)
 
 
-def _ordered(scene: Scene, width: float, model: str) -> list[Candidate]:
+def _ordered(scene: Scene, width: float, model: str) -> list[PlanCandidate]:
     loaded = capacitance_models()
     if model and model not in loaded:
         raise UnknownName("model of capacitance", model, loaded)
     found = [
-        Candidate(name, *expected(name, scene, width), "" if model in ("", name) else f"--model {model}")
+        PlanCandidate(name, *expected(name, scene, width), "" if model in ("", name) else f"--model {model}")
         for name in loaded
     ]
     return sorted(found, key=lambda c: _rank(c, loaded[c.model].COST, width))
 
 
-def _unfit(candidate: Candidate, scene: Scene, kind: str) -> str:
+def _unfit(candidate: PlanCandidate, scene: Scene, kind: str) -> str:
     loaded = capacitance_models()
     if hasattr(loaded[candidate.model], kind):
         return loaded[candidate.model].why_not_applicable(scene) or ""
@@ -215,7 +215,7 @@ def _unfit(candidate: Candidate, scene: Scene, kind: str) -> str:
     return f"dielectric losses are solved by {able} alone: leave the losses out to use it"
 
 
-def _rank(candidate: Candidate, cost: int, width: float) -> tuple[bool, float, float, float]:
+def _rank(candidate: PlanCandidate, cost: int, width: float) -> tuple[bool, float, float, float]:
     """Models in milliseconds first, then those that should suffice by cost and time, then others by expected width."""
     short = cost > _CHEAP and candidate.reach() > width
     loading = measured()[candidate.model].loading if candidate.model in measured() else 0.0
@@ -228,7 +228,7 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
     overlaps = overlap(scene)
     if overlaps:
         raise Unpredictable(f"{overlaps}; expected each place to belong to one body")
-    plan: list[Candidate] = []
+    plan: list[PlanCandidate] = []
     refused: list[str] = []
     bounds: dict[str, Interval | Disc] = {}
     kind = _kind(permittivity)
@@ -296,7 +296,7 @@ def _refuse_apart(bounds: Mapping[str, Interval]) -> None:
         )
 
 
-def _idle(candidate: Candidate, bounds: Mapping[str, Interval | Disc], width: float) -> str:
+def _idle(candidate: PlanCandidate, bounds: Mapping[str, Interval | Disc], width: float) -> str:
     """Why a model that applies is not needed."""
     best = min((found.width() for found in bounds.values()), default=inf)
     if bounds and best <= width:
@@ -336,7 +336,7 @@ def _of_plain(data: dict[str, Any]) -> Answer:
     """An answer from plain data."""
     return Answer(
         data["model"], Interval(**data["capacitance_f"]), tuple(data["refused"]),
-        inf if data["wanted"] is None else data["wanted"], tuple(Candidate(**c) for c in data["plan"]),
+        inf if data["wanted"] is None else data["wanted"], tuple(PlanCandidate(**c) for c in data["plan"]),
         loss_f=Interval(**data["loss_f"]) if data["loss_f"] else None,
     )  # fmt: skip
 

@@ -13,7 +13,7 @@ from sensorgen.design.body import Body
 from sensorgen.design.values import MaterialValue
 from sensorgen.prediction import losses
 from sensorgen.prediction.capacitance import Unpredictable, default_width, of_sensor
-from sensorgen.prediction.plan import Candidate, candidates_table
+from sensorgen.prediction.plan import PlanCandidate, candidates_table
 from sensorgen.prediction.sweep import Sweep
 from sensorgen.prediction.sweep import sweep as swept
 
@@ -25,7 +25,7 @@ QUANTITIES = {
 
 
 @dataclass(frozen=True)
-class Asked:
+class CapacitanceQuestion:
     """Question about every design.
 
     Attributes
@@ -80,7 +80,7 @@ class CellCapacitance(Displayed):
         Of the field, where dielectrics lose [Hz].
     refused : tuple of str
         Why other models do not apply.
-    plan : tuple of Candidate
+    plan : tuple of PlanCandidate
         All models, with what they reached.
     values : tuple of MaterialValue
         Material values used.
@@ -105,7 +105,7 @@ class CellCapacitance(Displayed):
     tan_delta: tuple[float, float] | None = None
     frequency_hz: float | None = None
     refused: tuple[str, ...] = ()
-    plan: tuple[Candidate, ...] = ()
+    plan: tuple[PlanCandidate, ...] = ()
     values: tuple[MaterialValue, ...] = ()
     doubts: tuple[str, ...] = ()
 
@@ -153,14 +153,14 @@ class CellCapacitance(Displayed):
         return ("; ".join((best, *self.refused)),)
 
 
-def answer(body: Body, asked: Asked) -> CellCapacitance:
+def answer(body: Body, asked: CapacitanceQuestion) -> CellCapacitance:
     """Bounds of the capacitance per area of one body's most likely cell, unloaded.
 
     Parameters
     ----------
     body : Body
         Drawn or printed.
-    asked : Asked
+    asked : CapacitanceQuestion
         Accuracy and model.
 
     Raises
@@ -195,8 +195,8 @@ def answer(body: Body, asked: Asked) -> CellCapacitance:
 
 
 def sweep(
-    key: str | tuple[str, ...], points: Sequence[tuple[Any, Body]], asked: Asked, jobs: int, done: Callable[[], None],
-    cluster: str = "",
+    key: str | tuple[str, ...], points: Sequence[tuple[Any, Body]], asked: CapacitanceQuestion, jobs: int,
+    done: Callable[[], None], cluster: str = "",
 ) -> Sweep[CellCapacitance]:  # fmt: skip
     """Answers along a sweep; a reason stands in place of what no model applies to, or at which one fails.
 

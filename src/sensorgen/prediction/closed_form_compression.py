@@ -14,7 +14,7 @@ from sensorgen.design.values import film, of_all_materials, permittivities
 from sensorgen.models import press2d, springs
 from sensorgen.prediction.capacitance import Answer, capacitance, is_plate
 from sensorgen.prediction.compression_law import elastic, gap_m, infill, law_of
-from sensorgen.prediction.mesh_ladder import Piece, refuse_crushing
+from sensorgen.prediction.mesh_ladder import PressedPiece, refuse_crushing
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class ClosedForm:
     rises: tuple[NDArray[np.float64], ...] = ()
 
 
-def _springs(design: Design, piece: Piece, stress_pa: Sequence[float]) -> ClosedForm:
+def _springs(design: Design, piece: PressedPiece, stress_pa: Sequence[float]) -> ClosedForm:
     """Samples as springs side by side, for any scene."""
     scene, why = piece.scene, press2d.why_not_applicable(piece.scene)
     solids = elastic(design, scene)
@@ -59,7 +59,7 @@ def _springs(design: Design, piece: Piece, stress_pa: Sequence[float]) -> Closed
 PLATES = {"unconfined": "free", "bonded": "bonded to both electrodes"}
 
 
-def law_name(design: Design, piece: Piece) -> str:
+def law_name(design: Design, piece: PressedPiece) -> str:
     """Law in closed form of a plate of one material, or of infill; "" of other cells, which are solved."""
     try:
         if piece.period_mm is not None or len({b.terminal for b in piece.scene.bodies} - {""}) != 2:
@@ -72,16 +72,16 @@ def law_name(design: Design, piece: Piece) -> str:
         return ""
 
 
-def _at_rest(design: Design, piece: Piece) -> Answer:
+def _at_rest(design: Design, piece: PressedPiece) -> Answer:
     eps = {t.material: t.value for t in permittivities(design)}
     return capacitance(piece.scene, eps, model="columns", keep=False)
 
 
-def _between(piece: Piece) -> set[str]:
+def _between(piece: PressedPiece) -> set[str]:
     return {body.material for body in piece.scene.bodies if not body.terminal}
 
 
-def _law(name: str, design: Design, piece: Piece, stress_pa: Sequence[float]) -> ClosedForm:
+def _law(name: str, design: Design, piece: PressedPiece, stress_pa: Sequence[float]) -> ClosedForm:
     """A law of solid plates or of infill."""
     known = _at_rest(design, piece)
     if name in PLATES and (not is_plate(known, piece.scene) or _between(piece) != {film(design)}):
@@ -99,7 +99,7 @@ def _law(name: str, design: Design, piece: Piece, stress_pa: Sequence[float]) ->
     raise OutOfRange(f"{stress_pa[-1] / 1e3:g} kPa: by the softest law the electrodes touch; expected less")
 
 
-MODELS: dict[str, Callable[[Design, Piece, Sequence[float]], ClosedForm]] = {
+MODELS: dict[str, Callable[[Design, PressedPiece, Sequence[float]], ClosedForm]] = {
     "springs": _springs, **{name: partial(_law, name) for name in (*PLATES, "infill")},
 }  # fmt: skip
 FIRST = "springs"  # applies to any scene: the default where no field can be solved

@@ -32,17 +32,26 @@ from sensorgen.prediction.mesh_ladder import (
     Case,
     Estimate,
     MeshLevel,
-    Piece,
+    PressedPiece,
     estimated,
     mesh_levels,
     why_not_applicable,
 )
-from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, run_until_within
+from sensorgen.prediction.plan import Level, Plan, PlanCandidate, cheapest, run_until_within
 from sensorgen.prediction.sensor_model import piece as piece_of
 from sensorgen.prediction.sweep import Sweep
 from sensorgen.prediction.sweep import sweep as swept
 
-__all__ = ["ALL", "Asked", "BoundaryConditions", "CompressionResult", "answer", "planned", "stresses_kpa", "sweep"]
+__all__ = [
+    "ALL",
+    "BoundaryConditions",
+    "CompressionResult",
+    "PressQuestion",
+    "answer",
+    "planned",
+    "stresses_kpa",
+    "sweep",
+]
 
 Step = Callable[[float], None]
 ALL = (*MODELS, *closed_form.MODELS)
@@ -66,7 +75,7 @@ _MEASURE = "relative error of the rise of C, at the worst stress"
 
 
 @dataclass(frozen=True)
-class Asked:
+class PressQuestion:
     """Question about a press.
 
     Attributes
@@ -220,14 +229,14 @@ class CompressionResult(Displayed):
         return wrong
 
 
-def answer(body: Body, asked: Asked, *, step: Step | None = None) -> CompressionResult:
+def answer(body: Body, asked: PressQuestion, *, step: Step | None = None) -> CompressionResult:
     """Displacement and bounds of the capacitance per area over stress.
 
     Parameters
     ----------
     body : Body
         Drawn or printed.
-    asked : Asked
+    asked : PressQuestion
         Stresses, boundary conditions and accuracy.
     step : callable, optional
         Called with every stress that is reached [Pa].
@@ -262,7 +271,7 @@ def answer(body: Body, asked: Asked, *, step: Step | None = None) -> Compression
 def sweep(
     key: str | tuple[str, ...],
     points: Sequence[tuple[Any, Body]],
-    asked: Asked,
+    asked: PressQuestion,
     jobs: int,
     done: Callable[[], None],
     cluster: str = "",
@@ -280,7 +289,7 @@ def _failed(body: Body, reason: str) -> CompressionResult:
     return CompressionResult(design=body.design.name, body=body.provenance, reason=reason)
 
 
-def planned(body: Body, asked: Asked) -> Plan:
+def planned(body: Body, asked: PressQuestion) -> Plan:
     """Plan of an accuracy, before anything is pressed; parameters and errors as of :func:`answer`."""
     if not asked.accuracy > 0:
         raise OutOfRange(f"an accuracy of {asked.accuracy:g}; expected a number above 0, as 1e-2")
@@ -299,15 +308,15 @@ def planned(body: Body, asked: Asked) -> Plan:
         if name != model:
             without_c = _NO_C if name in closed_form.MODELS else ""
             unfit = without_c or why_not_applicable(piece, name) or "the model before it applies to the cell"
-            candidates.append(Candidate(name, passed_over=f"--model {model}" if asked.model else unfit))
+            candidates.append(PlanCandidate(name, passed_over=f"--model {model}" if asked.model else unfit))
     meshes = _mesh_levels(piece, model, asked)
-    candidates += [Candidate(mesh.name, max(mesh.rise_error, VERIFIED), mesh.seconds) for mesh in meshes]
+    candidates += [PlanCandidate(mesh.name, max(mesh.rise_error, VERIFIED), mesh.seconds) for mesh in meshes]
     chosen = cheapest(tuple(candidates), asked.accuracy)
     level = Level("compression", _MEASURE, asked.accuracy, tuple(candidates), chosen)
     return Plan(asked.accuracy, f"the rise of C up to {asked.stress_kpa[-1]:g} kPa", (level,))
 
 
-def _model(body: Body, asked: Asked) -> str:
+def _model(body: Body, asked: PressQuestion) -> str:
     piece = piece_of(body)
     usual = asked.sides == "bonded" and asked.boundary.period == "fixed"
     law = closed_form.law_name(body.design, piece) if usual and not asked.model and not asked.check_mesh else ""
@@ -316,11 +325,11 @@ def _model(body: Body, asked: Asked) -> str:
     )
 
 
-def _mesh_levels(piece: Piece, model: str, asked: Asked) -> list[MeshLevel]:
+def _mesh_levels(piece: PressedPiece, model: str, asked: PressQuestion) -> list[MeshLevel]:
     return mesh_levels(piece, model, len(asked.stress_kpa) - 1)
 
 
-def _within(body: Body, asked: Asked, step: Step | None) -> CompressionResult:
+def _within(body: Body, asked: PressQuestion, step: Step | None) -> CompressionResult:
     """The first mesh within tolerance, from the expected one upwards; the best where none is."""
     plan, case = planned(body, asked), _case(body, asked)
     find = {
@@ -341,7 +350,7 @@ def _rise_error(found: Estimate) -> float:
     return inf if found.found.faults else found.relative()[1]
 
 
-def _case(body: Body, asked: Asked) -> Case:
+def _case(body: Body, asked: PressQuestion) -> Case:
     """Case to press; refuses one that would be answered, but not as it was asked."""
     piece = piece_of(body)
     ends = sorted({body.terminal for body in piece.scene.bodies if body.terminal})
@@ -355,12 +364,12 @@ def _case(body: Body, asked: Asked) -> Case:
     return case_of(body.design, piece, _model(body, asked), asked.tip or body.design.tip.tip(), asked.boundary)
 
 
-def _estimated(case: Case, asked: Asked, level: int, step: Step | None) -> Estimate:
+def _estimated(case: Case, asked: PressQuestion, level: int, step: Step | None) -> Estimate:
     stress_pa = [_PA_PER_KPA * kpa for kpa in asked.stress_kpa]
     return estimated(case, stress_pa, level, keep=asked.keep, step=step)
 
 
-def _result(body: Body, case: Case, estimate: Estimate, asked: Asked) -> CompressionResult:
+def _result(body: Body, case: Case, estimate: Estimate, asked: PressQuestion) -> CompressionResult:
     """In the units of results; the capacitance begins with that of the sensor at rest, as all predictions have it.
 
     The rise of a sensor of whole and broken periods, of which one was pressed, is scaled by what both differ at rest.
@@ -369,7 +378,7 @@ def _result(body: Body, case: Case, estimate: Estimate, asked: Asked) -> Compres
 
     found, first, tip = estimate.found, estimate.found.capacitance_f_per_m2[0], asked.tip or body.design.tip.tip()
     try:
-        rest = at_rest.answer(body, at_rest.Asked(keep=asked.keep))
+        rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
     except Unpredictable:
         rest = None
     known, factor = first, 1.0
@@ -424,13 +433,13 @@ def _known(values: Real) -> tuple[float | None, ...]:
     return tuple(value if isfinite(value) else None for value in values.tolist())
 
 
-def _closed_form(body: Body, asked: Asked, model: str) -> CompressionResult:
+def _closed_form(body: Body, asked: PressQuestion, model: str) -> CompressionResult:
     """Displacement, and of a plate or infill the capacitance, by a law that solves no field."""
     found = closed_form.MODELS[model](body.design, piece_of(body), [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
     unknown = np.full(len(asked.stress_kpa), nan)
     rise = off = lower = upper = unknown
     if found.rises:
-        rest = at_rest.answer(body, at_rest.Asked(keep=asked.keep))
+        rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
         ends = rest.lower_f_per_m2 or nan, rest.upper_f_per_m2 or nan
         rises = np.array(found.rises)
         rise, off = sum(ends) / 2 * rises[0], sum(ends) / 2 * abs(rises - rises[0]).max(0)
@@ -445,10 +454,10 @@ def _closed_form(body: Body, asked: Asked, model: str) -> CompressionResult:
     )  # fmt: skip
 
 
-def _unsolved(body: Body, asked: Asked, why: str) -> CompressionResult:
+def _unsolved(body: Body, asked: PressQuestion, why: str) -> CompressionResult:
     """Without the library for fields: a closed-form estimate, the capacitance at rest, and no accuracy."""
     found = _closed_form(body, asked, closed_form.FIRST)
-    rest = at_rest.answer(body, at_rest.Asked(keep=asked.keep))
+    rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
     unknown = (None,) * (len(asked.stress_kpa) - 1)
     found = replace(
         found, doubts=(*found.doubts, f"not solved: {why}"), lower_f_per_m2=(rest.lower_f_per_m2, *unknown),

@@ -21,14 +21,14 @@ from sensorgen.design.design import Design
 from sensorgen.design.tip import EVEN, STIFF, Tip
 from sensorgen.design.values import MaterialValue, film, material_value, of_all_materials, permittivities
 from sensorgen.models import compression, sandwich
-from sensorgen.models.compression import Compression, Curve, curve_of
+from sensorgen.models.compression import CapacitanceCurve, Compression, curve_of
 from sensorgen.prediction.capacitance import Answer, is_plate
 from sensorgen.prediction.mesh_ladder import (
     COARSEST,
     USUAL,
     Case,
     MeshLevel,
-    Piece,
+    PressedPiece,
     coarsest,
     drawn,
     estimated,
@@ -90,7 +90,7 @@ class Law:
 
 
 def law_of(
-    design: Design, answer: Answer, name: str = "", *, printed: Piece | None = None, tip: Tip = FLAT,
+    design: Design, answer: Answer, name: str = "", *, printed: PressedPiece | None = None, tip: Tip = FLAT,
     until_pa: float = 0.0,
 ) -> Law:  # fmt: skip
     """The best available pressure law of a design; "solved" takes a minute or two.
@@ -103,7 +103,7 @@ def law_of(
         Its unloaded capacitance.
     name : str
         One of ``LAWS``, or "" for the best available without solving.
-    printed : Piece, optional
+    printed : PressedPiece, optional
         As printed; as drawn where not given.
     tip : Tip
         What presses.
@@ -172,7 +172,7 @@ class LawOption:
 
 
 def options(
-    design: Design, answer: Answer, name: str = "", *, printed: Piece | None = None, tip: Tip = FLAT,
+    design: Design, answer: Answer, name: str = "", *, printed: PressedPiece | None = None, tip: Tip = FLAT,
     until_pa: float = 0.0,
 ) -> list[LawOption]:  # fmt: skip
     """The available laws of a design, the least expensive first; parameters and errors as of :func:`law_of`."""
@@ -195,21 +195,21 @@ def options(
     return meshes if asked else [known, *meshes]
 
 
-def expected(design: Design, mesh: MeshLevel) -> Curve:
+def expected(design: Design, mesh: MeshLevel) -> CapacitanceCurve:
     """Estimate of an unknown cell's curve on a mesh: that of the prototype that it resembles."""
     modulus_pa = of_all_materials(design, "youngs_modulus_pa")[film(design)].value
     scale = max(modulus_pa / compression.PROTOTYPE_PA, 1 / compression.REACH)  # softer ones could not be extrapolated
     return replace(compression.prototype(_LIKE[mesh.model]).scaled_modulus(scale), within=mesh.rise_error)
 
 
-def infill(design: Design, piece: Piece) -> Law | None:
+def infill(design: Design, piece: PressedPiece) -> Law | None:
     """Law of what lies between flat electrodes, as infill does, between bounds of its stiffness; None of other cells.
 
     Parameters
     ----------
     design : Design
         Whose materials it has.
-    piece : Piece
+    piece : PressedPiece
         Drawn or printed.
     """
     from sensorgen.models import porous
@@ -221,7 +221,7 @@ def infill(design: Design, piece: Piece) -> Law | None:
     eps = {t.material: t.value for t in permittivities(design)}
     modulus_pa, power = found.modulus_pa, found.rise_powers(eps[film(design)])
 
-    def law(modulus: float, power: float) -> Curve:
+    def law(modulus: float, power: float) -> CapacitanceCurve:
         ratio = (1 - _STRAIN) ** -power
         own = compression.curve("infill", porous.SOURCE, (modulus * _STRAIN).tolist(), ratio.tolist())
         return replace(own, displacement_m=float(_STRAIN[-1]) * found.gap_mm * M_PER_MM)
@@ -230,7 +230,7 @@ def infill(design: Design, piece: Piece) -> Law | None:
     return Law(law(modulus_pa.middle(), power.middle()), tuple(moduli.values()), others=others)
 
 
-def _stored(design: Design, youngs_modulus_pa: Mapping[str, float]) -> Curve | None:
+def _stored(design: Design, youngs_modulus_pa: Mapping[str, float]) -> CapacitanceCurve | None:
     """The stored curve of this cell, for materials of the same Poisson's ratio; else None."""
     known = compression.solved(design.shape, vars(design.params), youngs_modulus_pa)
     return known if known and _incompressible(design) else None
@@ -242,7 +242,9 @@ def _incompressible(design: Design) -> bool:
     return all(abs(ratio - compression.SOLVED_RATIO) < _SAME_RATIO for ratio in ratios)
 
 
-def _stored_print(design: Design, printed: Piece, youngs_modulus_pa: Mapping[str, float]) -> Curve | None:
+def _stored_print(
+    design: Design, printed: PressedPiece, youngs_modulus_pa: Mapping[str, float]
+) -> CapacitanceCurve | None:
     """The stored curve of a printed cell, as those of the thesis's designs are."""
     # Estimates; G-code, of which equal slices differ by 4 nm; both as the mirror image, as other counts of periods are
     keys = (content(printed, digits, turned=turned) for turned in (False, True) for digits in (6, 3))
@@ -250,7 +252,7 @@ def _stored_print(design: Design, printed: Piece, youngs_modulus_pa: Mapping[str
     return found if found and _incompressible(design) else None
 
 
-def content(piece: Piece, digits: int = 6, *, turned: bool = False) -> str:
+def content(piece: PressedPiece, digits: int = 6, *, turned: bool = False) -> str:
     """Identity of a cell's cross-section or its mirror image, to a digit of a millimetre; "" where it has several."""
     try:
         section, *others = sections(piece.scene)
@@ -271,7 +273,7 @@ def content(piece: Piece, digits: int = 6, *, turned: bool = False) -> str:
     return sha256(dumps([regions, piece.period_mm]).encode()).hexdigest()[:16]
 
 
-def _plate(design: Design, moduli: Mapping[str, MaterialValue], name: str, piece: Piece) -> Law:
+def _plate(design: Design, moduli: Mapping[str, MaterialValue], name: str, piece: PressedPiece) -> Law:
     """A plate: bonded to electrodes that it stretches, on a base that holds the lower one; or as ``name`` says."""
     if name in ("infill", "solved"):
         raise OutOfRange(f"{design.shape} is a solid plate: expected the law 'unconfined', 'bonded' or 'symmetric'")
@@ -326,14 +328,16 @@ def _electrode(moduli: Mapping[str, MaterialValue], scene: Scene, end: str) -> t
     return moduli[bodies[0].material].value, (max(z for _, z in spans) - min(z for z, _ in spans)) * M_PER_MM
 
 
-def _cell(found: Curve, moduli: Mapping[str, MaterialValue], tops: Mapping[str, Curve] | None = None) -> Law:
+def _cell(
+    found: CapacitanceCurve, moduli: Mapping[str, MaterialValue], tops: Mapping[str, CapacitanceCurve] | None = None
+) -> Law:
     """Law of a solved cell, with the errors of its rise and onset, and under other boundary conditions."""
     others = tuple(replace(found.scaled_rise(1 + sign * found.within), onset=1 + sign * _ONSET) for sign in (-1, 1))
     other_boundaries = tuple(found.scaled_rise(1 + change) for change in found.boundary_changes)
     return Law(found, tuple(moduli.values()), found.doubts, others, tops or {}, other_boundaries)
 
 
-def _stored_law(even: Curve, moduli: Mapping[str, MaterialValue], tip: Tip, *, usual: bool) -> Law:
+def _stored_law(even: CapacitanceCurve, moduli: Mapping[str, MaterialValue], tip: Tip, *, usual: bool) -> Law:
     """Law of a stored cell, solved under an even pressure, and under the ``usual`` block."""
     tops = {EVEN: even, STIFF: even.scaled_rise(1 + even.stiff_change)}
     return _cell(tops.get(tip.block) or even.under_block(usual=usual), moduli, tops)
@@ -353,7 +357,7 @@ def stresses_pa(until_pa: float) -> tuple[float, ...]:
 
 def solved(
     design: Design,
-    printed: Piece | None = None,
+    printed: PressedPiece | None = None,
     level: int = USUAL,
     boundary: "BoundaryConditions | None" = None,
     model: str = "",
@@ -367,7 +371,7 @@ def solved(
     ----------
     design : Design
         As drawn.
-    printed : Piece, optional
+    printed : PressedPiece, optional
         As printed; as drawn where not given.
     level : int
         Of the mesh, as of :func:`sensorgen.prediction.mesh_ladder.pressed`.
@@ -408,15 +412,16 @@ def solved(
 
 
 def under_tops(
-    design: Design, piece: Piece, model: str, tip: Tip, own: Curve, boundary: "BoundaryConditions | None" = None
-) -> dict[str, Curve]:  # fmt: skip
+    design: Design, piece: PressedPiece, model: str, tip: Tip, own: CapacitanceCurve,
+    boundary: "BoundaryConditions | None" = None,
+) -> dict[str, CapacitanceCurve]:  # fmt: skip
     """Curves under an even pressure and a stiff plate, by the ratio of rises on the coarsest mesh.
 
     Parameters
     ----------
     design, piece, model, tip, boundary
         As of :func:`case_of`.
-    own : Curve
+    own : CapacitanceCurve
         Under the tip.
     """
     loads, level = [own.stress_pa[-1] * share for share in _COARSE], coarsest(model)
@@ -445,7 +450,7 @@ def under_tops(
 
 
 def at_a_few_pressures(
-    design: Design, printed: Piece, answer: Answer, stress_pa: float, name: str = "", *, tip: Tip = FLAT,
+    design: Design, printed: PressedPiece, answer: Answer, stress_pa: float, name: str = "", *, tip: Tip = FLAT,
 ) -> Law | None:  # fmt: skip
     """The stored law of a printed cell; else a section or round cell solved at a few pressures on the coarsest mesh.
 
@@ -485,13 +490,13 @@ def at_a_few_pressures(
     return replace(known, compression=replace(curve, displacement_m=fallen_m), doubts=())
 
 
-def _case(design: Design, piece: Piece, model: str, boundary: "BoundaryConditions") -> Case:
+def _case(design: Design, piece: PressedPiece, model: str, boundary: "BoundaryConditions") -> Case:
     eps = {t.material: t.value for t in permittivities(design)}
     return Case(piece, model, elastic(design, piece.scene), eps, boundary)
 
 
 def case_of(
-    design: Design, piece: Piece, model: str, tip: Tip, boundary: "BoundaryConditions | None" = None
+    design: Design, piece: PressedPiece, model: str, tip: Tip, boundary: "BoundaryConditions | None" = None
 ) -> Case:  # fmt: skip
     """A piece under a tip: an even pressure, a stiff plate, or a block that is bonded to its top.
 
@@ -531,7 +536,7 @@ def _is_layered(scene: Scene) -> bool:
     return len(plans) == 1 and all(is_box for is_box, *_ in plans)
 
 
-def _under_block(piece: Piece, height_mm: float, name: str) -> Piece:
+def _under_block(piece: PressedPiece, height_mm: float, name: str) -> PressedPiece:
     """A piece with a block of some name and material on all of its top."""
     parts = [p for body in piece.scene.bodies for p in body.pieces]
     (x0, x1), (y0, y1), (z0, z1) = (

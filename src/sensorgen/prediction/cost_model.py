@@ -17,7 +17,7 @@ from sensorgen.scene.sections import sections
 FILE = "expected.yaml"
 
 
-class Measured(NamedTuple):
+class MeasuredCost(NamedTuple):
     """A model on one scene.
 
     ``points`` are the widths of its bounds that it reached [-], each with its time [s]; the time grows with a power of
@@ -78,11 +78,11 @@ def points(model: str, scene: Scene | None) -> list[tuple[float, float]]:
 
 
 @cache
-def measured() -> dict[str, Measured]:
+def measured() -> dict[str, MeasuredCost]:
     """Each model on its scene."""
     data = yamlfile.parse((resources.files(models) / FILE).read_text("utf-8"), FILE)
     return {
-        name: Measured(**{**entry, "points": [(width, seconds) for width, seconds in entry["points"]]})
+        name: MeasuredCost(**{**entry, "points": [(width, seconds) for width, seconds in entry["points"]]})
         for name, entry in data.items()
     }
 

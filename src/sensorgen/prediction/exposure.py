@@ -14,7 +14,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design.effects import Effects
 from sensorgen.design.tip import EVEN
 from sensorgen.models import pressure
-from sensorgen.models.compression import averaged
+from sensorgen.models.compression import averaged, beyond
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.compression_law import gap_m
 from sensorgen.prediction.reference_load import Dispersed, ReferenceLoad
@@ -28,7 +28,7 @@ class Exposure(NamedTuple):
     """An effect.
 
     ``keys`` are the design's of its size, ``sensors`` those at its ends: none where it is left out, None where they
-    are not known. ``since_rest`` if it came after the last reading at rest.
+    are not known. ``since_rest`` if it came after the last reading at rest, ``at_least`` if the law ends below it.
     """
 
     keys: tuple[str, ...]
@@ -37,6 +37,7 @@ class Exposure(NamedTuple):
     kind: Any
     sensors: Sequence[Sensor] | None
     since_rest: bool = True
+    at_least: bool = False
 
 
 def exposed(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
@@ -51,7 +52,8 @@ def exposed(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
             yield Term(one.name, one.what, one.kind, None, source=source)
         elif one.sensors:
             yield reference.term(
-                one.name, one.what, one.kind, one.sensors, since_rest=one.since_rest, source=source
+                one.name, one.what, one.kind, one.sensors, since_rest=one.since_rest, at_least=one.at_least,
+                source=source,
             )  # fmt: skip
     if effects.meter:
         gain = Changes(*(effects.meter,) * 5)  # the same at rest: the press is read as it is
@@ -105,7 +107,9 @@ def _tip(e: Effects, model: SensorModel, reference: ReferenceLoad) -> Iterator[E
         yield Exposure(("off_middle_mm",), "tip off the middle", f"by {e.off_middle_mm:g} mm across", "tip", ends)
     if e.tilt_deg and model.body.design.tip.block != EVEN:
         ends = _tilted(model, reference, tan(radians(e.tilt_deg)) * width_m)
-        yield Exposure(("tilt_deg",), "tip tilted", f"by {e.tilt_deg:g} degrees across", "tip", ends)
+        ended = len(ends or ()) > 1
+        what = f"by {e.tilt_deg:g} degrees across{': its edge presses beyond the compression law' * ended}"
+        yield Exposure(("tilt_deg",), "tip tilted", what, "tip", ends, at_least=ended)
 
 
 def _first_layer(e: Effects, sensor: Sensor) -> Iterator[Exposure]:
@@ -132,13 +136,16 @@ def _resistivity(sensor: Sensor, factor: float) -> Sensor:
 def _with_law(
     reference: ReferenceLoad, shares: Callable[[float], Real], scale: float = 1.0
 ) -> list[Sensor] | None:  # fmt: skip
-    """The sensor with the rise of its parts at uneven pressures, times a scale; None beyond its law."""
-    sensor = reference.sensor
+    """The sensor with the rise of its parts at uneven pressures, times a scale; None beyond the law of a plate.
+
+    Beyond the law of a cell, whose gaps close: with no further rise, and with one by its last slope.
+    """
+    sensor, mean_pa = reference.sensor, reference.stress_pa()
     try:
-        law = averaged(sensor.compression, shares, reference.stress_pa())
+        laws = [averaged(law, shares, mean_pa) for law in beyond(sensor.compression, mean_pa, shares)]
     except OutOfRange:
         return None
-    return [replace(sensor, compression=law.scaled_rise(scale))]
+    return [replace(sensor, compression=law.scaled_rise(scale)) for law in laws]
 
 
 def _tilted(model: SensorModel, reference: ReferenceLoad, difference_m: float) -> list[Sensor] | None:

@@ -17,6 +17,7 @@ from sensorgen.core.arrays import Complex, Mask, Real
 STEP = 1e-3  # of central differences [standard deviations]
 _MOST_LN = 80.0  # of a parameter's logarithm: beyond, numbers overflow
 _STEPS = 30
+_STRONG = 1.0  # damping of a step that is less than half of the undamped one
 PARALLEL = 1e-9  # sine of the angle between two directions below which they are one: slopes are right to 1e-11
 
 Index = NDArray[np.intp]
@@ -128,15 +129,15 @@ def whitening(covariance: Real) -> Real:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
 
 
-def slopes(function: Callable[[Real], Real], at: Real) -> Real:
-    """Derivatives by p parameters (..., p): central differences of a function of points (2 p, p)."""
-    step = np.eye(len(at)) * STEP
+def slopes(function: Callable[[Real], Real], at: Real, which: Sequence[int] | slice = slice(None)) -> Real:
+    """Derivatives by p parameters, or some of them (..., p): central differences of a function of points (2 p, p)."""
+    step = np.eye(len(at))[which] * STEP
     more, less = np.split(function(np.concatenate([at + step, at - step])), 2)
     return np.moveaxis(more - less, 0, -1) / (2 * STEP)
 
 
 @dataclass
-class Fit(Samples):
+class LocalFit(Samples):
     """Sum of squares near points, for n samples of p parameters.
 
     Attributes
@@ -202,32 +203,38 @@ class LeastSquares(ABC):
     """First damping where a step failed, relative to the information."""
 
     @abstractmethod
-    def fit(self, at: Real, rows: Index) -> Fit:
+    def fit(self, at: Real, rows: Index) -> LocalFit:
         """Sum of squares of some samples at points."""
 
-    def step(self, fit: Fit, damping: Real) -> Real:
+    def step(self, fit: LocalFit, damping: Real) -> Real:
         """Damped step within reach and bounds (n, p)."""
         information = fit.information * (1 + damping[:, None, None] * np.eye(fit.at.shape[1]))
-        step = _solved(information, fit.gradient)
-        if np.isfinite(self.reach):
-            step *= self.reach / np.maximum(self.reach, np.abs(step).max(1, keepdims=True))
+        step = self._reachable(_solved(information, fit.gradient))
         within = np.clip(fit.at + step, -self.bound, self.bound) - fit.at
         ended = np.abs(fit.at + step) > self.bound
         if ended.any():  # those go to their bound, the others to the least squares along it
             left = fit.gradient - np.einsum("nij,nj->ni", information, np.where(ended, within, 0.0))
             free = ~(ended[:, :, None] | ended[:, None, :])
             reduced = np.where(free, information, np.eye(fit.at.shape[1]))
-            step = _solved(reduced, np.where(ended, within, left))
+            step = self._reachable(_solved(reduced, np.where(ended, within, left)))
             within = np.clip(fit.at + step, -self.bound, self.bound) - fit.at
         return np.asarray(within)
 
-    def done(self, fit: Fit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
+    def _reachable(self, step: Real) -> Real:
+        """Step shortened to the reach."""
+        if np.isinf(self.reach):
+            return step
+        return np.asarray(step * self.reach / np.maximum(self.reach, np.abs(step).max(1, keepdims=True)))
+
+    def done(self, fit: LocalFit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
         """Samples of which this is the last step, by it and by its gain in the sum of squares."""
         return np.asarray(np.abs(step).max(1) < self.settled)
 
 
-def descend(problem: LeastSquares, start: Real) -> Fit:
+def descend(problem: LeastSquares, start: Real) -> LocalFit:
     """Least squares by damped Gauss-Newton (Levenberg and Marquardt), many samples together.
+
+    A step that is short because it is strongly damped is not the last.
 
     Parameters
     ----------
@@ -247,7 +254,7 @@ def descend(problem: LeastSquares, start: Real) -> Fit:
         now = best.rows(active)
         step = problem.step(now, damping[active])
         gain = np.einsum("ni,ni->n", step, now.gradient)
-        last = problem.done(now, step, gain, active)
+        last = problem.done(now, step, gain, active) & (damping[active] <= _STRONG)
         done = active[last]
         best.at[done] += step[last]
         best.chi2[done] = np.maximum(best.chi2[done] - gain[last], 0.0)

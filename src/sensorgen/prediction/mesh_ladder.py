@@ -24,7 +24,7 @@ from sensorgen.scene.sections import overlap
 
 if TYPE_CHECKING:
     from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness, Pressed
-    from sensorgen.models.press3d import Pieces
+    from sensorgen.models.press3d import BrickCounts
 
 MODELS = ("press2d", "press3d", "press_round")
 QUICK = ("press2d", "press_round", "press3d")
@@ -49,16 +49,16 @@ Data = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Piece:
+class PressedPiece:
     """The part of a sensor that is pressed: a scene without support, and the period of its pattern, if any [mm]."""
 
     scene: Scene
     period_mm: float | None
 
 
-def drawn(design: Design) -> Piece:
+def drawn(design: Design) -> PressedPiece:
     """The whole sensor as drawn."""
-    return Piece(design.in_use, getattr(design.params, "period_mm", None))
+    return PressedPiece(design.in_use, getattr(design.params, "period_mm", None))
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Case:
 
     Attributes
     ----------
-    piece : Piece
+    piece : PressedPiece
         That is pressed.
     model : str
         One of ``MODELS``.
@@ -79,7 +79,7 @@ class Case:
         Base, period, top and contact.
     """
 
-    piece: Piece
+    piece: PressedPiece
     model: str
     solids: "Mapping[str, Elastic]"
     permittivity: Mapping[str, float]
@@ -110,24 +110,24 @@ class MeshLevel:
 
 
 @lru_cache(maxsize=16)
-def why_not_applicable(piece: Piece, model: str) -> str | None:
+def why_not_applicable(piece: PressedPiece, model: str) -> str | None:
     """Why a model does not apply to a piece, or None."""
     said: str | None = import_module(f"sensorgen.models.{model}").why_not_applicable(piece.scene)
     return said
 
 
-def model_of(piece: Piece, *, quick: bool = False) -> str:
+def model_of(piece: PressedPiece, *, quick: bool = False) -> str:
     """The first of ``MODELS``, or of ``QUICK``, that applies to a piece; where none does, the first of all."""
     order = QUICK if quick else MODELS
     return next((model for model in order if not why_not_applicable(piece, model)), MODELS[0])
 
 
-def mesh_levels(piece: Piece, model: str, loads: int) -> list[MeshLevel]:
+def mesh_levels(piece: PressedPiece, model: str, loads: int) -> list[MeshLevel]:
     """The mesh levels of a model, coarsest first.
 
     Parameters
     ----------
-    piece : Piece
+    piece : PressedPiece
         That is pressed.
     model : str
         One of ``MODELS``.
@@ -158,12 +158,12 @@ def _area_error(model: str) -> float:
     return press_round.AREA_ERROR if model == "press_round" else 0.0
 
 
-def fineness(model: str, level: int) -> "Fineness | Pieces":
+def fineness(model: str, level: int) -> "Fineness | BrickCounts":
     """The mesh of a level: triangles of another size, or boxes of more or fewer pieces."""
     from sensorgen.models import press2d, press3d, press_round
 
     if model == "press3d":
-        pieces = press3d.Pieces()
+        pieces = press3d.BrickCounts()
         return replace(pieces, pieces=pieces.pieces + level)
     usual = press_round.USUAL if model == "press_round" else press2d.Fineness()
     return usual.scaled(_TIMES[level])
@@ -175,7 +175,7 @@ def _size(model: str, level: int) -> float:
 
     if model != "press3d":
         return _TIMES[level]
-    usual = press3d.Pieces().pieces
+    usual = press3d.BrickCounts().pieces
     return usual / (usual + level) if usual + level > 0 else inf
 
 
@@ -290,6 +290,7 @@ def estimated(
     coarse = found.first(1) if alone else pressed(case, some, level - 1, keep=keep).sound()
     if not alone and coarse.stress_pa[-1] < some[-1]:  # shorter steps
         coarse = pressed(case, [float(p) for p in found.stress_pa], level - 1, keep=keep).sound()
+    coarse = coarse.some(np.flatnonzero(np.isin(coarse.stress_pa, found.stress_pa)).tolist())
     return (_limit if case.model == "press3d" else _errors)(case, found, coarse, level)
 
 
@@ -297,7 +298,7 @@ def _limit(case: Case, fine: "Pressed", coarse: "Pressed", level: int) -> Estima
     """Where two meshes of boxes lead, with at least the error that this has on other cells."""
     from sensorgen.models import press3d
 
-    ahead = press3d.limit(fine, coarse, press3d.Pieces().pieces + level)
+    ahead = press3d.limit(fine, coarse, press3d.BrickCounts().pieces + level)
     least = max(_expected(case, level), VERIFIED)
     down = ahead.found.displacement_m - fine.fall_m
     moved = np.maximum(ahead.displacement_error_m, _OF_DISPLACEMENT * least * down)

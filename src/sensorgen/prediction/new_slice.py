@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sensorgen.asprinted import printed as asprinted
-from sensorgen.checks.volumes import Row
+from sensorgen.checks.volumes import LayerVolume
 from sensorgen.core.findings import Finding
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design
@@ -44,7 +44,7 @@ class Slicer:
 class Volumes:
     """Printed over exact volume per body and layer, and findings about what the lines print."""
 
-    layers: tuple[Row, ...]
+    layers: tuple[LayerVolume, ...]
     findings: tuple[Finding, ...]
 
 

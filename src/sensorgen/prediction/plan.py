@@ -14,7 +14,7 @@ Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
-class Candidate:
+class PlanCandidate:
     """A model in a plan: expected and reached error and time.
 
     Attributes
@@ -63,7 +63,7 @@ class Level:
         What the errors of its candidates are of, in words.
     allowed : float
         Tolerance [-].
-    candidates : tuple of Candidate
+    candidates : tuple of PlanCandidate
         The least expensive first.
     chosen : str
         The model whose answer is used, or that is expected to meet the tolerance; "" where none applies.
@@ -72,7 +72,7 @@ class Level:
     name: str
     measure: str
     allowed: float
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[PlanCandidate, ...]
     chosen: str = ""
 
 
@@ -114,7 +114,7 @@ class Plan:
             )
 
 
-def candidates_table(candidates: Sequence[Candidate], caption: str = "", chosen: str = "") -> Table:
+def candidates_table(candidates: Sequence[PlanCandidate], caption: str = "", chosen: str = "") -> Table:
     """Models with their expected and reached error and time; an arrow leads the one that was chosen."""
     columns = (Column(""), Column("model"), Column("expected"), Column("reached"), Column("reason"))
     rows = ((">" if c.model == chosen else "", c.model, c.expected(), c.reached(), c.passed_over) for c in candidates)
@@ -141,11 +141,11 @@ def without_times(plan: Plan) -> Plan:
     return replace(plan, levels=tuple(levels))
 
 
-def cheapest(candidates: tuple[Candidate, ...], allowed: float) -> str:
+def cheapest(candidates: tuple[PlanCandidate, ...], allowed: float) -> str:
     """Name of the first candidate expected within tolerance; else of the one with the least expected error."""
     able = [c for c in candidates if not c.passed_over]
     enough = [c for c in able if c.reach() <= allowed]
-    nearest = sorted(able, key=Candidate.reach)
+    nearest = sorted(able, key=PlanCandidate.reach)
     return next((c.model for c in (*enough, *nearest)), "")
 
 

@@ -14,7 +14,7 @@ from sensorgen.design.body import Body
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.capacitance import Answer, default_width, weighed
 from sensorgen.prediction.compression_law import Law, LawOption, infill, options
-from sensorgen.prediction.plan import Candidate, Level, Plan, cheapest, run_until_within
+from sensorgen.prediction.plan import Level, Plan, PlanCandidate, cheapest, run_until_within
 from sensorgen.prediction.query import DEFAULT, FLAT, Load, Query, Tip
 from sensorgen.prediction.reference_load import ReferenceLoad
 from sensorgen.prediction.rest_state import rest_state
@@ -183,12 +183,12 @@ def _cell(rough: SensorModel, width: float) -> Level:
 
 
 def _results(cell: Level, answer: Answer) -> Level:
-    candidates = answer.plan or (Candidate(answer.model, width=answer.width()),)
+    candidates = answer.plan or (PlanCandidate(answer.model, width=answer.width()),)
     return replace(cell, candidates=candidates, chosen=answer.model)
 
 
 def _compression(laws: list[LawOption], sensor: Sensor, load: Load, allowed: float) -> Level:
-    candidates = tuple(Candidate(o.name, _error_of_law(sensor, load, o.expected), o.seconds) for o in laws)
+    candidates = tuple(PlanCandidate(o.name, _error_of_law(sensor, load, o.expected), o.seconds) for o in laws)
     return Level("compression", _ERROR_OF_Z, allowed, candidates, cheapest(candidates, allowed))
 
 
@@ -219,7 +219,7 @@ def _error(sensor: Sensor, load: Load, *others: Sensor, factor: float = 1.0) -> 
 def _line(sensor: Sensor, load: Load, allowed: float, expected: Level | None = None) -> Level:
     """Sections under the tip until there are enough: one where its pressure is uniform, which is exact."""
     before = {c.model: c for c in expected.candidates} if expected else {}
-    found: list[Candidate] = []
+    found: list[PlanCandidate] = []
     for name, pieces in _NAMES.items():
         enough = found and (found[-1].width or 0.0) <= allowed
         if (pieces == 1) is (sensor.profile == UNIFORM) and not enough:
@@ -227,13 +227,13 @@ def _line(sensor: Sensor, load: Load, allowed: float, expected: Level | None = N
             cut = replace(sensor, pieces=pieces)
             error = 0.0 if pieces == 1 else _error(cut, load, replace(cut, pieces=2 * pieces), factor=_RICHARDSON)
             seconds = time.perf_counter() - begun
-            found.append(replace(before.get(name, Candidate(name)), width=error, seconds=seconds))
+            found.append(replace(before.get(name, PlanCandidate(name)), width=error, seconds=seconds))
     return Level("line", _ERROR_OF_Z, allowed, tuple(found), found[-1].model)
 
 
 def _expected(level: Level) -> Level:
     """Results for a rough sensor, as what to expect."""
-    return replace(level, candidates=tuple(Candidate(c.model, c.width, c.seconds) for c in level.candidates))
+    return replace(level, candidates=tuple(PlanCandidate(c.model, c.width, c.seconds) for c in level.candidates))
 
 
 def _reach(level: Level) -> float:

@@ -253,7 +253,7 @@ def _printed_otherwise(model: SensorModel, load: Load, query: Query) -> Iterator
     for rule in list(body.cells.scenes)[1:]:
         with suppress(SensorgenError):  # as of a short, which the prediction tells by itself
             other = body.printed_otherwise(rule)
-            rest = rest_state(other)
+            rest = rest_state(other, ranges=False)
             at_rest.append((rest.capacitance.value, other, rest))
     ends = {id(pick[1]): pick for pick in (_end(at_rest, least=True), _end(at_rest, least=False))}
     pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
@@ -450,12 +450,26 @@ def _ranges_assumed(design: Design, values: Iterable[MaterialValue]) -> Iterator
     )
 
 
+def _stripes(design: Design) -> Iterator[str]:
+    """Infill that an estimate of the print has as stripes, and that is none."""
+    from sensorgen.checks.estimate import lines
+
+    for name, of in lines(design).items():
+        if of.infill < 1 and of.pattern != "rectilinear":
+            yield (
+                f"{of.pattern} infill of {name} as stripes of its share, one above the other or crossed, both within "
+                "the range; G-code states where its lines lie"
+            )
+
+
 def _assumptions(body: Body, model: SensorModel | None) -> Iterator[str]:
     """Assumptions of the model."""
     if is_open(body.cells.first()):
         yield "electrodes are equipotential for the capacitance, and the fringe at their edges is in free air"
     else:
         yield "electrodes are equipotential for the capacitance; the fringe at the sensor's edge is in the range alone"
+    if body.kind == "estimated":
+        yield from _stripes(body.design)
     yield "electrode resistance from end face to end face, cogs included"
     yield from _ranges_assumed(body.design, model.values if model else ())
     if not body.is_drawn:

@@ -25,7 +25,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-class Reading(NamedTuple):
+class LoadedImpedance(NamedTuple):
     """Impedance under the load, its derivatives by force and position, and that at rest; a value per frequency."""
 
     pressed: Complex
@@ -74,13 +74,13 @@ class ReferenceLoad:
         self._own = self._read(sensor)
         self._told = self._grades(sensor)
 
-    def _read(self, sensor: Sensor) -> Reading:
+    def _read(self, sensor: Sensor) -> LoadedImpedance:
         """Values of a sensor; of one whose values depend on the frequency, by that of each tone."""
         tones = [(sensor, self._frequency)]
         if isinstance(sensor, Dispersed):
             tones = [(sensor.at(f), np.array([f])) for f in self._frequency.tolist()]
         read = [(*s.response(f, *self.at), s.impedance(f, 0.0, self.at[1])) for s, f in tones]
-        return Reading(*(np.concatenate(parts) for parts in zip(*read, strict=True)))
+        return LoadedImpedance(*(np.concatenate(parts) for parts in zip(*read, strict=True)))
 
     def stress_pa(self) -> float:
         """Highest pressure under the tip [Pa]."""
@@ -112,7 +112,7 @@ class ReferenceLoad:
             found = found.max(Changes(*(factor * d for d in (*parts, slope, c, *press))))
         return found
 
-    def _misread(self, read: Reading) -> tuple[float, float]:
+    def _misread(self, read: LoadedImpedance) -> tuple[float, float]:
         """By how much force and position [N], [m] are wrong that the sensor's own model finds in a reading.
 
         Least squares of the logarithms, by Gauss-Newton steps that stay on the sensor and within its law.
@@ -128,7 +128,7 @@ class ReferenceLoad:
                 pressed = self.sensor.response(self._frequency, *after.tolist())
             except OutOfRange:
                 break
-            own, at = Reading(*pressed, own.rest), after
+            own, at = LoadedImpedance(*pressed, own.rest), after
         off = np.abs(at - np.array(self.at))
         off[off < _PARALLEL * scale] = 0.0
         return float(off[0]), float(off[1])

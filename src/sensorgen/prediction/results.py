@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
 _SHORT = 60  # characters that say what an assumption is, on a first screen
+_LEAST_PERCENT = 0.005  # change of a value that is not rounding
 _LEAST_N, _LEAST_M = 1e-3, 1e-5  # by which a press is read wrongly: less is not said
 UNPREDICTED = "12-numbers"  # rule of the finding that there are none
 SCHEMA = (
@@ -564,8 +565,10 @@ def _range(bounds: Bounds) -> str:
 
 def _change(part: Interval, value: float) -> str:
     """Changes from the best value to the ends [%]."""
-    changes = (100 * (end / value - 1) for end in (part.lower, part.upper))
-    return " to ".join(f"{float(f'{c:.2g}'):+g}" if abs(c) >= 0.005 else "0" for c in changes) + " %"
+    changes = [100 * (end / value - 1) for end in (part.lower, part.upper)]
+    if max(map(abs, changes)) < _LEAST_PERCENT:
+        return "none" if part.lower == part.upper else f"within {2 * _LEAST_PERCENT:g} %"
+    return " to ".join(f"{float(f'{c:.2g}'):+g}" if abs(c) >= _LEAST_PERCENT else "0" for c in changes) + " %"
 
 
 @cache

@@ -12,7 +12,7 @@ from sensorgen.models import pressure
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.compression_law import Law, gap_m, law_of
 from sensorgen.prediction.losses import Lost, lost
-from sensorgen.prediction.mesh_ladder import Piece
+from sensorgen.prediction.mesh_ladder import PressedPiece
 from sensorgen.prediction.query import FLAT, Tip
 from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.scene.sections import square_to
@@ -60,9 +60,9 @@ class SensorModel:
         return (*self.rest.doubts, *self.law.doubts, *self.lost.doubts)
 
 
-def piece(body: Body) -> Piece:
+def piece(body: Body) -> PressedPiece:
     """Piece of a body to press: its most likely cell, and the period of the pattern."""
-    return Piece(body.cells.first(), body.cells.period_mm)
+    return PressedPiece(body.cells.first(), body.cells.period_mm)
 
 
 def pressure_pa(body: Body, tip: Tip, force_n: float) -> float:
@@ -150,7 +150,7 @@ def _thickness_m(body: Body, rest: RestState) -> tuple[float, float]:
     return found[0], found[1]
 
 
-def _contact(body: Body, law: Law, pressed: Piece, profile: str, radius_m: float) -> pressure.Contact:
+def _contact(body: Body, law: Law, pressed: PressedPiece, profile: str, radius_m: float) -> pressure.RoundContact:
     """Growth of a round tip's contact: on the film as a thick body, or on the cell as a foundation of springs."""
     if profile == "hertz":
         soft = film_of(body.design)

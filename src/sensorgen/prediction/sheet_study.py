@@ -12,7 +12,17 @@ from sensorgen.core.document import Cell, Column, Facts, Part, Table, to_json
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM, si
 from sensorgen.models.sensor import Sensor
-from sensorgen.models.sheet import Bounds, Contact, Patch, Port, Sheet, contact_sets, depth_m, impedance, localise
+from sensorgen.models.sheet import (
+    Contact,
+    Port,
+    PressErrors,
+    Sheet,
+    SheetPatch,
+    contact_sets,
+    depth_m,
+    impedance,
+    localise,
+)
 from sensorgen.prediction.sensor_model import SensorModel
 
 PLACES = 7  # along each side
@@ -106,11 +116,11 @@ class SheetStudy:
     ----------
     sheet : Sheet
         The film and its electrodes.
-    press : Patch
+    press : SheetPatch
         Size of the tip, and its factors at the force.
     ports : mapping of str to tuple of Port
         Contacts of each set.
-    bounds : mapping of str to Bounds
+    bounds : mapping of str to PressErrors
         With each set.
     force_n, noise : float
         The force [N], the noise of a reading relative to abs(Z) [-].
@@ -119,9 +129,9 @@ class SheetStudy:
     """
 
     sheet: Sheet
-    press: Patch
+    press: SheetPatch
     ports: Mapping[str, tuple[Port, ...]]
-    bounds: Mapping[str, Bounds]
+    bounds: Mapping[str, PressErrors]
     force_n: float
     noise: float
     doubts: tuple[str, ...]
@@ -175,7 +185,7 @@ class SheetStudy:
             {name: self._contact(name, found) for name, found in self.bounds.items()},
         )  # fmt: skip
 
-    def _contact(self, name: str, found: Bounds) -> ContactRecord:
+    def _contact(self, name: str, found: PressErrors) -> ContactRecord:
         z = impedance(self.sheet, self.ports[name], found.frequency_hz, cells=found.cells)
         force, x, y = np.moveaxis(found.sigma(), -1, 0)
         return ContactRecord(
@@ -237,7 +247,7 @@ def study(
     return SheetStudy(sheet, press, ports, bounds, force_n, noise, model.doubts)
 
 
-def _press(sensor: Sensor, tip_m: float, force_n: float) -> tuple[Patch, dict[str, float]]:
+def _press(sensor: Sensor, tip_m: float, force_n: float) -> tuple[SheetPatch, dict[str, float]]:
     """Effect of a force under the tip, and its derivatives by the force."""
     shorter = min(sensor.length_m, sensor.width_m)
     if not 0 < tip_m < shorter:
@@ -254,7 +264,7 @@ def _press(sensor: Sensor, tip_m: float, force_n: float) -> tuple[Patch, dict[st
     top, bottom = (1 + rise * force_n for rise in rises)
     per_newton = {"capacitance_factor": factor**2 * slope / area}
     per_newton |= {f"{end}_resistance_factor": rise for end, rise in zip(("top", "bottom"), rises, strict=True)}
-    return Patch(0.0, 0.0, tip_m, tip_m, factor, (top, bottom)), per_newton
+    return SheetPatch(0.0, 0.0, tip_m, tip_m, factor, (top, bottom)), per_newton
 
 
 def _map(values: NDArray[np.float64]) -> Map:

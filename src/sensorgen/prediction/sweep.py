@@ -16,7 +16,7 @@ from sensorgen.design.body import Body
 Value = float | str
 
 
-class Point(Protocol):
+class SweepPoint(Protocol):
     """A result that a sweep may have at each of its values."""
 
     @property
@@ -37,7 +37,7 @@ class Point(Protocol):
         ...
 
 
-Result = TypeVar("Result", bound=Point)
+Result = TypeVar("Result", bound=SweepPoint)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from sensorgen.models import thesis_cells
 from sensorgen.prediction import capacitance as planner
 from sensorgen.prediction import losses
 from sensorgen.prediction.capacitance import PLANE, Unpredictable
-from sensorgen.prediction.capacitance_answer import Asked
+from sensorgen.prediction.capacitance_answer import CapacitanceQuestion
 from sensorgen.prediction.sweep import Sweep
 
 NAMES = (*thesis_cells.NAMED, thesis_cells.GEOMETRY)
@@ -81,14 +81,14 @@ class FormulaResult:
         return () if self.model else (f"no answer: {self.reason}",)
 
 
-def answer(design: Design, asked: Asked, press_mm: float | None = None) -> FormulaResult:
+def answer(design: Design, asked: CapacitanceQuestion, press_mm: float | None = None) -> FormulaResult:
     """The capacitance per area of the sensor at rest that a formula gives.
 
     Parameters
     ----------
     design : Design
         Of a shape that the formula applies to.
-    asked : Asked
+    asked : CapacitanceQuestion
         The formula as its model; the accuracy of the field on the pressed geometry of 3.1.2.
     press_mm : float, optional
         Displacement of the top [mm]; only for those in ``PRESSED``.
@@ -115,7 +115,7 @@ def answer(design: Design, asked: Asked, press_mm: float | None = None) -> Formu
 
 
 def sweep(
-    key: str, points: Sequence[tuple[float | str, Design]], asked: Asked, press_mm: Sequence[float]
+    key: str, points: Sequence[tuple[float | str, Design]], asked: CapacitanceQuestion, press_mm: Sequence[float]
 ) -> Sweep[FormulaResult]:
     """Answers along a sweep, or along presses of one design; with a reason where there is no number.
 
@@ -125,7 +125,7 @@ def sweep(
         The setting that is varied, or "" for presses.
     points : sequence of (value, Design)
         Its values and their designs; one of them for presses.
-    asked : Asked
+    asked : CapacitanceQuestion
         As of :func:`answer`.
     press_mm : sequence of float
         Displacements of the top [mm]; may be empty.
@@ -166,14 +166,14 @@ def _refuse(design: Design, name: str, press_mm: float | None) -> None:
 Found = tuple[float, str, list[MaterialValue]]
 
 
-def _formula(design: Design, asked: Asked, press_mm: float) -> Found:
+def _formula(design: Design, asked: CapacitanceQuestion, press_mm: float) -> Found:
     """Of one permittivity, the film's."""
     taken = [t for t in permittivities(design) if t.material == design.slot("film")[0].name]
     value = thesis_cells.NAMED[asked.model].value_f_per_m2(design.params, taken[0].value, press_mm)
     return value, f"{thesis_cells.SOURCE}: a formula alone, without bounds; air is taken for 1", taken
 
 
-def _field(design: Design, asked: Asked, press_mm: float) -> Found:
+def _field(design: Design, asked: CapacitanceQuestion, press_mm: float) -> Found:
     """The field on the sizes that 3.1.2 makes of some whole periods, by the least expensive model within tolerance."""
     rest: Any = design.params
     now = thesis_cells.swept(rest, press_mm)

@@ -4,7 +4,7 @@ An electrode is the largest connected piece of the bodies that are drawn with it
 edge or a corner touch.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -148,15 +148,18 @@ def connected_layers(layers: Sequence[LayerRegions], bodies: Sequence[Body], con
     for (number, body, part), terminal in zip(pieces, terminals, strict=True):
         own = renamed.setdefault((body.name, terminal), _as(body, terminal))
         regions[number].setdefault(own.name, []).append(part)
-    made = [
-        layer.mapped(
-            {name: region for name, region in layer.regions.items() if name not in named}
-            | {name: shapely.multipolygons(own) if len(own) > 1 else own[0] for name, own in here.items()}
-        )
-        for layer, here in zip(layers, regions, strict=True)
-    ]
+    made = [_replaced(layer, named.keys(), here) for layer, here in zip(layers, regions, strict=True)]
     others = [own for (name, terminal), own in renamed.items() if named[name].terminal != terminal]
     return Connected(tuple(made), (*bodies, *others), tuple(_shorts(found, pairs)), floating)
+
+
+def _replaced(
+    layer: LayerRegions, names: Collection[str], parts_of: Mapping[str, list[shapely.Polygon]]
+) -> LayerRegions:  # fmt: skip
+    """A layer with other regions in place of those of some names."""
+    others = {name: region for name, region in layer.regions.items() if name not in names}
+    united = {name: shapely.multipolygons(own) if len(own) > 1 else own[0] for name, own in parts_of.items()}
+    return layer.mapped(others | united)
 
 
 def _as(body: Body, terminal: str) -> Body:

@@ -14,18 +14,18 @@ import numpy as np
 import shapely
 
 from sensorgen.scene.scene import Body, Piece, Point, Prism, Scene, seen_from_above
-from sensorgen.scene.sections import ROUNDING_MM, Column, Layer, alike, columns, sections
+from sensorgen.scene.sections import ROUNDING_MM, Layer, SectionColumn, alike, columns, sections
 
 
 @dataclass(frozen=True)
-class Part:
+class OverlayPart:
     """Columns side by side.
 
     Attributes
     ----------
     depth_mm : float
         Of all columns [mm].
-    columns : tuple of Column
+    columns : tuple of SectionColumn
         From left to right in a cross-section; in plan in no order, each 1 mm deep and as wide as that makes its area.
     looks : tuple of int
         Of each column, the number of the first that looks like it.
@@ -34,12 +34,12 @@ class Part:
     """
 
     depth_mm: float
-    columns: tuple[Column, ...]
+    columns: tuple[SectionColumn, ...]
     looks: tuple[int, ...]
     in_plan: bool = False
 
 
-def parts(scene: Scene) -> list[Part]:
+def parts(scene: Scene) -> list[OverlayPart]:
     """The parts that together are the scene.
 
     Raises
@@ -49,13 +49,13 @@ def parts(scene: Scene) -> list[Part]:
     """
     every = [p for body in scene.bodies for p in body.pieces]
     if all((isinstance(p, Prism) and p.axis != "z") or p.is_box() for p in every):
-        return [Part(s.depth_mm, tuple(columns(s)), tuple(alike(s))) for s in sections(scene)]
+        return [OverlayPart(s.depth_mm, tuple(columns(s)), tuple(alike(s))) for s in sections(scene)]
     found = _patches(scene)
-    return [Part(1.0, found, tuple(range(len(found))), in_plan=True)]
+    return [OverlayPart(1.0, found, tuple(range(len(found))), in_plan=True)]
 
 
 @lru_cache(maxsize=8)
-def _patches(scene: Scene) -> tuple[Column, ...]:
+def _patches(scene: Scene) -> tuple[SectionColumn, ...]:
     """Pieces of the plan over which the same layers lie, those of one look as one."""
     pieces = [(body, p) for body in scene.bodies for p in body.pieces]
     slanted = next((body for body, p in pieces if not p.is_constant("z")), None)
@@ -75,7 +75,7 @@ def _patches(scene: Scene) -> tuple[Column, ...]:
     for here, area in zip(over, shapely.area(faces).tolist(), strict=True):
         areas[tuple(sorted(kinds[k] for k in here))] += area
     looks = ((look, area) for look, area in areas.items() if area > ROUNDING_MM**2)
-    return tuple(Column(0.0, area, _layers([first[kind] for kind in look])) for look, area in looks)
+    return tuple(SectionColumn(0.0, area, _layers([first[kind] for kind in look])) for look, area in looks)
 
 
 def _plan(body: Body, piece: Piece) -> shapely.Polygon:

@@ -97,7 +97,7 @@ class Layer:
 
 
 @dataclass(frozen=True)
-class Column:
+class SectionColumn:
     """A vertical strip of a section in which every interface is one straight line."""
 
     left_mm: float
@@ -105,7 +105,7 @@ class Column:
     layers: tuple[Layer, ...]
 
 
-def columns(section: Section) -> list[Column]:
+def columns(section: Section) -> list[SectionColumn]:
     """Cut a section into columns, from left to right; layers from bottom to top."""
     return list(_columns(section))
 
@@ -125,7 +125,7 @@ def alike(section: Section, digits: int = 12) -> list[int]:
 
 
 @lru_cache(maxsize=8)
-def _columns(section: Section) -> list[Column]:
+def _columns(section: Section) -> list[SectionColumn]:
     cuts = sorted({u for _, outline in section.regions for u, _ in outline})
     edges: list[list[tuple[Point, int]]] = [[] for _ in cuts[1:]]
     for number, (_, outline) in enumerate(section.regions):
@@ -136,7 +136,7 @@ def _columns(section: Section) -> list[Column]:
                 left, right = va + (cuts[k] - ua) * slope, va + (cuts[k + 1] - ua) * slope
                 edges[k].append(((left, vb if cuts[k + 1] == ub else right), number))
     return [
-        Column(left, right, _layers(section, found))
+        SectionColumn(left, right, _layers(section, found))
         for (left, right), found in zip(pairwise(cuts), edges, strict=True)
         if right - left > ROUNDING_MM
     ]

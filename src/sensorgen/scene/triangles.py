@@ -51,7 +51,7 @@ class TriangleParams(Envelope):
 
 def layer_bodies(p: TriangleParams, fill: Fill, floor_mm: float) -> list[Body]:
     """Bodies of one layer over an electrode that ends at a height, its upper electrode among them."""
-    f = Frame(p, floor_mm)
+    f = LayerFrame(p, floor_mm)
     return [
         *_lower(f, fill),
         Body("support", fill.support, f.prisms(f.air()) if fill.support else ()),
@@ -60,7 +60,7 @@ def layer_bodies(p: TriangleParams, fill: Fill, floor_mm: float) -> list[Body]:
     ]
 
 
-def _lower(f: "Frame", fill: Fill) -> list[Body]:
+def _lower(f: "LayerFrame", fill: Fill) -> list[Body]:
     """Film and lower triangles: one body where they are of one material."""
     if f.film == f.low:
         return [Body("lower_dielectric", fill.dielectric, f.prisms(f.feet()))]
@@ -70,7 +70,7 @@ def _lower(f: "Frame", fill: Fill) -> list[Body]:
     return [film, Body("lower_dielectric", fill.dielectric, f.prisms(f.feet()))]
 
 
-class Frame:
+class LayerFrame:
     """Heights and places that the outlines of one layer share, and the outlines, not yet cut at the end [mm]."""
 
     def __init__(self, p: TriangleParams, floor_mm: float) -> None:

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from sensorgen.scene.scene import Point
-from sensorgen.scene.sections import ROUNDING_MM, Column, Section, columns
+from sensorgen.scene.sections import ROUNDING_MM, Section, SectionColumn, columns
 
 LARGER = 2  # slices of a cell that the sensor's end does not cut, over those of one that it cuts
 _MOST_PLACES = 400  # for the first two mirrors; a pattern of more corners than these is solved as a whole
@@ -75,7 +75,7 @@ class Slice:
 
 
 @dataclass(frozen=True)
-class Cell:
+class SectionCell:
     """Part of a section that has to be solved, with zero flux through both sides.
 
     Attributes
@@ -91,7 +91,7 @@ class Cell:
 
 
 @lru_cache(maxsize=8)
-def cell(section: Section, height_mm: float, evenly: bool = True) -> Cell:
+def cell(section: Section, height_mm: float, evenly: bool = True) -> SectionCell:
     """The smallest piece of a section that mirrors at its own two sides continue to the whole.
 
     Parameters
@@ -112,7 +112,7 @@ def cell(section: Section, height_mm: float, evenly: bool = True) -> Cell:
 
 
 @lru_cache(maxsize=16)
-def mirrored(slices: tuple[Slice, ...], evenly: bool = True) -> Cell:
+def mirrored(slices: tuple[Slice, ...], evenly: bool = True) -> SectionCell:
     """The smallest run of slices that mirrors at its own two sides continue to all of them."""
     # Slices as wide as their interfaces are straight
     whole: list[Slice] = []
@@ -134,10 +134,10 @@ def mirrored(slices: tuple[Slice, ...], evenly: bool = True) -> Cell:
                 continue
             if _repeats(whole, low, high):
                 return _cell(whole, low, high)
-    return Cell(tuple(whole), (1.0,) * len(whole))
+    return SectionCell(tuple(whole), (1.0,) * len(whole))
 
 
-def affordable(slices: tuple[Slice, ...], evenly: bool = True) -> Cell:
+def affordable(slices: tuple[Slice, ...], evenly: bool = True) -> SectionCell:
     """The piece that occurs a whole number of times, or the smallest where that has far fewer slices.
 
     Half a sensor may be a hundred periods: ``LARGER`` times as many slices are too many.
@@ -147,7 +147,7 @@ def affordable(slices: tuple[Slice, ...], evenly: bool = True) -> Cell:
     return even if len(even.slices) <= LARGER * len(smallest.slices) else smallest
 
 
-def _slice(column: Column, height_mm: float) -> Slice:
+def _slice(column: SectionColumn, height_mm: float) -> Slice:
     """A column with the air between its layers; layers of one material that touch are one."""
     bands: list[Band] = []
     at = (0.0, 0.0)
@@ -268,7 +268,7 @@ def _folded(slices: list[Slice], low: float, high: float) -> Iterator[Slice]:
                 yield Slice(low + left, low + right, bands)
 
 
-def _cell(slices: list[Slice], low: float, high: float) -> Cell:
+def _cell(slices: list[Slice], low: float, high: float) -> SectionCell:
     """The piece between two places, cut where a sensor's end falls into it, and how often each part occurs."""
     pieces = [(p.left_mm, p.right_mm) for p in _folded(slices, low, high)]
     inside = _cut(slices, low, high)
@@ -278,5 +278,5 @@ def _cell(slices: list[Slice], low: float, high: float) -> Cell:
     middles = [(p.left_mm + p.right_mm) / 2 for p in parts]
     shares = [float(sum(a < m < b for a, b in pieces)) for m in middles]
     if max(shares) == min(shares):
-        return Cell(tuple(inside), (shares[0],) * len(inside))
-    return Cell(tuple(parts), tuple(shares))
+        return SectionCell(tuple(inside), (shares[0],) * len(inside))
+    return SectionCell(tuple(parts), tuple(shares))

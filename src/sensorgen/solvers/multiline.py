@@ -19,7 +19,7 @@ _LITTLE = 0.5  # of a voltage
 _TERMS = 17  # of exp(N l) with |N l| up to 0.5: the next is below 1e-19 of the first
 
 
-class Line(NamedTuple):
+class LineMatrices(NamedTuple):
     """Matrices of a length of line, per length, and their change in one direction of interest."""
 
     series: Complex  # R [ohm/m]
@@ -29,7 +29,7 @@ class Line(NamedTuple):
     by_tilt: Complex | float = 0.0  # A [1/m]
 
 
-class Piece(NamedTuple):
+class LinePiece(NamedTuple):
     """A length as seen from its ends.
 
     Attributes
@@ -51,16 +51,16 @@ class Piece(NamedTuple):
 class Moving(NamedTuple):
     """A piece and its derivative."""
 
-    piece: Piece
-    by: Piece
+    piece: LinePiece
+    by: LinePiece
 
 
-def piece(line: Line, length_m: Real) -> Moving:
+def piece(line: LineMatrices, length_m: Real) -> Moving:
     """A length of line, by halving it until a series serves, and doubling that again.
 
     Parameters
     ----------
-    line : Line
+    line : LineMatrices
         Matrices (..., n, n).
     length_m : array
         Length, with two axes of 1 at its end [m].
@@ -77,7 +77,7 @@ def piece(line: Line, length_m: Real) -> Moving:
     return made
 
 
-def _short(line: Line, length_m: Real) -> Moving:
+def _short(line: LineMatrices, length_m: Real) -> Moving:
     """A piece so short that the exponential of its equations is a few terms of its series."""
     n = line.series.shape[-1]
     generator = _generator(line.series, line.shunt, 0.0) * length_m
@@ -94,8 +94,8 @@ def _short(line: Line, length_m: Real) -> Moving:
     inverse = np.linalg.inv(np.eye(n) + rest)
     opened, shorted, passed = -inverse @ shunt, -series @ inverse, _turned(inverse)  # type: ignore[arg-type]
     by_lost = passed @ _turned(by_rest) @ passed
-    found = Piece(opened, shorted, passed, passed @ _turned(rest))
-    by = Piece(
+    found = LinePiece(opened, shorted, passed, passed @ _turned(rest))
+    by = LinePiece(
         -inverse @ (by_shunt + by_rest @ opened), -(by_series + shorted @ by_rest) @ inverse, -by_lost, by_lost
     )  # fmt: skip
     return Moving(found, by)
@@ -127,13 +127,13 @@ def _doubled(moving: Moving) -> Moving:
     largest = np.abs(np.einsum("...kk->...k", product)).max(axis=-1)[..., None, None]
     arriving = np.where(largest < _LITTLE, product, np.eye(lost.shape[-1]) - lost)
     return Moving(
-        Piece(
+        LinePiece(
             opened + behind @ passed,
             shorted + before @ _turned(passed),
             arriving,
             lost,
         ),
-        Piece(
+        LinePiece(
             by.opened + _turned(passed) @ by_meet.opened @ passed + turn_1 + _turned(turn_1),
             by.shorted + passed @ by_meet.shorted @ _turned(passed) + turn_2 + _turned(turn_2),
             by_passed,
@@ -169,12 +169,12 @@ class Meeting:
         self.impedance: Complex = self.passed @ impedance
         self.lost: Complex = self.impedance @ admittance  # 1 - passed
 
-    def slopes(self, by_impedance: Complex, by_admittance: Complex) -> Piece:
+    def slopes(self, by_impedance: Complex, by_admittance: Complex) -> LinePiece:
         """Derivatives of ``admittance``, ``impedance``, ``passed`` and ``lost`` by X and W."""
         inward = by_admittance @ self.passed
         outward = self.passed @ by_impedance
         by_lost = outward @ self.admittance + self.impedance @ inward
-        return Piece(
+        return LinePiece(
             _turned(self.passed) @ inward - self.admittance @ by_impedance @ self.admittance,
             outward @ _turned(self.passed) - self.impedance @ by_admittance @ self.impedance,
             -by_lost,
@@ -186,7 +186,7 @@ def _turned(matrix: Complex) -> Complex:
     return np.swapaxes(matrix, -1, -2)
 
 
-def march(lines: Sequence[Line], lengths: Sequence[Real]) -> tuple[Complex, Complex]:
+def march(lines: Sequence[LineMatrices], lengths: Sequence[Real]) -> tuple[Complex, Complex]:
     """Admittance at the contacts and its derivative, from the open far end; the stack may be of any sections."""
     n = lines[0].series.shape[-1]
     w = by = np.zeros((n, n), complex)
@@ -237,7 +237,7 @@ def directions(deep: int, *changes: Complex | float) -> Complex:
     return found.reshape(len(changes), *(1,) * (deep + 1 - found.ndim), *found.shape[1:])
 
 
-class Body(NamedTuple):
+class GroundTie(NamedTuple):
     """Tie of a body to the ground of the instrument: a resistor and a capacitor in series.
 
     The defaults are the human body model of ANSI/ESDA/JEDEC JS-001, 1.5 kohm and 100 pF: an assumption, made for
@@ -277,7 +277,7 @@ class Touch(NamedTuple):
     isolation_f_per_m: float
     force_n: ArrayLike = 0.0
 
-    def admittance_s_per_m(self, frequency_hz: ArrayLike, body: Body) -> Complex:
+    def admittance_s_per_m(self, frequency_hz: ArrayLike, body: GroundTie) -> Complex:
         """Admittance from the top track through isolation and skin, where they touch [S/m]."""
         skin = body.resistance_ohm * np.asarray(self.length_m, float)
         susceptance = 2 * np.pi * np.asarray(frequency_hz, float) * self.isolation_f_per_m

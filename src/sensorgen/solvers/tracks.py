@@ -110,7 +110,7 @@ class Tracks:
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
+class CrossingReadings:
     """Readings of all crossings, and their slopes by the capacitance of every crossing.
 
     Attributes
@@ -170,13 +170,15 @@ class Readings:
         m, n = self.siemens.shape
         return self.by_row.reshape(m * n, m), self.by_column.reshape(m * n, n)
 
-    def turned(self) -> "Readings":
+    def turned(self) -> "CrossingReadings":
         """Readings with rows and columns exchanged."""
         by_row, by_column = (np.swapaxes(each, 0, 1) for each in (self.by_column, self.by_row))
         return replace(self, siemens=self.siemens.T, factor=self.factor.T, by_row=by_row, by_column=by_column)
 
 
-def readings(tracks: Tracks, frequency_hz: float, *, readout: Readout = "guarded", input_ohm: float = 50.0) -> Readings:
+def readings(
+    tracks: Tracks, frequency_hz: float, *, readout: Readout = "guarded", input_ohm: float = 50.0
+) -> CrossingReadings:
     """Readings of all crossings of a network at one frequency.
 
     Parameters
@@ -223,7 +225,9 @@ def readings(tracks: Tracks, frequency_hz: float, *, readout: Readout = "guarded
         ground, _ = _ground(tracks, y, 1 / (lead + input_ohm))
         across, z = _solved(tracks, y, ground)
         factor = np.outer(1 / (lead[row] + input_ohm), 1 / (lead[column] + input_ohm)).astype(complex)
-        return Readings(factor * z[row, column], across[:, :, row], across[:, :, column], factor, per_farad, readout)
+        return CrossingReadings(
+            factor * z[row, column], across[:, :, row], across[:, :, column], factor, per_farad, readout
+        )
     ohm = _middle_ohm(tracks)
     ground, label = _ground(tracks, y, np.full(m + n, 1 / ohm))
     across, z = _solved(tracks, y, ground)
@@ -233,7 +237,7 @@ def readings(tracks: Tracks, frequency_hz: float, *, readout: Readout = "guarded
     between = own[row, None] + own[None, column] - 2 * floating[row, column]
     connected = (label[row, None] == label[None, column]) & np.isfinite(between)
     value = np.where(connected, 1 / np.where(connected, between, 1), 0)
-    return Readings(value, across[:, :, row], across[:, :, column], value**2, per_farad, readout)
+    return CrossingReadings(value, across[:, :, row], across[:, :, column], value**2, per_farad, readout)
 
 
 def _middle_ohm(tracks: Tracks) -> float:

@@ -22,7 +22,7 @@ _MB = 1024  # kB
 
 
 @dataclass(frozen=True)
-class Answer:
+class ModelAnswer:
     """Answer of a model.
 
     Attributes
@@ -49,12 +49,12 @@ class Cost:
 
 
 @dataclass(frozen=True)
-class Run:
+class TimedAnswer:
     """An answer and what it cost.
 
     Attributes
     ----------
-    answer : Answer
+    answer : ModelAnswer
         Of the first time.
     cold, warm : Cost
         From the start of the process, nothing stored; once more in the same process, with what it has stored.
@@ -62,22 +62,22 @@ class Run:
         Peak of the process, libraries included [MB]; None on a system without such a record.
     """
 
-    answer: Answer
+    answer: ModelAnswer
     cold: Cost
     warm: Cost
     memory_mb: float | None
 
 
-Work = Callable[[], Answer]
-Runner = Callable[[Work], Run]
+Work = Callable[[], ModelAnswer]
+Runner = Callable[[Work], TimedAnswer]
 
 
-def here(work: Work) -> Run:
+def here(work: Work) -> TimedAnswer:
     """Run a piece of work in this process; raises what it raises."""
     return _measured(work, used_s(), time.time())
 
 
-def apart(work: Work) -> Run:
+def apart(work: Work) -> TimedAnswer:
     """Run a piece of work in a process of its own.
 
     Parameters
@@ -101,19 +101,19 @@ def apart(work: Work) -> Run:
     if done.returncode:
         last = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
         raise SensorgenError(f"the process ended before its answer: {last or 'as when the memory is full'}")
-    found: Run | str = pickle.loads(done.stdout)  # noqa: S301 - of our own process
+    found: TimedAnswer | str = pickle.loads(done.stdout)  # noqa: S301 - of our own process
     if isinstance(found, str):
         raise SensorgenError(found)
     return found
 
 
-def _measured(work: Work, before_s: float, started: float) -> Run:
+def _measured(work: Work, before_s: float, started: float) -> TimedAnswer:
     """An answer with its costs; the first one from when ``before_s`` were used and the clock stood at ``started``."""
     answer = work()
     cold = Cost(used_s() - before_s, time.time() - started)
     before_s, started = used_s(), time.time()
     work()
-    return Run(answer, cold, Cost(used_s() - before_s, time.time() - started), _peak_mb())
+    return TimedAnswer(answer, cold, Cost(used_s() - before_s, time.time() - started), _peak_mb())
 
 
 def used_s() -> float:
@@ -146,7 +146,7 @@ def answer_input() -> None:
     target = os.dup(1)
     os.dup2(2, 1)
     started, packed = pickle.loads(sys.stdin.buffer.read())  # noqa: S301 - of our own process
-    found: Run | str
+    found: TimedAnswer | str
     try:
         found = _measured(pickle.loads(packed), 0.0, started)  # noqa: S301
     except SensorgenError as error:

@@ -63,7 +63,7 @@ def _sheet(given: PressedLine, cells: int) -> Complex:
     )
     plate = sheet.Sheet(p["length_m"], p["width_m"], resistances, EPS0_F_PER_M * p["eps_r"] / p["film_m"])
     thinner = 1 / (1 - p["force_n"] / (p["width_m"] * p["tip_m"] * p["modulus_pa"]))
-    press = sheet.Patch(p["left_m"], 0.0, p["tip_m"], p["width_m"], thinner)
+    press = sheet.SheetPatch(p["left_m"], 0.0, p["tip_m"], p["width_m"], thinner)
     contacts = plate.edge("top", "left"), plate.edge("bottom", "left")
     return sheet.impedance(plate, [contacts], p["frequency_hz"], press, cells)[:, 0, 0]
 
@@ -74,7 +74,7 @@ def _tip(given: PressedLine, pieces: int = 1, profile: str = "uniform") -> Compl
 
     p, inputs = vars(given), read(given)
     film = EPS0_F_PER_M * p["eps_r"] * p["width_m"] / p["film_m"]
-    track = line_tip.Track(
+    track = line_tip.RestLine(
         p["length_m"], float(inputs.tracks()[0]), 0.0, film, p["tan_delta"], p["leak_s_per_m"], p["far_end"]
     )
     middle, contact = p["left_m"] + p["tip_m"] / 2, (np.asarray(p["tip_m"]), np.zeros(()))

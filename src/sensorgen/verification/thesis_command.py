@@ -38,7 +38,7 @@ def command(
         raise NotInstalled("thesis needs the solver NGSolve: pip install 'sensorgen[fem]'")
     with show.progress(CHAPTERS) as step:
         rows = thesis.rows(step)
-    made: dict[str, Callable[[Sequence[thesis.Row]], str]] = {
+    made: dict[str, Callable[[Sequence[thesis.ReproducedItem]], str]] = {
         "html": thesis.html, "md": thesis.markdown,
         "json": lambda rows: json.dumps(thesis.plain(rows), indent=2, ensure_ascii=False) + "\n",
     }  # fmt: skip

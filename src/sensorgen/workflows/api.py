@@ -37,7 +37,7 @@ from sensorgen.workflows import build as builds
 from sensorgen.workflows import display as display
 from sensorgen.workflows import slice as slicing
 from sensorgen.workflows.build import Built
-from sensorgen.workflows.slice import Printed
+from sensorgen.workflows.slice import SlicedFile
 
 if TYPE_CHECKING:
     from sensorgen.analysis.report.contents import Report
@@ -170,7 +170,7 @@ def sweep(
         raise BadInput("sweep() without values; expected some of a setting, as dielectric_mm=[0.2, 0.3]")
     points = [(chosen, _body(one)) for chosen, one in varied(_named(design), values)]
     if unloaded:
-        return at_rest.sweep(tuple(values), points, at_rest.Asked(query.accuracy), jobs, _silent)
+        return at_rest.sweep(tuple(values), points, at_rest.CapacitanceQuestion(query.accuracy), jobs, _silent)
     return swept_prediction.sweep(tuple(values), points, query, jobs, _silent)
 
 
@@ -195,7 +195,7 @@ def cell(
     69.06
     """
     _numbers("frequency_hz", () if frequency_hz is None else frequency_hz)
-    asked = at_rest.Asked(accuracy, frequency_hz=frequency_hz)
+    asked = at_rest.CapacitanceQuestion(accuracy, frequency_hz=frequency_hz)
     if not isinstance(what, Design | Body):
         return at_rest.sweep("design", _points(what), asked, 1, _silent)
     return at_rest.answer(_body(what), asked)
@@ -228,7 +228,7 @@ def compress(
     """
     wanted = inf if accuracy is None else accuracy
     pressures = compression.stresses_kpa(_numbers("pressure_kpa", pressure_kpa) or (0.0,))
-    asked = compression.Asked(pressures, BoundaryConditions(), accuracy=wanted)
+    asked = compression.PressQuestion(pressures, BoundaryConditions(), accuracy=wanted)
     if not isinstance(what, Design | Body):
         return compression.sweep("design", _points(what), asked, 1, _silent)
     return compression.answer(_body(what), asked)
@@ -277,7 +277,7 @@ def build(design: Design, out: str | Path = "out", *, cad: bool = True, force: b
     return builds.build(_named(design), Path(out), cad=cad, force=force)
 
 
-def slice_design(design: Design, out: str | Path = "out", *, slicer: str = "prusa", force: bool = False) -> Printed:
+def slice_design(design: Design, out: str | Path = "out", *, slicer: str = "prusa", force: bool = False) -> SlicedFile:
     """Write printer-ready G-code into ``out/NAME``, by a real slicer.
 
     Parameters and errors as of :func:`sensorgen.workflows.slice.slice_design`.

@@ -31,7 +31,7 @@ from sensorgen.prediction.results import Prediction, timeless, to_json
 from sensorgen.prediction.slices import PrintReview, reviewed
 from sensorgen.workflows import compensation, decision, sealed
 from sensorgen.workflows.changes import Advice
-from sensorgen.workflows.compensation import Change
+from sensorgen.workflows.compensation import Adjustment
 from sensorgen.workflows.decision import Decision
 from sensorgen.workflows.trial import Trial, table
 
@@ -58,7 +58,7 @@ class Built:
         About the print.
     prediction : Prediction
         Of the print, with the drawing's beside it.
-    compensated : tuple of Change
+    compensated : tuple of Adjustment
         How the design differs from the one that was asked for.
     replaced : tuple of str
         What made room: files of another design in the same folder.
@@ -78,7 +78,7 @@ class Built:
     verdict: str
     findings: tuple[Finding, ...]
     prediction: Prediction
-    compensated: tuple[Change, ...] = ()
+    compensated: tuple[Adjustment, ...] = ()
     replaced: tuple[str, ...] = ()
     trial: Trial | None = None
     advice: Advice | None = None
@@ -129,7 +129,7 @@ def build(
     cad: bool = True,
     force: bool = False,
     strict: bool = False,
-    compensated: Sequence[Change] = (),
+    compensated: Sequence[Adjustment] = (),
     budget_s: float | None = None,
     step: Step = lambda _: None,
     decided: Callable[[Built], None] = lambda _: None,
@@ -148,7 +148,7 @@ def build(
         Write the files even if checks report errors.
     strict : bool
         Take warnings for errors.
-    compensated : sequence of Change
+    compensated : sequence of Adjustment
         How the design differs from the one that was asked for, for the record.
     budget_s : float
         Processor time for trying changes that remove findings [s]; none are tried if not given.

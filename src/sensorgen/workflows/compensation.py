@@ -32,17 +32,18 @@ _STEP = log(1.12)  # from one width or period to the next, in logarithms
 _SHARES = (log(0.5), log(5.0))  # of its own value, that a width or a period may take, in logarithms
 _STIFFNESS = "stiffness_kpa_per_mm"
 _ACCURACY = 1e-2  # of a capacitance, relative
-_HALVINGS = 12  # of a step between two widths
+_STEEPEST = 5.0  # power of a width or period that a capacitance may follow; steeper, lines come or go [-]
 _MOST_TRIED, _MOST_SOLVED = 250, 30  # designs whose gap, and whose capacitance is found, before it gives up
 _PERIODS = 4  # of a sensor by which prints are estimated
 _MOST_PRESSED = 12  # designs whose stiffness is found
 
 BodyOf = Callable[[Design], Body]
 _Changes = dict[Key, Value]
+_End = tuple[float, float]  # share, and ln of the capacitance over that asked
 
 
 @dataclass(frozen=True)
-class Change:
+class Adjustment:
     """One thing that was changed, or that comes out changed.
 
     Attributes
@@ -61,7 +62,7 @@ class Change:
     why: str
 
 
-def document(changes: Sequence[Change]) -> Iterator[Part]:
+def document(changes: Sequence[Adjustment]) -> Iterator[Part]:
     """Changes, if any."""
     if changes:
         yield "compensated for the print:"
@@ -70,7 +71,7 @@ def document(changes: Sequence[Change]) -> Iterator[Part]:
 
 
 @dataclass(frozen=True)
-class Found:
+class CompensatedDesign:
     """A design with its electrode gap [mm], capacitance [pF] and stiffness [kPa/mm]; None where it has none."""
 
     design: Design
@@ -78,11 +79,11 @@ class Found:
     capacitance_pf: float | None
     stiffness_kpa_per_mm: float | None = None
 
-    def off(self, asked: "Found") -> float:
+    def off(self, asked: "CompensatedDesign") -> float:
         """Ln of the capacitance over the one asked for; 0 where none is asked for, infinite where there is none."""
         return _off(self.capacitance_pf, asked.capacitance_pf)
 
-    def stiffer(self, asked: "Found") -> float:
+    def stiffer(self, asked: "CompensatedDesign") -> float:
         """Request for the stiffness."""
         return _off(self.stiffness_kpa_per_mm, asked.stiffness_kpa_per_mm)
 
@@ -105,7 +106,7 @@ def compensated(
     stiffness: bool = False,
     sliced: BodyOf | None = None,
     step: Callable[[str], None] = lambda _: None,
-) -> tuple[Design, list[Change]]:
+) -> tuple[Design, list[Adjustment]]:
     """The design to print so that the requested one results, and what differs.
 
     Heights become whole layers, strips narrower than a line a line, gaps that would close gaps that stay open. Then
@@ -156,19 +157,19 @@ def compensated(
         return now, changes
     old, new = asdict(now.params), asdict(after.design.params)
     why = "gap, capacitance and stiffness" if stiffness else "gap and capacitance"
-    changes += [Change(name, old[name], new[name], why) for name in old if old[name] != new[name]]
+    changes += [Adjustment(name, old[name], new[name], why) for name in old if old[name] != new[name]]
     return _named(after.design, design), [*changes, *_comes_out(before, after, asked)]
 
 
-def _comes_out(before: Found, after: Found, asked: Found) -> Iterator[Change]:
+def _comes_out(before: CompensatedDesign, after: CompensatedDesign, asked: CompensatedDesign) -> Iterator[Adjustment]:
     """Quantities of the print before and after all changes."""
-    yield Change("electrode gap as printed [mm]", before.gap_mm, after.gap_mm, f"{asked.gap_mm:g} mm asked")
+    yield Adjustment("electrode gap as printed [mm]", before.gap_mm, after.gap_mm, f"{asked.gap_mm:g} mm asked")
     for name, unit in (("capacitance", "pF"), ("stiffness", "kPa/mm")):
         was, now, meant = (
             getattr(one, f"{name}_{unit.replace('/', '_per_').lower()}") for one in (before, after, asked)
         )
         if now and meant:
-            yield Change(f"{name} as printed [{unit}]", was or 0.0, now, f"{meant:.4g} {unit} asked")
+            yield Adjustment(f"{name} as printed [{unit}]", was or 0.0, now, f"{meant:.4g} {unit} asked")
 
 
 def _named(changed: Design, design: Design) -> Design:
@@ -180,7 +181,7 @@ def _named(changed: Design, design: Design) -> Design:
     return make(data | ({"name": design.name.removesuffix("-compensated")[:88] + "-compensated"} if own else {}))
 
 
-def found(body: Body, *, stiffness: bool = False) -> Found:
+def found(body: Body, *, stiffness: bool = False) -> CompensatedDesign:
     """Gap, capacitance and, asked for, stiffness of a body, by its most likely cell.
 
     Raises
@@ -191,37 +192,37 @@ def found(body: Body, *, stiffness: bool = False) -> Found:
     from sensorgen.design.values import permittivities
     from sensorgen.prediction.capacitance import Unpredictable, capacitance
     from sensorgen.prediction.compression_law import at_a_few_pressures, gap_m
-    from sensorgen.prediction.mesh_ladder import Piece
+    from sensorgen.prediction.mesh_ladder import PressedPiece
 
     cells, eps = body.cells, {v.material: v.value for v in permittivities(body.design)}
     gap = next(iter(cells.gap_mm.values()))
     try:
         answer = capacitance(cells.first(), eps, _ACCURACY)
     except Unpredictable:
-        return Found(body.design, gap, None)
+        return CompensatedDesign(body.design, gap, None)
     c = answer.times(cells.count).capacitance_f.middle() * 1e12
     if not stiffness:
-        return Found(body.design, gap, c)
-    law = at_a_few_pressures(body.design, Piece(cells.first(), cells.period_mm), answer, PRESSURE_PA)
+        return CompensatedDesign(body.design, gap, c)
+    law = at_a_few_pressures(body.design, PressedPiece(cells.first(), cells.period_mm), answer, PRESSURE_PA)
     if law is None:
         raise OutOfRange(
             f"{body.design.name}: its stiffness is not known without solving it in 3D, or not at all; "
             "--compensate print keeps gap and capacitance"
         )
     pa_per_m = law.compression.foundation_stiffness_pa_per_m(gap_m(cells.first()))
-    return Found(body.design, gap, c, pa_per_m * 1e-6)
+    return CompensatedDesign(body.design, gap, c, pa_per_m * 1e-6)
 
 
-def _reached(now: Found, wanted: Found) -> bool:
+def _reached(now: CompensatedDesign, wanted: CompensatedDesign) -> bool:
     near = abs(now.gap_mm - wanted.gap_mm) <= GAP_WITHIN * wanted.gap_mm
     return near and abs(now.off(wanted)) <= WITHIN and abs(now.stiffer(wanted)) <= STIFFNESS_WITHIN
 
 
 def _searched(
-    before: Found, wanted: Found, walls: str, sliced: BodyOf | None, step: Callable[[str], None]
-) -> Found:  # fmt: skip
+    before: CompensatedDesign, wanted: CompensatedDesign, walls: str, sliced: BodyOf | None, step: Callable[[str], None]
+) -> CompensatedDesign:  # fmt: skip
     """The print that is wanted, or the nearest: by the estimate, or by slices that correct it in turn."""
-    search, nearest = _Search(wanted, walls), before
+    search, nearest = _CompensationSearch(wanted, walls), before
     for count in range(1, MOST_SLICES):
         step(f"design {count}" if sliced else "designs")
         best = search.run()
@@ -239,11 +240,11 @@ def _searched(
     return nearest
 
 
-def _distance(one: Found, wanted: Found) -> tuple[float, float]:
+def _distance(one: CompensatedDesign, wanted: CompensatedDesign) -> tuple[float, float]:
     return round(abs(one.gap_mm - wanted.gap_mm), 6), abs(one.off(wanted)) + abs(one.stiffer(wanted))
 
 
-def _nearest(design: Design, nearest: Found, asked: Found) -> str:
+def _nearest(design: Design, nearest: CompensatedDesign, asked: CompensatedDesign) -> str:
     """The nearest print, what makes it and what it costs."""
     old, new = (asdict(each.params) | {"quality": each.quality} for each in (design, nearest.design))
     values = ", ".join(f"{k} {v if isinstance(v, str) else f'{v:.4g}'}" for k, v in new.items() if v != old[k])
@@ -254,22 +255,22 @@ def _nearest(design: Design, nearest: Found, asked: Found) -> str:
 
 
 @dataclass(eq=False)
-class _Search:
+class _CompensationSearch:
     """Designs whose estimated print is the wanted one: heights in whole layers, and one width or the period.
 
     The margin is the factor by which the width or period may shrink without another gap.
     """
 
-    wanted: Found
+    wanted: CompensatedDesign
     walls: str
     margin: float = _MARGIN
-    best: Found | None = field(default=None, init=False)
+    best: CompensatedDesign | None = field(default=None, init=False)
     least: float = field(default=inf, init=False)
-    tried: dict[frozenset[tuple[Key, Value]], Found | None] = field(default_factory=dict, init=False)
-    pressed: list[Found] = field(default_factory=list, init=False)
+    tried: dict[frozenset[tuple[Key, Value]], CompensatedDesign | None] = field(default_factory=dict, init=False)
+    pressed: list[CompensatedDesign] = field(default_factory=list, init=False)
     before: tuple[int, int] = field(default=(0, 0), init=False)
 
-    def run(self) -> Found | None:
+    def run(self) -> CompensatedDesign | None:
         """The wanted print with the least changes, else the nearest; estimates of a search before stay."""
         self.best, self.least, self.before = None, inf, self._count()
         self.pressed.clear()
@@ -303,7 +304,7 @@ class _Search:
             if key != film or thick[0] <= float(to) <= thick[1]
         ]
 
-    def _stiff_enough(self, hit: Found) -> Found | None:
+    def _stiff_enough(self, hit: CompensatedDesign) -> CompensatedDesign | None:
         """A print with its stiffness, if it is the wanted one, where one is wanted."""
         if self.wanted.stiffness_kpa_per_mm is None:
             return hit
@@ -322,10 +323,10 @@ class _Search:
         tried, solved = (now - then for now, then in zip(self._count(), self.before, strict=True))
         return tried > _MOST_TRIED or solved > _MOST_SOLVED or len(self.pressed) > _MOST_PRESSED
 
-    def _along(self, heights: _Changes, key: Key, way: float, most: float) -> tuple[Found | None, float]:
+    def _along(self, heights: _Changes, key: Key, way: float, most: float) -> tuple[CompensatedDesign | None, float]:
         """The first print with the wanted capacitance on the way up or down from a width, and how far it is."""
         start, share = float(moves.own(self.wanted.design, key) or 0.0), 0.0
-        before: tuple[float, Found] | None = None
+        before: tuple[float, CompensatedDesign] | None = None
         while _SHARES[0] <= share <= _SHARES[1] and abs(share) < most and not self._exhausted():
             here = self._at(heights | {key: start * exp(share)})
             if here and abs(here.off(self.wanted)) <= WITHIN / 2:
@@ -333,27 +334,27 @@ class _Search:
             if here and before:
                 one, other = before[1].off(self.wanted), here.off(self.wanted)
                 if (one > 0) != (other > 0):
-                    hit = self._between(heights, key, start, (before[0], share), one > 0)
-                    return hit, abs(share)
+                    return self._between(heights, key, start, (before[0], one), (share, other)), abs(share)
                 if abs(other) > abs(one):  # the other way
                     break
             before = (share, here) if here else None
             share += way * (2 if here and abs(here.off(self.wanted)) > abs(3 * way) else 1)
         return None, inf
 
-    def _between(
-        self, heights: _Changes, key: Key, start: float, ends: tuple[float, float], above: bool
-    ) -> Found | None:
-        low, high = ends
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2
-            here = self._at(heights | {key: start * exp(middle)})
+    def _between(self, heights: _Changes, key: Key, start: float, low: _End, high: _End) -> CompensatedDesign | None:
+        """Regula falsi and halvings in turn, between values above and below the wanted one; None at a jump."""
+        for half in (False, True) * 6:
+            if abs(high[1] - low[1]) > _STEEPEST * abs(high[0] - low[0]):
+                return None
+            share = low[0] + (high[0] - low[0]) * (0.5 if half else low[1] / (low[1] - high[1]))
+            here = self._at(heights | {key: start * exp(share)})
             if here is None or abs(here.off(self.wanted)) <= WITHIN / 4:
                 return here
-            low, high = (middle, high) if (here.off(self.wanted) > 0) == above else (low, middle)
+            middle = share, here.off(self.wanted)
+            low, high = (middle, high) if (middle[1] > 0) == (low[1] > 0) else (low, middle)
         return None
 
-    def _at(self, changes: _Changes) -> Found | None:
+    def _at(self, changes: _Changes) -> CompensatedDesign | None:
         """The estimate of a changed design, if it has the wanted gap, with the margin."""
         changes = {key: round(float(value), 3) for key, value in changes.items()}
         mark = frozenset(changes.items())
@@ -365,14 +366,14 @@ class _Search:
         one = self.tried[mark]
         return one if one and one.gap_mm == self.wanted.gap_mm and one.off(self.wanted) < inf else None
 
-    def _estimated(self, changes: _Changes) -> Found:
+    def _estimated(self, changes: _Changes) -> CompensatedDesign:
         """Gap with the margin; where that is the wanted one, the capacitance too."""
         now = self.wanted.design
         narrower = {k: float(v) / self.margin for k, v in changes.items() if k in self.widths}
         for each in (changes, changes | narrower):
             gap = _gap_mm(moves.short(now, each, _PERIODS), self.walls)
             if abs(gap - self.wanted.gap_mm) > SLIVER_MM:
-                return Found(moves.changed(now, changes), gap, None)
+                return CompensatedDesign(moves.changed(now, changes), gap, None)
         return replace(_estimate(moves.changed(now, changes), self.walls), gap_mm=self.wanted.gap_mm)
 
 
@@ -394,7 +395,7 @@ def _attainable_mm(design: Design, gap_mm: float) -> float:
     return round(max(round(gap_mm / layer), least) * layer, 9) if gap_mm < inf else gap_mm
 
 
-def _print(design: Design, body: BodyOf, *, stiffness: bool = False) -> Found:
+def _print(design: Design, body: BodyOf, *, stiffness: bool = False) -> CompensatedDesign:
     """Quantities of a body; of an array, of a few cells without rims, counted to all of its cells."""
     is_array = hasattr(design.params, "fitting")
     few = moves.short(design, periods=_PERIODS) if is_array or isinstance(body, partial) else design
@@ -405,7 +406,7 @@ def _print(design: Design, body: BodyOf, *, stiffness: bool = False) -> Found:
     return replace(one, design=design, capacitance_pf=one.capacitance_pf and one.capacitance_pf * larger)
 
 
-def _estimate(design: Design, walls: str, *, stiffness: bool = False) -> Found:
+def _estimate(design: Design, walls: str, *, stiffness: bool = False) -> CompensatedDesign:
     """Quantities of the print of a few periods by the rules of slicers, counted to the whole sensor."""
     from sensorgen.prediction.bodies import estimated
 
@@ -421,19 +422,19 @@ def _gap_mm(design: Design, walls: str) -> float:
 
 def printable(
     design: Design, walls: str = "arachne", *, bake: bool = False, gap_mm: float = inf
-) -> tuple[Design, list[Change]]:
+) -> tuple[Design, list[Adjustment]]:
     """The design in layers that make up its gap, with widths that print, larger by the bake; and what was changed."""
-    changes: list[Change] = []
+    changes: list[Adjustment] = []
     now = design
     if bake and not design.shrinkage:
         now = moves.changed(now, {("shrinkage",): BAKE})
-        changes.append(Change("shrinkage", 0.0, BAKE, "the bake takes it off in the plane"))
+        changes.append(Adjustment("shrinkage", 0.0, BAKE, "the bake takes it off in the plane"))
     layer = _layer_mm(now, gap_mm)
     if layer != now.layers.layer_mm:
-        changes.append(Change("layers [mm]", now.layers.layer_mm, layer, "the gap in whole layers"))
+        changes.append(Adjustment("layers [mm]", now.layers.layer_mm, layer, "the gap in whole layers"))
         now = _in_layers(now, layer)
     for name, value, why in _steps(now, walls):
-        changes.append(Change(name, getattr(now.params, name), value, why))
+        changes.append(Adjustment(name, getattr(now.params, name), value, why))
         now = moves.changed(now, {("parameters", name): value})
     return _named(now, design), changes
 

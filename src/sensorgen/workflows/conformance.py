@@ -18,7 +18,7 @@ from sensorgen.design import design as designs
 from sensorgen.design import materials, packs, printer, shape_files
 from sensorgen.design.packs import File, Kind, Pack
 from sensorgen.export import machine
-from sensorgen.export.slicers.loads import Load
+from sensorgen.export.slicers.loads import ToolLoad
 from sensorgen.measure import accuracy
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.scene import Envelope, Fill, Scene
@@ -359,7 +359,7 @@ def _printer(file: File) -> Faults:
     made, quality = printer.load_printer(file.name, own_text), printer.load_quality("fine")
     layer_mm = max(quality.layer_mm, made.min_layer_mm)
     quality = quality.model_copy(update={"layer_mm": layer_mm, "first_layer_mm": layer_mm})
-    loads = dict(zip(made.tool_numbers, map(Load, map(materials.load, ("etpu", "x60"))), strict=False))
+    loads = dict(zip(made.tool_numbers, map(ToolLoad, map(materials.load, ("etpu", "x60"))), strict=False))
     yield from machine.faults(made, quality, loads)
     try:
         made.check_tools(file.pack.folder)
@@ -372,7 +372,7 @@ def _quality(file: File) -> Faults:
     errors = []
     for name in printer.printer_names():
         made = printer.load_printer(name)
-        loads = {made.tool_numbers[0]: Load(materials.load("etpu"))}
+        loads = {made.tool_numbers[0]: ToolLoad(materials.load("etpu"))}
         errors += [message for rule, message, _ in machine.faults(made, quality, loads) if rule == "profile"][:1]
     if len(errors) == len(printer.printer_names()):
         yield "profile", f"no printer that ships can print it: {errors[0]}", "correct layers and speeds"

@@ -12,7 +12,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.core.parallel import in_parallel
 
 if TYPE_CHECKING:
-    from sensorgen.analysis.calibration import Made
+    from sensorgen.analysis.calibration import CalibrationWork
     from sensorgen.measure.log import Log
 
 LOG = "lab.db"
@@ -36,7 +36,7 @@ remark: {remark}
 
 
 @dataclass(frozen=True)
-class Found:
+class DemoValues:
     """Values found of a specimen, beside the true ones."""
 
     specimen: Annotated[str, Column("specimen")]
@@ -68,7 +68,7 @@ class Demo:
     ----------
     folder, page : str
         Where its files are, and the report.
-    found : tuple of Found
+    found : tuple of DemoValues
         Material values of each specimen.
     inverted : tuple of Inverted
         Presses of each specimen that were found again.
@@ -76,7 +76,7 @@ class Demo:
 
     folder: str
     page: str
-    found: tuple[Found, ...]
+    found: tuple[DemoValues, ...]
     inverted: tuple[Inverted, ...]
 
     def document(self) -> Iterator[Part]:
@@ -181,15 +181,17 @@ def _evaluated(
     return Demo(str(folder), str(page), found, inverted)
 
 
-def _found(made: "Made", truth: Mapping[str, float]) -> Iterator[Found]:
+def _found(made: "CalibrationWork", truth: Mapping[str, float]) -> Iterator[DemoValues]:
     """Values of a specimen's materials beside the true ones."""
     for value in made.calibration.materials():
         true = truth[value.quantity]
         holds = "yes" if value.lower <= true <= value.upper else "no"
-        yield Found(made.calibration.specimen, value.material, value.quantity, true, value.lower, value.upper, holds)
+        yield DemoValues(
+            made.calibration.specimen, value.material, value.quantity, true, value.lower, value.upper, holds
+        )
 
 
-def _inverted(log: "Log", made: "Made", number: int) -> Inverted:
+def _inverted(log: "Log", made: "CalibrationWork", number: int) -> Inverted:
     """Presses of a recording by a calibration that did not know them."""
     from sensorgen.analysis.calibration.pairs import known_presses
     from sensorgen.prediction.calibration.coverage import coverage_of

@@ -119,7 +119,7 @@ def demo(folder: Path, *, seed: int = 1, step: Callable[[str], None] = lambda _:
         f"{run.force:.2g} %, centre {run.centre_mm:.2g} mm; {run.dead} dead crossings are left white"
         for run in runs
     ]
-    sections = [pages.Section(figures=figures)]
+    sections = [pages.PageSection(figures=figures)]
     store.replace(page, pages.page("A step on two virtual insoles", [*words, shown.advice], sections).encode())
     return shown
 

@@ -14,18 +14,18 @@ from sensorgen.core.errors import Unprintable
 from sensorgen.core.findings import Finding, Verdict, headline, listed
 from sensorgen.design.design import Design
 from sensorgen.design.walls import rule
-from sensorgen.export.gcode.report import Report
+from sensorgen.export.gcode.report import FileNeeds
 from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 from sensorgen.export.slicing import Step
 from sensorgen.prediction.new_slice import SliceReport, slice_now
 from sensorgen.prediction.print_files import PrintFile
 from sensorgen.prediction.slices import combined, estimated, of_own_machine
 from sensorgen.workflows import compensation
-from sensorgen.workflows.compensation import Change
+from sensorgen.workflows.compensation import Adjustment
 
 
 @dataclass(frozen=True, kw_only=True)
-class Printed(SliceReport):
+class SlicedFile(SliceReport):
     """G-code of a design, as in the JSON beside it.
 
     Attributes
@@ -36,21 +36,21 @@ class Printed(SliceReport):
         CHANGE where a finding is an error, PRINT WITH WARNINGS, or PRINT.
     all_findings : tuple of Finding
         About drawing, file and print, as every command lists them.
-    compensated : tuple of Change
+    compensated : tuple of Adjustment
         How the design differs from the one that was asked for.
     """
 
     gcode: str
     verdict: Verdict
     all_findings: tuple[Finding, ...]
-    compensated: tuple[Change, ...] = ()
+    compensated: tuple[Adjustment, ...] = ()
 
     def document(self) -> Iterator[Part]:
         """Verdict, findings about design, file and print, and what the file takes."""
         yield from compensation.document(self.compensated)
         yield headline(self.name, self.all_findings, self.slicer.words)
         yield from listed(self.all_findings)
-        yield from Report.document(self)
+        yield from FileNeeds.document(self)
         yield volumes.table(self.printed.layers)
         yield from self.lifting.document()
         yield f"{self.gcode}: {'refused; ' * self.refused}{self.slicer.name} {self.slicer.version}"
@@ -65,9 +65,9 @@ def slice_design(
     time_limit_s: float = TIME_LIMIT_S,
     force: bool = False,
     strict: bool = False,
-    compensated: Sequence[Change] = (),
+    compensated: Sequence[Adjustment] = (),
     step: Step = lambda _: None,
-) -> Printed:
+) -> SlicedFile:
     """Write ``out/<name>/<name>.<slicer>.gcode``, and beside it ``.json`` with what was found and made.
 
     A file in which the check finds errors, on its own or against the design, gets the name
@@ -90,7 +90,7 @@ def slice_design(
         Slice even if checks of the design report errors; those of the G-code refuse it none the less.
     strict : bool
         Take warnings for errors.
-    compensated : sequence of Change
+    compensated : sequence of Adjustment
         How the design differs from the one that was asked for, for the record.
     step : callable
         Called with the next step, for a progress display.
@@ -119,14 +119,14 @@ def slice_design(
     stem = f"{design.name}.{slicer}"
     passed, refused = (f"{stem}.gcode", f"{stem}.gcode.json"), (f"{stem}.refused.gcode", f"{stem}.refused.json")
     names, others = (refused, passed) if report.refused else (passed, refused)
-    result = Printed(
+    result = SlicedFile(
         **vars(report), gcode=names[0], verdict=held.verdict, all_findings=tuple(held.findings),
         compensated=tuple(compensated),
     )  # fmt: skip
     return _written(result, out / design.name, made.content, page, others)
 
 
-def _written(result: Printed, folder: Path, content: bytes, page: str, others: tuple[str, ...]) -> Printed:
+def _written(result: SlicedFile, folder: Path, content: bytes, page: str, others: tuple[str, ...]) -> SlicedFile:
     """Put the files in place, and take away those that an earlier run has left under the other name."""
     store.replace(folder / result.gcode, content)
     stem = result.gcode.removesuffix(".gcode").removesuffix(".refused")

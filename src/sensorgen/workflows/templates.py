@@ -28,7 +28,7 @@ _NEXT: dict[What, str] = {
 
 
 @dataclass(frozen=True)
-class Made:
+class NewFile:
     """A new file.
 
     Attributes
@@ -47,7 +47,7 @@ class Made:
         return self.file, f"next: {self.next}"
 
 
-def new(what: What, name: str, pack: str = "") -> Made:
+def new(what: What, name: str, pack: str = "") -> NewFile:
     """Write a template.
 
     Parameters
@@ -80,4 +80,4 @@ def new(what: What, name: str, pack: str = "") -> Made:
         raise BadInput(f"{str(file)!r} exists; choose another name, or delete it first")
     template = Path(packs.__file__).parent / "templates" / f"{what}{packs.suffix(kind) if kind else '.yaml'}"
     files.replace(file, yamlfile.text(template).replace("NAME", name).encode())
-    return Made(str(file), _NEXT[what].format(name=name, file=file))
+    return NewFile(str(file), _NEXT[what].format(name=name, file=file))

@@ -18,7 +18,7 @@ from typing import Annotated, Any, cast
 from sensorgen.checks.slices import TOUCH_MM
 from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import BadInput
-from sensorgen.design.arrays import Layout, Params, layout
+from sensorgen.design.arrays import ArrayLayout, Params, layout
 from sensorgen.design.design import Design, make
 from sensorgen.scene.scene import rounded
 
@@ -83,7 +83,7 @@ def table(found: tuple[tuple[Tile, Design], ...]) -> Table:
     return Table.of("tiles", "", tuple(tile for tile, _ in found))
 
 
-def _fits(of: Layout, design: Design) -> bool:
+def _fits(of: ArrayLayout, design: Design) -> bool:
     """Test whether the bed holds a print of some tracks."""
     p, grown = of.params, 1 / (1 - design.shrinkage)
     size = of.size_mm[0] * grown, (of.size_mm[1] + p.ledge_mm) * grown

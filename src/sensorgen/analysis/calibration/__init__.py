@@ -21,11 +21,11 @@ from sensorgen.measure.log import BenchRun, Log, Reading, batches, notes
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log.entries import Specimen
 from sensorgen.prediction import bodies
-from sensorgen.prediction.calibration.baseline import Change
+from sensorgen.prediction.calibration.baseline import RestChange
 from sensorgen.prediction.calibration.calibration import BEYOND, Calibration, from_json
 from sensorgen.prediction.calibration.coverage import coverage_of, held_out
 from sensorgen.prediction.calibration.fitting import Data, calibrated, gain, loosened, shared, widened
-from sensorgen.prediction.calibration.inversion import Found
+from sensorgen.prediction.calibration.inversion import InvertedPresses
 from sensorgen.prediction.calibration.materials import links
 from sensorgen.prediction.calibration.rest import checked
 from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, Spread, spread_at
@@ -42,7 +42,7 @@ _INSTRUMENT = ("lead", "stray", "force offset", "position offset")  # shared by 
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
+class CalibrationWork:
     """A calibration, and what it was made of.
 
     Attributes
@@ -51,13 +51,13 @@ class Made:
         The result.
     data : Data
         Presses and rest.
-    held : Found or None
+    held : InvertedPresses or None
         The presses, each found again from the others; None of too few.
     """
 
     calibration: Calibration
     data: Data
-    held: Found | None
+    held: InvertedPresses | None
 
     def document(self) -> Iterator[Part]:
         """Paragraphs and tables of the calibration."""
@@ -72,7 +72,7 @@ class Made:
 class Together:
     """Several results as one."""
 
-    results: tuple["Made | Recheck", ...]
+    results: tuple["CalibrationWork | Recheck", ...]
 
     def document(self) -> Iterator[Part]:
         """One after the other."""
@@ -192,7 +192,7 @@ def _ln_rise_as_drawn(predicted: SensorModel) -> Real:
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class SpecimenEntries:
     """Entries of the log about a specimen, and the model that it is compared with.
 
     Attributes
@@ -230,7 +230,7 @@ class Known:
 
 def known(
     log: Log, specimen: str, bench: Bench, recordings: Sequence[int] = (), body_of: BodyOf = bodies.default_body
-) -> Known:
+) -> SpecimenEntries:
     """Gather what the log has of a specimen; parameters and errors as of :func:`calibrate`."""
     name, design = design_of(log, specimen)
     rows = _chosen(log, name, recordings)
@@ -254,7 +254,7 @@ def known(
         count = "1 reading of a meter counts" if len(read) == 1 else f"{len(read)} readings of meters count"
         notes.append(f"{count}, {_BAKED[read[-1].baked]}")
     uids = (*(row.uid for row in rows), *(one.uid for one in read))
-    return Known(
+    return SpecimenEntries(
         name, design, predicted, model, replace(data, meter=meter), uids, tuple(left_out), (*notes, *predicted.doubts)
     )
 
@@ -285,7 +285,7 @@ def stored(log: Log, specimen: str) -> Calibration | None:
 def calibrate(
     log: Log, specimens: Sequence[str], bench: Bench | None = None, recordings: Sequence[int] = (), *,
     body_of: BodyOf = bodies.default_body, step: Callable[[str], None] = lambda _: None,
-) -> list[Made]:  # fmt: skip
+) -> list[CalibrationWork]:  # fmt: skip
     """Calibrate specimens that were measured in one go: they share the bench.
 
     Parameters
@@ -333,7 +333,7 @@ def calibrate(
             links(one.predicted),
         )  # fmt: skip
         calibration = replace(calibration, notes=(*notes, *calibration.departures()))
-        made.append(Made(calibration, one.data, held[1] if held else None))
+        made.append(CalibrationWork(calibration, one.data, held[1] if held else None))
     return made
 
 
@@ -350,7 +350,7 @@ def _check_numbers(log: Log, names: Sequence[str], numbers: Sequence[int]) -> No
         raise BadInput(f"no recording {missing[0]} of {', '.join(names)}; expected one of its own: {has}")
 
 
-def _off(one: Known, at: Real) -> tuple[str, ...]:
+def _off(one: SpecimenEntries, at: Real) -> tuple[str, ...]:
     """A remark on readings of meters that no specimen of the design can have."""
     meter = one.data.meter
     off = meter.off(one.model, at) if meter else np.zeros(1)
@@ -381,7 +381,7 @@ class Recheck:
         Known ones, and those of them in their intervals by the old calibration.
     z : float
         Mean of force less median over its standard deviation, times the root of the number of presses [-].
-    change : Change
+    change : RestChange
         Of the reading at rest.
     """
 
@@ -389,7 +389,7 @@ class Recheck:
     presses: int
     inside: int
     z: float
-    change: Change
+    change: RestChange
 
     @property
     def alarm(self) -> bool:

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from sensorgen.analysis.comparison import of_iteration
-from sensorgen.analysis.comparison.allowed import Allowed, allowed
+from sensorgen.analysis.comparison.allowed import AllowedValues, allowed
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.design.body import BodyOf
 from sensorgen.measure import accuracy
 from sensorgen.measure.immittance import NEVER_NEGATIVE, pair, quantity_of
 from sensorgen.measure.log import Log, Reading
-from sensorgen.prediction.calibration.fitting import Meter
+from sensorgen.prediction.calibration.fitting import MeterReadings
 from sensorgen.prediction.inference import whitening
 from sensorgen.prediction.inverse.verdict import NORMAL_90
 
@@ -27,7 +27,7 @@ _LN = 0.3  # relative uncertainty up to which a value's logarithm is taken
 
 def readings_of(
     log: Log, name: str, body_of: BodyOf, resistivity_ohm_m: float
-) -> tuple[Meter | None, list[Reading], list[str]]:  # fmt: skip
+) -> tuple[MeterReadings | None, list[Reading], list[str]]:  # fmt: skip
     """Readings of a specimen in the state that it was last read in, baked or not; those that count; what does not.
 
     Parameters
@@ -57,7 +57,7 @@ def readings_of(
     return _meter(measured, _ln_resistance(ranges, resistivity_ohm_m)), counted, left_out
 
 
-def _ln_resistance(ranges: Sequence[Allowed], resistivity_ohm_m: float) -> tuple[float, float] | None:
+def _ln_resistance(ranges: Sequence[AllowedValues], resistivity_ohm_m: float) -> tuple[float, float] | None:
     """Mean of ln of resistivities over the predicted one, and its standard deviation."""
     if not ranges:
         return None
@@ -114,7 +114,7 @@ def _changes(at: accuracy.At, quantity: str, value: float, frequency_hz: float) 
     return by_r, by_x, accuracy.uncertainty(_UNKNOWN, quantity, value, z)
 
 
-def _meter(measured: Sequence[_Measured], ln_resistance: tuple[float, float] | None) -> Meter | None:
+def _meter(measured: Sequence[_Measured], ln_resistance: tuple[float, float] | None) -> MeterReadings | None:
     if not measured and not ln_resistance:
         return None
     value, error, by_r, by_x = (np.array([one[k] for one in measured], float) for k in range(2, 6))
@@ -131,4 +131,4 @@ def _meter(measured: Sequence[_Measured], ln_resistance: tuple[float, float] | N
 
     covariance = np.diag((error / unit) ** 2) + sum(np.outer(by, by) for by in (by_r / unit, by_x / unit))
     frequency_hz = np.array([one.frequency_hz for one in measured])
-    return Meter(frequency_hz, observed, scaled(value), whitening(covariance), ln_resistance)
+    return MeterReadings(frequency_hz, observed, scaled(value), whitening(covariance), ln_resistance)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sensorgen.analysis.calibration import Made, Recheck
+from sensorgen.analysis.calibration import CalibrationWork, Recheck
 from sensorgen.analysis.plots import pages
 from sensorgen.analysis.plots.figure import BLUE, COLOURS, GREY, ORANGE, Axis, Curve, Figure, Panel
 from sensorgen.core import document
@@ -17,17 +17,17 @@ from sensorgen.prediction.inverse.verdict import NORMAL_90
 _RESIDUALS = ("residual of the magnitude [%]", "residual of the phase [0.01 rad]")  # measured less fitted
 
 
-def html(made: Sequence[Made | Recheck]) -> str:
+def html(made: Sequence[CalibrationWork | Recheck]) -> str:
     """A page for the browser; raises MissingValue where Plotly is not installed."""
     sections = []
     for number, one in enumerate(made):
-        fit = (*_presses(one, number), *_left_over(one, number)) if isinstance(one, Made) else ()
+        fit = (*_presses(one, number), *_left_over(one, number)) if isinstance(one, CalibrationWork) else ()
         figures, specimen = (*fit, _parameters(one.calibration, number)), document.visible(one.calibration.specimen)
-        sections.append(pages.Section(f"specimen-{number}", specimen, figures, tuple(one.document())))
+        sections.append(pages.PageSection(f"specimen-{number}", specimen, figures, tuple(one.document())))
     return pages.page(f"Calibration of {', '.join(section.title for section in sections)}", (), sections)
 
 
-def _presses(made: Made, number: int) -> list[Figure]:
+def _presses(made: CalibrationWork, number: int) -> list[Figure]:
     """Force and position of known presses against what was found of them without them."""
     if made.held is None:
         return []
@@ -52,7 +52,7 @@ def _presses(made: Made, number: int) -> list[Figure]:
     return [Figure(f"presses-{number}", title, alt, {"": tuple(panels)}, columns=2)]
 
 
-def _left_over(made: Made, number: int) -> list[Figure]:
+def _left_over(made: CalibrationWork, number: int) -> list[Figure]:
     """Residuals of the ratios of presses at each tone over force, and of the reading at rest over frequency."""
     model, data = made.calibration.model, made.data
     specimen, at = made.calibration.specimen, made.calibration.posterior.at

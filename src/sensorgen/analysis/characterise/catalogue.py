@@ -38,7 +38,7 @@ Values = Mapping[str, Real]  # of unknowns in SI, or of sizes [mm]
 
 
 @dataclass(frozen=True)
-class Target:
+class CouponTarget:
     """A quantity that is wanted.
 
     Attributes
@@ -65,7 +65,7 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Size:
+class CouponSize:
     """A size of a coupon [mm], or a factor of its model [-].
 
     Attributes
@@ -87,7 +87,7 @@ class Size:
 
 
 @dataclass(frozen=True)
-class Reading:
+class CouponReading:
     """Reading of a coupon.
 
     Attributes
@@ -118,9 +118,9 @@ class Coupon:
         Name on plate and form; "bar", "ladder", "plate", "disc" or "pads".
     material : str
         What it is made of; of a plate the film's.
-    sizes : tuple of Size
+    sizes : tuple of CouponSize
         Drawn ones, those that calipers measure first.
-    readings : tuple of Reading
+    readings : tuple of CouponReading
         In the order of ``expected``.
     expected : callable
         Readings from unknowns and sizes [ohm, F, N/m].
@@ -133,8 +133,8 @@ class Coupon:
     name: str
     kind: str
     material: str
-    sizes: tuple[Size, ...]
-    readings: tuple[Reading, ...]
+    sizes: tuple[CouponSize, ...]
+    readings: tuple[CouponReading, ...]
     expected: Callable[[Values, Values], tuple[Real, ...]]
     volume_mm3: float
     box_mm: tuple[float, float]
@@ -163,7 +163,7 @@ class Meters:
     calipers_mm: float = 0.01
     compression_mm: float = 0.002
 
-    def noise(self, reading: Reading, stiffness_n_per_m: float = 0.0) -> float:
+    def noise(self, reading: CouponReading, stiffness_n_per_m: float = 0.0) -> float:
         """Standard deviation of a reading's logarithm."""
         if reading.kind != "stiffness":
             return self.resistance if reading.kind == "resistance" else self.capacitance
@@ -217,7 +217,7 @@ def _crossed_ohm_m(values: Values, line_m: float) -> Real:
     return along + values["crossed"] * (across_ohm_m(values, line_m) - along)
 
 
-def targets(conductor: str, dielectric: str, line_mm: float) -> tuple[Target, ...]:
+def targets(conductor: str, dielectric: str, line_mm: float) -> tuple[CouponTarget, ...]:
     """Quantities wanted of a pair of materials, by their names."""
     line_m = line_mm * M_PER_MM
 
@@ -225,18 +225,19 @@ def targets(conductor: str, dielectric: str, line_mm: float) -> tuple[Target, ..
         return lambda values: values[key]
 
     return (
-        Target("resistivity, lines as the profile lays them", conductor, "resistivity_ohm_m", 0.05,
-               lambda values: _crossed_ohm_m(values, line_m)),
-        Target("resistivity along the lines", conductor, "resistivity_along_ohm_m", 0.05, of("along_ohm_m")),
-        Target("resistivity across the lines", conductor, "resistivity_across_ohm_m", 0.05,
-               lambda values: across_ohm_m(values, line_m), derived=True),
-        Target("contact between lines", conductor, "line_contact_ohm_m2", 0.1, of("line_contact_ohm_m2")),
-        Target("resistivity through the layers", conductor, "resistivity_through_ohm_m", 0.05, of("through_ohm_m")),
-        Target("contact to terminals", conductor, "terminal_contact_ohm_m2", 0.1, of("terminal_ohm_m2")),
-        Target("permittivity", dielectric, "relative_permittivity", 0.03, of("permittivity")),
-        Target("interface gap", dielectric, INTERFACE_GAP, None, of("gap_m"), linear=True),
-        Target("Young's modulus", conductor, "youngs_modulus_pa", 0.1, of("conductor_pa")),
-        Target("Young's modulus", dielectric, "youngs_modulus_pa", 0.1, of("dielectric_pa")),
+        CouponTarget("resistivity, lines as the profile lays them", conductor, "resistivity_ohm_m", 0.05,
+                     lambda values: _crossed_ohm_m(values, line_m)),
+        CouponTarget("resistivity along the lines", conductor, "resistivity_along_ohm_m", 0.05, of("along_ohm_m")),
+        CouponTarget("resistivity across the lines", conductor, "resistivity_across_ohm_m", 0.05,
+                     lambda values: across_ohm_m(values, line_m), derived=True),
+        CouponTarget("contact between lines", conductor, "line_contact_ohm_m2", 0.1, of("line_contact_ohm_m2")),
+        CouponTarget("resistivity through the layers", conductor, "resistivity_through_ohm_m", 0.05,
+                     of("through_ohm_m")),
+        CouponTarget("contact to terminals", conductor, "terminal_contact_ohm_m2", 0.1, of("terminal_ohm_m2")),
+        CouponTarget("permittivity", dielectric, "relative_permittivity", 0.03, of("permittivity")),
+        CouponTarget("interface gap", dielectric, INTERFACE_GAP, None, of("gap_m"), linear=True),
+        CouponTarget("Young's modulus", conductor, "youngs_modulus_pa", 0.1, of("conductor_pa")),
+        CouponTarget("Young's modulus", dielectric, "youngs_modulus_pa", 0.1, of("dielectric_pa")),
     )  # fmt: skip
 
 
@@ -266,9 +267,9 @@ def catalogue(conductor: Material, dielectric: Material, line_mm: float) -> tupl
     return (*bars, *ladders, *plates, *discs, *pads)
 
 
-def _millimetres(key: str, drawn: float) -> Size:
+def _millimetres(key: str, drawn: float) -> CouponSize:
     """A size that calipers measure; else it is known as well as prints are."""
-    return Size(key, drawn, hypot(0.05, 0.03 * drawn), measured=True)
+    return CouponSize(key, drawn, hypot(0.05, 0.03 * drawn), measured=True)
 
 
 def _bar(material: str, degrees: float | None, height: float, line_m: float) -> Coupon:
@@ -288,10 +289,10 @@ def _bar(material: str, degrees: float | None, height: float, line_m: float) -> 
     turned = {45.0: (54.0, 54.0), 90.0: (width + 4.0, 60.0)}.get(degrees or 0.0, (60.0, width + 4.0))
     return Coupon(
         name, "bar", material,
-        (_millimetres("width_mm", width), _millimetres("height_mm", height), Size("taps_mm", length, 0.2),
-         Size("edge", 1.0, 0.012 if degrees else 0.005),
-         Size("fill", 1.0, _FILL)),
-        (Reading("resistance_ohm", "resistance", f"four-wire, between the side taps {length:g} mm apart, DC"),),
+        (_millimetres("width_mm", width), _millimetres("height_mm", height), CouponSize("taps_mm", length, 0.2),
+         CouponSize("edge", 1.0, 0.012 if degrees else 0.005),
+         CouponSize("fill", 1.0, _FILL)),
+        (CouponReading("resistance_ohm", "resistance", f"four-wire, between the side taps {length:g} mm apart, DC"),),
         expected, 60 * width * height + 16 * height, turned, degrees,
     )  # fmt: skip
 
@@ -322,15 +323,15 @@ def _ladder(material: str, degrees: float | None, height: float, line_m: float) 
             for k in range(len(LADDER_MM))
         )  # fmt: skip
 
-    strips = tuple(Size(f"strip_{k + 1}", 1.0, 0.05) for k in range(len(LADDER_MM) + 1))
-    between = tuple(Size(f"between_{k + 1}_mm", gap, 0.1) for k, gap in enumerate(LADDER_MM))
+    strips = tuple(CouponSize(f"strip_{k + 1}", 1.0, 0.05) for k in range(len(LADDER_MM) + 1))
+    between = tuple(CouponSize(f"between_{k + 1}_mm", gap, 0.1) for k, gap in enumerate(LADDER_MM))
     return Coupon(
         f"ladder-{'print' if degrees is None else '0'}-{height:g}", "ladder", material,
-        (_millimetres("width_mm", width), _millimetres("height_mm", height), Size("fill", 1.0, _FILL),
-         Size("spreading", 0.8, 0.1), *between, *strips),
+        (_millimetres("width_mm", width), _millimetres("height_mm", height), CouponSize("fill", 1.0, _FILL),
+         CouponSize("spreading", 0.8, 0.1), *between, *strips),
         tuple(
-            Reading(f"strips_{k + 1}_{k + 2}_ohm", "resistance", f"two-wire, strips {k + 1} and {k + 2}, {gap:g} mm "
-                    "of bar between them, DC")
+            CouponReading(f"strips_{k + 1}_{k + 2}_ohm", "resistance",
+                          f"two-wire, strips {k + 1} and {k + 2}, {gap:g} mm of bar between them, DC")
             for k, gap in enumerate(LADDER_MM)
         ),
         expected, length * width * height, (length, width), degrees,
@@ -368,11 +369,11 @@ def _plate(material: str, thicknesses_mm: tuple[float, ...]) -> Coupon:
     ]
     return Coupon(
         "plate-" + "-".join(f"{thickness:g}" for thickness in thicknesses_mm), "plate", material,
-        (*measured, _millimetres("electrode_mm", ELECTRODE_MM), Size("fringe", _FRINGE, 0.03), Size("fill", 1.0, 0.005),
-         Size("stray_pf", 0.0, 0.02)),
+        (*measured, _millimetres("electrode_mm", ELECTRODE_MM), CouponSize("fringe", _FRINGE, 0.03),
+         CouponSize("fill", 1.0, 0.005), CouponSize("stray_pf", 0.0, 0.02)),
         tuple(
-            Reading(f"capacitance_{k}_pf", "capacitance", "LCR meter, 1 kHz, open circuit subtracted; probes on the "
-                    f"pad and on the upper disc of the film of {thickness:g} mm")
+            CouponReading(f"capacitance_{k}_pf", "capacitance", "LCR meter, 1 kHz, open circuit subtracted; probes on "
+                          f"the pad and on the upper disc of the film of {thickness:g} mm")
             for k, thickness in enumerate(thicknesses_mm, 1)
         ),
         expected, sum(volumes) + PAD_MM**2 * ELECTRODE_MM, (2 * sum(rims) + PAD_MM, 2 * max(rims)),
@@ -400,14 +401,14 @@ def _disc(material: Material, role: str, diameter: float, height: float) -> Coup
     usual = (np.exp(centre), float(closed.bonded_modulus(np.exp(centre), 0.01, a, h)))
     loads = [min(_MOST_N, float(f"{_STRAIN * pi * a**2 * modulus:.2g}")) for modulus in usual]
     presses = (
-        Reading("sliding", "stiffness", "compression between lubricated plates", loads[0]),
-        Reading("bonded", "stiffness", "compression between plates that it is glued to", loads[1]),
+        CouponReading("sliding", "stiffness", "compression between lubricated plates", loads[0]),
+        CouponReading("bonded", "stiffness", "compression between plates that it is glued to", loads[1]),
     )
-    through = Reading("through_ohm", "resistance", "two-wire, terminals over both faces, DC")
+    through = CouponReading("through_ohm", "resistance", "two-wire, terminals over both faces, DC")
     return Coupon(
         f"disc-{material.name}-{diameter:g}x{height:g}", "disc", material.name,
-        (_millimetres("diameter_mm", diameter), _millimetres("height_mm", height), Size("fill", 1.0, _FILL),
-         Size("bonded", 1.0, 0.05), Size("lower_face", 1.0, 0.05), Size("upper_face", 1.0, 0.05)),
+        (_millimetres("diameter_mm", diameter), _millimetres("height_mm", height), CouponSize("fill", 1.0, _FILL),
+         CouponSize("bonded", 1.0, 0.05), CouponSize("lower_face", 1.0, 0.05), CouponSize("upper_face", 1.0, 0.05)),
         (*([through] if conducts else []), *presses),
         expected, pi * diameter**2 / 4 * height, (diameter, diameter),
     )  # fmt: skip
@@ -430,14 +431,14 @@ def _pads(material: str, *heights: float) -> Coupon:
             _millimetres(f"diameter_{k}_mm", PAD_DIAMETER_MM), _millimetres(f"height_{k}_mm", height),
         )
     ]  # fmt: skip
-    faces = [Size(f"{face}_face_{k}", 1.0, 0.05) for k in range(1, count + 1) for face in ("lower", "upper")]
+    faces = [CouponSize(f"{face}_face_{k}", 1.0, 0.05) for k in range(1, count + 1) for face in ("lower", "upper")]
     columns, rows = min(count, PADS_IN_ROW), -(-count // PADS_IN_ROW)
     return Coupon(
         "pads-" + "-".join(f"{count}x{height:g}" for height, count in Counter(heights).items()), "pads", material,
-        (*measured, Size("fill", 1.0, _FILL), *faces),
+        (*measured, CouponSize("fill", 1.0, _FILL), *faces),
         tuple(
-            Reading(f"through_{k}_ohm", "resistance", f"pad of {height:g} mm between terminals over both faces, two "
-                    "leads to each, DC")
+            CouponReading(f"through_{k}_ohm", "resistance", f"pad of {height:g} mm between terminals over both faces, "
+                          "two leads to each, DC")
             for k, height in enumerate(heights, 1)
         ),
         expected, sum(pi * PAD_DIAMETER_MM**2 / 4 * height for height in heights),
@@ -445,6 +446,6 @@ def _pads(material: str, *heights: float) -> Coupon:
     )  # fmt: skip
 
 
-def nominal(coupon: Coupon, meters: Meters) -> tuple[Size, ...]:
+def nominal(coupon: Coupon, meters: Meters) -> tuple[CouponSize, ...]:
     """Sizes as drawn, with the spread that calipers leave."""
     return tuple(replace(size, spread=meters.calipers_mm) if size.measured else size for size in coupon.sizes)

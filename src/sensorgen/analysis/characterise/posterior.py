@@ -11,9 +11,9 @@ from math import log
 
 import numpy as np
 
-from sensorgen.analysis.characterise.catalogue import Coupon, Size, Target
+from sensorgen.analysis.characterise.catalogue import Coupon, CouponSize, CouponTarget
 from sensorgen.core.arrays import Mask, Real
-from sensorgen.prediction.inference import Fit, Index, LeastSquares, Normal, Parameter, descend, whitening
+from sensorgen.prediction.inference import Index, LeastSquares, LocalFit, Normal, Parameter, descend, whitening
 
 DEAD = 0.05  # of coupons, before anything is read
 _DECADES = 6.0  # within which the reading of a dead coupon lies
@@ -30,7 +30,7 @@ class Observation:
     ----------
     coupon : Coupon
         What was read.
-    sizes : tuple of Size
+    sizes : tuple of CouponSize
         As measured, each with its standard deviation.
     log_values : (n,) array
         ln of the readings in SI units; nan where there is none.
@@ -39,7 +39,7 @@ class Observation:
     """
 
     coupon: Coupon
-    sizes: tuple[Size, ...]
+    sizes: tuple[CouponSize, ...]
     log_values: Real
     noise: Real
 
@@ -55,7 +55,7 @@ def physical(unknowns: Sequence[Parameter], theta: Real) -> dict[str, Real]:
 
 
 @dataclass(frozen=True)
-class Line:
+class Linearisation:
     """A coupon's readings near a point: ln of the values, their Jacobian, and the covariance of their errors."""
 
     log_values: Real
@@ -64,8 +64,8 @@ class Line:
 
 
 def linearised(
-    coupon: Coupon, sizes: Sequence[Size], noise: Real, unknowns: Sequence[Parameter], theta: Real
-) -> Line:  # fmt: skip
+    coupon: Coupon, sizes: Sequence[CouponSize], noise: Real, unknowns: Sequence[Parameter], theta: Real
+) -> Linearisation:  # fmt: skip
     """Expected readings, their derivatives by the unknowns, and the errors of meters and sizes together."""
     p, s = len(theta), len(sizes)
     steps = np.array([_STEP * u.spread for u in unknowns])
@@ -78,7 +78,9 @@ def linearised(
     with np.errstate(all="ignore"):
         found = np.log(np.stack(coupon.expected(physical(unknowns, points), around), axis=-1))
     by_size = (found[1 + p :] - found[0]) / 0.05  # for one standard deviation each
-    return Line(found[0], ((found[1 : 1 + p] - found[0]) / steps[:, None]).T, np.diag(noise**2) + by_size.T @ by_size)
+    return Linearisation(
+        found[0], ((found[1 : 1 + p] - found[0]) / steps[:, None]).T, np.diag(noise**2) + by_size.T @ by_size
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,30 +113,30 @@ class _Coupons(LeastSquares):
         """Unknowns before any reading."""
         return _before(self.unknowns)
 
-    def fit(self, at: Real, rows: Index) -> Fit:  # noqa: ARG002
+    def fit(self, at: Real, rows: Index) -> LocalFit:  # noqa: ARG002
         """Minus twice ln of the density of all readings but those of the dead, at unknowns (1, p)."""
         alive = (o for k, o in enumerate(self.observations) if k not in self.dead)
         return self.together(at, (self.one(o, at) for o in alive))
 
-    def together(self, at: Real, fits: Iterable[Fit]) -> Fit:
+    def together(self, at: Real, fits: Iterable[LocalFit]) -> LocalFit:
         """Fit of several coupons and of what was known before."""
-        zero = Fit.of(at, np.zeros((1, 0)), np.zeros((1, at.shape[1], 0)))
+        zero = LocalFit.of(at, np.zeros((1, 0)), np.zeros((1, at.shape[1], 0)))
         return sum(fits, zero).with_prior(self.before.at, self.before.information)
 
-    def one(self, o: Observation, at: Real) -> Fit:
+    def one(self, o: Observation, at: Real) -> LocalFit:
         """Fit of a coupon; infinite where its readings are undefined, as of a gap that is wider than its film."""
         line = linearised(o.coupon, o.sizes, o.noise, self.unknowns, at[0])
         residual, slope = (o.log_values - line.log_values)[o.read], line.jacobian[o.read]
         covariance = line.covariance[np.ix_(o.read, o.read)]
         if not all(np.isfinite(part).all() for part in (residual, covariance, slope)):
             nothing = np.zeros((1, at.shape[1]))
-            return Fit(at, np.array([np.inf]), nothing[:, None] * nothing.T, nothing)
+            return LocalFit(at, np.array([np.inf]), nothing[:, None] * nothing.T, nothing)
         root = whitening(covariance)
-        fit = Fit.of(at, (root @ residual)[None], (root @ slope).T[None])
+        fit = LocalFit.of(at, (root @ residual)[None], (root @ slope).T[None])
         fit.chi2 += len(residual) * log(2 * np.pi) - 2 * np.log(np.diag(root)).sum()
         return fit
 
-    def done(self, fit: Fit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
+    def done(self, fit: LocalFit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
         """Small steps, in standard deviations."""
         return np.asarray(gain < _STILL**2)
 
@@ -144,7 +146,7 @@ class _Coupons(LeastSquares):
         first = first if np.isfinite(self.fit(first, fresh).chi2).all() else self.before.at[None]
         return self.mode(self.fit(descend(self, first).at, fresh))
 
-    def mode(self, fit: Fit) -> Mode:
+    def mode(self, fit: LocalFit) -> Mode:
         """Distribution by a fit that is linear up to its peak, with its evidence by Laplace's approximation."""
         count = sum(int(self.observations[k].read.sum()) for k in self.dead)
         evidence = float(fit.log_evidence()[0]) - count * log(_DECADES * log(10.0))
@@ -175,7 +177,7 @@ class Interval95:
 
 
 @dataclass(frozen=True)
-class Posterior:
+class CouponPosterior:
     """Unknowns after the readings.
 
     Attributes
@@ -203,7 +205,7 @@ class Posterior:
         }
         return {name: share for name, share in shares.items() if share > 0.5}
 
-    def interval(self, target: Target) -> Interval95:
+    def interval(self, target: CouponTarget) -> Interval95:
         """Median and 95 % interval of a target: quantiles of the sum of normal distributions."""
         means, sigmas = [], []
         for mode in self.modes:
@@ -213,7 +215,7 @@ class Posterior:
         return _quantiles(np.array(means), np.array(sigmas), self.weights, linear=target.linear)
 
 
-def gradient(unknowns: Sequence[Parameter], at: Real, steps: Real, target: Target) -> tuple[float, Real]:
+def gradient(unknowns: Sequence[Parameter], at: Real, steps: Real, target: CouponTarget) -> tuple[float, Real]:
     """A target, or its ln unless it is linear, and its derivatives by the unknowns (p,), by differences of steps."""
     values = target.value(physical(unknowns, np.vstack([at, at + np.diag(steps)])))
     values = values if target.linear else np.log(np.maximum(values, 1e-300))
@@ -240,12 +242,12 @@ def _before(unknowns: Sequence[Parameter]) -> Mode:
     return Mode(mean, np.diag(spread**2))
 
 
-def prior(unknowns: Sequence[Parameter]) -> Posterior:
+def prior(unknowns: Sequence[Parameter]) -> CouponPosterior:
     """The unknowns before any reading."""
-    return Posterior(tuple(unknowns), (_before(unknowns),), np.ones(1), ())
+    return CouponPosterior(tuple(unknowns), (_before(unknowns),), np.ones(1), ())
 
 
-def posterior(observations: Sequence[Observation], unknowns: Sequence[Parameter]) -> Posterior:
+def posterior(observations: Sequence[Observation], unknowns: Sequence[Parameter]) -> CouponPosterior:
     """The unknowns after readings of coupons, of which up to three may be dead.
 
     Parameters
@@ -269,6 +271,6 @@ def posterior(observations: Sequence[Observation], unknowns: Sequence[Parameter]
     weights = np.exp([mode.log_evidence - best.log_evidence for mode in ranked])
     count = int((weights > 1e-6 * weights.sum()).sum())
     weights = weights[:count] / weights[:count].sum()
-    return Posterior(
+    return CouponPosterior(
         tuple(unknowns), tuple(ranked[:count]), weights, tuple(o.coupon.name for o in problem.observations)
     )

@@ -16,8 +16,8 @@ from itertools import combinations, combinations_with_replacement, product
 
 import numpy as np
 
-from sensorgen.analysis.characterise.catalogue import LEVEL_SIGMA, Coupon, Meters, Target, nominal
-from sensorgen.analysis.characterise.posterior import DEAD, Mode, Posterior, gradient, linearised, physical
+from sensorgen.analysis.characterise.catalogue import LEVEL_SIGMA, Coupon, CouponTarget, Meters, nominal
+from sensorgen.analysis.characterise.posterior import DEAD, CouponPosterior, Mode, gradient, linearised, physical
 from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.prediction.inference import Parameter, whitening
@@ -70,15 +70,15 @@ class Candidates:
         missed = np.log(np.maximum(1.0, over[0])).sum() + _SHARE * np.log(np.maximum(1.0, over[1:] / RESERVE)).sum()
         return float(-(1 - DEAD * len(pieces)) * log_det[0] - DEAD * log_det[1:].sum() - MISSED * missed)
 
-    def expected(self, chosen: Sequence[int], unknowns: Sequence[Parameter]) -> Posterior:
+    def expected(self, chosen: Sequence[int], unknowns: Sequence[Parameter]) -> CouponPosterior:
         """Posterior that a set of coupons is expected to give, all of them sound."""
         covariance = np.linalg.inv(self.prior + self.information[list(chosen)].sum(axis=0))
         mean = np.array([u.centre for u in unknowns])
-        return Posterior(tuple(unknowns), (Mode(mean, covariance),), np.ones(1), ())
+        return CouponPosterior(tuple(unknowns), (Mode(mean, covariance),), np.ones(1), ())
 
 
 def candidates(
-    coupons: Sequence[Coupon], unknowns: Sequence[Parameter], targets: Sequence[Target], meters: Meters
+    coupons: Sequence[Coupon], unknowns: Sequence[Parameter], targets: Sequence[CouponTarget], meters: Meters
 ) -> Candidates:
     """Fisher information of every coupon of a catalogue."""
     theta, spread = np.array([(u.centre, u.spread) for u in unknowns]).T

@@ -19,7 +19,7 @@ from sensorgen.prediction.electrodes import electrode_resistance
 
 
 @dataclass(frozen=True, slots=True)
-class Allowed:
+class AllowedValues:
     """ln of the resistivities [ohm m] that a reading allows, and of the leak per area [S/m2]; nan where unknown."""
 
     low: float
@@ -32,7 +32,7 @@ def usable(row: Compared) -> bool:
     return row.verdict.electrode == "sound" and isfinite(row.verdict.ry_ohm) and row.verdict.ry_ohm > 0
 
 
-def allowed(row: Compared, body: Body) -> Allowed | None:
+def allowed(row: Compared, body: Body) -> AllowedValues | None:
     """Resistivity that a reading allows; None without one above 0. A film without a reading is taken for tight."""
     ry, rz = row.verdict.ry_ohm, row.across_ohm
     if not 0 < ry < inf:
@@ -45,7 +45,7 @@ def allowed(row: Compared, body: Body) -> Allowed | None:
     ]
     leak = max(leak for *_, leak in known)
     low, high = min(ohm / this.upper for this, ohm, _ in known), max(ohm / this.lower for this, ohm, _ in known)
-    return Allowed(log(low), log(high), log(leak / area) if 0 < leak < inf else nan)
+    return AllowedValues(log(low), log(high), log(leak / area) if 0 < leak < inf else nan)
 
 
 @lru_cache(maxsize=64)

@@ -57,7 +57,7 @@ class Measured:
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
+class IterationReadings:
     """All readings of an iteration.
 
     Attributes
@@ -75,7 +75,7 @@ class Readings:
     designs: frozenset[tuple[str, str]]
 
 
-def readings(logged: Iterable[Reading]) -> Readings:
+def readings(logged: Iterable[Reading]) -> IterationReadings:
     """Readings one after the other, of which none is kept as it comes."""
     numbers, ends = array("q"), array("q", [0])
     ohms, along, kinds = array("d"), array("q"), array("q")
@@ -101,4 +101,4 @@ def readings(logged: Iterable[Reading]) -> Readings:
         split = begin + along[k]
         return Measured(numbers[k], tuple(ohms[begin:split]), tuple(ohms[split:end]), listed[kinds[k]])
 
-    return Readings(Lazy(made, range(len(numbers))), tuple(alternating), frozenset(designs))
+    return IterationReadings(Lazy(made, range(len(numbers))), tuple(alternating), frozenset(designs))

@@ -48,7 +48,8 @@ class Movable:
 
     def capacitance_f(self, permittivity: float) -> float:
         """With another permittivity of the film's material [F]."""
-        return rest_state(self.body.with_values({self.film: {PERMITTIVITY: permittivity}})).capacitance.value
+        changed = self.body.with_values({self.film: {PERMITTIVITY: permittivity}})
+        return rest_state(changed, ranges=False).capacitance.value
 
     @cached_property
     def by_permittivity(self) -> tuple[Real, Real]:
@@ -62,13 +63,12 @@ class Movable:
         A print has whole layers, so that its capacitance jumps with the film that is asked for.
         """
         data = self.body.design.model_dump(exclude={"name"}, exclude_defaults=True, mode="json")
-        d = getattr(self.body.design.params, "dielectric_mm", 0.0)
-        if not d:
+        if not (d := getattr(self.body.design.params, "dielectric_mm", 0.0)):
             return np.log(FACTORS), np.zeros(len(FACTORS))
 
         def at(factor: float) -> float:
-            parameters = data.get("parameters", {}) | {"dielectric_mm": d * factor}
-            return rest_state(bodies.drawn(make(data | {"parameters": parameters}))).capacitance.value
+            changed = make(data | {"parameters": data.get("parameters", {}) | {"dielectric_mm": d * factor}})
+            return rest_state(bodies.drawn(changed), ranges=False).capacitance.value
 
         return _curve(at, at(1.0))
 

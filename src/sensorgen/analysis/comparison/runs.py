@@ -17,7 +17,7 @@ from sensorgen.measure.signal.run import processed
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class RecordedRun:
     """A recording, or a part of one, without its samples.
 
     Attributes
@@ -73,7 +73,7 @@ class Run:
 
 def runs(
     log: Log, iteration: int | None, left_out: list[tuple[str, str]], *, specimens: Sequence[str] = ()
-) -> Iterator[Run]:
+) -> Iterator[RecordedRun]:
     """Recordings of an iteration, part after part; what cannot be read or used goes to ``left_out`` with its reason.
 
     Parameters
@@ -109,7 +109,7 @@ def _noted(left_out: list[tuple[str, str]], name: str) -> Iterator[None]:
         left_out.append((name, f"{type(error).__name__}: {error}; a fault of sensorgen, please report it"))
 
 
-def _of_part(entry: BenchRun, found: Sequence[Recording], pressed: RigLog | None) -> Iterator[Run]:
+def _of_part(entry: BenchRun, found: Sequence[Recording], pressed: RigLog | None) -> Iterator[RecordedRun]:
     """All lock-ins of a part, each with the rig's log, or without if they cannot be joined."""
     beside: Sequence[Joined | None] = [None] * len(found)
     without = "no log of the rig: force and position are not known"
@@ -133,7 +133,7 @@ def _of_part(entry: BenchRun, found: Sequence[Recording], pressed: RigLog | None
         rest, spread = z.mean(axis=0), np.asarray(scatter / np.sqrt(max(len(z), 1)))
         raw = np.flatnonzero(valid)[thinned_together(one.impedance_ohm, valid)]
         smooth = thinned_together(done.filtered_ohm)
-        yield Run(
+        yield RecordedRun(
             entry, one.source, one.tones_hz, counts["samples"], counts["valid"], float(one.time_s[-1]),
             one.time_s[raw], one.impedance_ohm[raw], done.filtered_s[smooth], done.filtered_ohm[smooth], rest, spread,
             scatter, done.pairs if done.by_force else None, notes,

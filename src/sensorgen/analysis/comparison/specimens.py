@@ -14,7 +14,7 @@ from sensorgen.core.errors import SensorgenError
 from sensorgen.core.lazy import Lazy
 from sensorgen.design.body import Body, BodyOf
 from sensorgen.design.design import Design
-from sensorgen.design.specimen_name import Specimen, design_of, parse
+from sensorgen.design.specimen_name import SpecimenName, design_of, parse
 from sensorgen.measure import accuracy
 from sensorgen.measure.log import BenchRun, Entry, Log, Prediction, Print, Reading, Withdrawal
 from sensorgen.measure.log.batches import designs as on_beds
@@ -22,7 +22,7 @@ from sensorgen.measure.log.logbook import conflict
 from sensorgen.measure.signal.verdicts import (
     INTACT_OHM,
     Evidence,
-    Verdict,
+    SignalVerdict,
     expected_from,
     intact_ohm,
     least,
@@ -46,14 +46,14 @@ class Compared:
         What the log has of it.
     predicted : Predicted or None
         None where no design is known.
-    evidence, verdict : Evidence, Verdict
+    evidence, verdict : Evidence, SignalVerdict
         What the readings say by themselves; what an electrode should have is the median of its own shape.
     """
 
     reading: Measured
     predicted: Predicted | None
     evidence: Evidence
-    verdict: Verdict
+    verdict: SignalVerdict
 
     @property
     def across_ohm(self) -> float:
@@ -254,7 +254,7 @@ def _by_specimen(
     """The designs of specimens: those that they are bound to, else what their names stand for."""
     found: dict[str, Design] = {}
     recorded = on_beds(log, refused)
-    made: dict[Specimen, Design | None] = {}
+    made: dict[SpecimenName, Design | None] = {}
     for specimen in log.specimens(iteration=iteration):
         name, of = specimen.specimen, printed.get(specimen.specimen)
         if specimens and name not in specimens:

@@ -8,9 +8,9 @@ from math import log, nan, sqrt
 
 import numpy as np
 
-from sensorgen.analysis.calibration import Bench, Known, known
+from sensorgen.analysis.calibration import Bench, SpecimenEntries, known
 from sensorgen.analysis.comparison import Compared, Comparison, Predicted, of_iteration
-from sensorgen.analysis.comparison.allowed import Allowed, allowed, usable
+from sensorgen.analysis.comparison.allowed import AllowedValues, allowed, usable
 from sensorgen.analysis.comparison.moved import Movable, at_rest
 from sensorgen.analysis.fit import resistance, tones
 from sensorgen.analysis.fit.results import Error, Fit, Fitted, Untold
@@ -96,9 +96,9 @@ def fit(
     )  # fmt: skip
 
 
-def _groups(allowing: Sequence[tuple[Compared, Allowed]]) -> dict[str, list[tuple[Allowed, bool]]]:
+def _groups(allowing: Sequence[tuple[Compared, AllowedValues]]) -> dict[str, list[tuple[AllowedValues, bool]]]:
     """Readings by shape and direction, each with whether its electrode is sound."""
-    groups: dict[str, list[tuple[Allowed, bool]]] = {}
+    groups: dict[str, list[tuple[AllowedValues, bool]]] = {}
     for row, reading in allowing:
         groups.setdefault(f"{row.evidence.shape} {row.evidence.axes}".strip(), []).append((reading, usable(row)))
     return groups
@@ -106,7 +106,7 @@ def _groups(allowing: Sequence[tuple[Compared, Allowed]]) -> dict[str, list[tupl
 
 def _measured(
     log: Log, which: _Which, comparison: Comparison, bench: Bench, body_of: BodyOf, left_out: list[tuple[str, str]]
-) -> Iterator[tuple[Known, str]]:
+) -> Iterator[tuple[SpecimenEntries, str]]:
     """Specimens that the bench or an LCR meter has measured, each with the name of its print."""
     prints: dict[str, str] = {}
     for row in (*log.about(BenchRun, *which), *comparison.alternating):
@@ -123,7 +123,7 @@ def _measured(
         yield one, print_ or specimen
 
 
-def _allowing(comparison: Comparison) -> Iterator[tuple[Compared, Allowed]]:
+def _allowing(comparison: Comparison) -> Iterator[tuple[Compared, AllowedValues]]:
     """Readings along electrodes, and what each of them allows."""
     for row in comparison.rows:
         if row.predicted and (reading := allowed(row, comparison.bodies[row.predicted.design])):
@@ -142,7 +142,7 @@ def held_back(names: Sequence[str], seed: int, share: float = HELD_BACK) -> froz
 
 
 def _fitted(
-    readings: Sequence[Allowed], fits: Sequence[tones.OfSpecimen], design: Design, seed: int
+    readings: Sequence[AllowedValues], fits: Sequence[tones.OfSpecimen], design: Design, seed: int
 ) -> tuple[list[Fitted], list[Untold]]:
     """All values and all that stays open; of two values of one quantity the one that is known better."""
     electrode, film = design.slot("top_electrode")[0].name, design.slot("film")[0].name
@@ -185,7 +185,9 @@ def _reading_errors(
     yield from _error("R_Y", residuals)
 
 
-def _rest_errors(specimens: Sequence[Known], comparison: Comparison, values: Sequence[Fitted]) -> Iterator[Error]:
+def _rest_errors(
+    specimens: Sequence[SpecimenEntries], comparison: Comparison, values: Sequence[Fitted]
+) -> Iterator[Error]:
     residuals = list[tuple[float, float]]()
     for one in specimens:
         body = comparison.bodies[comparison.names[one.specimen]]

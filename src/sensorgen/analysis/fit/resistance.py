@@ -5,7 +5,7 @@ from math import exp, isfinite, log, sqrt
 
 import numpy as np
 
-from sensorgen.analysis.comparison.allowed import Allowed
+from sensorgen.analysis.comparison.allowed import AllowedValues
 from sensorgen.analysis.fit.results import LEVEL, Fitted, GroupError, Untold
 from sensorgen.design.materials import FILM_LEAK
 from sensorgen.measure.recording.samples import Real
@@ -16,7 +16,7 @@ _DRAWS = 2000
 _PROPERTY = 10.0  # leaks that scatter by more than this factor about their median are no property of a material
 
 
-def resistivity(readings: Sequence[Allowed], material: str) -> Fitted | Untold:
+def resistivity(readings: Sequence[AllowedValues], material: str) -> Fitted | Untold:
     """One resistivity for both electrodes: the median of prints, and the interval that holds 95 % of other prints.
 
     The interval is Student's for one more print, by the scatter of ln of the resistivity; it holds at least the medians
@@ -39,12 +39,12 @@ def resistivity(readings: Sequence[Allowed], material: str) -> Fitted | Untold:
     )  # fmt: skip
 
 
-def by_group(groups: Mapping[str, Sequence[tuple[Allowed, bool]]], material: str) -> Iterator[GroupError]:
+def by_group(groups: Mapping[str, Sequence[tuple[AllowedValues, bool]]], material: str) -> Iterator[GroupError]:
     """Readings of each group beside the resistivity of all other groups.
 
     Parameters
     ----------
-    groups : mapping of str to sequence of (Allowed, bool)
+    groups : mapping of str to sequence of (AllowedValues, bool)
         Readings of a group, and whether the electrode is sound: others are predicted, but not fitted to.
     material : str
         Of the electrodes.
@@ -72,7 +72,7 @@ def _medians(values: Real, seed: int) -> Real:
     return np.asarray((ordered[ranks[0]] + ordered[ranks[1]]) / 2)
 
 
-def leak(readings: Sequence[Allowed], material: str, seed: int) -> Fitted | Untold:
+def leak(readings: Sequence[AllowedValues], material: str, seed: int) -> Fitted | Untold:
     """Leak per area, where it scatters little enough to be anything of the material's."""
     known = np.array([r.leak for r in readings if isfinite(r.leak)])
     if len(known) < LEAST:

@@ -9,7 +9,7 @@ from math import exp, inf, log, pi, sqrt
 
 import numpy as np
 
-from sensorgen.analysis.calibration import Known
+from sensorgen.analysis.calibration import SpecimenEntries
 from sensorgen.analysis.comparison.moved import PERMITTIVITY, Movable
 from sensorgen.analysis.fit.results import LEVEL, Fitted, Untold
 from sensorgen.core.arrays import Real
@@ -42,12 +42,12 @@ class OfSpecimen:
     stiffness: Estimate | None
 
 
-def of_specimen(known: Known, print_: str, of: Movable) -> OfSpecimen:
+def of_specimen(known: SpecimenEntries, print_: str, of: Movable) -> OfSpecimen:
     """Calibrate a specimen, and take what its readings say.
 
     Parameters
     ----------
-    known : Known
+    known : SpecimenEntries
         What the log has of it.
     print_ : str
         Name of its print bed; its own if that is unknown.
@@ -76,7 +76,7 @@ def _alone(model: SpecimenModel, posterior: Posterior, name: str) -> Estimate:
     return float(scale * pull / information[0]), float(scale / sqrt(information[0]))
 
 
-def _stiffness(known: Known, posterior: Posterior) -> Estimate:
+def _stiffness(known: SpecimenEntries, posterior: Posterior) -> Estimate:
     """Ln of one factor on all moduli by the rise at each force, whose own deviations from the law are marginalised."""
     model, sensor = known.model, known.model.sensor
     weights = model.law_weights()

@@ -47,4 +47,7 @@ def files(
         f"{len(frequency_hz)} frequencies, {force_n[0]:g} to {force_n[-1]:g} N, "
         f"{position_mm[0]:g} to {position_mm[-1]:g} mm, tip {answer.tip_mm:g} mm."
     )
-    yield PAGE, pages.page(f"{title or 'Sensor'} under load", [words], [pages.Section(figures=tuple(drawn))]).encode()
+    yield (
+        PAGE,
+        pages.page(f"{title or 'Sensor'} under load", [words], [pages.PageSection(figures=tuple(drawn))]).encode(),
+    )

@@ -1,33 +1,63 @@
 """Maps over the outline of an array."""
 
-from math import nan
+from math import isnan, nan
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sensorgen.analysis.plots import static
+from sensorgen.analysis.plots import pages, static
 from sensorgen.analysis.plots.figure import GREY, Axis, Curve, Figure, Map, Panel
 from sensorgen.core.arrays import Real
 
+_MEDIANS = 3.0  # standard errors beyond this many medians have one colour
+
 if TYPE_CHECKING:
-    from sensorgen.design.arrays import Layout
+    from sensorgen.design.arrays import ArrayLayout
     from sensorgen.prediction.array.frames import PressureMaps
     from sensorgen.prediction.array.study import ArrayStudy
 
 
 def png(study: "ArrayStudy") -> bytes:
-    """Standard errors of pressure over the outline, and crosstalk where it is known, as PNG.
+    """Standard errors of pressure over the outline, and crosstalk where it is known, as PNG."""
+    return static.png(resolution(study))
 
-    Crossings that are not determined are left white.
-    """
+
+def resolution(study: "ArrayStudy", name: str = "array", title: str = "") -> Figure:
+    """Standard errors of pressure over the outline, crosstalk where it is known; what is not determined is white."""
     layout = study.model.layout
     shown = np.where(study.determined, study.sigma_kpa, np.nan)
-    panels = [panel(layout, shown, "standard error [kPa]", f"one frame at {study.pressure_kpa:g} kPa")]
+    known = shown[study.determined]
+    most = min(float(known.max(initial=0.0)), _MEDIANS * float(np.median([*known, 0.0])))
+    panels = [panel(layout, shown, "standard error [kPa]", f"one frame at {study.pressure_kpa:g} kPa", most or nan)]
     if study.crosstalk is not None:
-        panels.append(panel(layout, np.where(study.determined, study.crosstalk, np.nan), "crosstalk [-]", "crosstalk"))
+        values = np.where(study.determined, study.crosstalk, np.nan)
+        panels.append(
+            panel(layout, values, "crosstalk [-]", "crosstalk", min(1.0, np.nanmax(values, initial=0.0)) or nan)
+        )
     alt = "Standard error of the pressure at every crossing, over the outline; crosstalk beside it."
-    return static.png(Figure("array", f"{study.model.design.name}, {study.readout.kind}", alt, {"": tuple(panels)},
-                             columns=len(panels)))  # fmt: skip
+    words = title or f"{study.model.design.name}, {study.readout.kind}"
+    return Figure(name, words, alt, {"": tuple(panels)}, columns=len(panels))
+
+
+def page(study: "ArrayStudy", found: "PressureMaps", true: "Real") -> bytes:
+    """Page of a resolution study: as printed, with a broken row and a shorted crossing, and a foot beside its truth."""
+    from sensorgen.core.document import Facts, Table
+    from sensorgen.prediction.array.study import study as again
+
+    row = study.model.layout.rows[len(study.model.layout.rows) // 2]
+    middle = (row.first + row.last) // 2 + 1
+    faults = {"broken": f"{row.name}:{middle}", "short": f"{row.name}c{middle}"}
+    figures = [resolution(study)]
+    for name, fault in faults.items():
+        with_fault = again(study.model, study.readout, study.pressure_kpa, [*study.faults, fault])
+        figures.append(resolution(with_fault, name, f"with the fault {fault}"))
+    figures.append(figure(found, true, "foot", "a foot: simulated frame at its heaviest, true and recovered"))
+    sections = [pages.PageSection(figures=tuple(figures))]
+    parts = list(study.document())
+    words = [f"{key}: {value}" for part in parts if isinstance(part, Facts) for key, value in part.rows]
+    words += [part for part in parts if isinstance(part, str) and part]
+    sections.append(pages.PageSection(parts=tuple(part for part in parts if isinstance(part, Table))))
+    return pages.page(f"Resolution of {study.model.design.name}", words, sections).encode()
 
 
 def maps(pressures: "PressureMaps", true: "Real | None" = None) -> bytes:
@@ -41,7 +71,8 @@ def figure(pressures: "PressureMaps", true: "Real | None" = None, name: str = "m
     What is not determined is left white, never drawn as no pressure.
     """
     k, layout = pressures.heaviest(), pressures.model.layout
-    shown = {f"frame at {pressures.time_s[k]:g} s": pressures.pressure_kpa[k]}
+    time_s = float(pressures.time_s[k])
+    shown = {f"frame {k + 1}" if isnan(time_s) else f"frame at {time_s:g} s": pressures.pressure_kpa[k]}
     if true is not None:
         shown = {"true": np.where(pressures.model.here, true[k], np.nan)} | shown
     most = max(float(np.nanmax(values, initial=1.0)) for values in shown.values())
@@ -75,12 +106,15 @@ def course(pressures: "PressureMaps", true: "Real", name: str, title: str) -> Fi
     return Figure(name, title, alt, {"": tuple(panels)}, columns=2)
 
 
-def panel(layout: "Layout", values: Real, label: str, title: str, most: float = nan) -> Panel:
-    """One map of a value of every crossing, with the outline of the print."""
+def panel(layout: "ArrayLayout", values: Real, label: str, title: str, most: float = nan) -> Panel:
+    """One map of a value of every crossing, with the outline of the sensing area."""
     import shapely
 
-    x, y = shapely.get_coordinates(layout.footprint.exterior).T
-    (length, width), edge = layout.size_mm, layout.params.margin_mm
-    ends = (Axis("x [mm]", low=-edge, high=length + edge), Axis("y [mm]", low=-edge, high=width + edge))
+    edge = layout.params.margin_mm
+    x0, y0, x1, y1 = layout.sensing.bounds
+    ends = (Axis("x [mm]", low=x0 - edge, high=x1 + edge), Axis("y [mm]", low=y0 - edge, high=y1 + edge))
     drawn = Map(np.array(layout.x_mm), np.array(layout.y_mm), values, label, low=0.0, high=most)
-    return Panel((drawn, Curve("line", "", x, y, colour=GREY)), *ends, title=title, equal=True)
+    rings = shapely.get_rings(shapely.get_parts(layout.sensing))
+    ways = (shapely.get_coordinates(ring).T for ring in rings)
+    outline = [Curve("line", "", x, y, colour=GREY) for x, y in ways]
+    return Panel((drawn, *outline), *ends, title=title, equal=True)

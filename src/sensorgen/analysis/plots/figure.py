@@ -127,7 +127,7 @@ class Map:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class BodyTriangles:
     """A body as triangles [mm]."""
 
     name: str
@@ -152,7 +152,7 @@ class Panel:
         Whether both axes have one scale.
     """
 
-    content: tuple[Curve | Map | Body, ...]
+    content: tuple[Curve | Map | BodyTriangles, ...]
     x: Axis = Axis()
     y: Axis = Axis()
     z: Axis = Axis()
@@ -162,7 +162,7 @@ class Panel:
     @property
     def solid(self) -> bool:
         """True for a panel of bodies, in three dimensions."""
-        return isinstance(self.content[0], Body) if self.content else False
+        return isinstance(self.content[0], BodyTriangles) if self.content else False
 
 
 @dataclass(frozen=True, eq=False)

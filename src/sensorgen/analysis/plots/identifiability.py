@@ -8,7 +8,7 @@ from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, Axis, Curve, Fig
 from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.identifiability.fisher import Bounds, Setup, bounds, slopes
+from sensorgen.prediction.identifiability.fisher import LeastErrors, Setup, bounds, slopes
 from sensorgen.prediction.identifiability.identify import HIGHEST_HZ, surface
 from sensorgen.prediction.identifiability.verdict import required
 from sensorgen.prediction.query import FORCE_N, NOISE
@@ -83,6 +83,6 @@ def _by_frequency(setup: Setup) -> tuple[Panel, Panel]:
     return panels[0], panels[1]
 
 
-def _single(setup: Setup, frequency_hz: Real) -> Bounds:
+def _single(setup: Setup, frequency_hz: Real) -> LeastErrors:
     by_press = slopes(setup.sensor, frequency_hz, setup.force_n, setup.position_m)
     return bounds(type(by_press)(*(slope[:, None] for slope in by_press)), setup.noise)

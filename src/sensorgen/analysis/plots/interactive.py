@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.analysis.plots.figure import Axis, Body, Curve, Figure, Map, Panel, Values
+from sensorgen.analysis.plots.figure import Axis, BodyTriangles, Curve, Figure, Map, Panel, Values
 
 _ROW_PX, _LEAST_PX, _PANEL_PX, _SOLID_PX, _FRAME_PX = 19, 260, 320, 560, 110
 _BELOW_PX = 58  # from the last axis to a legend: below its title
@@ -48,7 +48,7 @@ def _all_traces(panels: Sequence[Panel]) -> Iterator[Data]:
 
 def _traces(panel: Panel, domain: list[float]) -> Iterator[Data]:
     for part in panel.content:
-        if isinstance(part, Body):
+        if isinstance(part, BodyTriangles):
             yield _body(part)
         elif isinstance(part, Map):
             yield from _map(part, panel, domain)
@@ -124,7 +124,7 @@ def _axis(axis: Axis) -> Data:
 
 
 def _scene(panel: Panel, stretch: tuple[float, float, float]) -> Data:
-    corners = np.vstack([body.vertices_mm for body in panel.content if isinstance(body, Body)])
+    corners = np.vstack([body.vertices_mm for body in panel.content if isinstance(body, BodyTriangles)])
     size = np.ptp(corners, axis=0) * stretch
     axes = {
         f"{name}axis": {"title": {"text": escape(axis.title)}}
@@ -136,7 +136,7 @@ def _scene(panel: Panel, stretch: tuple[float, float, float]) -> Data:
     }  # fmt: skip
 
 
-def _body(body: Body) -> Data:
+def _body(body: BodyTriangles) -> Data:
     numbers = (*body.vertices_mm.T, *body.triangles.T)
     return {
         "type": "mesh3d", "name": escape(body.name), "showlegend": True, "color": body.colour, "flatshading": True,

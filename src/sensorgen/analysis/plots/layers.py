@@ -35,7 +35,7 @@ class BodyShown:
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedFinding:
     """A finding in the list, its number on the drawing, and the layer at which it shows, counted from 0."""
 
     finding: Finding
@@ -66,19 +66,19 @@ def bodies(design: "Design") -> tuple[BodyShown, ...]:
     return tuple(rows)
 
 
-def placed(findings: Sequence[Finding], layers: Sequence[LayerRegions]) -> list[Placed]:
+def placed(findings: Sequence[Finding], layers: Sequence[LayerRegions]) -> list[PlacedFinding]:
     """Findings with their numbers and layers."""
     tops, number = [layer.top_mm for layer in layers], numbered(findings)
     rows = []
     for f in findings:
         known = f.place_mm is not None and bool(tops)
         at = (f.layer - 1 if f.layer else bisect_right(tops, f.place_mm[2] + SLIVER_MM)) if known and f.place_mm else 0
-        rows.append(Placed(f, number[f], min(at, len(tops) - 1) if known else None))
+        rows.append(PlacedFinding(f, number[f], min(at, len(tops) - 1) if known else None))
     return rows
 
 
 def stack(
-    layers: Sequence[LayerRegions], names: Sequence[str], size_mm: Sequence[float], listed: Sequence[Placed],
+    layers: Sequence[LayerRegions], names: Sequence[str], size_mm: Sequence[float], listed: Sequence[PlacedFinding],
     travel: Sequence[Travel] = (),
 ) -> dict[str, Any]:  # fmt: skip
     """Data for the script: layers with their heights [mm], a path per body and per kind of travel, and findings."""
@@ -103,7 +103,7 @@ def stack(
 
 def page(
     title: str, words: Sequence[str], shown: Sequence[BodyShown], data: Mapping[str, Any],
-    listed: Sequence[Placed] = (), travel: Sequence[Travel] = (),
+    listed: Sequence[PlacedFinding] = (), travel: Sequence[Travel] = (),
 ) -> str:  # fmt: skip
     """The page as HTML that needs nothing else.
 
@@ -117,7 +117,7 @@ def page(
         Bodies, in the order of their names in ``data``.
     data : mapping
         As of :func:`stack`.
-    found : sequence of Placed
+    found : sequence of PlacedFinding
         Listed below the picture; it opens at the layer of the first that has one.
     travel : sequence of Travel
         Drawn over the bodies, each with a box to show or hide it.

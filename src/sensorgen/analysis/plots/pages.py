@@ -48,7 +48,7 @@ class Drawing:
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class PageSection:
     """A part of a page.
 
     Attributes
@@ -77,7 +77,7 @@ class Section:
 
 
 def page(
-    title: str, words: Sequence[str], sections: Sequence[Section], *, headline: Sequence[str] = (),
+    title: str, words: Sequence[str], sections: Sequence[PageSection], *, headline: Sequence[str] = (),
     findings: Sequence[str] = (), made_at: str = "",
 ) -> str:  # fmt: skip
     """A page of sections.
@@ -88,7 +88,7 @@ def page(
         Heading of the page.
     words, headline, findings : sequence of str
         Paragraphs below it, sentences that decide, and further ones in a list.
-    sections : sequence of Section
+    sections : sequence of PageSection
         With links to those that have a title.
     made_at : str
         For the foot of the page.

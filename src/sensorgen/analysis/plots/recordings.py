@@ -26,7 +26,7 @@ from sensorgen.analysis.plots.figure import (
     scale,
     thinned,
 )  # fmt: skip
-from sensorgen.analysis.plots.pages import Section, page
+from sensorgen.analysis.plots.pages import PageSection, page
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.recording.samples import Complex, Real
 from sensorgen.measure.signal.hysteresis import Hysteresis
@@ -39,7 +39,7 @@ _TIME, _FORCE, _POSITION = Axis("time [s]"), Axis("force [N]"), Axis("position [
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class DrawnRecording:
     """Recording, as it is drawn.
 
     Attributes
@@ -65,7 +65,7 @@ class Run:
     pairs: Pairs | None
 
 
-def series(run: Run, key: str = "time") -> Figure:
+def series(run: DrawnRecording, key: str = "time") -> Figure:
     """R and X over time at each frequency: raw, filtered, before and under each load."""
     choices = {}
     for k, f in enumerate(run.tones_hz):
@@ -98,7 +98,7 @@ def difference_surface(pairs: Pairs, part: str) -> Surface:
     return surface(pairs.force_n, pairs.position_mm, getattr(pairs.difference_ohm, PARTS[part][1]))
 
 
-def differences(run: Run, part: str, key: str = "") -> Figure:
+def differences(run: DrawnRecording, part: str, key: str = "") -> Figure:
     """Change of "resistance" or "reactance" by the loads over force and position, at each frequency.
 
     Raises
@@ -206,12 +206,12 @@ def schedule(steps: Sequence[Step], seconds: float) -> bytes:
     return static.png(Figure("plan", f"{len(steps)} loads in {seconds:.0f} s", "The plan.", {"": panels}, columns=2))
 
 
-def over_time(run: Run) -> bytes:
+def over_time(run: DrawnRecording) -> bytes:
     """Readings over time at each frequency, as PNG."""
     return static.png(series(run))
 
 
-def surfaces(run: Run, part: str) -> bytes:
+def surfaces(run: DrawnRecording, part: str) -> bytes:
     """Change of "resistance" or "reactance" over force and position, at each frequency, as PNG."""
     return static.png(differences(run, part))
 
@@ -221,9 +221,9 @@ def normalised_differences(runs: Mapping[str, Pairs], tones_hz: Real, *, togethe
     return static.png(compared(runs, tones_hz, together=together))
 
 
-def html(run: Run) -> str:
+def html(run: DrawnRecording) -> str:
     """The run as a page: readings over time and differences over force and position, frequency by frequency."""
     figures = [differences(run, part) for part in PARTS] if run.pairs is not None else []
     loads = f"{len(run.pairs.time_s)} loads, " if run.pairs is not None else ""
-    section = Section(figures=(*figures, series(run)))
+    section = PageSection(figures=(*figures, series(run)))
     return page(run.name, [f"{loads}{len(run.tones_hz)} frequencies, {run.time_s[-1]:.0f} s."], [section])

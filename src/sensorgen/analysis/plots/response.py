@@ -19,7 +19,7 @@ POSITION, FORCE = Axis("position [mm]"), Axis("force [N]")
 
 
 @dataclass(frozen=True)
-class Quantity:
+class RealQuantity:
     """A real quantity over force and position."""
 
     symbol: str
@@ -28,17 +28,17 @@ class Quantity:
 
 
 QUANTITIES = {
-    "resistance": Quantity("R", "Resistance R, real part of the impedance", "Ω"),
-    "reactance": Quantity("X", "Reactance X, imaginary part of the impedance", "Ω"),
-    "resistance-by-position": Quantity("dR/dx", "Change of resistance per position, dR/dx", "Ω/mm"),
-    "resistance-by-force": Quantity("dR/dF", "Change of resistance per force, dR/dF", "Ω/N"),
-    "reactance-by-position": Quantity("dX/dx", "Change of reactance per position, dX/dx", "Ω/mm"),
-    "reactance-by-force": Quantity("dX/dF", "Change of reactance per force, dX/dF", "Ω/N"),
+    "resistance": RealQuantity("R", "Resistance R, real part of the impedance", "Ω"),
+    "reactance": RealQuantity("X", "Reactance X, imaginary part of the impedance", "Ω"),
+    "resistance-by-position": RealQuantity("dR/dx", "Change of resistance per position, dR/dx", "Ω/mm"),
+    "resistance-by-force": RealQuantity("dR/dF", "Change of resistance per force, dR/dF", "Ω/N"),
+    "reactance-by-position": RealQuantity("dX/dx", "Change of reactance per position, dX/dx", "Ω/mm"),
+    "reactance-by-force": RealQuantity("dX/dF", "Change of reactance per force, dX/dF", "Ω/N"),
 }
 
 
 @dataclass(frozen=True)
-class Response:
+class ResponseMap:
     """Impedance and its slopes; the axes of the arrays are frequency, force and position.
 
     Attributes
@@ -87,7 +87,7 @@ class Response:
 
 def response(
     sensor: Sensor, frequency_hz: Sequence[float], force_n: Sequence[float], position_mm: Sequence[float]
-) -> Response:
+) -> ResponseMap:
     """Work out what is drawn.
 
     Parameters
@@ -113,7 +113,7 @@ def response(
     result = sensor.response(f[:, None, None], force[:, None], at * M_PER_MM)
     by_mm = result.by_position_ohm_per_m * M_PER_MM
     size = (sensor.tip_m / M_PER_MM, sensor.length_m / M_PER_MM)
-    return Response(f, force, at, result.impedance_ohm, result.by_force_ohm_per_n, by_mm, *size)
+    return ResponseMap(f, force, at, result.impedance_ohm, result.by_force_ohm_per_n, by_mm, *size)
 
 
 def lines(frequency_hz: Sequence[float], force_n: Real, position_mm: Real, impedance_ohm: Complex, name: str) -> Figure:
@@ -146,7 +146,7 @@ def lines(frequency_hz: Sequence[float], force_n: Real, position_mm: Real, imped
     return Figure("response", f"{name} under load", f"R and X over {along}.", {"": tuple(panels)}, columns=2)
 
 
-def quantity(of: Response, name: str) -> Figure:
+def quantity(of: ResponseMap, name: str) -> Figure:
     """One of ``QUANTITIES`` over force and position, at each frequency.
 
     The colours span the positions where the whole tip rests on the sensor, of slopes without the extreme 4 %, mostly
@@ -176,7 +176,7 @@ def _levels(low: float, high: float, count: int = 7) -> tuple[float, ...]:
     return tuple(k * step for k in range(math.floor(low / step) + 1, math.ceil(high / step)))
 
 
-def inverse(of: Response, which: str) -> Figure:
+def inverse(of: ResponseMap, which: str) -> Figure:
     """Inverse map: "position" or "force" over the plane of R and X, at each frequency (thesis Fig. 6.4).
 
     The plane is coloured where a load can lie. Where lines of constant force and of constant position run together,
@@ -214,7 +214,7 @@ def inverse(of: Response, which: str) -> Figure:
     return Figure(f"inverse-{which}", title, alt, choices, "frequency", columns=4)
 
 
-def figures(of: Response) -> Iterator[Figure]:
+def figures(of: ResponseMap) -> Iterator[Figure]:
     """All of them: quantities, then the inverse maps."""
     yield from (quantity(of, name) for name in QUANTITIES)
     yield from (inverse(of, which) for which in ("position", "force"))

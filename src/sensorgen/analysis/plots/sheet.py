@@ -10,12 +10,12 @@ from sensorgen.analysis.plots.figure import Axis, Curve, Figure, Map, Panel
 from sensorgen.core.units import M_PER_MM
 
 if TYPE_CHECKING:
-    from sensorgen.models.sheet import Bounds, Port, Sheet
+    from sensorgen.models.sheet import Port, PressErrors, Sheet
 
 _LEAST = 1 / 30  # of the error without information, at which the colours begin
 
 
-def png(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Sequence["Port"]]) -> bytes:
+def png(film: "Sheet", bounds: Mapping[str, "PressErrors"], ports: Mapping[str, Sequence["Port"]]) -> bytes:
     """Standard errors of x and y over the sheet, one column per set of contacts, as PNG.
 
     The colours end at the error without a reading: of a uniform distribution over the sheet.
@@ -24,7 +24,7 @@ def png(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Seque
     ----------
     film : Sheet
         Under load.
-    bounds : mapping of str to Bounds
+    bounds : mapping of str to PressErrors
         By the name of the set of contacts.
     ports : mapping of str to sequence of Port
         The contacts of each set.
@@ -40,7 +40,7 @@ def png(film: "Sheet", bounds: Mapping[str, "Bounds"], ports: Mapping[str, Seque
     return static.png(Figure("sheet", title, alt, {"": panels}, columns=len(bounds)))
 
 
-def _panel(film: "Sheet", name: str, bounds: "Bounds", ports: Sequence["Port"], row: int) -> Panel:
+def _panel(film: "Sheet", name: str, bounds: "PressErrors", ports: Sequence["Port"], row: int) -> Panel:
     none_mm = bounds.guess_m[row] / M_PER_MM
     sigma_mm = bounds.sigma(outline=True)[..., 1 + row].T / M_PER_MM
     shown = np.clip(sigma_mm, none_mm * _LEAST, none_mm)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sensorgen.analysis.plots.figure import GREY, SYMBOLS, Axis, Body, Curve, Figure, Map, Panel
+from sensorgen.analysis.plots.figure import GREY, SYMBOLS, Axis, BodyTriangles, Curve, Figure, Map, Panel
 from sensorgen.analysis.plots.libraries import needed
 
 if TYPE_CHECKING:
@@ -93,12 +93,7 @@ def drawn(figure: Figure, panels: Sequence[Panel], title: str = "") -> "Drawn":
         axes.set_axis_off()
     for k, (axes, panel) in enumerate(zip(grid, panels, strict=False)):
         _panel(axes, panel, figure)
-        if panel.solid:
-            axes.set(xlabel=panel.x.title, ylabel=panel.y.title, zlabel=panel.z.title)
-        else:  # titles of the axes: across under the last panel of those alike, upwards at the first one
-            below, before = panels[k + columns : k + columns + 1], panels[k - 1 : k] if k % columns else ()
-            axes.set_xlabel("" if below and below[0].x.title == panel.x.title else panel.x.title)
-            axes.set_ylabel("" if before and before[0].y.title == panel.y.title else panel.y.title)
+        _titled(axes, panel, panels[k + columns : k + columns + 1], panels[k - 1 : k] if k % columns else ())
     handles = [axes.get_legend_handles_labels() for axes in grid]
     named = {label: handle for pair in handles for handle, label in zip(*pair, strict=True)}
     if named and not figure.beside:  # every name once, under the panels
@@ -107,11 +102,20 @@ def drawn(figure: Figure, panels: Sequence[Panel], title: str = "") -> "Drawn":
     return canvas
 
 
+def _titled(axes: "Axes", panel: Panel, below: Sequence[Panel], before: Sequence[Panel]) -> None:
+    """Titles of the axes: across under the last panel of those alike, upwards at the first one."""
+    if panel.solid:
+        axes.set(xlabel=panel.x.title, ylabel=panel.y.title, zlabel=panel.z.title)
+        return
+    axes.set_xlabel("" if below and below[0].x.title == panel.x.title else panel.x.title)
+    axes.set_ylabel("" if before and before[0].y.title == panel.y.title else panel.y.title)
+
+
 def _panel(axes: "Axes", panel: Panel, figure: Figure) -> None:
     if panel.title:
         axes.set_title(panel.title, fontsize="medium")
     if panel.solid:
-        _bodies(axes, [body for body in panel.content if isinstance(body, Body)], figure)
+        _bodies(axes, [body for body in panel.content if isinstance(body, BodyTriangles)], figure)
         return
     axes.set(xscale="log" if panel.x.log else "linear", yscale="log" if panel.y.log else "linear")
     left = np.zeros(max(1, len(panel.y.names)))
@@ -203,7 +207,7 @@ def _map(axes: "Axes", part: Map, label: str) -> None:
                 bar.ax.axhline(level, color=colour, linestyle=style)
 
 
-def _bodies(axes: Any, bodies: Sequence[Body], figure: Figure) -> None:
+def _bodies(axes: Any, bodies: Sequence[BodyTriangles], figure: Figure) -> None:
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
     faces = np.concatenate([body.vertices_mm[body.triangles] for body in bodies])

@@ -6,7 +6,7 @@ from sensorgen.prediction.identifiability.results import GUESS, Identifiability,
 
 
 @dataclass(frozen=True)
-class Cell:
+class MapSquare:
     """Column and row in the picture, grade from 0, and the value in words."""
 
     column: int
@@ -23,7 +23,7 @@ class ErrorMapShown:
     required: str
     columns: int
     rows: int
-    cells: tuple[Cell, ...]
+    cells: tuple[MapSquare, ...]
     ends: tuple[str, str, str, str]  # of the position and of the force axis
 
 
@@ -48,7 +48,7 @@ def _map(known: Identifiability, quantity: str, sigma: Rows, need: float, useles
                 continue
             grade = 3 if value is None else 0 if value <= need else 1 if value < useless else 2
             shown = "undefined" if value is None else words(value) if grade < 2 else "no information"
-            cells.append(Cell(c, len(of.force_n) - 1 - r, grade, f"{force:g} N at {place * 1e3:.3g} mm: {shown}"))
+            cells.append(MapSquare(c, len(of.force_n) - 1 - r, grade, f"{force:g} N at {place * 1e3:.3g} mm: {shown}"))
     ends = (f"{min(of.position_m) * 1e3:g}", f"{max(of.position_m) * 1e3:g} mm", f"{min(of.force_n):g}",
             f"{max(of.force_n):g} N")  # fmt: skip
     rows = len(of.force_n) - (0.0 in of.force_n)

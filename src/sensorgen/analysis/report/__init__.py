@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator
 
-from sensorgen.analysis.plots.pages import Section
+from sensorgen.analysis.plots.pages import PageSection
 from sensorgen.analysis.report.contents import Report, report
 
 FORMATS = ("html", "md", "csv", "json")
 
-__all__ = ["FORMATS", "Report", "Section", "pieces", "report", "written"]
+__all__ = ["FORMATS", "PageSection", "Report", "pieces", "report", "written"]
 
 
 def written(content: Report, how: str) -> str:

@@ -6,10 +6,10 @@ from datetime import UTC, datetime
 from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison, of_iteration
-from sensorgen.analysis.comparison.runs import Run, runs
+from sensorgen.analysis.comparison.runs import RecordedRun, runs
 from sensorgen.analysis.comparison.specimens import UNTRUSTED, known_iterations
 from sensorgen.analysis.plots.figure import Figure
-from sensorgen.analysis.plots.pages import Section
+from sensorgen.analysis.plots.pages import PageSection
 from sensorgen.analysis.report import (
     alternating,
     calibrations,
@@ -55,7 +55,7 @@ class Report:
         Measured against predicted, one sentence for each quantity.
     findings : tuple of str
         Further results, in sentences.
-    sections : tuple of Section
+    sections : tuple of PageSection
         Residuals first.
     """
 
@@ -64,7 +64,7 @@ class Report:
     made_at: str
     headline: tuple[str, ...]
     findings: tuple[str, ...]
-    sections: tuple[Section, ...]
+    sections: tuple[PageSection, ...]
 
     @property
     def title(self) -> str:
@@ -157,7 +157,7 @@ def _untrusted(left_out: Sequence[tuple[str, str]]) -> Iterator[str]:
         yield f"Not compared: {names[0]}{f' and {len(names) - 1} more' if names[1:] else ''}: {why}."
 
 
-def _basis(comparison: Comparison, recorded: Sequence[Run]) -> Iterator[str]:
+def _basis(comparison: Comparison, recorded: Sequence[RecordedRun]) -> Iterator[str]:
     """Summary of the measurements, in one sentence; none of a single reading."""
     specimens = {row.reading.specimen for row in comparison.rows} | {run.entry.specimen for run in recorded}
     if len(comparison.rows) + len(recorded) > 1:
@@ -168,42 +168,42 @@ def _basis(comparison: Comparison, recorded: Sequence[Run]) -> Iterator[str]:
 
 
 def _sections(
-    log: Log, comparison: Comparison, recorded: Sequence[Run], explanations: Sequence[explained.Explanation],
+    log: Log, comparison: Comparison, recorded: Sequence[RecordedRun], explanations: Sequence[explained.Explanation],
     impedances: Table | None, ac: Sequence[alternating.AcRow], changes: Sequence[history.HistoryRow],
     calibrated: Sequence[Calibration], left_out: Sequence[tuple[str, str]],
-) -> Iterator[Section]:  # fmt: skip
+) -> Iterator[PageSection]:  # fmt: skip
     alone = len(comparison.rows) <= 1 and not recorded  # a short page
     figures = (*electrodes.figures(comparison), *(recordings.residuals(impedances) if impedances else ()))
     tables = (*([electrodes.readings(comparison)] if comparison.direct else ()), *([impedances] if impedances else ()))
     parts: tuple[Part, ...]
     notes: tuple[str, ...] = electrodes.NOTES if comparison.direct and not alone else ()
-    yield Section("measured", "Measured and predicted", figures, (*tables, *notes))
+    yield PageSection("measured", "Measured and predicted", figures, (*tables, *notes))
     if ac:
         parts = (alternating.table(ac), alternating.NOTE)
-        yield Section("ac", "Capacitance and impedance by frequency", tuple(alternating.figures(ac)), parts)
+        yield PageSection("ac", "Capacitance and impedance by frequency", tuple(alternating.figures(ac)), parts)
     if comparison.direct:
         grouped = (yields.table(comparison) if len(comparison.last) > 1 else None, direction.table(comparison))
         notes = () if alone else yields.notes(comparison)
         parts = (*filter(None, grouped), electrodes.reasons(comparison), *notes)
-        yield Section("verdicts", "Verdicts and yield", yields.figures(comparison), parts)
+        yield PageSection("verdicts", "Verdicts and yield", yields.figures(comparison), parts)
     if changes:
         notes = () if alone else (history.NOTE,)
-        yield Section("changes", "Bake, shrinkage and defects", (), (history.table(changes), *notes))
+        yield PageSection("changes", "Bake, shrinkage and defects", (), (history.table(changes), *notes))
     if explanations:
         parts = (explained.table(explanations), explained.NOTE)
-        yield Section("explained-by", "Which parameter explains the residuals", (), parts)
+        yield PageSection("explained-by", "Which parameter explains the residuals", (), parts)
     if calibrated:
         parts = (calibrations.table(calibrated), calibrations.NOTE)
-        yield Section("calibrated", "Calibrated specimens", (), parts)
+        yield PageSection("calibrated", "Calibrated specimens", (), parts)
     if recorded:
         figures = tuple(recordings.figures(recorded))
-        yield Section("recorded", "Recordings", figures, (recordings.facts(recorded),))
+        yield PageSection("recorded", "Recordings", figures, (recordings.facts(recorded),))
     figures = () if alone else tuple(variants.figures(comparison))
-    yield Section(
+    yield PageSection(
         "variants", "The variants", figures, variants.identifiability(comparison), variants.drawings(comparison)
     )
     if left_out:
         caption = "What was left out, or taken with care, and why"
         parts = (Table.of("left_out", caption, tuple(LeftOut(*row) for row in left_out)),)
-        yield Section("left-out", "What was left out, and why", parts=parts)
-    yield Section("provenance", "Provenance", parts=(origins(log, comparison, brief=alone),))
+        yield PageSection("left-out", "What was left out, and why", parts=parts)
+    yield PageSection("provenance", "Provenance", parts=(origins(log, comparison, brief=alone),))

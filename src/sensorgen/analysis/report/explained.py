@@ -15,7 +15,7 @@ import numpy as np
 
 from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.comparison.moved import Movable, at_rest, moved, pressed
-from sensorgen.analysis.comparison.runs import Run
+from sensorgen.analysis.comparison.runs import RecordedRun
 from sensorgen.analysis.report.electrodes import usable
 from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import SensorgenError
@@ -43,7 +43,7 @@ Model = Callable[[str, float], Complex]
 
 
 @dataclass(frozen=True, eq=False)
-class Kind:
+class MeasurementKind:
     """A kind of measurement: ln of the measured values, and of the predicted ones with one parameter moved.
 
     A leakage of 0 and a factor of 1 are the prediction itself.
@@ -67,7 +67,7 @@ class Explanation:
     share_percent: Annotated[float, Column("residual explained", "%", "of the sum of squares")]
 
 
-def explanations(comparison: Comparison, recorded: Sequence[Run]) -> list[Explanation]:
+def explanations(comparison: Comparison, recorded: Sequence[RecordedRun]) -> list[Explanation]:
     """All parameters for all kinds of measurements with two values or more, the best of each kind first."""
     kinds = [kind for kind in (*_resistances(comparison), *_impedances(comparison, recorded)) if len(kind.measured) > 1]
     return [
@@ -96,7 +96,7 @@ def sentences(explanations: Sequence[Explanation]) -> Iterator[str]:
         yield f"These readings cannot constrain {', '.join(silent[:-1])}{' or ' if silent[1:] else ''}{silent[-1]}."
 
 
-def _resistances(comparison: Comparison) -> Iterator[Kind]:
+def _resistances(comparison: Comparison) -> Iterator[MeasurementKind]:
     """Electrodes, and films up to what the meter can tell from an open circuit."""
 
     def across(ohm: float, parameter: str, value: float) -> float:
@@ -110,11 +110,11 @@ def _resistances(comparison: Comparison) -> Iterator[Kind]:
     kind = np.dtype([(name, "f8") for name in ("y", "z", "expected", "alone", "leak")] + [("apart", "?")])
     known = np.fromiter(rows, kind)
     if len(known):
-        yield Kind("electrode resistance", np.log(known["y"]).astype(complex), _along(known))
+        yield MeasurementKind("electrode resistance", np.log(known["y"]).astype(complex), _along(known))
     both = known[(known["z"] > 0) & known["apart"]]
     if len(both):
         measured = np.log(np.minimum(both["z"], INTACT_OHM)).astype(complex)
-        yield Kind("film resistance", measured, _of_electrodes(both["alone"], across))
+        yield MeasurementKind("film resistance", measured, _of_electrodes(both["alone"], across))
 
 
 def _along(known: Any) -> Model:
@@ -141,9 +141,9 @@ def _of_electrodes(middles: Real, law: Callable[[float, str, float], float]) -> 
     return lambda parameter, value: np.log([complex(law(ohm, parameter, value)) for ohm in distinct.tolist()])[of]
 
 
-def _impedances(comparison: Comparison, recorded: Sequence[Run]) -> Iterator[Kind]:
+def _impedances(comparison: Comparison, recorded: Sequence[RecordedRun]) -> Iterator[MeasurementKind]:
     """Z at rest, and its change under load, where a line can be made of the design."""
-    known: list[tuple[Run, Movable]] = []
+    known: list[tuple[RecordedRun, Movable]] = []
     for run in recorded:
         of = (
             Movable(comparison.bodies[comparison.names[run.entry.specimen]])
@@ -158,14 +158,14 @@ def _impedances(comparison: Comparison, recorded: Sequence[Run]) -> Iterator[Kin
             continue
     if known:
         rest = np.concatenate([np.log(run.rest_ohm) for run, _ in known])
-        yield Kind("impedance at rest", rest, partial(_modelled, known, loaded=False))
+        yield MeasurementKind("impedance at rest", rest, partial(_modelled, known, loaded=False))
     loaded = [(run, of) for run, of in known if run.pairs is not None]
     if loaded:
         measured = [np.log(r.pairs.pressed_ohm / r.pairs.before_ohm).ravel() for r, _ in loaded if r.pairs]
-        yield Kind("impedance under load", np.concatenate(measured), partial(_modelled, loaded, loaded=True))
+        yield MeasurementKind("impedance under load", np.concatenate(measured), partial(_modelled, loaded, loaded=True))
 
 
-def _modelled(known: Sequence[tuple[Run, Movable]], parameter: str, value: float, *, loaded: bool) -> Complex:
+def _modelled(known: Sequence[tuple[RecordedRun, Movable]], parameter: str, value: float, *, loaded: bool) -> Complex:
     """Ln Z of recordings at rest, or its change under load, with one parameter moved."""
     parts = []
     for run, of in known:
@@ -187,7 +187,7 @@ def _moves(of: Movable, parameter: str, value: float) -> dict[str, float]:
     return {RESISTIVITY: {"resistivity": value}, LEAK: {"leak_s": value}}.get(parameter, {})
 
 
-def _explained(kind: Kind, parameter: str) -> Explanation:
+def _explained(kind: MeasurementKind, parameter: str) -> Explanation:
     from scipy.optimize import minimize_scalar
 
     start, unit = (0.0, "S") if parameter == LEAK else (1.0, "factor")
@@ -215,6 +215,6 @@ def _explained(kind: Kind, parameter: str) -> Explanation:
     return Explanation(kind.name, parameter, exp(at), unit, float(np.exp(min(error, _OPEN))), slope, 100 * share)
 
 
-def _slope(kind: Kind, parameter: str, at: float) -> float:
+def _slope(kind: MeasurementKind, parameter: str, at: float) -> float:
     ends: list[Real] = [np.asarray(kind.model(parameter, exp(at + sign * _STEP))) for sign in (-1, 1)]
     return float(np.sqrt(np.mean(np.abs((ends[1] - ends[0]) / (2 * _STEP)) ** 2)))

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from sensorgen.analysis.comparison import Comparison
-from sensorgen.analysis.comparison.runs import Run
+from sensorgen.analysis.comparison.runs import RecordedRun
 from sensorgen.analysis.plots import recordings as plots
 from sensorgen.analysis.plots.figure import BLUE, ORANGE, Axis, Curve, Figure, Panel
 from sensorgen.analysis.report.alternating import at_text, capacitor_from, verdict
@@ -65,7 +65,7 @@ class RecordingRow:
     notes: Annotated[str, Column("notes")]
 
 
-def impedances(recorded: Sequence[Run], comparison: Comparison) -> Table:
+def impedances(recorded: Sequence[RecordedRun], comparison: Comparison) -> Table:
     """Impedance at rest, frequency by frequency, and its prediction."""
     rows: list[ImpedanceRow] = []
     for run in recorded:
@@ -94,7 +94,7 @@ def _predicted(of: Bounds | None) -> tuple[float | None, float | None, float | N
     return (of.value, of.lower, of.upper) if of else (None, None, None)
 
 
-def facts(recorded: Sequence[Run]) -> Table:
+def facts(recorded: Sequence[RecordedRun]) -> Table:
     """A row for each recording."""
     rows = (
         RecordingRow(
@@ -121,7 +121,7 @@ def headline(table: Table | None) -> Iterator[str]:
         )
 
 
-def findings(recorded: Sequence[Run], table: Table | None) -> Iterator[str]:
+def findings(recorded: Sequence[RecordedRun], table: Table | None) -> Iterator[str]:
     """Impedance, noise and capacitance of recordings at rest; verdicts; what cannot be, or was not expected."""
     rows: Sequence[ImpedanceRow] = table.rows if table else ()
     for run in recorded:
@@ -174,13 +174,13 @@ def residuals(table: Table) -> Iterator[Figure]:
     )  # fmt: skip
 
 
-def figures(recorded: Sequence[Run]) -> Iterator[Figure]:
+def figures(recorded: Sequence[RecordedRun]) -> Iterator[Figure]:
     """Differences of all recordings on a scale of their own, then each recording over time and over loads."""
     yield from compared(recorded)
     for run in recorded:
         part = f"-{run.source.part}" if run.source.part else ""
         key = f"{run.entry.number}-{run.source.lockin}{part}"
-        one = plots.Run(
+        one = plots.DrawnRecording(
             run.name, run.tones_hz, run.time_s, run.raw_ohm, run.filtered_s, run.filtered_ohm, run.pairs
         )  # fmt: skip
         yield plots.series(one, f"series-{key}")
@@ -191,7 +191,7 @@ def figures(recorded: Sequence[Run]) -> Iterator[Figure]:
                 continue
 
 
-def compared(recorded: Sequence[Run]) -> Iterator[Figure]:
+def compared(recorded: Sequence[RecordedRun]) -> Iterator[Figure]:
     """Normalised differences under load, of recordings with the same frequencies (thesis Fig. 6.33)."""
     loaded = [run for run in recorded if run.pairs is not None and len(run.pairs.time_s) > 1]
     if not loaded:

@@ -6,13 +6,13 @@ from math import nan
 from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison
-from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, Body, Curve, Figure, Panel
+from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, SKY, Axis, BodyTriangles, Curve, Figure, Panel
 from sensorgen.analysis.plots.pages import Drawing
 from sensorgen.checks.review import draw
 from sensorgen.core.document import Column, Table
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
-from sensorgen.prediction.identifiability.results import Identifiability
+from sensorgen.prediction.identifiability.results import Identifiability, StandardErrors
 from sensorgen.prediction.query import FORCE_N
 from sensorgen.prediction.slices import reviewed
 from sensorgen.scene.geometry.meshes import mesh
@@ -25,9 +25,11 @@ class IdentifiabilityRow:
     """Least standard errors of force and position of a design, and the verdict."""
 
     design: Annotated[str, Column("design")]
-    force_n: Annotated[float, Column("standard error of force", "N")]
-    position_mm: Annotated[float, Column("standard error of position", "mm")]
+    force_n: Annotated[float, Column("error of force, perfect model", "N")]
+    position_mm: Annotated[float, Column("error of position, perfect model", "mm")]
     correlation: Annotated[float, Column("correlation")]
+    bench_n: Annotated[float, Column("error of force, after 30 known presses", "N")]
+    bench_mm: Annotated[float, Column("error of position, after 30 known presses", "mm")]
     verdict: Annotated[str, Column("verdict")]
 
 
@@ -51,12 +53,19 @@ def identifiability(comparison: Comparison) -> tuple[Table, ...]:
     rows = []
     for name, of in comparison.predictions.items():
         card = of.prediction.identifiability
-        known = (card.sigma_force_n, card.sigma_position_m, card.correlation) if card else (None, None, None)
-        force, place, together = (nan if value is None else value for value in known)
+        force, place, together = _known(card)
+        bench_force, bench_place, _ = _known(card and card.calibrated)
         verdict = card.verdict if card else of.reason or "no prediction"
-        rows.append(IdentifiabilityRow(name, force, place / M_PER_MM, together, verdict))
-    caption = f"Predicted identifiability of {FORCE_N:g} N in the middle, by seven frequencies (Cramér-Rao)"
+        rows.append(IdentifiabilityRow(name, force, place, together, bench_force, bench_place, verdict))
+    caption = f"Standard errors of {FORCE_N:g} N in the middle, predicted, by seven frequencies (Cramér-Rao)"
     return (Table.of("identifiability", caption, rows),) if rows else ()
+
+
+def _known(of: StandardErrors | None) -> tuple[float, float, float]:
+    """Standard errors of force [N] and position [mm], and their correlation; nan where unknown."""
+    values = (of.sigma_force_n, of.sigma_position_m, of.correlation) if of else (None, None, None)
+    force, place, together = (nan if value is None else value for value in values)
+    return force, place / M_PER_MM, together
 
 
 def figures(comparison: Comparison) -> Iterator[Figure]:
@@ -100,11 +109,11 @@ def errors(card: Identifiability) -> tuple[Panel, Panel]:
     return panels[0], panels[1]
 
 
-def _bodies(design: Design) -> Iterator[Body]:
+def _bodies(design: Design) -> Iterator[BodyTriangles]:
     """The bodies of the sensor in use, as triangles."""
     for body in design.in_use.bodies:
         body_mesh = mesh(body)
-        yield Body(
+        yield BodyTriangles(
             body.name.replace("_", " "),
             body_mesh.vertices_mm,
             body_mesh.triangles,

@@ -10,7 +10,7 @@ from sensorgen.analysis.plots.figure import BLUE, BROWN, GREY, MOST_POINTS, PURP
 from sensorgen.analysis.report.electrodes import VERDICT_COLOURS
 from sensorgen.core.document import Cell, Column, Table
 from sensorgen.measure.signal.verdicts import ORDER, REACTANCES, WORDS, Evidence
-from sensorgen.measure.signal.yields import Group, Share, dependence, groups
+from sensorgen.measure.signal.yields import CountShare, Group, dependence, groups
 from sensorgen.prediction.query import TONES_HZ
 
 _LOOKS = {  # none with the colour of a verdict
@@ -148,7 +148,7 @@ def _parted(comparison: Comparison) -> Iterator[str]:
         )
 
 
-def _range(share: Share) -> str:
+def _range(share: CountShare) -> str:
     high = f"{100 * share.high:.2g}" if share.count < share.total else "100"
     return f"{100 * share.low:.2g} to {high} %"
 
@@ -197,7 +197,7 @@ def _row(by: str, name: str, g: Group) -> YieldRow:
     )  # fmt: skip
 
 
-def _percents(of: Share) -> tuple[Cell, Cell, Cell]:
+def _percents(of: CountShare) -> tuple[Cell, Cell, Cell]:
     return (100 * of.share, 100 * of.low, 100 * of.high) if of.total else (None, None, None)
 
 

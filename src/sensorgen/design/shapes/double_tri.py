@@ -12,7 +12,7 @@ One period, seen along the prisms; each layer as the shape ``tri`` (e: conductor
 from dataclasses import dataclass, field, replace
 
 from sensorgen.scene.scene import Body, Fill, Scene, rounded
-from sensorgen.scene.triangles import Frame, TriangleParams, layer_bodies
+from sensorgen.scene.triangles import LayerFrame, TriangleParams, layer_bodies
 
 SHORT = "doubletri"
 _MIDDLE = "middle_electrode_with_cogs"
@@ -27,8 +27,8 @@ class Params(TriangleParams):
 
 def scene(p: Params, fill: Fill) -> Scene:
     """Bodies of the double sensor of triangles."""
-    lower = Frame(p, p.electrode_mm)
-    upper = Frame(p, lower.top)
+    lower = LayerFrame(p, p.electrode_mm)
+    upper = LayerFrame(p, lower.top)
     first = [
         replace(b, name=_MIDDLE, terminal="middle") if b.terminal else replace(b, name=f"lower_{b.name}")
         for b in layer_bodies(p, fill, lower.low)

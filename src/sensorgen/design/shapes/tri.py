@@ -13,7 +13,7 @@ One period, seen along the prisms (e: conductor, x: dielectric, blank: air)::
 from dataclasses import dataclass
 
 from sensorgen.scene.scene import Body, Fill, Scene, rounded
-from sensorgen.scene.triangles import Frame, TriangleParams, layer_bodies
+from sensorgen.scene.triangles import LayerFrame, TriangleParams, layer_bodies
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Params(TriangleParams):
 
 def scene(p: Params, fill: Fill) -> Scene:
     """Bodies of the triangular sensor."""
-    f = Frame(p, p.electrode_mm)
+    f = LayerFrame(p, p.electrode_mm)
     bodies = [
         Body("bottom_electrode", fill.bottom_electrode, f.prisms([f.layer(0.0, f.low)]), "bottom"),
         *layer_bodies(p, fill, f.low),

@@ -10,30 +10,30 @@ from sensorgen.design import materials
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import commands, limits
 from sensorgen.export.gcode.files import Source
-from sensorgen.export.gcode.found import Found, merged
+from sensorgen.export.gcode.found import GcodeFinding, merged
 from sensorgen.export.gcode.motion import executed
 from sensorgen.export.gcode.moves import Motion
-from sensorgen.export.gcode.report import Report, report
+from sensorgen.export.gcode.report import FileNeeds, report
 
 
 @dataclass(frozen=True, kw_only=True)
-class Checked(Report):
+class Checked(FileNeeds):
     """Needs of a file, and findings.
 
     Attributes
     ----------
-    findings : tuple of Found
+    findings : tuple of GcodeFinding
         The severe first.
     """
 
-    findings: tuple[Found, ...]
+    findings: tuple[GcodeFinding, ...]
 
-    def errors(self, strict: bool = False) -> list[Found]:
+    def errors(self, strict: bool = False) -> list[GcodeFinding]:
         """Findings that refuse the file; with ``strict`` also the warnings."""
         bad = SEVERITIES[: 2 if strict else 1]
         return [f for f in self.findings if f.severity in bad]
 
-    def with_more(self, found: Iterable[Found]) -> Self:
+    def with_more(self, found: Iterable[GcodeFinding]) -> Self:
         """Add further findings."""
         return replace(self, findings=merged([*self.findings, *found]))
 

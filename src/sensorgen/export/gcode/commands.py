@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from sensorgen.design.materials import Material
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import allowed, macros
-from sensorgen.export.gcode.found import Findings, Found
+from sensorgen.export.gcode.found import Findings, GcodeFinding
 from sensorgen.export.gcode.heat import Heaters
-from sensorgen.export.gcode.moves import NO_TOOL, Change, Event, Motion
+from sensorgen.export.gcode.moves import NO_TOOL, Event, Motion, ToolChange
 from sensorgen.export.gcode.reading import macro_name
 from sensorgen.export.gcode.remarks import PRUSA
 
@@ -51,7 +51,7 @@ class _Simulation:
         self.changes = {change.number: change for change in motion.changes}
         start = machine.tool_at_start()
         self.tool = NO_TOOL if start is None else start
-        self.last: Change | None = None
+        self.last: ToolChange | None = None
         self.heaters, self.turning = Heaters(machine, loaded, self.found), macros.of_change(machine)
         self.homed: set[str] = set()
         self.levelled = not self.control.levels
@@ -122,7 +122,7 @@ class _Simulation:
             amid = len(self.lines) and self.lines[0] < event.row <= self.lines[-1]
             message = f"{code} waits for a person to continue" + (", with the nozzle at the part" if amid else "")
             severity = "error" if amid else "info"
-            self.found.append(Found("pause", severity, event.number, message, "be there, or leave it out"))
+            self.found.append(GcodeFinding("pause", severity, event.number, message, "be there, or leave it out"))
         self.heaters.obey(event, self.tool)
         self._modes(event)
         self._machine(event)
@@ -133,7 +133,7 @@ class _Simulation:
             self._not_homed(f"{code} probes the bed", event.number)
         self.levelled |= code in self.control.levels
 
-    def _take(self, change: Change) -> None:
+    def _take(self, change: ToolChange) -> None:
         if change.tool != NO_TOOL:
             self.heaters.check_tool(change.number, change.tool, "is taken")
         last, self.last = self.last, change
@@ -213,7 +213,7 @@ class _Simulation:
         if names and self.ended:
             message = f"tools {names} are left on to the macro of {self.ended}"
             advice = "switch them off in the file (G10 P.. S0 R0) if that macro does not"
-            self.found.append(Found("heat-left", "info", last, message, advice))
+            self.found.append(GcodeFinding("heat-left", "info", last, message, advice))
         elif names:
             self.found.error(
                 "heat-left", last, f"tools {names} are still heated at the end of the file",

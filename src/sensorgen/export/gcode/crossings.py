@@ -32,7 +32,7 @@ _Trees = Callable[["_Level"], shapely.STRtree]
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class PrintedLines:
     """Printed lines of the bodies as rectangles in plan, half a width longer at both ends.
 
     Attributes
@@ -52,13 +52,13 @@ class Lines:
     tool: Whole
     number: Whole
 
-    def of(self, rows: Mask | Whole) -> "Lines":
+    def of(self, rows: Mask | Whole) -> "PrintedLines":
         """Some of the lines."""
-        return Lines(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+        return PrintedLines(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class MovePieces:
     """Straight pieces of moves.
 
     Attributes
@@ -77,9 +77,9 @@ class Pieces:
     tool: Whole
     number: Whole
 
-    def of(self, rows: slice) -> "Pieces":
+    def of(self, rows: slice) -> "MovePieces":
         """Some of the pieces."""
-        return Pieces(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+        return MovePieces(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +189,7 @@ def crossings(
     return Crossings(Points(*travel), rubbing, tool)
 
 
-def printed_lines(motion: Motion, machine: Printer, numbering: Numbering) -> Lines:
+def printed_lines(motion: Motion, machine: Printer, numbering: Numbering) -> PrintedLines:
     """The lines of the bodies with their widths by volume."""
     found = paths_of(motion, machine, numbering).model()
     level = np.round(found.end_mm[:, 2] / _LEVEL_MM).astype(np.int64)
@@ -199,7 +199,7 @@ def printed_lines(motion: Motion, machine: Printer, numbering: Numbering) -> Lin
         np.isfinite(found.height_mm) & (found.height_mm > 0), found.height_mm, np.maximum(rise, _LEVEL_MM)
     )
     width = found.volume_mm3(machine.filament_mm) / (found.length_mm() * height)
-    return Lines(
+    return PrintedLines(
         found.start_mm[:, :2],
         found.end_mm[:, :2],
         np.asarray(level * _LEVEL_MM, float),
@@ -209,16 +209,16 @@ def printed_lines(motion: Motion, machine: Printer, numbering: Numbering) -> Lin
     )
 
 
-def _cut(motion: Motion, tool: Whole, rows: Whole) -> Pieces:
+def _cut(motion: Motion, tool: Whole, rows: Whole) -> MovePieces:
     """Moves as pieces of at most ``_PIECE_MM``; an arc as its chord."""
     start, way = motion.start_mm[rows], motion.end_mm[rows] - motion.start_mm[rows]
     which, low, high = _shares(_counts(way[:, :2]))
     start, way = start[which], way[which]
     first, last = (start + share[:, None] * way for share in (low, high))
-    return Pieces(rows[which], first, last, tool[rows][which], motion.number[rows][which])
+    return MovePieces(rows[which], first, last, tool[rows][which], motion.number[rows][which])
 
 
-def _blocks(motion: Motion, tool: Whole, rows: Whole) -> Iterator[Pieces]:
+def _blocks(motion: Motion, tool: Whole, rows: Whole) -> Iterator[MovePieces]:
     """Moves as pieces, some at a time: all at once would take more memory than the file."""
     for first in range(0, len(rows), _BLOCK):
         pieces = _cut(motion, tool, rows[first : first + _BLOCK])
@@ -239,7 +239,7 @@ def _shares(count: Whole) -> tuple[Whole, Real, Real]:
     return which, step / count[which], (step + 1) / count[which]
 
 
-def _over(blocks: Iterator[Pieces], lines: Lines, within_mm: float, grown_mm: float) -> Iterator[Points]:
+def _over(blocks: Iterator[MovePieces], lines: PrintedLines, within_mm: float, grown_mm: float) -> Iterator[Points]:
     """Points of pieces over earlier lines of other tools, where no own line lies higher; many at once."""
     levels, pitch_mm = _levels(lines), _RUB_PITCH_MM if grown_mm else PITCH_MM
     tree = lru_cache(_TREES)(_Level.tree)  # a file goes up: those far below are never needed again
@@ -250,7 +250,14 @@ def _over(blocks: Iterator[Pieces], lines: Lines, within_mm: float, grown_mm: fl
 
 
 def _points(
-    pieces: Pieces, lines: Lines, within_mm: float, pitch_mm: float, piece: Whole, line: Whole, low: Real, high: Real
+    pieces: MovePieces,
+    lines: PrintedLines,
+    within_mm: float,
+    pitch_mm: float,
+    piece: Whole,
+    line: Whole,
+    low: Real,
+    high: Real,
 ) -> Points:
     """Points of pieces at which the highest of the lines met is of another tool."""
     foreign = lines.tool[line] != pieces.tool[piece]
@@ -284,10 +291,10 @@ class _Level:
     """Lines of one height and tool, cut to pieces; ``row`` of each in the lines of the file."""
 
     row: Whole
-    lines: Lines
+    lines: PrintedLines
 
     @classmethod
-    def of(cls, lines: Lines, rows: Whole) -> "_Level":
+    def of(cls, lines: PrintedLines, rows: Whole) -> "_Level":
         """Some lines, of one height and tool."""
         whole = lines.of(rows)
         which, low, high = _shares(_counts(whole.end_mm - whole.start_mm))
@@ -299,7 +306,7 @@ class _Level:
         """All pieces by their places."""
         return shapely.STRtree(shapely.linestrings(np.stack([self.lines.start_mm, self.lines.end_mm], axis=1)))
 
-    def met(self, tree: _Trees, pieces: Pieces, by: Whole, within_mm: float, grown_mm: float) -> _Met:
+    def met(self, tree: _Trees, pieces: MovePieces, by: Whole, within_mm: float, grown_mm: float) -> _Met:
         """Of some pieces those that meet a line that is printed before, that line, and from which share to which."""
         lowest = np.minimum(pieces.start_mm[by, 2], pieces.end_mm[by, 2])
         lowest -= self.lines.top_mm[0] + within_mm + _ROUNDING_MM
@@ -317,7 +324,7 @@ class _Level:
         return piece[meets], self.row[hit[meets]], low[meets], high[meets]
 
 
-def _levels(lines: Lines) -> dict[int, list[_Level]]:
+def _levels(lines: PrintedLines) -> dict[int, list[_Level]]:
     """Lines by tool and height."""
     found = {}
     for tool in np.unique(lines.tool).tolist():
@@ -329,7 +336,7 @@ def _levels(lines: Lines) -> dict[int, list[_Level]]:
 
 
 def _meetings(
-    pieces: Pieces, levels: dict[int, list[_Level]], tree: _Trees, within_mm: float, grown_mm: float
+    pieces: MovePieces, levels: dict[int, list[_Level]], tree: _Trees, within_mm: float, grown_mm: float
 ) -> Iterator[_Met]:
     """Pairs of pieces and lines of other tools that they meet, and of own lines where these may lie higher."""
     for tool in np.unique(pieces.tool).tolist():
@@ -342,7 +349,7 @@ def _meetings(
             yield from (level.met(tree, pieces, over, within_mm, grown_mm) for level in levels.get(tool, []))
 
 
-def _clipped(pieces: Pieces, lines: Lines, piece: Whole, line: Whole, grown_mm: float) -> tuple[Real, Real]:
+def _clipped(pieces: MovePieces, lines: PrintedLines, piece: Whole, line: Whole, grown_mm: float) -> tuple[Real, Real]:
     """Shares of pieces, from and to, that lie within lines."""
     way = lines.end_mm[line] - lines.start_mm[line]
     length, half = np.hypot(*way.T), lines.width_mm[line] / 2 + grown_mm

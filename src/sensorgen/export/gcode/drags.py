@@ -33,7 +33,7 @@ _Z = re.compile(rb"\s*Z\s*[-+.0-9]+", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
-class OfTool:
+class ToolTravel:
     """Travel of one tool over what other tools have printed."""
 
     tool: Annotated[int, Column("tool")]
@@ -60,13 +60,13 @@ class Drags:
 
     Attributes
     ----------
-    tools : tuple of OfTool
+    tools : tuple of ToolTravel
         Every tool that moves over another's material.
     layers : tuple of OfLayer
         Travel alone, by height of the nozzle.
     """
 
-    tools: tuple[OfTool, ...]
+    tools: tuple[ToolTravel, ...]
     layers: tuple[OfLayer, ...]
 
     @property
@@ -234,7 +234,7 @@ def summed(motion: Motion, found: Crossings, machine: Printer) -> Drags:
         whole = np.bincount(stretch[mine], (contact + near)[mine]) > COUNTED_MM
         bare = np.bincount(stretch[mine], ((contact + near) * ~drawn)[mine]) > COUNTED_MM
         sums = [float(v[mine].sum()) for v in (contact, near, found.rubbing_mm)]
-        tools.append(OfTool(tool, sums[0], sums[1], int(whole.sum()), int(bare.sum()), sums[2]))
+        tools.append(ToolTravel(tool, sums[0], sums[1], int(whole.sum()), int(bare.sum()), sums[2]))
     keys = np.column_stack([np.round(points.place_mm[:, 2], 2), found.tool[points.row]])
     found_keys, place = np.unique(keys, axis=0, return_inverse=True)
     lengths = [

@@ -7,7 +7,7 @@ from sensorgen.core.findings import SEVERITIES
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class GcodeFinding:
     """One finding of one rule.
 
     Attributes
@@ -34,24 +34,24 @@ class Found:
     count: int = 1
 
 
-class Findings(list[Found]):
+class Findings(list[GcodeFinding]):
     """Findings of a check as it goes on."""
 
     def error(self, rule: str, line: int, message: str, advice: str) -> None:
         """Add a finding that refuses the file."""
-        self.append(Found(rule, "error", line, message, advice))
+        self.append(GcodeFinding(rule, "error", line, message, advice))
 
     def warning(self, rule: str, line: int, message: str, advice: str) -> None:
         """Add a finding that does not."""
-        self.append(Found(rule, "warning", line, message, advice))
+        self.append(GcodeFinding(rule, "warning", line, message, advice))
 
 
-def merged(found: Iterable[Found]) -> tuple[Found, ...]:
+def merged(found: Iterable[GcodeFinding]) -> tuple[GcodeFinding, ...]:
     """Findings of the same words as one, which has the first line; the severe first, and then by line.
 
     Bytes of the file that are no UTF-8 are written out, so that any text can hold them.
     """
-    kept: dict[tuple[str, str, str], Found] = {}
+    kept: dict[tuple[str, str, str], GcodeFinding] = {}
     for given in found:
         f = replace(given, message=given.message.encode("utf-8", "backslashreplace").decode())
         key = (f.rule, f.severity, f.message)

@@ -6,7 +6,7 @@ from math import isnan, nan
 
 from sensorgen.design.materials import Material
 from sensorgen.design.printer import Printer
-from sensorgen.export.gcode.found import Findings, Found
+from sensorgen.export.gcode.found import Findings, GcodeFinding
 from sensorgen.export.gcode.moves import Event
 
 WITHIN_C = 15.0  # slicers raise a temperature by less after the first layer without waiting
@@ -87,7 +87,7 @@ class Heaters:
             known = tool in self.materials and self.machine.macro("tpost") is not None  # which has no wait
             low_c = self.materials[tool].print_range("nozzle_temperature_c", WITHIN_C)[0] if known else 0.0
             severity = "error" if heat.standby_c < low_c else "warning"
-            self.found.append(Found("wait", severity, number, message, advice))
+            self.found.append(GcodeFinding("wait", severity, number, message, advice))
         if self.bed.active_c > self.bed.awaited_c + WITHIN_C:
             message = f"lines are printed without waiting for the bed's {self.bed.active_c:g} C"
             self.found.error("wait", number, message, "wait for it before (M190)")

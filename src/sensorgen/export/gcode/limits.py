@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sensorgen.design.materials import Material
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import macros
-from sensorgen.export.gcode.found import Found
+from sensorgen.export.gcode.found import GcodeFinding
 from sensorgen.export.gcode.moves import NO_TOOL, Motion
 
 Floats = NDArray[np.float64]
@@ -22,7 +22,7 @@ MM_MIN = 60.0
 MOST_TOLD = 20  # lines that cannot be read; more of them say no more
 
 
-def check(motion: Motion, machine: Printer) -> Iterator[Found]:
+def check(motion: Motion, machine: Printer) -> Iterator[GcodeFinding]:
     """Findings of all rules on moves.
 
     Parameters
@@ -38,7 +38,7 @@ def check(motion: Motion, machine: Printer) -> Iterator[Found]:
 
 def check_loaded(
     motion: Motion, machine: Printer, loaded: Mapping[int, Material], *, others_empty: bool
-) -> Iterator[Found]:
+) -> Iterator[GcodeFinding]:
     """Lines that suit no material of their tool: melted faster than it can be, or of a tool on which there is nothing.
 
     Parameters
@@ -58,7 +58,7 @@ def check_loaded(
         for tool in np.setdiff1d(tools[motion.extruded_mm > 0], [NO_TOOL, *loaded]).astype(int).tolist():
             message = f"tool {tool} prints, and nothing is on it; loaded are {known}"
             rows = (tools == tool) & (motion.extruded_mm > 0)
-            yield Found("tool", "error", int(motion.number[rows][0]), message, "use another tool")
+            yield GcodeFinding("tool", "error", int(motion.number[rows][0]), message, "use another tool")
     lines = (motion.extruded_mm > 0) & (motion.across_mm > 0)
     area_mm2 = motion.extruded_mm * (math.pi / 4 * machine.filament_mm**2) / np.where(lines, motion.length_mm, 1.0)
     flow_mm3_s = np.where(lines, area_mm2 * motion.feed_mm_min / MM_MIN, 0.0)
@@ -73,14 +73,14 @@ def check_loaded(
         )  # fmt: skip
 
 
-def _found(motion: Motion, wrong: Mask, rule: str, severity: str, message: str, advice: str) -> Iterator[Found]:
+def _found(motion: Motion, wrong: Mask, rule: str, severity: str, message: str, advice: str) -> Iterator[GcodeFinding]:
     """A finding if any move is wrong."""
     if wrong.any():
         numbers = np.unique(motion.rows[wrong, 9])
-        yield Found(rule, severity, int(numbers[0]), message, advice, len(numbers))
+        yield GcodeFinding(rule, severity, int(numbers[0]), message, advice, len(numbers))
 
 
-def _reach(motion: Motion, machine: Printer) -> Iterator[Found]:
+def _reach(motion: Motion, machine: Printer) -> Iterator[GcodeFinding]:
     """No axis leaves its limits."""
     reach = machine.reach_mm()
     lowest, highest = motion.box_mm()
@@ -95,7 +95,7 @@ def _reach(motion: Motion, machine: Printer) -> Iterator[Found]:
             )  # fmt: skip
 
 
-def _bed(motion: Motion, machine: Printer) -> Iterator[Found]:
+def _bed(motion: Motion, machine: Printer) -> Iterator[GcodeFinding]:
     """Nothing is printed beside the bed or above the print volume."""
     prints = (motion.extruded_mm > 0) & (motion.across_mm > 0)
     middle = np.array(machine.bed_centre_mm())
@@ -115,7 +115,7 @@ def _bed(motion: Motion, machine: Printer) -> Iterator[Found]:
     )  # fmt: skip
 
 
-def _below(motion: Motion, _: Printer) -> Iterator[Found]:
+def _below(motion: Motion, _: Printer) -> Iterator[GcodeFinding]:
     """No move across goes lower than what is already printed: the nozzle would plough through it."""
     across = motion.across_mm > 0
     prints = (motion.extruded_mm > 0) & across
@@ -134,7 +134,7 @@ def _below(motion: Motion, _: Printer) -> Iterator[Found]:
     )  # fmt: skip
 
 
-def _speed(motion: Motion, machine: Printer) -> Iterator[Found]:
+def _speed(motion: Motion, machine: Printer) -> Iterator[GcodeFinding]:
     """A feed is above 0, and no axis is asked for more than its limit."""
     message, advice = "a move has a feed of 0 or less", "give a feed (F)"
     yield from _found(motion, motion.feed_mm_min <= 0, "speed", "error", message, advice)
@@ -163,7 +163,7 @@ def _speed(motion: Motion, machine: Printer) -> Iterator[Found]:
             )  # fmt: skip
 
 
-def _purge(motion: Motion, machine: Printer) -> Iterator[Found]:
+def _purge(motion: Motion, machine: Printer) -> Iterator[GcodeFinding]:
     """Filament that is pushed at one place, or drawn back in all, stays within what was seen to work."""
     control, count = machine.control, len(motion.rows)
     tools = motion.tools.column(count, NO_TOOL)
@@ -189,7 +189,7 @@ def _purge(motion: Motion, machine: Printer) -> Iterator[Found]:
         yield from _found(motion, wrong, "purge", "error", message, advice)
 
 
-def _z_stated(motion: Motion, machine: Printer) -> Iterator[Found]:
+def _z_stated(motion: Motion, machine: Printer) -> Iterator[GcodeFinding]:
     """Z is stated after a change of tool before a line is printed, where the printer's macros leave it elsewhere."""
     change = macros.of_change(machine)
     if change is None or (change.offset_mm[2] == 0 and math.isnan(change.place_mm[2])):
@@ -202,18 +202,18 @@ def _z_stated(motion: Motion, machine: Printer) -> Iterator[Found]:
     )  # fmt: skip
 
 
-def _read(motion: Motion, _: Printer) -> Iterator[Found]:
+def _read(motion: Motion, _: Printer) -> Iterator[GcodeFinding]:
     """Every line can be read."""
     for severe, advice in ((True, "correct the line"), (False, "keep to plain ASCII and plain commands")):
         faults = [fault for fault in motion.faults if fault.severe == severe]
         severity = "error" if severe else "warning"
         for fault in faults[:MOST_TOLD]:
-            yield Found("read", severity, fault.number, fault.what, advice)
+            yield GcodeFinding("read", severity, fault.number, fault.what, advice)
         if rest := faults[MOST_TOLD:]:
             message = "further lines cannot be read: is this G-code?"
-            yield Found("read", severity, rest[0].number, message, advice, len(rest))
+            yield GcodeFinding("read", severity, rest[0].number, message, advice, len(rest))
 
 
-RULES: tuple[Callable[[Motion, Printer], Iterator[Found]], ...] = (
+RULES: tuple[Callable[[Motion, Printer], Iterator[GcodeFinding]], ...] = (
     _reach, _bed, _below, _speed, _purge, _z_stated, _read,
 )  # fmt: skip

@@ -10,8 +10,8 @@ from sensorgen.export.gcode.arcs import Arcs, centres_of_radius
 from sensorgen.export.gcode.columns import WORDS, Floats, Ints, Mask
 from sensorgen.export.gcode.files import Source, text_of
 from sensorgen.export.gcode.macros import Effect
-from sensorgen.export.gcode.moves import NO_TOOL, Change, Event, Fault, Motion, Track
-from sensorgen.export.gcode.reading import OFFSET, PLACE, SHIFT, Holding, Reading
+from sensorgen.export.gcode.moves import NO_TOOL, Event, FileFault, ModalValues, Motion, ToolChange
+from sensorgen.export.gcode.reading import OFFSET, PLACE, SHIFT, GcodeFile, Holding
 
 DEFAULT_FEED_MM_MIN = 3000.0  # RepRapFirmware's, until a line says another
 MOST_MM = 1e9  # beyond this a number is a slip, and differences of it are noise
@@ -40,7 +40,7 @@ def follow(source: Source, prime_macro: str = "", change: Effect | None = None) 
     >>> motion.extruded_mm.tolist(), motion.length_mm.tolist(), motion.kinds
     ([0.0, 0.0, 0.0, 0.5], [5.0, 0.0, 0.0, 4.0], ('', 'perimeter'))
     """
-    return _Steps(Reading(text_of(source), prime_macro, change)).motion()
+    return _Steps(GcodeFile(text_of(source), prime_macro, change)).motion()
 
 
 def executed(source: Source, machine: Printer) -> Motion:
@@ -51,7 +51,7 @@ def executed(source: Source, machine: Printer) -> Motion:
 class _Steps:
     """All moves of a file, and between them the places that it names anew, as G92 does."""
 
-    def __init__(self, said: Reading) -> None:
+    def __init__(self, said: GcodeFile) -> None:
         self.said = said
         self.place, table = said.table()
         self.code = table[:, 0]
@@ -69,19 +69,19 @@ class _Steps:
             rows[:, k] = column if len(column) == len(rows) else column[self.moves]
         far = ~np.all([np.abs(rows[:, k]) < MOST_MM for k in range(9)], axis=0)
         rows[far, :9] = np.clip(rows[far, :9], -MOST_MM, MOST_MM)
-        faults = [Fault(int(number), "a number beyond all measure") for number in rows[far, 9][:1]]
+        faults = [FileFault(int(number), "a number beyond all measure") for number in rows[far, 9][:1]]
         straight = self.moves & (self.code < 2)
         for letters, what in (
             ("R", "R of G0 or G1 goes by a stored place"),
             ("IJ", "I or J stands in a straight move"),
         ):
             given = straight & np.any([~np.isnan(self.words[letter]) for letter in letters], axis=0)
-            faults += [Fault(n >> SHIFT, what) for n in self.place[given].tolist()]
+            faults += [FileFault(n >> SHIFT, what) for n in self.place[given].tolist()]
         arcs, wrong = self._arcs(rows)
         told = [*said.events, *said.odd]
         before = iter(self._rows([*(place for place, _ in told), *(place for place, _, _ in said.changes)]))
         events = [Event(next(before), place >> SHIFT, command) for place, command in told]
-        changes = [Change(next(before), place >> SHIFT, tool, macro) for place, tool, macro in said.changes]
+        changes = [ToolChange(next(before), place >> SHIFT, tool, macro) for place, tool, macro in said.changes]
         return Motion(
             rows, arcs, events[: len(said.events)], events[len(said.events) :], changes, self._track(said.tools),
             tuple(said.kinds), self._track(said.kind),
@@ -115,9 +115,9 @@ class _Steps:
     def _held(self, holding: Holding, before: float) -> Floats:
         """Value that applies to each step."""
         rows = np.searchsorted(self.place, np.array(holding.places, np.int64))
-        return Track(rows.tolist(), holding.values.tolist()).column(len(self.place), before)
+        return ModalValues(rows.tolist(), holding.values.tolist()).column(len(self.place), before)
 
-    def _arcs(self, rows: Floats) -> tuple[Arcs, list[Fault]]:
+    def _arcs(self, rows: Floats) -> tuple[Arcs, list[FileFault]]:
         """Moves that are arcs, and what is wrong with those that cannot be."""
         code = self.code[self.moves]
         row = np.flatnonzero((code == 2) | (code == 3))
@@ -133,7 +133,7 @@ class _Steps:
         centre[self._held(self.said.level, 1.0)[step] == 0] = np.nan
         fits = ~np.isnan(centre).any(axis=1)
         faults = [
-            Fault(int(rows[k, 9]), f"G{int(code[k])} without a centre that fits; taken as a straight line")
+            FileFault(int(rows[k, 9]), f"G{int(code[k])} without a centre that fits; taken as a straight line")
             for k in row[~fits].tolist()
         ]
         return Arcs.of(row[fits], start[fits], end[fits], centre[fits], clockwise[fits]), faults
@@ -143,8 +143,8 @@ class _Steps:
         found: list[int] = np.searchsorted(self.place[self.moves], np.array(places, np.int64)).tolist()
         return found
 
-    def _track(self, holding: Holding) -> Track:
-        return Track(self._rows(holding.places), holding.values.tolist())
+    def _track(self, holding: Holding) -> ModalValues:
+        return ModalValues(self._rows(holding.places), holding.values.tolist())
 
 
 def _last(given: Mask) -> Ints:

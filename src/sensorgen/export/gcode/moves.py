@@ -26,7 +26,7 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class FileFault:
     """Part of a file that could not be read or followed, with its place."""
 
     number: int
@@ -35,7 +35,7 @@ class Fault:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ToolChange:
     """A tool is taken, by ``T`` or by a macro: the moves before it, its line, the tool, and how."""
 
     row: int
@@ -45,7 +45,7 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
-class Track:
+class ModalValues:
     """Something that holds from one place in the file to the next: its values, and the moves before each."""
 
     rows: list[int]
@@ -73,17 +73,17 @@ class Motion:
         All other commands.
     odd : sequence of Event
         Moves that have words of their own, as those of further axes; they are among the moves too.
-    changes : sequence of Change
+    changes : sequence of ToolChange
         Tools in the order in which they are taken, also the same again; ``NO_TOOL`` where one is put down.
-    tools : Track
+    tools : ModalValues
         The tool in hand, ``NO_TOOL`` before the first.
     kinds : tuple of str
         Kinds of line that comments name, in lower case; the first is "".
-    kind, width_mm, height_mm, layer : Track
+    kind, width_mm, height_mm, layer : ModalValues
         Index into ``kinds``, and what comments say of the lines: width and height [mm], and layer from 1.
-    absolute_e : Track
+    absolute_e : ModalValues
         1 where E is absolute, 0 where it is relative.
-    faults : sequence of Fault
+    faults : sequence of FileFault
         What could not be read or followed.
     lines : int
         How many lines the file has.
@@ -97,15 +97,15 @@ class Motion:
     arcs: Arcs
     events: Sequence[Event]
     odd: Sequence[Event]
-    changes: Sequence[Change]
-    tools: Track
+    changes: Sequence[ToolChange]
+    tools: ModalValues
     kinds: tuple[str, ...]
-    kind: Track
-    width_mm: Track
-    height_mm: Track
-    layer: Track
-    absolute_e: Track
-    faults: Sequence[Fault]
+    kind: ModalValues
+    width_mm: ModalValues
+    height_mm: ModalValues
+    layer: ModalValues
+    absolute_e: ModalValues
+    faults: Sequence[FileFault]
     lines: int
     maker: str
     z_stated: NDArray[np.bool_]

@@ -14,7 +14,7 @@ import numpy as np
 from sensorgen.export.gcode import columns, remarks, words
 from sensorgen.export.gcode.columns import Floats, Ints
 from sensorgen.export.gcode.macros import Effect
-from sensorgen.export.gcode.moves import NO_TOOL, Fault
+from sensorgen.export.gcode.moves import NO_TOOL, FileFault
 from sensorgen.export.gcode.words import Command
 
 INCH_MM = 25.4
@@ -41,7 +41,7 @@ class Holding:
         self.values.append(value)
 
 
-class Reading:
+class GcodeFile:
     """A file, read; nothing is followed yet.
 
     Attributes
@@ -54,7 +54,7 @@ class Reading:
         Place, tool and whether a macro takes it.
     turns : list of int
         Places at which the firmware runs its macros of a change.
-    faults : list of Fault
+    faults : list of FileFault
         What could not be read.
     scale, relative, absolute_e, level : Holding
         Millimetres of a unit, whether places are relative, whether E is absolute, whether arcs lie in the bed's plane.
@@ -74,7 +74,7 @@ class Reading:
         self.odd: list[tuple[int, Command]] = []
         self.changes: list[tuple[int, int, bool]] = []
         self.turns: list[int] = []
-        self.faults: list[Fault] = []
+        self.faults: list[FileFault] = []
         self.scale, self.relative, self.absolute_e, self.level = Holding(), Holding(), Holding(), Holding()
         self.tools, self.kind, self.width_mm, self.height_mm, self.layer = (Holding() for _ in range(5))
         self.kinds = {"": 0}
@@ -164,7 +164,7 @@ class Reading:
 
     def _fault(self, place: int, what: str, *, severe: bool = True) -> None:
         if len(self.faults) < MOST_FAULTS:
-            self.faults.append(Fault(place >> SHIFT, what, severe))
+            self.faults.append(FileFault(place >> SHIFT, what, severe))
 
     def _position(self, command: Command, place: int) -> None:
         """Add a row for a move, or for a command that names the place anew."""

@@ -18,7 +18,7 @@ from sensorgen.export.gcode.timing import seconds
 
 
 @dataclass(frozen=True)
-class OfTool:
+class ToolMaterial:
     """Material of one tool: filament and its part that is no body [mm], volume [mm3], mass [g] where known."""
 
     tool: Annotated[int, Column("tool")]
@@ -30,7 +30,7 @@ class OfTool:
 
 
 @dataclass(frozen=True)
-class Report:
+class FileNeeds:
     """Needs of a file.
 
     Attributes
@@ -39,7 +39,7 @@ class Report:
         How many it has; layers as its comments count, 0 without [-].
     time_s : float
         At the feeds of the file, without acceleration, heating and changing tools: a lower bound [s].
-    tools : tuple of OfTool
+    tools : tuple of ToolMaterial
         Each tool that prints.
     tool_changes : int
         How often another tool is taken [-].
@@ -51,7 +51,7 @@ class Report:
     moves: int
     layers: int
     time_s: float
-    tools: tuple[OfTool, ...]
+    tools: tuple[ToolMaterial, ...]
     tool_changes: int
     box_mm: tuple[tuple[float, ...], tuple[float, ...]] | None
 
@@ -85,7 +85,7 @@ def clock(seconds: float) -> str:
 def report(
     motion: Motion, machine: Printer, loaded: dict[int, str] | None = None,
     texts: materials.Texts = materials.NO_TEXTS,
-) -> Report:  # fmt: skip
+) -> FileNeeds:  # fmt: skip
     """Sum a file up.
 
     Parameters
@@ -110,7 +110,7 @@ def report(
     waits = (e.command for e in motion.events if e.command.code == "G4")
     dwells_s = sum((w.number("S") or 0.0) + (w.number("P") or 0.0) / 1000 for w in waits)
     moving_s = float(seconds(motion, machine.max_speed_mm_s).sum())
-    return Report(
+    return FileNeeds(
         lines=motion.lines,
         moves=len(motion.rows),
         layers=int(max(motion.layer.values, default=0)),
@@ -128,7 +128,7 @@ def usual(machine: Printer) -> dict[int, str]:
     return {tool: material for material, tool in named if tools.count(tool) == 1}
 
 
-def _tools(motion: Motion, machine: Printer, loaded: dict[int, str], texts: materials.Texts) -> Iterator[OfTool]:
+def _tools(motion: Motion, machine: Printer, loaded: dict[int, str], texts: materials.Texts) -> Iterator[ToolMaterial]:
     count, start, extruded = len(motion.rows), machine.tool_at_start(), motion.extruded_mm
     tools = motion.tools.column(count, NO_TOOL if start is None else start).astype(np.int64)
     kinds = motion.kind.column(count, 0).astype(np.int64)
@@ -142,4 +142,4 @@ def _tools(motion: Motion, machine: Printer, loaded: dict[int, str], texts: mate
         except (MissingValue, UnknownName):
             density = None
         mass_g = None if density is None else volume_mm3 * density * 1e-6
-        yield OfTool(tool, material, length_mm, purge_mm, volume_mm3, mass_g)
+        yield ToolMaterial(tool, material, length_mm, purge_mm, volume_mm3, mass_g)

@@ -65,7 +65,7 @@ class Command:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class GcodeLine:
     """Content of a line: its commands, its remarks, and what could not be read."""
 
     commands: tuple[Command, ...]
@@ -73,7 +73,7 @@ class Line:
     faults: tuple[str, ...] = ()
 
 
-def parse(text: str) -> Line:
+def parse(text: str) -> GcodeLine:
     """Read one line.
 
     Parameters
@@ -95,12 +95,14 @@ def parse(text: str) -> Line:
     'say "hi"; go'
     """
     if len(text) > _LONGEST and len(text.partition(";")[0]) > _LONGEST:
-        return Line((), "", (f"a line of {len(text)} characters; no firmware takes it",))
+        return GcodeLine((), "", (f"a line of {len(text)} characters; no firmware takes it",))
     if free := _FREE_TEXT.match(text):
         code, rest = free.groups()
-        return Line((Command(code.upper(), (("", rest.partition(";")[0].strip()),)),))
+        return GcodeLine((Command(code.upper(), (("", rest.partition(";")[0].strip()),)),))
     if is_meta(text):
-        return Line((), "", (f"a line of the firmware's own language, which is not followed: {text.strip()[:60]!r}",))
+        return GcodeLine(
+            (), "", (f"a line of the firmware's own language, which is not followed: {text.strip()[:60]!r}",)
+        )
     return _read(text)
 
 
@@ -109,7 +111,7 @@ def is_meta(text: str) -> bool:
     return _META.match(text) is not None
 
 
-def _read(text: str) -> Line:
+def _read(text: str) -> GcodeLine:
     commands: list[tuple[str, list[tuple[str, str]]]] = []
     faults: list[str] = []
     remark = ""
@@ -128,7 +130,7 @@ def _read(text: str) -> Line:
         else:
             faults.append(f"{token['junk']!r} means nothing here")
     made = tuple(Command(code, tuple(words)) for code, words in commands)
-    return Line(made, remark, tuple(faults[:_MOST_FAULTS]))
+    return GcodeLine(made, remark, tuple(faults[:_MOST_FAULTS]))
 
 
 def _take(commands: list[tuple[str, list[tuple[str, str]]]], letter: str, value: str) -> list[str]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from sensorgen.core.errors import MissingValue, OutOfRange
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.design.tower import PRIME_MM3, tower
-from sensorgen.export.slicers.loads import Load, Recipe, by_hand, number, overlaid, recipes, templates
+from sensorgen.export.slicers.loads import Recipe, ToolLoad, by_hand, number, overlaid, recipes, templates
 from sensorgen.export.slicers.versions import Version
 
 if TYPE_CHECKING:
@@ -27,7 +27,9 @@ PATTERNS = {
 DIRECTIONS = {"lines": 1, "grid": 2, "concentric": 1, "triangles": 3, "gyroid": 1}  # of lines in one layer
 
 
-def profiles(printer: Printer, quality: Quality, loads: Mapping[int, Load], version: Version = ()) -> dict[str, str]:
+def profiles(
+    printer: Printer, quality: Quality, loads: Mapping[int, ToolLoad], version: Version = ()
+) -> dict[str, str]:
     """Texts of Cura's files under their path in its resources folder.
 
     Parameters

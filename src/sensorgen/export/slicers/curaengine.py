@@ -17,7 +17,7 @@ from pathlib import Path
 from sensorgen.core.errors import SlicerFailed
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.export.slicers import PROGRAMS, cura
-from sensorgen.export.slicers.loads import Load, recipes
+from sensorgen.export.slicers.loads import ToolLoad, recipes
 from sensorgen.export.slicers.run import USUAL, Runner, find, run
 from sensorgen.export.slicers.versions import Version
 
@@ -39,7 +39,7 @@ class EngineSettings:
 
 
 def engine_settings(
-    printer: Printer, quality: Quality, loads: Mapping[int, Load], version: Version = ()
+    printer: Printer, quality: Quality, loads: Mapping[int, ToolLoad], version: Version = ()
 ) -> EngineSettings:
     """Settings for a run of the engine.
 

@@ -23,7 +23,7 @@ RETRACTION_SPEED_MM_S = 40.0  # PrusaSlicer's default; slower where the printer'
 
 
 @dataclass(frozen=True)
-class Load:
+class ToolLoad:
     """Material of a tool: the source of its numbers, and what the design overrides.
 
     ``profile`` is the design's, for all its tools.
@@ -36,13 +36,13 @@ class Load:
     profile: Profile = field(default_factory=Profile)
 
 
-def load(design: Design, name: str) -> Load:
+def load(design: Design, name: str) -> ToolLoad:
     """Load of a material's tool for a design."""
     infill = design.infill.get(name, Infill())
-    return Load(design.material(name), design.used()[name], infill.percent, infill.pattern, design.profile)
+    return ToolLoad(design.material(name), design.used()[name], infill.percent, infill.pattern, design.profile)
 
 
-def loads(design: Design) -> dict[int, Load]:
+def loads(design: Design) -> dict[int, ToolLoad]:
     """Loads of a design, by the printer's own tool number."""
     return {design.tool(name): load(design, name) for name in design.used()}
 
@@ -77,7 +77,7 @@ class Recipe:
         return min(10.0, self.speed_mm_s)
 
 
-def recipe(printer: Printer, quality: Quality, tool: int, load: Load) -> Recipe:
+def recipe(printer: Printer, quality: Quality, tool: int, load: ToolLoad) -> Recipe:
     """Look up a load's numbers and hold them against the printer's limits.
 
     Parameters
@@ -86,7 +86,7 @@ def recipe(printer: Printer, quality: Quality, tool: int, load: Load) -> Recipe:
         What prints, and in which layers.
     tool : int
         The printer's own number of the tool [-]; errors name it.
-    load : Load
+    load : ToolLoad
         What that tool prints.
 
     Raises
@@ -141,7 +141,7 @@ def recipe(printer: Printer, quality: Quality, tool: int, load: Load) -> Recipe:
     )
 
 
-def recipes(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> dict[int, Recipe]:
+def recipes(printer: Printer, quality: Quality, loads: Mapping[int, ToolLoad]) -> dict[int, Recipe]:
     """Recipe of each loaded tool under the slicer's number of it, which counts from 0.
 
     Parameters

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.design.tower import PRIME_MM3, tower
-from sensorgen.export.slicers.loads import Load, Recipe, line_area_mm2, number, recipes, templates
+from sensorgen.export.slicers.loads import Recipe, ToolLoad, line_area_mm2, number, recipes, templates
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -21,7 +21,7 @@ PATTERNS = {"rectilinear": "zig-zag"}  # others have the same name as in PrusaSl
 VERSION = "2.0.0.0"  # of the presets
 
 
-def profiles(printer: Printer, quality: Quality, loads: Mapping[int, Load]) -> dict[str, str]:
+def profiles(printer: Printer, quality: Quality, loads: Mapping[int, ToolLoad]) -> dict[str, str]:
     """Texts of Orca's presets under their path in its folder of a user's presets.
 
     Parameters

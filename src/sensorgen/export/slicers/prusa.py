@@ -10,8 +10,8 @@ from sensorgen.design.printer import Printer, Quality
 from sensorgen.design.tower import PRIME_MM3, tower
 from sensorgen.export.slicers import PROGRAMS
 from sensorgen.export.slicers.loads import (
-    Load,
     Recipe,
+    ToolLoad,
     by_hand,
     line_area_mm2,
     number,
@@ -39,7 +39,7 @@ _WIDTHS = (
 )  # fmt: skip
 
 
-def profile(printer: Printer, quality: Quality, loads: Mapping[int, Load], version: Version = ()) -> str:
+def profile(printer: Printer, quality: Quality, loads: Mapping[int, ToolLoad], version: Version = ()) -> str:
     """Text of the ``.ini`` file that ``prusa-slicer --load`` takes.
 
     PrusaSlicer keeps speeds, walls and infill per body, not per tool. Where the loads disagree, this file
@@ -84,7 +84,7 @@ def _templates(version: Version) -> "Environment":
     return templates("prusa", version, row=row, escaped=escaped, texts=texts, note=note, pattern=_pattern)
 
 
-def volume_settings(printer: Printer, quality: Quality, tool: int, load: Load) -> dict[str, str]:
+def volume_settings(printer: Printer, quality: Quality, tool: int, load: ToolLoad) -> dict[str, str]:
     """Settings that a body of this load carries in its 3MF, as PrusaSlicer names them.
 
     They go into ``Metadata/Slic3r_PE_model.config`` as ``<metadata type="volume" key=.. value=../>`` of
@@ -96,7 +96,7 @@ def volume_settings(printer: Printer, quality: Quality, tool: int, load: Load) -
         What prints, and in which layers.
     tool : int
         The printer's own number of the tool [-].
-    load : Load
+    load : ToolLoad
         What that tool prints.
     """
     r = recipe(printer, quality, tool, load)

@@ -26,7 +26,7 @@ _ANSWER_S = 30.0  # within which a program says its version
 _SETTING = re.compile(r"^([a-z0-9_]+) = (.*)$")
 
 
-class Change(Strict):
+class VersionChange(Strict):
     """Difference of a version from the one before.
 
     Attributes
@@ -64,18 +64,18 @@ class Change(Strict):
 
 
 @cache
-def changes(slicer: str) -> dict[Version, Change]:
+def changes(slicer: str) -> dict[Version, VersionChange]:
     """Changes of a slicer's versions, the oldest first.
 
     Raises
     ------
     BadInput
-        A file is not as :class:`Change` has it.
+        A file is not as :class:`VersionChange` has it.
     """
     found = {}
     for path in (folder() / "versions").glob(f"{slicer}-*.yaml"):
         try:
-            found[parse(path.stem.partition("-")[2])] = checked(Change, yamlfile.read(path))
+            found[parse(path.stem.partition("-")[2])] = checked(VersionChange, yamlfile.read(path))
         except BadInput as error:
             raise error.within(str(path)) from None
     return dict(sorted(found.items()))

@@ -25,7 +25,7 @@ _KEYS = {"name", "also", "source", "ranges", "leads_ohm", "bands", "least_ohm", 
 
 
 @dataclass(frozen=True)
-class Range:
+class MeterRange:
     """Limits of error of a multimeter in one range.
 
     Attributes
@@ -42,7 +42,7 @@ class Range:
 
 
 @dataclass(frozen=True)
-class Band:
+class MeterBand:
     """Limits of error of an LCR meter in a band of frequencies.
 
     Attributes
@@ -74,11 +74,11 @@ class Instrument:
         Other types with the same specification.
     source : str
         Document, and its conditions.
-    ranges : tuple of Range
+    ranges : tuple of MeterRange
         DC resistance, the smallest range first.
     leads_ohm : float
         Added with two wires [ohm].
-    bands : tuple of Band
+    bands : tuple of MeterBand
         AC quantities.
     least_ohm, most_ohm : float
         Impedances between which the specification holds [ohm].
@@ -87,9 +87,9 @@ class Instrument:
     name: str
     also: tuple[str, ...]
     source: str
-    ranges: tuple[Range, ...] = ()
+    ranges: tuple[MeterRange, ...] = ()
     leads_ohm: float = 0.0
-    bands: tuple[Band, ...] = ()
+    bands: tuple[MeterBand, ...] = ()
     least_ohm: float = 0.0
     most_ohm: float = math.inf
 
@@ -159,7 +159,7 @@ def uncertainty(share: float, quantity: str, value: float, z_ohm: complex) -> fl
 
 
 @dataclass(frozen=True)
-class Value:
+class MeasuredValue:
     """A measured value, and its standard uncertainty; nan where none is known."""
 
     value: float
@@ -198,20 +198,20 @@ class At:
         c = mean(self.values.get("Cp", [0.0]))
         return complex(0, -1 / (2 * math.pi * self.frequency_hz * c)) if c > 0 else None
 
-    def value(self, quantity: str) -> Value:
+    def value(self, quantity: str) -> MeasuredValue:
         """Mean, and its uncertainty: scatter of the repeats (type A) and the meter's limit, or what was stated."""
         z = self.z_ohm
         these = self.values.get(quantity) or [
             float(quantity_of(quantity, each, self.frequency_hz)) for each in self.impedances if each
         ]
         if not these:
-            return Value(math.nan)
+            return MeasuredValue(math.nan)
         middle = mean(these)
         a = stdev(these) / math.sqrt(len(these)) if len(these) > 1 else 0.0
         b = self.stated.get(quantity) or (
             self.meter.ac(quantity, middle, self.frequency_hz, z) if self.meter and z else None
         )
-        return Value(middle, math.hypot(a, b) if b is not None else a or math.nan)
+        return MeasuredValue(middle, math.hypot(a, b) if b is not None else a or math.nan)
 
 
 def at_frequency(reading: Reading, frequency_hz: float) -> At:
@@ -256,8 +256,8 @@ def _instrument(data: dict[str, Any]) -> Instrument:
         raise UnknownName("key", min(unknown), _KEYS)
     if not data["name"].split() or not isinstance(data["source"], str):
         raise ValueError
-    ranges = tuple(Range(ohm, percent / 100, of / 100) for ohm, percent, of in data.get("ranges", ()))
-    bands = tuple(Band(low, high, percent / 100, zs, yo) for low, high, percent, zs, yo in data.get("bands", ()))
+    ranges = tuple(MeterRange(ohm, percent / 100, of / 100) for ohm, percent, of in data.get("ranges", ()))
+    bands = tuple(MeterBand(low, high, percent / 100, zs, yo) for low, high, percent, zs, yo in data.get("bands", ()))
     plain = {name: data[name] for name in ("leads_ohm", "least_ohm", "most_ohm") if name in data}
     return Instrument(data["name"], tuple(data.get("also", ())), data["source"], ranges, bands=bands, **plain)
 

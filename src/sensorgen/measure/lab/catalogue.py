@@ -18,10 +18,11 @@ from pydantic import Field
 from sensorgen.core.errors import BadInput, NotInstalled, UnknownName
 from sensorgen.core.records import Line, Strict, checked
 from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.devices import PYMEASURE, AnyDevice, Role
+from sensorgen.measure.lab.devices import PYMEASURE, Actuator, FrameMeter, ImpedanceMeter, Meter, Role, Stage
 from sensorgen.measure.virtual.plant import Plant
 
 GROUP = "sensorgen.devices"
+Device = Actuator | Stage | ImpedanceMeter | Meter | FrameMeter
 
 
 @dataclass(frozen=True)
@@ -30,13 +31,13 @@ class Simulated:
 
     Attributes
     ----------
-    driver : AnyDevice
+    driver : Device
         As for a real device.
     simulator : object
         With the attribute ``fault``.
     """
 
-    driver: AnyDevice
+    driver: Device
     simulator: Any
 
 
@@ -58,8 +59,12 @@ class Kind:
 
     role: Role
     settings: type[Strict]
-    open: Callable[[str, Any, Clock], AnyDevice]
+    open: Callable[[str, Any, Clock], Device]
     simulate: Callable[[Plant, Any, Clock], Simulated] | None = None
+
+
+class NoSettings(Strict):
+    """A kind without settings."""
 
 
 class HandyscopeSettings(Strict):
@@ -126,7 +131,7 @@ def kind(name: str) -> Kind:
     return found
 
 
-def opened(name: str, address: str, settings: Mapping[str, Any], clock: Clock) -> AnyDevice:
+def opened(name: str, address: str, settings: Mapping[str, Any], clock: Clock) -> Device:
     """Driver of a real device, which is sent nothing yet.
 
     Parameters
@@ -192,7 +197,7 @@ def _installed() -> dict[str, Any]:
 
 
 def _at_port(
-    role: Role, settings: type[Strict], driver: Callable[[Any, Clock, Any], AnyDevice], port: Callable[[str, Any], Any],
+    role: Role, settings: type[Strict], driver: Callable[[Any, Clock, Any], Device], port: Callable[[str, Any], Any],
     simulator: Callable[[Plant, Any], Any],
 ) -> Kind:  # fmt: skip
     """A kind whose driver has a port: of a device, or of a simulator."""
@@ -210,7 +215,7 @@ def _smac() -> Kind:
     from sensorgen.measure.virtual.smac import SmacController
 
     return _at_port(
-        "actuator", smac.Settings, smac.Actuator, lambda address, _: port.SerialPort(address, smac.BAUD),
+        "actuator", smac.Settings, smac.SmacActuator, lambda address, _: port.SerialPort(address, smac.BAUD),
         lambda plant, given: SmacController(
             plant, newton_per_unit=given.newton_per_unit, mm_per_count=given.mm_per_count
         ),
@@ -225,11 +230,7 @@ def _reprap() -> Kind:
         return port.HttpPort(address) if "://" in address else port.SerialPort(address, given.baud)
 
     return _at_port(
-        "stage",
-        reprap.Settings,
-        reprap.stage,
-        at,
-        lambda plant, given: RepRapFirmware(plant, password=given.password),
+        "stage", reprap.Settings, reprap.stage, at, lambda plant, given: RepRapFirmware(plant, password=given.password)
     )
 
 
@@ -243,7 +244,7 @@ def _handyscope() -> Kind:
         made = PhasorMeter(plant, clock, Analyser(given.feedback_ohm, given.feedback_f), range_v=given.range_v)
         return Simulated(made, made)
 
-    def real(address: str, given: HandyscopeSettings, clock: Clock) -> AnyDevice:
+    def real(address: str, given: HandyscopeSettings, clock: Clock) -> Device:
         gains = handyscope.gains(Path(given.gains)) if given.gains else ()
         bridge = handyscope.Bridge(given.feedback_ohm, given.feedback_f, given.range_v, gains)
         return handyscope.Handyscope(address, clock, bridge=bridge)
@@ -261,14 +262,23 @@ def _scpi(name: str) -> Kind:
     model = {"hp-4284a": lcr_meter.HP_4284A, "keysight-e4980a": lcr_meter.E4980A}.get(name)
     if model:
         return _at_port(
-            "impedance", lcr_meter.Settings, lambda line, clock, of: lcr_meter.LcrMeter(line, clock, model, of), at,
-            lambda plant, _: scpi.LcrMeter(plant, name),
+            "impedance", lcr_meter.Settings, lambda line, clock, given: lcr_meter.LcrMeter(line, clock, model, given),
+            at, lambda plant, _: scpi.SimulatedLcrMeter(plant, name),
         )  # fmt: skip
     key = {"hp-34401a": "34401A", "keithley-2000": "MODEL 2000"}[name]
     return _at_port(
-        "meter", Strict, lambda line, *_: multimeter.Multimeter(line, {key: multimeter.KNOWN[key]}), at,
-        lambda plant, _: scpi.Multimeter(plant, name),
+        "meter", NoSettings, lambda line, *_: multimeter.Multimeter(line, {key: multimeter.KNOWN[key]}), at,
+        lambda plant, _: scpi.SimulatedMultimeter(plant, name),
     )  # fmt: skip
+
+
+def _frames() -> Kind:
+    from sensorgen.measure.lab import frame_stream, port
+
+    def real(address: str, given: frame_stream.StreamSettings, clock: Clock) -> Device:
+        return frame_stream.FrameStream(port.SerialPort(address, given.baud), clock)
+
+    return Kind("array", frame_stream.StreamSettings, real)
 
 
 def _pymeasure(name: str) -> Kind:
@@ -282,5 +292,6 @@ _KINDS: dict[str, Callable[[], Kind]] = {
     "smac-lcc10": _smac,
     "reprapfirmware": _reprap,
     "handyscope-hs5": _handyscope,
+    "frame-stream": _frames,
     **{name: partial(_scpi, name) for name in ("hp-4284a", "keysight-e4980a", "hp-34401a", "keithley-2000")},
 }

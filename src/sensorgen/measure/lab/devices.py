@@ -16,7 +16,7 @@ from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import InstrumentFailed
 
 PYMEASURE = "pymeasure:"  # begin of the kinds that are classes of PyMeasure
-Role = Literal["actuator", "stage", "impedance", "meter"]
+Role = Literal["actuator", "stage", "impedance", "meter", "array"]
 
 
 class DeviceFault(InstrumentFailed):
@@ -200,6 +200,47 @@ class ImpedanceMeter(AnyDevice, Protocol):
 
     def stop(self) -> None:
         """End the measurement and switch the output off."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameLot:
+    """Frames of an array since the last call.
+
+    Attributes
+    ----------
+    time_s : (k,) array
+        By the device, rising [s].
+    siemens : (k, m, n) array
+        Readings; of capacitances alone the real part is nan [S].
+    lost, damaged : int
+        Frames that are missing, and lines that were no message.
+    saturated : int
+        Readings beyond the device's range.
+    """
+
+    time_s: Real
+    siemens: Complex
+    lost: int = 0
+    damaged: int = 0
+    saturated: int = 0
+
+
+class FrameMeter(AnyDevice, Protocol):
+    """Reads all crossings of an array, again and again.
+
+    Attributes
+    ----------
+    shape : (int, int)
+        Rows and columns, once identified.
+    frequency_hz : float
+        Of the readings, once identified [Hz].
+    """
+
+    shape: tuple[int, int]
+    frequency_hz: float
+
+    def read(self) -> FrameLot:
+        """Frames since the last call; none is an answer."""
 
 
 class Meter(AnyDevice, Protocol):

@@ -47,7 +47,7 @@ class Devices(Strict):
     impedance: Device
 
 
-class Tip(Strict):
+class ExperimentTip(Strict):
     """Tip that presses.
 
     Attributes
@@ -63,7 +63,7 @@ class Tip(Strict):
 
 
 _ROOM = 0.95  # of the limit, so that the noise of a reading does not reach it
-TIPS = {"flat": Tip(length_mm=5.0), "soft": Tip(length_mm=10.0)}
+TIPS = {"flat": ExperimentTip(length_mm=5.0), "soft": ExperimentTip(length_mm=10.0)}
 """Thesis 5.1: of PLA, flat, 5 mm; of Ninjaflex, 10 mm, whose stiffness was not measured."""
 
 
@@ -177,7 +177,7 @@ class Sine(Strict):
     rest_s: Positive = 4.0
 
 
-class Sweep(Strict):
+class ForceSweep(Strict):
     """One force at places side by side."""
 
     force_n: Positive
@@ -193,21 +193,21 @@ class Next(Free):
     aim: Literal["values", "presses"] = "values"
 
 
-Kind = Random | Ramp | Hold | Sine | Sweep | Next
+Kind = Random | Ramp | Hold | Sine | ForceSweep | Next
 
 
-class Part(Strict):
+class ExperimentPart(Strict):
     """A part of the plan: one of its keys."""
 
     random: Random | None = None
     ramp: Ramp | None = None
     hold: Hold | None = None
     sine: Sine | None = None
-    sweep: Sweep | None = None
+    sweep: ForceSweep | None = None
     next: Next | None = None
 
     @model_validator(mode="after")
-    def _one(self) -> "Part":
+    def _one(self) -> "ExperimentPart":
         if len(self.model_fields_set) != 1 or None in (getattr(self, name) for name in self.model_fields_set):
             given = ", ".join(sorted(self.model_fields_set)) or "nothing"
             raise ValueError(f"a part of {given}; expected one of {', '.join(type(self).model_fields)}")
@@ -272,16 +272,16 @@ class Experiment(Strict):
     length_mm: Positive | None = None
     virtual: VirtualSpecimen | None = None
     devices: Devices | None = None
-    tip: Literal["flat", "soft"] | Tip = "flat"
+    tip: Literal["flat", "soft"] | ExperimentTip = "flat"
     readout: Readout = Readout()
     approach: Approach = Approach()
     limits: Limits = Limits()
-    plan: Annotated[tuple[Part, ...], Field(strict=False, min_length=1, max_length=1000)]
+    plan: Annotated[tuple[ExperimentPart, ...], Field(strict=False, min_length=1, max_length=1000)]
     stop: Stop = Stop()
     remark: Annotated[Line, Field(max_length=1000)] = ""
 
     @property
-    def pressing(self) -> Tip:
+    def pressing(self) -> ExperimentTip:
         """The tip with its size."""
         return TIPS[self.tip] if isinstance(self.tip, str) else self.tip
 
@@ -385,7 +385,7 @@ def _check_part(key: str, part: Kind, limit_n: float, places_mm: tuple[float, fl
     where = part.position_mm
     for place in () if where is None else where if isinstance(where, tuple) else (where,):
         _inside(f"{key}.position_mm", place, places_mm)
-    if isinstance(where, tuple) and not isinstance(part, Sweep):
+    if isinstance(where, tuple) and not isinstance(part, ForceSweep):
         _rising(f"{key}.position_mm", where)
 
 

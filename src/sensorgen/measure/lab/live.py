@@ -89,6 +89,9 @@ class LiveView:
         No port of this computer is free.
     """
 
+    names: tuple[str, ...] = COMMANDS
+    page = "live"
+
     def __init__(self, title: str, tones_hz: ArrayLike) -> None:
         self.title = title
         self.tones_hz: Real = np.atleast_1d(np.asarray(tones_hz, float))
@@ -99,7 +102,7 @@ class LiveView:
         self._commands: list[str] = []
         self._last = ""
         token = secrets.token_urlsafe(24)
-        self._server = Server(token, self)
+        self._server = Server(token, self, self.page)
         self.url = f"http://127.0.0.1:{self._server.port}/{token}/"
 
     def __enter__(self) -> Self:
@@ -110,13 +113,17 @@ class LiveView:
 
     def update(self, sample: Sample) -> None:
         """Show a sample, whether anybody watches or not; of several within 0.05 s only the first."""
-        if 0 <= sample.time_s - self._kept_s < _ROW_S:
+        self.keep(sample.time_s, lambda: (_row(sample), _state(sample)))
+
+    def keep(self, time_s: float, drawn: Callable[[], tuple[str, str]]) -> None:
+        """Keep a row, or "" for none, and the state, in JSON; of several within 0.05 s only the first."""
+        if 0 <= time_s - self._kept_s < _ROW_S:
             return
-        row, state = _row(sample), _state(sample)
+        row, state = drawn()
         with self._lock:
-            self._rows.append(row)
-            self._count += 1
-            self._kept_s, self._state = sample.time_s, state
+            self._rows.extend([row] if row else [])
+            self._count += bool(row)
+            self._kept_s, self._state = time_s, state
 
     def commands(self) -> list[str]:
         """Commands since the last call, in their order: "pause", "resume", "abort"."""
@@ -142,7 +149,7 @@ class LiveView:
 
     def command(self, name: str) -> bool:
         """Take a command from the page."""
-        if name not in COMMANDS:
+        if name not in self.names:
             return False
         with self._lock:
             if len(self._commands) < _WAITING or (name == "abort" and name not in self._commands):

@@ -8,11 +8,7 @@ from importlib import resources
 from typing import Any, Protocol
 from urllib.parse import parse_qs, urlsplit
 
-_FILES = {
-    "": ("live.html", "text/html"),
-    "live.js": ("live.js", "text/javascript"),
-    "live.css": ("live.css", "text/css"),
-}
+_KINDS = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
 _HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
     "img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
@@ -49,6 +45,8 @@ class Server(ThreadingHTTPServer):
         First part of every path.
     served : Served
         What it serves.
+    page : str
+        Name of the page's files.
 
     Attributes
     ----------
@@ -58,7 +56,7 @@ class Server(ThreadingHTTPServer):
 
     daemon_threads, block_on_close = True, False
 
-    def __init__(self, token: str, served: Served) -> None:
+    def __init__(self, token: str, served: Served, page: str = "live") -> None:
         super().__init__(("127.0.0.1", 0), _Request)
         self.token, self.served = token, served
         self.hosts = {f"{name}:{self.server_address[1]}" for name in ("127.0.0.1", "localhost")}
@@ -66,7 +64,10 @@ class Server(ThreadingHTTPServer):
         folder = resources.files("sensorgen.measure.lab") / "templates"
         self.port = int(self.server_address[1])
         self._thread = threading.Thread(target=self.serve_forever, args=(0.05,), daemon=True, name="live page")
-        self.files = {name: ((folder / file).read_bytes(), kind) for name, (file, kind) in _FILES.items()}
+        files = {"": f"{page}.html"} | {name: name for name in ("live.css", "chart.js", f"{page}.js")}
+        self.files = {
+            name: ((folder / file).read_bytes(), _KINDS[file.partition(".")[2]]) for name, file in files.items()
+        }
         self._thread.start()
 
     def close(self) -> None:

@@ -14,7 +14,7 @@ from sensorgen.measure.lab.devices import DeviceFault, Extension, Place
 from sensorgen.measure.lab.experiment import Experiment
 from sensorgen.measure.lab.live import Sample
 from sensorgen.measure.lab.recorder import Recorder
-from sensorgen.measure.lab.safety import UP_MM, Ended, Rig
+from sensorgen.measure.lab.safety import UP_MM, Ended, RunDevices
 from sensorgen.measure.lab.sweeps import Sweeps
 from sensorgen.measure.lab.watch import Watch
 
@@ -27,7 +27,7 @@ _FREE_MM = 0.3  # above the landing
 _DEEP_MM = 0.5  # beyond the deepest position
 
 
-class View(Protocol):
+class RunView(Protocol):
     """Display of a run, as :class:`sensorgen.measure.lab.live.LiveView`."""
 
     def update(self, sample: Sample) -> None:
@@ -96,13 +96,13 @@ class Loop:
         Presses that were done.
     """
 
-    rig: Rig
+    rig: RunDevices
     clock: Clock
     recorder: Recorder
     experiment: Experiment
     controls: Controls
     watch: Watch
-    view: View | None = None
+    view: RunView | None = None
     guardian: Alive | None = None
     predicted: Predicted | None = None
     extension: Extension = field(default=Extension(nan, nan, nan))

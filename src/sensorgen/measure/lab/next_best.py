@@ -10,9 +10,9 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import M_PER_MM
 from sensorgen.measure.lab.experiment import Next
-from sensorgen.measure.lab.plans import Choice, Pressed
+from sensorgen.measure.lab.plans import Choice, DonePress
 from sensorgen.prediction.calibration.fitting import NOISE, Data, Posterior, by_rest, calibrated
-from sensorgen.prediction.calibration.next_press import NextPress, Range
+from sensorgen.prediction.calibration.next_press import NextPress, PossiblePresses
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, unknown
 
 _LEAST = 3e-4  # relative error of a mean at rest: from one place and time to the next it differs by more than noise
@@ -33,14 +33,14 @@ class ByModel:
 
     model: SpecimenModel
 
-    def __call__(self, part: Next, pressed: Sequence[Pressed], rest_ohm: Complex) -> Choice:
+    def __call__(self, part: Next, pressed: Sequence[DonePress], rest_ohm: Complex) -> Choice:
         """The best next press.
 
         Parameters
         ----------
         part : Next
             With the places that are possible.
-        pressed : sequence of Pressed
+        pressed : sequence of DonePress
             All so far.
         rest_ohm : (m,) array
             The latest mean at rest [ohm].
@@ -54,7 +54,7 @@ class ByModel:
             raise BadInput("the next press needs a reading at rest, and places that are possible")
         known = self._known(pressed, rest_ohm)
         low, high = part.position_mm
-        within = Range(part.force_n, (low * M_PER_MM, high * M_PER_MM), part.hold_s)
+        within = PossiblePresses(part.force_n, (low * M_PER_MM, high * M_PER_MM), part.hold_s)
         noise = np.median([press.noise for press in pressed], axis=0) if pressed else np.full(len(rest_ohm), NOISE)
         best = NextPress(self.model, within, np.maximum(noise, _LEAST), part.aim).best(known)
         interval = self._interval(known) if pressed else inf
@@ -66,7 +66,7 @@ class ByModel:
         press = unknown(np.array([force_n]), np.array([place_mm * M_PER_MM]))
         return np.asarray(rest_ohm * np.exp(self.model.ratio(np.zeros(len(self.model.names)), press)[0]))
 
-    def _known(self, pressed: Sequence[Pressed], rest_ohm: Complex) -> Posterior:
+    def _known(self, pressed: Sequence[DonePress], rest_ohm: Complex) -> Posterior:
         if not pressed:
             return by_rest(self.model, np.log(rest_ohm), _LEAST, NOISE)
         steps = [press.step for press in pressed]

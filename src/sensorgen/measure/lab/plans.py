@@ -7,9 +7,9 @@ from math import inf, nan, pi, sin
 import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
-from sensorgen.measure.lab.experiment import Approach, Experiment, Hold, Next, Ramp, Random, Sine, Sweep
+from sensorgen.measure.lab.experiment import Approach, Experiment, ForceSweep, Hold, Next, Ramp, Random, Sine
 from sensorgen.measure.signal.presses import GUARD_S, WINDOW_S
-from sensorgen.measure.signal.schedule import Plan
+from sensorgen.measure.signal.schedule import RunPlan
 
 AVERAGED_S = WINDOW_S + GUARD_S  # end of every hold, over which the evaluation averages [s]
 _AT_PEAK_S = 0.5  # how long a higher force is held before the force of the press
@@ -18,7 +18,7 @@ _TRAVEL_S = 8.0  # to another place, about: a part of the rest
 
 
 @dataclass(frozen=True)
-class Step:
+class PlannedPress:
     """One press.
 
     Attributes
@@ -66,12 +66,12 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
-class Pressed:
+class DonePress:
     """A press that was done.
 
     Attributes
     ----------
-    step : Step
+    step : PlannedPress
         What it was to be.
     before_ohm, pressed_ohm : (m,) array
         Mean at rest before it, and over the last second of its hold [ohm].
@@ -79,7 +79,7 @@ class Pressed:
         Standard error of their ratio, of its real and imaginary part [-].
     """
 
-    step: Step
+    step: PlannedPress
     before_ohm: Complex
     pressed_ohm: Complex
     noise: Real
@@ -106,35 +106,35 @@ class Choice:
     interval: float = inf
 
 
-NextPress = Callable[[Next, Sequence[Pressed], Complex], Choice]
+NextPress = Callable[[Next, Sequence[DonePress], Complex], Choice]
 """The best next press, by the part of the plan that asks, all presses so far, and the mean at rest (m,) [ohm]."""
 
 
-def steps(experiment: Experiment, length_mm: float) -> list[Step]:
+def steps(experiment: Experiment, length_mm: float) -> list[PlannedPress]:
     """All presses of an experiment on a specimen of a length [mm]."""
     places = experiment.places_mm(length_mm)
-    found: list[Step] = []
+    found: list[PlannedPress] = []
     for k, part in enumerate(experiment.plan):
         for step in _presses(part.content, experiment, places):
             found.append(replace(step, number=len(found) + 1, part=k, kind=part.kind))
     return found
 
 
-def seconds(planned: Sequence[Step], longest_hold_s: float = 30.0) -> float:
+def seconds(planned: Sequence[PlannedPress], longest_hold_s: float = 30.0) -> float:
     """About how long a plan takes; one chosen during the run is taken as held for a third of the longest [s]."""
     chosen = longest_hold_s / 3 + AVERAGED_S
     return sum(max(step.rest_s, _TRAVEL_S) + _LANDING_S + (step.seconds if step.course else chosen) for step in planned)
 
 
-def chosen(step: Step, choice: Choice, approach: Approach) -> Step:
+def chosen(step: PlannedPress, choice: Choice, approach: Approach) -> PlannedPress:
     """A step with what was chosen for it."""
     made = _press(approach, choice.position_mm, choice.force_n, choice.peak_n, choice.hold_s, step.rest_s)
     return replace(made, number=step.number, part=step.part, kind=step.kind)
 
 
 def _presses(
-    part: Random | Ramp | Hold | Sine | Sweep | Next, experiment: Experiment, places: tuple[float, float]
-) -> Iterator[Step]:
+    part: Random | Ramp | Hold | Sine | ForceSweep | Next, experiment: Experiment, places: tuple[float, float]
+) -> Iterator[PlannedPress]:
     approach = experiment.approach
     match part:
         case Random():
@@ -149,7 +149,7 @@ def _presses(
             yield _press(approach, part.position_mm, part.force_n, 0.0, part.hold_s, part.rest_s)
         case Sine():
             yield _swing(part, approach)
-        case Sweep():
+        case ForceSweep():
             for place in np.linspace(*part.position_mm, part.places).round(3).tolist():
                 yield _press(approach, place, part.force_n, 0.0, part.hold_s, part.rest_s)
         case Next():
@@ -157,9 +157,9 @@ def _presses(
                 yield _step(nan, (), part.rest_s, nan)
 
 
-def _random(part: Random, approach: Approach, places: tuple[float, float]) -> Iterator[Step]:
+def _random(part: Random, approach: Approach, places: tuple[float, float]) -> Iterator[PlannedPress]:
     """Forces and places of a seeded plan; holds even in their logarithm, and a share reached from a higher force."""
-    plan = Plan(part.seed, part.presses, part.force_n, places, 1.0, 0.0, part.repeats).steps()
+    plan = RunPlan(part.seed, part.presses, part.force_n, places, 1.0, 0.0, part.repeats).steps()
     rng = np.random.default_rng([part.seed, 1])
     short, long = np.log(part.hold_s).tolist()
     holds = np.exp(rng.uniform(short, long, len(plan))).round(2).tolist()
@@ -170,7 +170,9 @@ def _random(part: Random, approach: Approach, places: tuple[float, float]) -> It
         yield _press(approach, press.position_mm, press.force_n, round(peak, 3), hold, part.rest_s)
 
 
-def _press(approach: Approach, place_mm: float, force_n: float, peak_n: float, hold_s: float, rest_s: float) -> Step:
+def _press(
+    approach: Approach, place_mm: float, force_n: float, peak_n: float, hold_s: float, rest_s: float
+) -> PlannedPress:
     """Up to a force, over a higher one if there is one, hold, average, and down."""
     course = [(0.0, approach.contact_n)]
     if peak_n > force_n:
@@ -186,12 +188,12 @@ def _extend(course: list[tuple[float, float]], approach: Approach, force_n: floa
     course += [(there_s, force_n), (there_s + stay_s, force_n)]
 
 
-def _swing(part: Sine, approach: Approach) -> Step:
+def _swing(part: Sine, approach: Approach) -> PlannedPress:
     course = [(0.0, approach.contact_n)]
     _extend(course, approach, part.mean_n, part.cycles / part.frequency_hz)
     step = _step(part.position_mm, tuple(course), part.rest_s, part.mean_n + part.amplitude_n)
     return replace(step, wave=(part.amplitude_n, part.frequency_hz))
 
 
-def _step(place_mm: float, course: tuple[tuple[float, float], ...], rest_s: float, force_n: float) -> Step:
-    return Step(0, 0, "", place_mm, course, rest_s, force_n, force_n, 0.0)
+def _step(place_mm: float, course: tuple[tuple[float, float], ...], rest_s: float, force_n: float) -> PlannedPress:
+    return PlannedPress(0, 0, "", place_mm, course, rest_s, force_n, force_n, 0.0)

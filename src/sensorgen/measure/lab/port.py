@@ -17,6 +17,7 @@ from sensorgen.measure.lab.clock import Clock, RealClock
 from sensorgen.measure.lab.devices import DeviceFault
 from sensorgen.measure.virtual.plant import Simulator
 
+_BLOCK = 4096  # bytes: over TCP pyserial only knows that some wait
 _POLL_S = 0.005  # of the serial driver; half a period of the fastest control loop
 
 
@@ -70,12 +71,12 @@ def faults(address: str, what: str = "connection to {} failed", *also: type[Exce
 
 
 class SerialPort:
-    """A serial line of this computer: 8 data bits, no parity, one stop bit, no flow control.
+    """A serial line of this computer: 8 data bits, no parity, one stop bit, no flow control; or one over TCP.
 
     Parameters
     ----------
     address : str
-        ``/dev/ttyUSB0``, ``COM3``.
+        ``/dev/ttyUSB0``, ``COM3``, ``socket://10.0.0.5:7000``.
     baud : int
         Bits per second.
 
@@ -93,9 +94,9 @@ class SerialPort:
         except ImportError:
             raise NotInstalled("serial lines need pyserial: pip install 'sensorgen[lab]'") from None
         self.address = address
-        self._received = bytearray()
+        self._received, self._least = bytearray(), _BLOCK if "://" in address else 1
         with faults(address):
-            self._line = serial.Serial(address, baud, timeout=_POLL_S, write_timeout=1.0, exclusive=True)
+            self._line = serial.serial_for_url(address, baud, timeout=_POLL_S, write_timeout=1.0, exclusive=True)
 
     def write(self, data: bytes) -> None:
         """Send; DeviceFault if the line is cut."""
@@ -111,7 +112,7 @@ class SerialPort:
                 waiting = self._line.in_waiting
                 if not waiting and clock.now() >= until:
                     break
-                self._received += self._line.read(waiting or 1)
+                self._received += self._line.read(max(waiting, self._least))
         return _taken(self._received, end)
 
     def close(self) -> None:

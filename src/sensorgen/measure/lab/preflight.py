@@ -6,14 +6,14 @@ from sensorgen.core.errors import within
 from sensorgen.measure.lab import press
 from sensorgen.measure.lab.devices import DeviceFault, Identity
 from sensorgen.measure.lab.loop import Loop
-from sensorgen.measure.lab.safety import UP_MM, Rig
+from sensorgen.measure.lab.safety import UP_MM, RunDevices
 
 _UP_S = 15.0  # to the upper end, with homing
 _GENTLE = 8.0  # times the force of the contact: limit of the actuator until the contact is known
 _FIRST_S, _FIRST_REST_S = 10.0, 1.0  # until the first sound reading, and from then on
 
 
-def identified(rig: Rig) -> dict[str, Identity]:
+def identified(rig: RunDevices) -> dict[str, Identity]:
     """Ask every device what it is; nothing else is sent to any before all have answered.
 
     Raises

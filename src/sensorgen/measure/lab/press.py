@@ -6,7 +6,7 @@ import numpy as np
 
 from sensorgen.measure.lab.devices import DeviceFault
 from sensorgen.measure.lab.loop import Loop
-from sensorgen.measure.lab.plans import AVERAGED_S, Pressed, Step
+from sensorgen.measure.lab.plans import AVERAGED_S, DonePress, PlannedPress
 from sensorgen.measure.lab.safety import RAISED_MM, UP_MM, Ended
 
 _STUCK_S, _TRAVEL_S, _LAND_S = 0.5, 120.0, 60.0  # a piston that rises not at all; longest move and landing
@@ -131,7 +131,7 @@ def _rests(loop: Loop, begun_s: float) -> bool:
     return True
 
 
-def press(loop: Loop, step: Step) -> Pressed:
+def press(loop: Loop, step: PlannedPress) -> DonePress:
     """Rest, land, follow the course of the force, and lift.
 
     The rest counts from the last lift on; at least what is averaged of it is at the place of the press.
@@ -147,7 +147,7 @@ def press(loop: Loop, step: Step) -> Pressed:
     while (time_s := loop.clock.now() - begun) < step.seconds:
         loop.set_n = step.force_at(time_s)
         loop.period()
-    pressed = Pressed(step, before, loop.watch.mean(), np.hypot(noise, loop.watch.noise()))
+    pressed = DonePress(step, before, loop.watch.mean(), np.hypot(noise, loop.watch.noise()))
     lift(loop)
     loop.presses += 1
     return pressed

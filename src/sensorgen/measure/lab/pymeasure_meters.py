@@ -82,9 +82,7 @@ def _way(kind: Any, wires: int) -> tuple[dict[str, str], str]:
     return {}, next((name for name in _READS[wires] if hasattr(kind, name)), "")
 
 
-def meter(
-    name: str,
-) -> tuple[Role, Callable[[Any, Settings, Clock], "Multimeter | LcrMeter"]]:
+def meter(name: str) -> tuple[Role, Callable[[Any, Settings, Clock], "PyMeasureMultimeter | PyMeasureLcrMeter"]]:
     """Role of a meter, and its driver by address, settings and clock; it connects when it is asked what it is.
 
     Raises
@@ -95,7 +93,7 @@ def meter(
     if name not in roles():
         raise UnknownName("meter of PyMeasure", name, roles())
     role, kind = roles()[name]
-    return role, partial(LcrMeter if role == "impedance" else Multimeter, kind)
+    return role, partial(PyMeasureLcrMeter if role == "impedance" else PyMeasureMultimeter, kind)
 
 
 class _Meter:
@@ -184,7 +182,7 @@ class _Meter:
             yield
 
 
-class Multimeter(_Meter):
+class PyMeasureMultimeter(_Meter):
     """A multimeter; a :class:`sensorgen.measure.lab.devices.Meter`."""
 
     def resistance(self, *, wires: int) -> str:
@@ -215,7 +213,7 @@ class Multimeter(_Meter):
         return f"{ohm:+.8E}" if abs(ohm) < _OVERLOAD_OHM else "+9.90000000E+37"
 
 
-class LcrMeter(_Meter):
+class PyMeasureLcrMeter(_Meter):
     """An LCR meter, one frequency after the other; a :class:`sensorgen.measure.lab.devices.ImpedanceMeter`."""
 
     def start(self, tones_hz: Real, voltage_v: float) -> None:

@@ -90,7 +90,7 @@ class Appended:
         return Unwritable(f"cannot write to {str(self._path)!r}: {error.strerror or error}; make room on the disk")
 
 
-class Synced:
+class SyncedFiles:
     """Brings files to the disk every half second, beside the run, which does not wait for it."""
 
     def __init__(self, files: Sequence[Appended]) -> None:
@@ -135,7 +135,7 @@ class Recorder:
         self.impedance.write(",".join(["time_s", "stamp_s", *names, "clipped", "valid"]) + "\n")
         self.rig.write(_RIG)
         self.journal = Journal(folder / JOURNAL, clock)
-        self._synced = Synced((self.impedance, self.rig, self.journal.file))
+        self._synced = SyncedFiles((self.impedance, self.rig, self.journal.file))
 
     def readings(self, found: Readings) -> None:
         """Append impedances that came just now."""
@@ -184,7 +184,7 @@ class Journal:
 
 
 @dataclass(frozen=True)
-class Run:
+class RunFolder:
     """A run as its folder tells.
 
     Attributes
@@ -276,7 +276,7 @@ def log_attempts(log: "Log", folder: Path, clock: Clock) -> "list[BenchRun]":
 
     What cannot be logged, as of a run that was killed before its first reading, is noted in the journal.
     """
-    run = Run.read(folder)
+    run = RunFolder.read(folder)
     logged = {each["attempt"] for each in run.of("logged")}
     rows: list[BenchRun] = []
     waiting = [each for each in run.of("begun") if each["attempt"] not in logged]

@@ -70,7 +70,7 @@ class Settings(Strict):
 
 
 @dataclass(frozen=True)
-class Report:
+class FirmwareState:
     """State of the firmware.
 
     Attributes
@@ -85,7 +85,7 @@ class Report:
     axes_mm: tuple[float, ...]
 
 
-class Link(Protocol):
+class FirmwareLink(Protocol):
     """A way to the firmware."""
 
     address: str
@@ -96,7 +96,7 @@ class Link(Protocol):
     def send(self, *codes: str) -> None:
         """Send G-code without waiting for its end."""
 
-    def report(self) -> Report | None:
+    def report(self) -> FirmwareState | None:
         """Newest state that was asked for after all that was sent; None if there is none yet."""
 
     def emergency(self) -> None:
@@ -117,7 +117,7 @@ class SerialLink:
         self._lines: list[str] = []
         self._partial = b""
         self._status = ""
-        self._report: Report | None = None
+        self._report: FirmwareState | None = None
         self._identifying = 0
 
     def identify(self) -> str:
@@ -149,7 +149,7 @@ class SerialLink:
             if code not in _QUESTIONS:
                 self._report = None
 
-    def report(self) -> Report | None:
+    def report(self) -> FirmwareState | None:
         """Newest state; a question is sent when the last one is answered."""
         self._receive()
         if not self._waiting:
@@ -200,7 +200,7 @@ class SerialLink:
         if code == _STATUS:
             self._status = _text(_result(text, self.address), self.address)
         elif code == _AXES and not self._waiting:  # nothing was sent after the question
-            self._report = Report(self._status, _numbers(_result(text, self.address), self.address))
+            self._report = FirmwareState(self._status, _numbers(_result(text, self.address), self.address))
 
 
 class WebLink:
@@ -212,7 +212,7 @@ class WebLink:
         self._replies = 0
         self._busy = 0
         self._next_s = -math.inf
-        self._report: Report | None = None
+        self._report: FirmwareState | None = None
 
     def identify(self) -> str:
         """Open a session, which only this firmware does, and ask M115."""
@@ -236,7 +236,7 @@ class WebLink:
             raise DeviceFault(f"{self.address} does not take {codes[0]!r} ...: {answer!r:.80}; its buffer is full")
         self._report, self._next_s = None, -math.inf
 
-    def report(self) -> Report | None:
+    def report(self) -> FirmwareState | None:
         """Newest state, asked for at most 20 times a second; replies are fetched when there are new ones."""
         now = self._clock.now()
         if now < self._next_s:
@@ -253,7 +253,7 @@ class WebLink:
                 raise DeviceFault(f"{self.address} replies {reply!r:.120}")
         try:
             axes = tuple(float(each["machinePosition"]) for each in model["move"]["axes"])
-            self._report = Report(str(model["state"]["status"]), axes)
+            self._report = FirmwareState(str(model["state"]["status"]), axes)
         except (KeyError, TypeError, ValueError):
             raise DeviceFault(f"{self.address} has no state.status or move.axes in its object model") from None
         return self._report
@@ -321,12 +321,12 @@ class WebLink:
         return found
 
 
-class Stage:
+class RepRapStage:
     """Driver of the gantry.
 
     Parameters
     ----------
-    link : Link
+    link : FirmwareLink
         Serial or HTTP.
     clock : Clock
         Of the run.
@@ -334,7 +334,7 @@ class Stage:
         Of this gantry.
     """
 
-    def __init__(self, link: Link, clock: Clock, settings: Settings | None = None) -> None:
+    def __init__(self, link: FirmwareLink, clock: Clock, settings: Settings | None = None) -> None:
         self.settings = settings or Settings()
         self._link, self._clock = link, clock
         self._known = False
@@ -432,11 +432,11 @@ class Stage:
         self._link.send("G90", f"G1 {axis}{position_mm:.3f} F{60 * speed_mm_s:.1f}")
 
 
-def stage(port: Any, clock: Clock, settings: Settings) -> Stage:
+def stage(port: Any, clock: Clock, settings: Settings) -> RepRapStage:
     """Driver at a serial line or an address of HTTP."""
     web = isinstance(port, HttpPort)
-    link: Link = WebLink(port, clock, settings.password) if web else SerialLink(port, clock)
-    return Stage(link, clock, settings)
+    link: FirmwareLink = WebLink(port, clock, settings.password) if web else SerialLink(port, clock)
+    return RepRapStage(link, clock, settings)
 
 
 def _result(text: str, address: str) -> object:

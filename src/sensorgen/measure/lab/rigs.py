@@ -13,7 +13,7 @@ from sensorgen.measure.lab.devices import Meter
 from sensorgen.measure.lab.experiment import Device, Devices, Experiment
 from sensorgen.measure.lab.multimeter import Multimeter
 from sensorgen.measure.lab.port import VisaPort
-from sensorgen.measure.lab.safety import Rig
+from sensorgen.measure.lab.safety import RunDevices
 from sensorgen.measure.virtual import faults, mechanics, rig
 
 _HEARD = 1000  # messages that a simulator remembers
@@ -28,7 +28,7 @@ _STRIKES: Mapping[str, faults.Strikes] = {
 }  # fmt: skip
 
 
-def real(devices: Devices, clock: Clock) -> Rig:
+def real(devices: Devices, clock: Clock) -> RunDevices:
     """Drivers of real devices, which are sent nothing yet.
 
     Raises
@@ -38,10 +38,10 @@ def real(devices: Devices, clock: Clock) -> Rig:
     DeviceFault
         There is no such line.
     """
-    return Rig(**_drivers(devices, lambda device: opened(device, clock)))
+    return RunDevices(**_drivers(devices, lambda device: opened(device, clock)))
 
 
-def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Rig, mechanics.Rig]:
+def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[RunDevices, mechanics.VirtualRig]:
     """Drivers with simulators in this process, and the mechanism that they share, its faults planted.
 
     Raises
@@ -68,7 +68,7 @@ def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Rig
             plant.planted.attach(_STRIKES[device.kind], of.simulator)
         return of.driver
 
-    return Rig(**_drivers(devices, made)), plant
+    return RunDevices(**_drivers(devices, made)), plant
 
 
 def _drivers(devices: Devices, made: Callable[[Device], Any]) -> dict[str, Any]:

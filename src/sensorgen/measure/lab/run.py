@@ -22,10 +22,10 @@ from sensorgen.measure.lab.clock import Clock, SimulatedClock
 from sensorgen.measure.lab.controls import Controls
 from sensorgen.measure.lab.devices import Identity, SelfLifting
 from sensorgen.measure.lab.experiment import Experiment, Next
-from sensorgen.measure.lab.loop import Alive, Loop, Paused, Predicted, View
-from sensorgen.measure.lab.plans import Choice, NextPress, Pressed, Step
-from sensorgen.measure.lab.recorder import Recorder, Run
-from sensorgen.measure.lab.safety import Ended, Rig
+from sensorgen.measure.lab.loop import Alive, Loop, Paused, Predicted, RunView
+from sensorgen.measure.lab.plans import Choice, DonePress, NextPress, PlannedPress
+from sensorgen.measure.lab.recorder import Recorder, RunFolder
+from sensorgen.measure.lab.safety import Ended, RunDevices
 from sensorgen.measure.lab.watch import Watch
 from sensorgen.measure.log import notes
 from sensorgen.measure.log.entries import BenchRun
@@ -33,7 +33,7 @@ from sensorgen.measure.log.entries import BenchRun
 if TYPE_CHECKING:
     from sensorgen.measure.log import Log
 
-Confirm = Callable[["Planned", dict[str, Identity]], bool]
+Confirm = Callable[["PlannedRun", dict[str, Identity]], bool]
 """Whether the rig may move, by what is planned and what each device said that it is."""
 WATCHDOG_S = 1.5  # without a reading, until the actuator's controller lifts
 UNWATCHED_N = 1.0  # highest limits.force_n without that: the weight of the piston alone is 0.9 N
@@ -101,7 +101,7 @@ def _named(who: Identity) -> str:
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedRun:
     """A checked experiment with its presses.
 
     Attributes
@@ -110,7 +110,7 @@ class Planned:
         What was asked.
     length_mm : float
         Of the specimen [mm].
-    steps : tuple of Step
+    steps : tuple of PlannedPress
         All presses.
     seconds : float
         How long they take, about [s].
@@ -118,7 +118,7 @@ class Planned:
 
     experiment: Experiment
     length_mm: float
-    steps: tuple[Step, ...]
+    steps: tuple[PlannedPress, ...]
     seconds: float
 
     def summary(self) -> str:
@@ -133,7 +133,7 @@ class Planned:
         )
 
 
-def planned(experiment: Experiment, log: "Log | None" = None) -> Planned:
+def planned(experiment: Experiment, log: "Log | None" = None) -> PlannedRun:
     """Check an experiment against its specimen, and make its presses; nothing moves.
 
     Raises
@@ -149,7 +149,7 @@ def planned(experiment: Experiment, log: "Log | None" = None) -> Planned:
     holds = [part.content.hold_s[1] for part in experiment.plan if isinstance(part.content, Next)]
     seconds = plans.seconds(steps, max(holds, default=0.0))
     experiments.check(experiment, length, seconds)
-    return Planned(experiment, length, tuple(steps), seconds)
+    return PlannedRun(experiment, length, tuple(steps), seconds)
 
 
 def design_of(experiment: Experiment, log: "Log | None") -> Design | None:
@@ -173,7 +173,7 @@ def _length_mm(design: Design | None) -> float:
 
 
 def run(
-    experiment: Experiment, *, clock: Clock, log: "Log", rig: Rig, simulated: bool, view: View | None = None,
+    experiment: Experiment, *, clock: Clock, log: "Log", rig: RunDevices, simulated: bool, view: RunView | None = None,
     controls: Controls | None = None, guardian: Alive | None = None, next_press: NextPress | None = None,
     predicted: Predicted | None = None, resume: Path | None = None, confirm: Confirm = lambda *_: True,
     watchdog: bool = True,
@@ -188,7 +188,7 @@ def run(
         Real, or simulated, with simulated devices alone.
     log : Log
         An open log, which gets the recording.
-    rig : Rig
+    rig : RunDevices
         The devices; they are closed at the end.
     simulated : bool
         Whether the devices are; the log says so.
@@ -226,7 +226,7 @@ def run(
         return attempt.result(view, controls, guardian, predicted)
 
 
-def _check_watchdog(experiment: Experiment, rig: Rig) -> None:
+def _check_watchdog(experiment: Experiment, rig: RunDevices) -> None:
     """Refuse forces that would stay on the specimen if run and guardian ended together."""
     if not isinstance(rig.actuator, SelfLifting) and experiment.limits.force_n > UNWATCHED_N:
         raise BadInput(
@@ -239,18 +239,18 @@ class _Attempt:
     """One attempt at a run: the first, or one that resumes it."""
 
     def __init__(
-        self, plan: Planned, clock: Clock, log: "Log", rig: Rig, folder: Path, simulated: bool,
+        self, plan: PlannedRun, clock: Clock, log: "Log", rig: RunDevices, folder: Path, simulated: bool,
         next_press: NextPress | None, confirm: Confirm, watchdog: bool,
     ) -> None:  # fmt: skip
         self.plan, self.clock, self.log, self.rig, self.folder = plan, clock, log, rig, folder
         self.simulated, self.next_press, self.confirm, self.watchdog = simulated, next_press, confirm, watchdog
-        before = Run.read(folder) if (folder / recorder.JOURNAL).exists() else Run(folder, ())
+        before = RunFolder.read(folder) if (folder / recorder.JOURNAL).exists() else RunFolder(folder, ())
         self.number, self.done = before.attempts + 1, before.done
         self.pressed = _pressed(before, plan.steps)
         self.identities: dict[str, Identity] = {}
 
     def result(
-        self, view: View | None, controls: Controls, guardian: Alive | None, predicted: Predicted | None
+        self, view: RunView | None, controls: Controls, guardian: Alive | None, predicted: Predicted | None
     ) -> RunResult:
         """Do it."""
         experiment = self.plan.experiment
@@ -331,7 +331,7 @@ class _Attempt:
     def _places_mm(self) -> tuple[float, float]:
         return self.plan.experiment.places_mm(self.plan.length_mm)
 
-    def _step(self, loop: Loop, step: Step) -> bool:
+    def _step(self, loop: Loop, step: PlannedPress) -> bool:
         """One press, again after a pause; False where no further one is worth it."""
         while True:
             loop.pausable = True
@@ -355,7 +355,7 @@ class _Attempt:
                 self.pressed.append(pressed)
             return True
 
-    def _chosen(self, loop: Loop, step: Step) -> Step | None:
+    def _chosen(self, loop: Loop, step: PlannedPress) -> PlannedPress | None:
         """The step with force and place; None where the rule of the interval says that it is enough."""
         part = self.plan.experiment.plan[step.part].content
         if step.course or not isinstance(part, Next) or self.next_press is None:
@@ -396,7 +396,7 @@ class _Attempt:
         if end == "done" and unkept:
             end, reason = "fault", f"{reason}, but {unkept[0]}"
         failed += unkept
-        failed += [each["problem"] for each in Run.read(self.folder).of("logged") if each["problem"]]
+        failed += [each["problem"] for each in RunFolder.read(self.folder).of("logged") if each["problem"]]
         return RunResult(
             self.plan.experiment.specimen, str(self.folder), end, reason, len(self.done), len(self.plan.steps),
             self.simulated, up, tuple(rows), tuple(failed), self.identities, counts,
@@ -418,7 +418,7 @@ def _beside(loop: Loop, choose: Callable[[], Choice]) -> Choice:
         return future.result()
 
 
-def _kept(pressed: Pressed) -> dict[str, Any]:
+def _kept(pressed: DonePress) -> dict[str, Any]:
     """Part of a press that the journal keeps."""
     step = pressed.step
     return {
@@ -433,7 +433,7 @@ def _numbers(values: Real) -> list[float] | None:
     return values.tolist() if np.isfinite(values).all() else None
 
 
-def _pressed(before: Run, steps: Sequence[Step]) -> list[Pressed]:
+def _pressed(before: RunFolder, steps: Sequence[PlannedPress]) -> list[DonePress]:
     """Presses of earlier attempts, for the choice of further ones."""
     by_number = {step.number: step for step in steps}
     found = []
@@ -442,5 +442,5 @@ def _pressed(before: Run, steps: Sequence[Step]) -> list[Pressed]:
         if step and all(event[name] for name in ("before_ohm", "pressed_ohm", "noise")):
             values = {name: event[name] for name in ("place_mm", "force_n", "peak_n", "hold_s")}
             at_rest, after = (np.array(event[name]).view(complex) for name in ("before_ohm", "pressed_ohm"))
-            found.append(Pressed(replace(step, **values), at_rest, after, np.array(event["noise"])))
+            found.append(DonePress(replace(step, **values), at_rest, after, np.array(event["noise"])))
     return found

@@ -32,7 +32,7 @@ class Ended(Exception):
 
 
 @dataclass
-class Rig:
+class RunDevices:
     """Devices of a run.
 
     Attributes
@@ -74,12 +74,12 @@ class _Attempts:
         return True
 
 
-def made_safe(rig: Rig, clock: Clock, beat: Callable[[], None] = lambda: None) -> tuple[bool, tuple[str, ...]]:
+def made_safe(rig: RunDevices, clock: Clock, beat: Callable[[], None] = lambda: None) -> tuple[bool, tuple[str, ...]]:
     """Lift the actuator, raise the stage, and switch the motor off; devices that were never started are left alone.
 
     Parameters
     ----------
-    rig : Rig
+    rig : RunDevices
         The devices.
     clock : Clock
         The run's.
@@ -103,7 +103,7 @@ def made_safe(rig: Rig, clock: Clock, beat: Callable[[], None] = lambda: None) -
     return up, tuple(attempt.problems)
 
 
-def _lift(rig: Rig, clock: Clock, attempt: _Attempts) -> dict[str, bool]:
+def _lift(rig: RunDevices, clock: Clock, attempt: _Attempts) -> dict[str, bool]:
     """Lift by both, again where one does not follow; which of them say that the tip is up."""
     until, again = clock.now() + _LIFT_S, -inf
     up: dict[str, bool] = {role: False for role in ("actuator", "stage") if role in rig.started}
@@ -130,7 +130,7 @@ def _lift(rig: Rig, clock: Clock, attempt: _Attempts) -> dict[str, bool]:
     return up
 
 
-def _held(rig: Rig, clock: Clock, attempt: _Attempts) -> None:
+def _held(rig: RunDevices, clock: Clock, attempt: _Attempts) -> None:
     """See that friction holds the piston up, where the stage does not keep it away; else its motor has to."""
     fallen = False
 
@@ -150,7 +150,7 @@ def _held(rig: Rig, clock: Clock, attempt: _Attempts) -> None:
         )
 
 
-def close(rig: Rig) -> tuple[str, ...]:
+def close(rig: RunDevices) -> tuple[str, ...]:
     """Switch the impedance meter off, and give all connections back; what failed."""
     attempt = _Attempts(lambda: None)
     if "impedance" in rig.started:

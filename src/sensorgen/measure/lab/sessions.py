@@ -17,16 +17,16 @@ from sensorgen.measure.lab.guardian import Guardian, Orders
 from sensorgen.measure.lab.live import LiveText, LiveView, Sample
 from sensorgen.measure.lab.next_best import ByModel
 from sensorgen.measure.lab.run import Confirm, RunResult, design_of, planned, run
-from sensorgen.measure.lab.safety import Rig
+from sensorgen.measure.lab.safety import RunDevices
 
 if TYPE_CHECKING:
     from sensorgen.measure.log import Log
-    from sensorgen.measure.virtual.mechanics import Rig as Mechanism
+    from sensorgen.measure.virtual.mechanics import VirtualRig as Mechanism
     from sensorgen.prediction.calibration.specimen import SpecimenModel
 
 
 @dataclass(frozen=True)
-class Asked:
+class SessionTask:
     """Task of a session.
 
     Attributes
@@ -44,7 +44,7 @@ class Asked:
     folder: Path | None = None
 
 
-def new(path: Path, *, simulate: bool) -> Asked:
+def new(path: Path, *, simulate: bool) -> SessionTask:
     """A new run of an experiment's file.
 
     Raises
@@ -55,10 +55,10 @@ def new(path: Path, *, simulate: bool) -> Asked:
     found = experiments.read(path)
     if not simulate and found.devices is None:
         raise BadInput(f"{path}: devices is missing; expected actuator, stage and impedance, or --simulate")
-    return Asked(found, simulate)
+    return SessionTask(found, simulate)
 
 
-def again(log: "Log", name: str) -> Asked:
+def again(log: "Log", name: str) -> SessionTask:
     """A run that ended early, by its folder or the folder's name.
 
     Raises
@@ -70,13 +70,13 @@ def again(log: "Log", name: str) -> Asked:
     if not folder.is_dir():
         runs = sorted(each.name for each in recorder.home(log.path).glob("*/"))
         raise BadInput(f"--resume {name!r:.80}: no such run; expected one of {', '.join(runs[-5:]) or 'none yet'}")
-    before = recorder.Run.read(folder)
+    before = recorder.RunFolder.read(folder)
     begun = next(before.of("begun"), None)
     if begun is None:
         raise BadInput(f"--resume {name!r:.80}: it never began; run its experiment again")
     if before.finished:
         raise BadInput(f"--resume {name!r:.80}: all of it is done; expected a run that ended early")
-    return Asked(experiments.from_json(begun["experiment"]), bool(begun["simulated"]), folder)
+    return SessionTask(experiments.from_json(begun["experiment"]), bool(begun["simulated"]), folder)
 
 
 class Views:
@@ -103,7 +103,7 @@ class Session:
 
     Parameters
     ----------
-    asked : Asked
+    asked : SessionTask
         What is to be done.
     log : Log
         An open log.
@@ -118,7 +118,7 @@ class Session:
     ----------
     url : str
         Address of the page; "" without one.
-    mechanism : Rig or None
+    mechanism : RunDevices or None
         Of a simulated run: what was really done to the specimen.
 
     Raises
@@ -128,7 +128,7 @@ class Session:
     """
 
     def __init__(
-        self, asked: Asked, log: "Log", *, real_time: bool = False, page: bool = False, text: bool = True,
+        self, asked: SessionTask, log: "Log", *, real_time: bool = False, page: bool = False, text: bool = True,
         model: "Callable[[Design, Experiment], SpecimenModel] | None" = None,
     ) -> None:  # fmt: skip
         self._asked, self._log, self._stack = asked, log, ExitStack()
@@ -155,7 +155,7 @@ class Session:
             self._stack.close()
             raise
 
-    def _devices(self, experiment: Experiment) -> Rig:
+    def _devices(self, experiment: Experiment) -> RunDevices:
         if self._asked.simulated:
             rig, self.mechanism = rigs.simulated(experiment, _design(experiment, self._log), self._clock)
             return rig

@@ -123,7 +123,7 @@ class _State:
     count: int = 0
 
 
-class Actuator:
+class SmacActuator:
     """Driver of the actuator; its zero is the encoder's index at the upper end.
 
     Until homing has ended, :meth:`read` gives the whole stroke as position, so that the tip does not count as lifted.

@@ -20,7 +20,7 @@ from sensorgen.core.document import spreadsheet
 from sensorgen.core.errors import BadInput, MissingValue, Unwritable
 from sensorgen.core.records import shown
 from sensorgen.core.terminal import escaped, harmless
-from sensorgen.measure.csv_table import Table
+from sensorgen.measure.csv_table import CsvTable
 from sensorgen.measure.log import fields, files
 from sensorgen.measure.log.entries import (
     NAMES,
@@ -139,7 +139,7 @@ def _text(words: str) -> str:
     return spreadsheet(words) if harmless(words) == words else f"'{escaped(json.dumps(words, ensure_ascii=False))}"
 
 
-def from_csv(kind: type[Entry], table: Table) -> Iterator[Entry]:
+def from_csv(kind: type[Entry], table: CsvTable) -> Iterator[Entry]:
     """Rows of an exported CSV table.
 
     Raises

@@ -53,7 +53,7 @@ class LockIn:
 
 
 @dataclass(frozen=True)
-class Rig:
+class RigDay:
     """Log of the rig beside a recording.
 
     Attributes
@@ -89,7 +89,7 @@ class Rig:
 
 
 @dataclass(frozen=True)
-class Facts:
+class RecordingFacts:
     """Summary of a recording.
 
     Attributes
@@ -98,14 +98,14 @@ class Facts:
         Every lock-in of the file.
     columns, rig_columns : dict of str to str
         From the columns of the files to sensorgen's, to read the files again.
-    rig : Rig or None
+    rig : RigDay or None
         None without a log of the rig.
     """
 
     lockins: tuple[LockIn, ...] = ()
     columns: dict[str, str] = field(default_factory=dict)
     rig_columns: dict[str, str] = field(default_factory=dict)
-    rig: Rig | None = None
+    rig: RigDay | None = None
 
     def words(self) -> Iterator[tuple[str, str]]:
         """Lock-ins and rig, for people."""
@@ -118,12 +118,12 @@ class Facts:
 _CLOCK = ("offset_s", "offset_error_s", "skew", "skew_error", "explained")
 
 
-def to_json(facts: Facts) -> str:
+def to_json(facts: RecordingFacts) -> str:
     """Facts as JSON."""
     return str(_adapter().dump_json(facts, exclude_none=facts.rig is None).decode())
 
 
-def from_json(text: str) -> Facts:
+def from_json(text: str) -> RecordingFacts:
     """Facts of a logged recording.
 
     Raises
@@ -136,7 +136,7 @@ def from_json(text: str) -> Facts:
     from sensorgen.core.records import problem
 
     try:
-        facts: Facts = _adapter().validate_json(text)
+        facts: RecordingFacts = _adapter().validate_json(text)
     except ValidationError as error:
         raise BadInput(f"the facts of a recording are damaged: {problem(error, _plain(text))}") from None
     return facts
@@ -153,12 +153,12 @@ def _plain(text: str) -> Any:
 def _adapter() -> Any:
     from pydantic import TypeAdapter
 
-    return TypeAdapter(Facts)
+    return TypeAdapter(RecordingFacts)
 
 
 def summarised(
     parts: "Iterable[tuple[Recording, ...]]", columns: dict[str, str], rig: "RigLog | None", rig_columns: dict[str, str]
-) -> Facts:
+) -> RecordingFacts:
     """Facts of recordings, part after part, joined with the rig's log if there is one and the recording shows how."""
     from sensorgen.measure.recording import joined_all
 
@@ -177,8 +177,8 @@ def summarised(
         for one in map(lockin, marked):
             lockins[one.lockin] = _longer(lockins[one.lockin], one) if one.lockin in lockins else one
     if rig and beside is None and fault:  # as of a sensor with a hole, which does not respond to the force
-        beside = Rig(len(rig.time_s), int(rig.error.sum()), clocks=f"not joined with the rig: {fault}")
-    return Facts(tuple(lockins.values()), dict(columns), dict(rig_columns), beside)
+        beside = RigDay(len(rig.time_s), int(rig.error.sum()), clocks=f"not joined with the rig: {fault}")
+    return RecordingFacts(tuple(lockins.values()), dict(columns), dict(rig_columns), beside)
 
 
 def _longer(before: LockIn, part: LockIn) -> LockIn:
@@ -187,12 +187,12 @@ def _longer(before: LockIn, part: LockIn) -> LockIn:
     return replace(before, counts=counts, seconds=part.seconds, notes=(*before.notes, *part.notes))
 
 
-def _with_rig(before: Rig | None, first: "Joined", rig: "RigLog") -> Rig:
+def _with_rig(before: RigDay | None, first: "Joined", rig: "RigLog") -> RigDay:
     samples = first.recording.counts()["rig error"]
     if before:
         return replace(before, samples=before.samples + samples)
     numbers: dict[str, Any] = {name: _known(getattr(first, name)) for name in _CLOCK}
-    return Rig(**rig.counts(), samples=samples, clocks=first.clock_text(), notes=first.notes, **numbers)
+    return RigDay(**rig.counts(), samples=samples, clocks=first.clock_text(), notes=first.notes, **numbers)
 
 
 def lockin(recording: "Recording") -> LockIn:

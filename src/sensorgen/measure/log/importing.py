@@ -18,7 +18,7 @@ _MOST_DOUBTS = 5  # of implausible values in one file
 
 
 @dataclass(frozen=True)
-class Imported:
+class ImportedRecording:
     """Result of an import.
 
     Attributes
@@ -52,14 +52,14 @@ class Imported:
             yield f"columns left out: {', '.join(self.left_out)}"
 
 
-def thesis(log: Log) -> Imported:
+def thesis(log: Log) -> ImportedRecording:
     """Log Table D.1 of the thesis."""
     return _add(log, tables.thesis())
 
 
 def lcr_export(
     log: Log, path: Path, specimen: str, *, instrument: str = "", baked: bool | None = None, remark: str = ""
-) -> Imported:
+) -> ImportedRecording:
     """Log the export of an LCR meter as one reading of a specimen, and keep the file.
 
     Parameters
@@ -92,10 +92,12 @@ def lcr_export(
         instrument=instrument or found,
     )  # fmt: skip
     new = [row for row in log.add([kept, row]) if isinstance(row, Reading)]
-    return Imported(table.rows, table.rows * len(new), sum(bool(row.doubts) for row in new), left_out=table.left_out)
+    return ImportedRecording(
+        table.rows, table.rows * len(new), sum(bool(row.doubts) for row in new), left_out=table.left_out
+    )
 
 
-def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> Imported:
+def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> ImportedRecording:
     """Log a file; its format is recognised.
 
     Parameters
@@ -160,10 +162,10 @@ def _is_log_table(path: Path) -> bool:
     return False
 
 
-def _add(log: Log, rows: Iterable[Entry], left_out: Iterable[str] = ()) -> Imported:
+def _add(log: Log, rows: Iterable[Entry], left_out: Iterable[str] = ()) -> ImportedRecording:
     numbers, new, doubtful, corrections = count(), 0, 0, 0
     for row in log.adding(row for row, _ in zip(rows, numbers, strict=False)):
         new += 1
         doubtful += isinstance(row, Reading) and bool(row.doubts)
         corrections += bool(getattr(row, "supersedes", "")) and not row.claimed_at  # of no export
-    return Imported(next(numbers), new, doubtful, corrections, tuple(left_out))
+    return ImportedRecording(next(numbers), new, doubtful, corrections, tuple(left_out))

@@ -350,7 +350,7 @@ class Log:
         """
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         with database.transaction(self._connection, self.path):
-            writer = _Writer(self._connection, *self.head())
+            writer = _Appender(self._connection, *self.head())
             for entry in entries:
                 if added := self._add(entry, now, writer):
                     yield added
@@ -368,7 +368,7 @@ class Log:
         """
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         with database.transaction(self._connection, self.path):
-            writer = _Writer(self._connection, *self.head())
+            writer = _Appender(self._connection, *self.head())
             merging = Merging(self, writer)
             yield merging
             if merging.added:
@@ -405,7 +405,7 @@ class Log:
         sql = "SELECT kind, content, number, logged_at FROM record WHERE kind = ? AND uid = ? AND number IS NOT NULL"
         return (self._row(*row) for row in (self._rows(sql, [NAMES[kind], uid]) if uid else ()))
 
-    def _add(self, entry: Entry, now: str, writer: "_Writer") -> Entry | None:
+    def _add(self, entry: Entry, now: str, writer: "_Appender") -> Entry | None:
         kind = type(entry)
         if self._exists(kind, entry.uid):
             known = next(self._of_uid(kind, entry.uid))
@@ -470,8 +470,9 @@ class Log:
     def conflicts(self) -> list[str]:
         """Corrections that two machines have made of one row, until the one that does not count is withdrawn."""
         sql = (
-            "SELECT row.kind, row.content, row.number, row.logged_at, other.number FROM record row, record other "  # noqa: S608
-            f"WHERE row.kind = ?1 AND row.number IS NOT NULL AND row.supersedes IS NOT NULL AND {_PREFERRED}"
+            "SELECT row.kind, row.content, row.number, row.logged_at, other.number "  # noqa: S608
+            "FROM record row, record other WHERE row.kind = ?1 AND row.number IS NOT NULL "
+            f"AND row.supersedes IS NOT NULL AND {_PREFERRED}"
         )
         return [
             f"conflict: {word(kind)}s {row[2]} and {other} correct the same row; {other} counts: withdraw one of them"
@@ -484,7 +485,7 @@ class Log:
         """Test whether a row, or its last correction, is withdrawn."""
         return any(isinstance(later, Withdrawal) or self._withdrawn(later) for later in self.superseding(entry))
 
-    def _with_print(self, entry: Reading | BenchRun, writer: "_Writer") -> Reading | BenchRun:
+    def _with_print(self, entry: Reading | BenchRun, writer: "_Appender") -> Reading | BenchRun:
         """Entry with batch and design of the specimen's latest print."""
         if entry.specimen not in writer.printed:
             printed, changes = self.bound(entry.specimen), dict[str, Any]()
@@ -534,7 +535,7 @@ class Merging:
         At the number of each record that was offered and that the log has now: 1.
     """
 
-    def __init__(self, log: Log, writer: "_Writer") -> None:
+    def __init__(self, log: Log, writer: "_Appender") -> None:
         self._log, self._writer = log, writer
         self.added, self.heads = 0, dict.fromkeys([writer.head] if writer.head else [])
         self.offered = bytearray(writer.sequence + 1)
@@ -563,7 +564,7 @@ class Merging:
         return ""
 
 
-class _Writer:
+class _Appender:
     """Appends records within a transaction, each with its number among those of its kind."""
 
     def __init__(self, connection: Any, sequence: int, head: str) -> None:

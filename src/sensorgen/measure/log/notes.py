@@ -185,13 +185,13 @@ def design_of(written: str) -> Design | None:
     return _design(_kind(specimen_name.parse(written)))[0]
 
 
-def _kind(name: specimen_name.Specimen) -> specimen_name.Specimen:
+def _kind(name: specimen_name.SpecimenName) -> specimen_name.SpecimenName:
     """The part of a name that decides its design."""
     return dataclasses.replace(name, iteration=None, replicate=None, place="", raw="", assumed=())
 
 
 @lru_cache(maxsize=256)
-def _design(name: specimen_name.Specimen) -> tuple[Design | None, tuple[str, str]]:
+def _design(name: specimen_name.SpecimenName) -> tuple[Design | None, tuple[str, str]]:
     """Design, and its identity and name."""
     try:
         design = specimen_name.design_of(name)

@@ -10,7 +10,7 @@ from pathlib import Path
 from sensorgen.core.errors import BadInput, UnknownName, within
 from sensorgen.core.records import shown
 from sensorgen.measure import csv_table
-from sensorgen.measure.csv_table import Table
+from sensorgen.measure.csv_table import CsvTable
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.log.entries import Reading
 from sensorgen.measure.log.notes import reading
@@ -30,7 +30,7 @@ _TRUTH = {"": None, "yes": True, "true": True, "1": True, "baked": True, "no": F
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[Table]:
+def opened(path: Path) -> Iterator[CsvTable]:
     """Open a table.
 
     Raises
@@ -46,12 +46,12 @@ def opened(path: Path) -> Iterator[Table]:
         yield table
 
 
-def readings(table: Table, columns: Mapping[str, str], source: str) -> tuple[Iterator[Reading], list[str]]:
+def readings(table: CsvTable, columns: Mapping[str, str], source: str) -> tuple[Iterator[Reading], list[str]]:
     """Readings of a table as it is read, and the columns that are ignored.
 
     Parameters
     ----------
-    table : Table
+    table : CsvTable
         An open table.
     columns : mapping
         From our columns (``NAMES``) to the table's, where the names are not recognised.
@@ -68,7 +68,7 @@ def readings(table: Table, columns: Mapping[str, str], source: str) -> tuple[Ite
     return _rows(table, places, source), left_out
 
 
-def _rows(table: Table, places: Mapping[str, int], source: str) -> Iterator[Reading]:
+def _rows(table: CsvTable, places: Mapping[str, int], source: str) -> Iterator[Reading]:
     seen: Counter[str] = Counter()
     for number, cells in table.text_rows():
         yield _row(table, number, cells, places, seen, source)
@@ -76,7 +76,7 @@ def _rows(table: Table, places: Mapping[str, int], source: str) -> Iterator[Read
         raise BadInput(f"{table.name}: no rows below the header")
 
 
-def _places(table: Table, columns: Mapping[str, str]) -> dict[str, int]:
+def _places(table: CsvTable, columns: Mapping[str, str]) -> dict[str, int]:
     """Position of each of our columns in the table."""
     position = {name.casefold(): k for k, name in enumerate(table.names)}
     places = {}
@@ -100,7 +100,7 @@ def _places(table: Table, columns: Mapping[str, str]) -> dict[str, int]:
 
 
 def _row(
-    table: Table, number: int, row: list[str], places: Mapping[str, int], seen: Counter[str], source: str
+    table: CsvTable, number: int, row: list[str], places: Mapping[str, int], seen: Counter[str], source: str
 ) -> Reading:
     cells = {ours: row[places[ours]].strip() if ours in places else "" for ours in NAMES}
     content = json.dumps(list(cells.values()))

@@ -3,9 +3,19 @@
 from sensorgen.measure.recording.files import parts, read, read_all
 from sensorgen.measure.recording.join import Joined, joined, joined_all
 from sensorgen.measure.recording.rig import RigLog, rig
-from sensorgen.measure.recording.samples import MARKS, Clock, Recording, Source
+from sensorgen.measure.recording.samples import MARKS, Recording, RecordingClock, Source
 
 __all__ = [
-    "MARKS", "Clock", "Joined", "Recording", "RigLog", "Source", "joined", "joined_all", "parts", "read", "read_all",
+    "MARKS",
+    "Joined",
+    "Recording",
+    "RecordingClock",
+    "RigLog",
+    "Source",
+    "joined",
+    "joined_all",
+    "parts",
+    "read",
+    "read_all",
     "rig",
 ]  # fmt: skip

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording.samples import Bools, Clock, Real
+from sensorgen.measure.recording.samples import Bools, Real, RecordingClock
 
 _OUTLIER = 6.0  # standard deviations from which on a stamp is an outlier, or a step a gap
 _SIGNIFICANT = 3.0  # standard errors from which on a skew is one
@@ -31,7 +31,7 @@ class Rebuilt:
     ----------
     time_s : (n,) array
         Rising [s].
-    clock : Clock
+    clock : RecordingClock
         Relation to real time.
     marks : dict of str to (n,) array
         Marks of gaps and of bad stamps.
@@ -40,7 +40,7 @@ class Rebuilt:
     """
 
     time_s: Real
-    clock: Clock
+    clock: RecordingClock
     marks: dict[str, Bools]
     notes: tuple[str, ...]
 
@@ -66,12 +66,12 @@ def rebuilt(count: int, time_s: Real | None, stamp_s: Real | None) -> Rebuilt:
     even, notes = _even(count, time_s, stamp_s)
     marks = {name: np.zeros(count, bool) for name in ("gap", "reversed stamp", "repeated stamp", "no stamp")}
     if stamp_s is None:
-        return Rebuilt(even, Clock(), marks, notes)
+        return Rebuilt(even, RecordingClock(), marks, notes)
     steps = np.diff(stamp_s)
     marks["reversed stamp"][1:], marks["repeated stamp"][1:] = steps < 0, steps == 0
     marks["no stamp"][:] = ~np.isfinite(stamp_s)
     if marks["no stamp"].all():
-        return Rebuilt(even, Clock(), marks, notes)
+        return Rebuilt(even, RecordingClock(), marks, notes)
     first, first_stamp = _block_starts(stamp_s)
     set_back = np.zeros(count)
     for index, jump_s in _jumps(even, first, first_stamp):
@@ -139,7 +139,7 @@ def _jumps(even: Real, first: NDArray[np.intp], stamp_s: Real) -> list[tuple[int
     return jumps
 
 
-def _fitted(time_s: Real, stamp_s: Real) -> Clock:
+def _fitted(time_s: Real, stamp_s: Real) -> RecordingClock:
     """Straight line through the stamps without outliers; without skew unless the skew is significant."""
     reference = float(np.median(stamp_s - time_s))  # stamps are large numbers: their fractions are what counts
     difference = stamp_s - time_s - reference
@@ -149,7 +149,7 @@ def _fitted(time_s: Real, stamp_s: Real) -> Clock:
     t, difference = time_s[good], difference[good]
     count, middle = len(t), float(t.mean())
     if count < 3:
-        return Clock(reference + float(difference.mean()), blocks=count)
+        return RecordingClock(reference + float(difference.mean()), blocks=count)
     moment = float(((t - middle) ** 2).sum())
     slope = float(((t - middle) * difference).sum()) / moment if moment > 0 else 0.0
     residual = difference - difference.mean() - slope * (t - middle)
@@ -158,4 +158,4 @@ def _fitted(time_s: Real, stamp_s: Real) -> Clock:
     if not _SIGNIFICANT * slope_error < abs(slope) < MAX_SKEW:
         slope = 0.0
     epoch = reference + float(difference.mean()) - slope * middle
-    return Clock(epoch, slope, jitter / count**0.5, slope_error, jitter, count)
+    return RecordingClock(epoch, slope, jitter / count**0.5, slope_error, jitter, count)

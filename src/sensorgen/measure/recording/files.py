@@ -8,7 +8,7 @@ from sensorgen.core.errors import BadInput, within
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.recording import hdf, matfive, table, tiepie
 from sensorgen.measure.recording.samples import Recording, Source, at_pauses, numbered
-from sensorgen.measure.recording.spool import MOST_BYTES, Spool
+from sensorgen.measure.recording.spool import MOST_BYTES, FileSpool
 
 _HDF = b"\x89HDF\r\n\x1a\n"
 _HDF_PLACES = (0, 512, 1024, 2048)
@@ -69,7 +69,7 @@ def parts(path: Path | str, columns: Mapping[str, str] | None = None) -> Iterato
     file_format = "MATLAB 5" if matlab or head[126:128] in (b"IM", b"MI") else "CSV"
     if any(head[at : at + len(_HDF)] == _HDF for at in _HDF_PLACES):
         file_format = "MATLAB 7.3" if matlab else "HDF5"
-    spool = Spool()
+    spool = FileSpool()
     stretches = table.recordings(path, columns or {}) if file_format == "CSV" else _stretches(path, file_format, spool)
     try:
         yield from numbered(_relieved(path, stretches, spool))
@@ -77,7 +77,7 @@ def parts(path: Path | str, columns: Mapping[str, str] | None = None) -> Iterato
         raise BadInput(f"cannot read {str(path)!r}: {error.strerror or error}") from None
 
 
-def _stretches(path: Path, file_format: str, spool: Spool) -> Iterator[tuple[Recording, ...]]:
+def _stretches(path: Path, file_format: str, spool: FileSpool) -> Iterator[tuple[Recording, ...]]:
     with within(str(path)):
         if file_format == "MATLAB 5":
             tree = matfive.variables(spool.file(path), tiepie.WANTED, spool)
@@ -86,7 +86,9 @@ def _stretches(path: Path, file_format: str, spool: Spool) -> Iterator[tuple[Rec
         yield from tiepie.recordings(tree, Source(path.name, file_format))
 
 
-def _relieved(path: Path, stretches: Iterable[tuple[Recording, ...]], spool: Spool) -> Iterator[tuple[Recording, ...]]:
+def _relieved(
+    path: Path, stretches: Iterable[tuple[Recording, ...]], spool: FileSpool
+) -> Iterator[tuple[Recording, ...]]:
     for stretch in stretches:
         spool.relieve()
         with within(str(path)):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sensorgen.core.errors import BadInput, MissingValue, within
 from sensorgen.measure.recording.matfive import Split
-from sensorgen.measure.recording.spool import Spool
+from sensorgen.measure.recording.spool import FileSpool
 
 _DEEPEST = 12
 _MOST_ITEMS = 2_000
@@ -25,7 +25,7 @@ _CLASS = "MATLAB_class"
 _BROKEN = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, OverflowError, MemoryError)
 
 
-def variables(path: Path, wanted: Collection[str], spool: Spool) -> dict[str, Any]:
+def variables(path: Path, wanted: Collection[str], spool: FileSpool) -> dict[str, Any]:
     """Read variables of a file.
 
     Parameters
@@ -34,7 +34,7 @@ def variables(path: Path, wanted: Collection[str], spool: Spool) -> dict[str, An
         The file.
     wanted : collection of str
         Names of variables; others are skipped unread.
-    spool : Spool
+    spool : FileSpool
         Where large arrays are copied to.
 
     Raises
@@ -61,7 +61,7 @@ def variables(path: Path, wanted: Collection[str], spool: Spool) -> dict[str, An
 class _Reader:
     """Groups and datasets of a file, up to a depth and a number of items."""
 
-    def __init__(self, file: Any, spool: Spool) -> None:
+    def __init__(self, file: Any, spool: FileSpool) -> None:
         import h5py
 
         self._h5, self._file, self._spool, self._left = h5py, file, spool, _MOST_ITEMS

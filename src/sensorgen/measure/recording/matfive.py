@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import BadInput, within
-from sensorgen.measure.recording.spool import Spool
+from sensorgen.measure.recording.spool import FileSpool
 
 _HEADER = 128
 _DEEPEST = 12
@@ -72,7 +72,7 @@ class _Element(NamedTuple):
     offset: int
 
 
-def variables(content: bytes | memoryview, wanted: Collection[str], spool: Spool) -> dict[str, Any]:
+def variables(content: bytes | memoryview, wanted: Collection[str], spool: FileSpool) -> dict[str, Any]:
     """Read variables of a file.
 
     Parameters
@@ -81,7 +81,7 @@ def variables(content: bytes | memoryview, wanted: Collection[str], spool: Spool
         The whole file.
     wanted : collection of str
         Names of variables; others are skipped unread.
-    spool : Spool
+    spool : FileSpool
         Where packed variables are unpacked to.
 
     Returns
@@ -165,7 +165,7 @@ def _elements(data: memoryview, order: str, offset: int) -> Iterator[_Element]:
         at = after
 
 
-def _unpacked(element: _Element, order: str, spool: Spool) -> _Element:
+def _unpacked(element: _Element, order: str, spool: FileSpool) -> _Element:
     blocks = _inflated(element)
     begin = next(blocks, b"")
     if len(begin) < 8:

@@ -8,7 +8,7 @@ import numpy as np
 
 from sensorgen.core.errors import BadInput
 from sensorgen.measure import csv_table
-from sensorgen.measure.csv_table import SAME_NAMES, Table, listed
+from sensorgen.measure.csv_table import SAME_NAMES, CsvTable, listed
 from sensorgen.measure.input_file import checked_head
 from sensorgen.measure.recording.samples import Bools, Real
 from sensorgen.measure.recording.spool import MOST_BYTES
@@ -85,7 +85,7 @@ def rig(path: Path | str, columns: Mapping[str, str] | None = None) -> RigLog:
         raise BadInput(f"cannot read {str(path)!r}: {error.strerror or error}") from None
 
 
-def _read(table: Table) -> RigLog:
+def _read(table: CsvTable) -> RigLog:
     names = table.names
     time_name = _STAMP if _STAMP in names else _TIME
     for needed in (time_name, *_NEEDED):

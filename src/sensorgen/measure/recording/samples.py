@@ -54,7 +54,7 @@ def sifted(impedance_ohm: Complex) -> dict[str, Bools]:
 
 
 @dataclass(frozen=True)
-class Clock:
+class RecordingClock:
     """Relation of a recording's time to real time: ``epoch_s + (1 + skew) time_s``.
 
     Attributes
@@ -131,7 +131,7 @@ class Recording:
         Complex impedance [ohm]; nan where none was measured.
     marks : mapping of str to (n,) array
         Marked samples, for every name of ``MARKS``.
-    clock : Clock
+    clock : RecordingClock
         Relation of ``time_s`` to real time.
     source : Source
         Origin.
@@ -141,7 +141,7 @@ class Recording:
     tones_hz: Real
     impedance_ohm: Complex
     marks: Mapping[str, Bools]
-    clock: Clock
+    clock: RecordingClock
     source: Source = field(default=Source("", ""))
 
     @property

@@ -18,7 +18,7 @@ _PACKED_TO = 100  # bytes that one byte packs at most: noise does not pack by mo
 
 
 @dataclass
-class Spool:
+class FileSpool:
     """Content of one file, beside memory and within :data:`MOST_BYTES`.
 
     Content goes to ``TMPDIR``, else to ``/var/tmp``, as ``/tmp`` may itself be memory.

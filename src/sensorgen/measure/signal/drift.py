@@ -48,14 +48,14 @@ class Drift:
         Reason for the law.
     start_s : float
         Time of the first reading [s].
-    fit : Fit
+    fit : LawFit
         ln Z at rest, at any time.
     """
 
     law: str
     reason: str
     start_s: float
-    fit: laws.Fit
+    fit: laws.LawFit
 
     def at(self, time_s: Real) -> Complex:
         """Drift of ln Z since the first reading, at any times [s] (n, m) [-]."""

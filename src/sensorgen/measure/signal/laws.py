@@ -89,7 +89,7 @@ class Wander:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class LawFit:
     """A fitted law.
 
     Attributes
@@ -144,22 +144,22 @@ def binned(time_s: Real, values: Complex) -> Bins:
     return Bins(middle, means, np.sqrt(counts / np.median(counts)))
 
 
-def explained(bins: Bins, terms: tuple[Term, ...], shared: int = 0) -> Fit:
+def explained(bins: Bins, terms: tuple[Term, ...], shared: int = 0) -> LawFit:
     """Fit terms by least squares."""
     basis, weight = _basis(terms, bins.time_s), bins.weight[:, None]
     weights = np.linalg.lstsq(basis * weight, bins.values * weight, rcond=_ROUNDING)[0]
     left = np.asarray((bins.values - basis @ weights) * weight, np.complex128)
-    return Fit(terms, np.asarray(weights, np.complex128), left, shared)
+    return LawFit(terms, np.asarray(weights, np.complex128), left, shared)
 
 
-def relaxing(bins: Bins, fit: Fit, time_s: Real, force_n: Real, fastest_s: float) -> Fit:
+def relaxing(bins: Bins, fit: LawFit, time_s: Real, force_n: Real, fastest_s: float) -> LawFit:
     """Add relaxation after presses to a fit: one time constant after the other while the BIC falls.
 
     Parameters
     ----------
     bins : Bins
         Of the readings at rest.
-    fit : Fit
+    fit : LawFit
         Fit to extend.
     time_s, force_n : (n,) array
         Time and force [s], [N].
@@ -194,7 +194,7 @@ def relaxing(bins: Bins, fit: Fit, time_s: Real, force_n: Real, fastest_s: float
     return best
 
 
-def wandering(bins: Bins, fit: Fit) -> Fit:
+def wandering(bins: Bins, fit: LawFit) -> LawFit:
     """Add a random walk to a fit, with the distance of knots of least BIC."""
     fits = [fit]
     for apart_s in _KNOTS_S:
@@ -205,8 +205,8 @@ def wandering(bins: Bins, fit: Fit) -> Fit:
         sums: Complex = np.asarray(np.add.reduceat(fit.left * bins.weight[:, None], starts), np.complex128)
         wander = Wander(middle, sums / total[:, None])
         left = fit.left - wander.at(bins.time_s) * bins.weight[:, None]
-        fits.append(Fit(fit.terms, fit.weights, left, fit.shared + 1, wander))
-    return min(fits, key=Fit.bic)
+        fits.append(LawFit(fit.terms, fit.weights, left, fit.shared + 1, wander))
+    return min(fits, key=LawFit.bic)
 
 
 def _basis(terms: tuple[Term, ...], time_s: Real) -> Real:

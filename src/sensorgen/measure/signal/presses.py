@@ -21,14 +21,14 @@ _SAME, _SAME_N = 0.05, 0.05  # share, and least difference, up to which two forc
 _MAD = 0.6745  # median absolute deviation of noise over its standard deviation
 
 
-class Press(NamedTuple):
+class PressTimes(NamedTuple):
     """Begin and end of a press [s]."""
 
     start_s: float
     end_s: float
 
 
-def by_force(time_s: Real, force_n: Real, threshold_n: float = THRESHOLD_N) -> list[Press]:
+def by_force(time_s: Real, force_n: Real, threshold_n: float = THRESHOLD_N) -> list[PressTimes]:
     """Presses by the force: from the threshold up to the fall below half of it.
 
     Parameters
@@ -47,10 +47,10 @@ def by_force(time_s: Real, force_n: Real, threshold_n: float = THRESHOLD_N) -> l
     switch = np.where(force >= threshold_n, 1, np.where(force < _HYSTERESIS * threshold_n, -1, 0))
     last = np.maximum.accumulate(np.where(switch != 0, np.arange(len(switch)), 0))
     spans = ((float(time_s[a]), float(time_s[b - 1])) for a, b in _spans(switch[last] == 1))
-    return [Press(start, end) for start, end in spans if end - start >= _SHORTEST_S]
+    return [PressTimes(start, end) for start, end in spans if end - start >= _SHORTEST_S]
 
 
-def by_readings(time_s: Real, impedance_ohm: Complex) -> list[Press]:
+def by_readings(time_s: Real, impedance_ohm: Complex) -> list[PressTimes]:
     """Presses by the readings alone: where they leave their usual level.
 
     Parameters
@@ -84,7 +84,7 @@ def by_readings(time_s: Real, impedance_ohm: Complex) -> list[Press]:
         (int(a + np.argmax(sign * step[a:b])), sign) for sign in (1, -1) for a, b in _spans(sign * step > limit)
     )
     spans = _returning(edges, before, after, width)
-    return [Press(float(time_s[i]), float(time_s[j])) for i, j in spans if time_s[j] - time_s[i] >= _SHORTEST_S]
+    return [PressTimes(float(time_s[i]), float(time_s[j])) for i, j in spans if time_s[j] - time_s[i] >= _SHORTEST_S]
 
 
 def _spans(on: Bools) -> list[tuple[int, int]]:
@@ -147,7 +147,7 @@ class Pairs:
 
 
 def pairs(
-    time_s: Real, impedance_ohm: Complex, valid: Bools, presses: list[Press], force_n: Real, position_mm: Real,
+    time_s: Real, impedance_ohm: Complex, valid: Bools, presses: list[PressTimes], force_n: Real, position_mm: Real,
     window_s: float = WINDOW_S, guard_s: float = GUARD_S,
 ) -> Pairs:  # fmt: skip
     """Average the readings before and under each press.
@@ -160,7 +160,7 @@ def pairs(
         Readings, not filtered: their mean is the better filter, and its error is known [ohm].
     valid : (n,) array of bool
         Valid readings.
-    presses : list of Press
+    presses : list of PressTimes
         As :func:`by_force` or :func:`by_readings` returns them.
     force_n, position_mm : (n,) array
         Force and position; nan where unknown [N], [mm].

@@ -123,7 +123,7 @@ class RecordingResult:
         lockin = facts.LockIn(self.tones_hz, self.counts, self.seconds, self.program, lockin=self.lockin)
         rig: Iterable[tuple[str, str]] = [("rig", "no log: forces and positions are not known")]
         if self.rig:
-            rig = facts.Rig(self.rig["rows"], self.rig["errors"]).words()
+            rig = facts.RigDay(self.rig["rows"], self.rig["errors"]).words()
         rows = [*lockin.words(), *rig, *(("", note) for note in self.notes)]
         if self.drift is not None:
             rows.append(("drift", f"{self.drift:.2%} of Z over the run, fitted to the rest, taken out of the presses"))

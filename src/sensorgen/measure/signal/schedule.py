@@ -46,7 +46,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Plan:
+class RunPlan:
     """Parameters of a run.
 
     Attributes
@@ -108,7 +108,7 @@ class Schedule:
 
     Attributes
     ----------
-    plan : Plan
+    plan : RunPlan
         Its parameters.
     design : str
         Name of the design.
@@ -118,7 +118,7 @@ class Schedule:
         In the order of the run.
     """
 
-    plan: Plan
+    plan: RunPlan
     design: str
     seconds: float
     steps: tuple[Step, ...]
@@ -136,6 +136,6 @@ class Schedule:
         yield f"{len(self.steps)} presses, {f'{hours} h {minutes} min' if hours else f'{minutes} min {rest} s'}"
 
 
-def schedule(plan: Plan, design: str) -> Schedule:
+def schedule(plan: RunPlan, design: str) -> Schedule:
     """The presses of a plan for a design."""
     return Schedule(plan, design, plan.seconds(), tuple(plan.steps()))

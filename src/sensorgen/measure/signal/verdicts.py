@@ -60,7 +60,7 @@ class Evidence:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class SignalVerdict:
     """A verdict with its numbers.
 
     Attributes
@@ -122,7 +122,7 @@ def intact_ohm(capacitance_f: float, lowest_hz: float, meter_ohm: float = INTACT
     return min(meter_ohm, REACTANCES / (2 * pi * lowest_hz * capacitance_f)) if capacitance_f else meter_ohm
 
 
-def verdict(of: Evidence, intact_ohm: float = INTACT_OHM) -> Verdict:
+def verdict(of: Evidence, intact_ohm: float = INTACT_OHM) -> SignalVerdict:
     """Verdict on a specimen.
 
     Parameters
@@ -152,7 +152,7 @@ def verdict(of: Evidence, intact_ohm: float = INTACT_OHM) -> Verdict:
     ratio = nan if isnan(ry) or isnan(rz) or ry in (0, inf) else rz / ry
     grave = [word for word in WORDS[:4] if word in (electrode, film)]
     word = grave[0] if grave else "unknown" if "unknown" in (electrode, film) else "intact"
-    return Verdict(word, electrode, film, ry, rz, ratio, leak, (why_electrode, why_film), intact_ohm)
+    return SignalVerdict(word, electrode, film, ry, rz, ratio, leak, (why_electrode, why_film), intact_ohm)
 
 
 def _electrode(of: Evidence, ry: float) -> tuple[str, str]:

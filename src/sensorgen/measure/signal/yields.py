@@ -15,7 +15,7 @@ from statistics import median
 from typing import Any
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.measure.signal.verdicts import ORDER, Evidence, Verdict
+from sensorgen.measure.signal.verdicts import ORDER, Evidence, SignalVerdict
 
 CONFIDENCE = 0.95
 _MOST_TABLES, _MOST = 20_000, 1000  # tables, and specimens in them, that are enumerated
@@ -24,7 +24,7 @@ _SAME = 1 + 1e-9  # ratio of equal probabilities after rounding
 
 
 @dataclass(frozen=True)
-class Share:
+class CountShare:
     """Share of a count in a total, with its confidence interval."""
 
     count: int
@@ -46,9 +46,9 @@ class Group:
     ----------
     key : tuple
         Common property.
-    intact : Share
+    intact : CountShare
         The yield: intact specimens among those with a verdict, without shorts by design.
-    shorted : Share
+    shorted : CountShare
         Specimens whose R_Z is below ten times R_Y among those with both readings, without shorts by design.
     median_ratio : float
         Median of R_Z over R_Y [-]; nan without any.
@@ -57,16 +57,16 @@ class Group:
     """
 
     key: tuple[Hashable, ...]
-    intact: Share
-    shorted: Share
+    intact: CountShare
+    shorted: CountShare
     median_ratio: float
     words: Mapping[str, int]
 
 
-Judged = tuple[Evidence, Verdict]
+Judged = tuple[Evidence, SignalVerdict]
 
 
-def share(count: int, total: int, confidence: float = CONFIDENCE, plates: Sequence[tuple[int, int]] = ()) -> Share:
+def share(count: int, total: int, confidence: float = CONFIDENCE, plates: Sequence[tuple[int, int]] = ()) -> CountShare:
     """Share with its exact confidence interval (Clopper and Pearson 1934).
 
     Parameters
@@ -98,7 +98,7 @@ def share(count: int, total: int, confidence: float = CONFIDENCE, plates: Sequen
     yes, no = count * part, (total - count) * part
     low = float(betaincinv(yes, no + 1, tail)) if count else 0.0
     high = float(betaincinv(yes + 1, no, 1 - tail)) if count < total else 1.0
-    return Share(count, total, low, high)
+    return CountShare(count, total, low, high)
 
 
 def _independent(count: int, total: int, confidence: float, plates: Sequence[tuple[int, int]]) -> float:
@@ -125,7 +125,7 @@ def groups(
 
     Parameters
     ----------
-    judged : iterable of (Evidence, Verdict)
+    judged : iterable of (Evidence, SignalVerdict)
         Specimens.
     by : function
         Key of a specimen, as ``lambda of: (of.shape, of.film_mm)``.
@@ -158,7 +158,7 @@ def groups(
 _Plates = Counter[tuple[str, bool]]
 
 
-def _shared(such: _Plates, confidence: float) -> Share:
+def _shared(such: _Plates, confidence: float) -> CountShare:
     """A share by plates; a specimen whose plate is not known is a plate of its own."""
     count = sum(n for (_, yes), n in such.items() if yes)
     named = {plate for plate, _ in such if plate}

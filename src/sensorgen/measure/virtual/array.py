@@ -11,7 +11,7 @@ from io import BytesIO
 import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
-from sensorgen.design.arrays import Layout
+from sensorgen.design.arrays import ArrayLayout
 from sensorgen.prediction.array.model import ArrayModel
 from sensorgen.prediction.array.readout import ArrayReadout, faulty
 from sensorgen.solvers.tracks import Tracks
@@ -45,7 +45,7 @@ class WalkedStep:
     centre_mm: Real
 
 
-def foot(layout: Layout, fine: int = 1) -> Real:
+def foot(layout: ArrayLayout, fine: int = 1) -> Real:
     """A foot's map on an array: lobes of the heel, the metatarsals and the hallux, (m fine, n fine) [kPa].
 
     The longer side is the foot's. The peak is ``PEAK_KPA``; an even part brings the mean over the outline near
@@ -63,7 +63,7 @@ def foot(layout: Layout, fine: int = 1) -> Real:
     return np.where(here, np.maximum(shape, even), 0.0)
 
 
-def points(layout: Layout, fine: int) -> tuple[Real, Real]:
+def points(layout: ArrayLayout, fine: int) -> tuple[Real, Real]:
     """Middles of the parts of all squares along x and y [mm]."""
     parts = (np.arange(fine) + 0.5) / fine - 0.5
     sides = zip((layout.x_mm, layout.y_mm), layout.params.pitch, strict=True)
@@ -71,7 +71,7 @@ def points(layout: Layout, fine: int) -> tuple[Real, Real]:
     return x, y
 
 
-def walked(layout: Layout, fine: int = 1, frames: int = STEP) -> WalkedStep:
+def walked(layout: ArrayLayout, fine: int = 1, frames: int = STEP) -> WalkedStep:
     """One step from heel to toe."""
     whole, (x, y) = foot(layout, fine), points(layout, fine)
     along = np.broadcast_to((x - x[0]) / max(np.ptp(x), 1.0), whole.shape)
@@ -98,6 +98,8 @@ class VirtualArray:
         Its network at rest.
     rise : callable
         C/C0 - 1 of every crossing by the pressure that it feels, (m, n) [kPa].
+    spread : callable
+        Pressures that crossings carry under the cover by those on the surface, (k, m, n) [kPa].
     play : float
         By which unloading lags behind loading, half of it each way, over the largest pressure before [-].
     creep : float
@@ -110,6 +112,7 @@ class VirtualArray:
 
     tracks: Tracks
     rise: Callable[[Real], Real]
+    spread: Callable[[Real], Real]
     play: float = 0.0
     creep: float = 0.0
     creep_s: float = 100.0
@@ -119,6 +122,7 @@ class VirtualArray:
         self, pressure_kpa: Real, time_s: Real, readout: ArrayReadout, draw: np.random.Generator, day: float = 0.0
     ) -> Complex:
         """Frames under loads, (k, m, n), by the first frequency [S]."""
+        pressure_kpa = self.spread(pressure_kpa)
         found = np.empty(pressure_kpa.shape, complex)
         play = slow = most = np.zeros(pressure_kpa.shape[1:])
         for k, (load, elapsed) in enumerate(zip(pressure_kpa, np.diff(time_s, prepend=time_s[0]), strict=True)):
@@ -173,11 +177,11 @@ def printed(
         return np.asarray(gain * (model.under(kpa * 1e3)[0] - 1))
 
     if not own_law:
-        return VirtualArray(tracks, predicted, play, creep, drift=drift)
+        return VirtualArray(tracks, predicted, model.carried, play, creep, drift=drift)
     at_full = float(model.under(np.array(_FULL_KPA * 1e3))[0]) - 1
     power = 0.95 + 0.02 * draw.normal(size=shape)
     own = closing(gain * at_full / (1 + at_full) / stiffness, power)
-    return VirtualArray(tracks, own, play, creep, drift=drift)
+    return VirtualArray(tracks, own, model.carried, play, creep, drift=drift)
 
 
 def nodal(tracks: Tracks, capacitance_f: Real, readout: ArrayReadout) -> Complex:

@@ -17,12 +17,12 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design, Slots
 from sensorgen.design.values import film, material_value, of_all_materials, resistivities
 from sensorgen.measure.virtual.bricks import bricks
-from sensorgen.measure.virtual.cell import AIR, Bricks, Raster, Solid, capacitance, conductance, pressed
+from sensorgen.measure.virtual.cell import AIR, CellBricks, SectionRaster, Solid, capacitance, conductance, pressed
 from sensorgen.measure.virtual.section import FINE_MM, raster, section_of
 from sensorgen.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from sensorgen.asprinted.printed import Cell
+    from sensorgen.asprinted.printed import PrintCell
 
 PRESSURES_PA = tuple(1e3 * p for p in (0, 2.5, 5, 10, 20, 35, 60, 100, 150, 200, 300, 400))
 _LN_PERMITTIVITY = (-0.4, 0.0, 0.4)
@@ -150,7 +150,9 @@ def tracks(design: Design) -> tuple[float, float]:
     return top, bottom
 
 
-def _grids(design: Design, scene: Scene, of: tuple[float, int]) -> tuple[Raster | Bricks, Raster | Bricks]:
+def _grids(
+    design: Design, scene: Scene, of: tuple[float, int]
+) -> tuple[SectionRaster | CellBricks, SectionRaster | CellBricks]:
     """A coarse grid of a cell and one of half its elements' size, bricks of a size and number."""
     numbers = {name: k + 1 for k, name in enumerate(_solids(design))}
     if section_of(scene):
@@ -158,7 +160,7 @@ def _grids(design: Design, scene: Scene, of: tuple[float, int]) -> tuple[Raster 
     return bricks(scene, numbers, *of), bricks(scene, numbers, *of, parts=2)
 
 
-def _per_length(design: Design, cell: "Cell", grid: Raster | Bricks) -> float:
+def _per_length(design: Design, cell: "PrintCell", grid: SectionRaster | CellBricks) -> float:
     """Depth of all sections of a sensor over its length [-], or number of cells as of bricks per length [1/m]."""
     x_mm, y_mm, _ = cell.scene.size_mm
     plan_m2, of_grid = x_mm * y_mm * M_PER_MM**2, float(grid.grid.top_m.sum())
@@ -181,7 +183,7 @@ def _at_rest(design: Design, scene: Scene, ln_permittivities: Sequence[float]) -
 
 
 def _table(
-    design: Design, grid: Raster | Bricks, ln_moduli: Sequence[float], ln_permittivities: Sequence[float],
+    design: Design, grid: SectionRaster | CellBricks, ln_moduli: Sequence[float], ln_permittivities: Sequence[float],
     count: int = len(PRESSURES_PA),
 ) -> Real:  # fmt: skip
     """Capacitances of a grid's cell, by ln of modulus, of permittivity, and pressure, of those all reach."""
@@ -216,10 +218,10 @@ def _by_film(design: Design, scene: Scene) -> float:
     return log(ends[0] / ends[1]) / (2 * by)
 
 
-def _as_track(grid: Raster | Bricks, electrode: int, *, along: bool) -> float:
+def _as_track(grid: SectionRaster | CellBricks, electrode: int, *, along: bool) -> float:
     """Volume of a plain track that resists as an electrode of the grid's cell: per depth [m2], or of bricks [m3]."""
     period = float(grid.x_m[-1] - grid.x_m[0])
-    if along or isinstance(grid, Bricks):
+    if along or isinstance(grid, CellBricks):
         return conductance(grid, electrode) * period**2
     z = (grid.z_m[:, 1:] + grid.z_m[:, :-1]) / 2
     return float((np.diff(z, axis=0) * np.diff(grid.x_m))[grid.electrode == electrode].sum())

@@ -10,7 +10,7 @@ import shapely
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
-from sensorgen.measure.virtual.cell import Bricks
+from sensorgen.measure.virtual.cell import CellBricks
 from sensorgen.measure.virtual.section import TERMINALS, graded
 from sensorgen.scene.scene import Body, Outline, Point, Scene, is_rectangle, seen_from_above
 
@@ -20,7 +20,7 @@ _COARSER = 1.1
 _INNER = 0.9  # share of a pattern that has to repeat; its ends may be cut
 
 
-def bricks(scene: Scene, materials: Mapping[str, int], size_mm: float, most: int, parts: int = 1) -> Bricks:
+def bricks(scene: Scene, materials: Mapping[str, int], size_mm: float, most: int, parts: int = 1) -> CellBricks:
     """A scene between mirrors as bricks; of a symmetric scene the part in its middle that mirrors repeat.
 
     The ends of a scene, where the pattern may be cut, are taken to be as its middle. An outline that is not parallel to
@@ -55,7 +55,7 @@ def bricks(scene: Scene, materials: Mapping[str, int], size_mm: float, most: int
     for axis in range(3):
         kinds = kinds.repeat(parts, axis + 1)
     x, y, z = (_cut(at, parts * n) * M_PER_MM for at, n in zip(part, counts, strict=True))
-    return Bricks(x, y, z, *kinds)
+    return CellBricks(x, y, z, *kinds)
 
 
 def _pieces(scene: Scene) -> list[tuple[Body, Outline, Point]]:

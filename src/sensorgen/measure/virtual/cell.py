@@ -26,7 +26,7 @@ _BULK = 1000.0  # Lame's first constant over the shear modulus at most: with the
 _ROUNDS = 40
 _SETTLED = 1e-7  # of the energy's fall, relative to the load's work
 _SMALLEST_STEP = 1e-2  # of a load step, before it is given up
-_GAUSS = 0.5 / np.sqrt(3)
+_GAUSS, _ADJUGATE = 0.5 / np.sqrt(3), np.array([[1, -1], [-1, 1]])  # signs of a matrix turned by half a turn
 _FLAT = 1e-9  # of the height: rows that are flatter have none
 _MOST_DIRECT = 15_000  # unknowns of a field that is solved by factors
 _RESIDUAL = 1e-8  # relative, of larger ones
@@ -45,7 +45,7 @@ AIR = Solid(0.0, 0.0, 1.00059)
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class ElementGrid:
     """Elements of a section (d = 2) or of a whole cell (d = 3); those of no area are left out.
 
     Attributes
@@ -76,7 +76,7 @@ class Grid:
 
 
 @dataclass(frozen=True, eq=False)
-class Raster:
+class SectionRaster:
     """A section as a grid of columns, each of them cut into as many rows.
 
     Attributes
@@ -100,7 +100,7 @@ class Raster:
     repeats: bool
 
     @cached_property
-    def grid(self) -> Grid:
+    def grid(self) -> ElementGrid:
         """Elements of the cell."""
         z = self.z_m
         rise = np.diff(z, axis=0) > _FLAT * np.ptp(z)
@@ -117,11 +117,11 @@ class Raster:
         at = np.stack([np.broadcast_to(self.x_m, z.shape), z], -1)
         kept = (rise[:, 1:] | rise[:, :-1]).T.ravel()
         of = self.material.T.ravel()[kept], self.electrode.T.ravel()[kept]
-        return Grid(_at_corners(number.T, 2)[kept], _at_corners(at.swapaxes(0, 1), 2)[kept], *of, fixed, top)
+        return ElementGrid(_at_corners(number.T, 2)[kept], _at_corners(at.swapaxes(0, 1), 2)[kept], *of, fixed, top)
 
 
 @dataclass(frozen=True, eq=False)
-class Bricks:
+class CellBricks:
     """A cell as bricks between mirrors, of planes square to x, y and z.
 
     Attributes
@@ -129,7 +129,7 @@ class Bricks:
     x_m, y_m, z_m : (nx + 1,), (ny + 1,), (nz + 1,) array
         Places of the planes [m].
     material, electrode : (nx, ny, nz) array
-        As of :class:`Raster`.
+        As of :class:`SectionRaster`.
     """
 
     x_m: Real
@@ -139,7 +139,7 @@ class Bricks:
     electrode: Whole
 
     @cached_property
-    def grid(self) -> Grid:
+    def grid(self) -> ElementGrid:
         """Elements of the cell."""
         at = np.stack(np.meshgrid(self.x_m, self.y_m, self.z_m, indexing="ij"), -1)
         number = np.arange(at[..., 0].size).reshape(at.shape[:3])
@@ -148,7 +148,7 @@ class Bricks:
         fixed[number[[0, -1]], 0] = fixed[number[:, [0, -1]], 1] = True
         top[number[..., -1]] = np.outer(_shares(self.x_m), _shares(self.y_m))
         of = self.material.ravel(), self.electrode.ravel()
-        return Grid(_at_corners(number, 3), _at_corners(at, 3), *of, fixed, top)
+        return ElementGrid(_at_corners(number, 3), _at_corners(at, 3), *of, fixed, top)
 
 
 def _shares(at_m: Real) -> Real:
@@ -192,7 +192,7 @@ def gradients(at_m: Real) -> tuple[Real, Real]:
 
 
 @dataclass(frozen=True, eq=False)
-class Pressed:
+class PressureSeries:
     """A cell under a series of pressures.
 
     Attributes
@@ -211,13 +211,13 @@ class Pressed:
 
 
 def pressed(
-    raster: Raster | Bricks, solids: Sequence[Solid], pressure_pa: Sequence[float], least: int | None = None
-) -> Pressed:
+    raster: SectionRaster | CellBricks, solids: Sequence[Solid], pressure_pa: Sequence[float], least: int | None = None
+) -> PressureSeries:
     """Press the top of a cell that stands on a fixed base; its width stays.
 
     Parameters
     ----------
-    raster : Raster or Bricks
+    raster : SectionRaster or CellBricks
         The section, or the cell.
     solids : sequence of Solid
         Materials by number; the first, of air, counts by its permittivity alone.
@@ -253,13 +253,13 @@ def pressed(
             break
         sinks.append(float(body.load @ u) / float(grid.top_m.sum()))
         places.append(grid.at_m + u.reshape(grid.fixed.shape)[grid.nodes])
-    return Pressed(np.array(pressure_pa[: len(sinks)], float), np.array(sinks), np.array(places))
+    return PressureSeries(np.array(pressure_pa[: len(sinks)], float), np.array(sinks), np.array(places))
 
 
 class _Body:
     """Energy of a cell by its displacements, of a section per depth, and its derivatives."""
 
-    def __init__(self, grid: Grid, solids: Sequence[Solid]) -> None:
+    def __init__(self, grid: ElementGrid, solids: Sequence[Solid]) -> None:
         self.grid = grid
         self.air: Mask = grid.material == 0
         shear = np.array([0.0] + [s.modulus_pa / 2 / (1 + s.poisson) for s in solids[1:]])
@@ -281,7 +281,7 @@ class _Body:
         """Deformation gradients (e, 2^d, d, d) and their determinants (e, 2^d)."""
         moved = u.reshape(self.grid.fixed.shape)[self.grid.nodes]
         f = np.eye(moved.shape[-1]) + moved.swapaxes(1, 2)[:, None] @ self.grid.shapes[0]
-        return f, np.linalg.det(f)
+        return f, np.linalg.det(f) if f.shape[-1] > 2 else f[..., 0, 0] * f[..., 1, 1] - f[..., 0, 1] * f[..., 1, 0]
 
     def energy(self, u: Real, pressure: float) -> float:
         """Of strain less the load's work; infinite where an element is turned inside out."""
@@ -293,7 +293,7 @@ class _Body:
         density = density + np.where(self.air, _AIR_BULK / 2 * self.shear, 0.0)[:, None] * ln**2
         mean = (w * j).sum(1) / w.sum(1) - 1
         own = u[self.dofs]
-        twist = np.einsum("ea,eab,eb->", own, self.hourglass, own) / 2
+        twist = (own * (self.hourglass @ own[..., None])[..., 0]).sum() / 2
         total = (w * density).sum() + (w.sum(1) * self.bulk * mean**2).sum() / 2 + twist
         return float(total - pressure * (self.load @ u))
 
@@ -306,16 +306,16 @@ class _Body:
         air = self.air[:, None]
         twice = np.where(air, _AIR_BULK * self.shear[:, None], (self.bulk * mean)[:, None] * j)  # by ln J, twice
         by_ln = np.where(air, self.shear[:, None] * (_AIR_BULK * np.log(j) - 1), twice - self.shear[:, None])
-        b = g @ np.linalg.inv(f)  # derivatives of ln J
+        inverse = np.linalg.inv(f) if d > 2 else f[..., ::-1, ::-1].swapaxes(2, 3) * _ADJUGATE / j[..., None, None]
+        b = g @ inverse  # derivatives of ln J
         stretch, flat = w * self.shear[:, None], b.reshape(elements, points, -1)
-        force = np.einsum("eg,egnk,egik->eni", stretch, g, f) + np.einsum("eg,egni->eni", w * by_ln, b)
+        force = (stretch[..., None, None] * (g @ f.swapaxes(2, 3)) + (w * by_ln)[..., None, None] * b).sum(1)
         turned = _products(w * by_ln, flat).reshape(elements, corners, d, corners, d).swapaxes(2, 4)
         k = _each_way(_gradient_products(stretch, g), d) + _products(w * twice, flat)
         k = k - turned.reshape(k.shape)
-        volume = np.einsum("eg,egm->em", w * j, flat)
+        volume = ((w * j)[:, None] @ flat)[:, 0]
         k = k + (self.bulk / w.sum(1))[:, None, None] * volume[:, :, None] * volume[:, None, :]
-        own = np.einsum("eab,eb->ea", self.hourglass, u[self.dofs])
-        return force.reshape(elements, -1) + own, k + self.hourglass
+        return force.reshape(elements, -1) + (self.hourglass @ u[self.dofs][..., None])[..., 0], k + self.hourglass
 
     def settled(self, u: Real, pressure: float) -> Real | None:
         """Displacements in equilibrium, by Newton's method with a search along each step; None if there is none."""
@@ -378,12 +378,12 @@ def _twists(at_m: Real) -> Real:
     return _each_way(np.asarray(found), dimensions)
 
 
-def capacitance(raster: Raster | Bricks, permittivity: Sequence[float], place_m: Real) -> float:
+def capacitance(raster: SectionRaster | CellBricks, permittivity: Sequence[float], place_m: Real) -> float:
     """Between the electrodes, of a section per depth [F/m], of bricks [F].
 
     Parameters
     ----------
-    raster : Raster or Bricks
+    raster : SectionRaster or CellBricks
         The section, or the cell.
     permittivity : sequence of float
         Relative, by material; the first of air.
@@ -397,7 +397,7 @@ def capacitance(raster: Raster | Bricks, permittivity: Sequence[float], place_m:
     return _flux(_potentials(grid)[grid.nodes[inside]], eps[:, None] * np.abs(size), by)
 
 
-def conductance(raster: Raster | Bricks, electrode: int) -> float:
+def conductance(raster: SectionRaster | CellBricks, electrode: int) -> float:
     """Of an electrode from the lowest x to the highest, per conductivity: of a section per depth [-], of bricks [m]."""
     grid = raster.grid
     inside = grid.electrode == electrode
@@ -435,7 +435,7 @@ def _solved(matrix: Any, right: Real) -> Real:
     return np.asarray(found)
 
 
-def _potentials(grid: Grid) -> Whole:
+def _potentials(grid: ElementGrid) -> Whole:
     """Number of each node's unknown: -1 at the bottom terminal, -2 at the top one; one in a piece that floats."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components

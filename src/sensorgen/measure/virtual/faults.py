@@ -117,7 +117,7 @@ class Faulty(Protocol):
     fault: str
 
 
-class Schedule:
+class FaultSchedule:
     """Faults that wait for their time, and those that last.
 
     Parameters

@@ -8,8 +8,8 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.virtual.faults import Schedule
-from sensorgen.measure.virtual.specimen import Line, Specimen
+from sensorgen.measure.virtual.faults import FaultSchedule
+from sensorgen.measure.virtual.specimen import PressedSpecimen, VirtualLine
 
 STEP_S = 2e-3  # of the mechanism
 _OWN_MM_S = 2.0  # of a stage that moves by itself
@@ -115,12 +115,12 @@ class _Axis:
 
 
 @dataclass
-class Rig:
+class VirtualRig:
     """A :class:`sensorgen.measure.virtual.plant.Plant`.
 
     Attributes
     ----------
-    specimen : Specimen
+    specimen : PressedSpecimen
         Below the tip.
     mechanics : Mechanics
         Of piston, tip and stage.
@@ -136,11 +136,11 @@ class Rig:
         So far, in the order of their begin.
     fault : str
         Name of a fault of the mechanism or of the cables, see :mod:`sensorgen.measure.virtual.faults`; "" for none.
-    planted : Schedule or None
+    planted : FaultSchedule or None
         Faults to come; those that strike the rig set ``fault``, others that of the simulators attached to it.
     """
 
-    specimen: Specimen
+    specimen: PressedSpecimen
     mechanics: Mechanics = field(default_factory=Mechanics)
     seed: int = 0
     noise: float = 0.0
@@ -151,7 +151,7 @@ class Rig:
     peak_n: float = 0.0
     fault: str = ""
     violations: list[Violation] = field(default_factory=list)
-    planted: Schedule | None = None
+    planted: FaultSchedule | None = None
 
     def __post_init__(self) -> None:
         """At rest, raised."""
@@ -164,7 +164,7 @@ class Rig:
         self._open: dict[str, Violation] = {}
         self._rng, self._interference = (np.random.default_rng([self.seed, k]) for k in (1, 2))
         self._drift, self._drifted_s = self._rng.standard_normal(2), self.time_s
-        self._lines: dict[bytes, Line] = {}
+        self._lines: dict[bytes, VirtualLine] = {}
 
     def advance(self, time_s: float) -> None:
         """Let the mechanism move on to a time [s]; one that is past changes nothing."""

@@ -8,9 +8,9 @@ from pydantic import Field, model_validator
 from sensorgen.core.errors import UnknownName
 from sensorgen.core.records import Strict
 from sensorgen.design.design import Design
-from sensorgen.measure.virtual.faults import Planted, Schedule
-from sensorgen.measure.virtual.mechanics import Mechanics, Rig
-from sensorgen.measure.virtual.specimen import Specimen, Truth, drawn
+from sensorgen.measure.virtual.faults import FaultSchedule, Planted
+from sensorgen.measure.virtual.mechanics import Mechanics, VirtualRig
+from sensorgen.measure.virtual.specimen import PressedSpecimen, Truth, drawn
 
 Waves = Annotated[tuple[float, ...], Field(strict=False)]
 
@@ -51,7 +51,7 @@ class VirtualSpecimen(Strict):
         return self
 
 
-def rig_of(settings: VirtualSpecimen, design: Design, tip_m: float) -> Rig:
+def rig_of(settings: VirtualSpecimen, design: Design, tip_m: float) -> VirtualRig:
     """The simulated rig of an experiment, with its faults planted.
 
     Parameters
@@ -69,7 +69,7 @@ def rig_of(settings: VirtualSpecimen, design: Design, tip_m: float) -> Rig:
         A truth, rig or body that cannot be.
     """
     changes: dict[str, Any] = dict(settings.truth)
-    specimen = Specimen(design, replace(drawn(design, settings.seed), **changes), tip_m)
-    rig = Rig(specimen, Mechanics(**settings.rig), settings.seed, settings.noise)
-    rig.planted = Schedule(settings.faults)
+    specimen = PressedSpecimen(design, replace(drawn(design, settings.seed), **changes), tip_m)
+    rig = VirtualRig(specimen, Mechanics(**settings.rig), settings.seed, settings.noise)
+    rig.planted = FaultSchedule(settings.faults)
     return rig

@@ -67,7 +67,7 @@ class _Instrument(Simulator):
         return line[: len(line) // 2] if self.fault == "truncated" else line
 
 
-class LcrMeter(_Instrument):
+class SimulatedLcrMeter(_Instrument):
     """A 4284A or an E4980A: measures what the plant has when it is triggered, and answers when its time is over."""
 
     def __init__(self, plant: Plant, model: str = "hp-4284a") -> None:
@@ -126,7 +126,7 @@ class LcrMeter(_Instrument):
             self._data = f"{pair[0]:+.5E},{pair[1]:+.5E},+0"
 
 
-class Multimeter(_Instrument):
+class SimulatedMultimeter(_Instrument):
     """A 34401A or a Keithley 2000."""
 
     def __init__(self, plant: Plant, model: str = "hp-34401a") -> None:

@@ -9,9 +9,9 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import M_PER_MM
-from sensorgen.measure.virtual.cell import Raster
+from sensorgen.measure.virtual.cell import SectionRaster
 from sensorgen.scene.scene import FLOATING, Body, Scene
-from sensorgen.scene.sections import Column, Section, columns, sections
+from sensorgen.scene.sections import Section, SectionColumn, columns, sections
 
 FINE_MM = 0.025
 _MOST_COLUMNS = 120  # of elements; the width of a cell with a larger one is cut evenly
@@ -29,7 +29,7 @@ def section_of(scene: Scene) -> Section | None:
     return found[0] if len(found) == 1 else None
 
 
-def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM) -> Raster:
+def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM) -> SectionRaster:
     """A scene's section as elements.
 
     Parameters
@@ -68,7 +68,7 @@ def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM)
             kinds = _kinds(column, ends, share, materials)
             material.append(kinds[0])
             electrode.append(kinds[1])
-    return Raster(
+    return SectionRaster(
         np.array(x) * M_PER_MM, np.array(z).T * M_PER_MM, np.array(material).T, np.array(electrode).T,
         scene.repeats[across],
     )  # fmt: skip
@@ -80,7 +80,7 @@ def graded(count: int) -> Real:
     return np.asarray(_GRADED * (1 - np.cos(np.pi * even)) / 2 + (1 - _GRADED) * even)
 
 
-def _interfaces(found: Sequence[Column]) -> list[Real]:
+def _interfaces(found: Sequence[SectionColumn]) -> list[Real]:
     """Heights of the interfaces of all columns at their sides, the same ones from side to side [mm]."""
     levels = _levels(found)
     lines = [_lines(c, levels) for c in found]
@@ -92,14 +92,14 @@ def _interfaces(found: Sequence[Column]) -> list[Real]:
     return lines
 
 
-def _levels(found: Sequence[Column]) -> list[float]:
+def _levels(found: Sequence[SectionColumn]) -> list[float]:
     """Heights at which some interface is level."""
     ends = (end for column in found for layer in column.layers for end in (layer.bottom_mm, layer.top_mm))
     level = sorted({round(a, 9) for a, b in ends if abs(a - b) < _NONE_MM})
     return [0.0, *(z for z in level if z > _NONE_MM)]
 
 
-def _lines(column: Column, levels: Sequence[float]) -> Real:
+def _lines(column: SectionColumn, levels: Sequence[float]) -> Real:
     """Heights of all interfaces of a column at its sides, upwards (k, 2) [mm]: its sloping ones and all levels."""
     ends = {end for layer in column.layers for end in (layer.bottom_mm, layer.top_mm)}
     sloping = [end for end in ends if abs(end[0] - end[1]) >= _NONE_MM]
@@ -113,7 +113,7 @@ def _joined(lines: Sequence[Real]) -> bool:
 
 
 def _kinds(
-    column: Column, ends: Sequence[Real], share: float, materials: Mapping[str, int]
+    column: SectionColumn, ends: Sequence[Real], share: float, materials: Mapping[str, int]
 ) -> tuple[list[int], list[int]]:
     """Materials and terminals of a column's elements, upwards, at a share of its width."""
     z = ends[0] + (ends[1] - ends[0]) * share

@@ -125,7 +125,7 @@ def drawn(design: Design, seed: int) -> Truth:
 
 
 @dataclass(frozen=True, eq=False)
-class Specimen:
+class PressedSpecimen:
     """A specimen that can be pressed.
 
     Attributes
@@ -231,12 +231,12 @@ class Specimen:
         found *= 1 + self.truth.hysteresis * unloading
         return found * (1 + self.truth.creep * decades)
 
-    def line(self, frequency_hz: Real) -> "Line":
+    def line(self, frequency_hz: Real) -> "VirtualLine":
         """Line of the specimen at (m,) frequencies [Hz]."""
-        return Line(self, frequency_hz)
+        return VirtualLine(self, frequency_hz)
 
 
-class Line:
+class VirtualLine:
     """The strip at some frequencies: a chain of short pieces of constant values, open at its far end.
 
     What lies left and right of the tip is worked out once for every place.
@@ -244,7 +244,7 @@ class Line:
 
     _STEP = 1e-3
 
-    def __init__(self, specimen: Specimen, frequency_hz: Real) -> None:
+    def __init__(self, specimen: PressedSpecimen, frequency_hz: Real) -> None:
         self._of = specimen
         truth = specimen.truth
         self.frequency_hz: Real = np.array(frequency_hz, float)

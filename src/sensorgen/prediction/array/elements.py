@@ -12,8 +12,8 @@ a line's specimen are nonlinear in a few parameters of one body (:mod:`sensorgen
 thousand parameters are linear, and exchangeable between elements.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -30,6 +30,24 @@ _ROUNDS = 2  # of laws and drift in turn
 _EFFECTIVE = 20.0  # at least, samples of a session
 _RESPONDS = 0.5  # share of the variance of a reference that a live element's reading explains
 _N_PER_KPA_MM2 = 1e-3
+_LONG_S = 5.0  # from a frame to the next: longer is doubtful
+
+
+@dataclass
+class Past:
+    """State of the memory after earlier frames of a recording; further frames go on from it, and change it.
+
+    Attributes
+    ----------
+    time_s : float
+        Of the last frame; nan before the first [s].
+    reading, lagged : (n,) array
+        Last reading of each element that is known, and weighted past.
+    """
+
+    time_s: float = np.nan
+    reading: "Real | float" = np.nan
+    lagged: "Real | float" = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +72,10 @@ class ArraySession:
         Reference of the total force; nan where none is known [N].
     area_mm2 : float
         Of an element [mm2].
+    names : tuple of str
+        Of the elements; none where they are numbered.
+    past : Past, optional
+        Of the frames before these.
     """
 
     name: str
@@ -64,6 +86,28 @@ class ArraySession:
     pressure_kpa: Real
     force_n: Real
     area_mm2: float = 100.0
+    names: tuple[str, ...] = ()
+    past: "Past | None" = None
+
+    def matched(self, names: Sequence[str]) -> "ArraySession":
+        """The session with its elements in an order of names; as it is where either has none.
+
+        Raises
+        ------
+        BadInput
+            Other elements.
+        """
+        if not (names and self.names) or tuple(names) == self.names:
+            return self
+        if odd := [*sorted({*names} - {*self.names}), *sorted({*self.names} - {*names})]:
+            raise BadInput(
+                f"{self.name}: {odd[0]} is an element here or in the calibration alone; expected {len(names)}, "
+                f"{names[0]} to {names[-1]}"
+            )
+        order = [self.names.index(name) for name in names]
+        return replace(
+            self, names=tuple(names), reading=self.reading[:, order], pressure_kpa=self.pressure_kpa[:, order]
+        )
 
     @cached_property
     def unloaded(self) -> Mask:
@@ -121,19 +165,30 @@ def _mean(values: Real) -> Real:
         return np.asarray(np.where(finite, values, 0.0).sum(0) / finite.sum(0))
 
 
-def lagged(x: Real, time_s: Real, tau_s: float, start: "Real | None" = None) -> Real:
+def doubtful_time(time_s: Real) -> Iterator[str]:
+    """A line where frames are so far from each other that their time may have another unit."""
+    step = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
+    if step > _LONG_S:
+        yield f"doubtful: a frame every {step:.4g} s; expected time_s in seconds, not in ms"
+
+
+def lagged(x: Real, time_s: Real, tau_s: float, past: "Past | None" = None) -> Real:
     """Exponentially weighted past of each column: dz/dt = (x - z) / tau, by steps over which x is even.
+
+    Where x is missing, it is as before.
 
     >>> z = lagged(np.ones((3, 1)), np.array([0.0, 1.0, 3.0]), 2.0)
     >>> np.round(z[:, 0], 4).tolist()
     [0.0, 0.3935, 0.7769]
     """
-    found = np.empty_like(x)
-    z = np.zeros(x.shape[1]) if start is None else start
-    kept = -np.expm1(-np.diff(time_s, prepend=time_s[:1]) / tau_s)
+    found, past = np.empty_like(x), past or Past()
+    first = past.time_s if np.isfinite(past.time_s) else float(time_s[0])
+    kept = -np.expm1(-np.diff(time_s, prepend=first) / tau_s)
     for k, (row, share) in enumerate(zip(x, kept.tolist(), strict=True)):
-        z = z + share * (row - z)
-        found[k] = z
+        past.reading = np.where(np.isfinite(row), row, past.reading)
+        past.lagged = past.lagged + share * (np.nan_to_num(past.reading) - past.lagged)
+        found[k] = past.lagged
+    past.time_s = float(time_s[-1])
     return found
 
 
@@ -158,11 +213,11 @@ class LawForm:
     drift: bool = False
     tared: bool = True
 
-    def basis(self, x: Real, time_s: Real) -> Real:
-        """Terms of the law, (k, n, terms); 0 where a reading is missing."""
-        x = np.nan_to_num(x)
-        terms = [x**power for power in range(0 if not self.tared else 1, self.powers + 1)]
-        return np.stack([*terms, *([lagged(x, time_s, self.tau_s)] if self.tau_s else [])], -1)
+    def basis(self, x: Real, time_s: Real, past: "Past | None" = None) -> Real:
+        """Terms of the law, (k, n, terms); powers are 0 where a reading is missing."""
+        known = np.nan_to_num(x)
+        terms = [known**power for power in range(0 if not self.tared else 1, self.powers + 1)]
+        return np.stack([*terms, *([lagged(x, time_s, self.tau_s, past)] if self.tau_s else [])], -1)
 
     def words(self) -> str:
         """The form in words."""
@@ -207,11 +262,11 @@ def features(session: ArraySession, form: LawForm, scale: float, tare: "Real | N
     """Terms of the law of every frame and element, (k, n, terms)."""
     zero = session.tare if tare is None else tare
     x = session.reading - zero if form.tared else session.reading
-    return form.basis(x / scale, session.time_s)
+    return form.basis(x / scale, session.time_s, session.past)
 
 
 @dataclass(frozen=True, eq=False)
-class Law:
+class ElementLaw:
     """Law of every element, by the sessions that it was learnt of.
 
     Attributes
@@ -269,20 +324,20 @@ def responding(sums: Sequence[Sums]) -> Mask:
     return np.asarray((count == 0) | (explained > _RESPONDS * square))
 
 
-def learnt(sums: Sequence[Sums], form: LawForm, scale: float, alive: Mask) -> Law:
+def learnt(sums: Sequence[Sums], form: LawForm, scale: float, alive: Mask) -> ElementLaw:
     """Law of every element by empirical Bayes: EM over the print's mean, covariance and noise; dead ones left out."""
     day = float(np.mean([s.day for s in sums]))
     days = np.array([s.day for s in sums]) - day
     at, spread = _expected(sums, np.ones(len(days)), alive)
     if not np.ptp(days):
-        return Law(form, scale, at, spread, day, 0.0, 0.0, alive)
+        return ElementLaw(form, scale, at, spread, day, 0.0, 0.0, alive)
     rate, error = _drift(sums, days, at)
     if not form.drift:
-        return Law(form, scale, at, spread, day, 0.0, float(np.hypot(rate, error)), alive)
+        return ElementLaw(form, scale, at, spread, day, 0.0, float(np.hypot(rate, error)), alive)
     for _ in range(_ROUNDS):
         at, spread = _expected(sums, np.exp(rate * days), alive)
         rate, error = _drift(sums, days, at)
-    return Law(form, scale, at, spread, day, rate, error, alive)
+    return ElementLaw(form, scale, at, spread, day, rate, error, alive)
 
 
 def _drift(sums: Sequence[Sums], days: Real, at: Real) -> tuple[float, float]:

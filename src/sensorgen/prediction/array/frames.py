@@ -13,22 +13,30 @@ from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.document import Column, Facts, Part, Table, comma_separated, to_json
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import si
+from sensorgen.prediction.array.elements import Past, doubtful_time
 from sensorgen.prediction.array.model import PA_PER_KPA, ArrayModel
 from sensorgen.prediction.array.readout import FULL_SCALE_PA, MOST_DENSE, ArrayReadout, own_slopes
 from sensorgen.prediction.array.sessions import ArrayCalibration
 from sensorgen.prediction.array.study import DETECTED, DETERMINED
 from sensorgen.prediction.inverse.verdict import NORMAL_90
-from sensorgen.solvers.tracks import Readings, readings
+from sensorgen.solvers.tracks import CrossingReadings, Tracks, readings
 
 SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration of each
 _STEPS = 25  # of Gauss-Newton with the slopes at rest
 _DONE = 0.02  # of a standard error: a smaller step ends it
+_HEAVIER = 1.1  # times the heaviest frame so far: a later one is compared with the network too
 _SUFFICES = 1.0  # standard error by which C/C0 may differ from the network
 _ALIVE = 3.0  # factor of a reading at rest to the predicted one; prints differ by less
 _SHORTED = 10.0  # real part at rest over the predicted magnitude
 _LEAKS = 6  # steps to the conductance of shorts
 _SHOWN = 6  # crossings that are named
 _CI = 1.96  # standard errors of 95 %
+
+
+_REGION = (
+    Column("force", "N", key="force_n"), Column("mean", "kPa", key="mean_kpa"), Column("peak", "kPa", key="peak_kpa"),
+    Column("contact", "mm2", key="area_mm2"), Column("not determined", key="undetermined"),
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +50,7 @@ class PressureMaps:
     by : str
         Model that inverted the readings, and why.
     time_s : (k,) array
-        Of each frame [s].
+        Of each frame; nan where it is not known [s].
     pressure_kpa, sigma_kpa : (k, m, n) array
         Pressure on the surface and its standard error of noise and scatter alone; nan where it is not determined [kPa].
     calibration : ArrayCalibration or None
@@ -55,6 +63,30 @@ class PressureMaps:
     pressure_kpa: Real
     sigma_kpa: Real
     calibration: "ArrayCalibration | None" = None
+
+    def on_surface(self) -> "PressureMaps":
+        """Maps of the pressure on the cover, its spread undone; what is not determined is as what lies around it.
+
+        Standard errors of more crossings than one matrix takes grow as those of an array without ends.
+        """
+        from scipy.sparse import csc_array, diags_array
+        from scipy.sparse.linalg import splu
+
+        spread, shape = self.model.spread, self.pressure_kpa.shape
+        pressure, sigma = (each.reshape(shape[0], -1).copy() for each in (self.pressure_kpa, self.sigma_kpa))
+        masks, which = np.unique(np.isfinite(pressure), axis=0, return_inverse=True)
+        for k, known in enumerate(masks):
+            own = csc_array(spread[known][:, known])
+            back = splu(csc_array(diags_array(spread[known].sum(1) / own.sum(1)) @ own))
+            at = np.ix_(which.ravel() == k, known)
+            pressure[at] = back.solve(pressure[at].T).T
+            if known.sum() > MOST_DENSE:
+                sigma[at] *= self.model.undone
+            else:
+                sigma[at] = np.sqrt(sigma[at] ** 2 @ (back.solve(np.eye(own.shape[0])) ** 2).T)
+        lost = ~_known(sigma * PA_PER_KPA)
+        pressure[lost] = sigma[lost] = nan
+        return replace(self, pressure_kpa=pressure.reshape(shape), sigma_kpa=sigma.reshape(shape))
 
     @cached_property
     def interval_kpa(self) -> tuple[Real, Real]:
@@ -82,11 +114,14 @@ class PressureMaps:
 
     @cached_property
     def centre_mm(self) -> tuple[Real, Real]:
-        """Centre of pressure of all determined crossings, from the print's corner; nan where nothing is touched [mm].
+        """Centre of pressure of touched crossings and their neighbours, from the print's corner; nan of none [mm].
 
-        A threshold would leave light loads with a long arm out; noise of many unloaded crossings has a mean of 0.
+        Light loads lie beside heavier ones; farther off there is noise, with a long arm.
         """
-        weight = np.nan_to_num(self._newtons)
+        from scipy import ndimage
+
+        near = ndimage.binary_dilation(self.touched, np.ones((1, 3, 3)))
+        weight = np.where(near, np.nan_to_num(self._newtons), 0.0)
         total = np.where(self.touched.any((1, 2)), weight.sum((1, 2)), np.nan)
         layout = self.model.layout
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -103,18 +138,41 @@ class PressureMaps:
         peak = np.where(np.isnan(self.pressure_kpa), -np.inf, self.pressure_kpa).max((1, 2))
         return np.where(np.isfinite(peak), peak, np.nan)
 
+    @cached_property
+    def regions(self) -> dict[str, Real]:
+        """Values of each region by frame, (k,), named as in CSV: of determined crossings, nan without any."""
+        found = dict[str, Real]()
+        for name, inside in self.model.regions.items():
+            kpa = self.pressure_kpa[:, inside]
+            count = np.isfinite(kpa).sum(1)
+            force = np.where(count, np.nansum(self._newtons[:, inside], 1), np.nan)
+            peak = np.where(np.isnan(kpa), -np.inf, kpa).max(1)
+            mean = force / (np.maximum(count, 1) * self.model.pitch_area_m2 * PA_PER_KPA)
+            area = self.touched[:, inside].sum(1) * self.model.pitch_area_m2 * 1e6
+            values = (force, mean, np.where(count, peak, np.nan), area, inside.sum() - count)
+            found |= {f"{name}_{column.key}": of for column, of in zip(_REGION, values, strict=True)}
+        return found
+
+    def regional(self, k: int) -> Table:
+        """Force, mean and peak pressure and area of contact of each region in a frame."""
+        rows = (
+            (name, *(_cell(float(f"{self.regions[f'{name}_{c.key}'][k]:.4g}")) for c in _REGION))
+            for name in self.model.regions
+        )
+        return Table("regions", "", (Column("region"), *_REGION), tuple(rows))
+
     def table(self) -> Table:
-        """Force, centre of pressure, area and peak of each frame."""
+        """Force, centre of pressure, area and peak of each frame, and for programs those of each region."""
         (force, sigma), (x, y) = self.force_n, self.centre_mm
         columns = (
             Column("time", "s", key="time_s"), Column("force", "N", key="force_n"),
             Column("sigma F", "N", key="sigma_force_n"), Column("x", "mm", key="x_mm"), Column("y", "mm", key="y_mm"),
             Column("contact", "mm2", key="area_mm2"), Column("peak", "kPa", key="peak_kpa"),
-            Column("not determined", key="undetermined"),
+            Column("not determined", key="undetermined"), *(Column(key, key=key, hidden=True) for key in self.regions),
         )  # fmt: skip
         dark = (np.isnan(self.pressure_kpa) & self.model.here).sum((1, 2))
-        values = np.stack([self.time_s, force, sigma, x, y, self.area_mm2, self.peak_kpa, dark], 1).tolist()
-        return Table("frames", "", columns, tuple(tuple(None if v != v else v for v in row) for row in values))
+        found = (self.time_s, force, sigma, x, y, self.area_mm2, self.peak_kpa, dark, *self.regions.values())
+        return Table("frames", "", columns, tuple(tuple(map(_cell, row)) for row in np.stack(found, 1).tolist()))
 
     def heaviest(self) -> int:
         """Number of the frame with the largest force."""
@@ -138,10 +196,15 @@ class PressureMaps:
         yield ""
         shown = tuple(float(f"{v:.4g}") if isinstance(v, float) else v for v in table.cells[k])
         yield Table("heaviest", "the heaviest frame", table.columns, (shown,))
+        if self.model.regions:
+            yield self.regional(k)
         if not self.calibration:
             yield from self.model.shared()
             yield from self.model.beyond(self.peak_kpa)
         yield from (f"doubtful: {doubt}" for doubt in self.model.crossing.doubts)
+        if np.isnan(self.time_s).any():
+            yield "no time_s: times of the frames are not known"
+        yield from doubtful_time(self.time_s)
 
     def _names(self, k: int) -> str:
         """First crossings that a frame does not determine."""
@@ -155,9 +218,10 @@ class PressureMaps:
     def npz(self) -> bytes:
         """Maps and numbers of every frame as NPZ."""
         target, (force, sigma), (x, y) = BytesIO(), self.force_n, self.centre_mm
+        regions: dict[str, Any] = {**self.regions}
         np.savez_compressed(
             target, time_s=self.time_s, pressure_kpa=self.pressure_kpa, sigma_kpa=self.sigma_kpa, force_n=force,
-            sigma_force_n=sigma, centre_x_mm=x, centre_y_mm=y, area_mm2=self.area_mm2,
+            sigma_force_n=sigma, centre_x_mm=x, centre_y_mm=y, area_mm2=self.area_mm2, **regions,
         )  # fmt: skip
         return target.getvalue()
 
@@ -173,6 +237,33 @@ class PressureMaps:
             "frames": frames,
         }
         return to_json(found)
+
+
+@dataclass
+class MapPlan:
+    """Choice between C/C0 and the network, by the heaviest frame so far; changed by further frames of a recording.
+
+    Attributes
+    ----------
+    load : float
+        Sum over crossings of C/C0 - 1 in that frame [-].
+    worst : float
+        Largest difference of both, in standard errors; infinite where the network did not settle.
+    """
+
+    load: float = -np.inf
+    worst: float = 0.0
+
+    @property
+    def network(self) -> bool:
+        """True where C/C0 does not suffice."""
+        return not self.worst < _SUFFICES
+
+    def words(self) -> str:
+        """Model, and why."""
+        if self.network:
+            return f"the network of the tracks: C/C0 differs by {self.worst:.2g} standard errors in the heaviest frame"
+        return f"C/C0: the network differs by at most {self.worst:.2g} standard errors in the heaviest frame"
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,15 +295,19 @@ class MapInverter:
                 f"{self.model.here.size} crossings by two terminals; expected at most {MOST_DENSE}: read it guarded"
             )
 
-    def read(self, capacitance_f: Real) -> Readings:
+    def read(self, capacitance_f: Real) -> CrossingReadings:
         """Readings of the network, with the shorts that the readings at rest show."""
         return self._network(capacitance_f, self.leaks_s)
 
-    def _network(self, capacitance_f: Real, leaks_s: Real) -> Readings:
+    def _network(self, capacitance_f: Real, leaks_s: Real) -> CrossingReadings:
         return readings(
-            replace(self.model.tracks(capacitance_f), leak_s=leaks_s), self.readout.frequency_hz[0],
+            replace(self._tracks, capacitance_f=capacitance_f, leak_s=leaks_s), self.readout.frequency_hz[0],
             readout=self.readout.kind, input_ohm=self.readout.input_ohm,
         )  # fmt: skip
+
+    @cached_property
+    def _tracks(self) -> Tracks:
+        return self.model.tracks()
 
     @cached_property
     def leaks_s(self) -> Real:
@@ -233,7 +328,7 @@ class MapInverter:
         return np.isfinite(self.rest_s.real) & self.alive, self.alive
 
     @cached_property
-    def nominal(self) -> Readings:
+    def nominal(self) -> CrossingReadings:
         """Readings of the array as predicted, at rest."""
         return self._network(self.model.capacitances(), np.zeros(self.model.here.shape))
 
@@ -341,47 +436,59 @@ class MapInverter:
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.stack([np.where(sure & settled, c / rest, np.nan) for c, settled in each])
 
-    def planned(self, siemens: Complex) -> tuple[Real, Real, str]:
+    @cached_property
+    def error(self) -> Real:
+        """Error of C/C0 by noise, (m, n) [-]."""
+        variance = self.gain[1].reshape(self.model.here.shape)
+        return np.asarray(np.sqrt(variance) / np.where(self.model.here, self.rest_f, 1.0))
+
+    def _compared(self, siemens: Complex, ratio: Real) -> float:
+        """Largest difference of C/C0 from the network in a frame, in standard errors."""
+        network = self.by_network(siemens[None])[0]
+        counted = _known(self.error * self.model.pressures(np.ones(1))[1]) & self.alive & np.isfinite(ratio)
+        off = (np.abs(network - ratio) / self.error)[counted]
+        return float(np.where(np.isnan(off), np.inf, off).max(initial=0.0))
+
+    def planned(self, siemens: Complex, plan: "MapPlan | None" = None) -> tuple[Real, Real, str]:
         """Capacitance over that at rest (k, m, n), its error by noise (m, n), and by which model, and why.
 
-        C/C0 where it agrees with the network in the heaviest frame, else the network.
+        C/C0 where it agrees with the network in the heaviest frame, else the network. Of a plan that goes on, frames
+        are compared that are heavier by a tenth than all before.
         """
-        ratio = self.by_ratio(siemens)
-        heaviest = int(np.nansum(np.where(self.alive, ratio, 0), (1, 2)).argmax())
-        network = self.by_network(siemens[heaviest : heaviest + 1])[0]
-        variance = self.gain[1].reshape(self.model.here.shape)
-        error = np.sqrt(variance) / np.where(self.model.here, self.rest_f, 1.0)
-        counted = _known(error * self.model.pressures(np.ones(1))[1]) & self.alive & np.isfinite(ratio[heaviest])
-        off = (np.abs(network - ratio[heaviest]) / error)[counted]
-        worst = float(np.nan_to_num(off).max(initial=0.0))
-        if worst < _SUFFICES and not np.isnan(off).any():
-            return (
-                ratio,
-                error,
-                f"C/C0: the network differs by at most {worst:.2g} standard errors in the heaviest frame",
-            )
-        by = f"the network of the tracks: C/C0 differs by {worst:.2g} standard errors in the heaviest frame"
+        ratio, error, plan = self.by_ratio(siemens), self.error, plan or MapPlan()
+        loads = np.nansum(np.where(self.alive, ratio - 1, 0), (1, 2))
+        heaviest = int(loads.argmax())
+        if not plan.network and loads[heaviest] > _HEAVIER * plan.load:
+            plan.worst = max(plan.worst, self._compared(siemens[heaviest], ratio[heaviest]))
+            plan.load = max(float(loads[heaviest]), 0.0)
+        by = plan.words()
+        if not plan.network:
+            return ratio, error, by
         ratio = np.where(np.isfinite(siemens.imag), self.by_network(siemens), np.nan)
         if lost := int((np.isnan(ratio) & np.isfinite(siemens.imag) & self.alive).sum()):
             by += f"; {lost} values left out that {_STEPS} steps of Gauss-Newton did not settle"
         return ratio, error, by
 
     def maps(
-        self, siemens: Complex, time_s: Real, calibration: "ArrayCalibration | None" = None, day: float = nan
+        self, siemens: Complex, time_s: Real, calibration: "ArrayCalibration | None" = None, day: float = nan,
+        plan: "MapPlan | None" = None, past: "Past | None" = None,
     ) -> PressureMaps:  # fmt: skip
         """Pressure maps of frames, by the law of the cell, or of each element where they are calibrated."""
-        ratio, error, by = self.planned(siemens)
+        ratio, error, by = self.planned(siemens, plan)
         pressure, per = self.model.pressures(np.nan_to_num(ratio, nan=1.0, posinf=1.0, neginf=1.0))
         noise = error * per * np.sqrt(1 + 1 / self.rest_count)
         sigma = np.hypot(noise, self.scatter * pressure)
         given = _known(sigma) & self.alive & np.isfinite(ratio) & self._same_sign(siemens)
         if calibration:
             by += f"; {calibration.law.form.words()} of each element, calibrated"
-            shape = ratio.shape
-            mean, half = calibration.of_ratio(ratio.reshape(shape[0], -1), time_s, calibration.counted(day))
-            pressure, sigma = PA_PER_KPA * mean.reshape(shape), PA_PER_KPA / NORMAL_90 * half.reshape(shape)
+            mean, half = calibration.of_ratio(ratio, time_s, calibration.counted(day), past)
+            pressure, sigma = PA_PER_KPA * mean, PA_PER_KPA / NORMAL_90 * half
         shown, error_kpa = (np.where(given, each / PA_PER_KPA, np.nan) for each in (pressure, sigma))
         return PressureMaps(self.model, by, time_s, shown, error_kpa, calibration)
+
+
+def _cell(value: float) -> float | None:
+    return None if value != value else value
 
 
 def _known(sigma_pa: Real) -> Mask:
@@ -414,7 +521,7 @@ def at_rest(
 def inverted(
     model: ArrayModel, readout: ArrayReadout, siemens: Complex, rest: Mask, time_s: Real, scatter: float = SCATTER,
     apart: "Complex | None" = None, unused: Sequence[str] = (), calibration: "ArrayCalibration | None" = None,
-    day: float = nan,
+    day: float = nan, surface: bool = True,
 ) -> PressureMaps:  # fmt: skip
     """Pressure maps of a recording.
 
@@ -438,6 +545,8 @@ def inverted(
         Of each element.
     day : float
         Of the recording, as the calibration counts them [d].
+    surface : bool
+        Pressures on the cover; else those that cells carry under it.
 
     Raises
     ------
@@ -448,7 +557,8 @@ def inverted(
     loaded = ~rest
     if not loaded.any():
         raise BadInput("all frames are at rest; expected some under load")
-    return inverter.maps(missing(siemens)[loaded], time_s[loaded], calibration, day)
+    maps = inverter.maps(missing(siemens)[loaded], time_s[loaded], calibration, day)
+    return maps.on_surface() if surface else maps
 
 
 def missing(siemens: Complex) -> Complex:

@@ -1,31 +1,40 @@
 """An array in numbers: the cell of every crossing as printed, and the resistance of every track to its pad."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from sensorgen.core.arrays import Real
-from sensorgen.core.bounds import Bounds
+from sensorgen.core.arrays import Mask, Real
+from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.document import Column, Table
 from sensorgen.core.errors import BadInput, MissingValue
-from sensorgen.core.units import M_PER_MM
-from sensorgen.design.arrays import Layout, Track
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
+from sensorgen.design.arrays import ArrayLayout, ArrayTrack
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
-from sensorgen.models.compression import Curve
+from sensorgen.design.values import material_value
+from sensorgen.models.compression import CapacitanceCurve
 from sensorgen.prediction import bodies
+from sensorgen.prediction.array.fringe import CrossingSection, Fringe, fringe
 from sensorgen.prediction.error_budget import modulus_range
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.sensor_model import SensorModel
+from sensorgen.solvers.cover import ElasticLayer, kernel
 from sensorgen.solvers.tracks import Tracks
 
-PA_PER_KPA = 1e3
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+PA_PER_KPA, PA_PER_MPA = 1e3, 1e6
 USUAL_KPA = 90.0  # of 6 N on 8 x 8 mm
 _N_PER_KPA_MM2 = 1e-3
 _NEWTON = 12  # steps: the law is smooth and nearly straight
+_FELT = 1e-4  # of a pressure: less is not spread
+_RUBBER = 0.48  # Poisson's ratio of a sheet
+_FILM = 0.9  # of the reduced gap: a film that is more of it is the cell
 SHORT_OHM = 1e3  # of a shorted crossing: one bead of the electrodes' material across the film
 
 
@@ -68,7 +77,7 @@ class ArrayModel:
     lead_ohm: tuple[float, float]
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> ArrayLayout:
         """Tracks in plan."""
         found = self.design.layout
         if found is None:
@@ -80,10 +89,63 @@ class ArrayModel:
         """Crossings that the outline has, (m, n)."""
         return np.array(self.layout.here)
 
-    @property
+    @cached_property
+    def regions(self) -> dict[str, Mask]:
+        """Crossings whose middle lies in each region of the design, (m, n) of bool.
+
+        Raises
+        ------
+        BadInput
+            A region that is no area, or without a crossing.
+        """
+        import shapely
+
+        p, of, found = self.layout.params, self.layout, {}
+        (px, py), (m, n) = p.pitch, self.here.shape
+        x = np.array(of.x_mm) - of.x_mm[0] + (p.length_mm - (n - 1) * px) / 2  # from the outline's corner
+        y = np.array(of.y_mm) - of.y_mm[0] + (p.width_mm - (m - 1) * py) / 2
+        for name, corners in self.design.regions.items():
+            region = shapely.MultiPoint(corners) if {*map(len, corners)} == {2} else shapely.Point()
+            area = region.envelope if len(corners) == 2 else shapely.Polygon(corners) if len(corners) > 2 else region
+            inside = self.here & shapely.intersects_xy(area, x[None], y[:, None])
+            if not (area.is_valid and area.area and inside.any()):
+                raise BadInput(
+                    f"regions.{name}: no area with a crossing; expected two corners of a rectangle, or three or more "
+                    f"of a polygon, up to {p.length_mm:g}, {p.width_mm:g} mm"
+                )
+            found[name] = inside
+        return found
+
+    @cached_property
     def capacitance(self) -> Bounds:
-        """Of one crossing at rest [F]."""
-        return self.crossing.rest.capacitance
+        """Of one crossing at rest, the fringe at its edges included [F]."""
+        own, edges = self.crossing.rest.capacitance, self.fringe
+        least, most = 1 + edges.least, 1 + edges.most
+        return replace(
+            own.times(1 + edges.share, own.unit), lower=own.lower * least, upper=own.upper * most,
+            leads=Interval(own.value * least, own.value * most),
+        )  # fmt: skip
+
+    @cached_property
+    def fringe(self) -> Fringe:
+        """Part of the edges of the tracks in the capacitance and in its rise."""
+        p, eps = self.layout.params, {
+            part: material_value(*self.design.slot(part), "relative_permittivity").value
+            for part in ("film", "dielectric", "isolation")
+        }  # fmt: skip
+        gap = self.crossing.body.cells.first().size_mm[2] - 2 * p.electrode_mm
+        film = getattr(self.design.crossing.params, "dielectric_mm", 0.0)
+        area_m = p.column_mm * p.row_mm * M_PER_MM
+        reduced = EPS0_F_PER_M * area_m / self.crossing.rest.capacitance.value
+        if film / eps["film"] > _FILM * reduced or film >= gap:
+            film = 0.0
+        cell = (gap - film) / (reduced - film / eps["film"])
+        values = {
+            "film": eps["film"], "cell": cell, "solid": eps["dielectric"], "cover": eps["isolation"], "air": 1.0,
+            "beside": 1.0 if p.between == "air" else eps["dielectric"],
+        }  # fmt: skip
+        (px, py), heights = p.pitch, (film, gap - film, p.electrode_mm, p.isolation_mm, p.base_mm)
+        return fringe(CrossingSection((p.column_mm, px - p.column_mm), (p.row_mm, py - p.row_mm), *heights, values))
 
     @property
     def pitch_area_m2(self) -> float:
@@ -98,27 +160,90 @@ class ArrayModel:
         Springs side by side under a stiff cover: the cells, and the solid dielectric between them; with air between,
         the cells carry all.
         """
-        p = self.layout.params
-        share = p.column_mm * p.row_mm / (p.pitch[0] * p.pitch[1])
-        scene, law = self.crossing.body.cells.first(), self.crossing.law.compression
-        if p.between == "air":
+        share = self._share
+        if self.layout.params.between == "air":
             return 1 / share
         if getattr(self.design.crossing.params, "period_mm", None) is None:
             return 1.0  # a plate like what is between the tracks
-        height_m = (scene.size_mm[2] - 2 * p.electrode_mm) * M_PER_MM
-        material, source = self.design.slot("dielectric")
         try:
-            wall = material.value("youngs_modulus_pa", source).value / height_m
-            cell = law.foundation_stiffness_pa_per_m(height_m)
+            cell, wall = self._springs
         except MissingValue:
             return 1.0
         return cell / (share * cell + (1 - share) * wall)
+
+    @property
+    def _share(self) -> float:
+        """Share of the surface that crossings are [-]."""
+        p = self.layout.params
+        return p.column_mm * p.row_mm / (p.pitch[0] * p.pitch[1])
+
+    @cached_property
+    def _springs(self) -> tuple[float, float]:
+        """Stiffness of cells, and of what is between them, per area [Pa/m]."""
+        p = self.layout.params
+        height_m = (self.crossing.body.cells.first().size_mm[2] - 2 * p.electrode_mm) * M_PER_MM
+        cell = self.crossing.law.compression.foundation_stiffness_pa_per_m(height_m)
+        if p.between == "air":
+            return cell, 0.0
+        return cell, material_value(*self.design.slot("dielectric"), "youngs_modulus_pa").value / height_m
+
+    @cached_property
+    def cover(self) -> tuple[ElasticLayer, ...]:
+        """Layers on the cells, from below: columns and isolation as one, then a sheet."""
+        p = self.layout.params
+        parts = {"top_electrode": p.electrode_mm, "isolation": p.isolation_mm}
+        thick = sum(parts.values())
+        modulus, nu = (
+            sum(mm * material_value(*self.design.slot(part), of).value for part, mm in parts.items()) / thick
+            for of in ("youngs_modulus_pa", "poisson_ratio")
+        )
+        own = ElasticLayer(thick * M_PER_MM, modulus, nu)
+        return (own, ElasticLayer(p.cover_mm * M_PER_MM, p.cover_mpa * PA_PER_MPA, _RUBBER)) if p.cover_mm else (own,)
+
+    @cached_property
+    def kernel(self) -> Real:
+        """Pressure that squares carry for 1 on that at (0, 0), by rows and columns; of unknown moduli there alone."""
+        (px, py), alone = self.layout.params.pitch, np.zeros((2, 2))
+        alone[0, 0] = 1.0
+        try:
+            cell, wall = self._springs
+            return kernel(self.cover, self._share * cell + (1 - self._share) * wall, (py * M_PER_MM, px * M_PER_MM))
+        except MissingValue:
+            return alone
+
+    @cached_property
+    def spread(self) -> "csr_array":
+        """Pressures that crossings carry by those on the surface of each, (m n, m n); nothing lies beside the array."""
+        from scipy.sparse import csr_array
+
+        of, here = self.kernel, self.here
+        i, j = np.nonzero(here)
+        (m, n), reach = here.shape, len(of) // 2
+        rows, columns, values = [np.flatnonzero(~here)], [np.flatnonzero(~here)], [np.ones(int((~here).sum()))]
+        for di, dj in np.argwhere(np.abs(of) > _FELT).tolist():
+            a, b = (i + (di + reach) % len(of) - reach), (j + (dj + reach) % len(of) - reach)
+            inside = (a >= 0) & (a < m) & (b >= 0) & (b < n)
+            inside[inside] = here[a[inside], b[inside]]
+            rows.append((a * n + b)[inside])
+            columns.append((i * n + j)[inside])
+            values.append(np.full(int(inside.sum()), of[di, dj]))
+        at = tuple(np.concatenate(each) for each in (rows, columns))
+        return csr_array((np.concatenate(values), at), shape=(m * n, m * n))
+
+    @property
+    def undone(self) -> float:
+        """Factor by which standard errors grow where the spread is undone, of an array without ends [-]."""
+        return float(np.sqrt(np.mean(np.abs(np.fft.fft2(self.kernel)) ** -2.0)))
+
+    def carried(self, pressure: Real) -> Real:
+        """Pressures that crossings carry by those on the surface, (k, m, n)."""
+        return np.asarray((self.spread @ pressure.reshape(len(pressure), -1).T).T.reshape(pressure.shape))
 
     @cached_property
     def known_pa(self) -> float:
         """Pressure on the surface up to which the law of the cell is known, further straight; infinite of a plate."""
         law = self.crossing.law.compression
-        return law.stress_pa[-1] / self.load_factor if isinstance(law, Curve) else float("inf")
+        return law.stress_pa[-1] / self.load_factor if isinstance(law, CapacitanceCurve) else float("inf")
 
     @cached_property
     def shared_factor(self) -> tuple[float, float]:
@@ -148,8 +273,9 @@ class ArrayModel:
         law, pressure_pa = self.crossing.law.compression, np.asarray(pressure_pa, float)
         inside = np.clip(pressure_pa, 0.0, self.known_pa)
         strain, slope = law.capacitive_strain(inside * self.load_factor)
-        slope = slope * self.load_factor / (1 - strain) ** 2
-        return np.asarray(1 / (1 - strain) + (pressure_pa - inside) * slope), np.asarray(slope)
+        slope = self.fringe.gain * slope * self.load_factor / (1 - strain) ** 2
+        rise = self.fringe.gain * strain / (1 - strain)
+        return np.asarray(1 + rise + (pressure_pa - inside) * slope), np.asarray(slope)
 
     def pressures(self, ratio: Real) -> tuple[Real, Real]:
         """Pressure on the surface by capacitance over that at rest [Pa], and its derivative [Pa]: Newton's method."""
@@ -201,7 +327,7 @@ class ArrayModel:
             np.zeros(n, dtype=np.int64), self.crossing.lost.tan_delta, np.zeros((m, n)),
         )  # fmt: skip
 
-    def _stretches(self, track: Track, at_mm: Sequence[float]) -> tuple[Real, float]:
+    def _stretches(self, track: ArrayTrack, at_mm: Sequence[float]) -> tuple[Real, float]:
         """Resistances between crossings, infinite beyond the track's end, and from crossing 0 to the pad [ohm]."""
         start, per_track, per_lead = self._per_mm(track)
         ends = np.asarray(at_mm)
@@ -209,7 +335,7 @@ class ArrayModel:
         stretches = np.where(np.arange(1, len(ends)) <= track.last, np.diff(ohm), np.inf)
         return stretches, float(track.lead_length_mm * per_lead + ohm[0])
 
-    def _per_mm(self, track: Track) -> tuple[float, float, float]:
+    def _per_mm(self, track: ArrayTrack) -> tuple[float, float, float]:
         """Where a track begins along itself [mm], and resistances of track and lead per length [ohm/mm]."""
         p, is_row = self.layout.params, track.name.startswith("r")
         sheet, width = (self.row_ohm, p.row_mm) if is_row else (self.column_ohm, p.column_mm)
@@ -220,7 +346,7 @@ class ArrayModel:
         found = sorted([*self.layout.rows, *self.layout.columns], key=lambda t: t.pad[0])
         return tuple(self._wire(k, track) for k, track in enumerate(found, 1))
 
-    def _wire(self, number: int, track: Track) -> Wire:
+    def _wire(self, number: int, track: ArrayTrack) -> Wire:
         _, per_track, per_lead = self._per_mm(track)
         x0, x1, y0, y1 = track.body
         is_row = track.name.startswith("r")

@@ -9,7 +9,7 @@ import numpy as np
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.prediction.array.model import SHORT_OHM, ArrayModel
-from sensorgen.solvers.tracks import Readings, Tracks, readings
+from sensorgen.solvers.tracks import CrossingReadings, Tracks, readings
 from sensorgen.solvers.tracks import Readout as Kind
 
 MOST_DENSE = 2000  # crossings of which the information is a whole matrix; beyond, each crossing as if it were alone
@@ -50,11 +50,11 @@ class ArrayReadout:
         if not self.frequency_hz:
             raise OutOfRange("no frequency; expected one or more")
 
-    def read(self, tracks: Tracks) -> list[Readings]:
+    def read(self, tracks: Tracks) -> list[CrossingReadings]:
         """Readings of a network at each frequency."""
         return [readings(tracks, f, readout=self.kind, input_ohm=self.input_ohm) for f in self.frequency_hz]
 
-    def sigma_s(self, siemens: Complex) -> Real:
+    def sigma_s(self, siemens: Complex | Real) -> Real:
         """Standard deviation of real and imaginary parts [S]; infinite of readings that are nothing."""
         sigma = np.hypot(self.noise * np.abs(siemens), self.noise_s)
         return np.where(np.abs(siemens) > 0, sigma, np.inf)
@@ -69,26 +69,33 @@ class ArrayReadout:
         return float((_TAUS * tau + _PERIODS / min(self.frequency_hz)) * (m if self.kind == "guarded" else m * n))
 
 
-def information(read: Sequence[Readings], readout: ArrayReadout) -> Real:
+def information(
+    read: Sequence[CrossingReadings], readout: ArrayReadout, here: Mask,
+    whole: "Sequence[CrossingReadings] | None" = None,
+) -> Real:  # fmt: skip
     """Information of all readings on the capacitances, (m n, m n); beyond ``MOST_DENSE`` its diagonal, (m n,) [1/F2].
 
-    The diagonal is that of each crossing by its own reading: what others contribute and take is left out.
+    The diagonal is that of each crossing by its own reading: what others contribute and take is left out. Noise is not
+    less than that of the ``whole`` array, and crossings outside the outline are not read: their readings are nearly
+    nothing, and noise relative to that would be, too.
     """
+    both = zip(read, whole or read, strict=True)
+    sizes = [np.where(here, np.maximum(np.abs(one.siemens), np.abs(of.siemens)), 0.0) for one, of in both]
     m, n = read[0].siemens.shape
     if m * n > MOST_DENSE:
         total = np.zeros((m, n))
-        for one in read:
-            own = np.abs(own_slopes(one)) / readout.sigma_s(one.siemens)
+        for one, size in zip(read, sizes, strict=True):
+            own = np.abs(own_slopes(one)) / readout.sigma_s(size)
             total += own**2
         return total.ravel()
     found = np.zeros((m * n, m * n))
-    for one in read:
-        slopes = one.matrix() / readout.sigma_s(one.siemens).reshape(-1, 1)
+    for one, size in zip(read, sizes, strict=True):
+        slopes = one.matrix() / readout.sigma_s(size).reshape(-1, 1)
         found += slopes.real.T @ slopes.real + slopes.imag.T @ slopes.imag
     return found
 
 
-def own_slopes(read: Readings) -> Complex:
+def own_slopes(read: CrossingReadings) -> Complex:
     """Slope of each reading by the capacitance of its own crossing, (m, n) [S/F]."""
     i, j = np.indices(read.siemens.shape)
     u, v = read.by_row[i, j, i], read.by_column[i, j, j]
@@ -110,7 +117,7 @@ def covariance(found: Real, prior_f: Real) -> Real:
     return np.asarray(1 / (found + before) if found.ndim == 1 else np.linalg.inv(found + np.diag(before)))
 
 
-def crosstalk(read: Readings) -> Real:
+def crosstalk(read: CrossingReadings) -> Real:
     """Largest effect of another crossing on each reading, relative to that of its own, (m, n) [-]."""
     found = np.empty(read.siemens.shape)
     own = np.abs(own_slopes(read))

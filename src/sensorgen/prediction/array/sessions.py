@@ -20,9 +20,11 @@ from sensorgen.prediction.array.elements import (
     TARE_S,
     UNLOADED,
     ArraySession,
-    Law,
+    ElementLaw,
     LawForm,
+    Past,
     Sums,
+    doubtful_time,
     learnt,
     responding,
     scale_of,
@@ -47,7 +49,7 @@ class ArrayCalibration:
 
     Attributes
     ----------
-    law : Law
+    law : ElementLaw
         Of every element.
     floor_kpa, share : float
         Error besides that of the parameters: constant [kPa], and relative to the pressure [-].
@@ -59,30 +61,42 @@ class ArrayCalibration:
         Of the sessions that trained.
     quiet : (n,) array
         Standard deviation of an unloaded reading.
+    names : tuple of str
+        Of the elements; none where they are numbered.
     """
 
-    law: Law
+    law: ElementLaw
     floor_kpa: float
     share: float
     reach: float
     common: float
     tares: Real
     quiet: Real
+    names: tuple[str, ...] = ()
 
     def pressures(self, session: ArraySession, tare: "Real | None" = None) -> tuple[Real, Real]:
         """Pressures, and half-widths of their intervals, (k, n); nan of dead elements and missing readings [kPa]."""
         mean, by_law = self.law.pressures(session, tare)
         return mean, self.reach * np.sqrt(by_law**2 + self.floor_kpa**2 + (self.share * mean) ** 2)
 
-    def of_ratio(self, ratio: Real, time_s: Real, day: float) -> tuple[Real, Real]:
-        """Pressures and half-widths by capacitance over that at rest of each crossing, (k, n) [kPa]."""
-        if ratio.shape[1] != len(self.law.alive):
+    def of_ratio(
+        self, ratio: Real, time_s: Real, day: float, past: "Past | None" = None
+    ) -> tuple[Real, Real]:  # fmt: skip
+        """Pressures and half-widths by capacitance over that at rest of each crossing, (k, m, n) [kPa]."""
+        names, (k, m, n) = tuple(f"r{i + 1}c{j + 1}" for i, j in np.ndindex(ratio.shape[1:])), ratio.shape
+        if len(self.law.alive) != m * n or self.names not in ((), names):
             raise BadInput(
-                f"a calibration of {len(self.law.alive)} elements; expected {ratio.shape[1]}, as of the array"
+                f"a calibration of {len(self.law.alive)} elements, {', '.join(self.names[:2])} ...; expected "
+                f"{m * n}, r1c1 to {names[-1]}, as of the array"
             )
-        nothing = np.full(len(ratio), np.nan)
-        session = ArraySession("", day, time_s, ratio - 1, np.zeros(len(ratio), bool), nothing[:, None], nothing)
-        return self.pressures(session, np.zeros(ratio.shape[1]))
+        if self.law.form.tau_s and not np.isfinite(time_s).all():
+            raise BadInput("no time_s of the frames; expected it: the calibration has a memory")
+        nothing = np.full((k, m * n), np.nan)
+        session = ArraySession(
+            "", day, time_s, ratio.reshape(k, -1) - 1, nothing[:, 0] < 0, nothing, nothing[:, 0], past=past
+        )
+        mean, half = self.pressures(session, np.zeros(m * n))
+        return mean.reshape(ratio.shape), half.reshape(ratio.shape)
 
     def counted(self, day: float) -> float:
         """A day, or where none is known that of the calibration.
@@ -135,7 +149,7 @@ class ArrayCalibration:
         np.savez_compressed(
             target, form=np.array(form, float), scale=law.scale, at=law.at, spread=law.spread, alive=law.alive,
             numbers=np.array([law.day, law.drift, law.unsure, *error]), tares=self.tares,
-            quiet=self.quiet,
+            quiet=self.quiet, names=np.array(self.names, str),
         )  # fmt: skip
         return target.getvalue()
 
@@ -152,11 +166,12 @@ def stored(path: Path) -> ArrayCalibration:
         with reading(path), np.load(path, allow_pickle=False) as data:
             powers, tau_s, drift, tared = data["form"].tolist()
             day, rate, unsure, floor, share, reach, common = data["numbers"].tolist()
-            law = Law(
+            law = ElementLaw(
                 LawForm(int(powers), tau_s, bool(drift), bool(tared)), float(data["scale"]), data["at"], data["spread"],
                 day, rate, unsure, data["alive"],
             )  # fmt: skip
-            return ArrayCalibration(law, floor, share, reach, common, data["tares"], data["quiet"])
+            names = tuple(data["names"].tolist()) if "names" in data else ()
+            return ArrayCalibration(law, floor, share, reach, common, data["tares"], data["quiet"], names)
     except (KeyError, TypeError, ValueError, EOFError, BadZipFile):
         raise BadInput(f"{path}: no calibration of an array; expected a file of 'calibrate --calibration'") from None
 
@@ -174,13 +189,13 @@ def training(sessions: Sequence[ArraySession], held_out: int) -> list[ArraySessi
     return [session for k, session in enumerate(sessions) if k != held_out]
 
 
-def law_of(sessions: Sequence[ArraySession], form: LawForm) -> Law:
+def law_of(sessions: Sequence[ArraySession], form: LawForm) -> ElementLaw:
     """Law of every element by sessions, of a given form."""
     scale = scale_of(sessions, form)
     return _law([sums_of(session, form, scale) for session in sessions], form, scale)
 
 
-def _law(sums: Sequence[Sums], form: LawForm, scale: float) -> Law:
+def _law(sums: Sequence[Sums], form: LawForm, scale: float) -> ElementLaw:
     alive = responding(sums)
     if not alive.any():
         raise BadInput("no element's reading follows its reference; expected half of its variance or more of one")
@@ -228,7 +243,7 @@ def _left_out(sessions: Sequence[ArraySession], form: LawForm) -> float:
     return float(np.mean(found))
 
 
-def _error(own: Sums, law: Law) -> float:
+def _error(own: Sums, law: ElementLaw) -> float:
     at = np.exp(law.drift * (own.day - law.day)) * law.at
     if own.count.any():
         left = own.square - 2 * np.einsum("nq,nq->n", at, own.cross) + np.einsum("nq,nqr,nr->n", at, own.gram, at)
@@ -254,15 +269,16 @@ def calibrated(sessions: Sequence[ArraySession], form: "LawForm | None" = None) 
     gains = [float(off @ mean) / (float(mean @ mean) or 1.0) for off, mean, _ in errors]
     common = float(np.sqrt(np.mean(np.square(gains))))
     off, mean, sigma = (np.concatenate(each) for each in zip(*errors, strict=True))
+    names = sessions[0].names
     if not off.size:  # total forces alone: the parameters' covariance is what is known
-        return ArrayCalibration(law, 0.0, 0.0, NORMAL_90, common, tares, quiet)
+        return ArrayCalibration(law, 0.0, 0.0, NORMAL_90, common, tares, quiet, names)
     floor, share = _scale(np.maximum(off**2 - sigma**2, 0.1 * off**2), mean)
     reach = float(np.quantile(np.abs(off) / np.sqrt(sigma**2 + floor**2 + (share * mean) ** 2), LEVEL))
     reach *= float(np.sqrt(1 + 1 / len(sessions)))  # one more session, by a scatter that so few tell
-    return ArrayCalibration(law, floor, share, reach, common, tares, quiet)
+    return ArrayCalibration(law, floor, share, reach, common, tares, quiet, names)
 
 
-def _residuals(session: ArraySession, law: Law) -> tuple[Real, Real, Real]:
+def _residuals(session: ArraySession, law: ElementLaw) -> tuple[Real, Real, Real]:
     """Errors, pressures and standard errors by the parameters, of loaded frames evenly taken [kPa]."""
     mean, sigma = law.pressures(session)
     size = np.abs(session.pressure_kpa)
@@ -322,6 +338,7 @@ class CalibrationStudy:
     def document(self) -> Iterator[Part]:
         """The law, and a row for each session."""
         yield Facts(tuple(self._facts()))
+        yield from (f"{line}: {of.name}" for of in self.sessions for line in doubtful_time(of.time_s))
         if not self.errors:
             yield "one session: its errors in another are not known; expected more, of several days"
             return
@@ -356,6 +373,7 @@ def study(sessions: Sequence[ArraySession], *, by_first: bool = False) -> Calibr
     BadInput
         Sessions of different elements, or without any reference.
     """
+    sessions = [session.matched(sessions[0].names) for session in sessions]
     _refuse(sessions)
     pressed = [k for k, session in enumerate(sessions) if np.isfinite(session.pressure_kpa).any()]
     tested = [k for k in pressed if len(sessions) > 1 and not (by_first and k == 0)]

@@ -11,6 +11,7 @@ from sensorgen.core.document import Cell, Column, Facts, Part, Table, to_json
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import si
 from sensorgen.prediction.array.model import PA_PER_KPA, ArrayModel
+from sensorgen.prediction.array.presses import PRESS_MM, PRESS_N, count, distance_mm
 from sensorgen.prediction.array.readout import (
     FULL_SCALE_PA,
     MOST_DENSE,
@@ -44,6 +45,10 @@ class ArrayStudy:
         Largest effect of another crossing at the lowest frequency [-]; None of large arrays.
     faults : tuple of str
         That the network has.
+    apart_mm : float
+        Distance from which two presses are told apart; infinite of none [mm].
+    short : float
+        Probability that a crossing is shorted, P(short) of its print [-].
     """
 
     model: ArrayModel
@@ -52,6 +57,8 @@ class ArrayStudy:
     sigma_kpa: Real
     crosstalk: "Real | None"
     faults: tuple[str, ...] = ()
+    apart_mm: float = np.inf
+    short: float = 0.0
 
     @property
     def determined(self) -> Mask:
@@ -74,8 +81,20 @@ class ArrayStudy:
             ),
         )
         yield "crossing", f"{model.capacitance.words()} at rest, {self._rises()}"
+        edges = model.fringe
+        words = (
+            f"edges of the tracks are {100 * edges.share:.3g} % of its own area's capacitance "
+            f"({100 * edges.least:.2g} to {100 * edges.most:.2g} %); the rise is {edges.gain:.2f} of the cell's"
+        )
+        yield "fringe", words
         if model.load_factor != 1:
             yield "load", f"a cell carries {model.load_factor:.2f} times the pressure on the surface"
+        sheet, of = f" and {p.cover_mm:g} mm of {p.cover_mpa:g} MPa" if p.cover_mm else "", 100 * model.kernel
+        words = (
+            f"of a press on one square its cell feels {of[0, 0]:.3g} %, each neighbour of the row {of[0, 1]:.2g} % "
+            f"and of the column {of[1, 0]:.2g} %, through columns, isolation{sheet} (loose layers on springs)"
+        )
+        yield "cover", words
         ends = [wire.end_ohm for wire in model.wires()]
         yield (
             "tracks",
@@ -89,8 +108,19 @@ class ArrayStudy:
         noise = " and ".join([*([f"{readout.noise:.2g} of a reading"] if readout.noise else []),
                               *([si(readout.noise_s, "S")] if readout.noise_s else [])])  # fmt: skip
         yield "readout", f"{readout.kind}, {by}, {tones}, noise {noise}; {1 / readout.frame_s(model):.3g} frames/s"
+        if self.short:
+            words = (
+                f"{100 * self.whole:.3g} % of prints have no short at P(short) {self.short:g} of a crossing; "
+                f"{count * self.short:.3g} are shorted on average"
+            )
+            yield "yield", words
         if self.faults:
             yield "faults", f"{', '.join(self.faults)}: {self._lost()}"
+
+    @property
+    def whole(self) -> float:
+        """Probability that a print has no short, crossings by themselves [-]."""
+        return float((1 - self.short) ** self.model.here.sum())
 
     def _lost(self) -> str:
         dark = int((self.model.here & ~self.determined).sum())
@@ -122,7 +152,14 @@ class ArrayStudy:
         yield Table("resolution", "", columns, tuple(rows))
         yield (
             f"(standard errors of one frame at {self.pressure_kpa:g} kPa, of noise alone; smallest press: "
-            f"{DETECTED:g} sigma on one crossing; two presses show apart from two pitches on)"
+            f"{DETECTED:g} sigma on one crossing)"
+        )
+        press = f"of {PRESS_N:g} N on {PRESS_MM:g} x {PRESS_MM:g} mm"
+        yield (
+            f"two presses {press} are told apart from {self.apart_mm:.3g} mm on, wherever they lie: "
+            f"{count(self.model, self.apart_mm)} at once"
+            if np.isfinite(self.apart_mm)
+            else f"two presses {press} are not told apart at every place, however far"
         )
         yield from self.model.shared()
         yield from self.model.beyond(np.array([self.pressure_kpa]))
@@ -135,10 +172,7 @@ class ArrayStudy:
         if self.model.here.size > MOST_DENSE:
             yield f"above {MOST_DENSE} crossings each standard error is as if all other capacitances were known"
         yield from (f"doubtful: {doubt}" for doubt in self.model.crossing.doubts)
-        yield (
-            "left out: fringe between neighbouring tracks, spreading of the load by the cover, strays of the cable, "
-            "contact resistance"
-        )
+        yield "left out: strays of the cable, contact resistance"
 
     def record(self) -> dict[str, Any]:
         """Numbers by crossing, null outside the outline and where nothing is determined."""
@@ -154,8 +188,10 @@ class ArrayStudy:
             "sigma_kpa": _map(np.where(self.determined, self.sigma_kpa, np.nan)),
             "sigma_n": _map(np.where(self.determined, self.sigma_n, np.nan)),
             "crosstalk": None if self.crosstalk is None else _map(self.crosstalk),
+            "apart_mm": self.apart_mm if np.isfinite(self.apart_mm) else None,
             "frames_per_s": 1 / self.readout.frame_s(self.model),
             "faults": self.faults,
+            "yield": self.whole if self.short else None,
         }
 
     def to_json(self) -> str:
@@ -164,7 +200,8 @@ class ArrayStudy:
 
 
 def study(
-    model: ArrayModel, readout: ArrayReadout, pressure_kpa: float = 100.0, faults: Sequence[str] = ()
+    model: ArrayModel, readout: ArrayReadout, pressure_kpa: float = 100.0, faults: Sequence[str] = (),
+    short: float = 0.0,
 ) -> ArrayStudy:  # fmt: skip
     """Resolution of an array under an even pressure.
 
@@ -176,6 +213,8 @@ def study(
         On the surface [kPa].
     faults : sequence of str
         As of :func:`sensorgen.prediction.array.readout.faulty`.
+    short : float
+        Probability that a crossing is shorted [-].
 
     Raises
     ------
@@ -186,17 +225,25 @@ def study(
         raise OutOfRange(f"a pressure of {pressure_kpa:g} kPa; expected 0 or more")
     ratio, slope = model.under(np.array(pressure_kpa * PA_PER_KPA))
     per_pa = model.capacitance.value * float(slope)
-    tracks = faulty(model.tracks(model.capacitances(float(ratio))), faults, model.here)
-    read = readout.read(tracks)
+    whole = model.tracks(model.capacitances(float(ratio)))
+    read = readout.read(faulty(whole, faults, model.here))
     prior = np.where(model.here, per_pa * FULL_SCALE_PA, 1e-6 * model.capacitance.value).ravel()
-    spread = covariance(information(read, readout), prior)
+    known = _on_surface(information(read, readout, model.here, readout.read(whole) if faults else None), model)
+    spread = covariance(known, prior)
     variance = spread if spread.ndim == 1 else np.diag(spread)
     sigma = np.sqrt(variance).reshape(model.here.shape) / per_pa / PA_PER_KPA
     small = model.here.size <= MOST_DENSE
     return ArrayStudy(
         model, readout, pressure_kpa, np.where(model.here, sigma, np.nan), crosstalk(read[0]) if small else None,
-        tuple(faults),
+        tuple(faults), distance_mm(model, known * per_pa**2), short,
     )  # fmt: skip
+
+
+def _on_surface(found: Real, model: ArrayModel) -> Real:
+    """Information on pressures on the surface by that on those that cells carry, (k, k), or each alone, (k,)."""
+    if found.ndim == 1:
+        return found / model.undone**2
+    return np.asarray(model.spread.T @ found @ model.spread)
 
 
 def _map(values: Real) -> list[list[float | None]]:

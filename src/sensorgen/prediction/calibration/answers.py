@@ -8,7 +8,7 @@ import numpy as np
 from sensorgen.core.arrays import Mask
 from sensorgen.core.document import Part
 from sensorgen.core.units import M_PER_MM
-from sensorgen.prediction.calibration.inversion import WIDE, Found, Verdict
+from sensorgen.prediction.calibration.inversion import WIDE, InvertedPresses, Verdict
 from sensorgen.prediction.calibration.rest import STALE_S
 from sensorgen.prediction.inverse import statuses
 
@@ -24,14 +24,14 @@ def header(given: Sequence[str]) -> str:
     return statuses.header(given, COLUMNS)
 
 
-def rows(given: Sequence[Sequence[str]], found: Found, rest: Mask) -> str:
+def rows(given: Sequence[Sequence[str]], found: InvertedPresses, rest: Mask) -> str:
     """Rows of a CSV file, blank where nothing was found.
 
     Parameters
     ----------
     given : sequence of sequence of str
         The input's other cells, row by row.
-    found : Found
+    found : InvertedPresses
         The results.
     rest : (n,) array of bool
         Readings at rest.
@@ -116,7 +116,7 @@ class CalibratedInversion:
         yield from (f"note: {note}" for note in self.notes)
 
 
-class Summary:
+class CalibratedSummary:
     """Counts blocks of results; of widths each block's median is kept."""
 
     def __init__(self) -> None:
@@ -129,7 +129,7 @@ class Summary:
         """Readings under load so far."""
         return self._statuses.samples
 
-    def add(self, found: Found, rest: Mask) -> None:
+    def add(self, found: InvertedPresses, rest: Mask) -> None:
         """Count a block."""
         self.at_rest += int(rest.sum())
         self._statuses.add(found.verdict[~rest])

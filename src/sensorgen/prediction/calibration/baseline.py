@@ -12,7 +12,7 @@ import numpy as np
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.prediction.calibration.fitting import Posterior, rest_gain
 from sensorgen.prediction.calibration.specimen import SpecimenModel
-from sensorgen.prediction.inference import parts
+from sensorgen.prediction.inference import parts, slopes
 from sensorgen.prediction.inverse.verdict import chi2_limit
 
 SESSION_C, SESSION_R = 0.01, 0.03  # standard deviations of ln C and ln R from one session to another: guesses, some K
@@ -22,7 +22,7 @@ _SURE = 3.0  # standard deviations
 
 
 @dataclass(frozen=True)
-class Change:
+class RestChange:
     """Difference of a reading at rest from the one of the calibration.
 
     Attributes
@@ -76,18 +76,18 @@ class Baseline:
     def __init__(self, model: SpecimenModel, posterior: Posterior, gain: Complex | None = None) -> None:
         at, m = posterior.at, len(model.frequency_hz)
         self._ln_z = model.rest(at) + (0.0 if gain is None else gain)
-        slopes = model.rest_slopes(at)
+        by_parameter = slopes(lambda near: parts(model.rest(near)), at)
 
         def by(name: str) -> Real:
-            return slopes[:, model.names.index(name)]
+            return by_parameter[:, model.names.index(name)]
 
         leads = np.stack([by(name) * change / model.value(name, at) for name, change in _LEADS.items()], 1)
         self._weights = np.stack([by(name) / getattr(model.spread, name) for name in ("capacitance", "resistance")], 1)
         self._covariance = leads @ leads.T + _METER**2 * np.eye(2 * m)
         if gain is None:
-            self._covariance += slopes @ posterior.covariance @ slopes.T + rest_gain(model)
+            self._covariance += by_parameter @ posterior.covariance @ by_parameter.T + rest_gain(model)
 
-    def change(self, z_ohm: Complex, noise: Real | float) -> Change:
+    def change(self, z_ohm: Complex, noise: Real | float) -> RestChange:
         """Difference of a reading at rest.
 
         Parameters
@@ -110,4 +110,4 @@ class Baseline:
             _SURE * hypot(session, float(variance[k, k]) ** 0.5) for k, session in enumerate((SESSION_C, SESSION_R))
         )
         other = float(left @ inverse @ left) > float(chi2_limit(np.array(max(len(kept) - 2, 0))))
-        return Change(float(found[0]), float(found[1]), usual_c, usual_r, other)
+        return RestChange(float(found[0]), float(found[1]), usual_c, usual_r, other)

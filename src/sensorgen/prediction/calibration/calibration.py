@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
-from sensorgen.models.compression import Curve, Plate
+from sensorgen.models.compression import CapacitanceCurve, Plate
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.calibration.baseline import Baseline
 from sensorgen.prediction.calibration.coverage import FEWEST, Coverage
@@ -27,11 +27,11 @@ from sensorgen.prediction.inverse.verdict import NORMAL_90
 SCHEMA = 2
 _TOLD = 0.8  # of the prior's standard deviation: a parameter that keeps more was not identified
 BEYOND = 1.25  # times the largest known force: up to which a press is looked for
-_LAWS = {"plate": Plate, "curve": Curve}
+_LAWS = {"plate": Plate, "curve": CapacitanceCurve}
 
 
 @dataclass(frozen=True)
-class Value:
+class CalibratedValue:
     """A parameter after calibration, and before."""
 
     name: Annotated[str, Column("parameter")]
@@ -91,7 +91,7 @@ class Calibration:
 
     def departures(self) -> tuple[str, ...]:
         """Remarks on values that no longer lie where they were expected."""
-        found: dict[str, Value | MaterialEstimate] = {
+        found: dict[str, CalibratedValue | MaterialEstimate] = {
             (f"{one.name} [{one.unit}]" if one.unit else one.name): one for one in self.values()
         }
         found |= {f"{one.material} {one.quantity}": one for one in self.materials()}
@@ -144,7 +144,7 @@ class Calibration:
         """The reading at rest that later ones are compared with."""
         return Baseline(self.model, self.posterior, np.array(self.gain) if self.gain else None)
 
-    def values(self) -> list[Value]:
+    def values(self) -> list[CalibratedValue]:
         """Parameters in their units."""
         parameters = {one.key: (one, np.eye(len(self.model.names))[k]) for k, one in enumerate(self.model.parameters)}
         rise, _ = parameters["rise"]
@@ -153,14 +153,14 @@ class Calibration:
             parameters[name] = replace(rise, key=name), weights
         return [self._value(one, weights) for one, weights in parameters.values()]
 
-    def _value(self, parameter: Parameter, weights: Real) -> Value:
+    def _value(self, parameter: Parameter, weights: Real) -> CalibratedValue:
         """A parameter by the weights of all in its deviation from the prior's mean."""
         at, before = float(weights @ self.posterior.at), sqrt(weights @ weights)
         sd = sqrt(weights @ self.posterior.covariance @ weights)
         ends = np.array([at, at - NORMAL_90 * sd, at + NORMAL_90 * sd, -NORMAL_90 * before, NORMAL_90 * before])
         middle, lower, upper, *prior = (parameter.shown * parameter.at(ends)).tolist()
         by = "presses and rest" if sd / before < _TOLD else "prediction"
-        return Value(parameter.key, parameter.unit, middle, lower, upper, prior[0], prior[1], by)
+        return CalibratedValue(parameter.key, parameter.unit, middle, lower, upper, prior[0], prior[1], by)
 
     @property
     def unidentified(self) -> tuple[str, ...]:

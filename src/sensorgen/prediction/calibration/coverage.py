@@ -7,7 +7,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Mask, Real
 from sensorgen.prediction.calibration.fitting import Data, calibrated
-from sensorgen.prediction.calibration.inversion import Found, Inverter
+from sensorgen.prediction.calibration.inversion import InvertedPresses, Inverter
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel
 
 FOLDS = 5
@@ -39,7 +39,7 @@ class Coverage:
     position_error_m: float
 
 
-def inside(found: Found, presses: Presses) -> tuple[Mask, Mask]:
+def inside(found: InvertedPresses, presses: Presses) -> tuple[Mask, Mask]:
     """Masks of the forces and of the positions that lie in their intervals."""
     return tuple(  # type: ignore[return-value]
         (ends[:, 0] <= truth) & (truth <= ends[:, 1])
@@ -47,7 +47,7 @@ def inside(found: Found, presses: Presses) -> tuple[Mask, Mask]:
     )
 
 
-def coverage_of(found: Found, presses: Presses) -> Coverage:
+def coverage_of(found: InvertedPresses, presses: Presses) -> Coverage:
     """Of presses that are known."""
     force, position = inside(found, presses)
     return Coverage(
@@ -63,7 +63,7 @@ def _rms(off: Real) -> float:
 
 def held_out(
     model: SpecimenModel, data: Data, limit_n: float, step: Callable[[str], None] = lambda _: None
-) -> tuple[Coverage, Found] | None:  # fmt: skip
+) -> tuple[Coverage, InvertedPresses] | None:  # fmt: skip
     """Coverage of presses held back in turn; None of fewer presses than ``FEWEST``.
 
     Parameters
@@ -86,5 +86,5 @@ def held_out(
         known = replace(known, noise=np.median(data.noise, axis=0))
         parts.append(Inverter(model, known, force_limit_n=limit_n).batch(data.ratio[fold == k]))
     order = np.argsort(np.concatenate([np.flatnonzero(fold == k) for k in range(FOLDS)]), kind="stable")
-    found = Found.joined(parts).rows(order)
+    found = InvertedPresses.joined(parts).rows(order)
     return coverage_of(found, data.presses), found

@@ -8,9 +8,9 @@ import numpy as np
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel, no_presses
 from sensorgen.prediction.inference import (
-    Fit,
     Index,
     LeastSquares,
+    LocalFit,
     Normal,
     descend,
     parts,
@@ -31,7 +31,7 @@ _LN_LOOSE = 3.0  # the same where presses tell: tighter, a specimen that never w
 
 
 @dataclass(frozen=True, eq=False)
-class Meter:
+class MeterReadings:
     """Readings of meters, apart from the bench, with nothing on the sensor.
 
     Attributes
@@ -80,7 +80,7 @@ class Data:
         Standard deviation of its real and imaginary part [-].
     single : (m,) array or None
         Standard deviation of the parts of a ratio of single readings, where ``ratio`` has means [-].
-    meter : Meter or None
+    meter : MeterReadings or None
         Readings apart from the bench.
     """
 
@@ -90,7 +90,7 @@ class Data:
     rest: Complex
     rest_noise: Real
     single: Real | None = None
-    meter: Meter | None = None
+    meter: MeterReadings | None = None
 
     def rows(self, which: Index | Mask) -> "Data":
         """Some of the presses."""
@@ -249,7 +249,7 @@ class _Specimen(LeastSquares):
     reach = 3.0
     bound = 8.0  # beyond, readings that no specimen gives lead to numbers that no line takes
 
-    def fit(self, at: Real, rows: Index) -> Fit:  # noqa: ARG002
+    def fit(self, at: Real, rows: Index) -> LocalFit:  # noqa: ARG002
         """Sum of squares at parameters (1, p)."""
         fit = _pressed(at, *self.ratios(at[0]), self.root) + self.resting(at)
         return fit.with_prior(self.before.at, self.before.information)
@@ -259,7 +259,7 @@ class _Specimen(LeastSquares):
         presses = self.data.presses
         return parts(self.data.ratio - self.model.ratio(at, presses)), self.model.slopes(at, presses)
 
-    def resting(self, at: Real) -> Fit:
+    def resting(self, at: Real) -> LocalFit:
         """Sum of squares of all that was read with nothing on the sensor, at parameters (1, p)."""
         data, root = self.data, whitening(_rest_covariance(self.model, self.data))
 
@@ -267,16 +267,16 @@ class _Specimen(LeastSquares):
             bench = parts(data.rest - self.model.rest(near)) @ root.T
             return np.concatenate([bench, data.meter.off(self.model, near)], -1) if data.meter else bench
 
-        return Fit.of(at, off(at), -slopes(off, at[0]).T[None])
+        return LocalFit.of(at, off(at), -slopes(off, at[0]).T[None])
 
 
-def _pressed(at: Real, residual: Real, slope: Real, root: Real) -> Fit:
+def _pressed(at: Real, residual: Real, slope: Real, root: Real) -> LocalFit:
     """Sum of squares at parameters (1, p) of n ratios (n, k), their slopes (n, k, p) and whitening (n, k, k)."""
     white, by = np.einsum("nij,nj->ni", root, residual), root @ slope
-    return Fit.of(at, white.reshape(1, -1), by.reshape(1, -1, at.shape[1]).transpose(0, 2, 1))
+    return LocalFit.of(at, white.reshape(1, -1), by.reshape(1, -1, at.shape[1]).transpose(0, 2, 1))
 
 
-def _descended(model: SpecimenModel, data: Data, at: Real, components: Real, before: Normal) -> Fit:
+def _descended(model: SpecimenModel, data: Data, at: Real, components: Real, before: Normal) -> LocalFit:
     """Most probable parameters (1, p), and the information on them."""
     return descend(_Specimen(model, data, before, whitening(covariances(model, at, data, components))), at[None])
 

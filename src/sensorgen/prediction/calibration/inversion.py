@@ -65,7 +65,7 @@ class Verdict(Worded):
 
 
 @dataclass(frozen=True, eq=False)
-class Found(Samples):
+class InvertedPresses(Samples):
     """Presses behind readings.
 
     Attributes
@@ -168,7 +168,7 @@ class Inverter:
         weighted = np.linalg.solve(self._covariances[0], fall)
         self._fall = weighted / np.sqrt(fall @ weighted)
 
-    def batch(self, ratio: Complex, rest_age_s: Real | None = None, changed: Mask | None = None) -> Found:
+    def batch(self, ratio: Complex, rest_age_s: Real | None = None, changed: Mask | None = None) -> InvertedPresses:
         """Presses behind readings.
 
         Parameters
@@ -201,7 +201,7 @@ class Inverter:
         stale = np.zeros(len(ratio), bool) if rest_age_s is None else ~(rest_age_s <= STALE_S)
         return self._judged(found, stale, np.zeros(len(ratio), bool) if changed is None else changed)
 
-    def _put(self, found: Found, rows: Index, ratio: Complex, tones: Mask) -> None:
+    def _put(self, found: InvertedPresses, rows: Index, ratio: Complex, tones: Mask) -> None:
         kept = np.flatnonzero(np.tile(tones, 2))
         table = self._table(tones, kept)
 
@@ -216,7 +216,7 @@ class Inverter:
         with ThreadPoolExecutor(2) as pool:
             list(pool.map(put, blocks))
 
-    def _without_one(self, found: Found, rows: Index, ratio: Complex, measured: Mask) -> None:
+    def _without_one(self, found: InvertedPresses, rows: Index, ratio: Complex, measured: Mask) -> None:
         """Of readings that no press explains, leave out the tone whose absence explains the most."""
         best = nothing(len(rows))
         for tone in range(ratio.shape[1]):
@@ -231,7 +231,7 @@ class Inverter:
         good = np.isfinite(best.chi2)
         found.put(rows[good], best.rows(good))
 
-    def _block(self, reading: Real, table: _Table, kept: Index) -> Found:
+    def _block(self, reading: Real, table: _Table, kept: Index) -> InvertedPresses:
         k = reading.shape[1]
         white = (table.root @ reading.T.astype(np.float32)).reshape(-1, k, len(reading))
         white -= table.mean[:, :, None]
@@ -284,7 +284,7 @@ class Inverter:
             )
         return self._tables[key]
 
-    def _judged(self, found: Found, stale: Mask, changed: Mask) -> Found:
+    def _judged(self, found: InvertedPresses, stale: Mask, changed: Mask) -> InvertedPresses:
         expected = 2 * NORMAL_90 * np.interp(found.force_n, *self._position_error_m)
         wide = np.ptp(found.position_90_m, axis=1) > WIDE * self._length
         rules = (
@@ -300,23 +300,23 @@ class Inverter:
         return replace(found, verdict=Verdict.worst(len(wide), rules))
 
 
-def _one_press(found: Found) -> Mask:
+def _one_press(found: InvertedPresses) -> Mask:
     """Readings that are not known to be of anything but one press."""
     return ~(found.chi2 > chi2_limit(2 * found.tones - 2))
 
 
-def _more(found: Found) -> Mask:
+def _more(found: InvertedPresses) -> Mask:
     """Readings that another capacitance besides a press explains, and a press alone does not."""
     left = found.chi2 - np.square(found.more)
     return (found.more > _MORE) & (left <= np.maximum(chi2_limit(2 * found.tones - 3), _UNLIKE * found.chi2))
 
 
-def doubt_rest(found: Found, rest: Mask, left: int) -> int:
+def doubt_rest(found: InvertedPresses, rest: Mask, left: int) -> int:
     """Mark readings below their reading at rest, and those near them, whose rest was read the same way.
 
     Parameters
     ----------
-    found : Found
+    found : InvertedPresses
         Results in the order of time; their verdicts change.
     rest : (n,) array of bool
         Readings at rest.
@@ -337,11 +337,11 @@ def doubt_rest(found: Found, rest: Mask, left: int) -> int:
     return max(int(_DOUBTED - (count[-1] - last[-1])), 0) if len(count) else left
 
 
-def nothing(n: int) -> Found:
+def nothing(n: int) -> InvertedPresses:
     """Results of readings in which nothing was found yet."""
     (force, place, *others), ends = np.full((5, n), np.nan), np.full((2, n, 2), np.nan)
     tones, verdict = np.zeros(n, np.intp), np.full(n, Verdict.MISSING, np.uint8)
-    return Found(force, place, ends[0], ends[1], others[0], others[1], others[2], tones, verdict)
+    return InvertedPresses(force, place, ends[0], ends[1], others[0], others[1], others[2], tones, verdict)
 
 
 def _pairs(force_n: Real, position_m: Real) -> tuple[Real, Real]:

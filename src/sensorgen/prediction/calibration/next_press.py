@@ -29,7 +29,7 @@ _HALTON = 200  # presses that stand for all
 
 
 @dataclass(frozen=True)
-class Range:
+class PossiblePresses:
     """Presses that are possible.
 
     Attributes
@@ -81,7 +81,7 @@ class NextPress:
     ----------
     model : SpecimenModel
         Of the specimen.
-    within : Range
+    within : PossiblePresses
         Presses that are possible.
     noise : (m,) array
         Standard deviation of the real and imaginary part of a press's ratio, a mean over its readings [-].
@@ -90,7 +90,7 @@ class NextPress:
     """
 
     model: SpecimenModel
-    within: Range
+    within: PossiblePresses
     noise: Real
     aim: str = "values"
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.prediction.calibration.baseline import Baseline, Change
+from sensorgen.prediction.calibration.baseline import Baseline, RestChange
 
 LATEST = 64  # readings at rest that count, of those since the last press
 FEWEST = 8  # differences of successive ones from which noise can be told
@@ -30,7 +30,7 @@ class Rest:
 
     Attributes
     ----------
-    change : Change or None
+    change : RestChange or None
         The first reading at rest that was of another sensor than the calibrated one, or of one that has changed.
     """
 
@@ -38,7 +38,7 @@ class Rest:
         self, given: Complex | None = None, at_s: float = np.nan, baseline: Baseline | None = None
     ) -> None:  # fmt: skip
         self._baseline, self._changed = baseline, False
-        self.change: Change | None = None
+        self.change: RestChange | None = None
         self._latest: deque[tuple[float, Complex]] = deque(maxlen=LATEST)
         self._squares: deque[Real] = deque(maxlen=_MOST_STEPS)
         self._loaded = True  # since the latest reading at rest

@@ -3,10 +3,9 @@
 Each parameter is a standard normal number before calibration; its unit is the standard deviation of the prior.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from itertools import pairwise
 from math import log
 
 import numpy as np
@@ -90,8 +89,7 @@ class Spread:
 
 def spread_at(sensor: Sensor) -> Spread:
     """Spread of a bench whose leads a design states; the usual one where it does not."""
-    usual = Spread()
-    return replace(usual, lead_ohm=sensor.lead_ohm or usual.lead_ohm, stray_f=sensor.lead_f or usual.stray_f)
+    return Spread(lead_ohm=sensor.lead_ohm or Spread.lead_ohm, stray_f=sensor.lead_f or Spread.stray_f)
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,7 +222,7 @@ class SpecimenModel:
         if frequency_hz is not None:
             at = np.array(at)
             at[..., [self._at["lead"], self._at["stray"]]] = -np.inf
-        return next(self._read(at, nothing, (False,), frequency_hz=frequency_hz))[..., 0, :]
+        return np.asarray(self._read(at, nothing, (False,), frequency_hz=frequency_hz)[0, ..., 0, :])
 
     def ratio(self, at: Real, presses: Presses, changes: Real | None = None) -> Complex:
         """Ln of pressed over rest.
@@ -246,8 +244,8 @@ class SpecimenModel:
         if changes is None:
             pressed, free = self._read(at, presses, (True, False))
         else:  # since the rest reading
-            (pressed,), (free,) = self._read(at, presses, (True,), changes), self._read(at, presses, (False,))
-        return pressed - free
+            pressed, free = self._read(at, presses, (True,), changes)[0], self._read(at, presses, (False,))[0]
+        return np.asarray(pressed - free)
 
     def _pressed(
         self, at: Real, value: Mapping[str, Real], presses: Presses, length_m: Real, rise: Real
@@ -259,7 +257,7 @@ class SpecimenModel:
         share, _ = sensor.compression.capacitive_strain(np.minimum(stress, self.most_pa))
         first = self._at[f"rise at {FORCES_N[0]:g} N"]
         knots = self.spread.law_shape * (at[..., first : first + len(FORCES_N)] @ self._shapes.T)
-        ln_rise = rise + _interpolated(np.log(force), knots)
+        ln_rise = rise + np.matmul(_shares(np.log(force)), knots[..., None])[..., 0]
         for name, course in (("hysteresis", presses.unloading), ("creep", presses.decades)):
             ln_rise = ln_rise + value[name] * np.nan_to_num(course)
         beyond = np.maximum(stress / self.most_pa, 1.0)
@@ -268,8 +266,8 @@ class SpecimenModel:
     def _read(
         self, at: Real, presses: Presses, loads: Sequence[bool], changes: Real | None = None,
         frequency_hz: Real | None = None,
-    ) -> Iterator[Complex]:  # fmt: skip
-        """Ln of the impedance that the bench reads, with the tip down or not."""
+    ) -> Complex:  # fmt: skip
+        """Ln of the impedance that the bench reads, with the tip down or not, along the first axis."""
         sensor = self.sensor
         value = {name: self.value(name, at)[..., None] for name in self.names}
         rise, c, r = np.moveaxis(np.zeros(3) if changes is None else changes, -1, 0)[..., None]
@@ -283,17 +281,15 @@ class SpecimenModel:
         left, right = patch.left_m, np.maximum(sensor.length_m - patch.left_m - length, 0.0)
         shares = np.arange(_PIECES + 1) / _PIECES
         ends = np.stack([*(left * k for k in shares), *(left + length + right * k for k in shares)])
-        tracks = [(whole * np.exp(self._bent(value, start, end)))[..., None] for start, end in pairwise(ends)]
+        tracks = [(whole * bent)[..., None] for bent in np.exp(self._bent(value, ends[:-1], ends[1:]))]
         films, lengths = [leak + stored] * len(tracks), [one[..., None] for one in np.diff(ends, axis=0)]
         stray, lead = (value[name][..., None] for name in ("stray", "lead"))
-        for loaded in loads:
-            own, film = list(tracks), list(films)
-            if loaded:
-                lifted, stress = self._pressed(at, value, presses, length, rise)
-                film[_PIECES] = leak + stored * lifted[..., None]
-                own[_PIECES] = own[_PIECES] + (stress * by_pressure)[..., None]
-            z = line.cascade(own, film, lengths, sensor.far_end)
-            yield np.asarray(np.log(lead + 1 / (1 / z + 1j * omega * stray)))
+        lifted, stress = self._pressed(at, value, presses, length, rise)
+        down = np.reshape(loads, (-1, *[1] * (lifted.ndim + 1)))
+        films[_PIECES] = leak + stored * np.where(down, lifted[..., None], 1.0)
+        tracks[_PIECES] = tracks[_PIECES] + down * (stress * by_pressure)[..., None]
+        z = line.cascade(tracks, films, lengths, sensor.far_end)
+        return np.asarray(np.log(lead + 1 / (1 / z + 1j * omega * stray)))
 
     def _film(self, value: Mapping[str, Real], c: Real, omega: Real) -> tuple[Complex, Complex]:
         """Admittance of the film with nothing on it [S/m]: of its leak, and of what rises with C."""
@@ -313,23 +309,25 @@ class SpecimenModel:
         return ln
 
     def slopes(self, at: Real, presses: Presses) -> Real:
-        """Derivatives of the ratio's real and imaginary parts by the parameters, (n, 2 m, p)."""
-        return slopes(lambda near: parts(self.ratio(near, presses)), at)
+        """Derivatives of the ratio's real and imaginary parts by the parameters, (n, 2 m, p).
 
-    def rest_slopes(self, at: Real) -> Real:
-        """Derivatives of the rest reading's parts by the parameters, (2 m, p)."""
-        return slopes(lambda near: parts(self.rest(near)), at)
+        Parameters of the rise alone have a part in the derivative by ln of the rise.
+        """
+        ln = np.log(np.maximum(presses.force_n + self.value("force offset", at), _NOTHING_N))
+        by = _shares(ln) @ self.law_weights()
+        for name, course in (("hysteresis", presses.unloading), ("creep", presses.decades)):
+            by[:, self._at[name]] = self.value(name, at) * np.nan_to_num(course)
+        found = self.scatters(at, presses, [0]) * by[:, None]
+        others = [k for k, name in enumerate(self.names) if not name.startswith(("rise", "hysteresis", "creep"))]
+        found[..., others] = slopes(lambda near: parts(self.ratio(near, presses)), at, others)
+        return found
 
-    def scatters(self, at: Real, presses: Presses) -> Real:
+    def scatters(self, at: Real, presses: Presses, which: Sequence[int] = range(3)) -> Real:
         """Derivatives of the ratio's parts by ln of the rise, of C and of R since the rest reading, (n, 2 m, 3)."""
-        return slopes(lambda changes: parts(self.ratio(at, presses, changes)), np.zeros(3))
+        return slopes(lambda changes: parts(self.ratio(at, presses, changes)), np.zeros(3), which)
 
 
-def _interpolated(ln_force: Real, knots: Real) -> Real:
-    """Values at the knots of ``FORCES_N`` between them, straight over ln force: (..., n) of (..., knots)."""
-    ln = np.log(FORCES_N)
-    inside = np.clip(ln_force, ln[0], ln[-1])
-    k = np.clip(np.searchsorted(ln, inside, side="right") - 1, 0, len(ln) - 2)
-    share = (inside - ln[k]) / (ln[k + 1] - ln[k])
-    low, high = (np.take_along_axis(np.broadcast_to(knots, (*k.shape[:-1], len(ln))), at, -1) for at in (k, k + 1))
-    return np.asarray(low + share * (high - low))
+def _shares(ln_force: Real) -> Real:
+    """Shares that each of ``FORCES_N`` has in a value between them, straight over ln force (..., n, k)."""
+    place = np.interp(ln_force, np.log(FORCES_N), np.arange(len(FORCES_N)))
+    return np.asarray(np.maximum(0.0, 1 - np.abs(place[..., None] - np.arange(len(FORCES_N)))))

@@ -9,7 +9,7 @@ from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.values import MaterialValue
-from sensorgen.models.stack import Body
+from sensorgen.models.stack import GroundTie
 from sensorgen.prediction.double_layer.designs import press_at, stacked
 from sensorgen.prediction.double_layer.differencing import ReadingErrors, bounds
 from sensorgen.prediction.double_layer.touching import THICKEST_MM, WIRINGS, Touching, TouchResult
@@ -157,7 +157,7 @@ def study(
     found = stacked(design, law, tip_m)
     press, frequency = press_at(found, force_n, position_m), np.asarray(frequency_hz, float)
     z = found.double.impedance(frequency, press)
-    touching = Touching(found.own, found.isolation_eps_r, frequency, press, noise, Body())
+    touching = Touching(found.own, found.isolation_eps_r, frequency, press, noise, GroundTie())
     return StackStudy(
         force_n, float(np.asarray(press.left_m)) + tip_m / 2, noise, drift, within_n,
         tuple(

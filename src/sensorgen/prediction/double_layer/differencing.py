@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.models.stack import Press, Response, Stack, port, standard_errors
+from sensorgen.models.stack import Press, Stack, StackResponse, port, standard_errors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -71,7 +71,7 @@ def _alone(stack: Stack, which: int, frequency_hz: Real, press: Press, noise: fl
     return _slopes(found)[..., 0, 0], noise * np.abs(found.impedance_ohm[..., 0, 0])
 
 
-def _slopes(response: Response) -> Complex:
+def _slopes(response: StackResponse) -> Complex:
     """By force, position, and the drift that all films share, along a first axis."""
     drift = np.sum(response.by_film_ohm, axis=0)
     return np.stack([response.by_force_ohm_per_n, response.by_position_ohm_per_m, drift])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
-from sensorgen.models.stack import Body, Press, Stack, Touch
+from sensorgen.models.stack import GroundTie, Press, Stack, Touch
 
 THICKEST_MM = 10.0  # isolation that is tried: the most that a design may have
 _THINNEST_MM = 1e-4
@@ -67,7 +67,7 @@ class Touching:
         The press that a touch is mistaken for, at the same place.
     noise : float
         Relative noise, by which frequencies are weighted [-].
-    body : Body
+    body : GroundTie
         Its coupling to ground.
     """
 
@@ -76,7 +76,7 @@ class Touching:
     frequency_hz: Real
     press: Press
     noise: float
-    body: Body
+    body: GroundTie
 
     @cached_property
     def _pressed_ohm(self) -> Complex:

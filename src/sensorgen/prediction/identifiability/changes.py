@@ -12,7 +12,7 @@ import numpy as np
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models import compression
 from sensorgen.models.compression import Plate
-from sensorgen.prediction.identifiability.fisher import Bounds, Setup, standard_errors
+from sensorgen.prediction.identifiability.fisher import LeastErrors, Setup, standard_errors
 from sensorgen.prediction.identifiability.frequencies import spread
 from sensorgen.prediction.identifiability.results import ChangeResult
 from sensorgen.prediction.identifiability.verdict import Required
@@ -28,7 +28,7 @@ CELL_F_PER_M2 = 159.65204e-12 / 2e-3  # of that cell, unloaded, by finite elemen
 
 
 @dataclass(frozen=True)
-class Change:
+class Remedy:
     """One thing to do differently.
 
     Attributes
@@ -53,9 +53,9 @@ class Change:
 class Tried:
     """A change, the changed setup and its bounds."""
 
-    change: Change
+    change: Remedy
     setup: Setup
-    bounds: Bounds
+    bounds: LeastErrors
     shortfall: float
 
     def result(self) -> ChangeResult:
@@ -88,7 +88,7 @@ def most_helpful(setup: Setup, need: Required) -> list[Tried]:
     return sorted(of_kind.values(), key=lambda t: t.shortfall)[:SHOWN]
 
 
-def together(setup: Setup, changes: Sequence[Tried]) -> Bounds | None:
+def together(setup: Setup, changes: Sequence[Tried]) -> LeastErrors | None:
     """Bounds with several changes, frequencies last since they depend on the corner; None if the film closes."""
     ordered = sorted((t.change for t in changes), key=CHANGES.index)
     try:
@@ -198,23 +198,23 @@ def quieter(setup: Setup) -> Setup:
 
 
 CHANGES = (
-    Change("film", "triangles 2 mm apart over a film of 0.1 mm (tri), as drawn, in place of this cell",
+    Remedy("film", "triangles 2 mm apart over a film of 0.1 mm (tri), as drawn, in place of this cell",
            "a print may lose the apexes, or short through a film of one or two layers: see sensorgen check tri", cell),
-    Change("film", "a film six times softer (X60: 1 MPa by Table 4.1 in place of 6 MPa)",
+    Remedy("film", "a film six times softer (X60: 1 MPa by Table 4.1 in place of 6 MPa)",
            "softer filaments are hard to feed, and creep more", soft_film),
-    Change("film", "a film half as thick", "it shorts sooner, and if bonded is four times stiffer", thin_film),
-    Change("electrodes", "electrodes of at least 0.83 ohm m (another filament than PI-eTPU, or little carbon)",
+    Remedy("film", "a film half as thick", "it shorts sooner, and if bonded is four times stiffer", thin_film),
+    Remedy("electrodes", "electrodes of at least 0.83 ohm m (another filament than PI-eTPU, or little carbon)",
            "resistance then scatters and drifts more with strain and temperature", worse_filament),
-    Change("electrodes", "electrodes five times as resistive", "needs another filament: little carbon scatters much",
+    Remedy("electrodes", "electrodes five times as resistive", "needs another filament: little carbon scatters much",
            resistive),
-    Change("electrodes", "electrodes half as thick", "few layers: gaps in one of them cut the track", thin_electrodes),
-    Change("outline", "half the width", "a smaller target, and twice the pressure on the film", narrow),
-    Change("far end", "a resistor at the far end, as large as both electrodes", "a contact at the far end", ended),
-    Change("tip", "a tip twice as long", "two presses closer than the tip become one", tip(2.0)),
-    Change("tip", "a tip half as long", "twice the pressure on the film", tip(0.5)),
-    Change("frequencies", "ten times higher frequencies, {lowest} to {highest}",
+    Remedy("electrodes", "electrodes half as thick", "few layers: gaps in one of them cut the track", thin_electrodes),
+    Remedy("outline", "half the width", "a smaller target, and twice the pressure on the film", narrow),
+    Remedy("far end", "a resistor at the far end, as large as both electrodes", "a contact at the far end", ended),
+    Remedy("tip", "a tip twice as long", "two presses closer than the tip become one", tip(2.0)),
+    Remedy("tip", "a tip half as long", "twice the pressure on the film", tip(0.5)),
+    Remedy("frequencies", "ten times higher frequencies, {lowest} to {highest}",
            "stray capacitance and leads count more", higher_frequencies),
-    Change("frequencies", "{count} frequencies about the corner, log-spaced from {lowest} to {highest}",
+    Remedy("frequencies", "{count} frequencies about the corner, log-spaced from {lowest} to {highest}",
            "stray capacitance and leads count more", frequencies_at_corner),
-    Change("noise", "a tenth of the noise", "a hundred readings averaged in place of one, or a better bridge", quieter),
+    Remedy("noise", "a tenth of the noise", "a hundred readings averaged in place of one, or a better bridge", quieter),
 )  # fmt: skip

@@ -24,7 +24,7 @@ class Slopes(NamedTuple):
     by_position_per_m: Complex
 
 
-class Bounds(NamedTuple):
+class LeastErrors(NamedTuple):
     """Least standard errors of any unbiased estimate of a press; nan where they are undefined."""
 
     force_n: Real
@@ -60,7 +60,7 @@ class Setup:
     highest_hz: float
     assumed: str = ""
 
-    def bounds(self) -> Bounds:
+    def bounds(self) -> LeastErrors:
         """Bounds of the press by these readings."""
         return bounds(slopes(self.sensor, self.frequency_hz, self.force_n, self.position_m), self.noise)
 
@@ -93,7 +93,7 @@ def slopes(sensor: Sensor, frequency_hz: ArrayLike, force_n: ArrayLike, position
     return Slopes(by_force / z, np.where(force == 0, 0.0, by_position / z))  # at the ends rounding would leave residues
 
 
-def bounds(found: Slopes, noise: float) -> Bounds:
+def bounds(found: Slopes, noise: float) -> LeastErrors:
     """Cramer-Rao bounds of force and position, both unknown: see :func:`sensorgen.prediction.inference.cramer_rao`.
 
     Slopes are those of ln Z; real and imaginary parts of all frequencies count alike.
@@ -120,7 +120,7 @@ def bounds(found: Slopes, noise: float) -> Bounds:
     (0.005, 0.002)
     """
     force, position, correlation = cramer_rao(*found)
-    return Bounds(noise * force, noise * position, correlation)
+    return LeastErrors(noise * force, noise * position, correlation)
 
 
 def shares(found: Slopes) -> tuple[Real, Real]:
@@ -161,7 +161,7 @@ def bearable(sensor: Sensor, force_n: Real, position_m: Real) -> Mask:
     return np.array([defined(np.asarray(one)) for one in stress.ravel()]).reshape(stress.shape)
 
 
-def standard_errors(limits: Bounds) -> StandardErrors:
+def standard_errors(limits: LeastErrors) -> StandardErrors:
     """Bounds of one press, None where they are undefined."""
     return StandardErrors(
         sigma_force_n=finite(limits.force_n),

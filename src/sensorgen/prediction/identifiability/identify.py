@@ -9,7 +9,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.identifiability import changes, fisher, frequencies, results, verdict
-from sensorgen.prediction.identifiability.fisher import Bounds, Setup
+from sensorgen.prediction.identifiability.fisher import LeastErrors, Setup
 from sensorgen.prediction.identifiability.results import Identifiability, StandardErrors, cartesian, finite
 from sensorgen.prediction.query import FORCE_N, NOISE
 
@@ -137,12 +137,12 @@ def _frequencies(setup: Setup, slopes: fisher.Slopes) -> tuple[results.Frequency
     )  # fmt: skip
 
 
-def surface(setup: Setup, force_n: Real, position_m: Real) -> Bounds:
+def surface(setup: Setup, force_n: Real, position_m: Real) -> LeastErrors:
     """Bounds over forces (rows, [N]) and positions (columns, [m]); nan where undefined or the electrodes touch."""
     force, place = np.broadcast_arrays(force_n[:, None], position_m)
     valid = fisher.bearable(setup.sensor, force, place)
     slopes = fisher.slopes(setup.sensor, setup.frequency_hz, np.where(valid, force, 0.0), place)
-    return Bounds(*(np.where(valid, value, np.nan) for value in fisher.bounds(slopes, setup.noise)))
+    return LeastErrors(*(np.where(valid, value, np.nan) for value in fisher.bounds(slopes, setup.noise)))
 
 
 def _map(setup: Setup, need: verdict.Required) -> results.ErrorMap:

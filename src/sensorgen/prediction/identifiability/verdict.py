@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sensorgen.core.arrays import Real
-from sensorgen.prediction.identifiability.fisher import Bounds, Setup
+from sensorgen.prediction.identifiability.fisher import LeastErrors, Setup
 from sensorgen.prediction.identifiability.results import FORCE_SHARE, GUESS, StandardErrors, metres, newtons
 
 _FORCE = {"yes": "senses force", "roughly": "senses force only roughly", "no": "cannot sense force"}
@@ -33,7 +33,7 @@ class Required:
     guess_force_n: float
     guess_position_m: float
 
-    def shortfall(self, bounds: Bounds) -> Real:
+    def shortfall(self, bounds: LeastErrors) -> Real:
         """By what factor the worse of both errors exceeds what is required [-]; infinite where undefined."""
         with np.errstate(all="ignore"):  # without force, nothing is required
             worse = np.maximum(bounds.force_n / self.force_n, bounds.position_m / self.position_m)
@@ -64,7 +64,7 @@ def _grade(sigma: float, serves: float, guess: float) -> str:
     return "roughly" if sigma < guess else "no"
 
 
-def verdict(setup: Setup, bounds: Bounds, need: Required, reason: str) -> str:
+def verdict(setup: Setup, bounds: LeastErrors, need: Required, reason: str) -> str:
     """Verdict on a design, in one sentence; ``reason`` says why position is undefined."""
     where = f"at {setup.force_n:g} N and {setup.position_m * 1e3:g} mm"
     unless = f"not known, as {setup.assumed}; if it did: " if setup.assumed else ""
@@ -75,7 +75,7 @@ def verdict(setup: Setup, bounds: Bounds, need: Required, reason: str) -> str:
     )
 
 
-def bracket(free: Bounds, stiff: Bounds, need: Required) -> str:
+def bracket(free: LeastErrors, stiff: LeastErrors, need: Required) -> str:
     """The verdict where the law of compression lies anywhere between a free and a confined film."""
     certain = ": what it cannot do is certain" if "no" in _grades(free, need) else ""
     return (
@@ -84,10 +84,10 @@ def bracket(free: Bounds, stiff: Bounds, need: Required) -> str:
     )
 
 
-def _ability(bounds: Bounds, need: Required) -> str:
+def _ability(bounds: LeastErrors, need: Required) -> str:
     force, position = _grades(bounds, need)
     return f"{_FORCE[force]} and {_POSITION[position]}"
 
 
-def _grades(bounds: Bounds, need: Required) -> tuple[str, str]:
+def _grades(bounds: LeastErrors, need: Required) -> tuple[str, str]:
     return need.force(float(bounds.force_n)), need.position(float(bounds.position_m))

@@ -7,7 +7,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Mask, Real
 from sensorgen.prediction import inference
-from sensorgen.prediction.inference import Fit, Index
+from sensorgen.prediction.inference import Index, LocalFit
 from sensorgen.prediction.inverse.table import Local
 
 LOOSE, TIGHT = 0.2, 0.01  # share of the residual that a step still removes when a sample is done (Bates and Watts 1981)
@@ -19,7 +19,7 @@ Model = Callable[[Real], Local]
 
 
 @dataclass(frozen=True)
-class Target:
+class FitGoal:
     """Goal of a fit: responses with their weights, and a normal prior.
 
     Attributes
@@ -35,30 +35,32 @@ class Target:
     expected: Real
     information: Real
 
-    def rows(self, rows: Index) -> "Target":
+    def rows(self, rows: Index) -> "FitGoal":
         """Some of the samples."""
-        return Target(self.response[rows], self.weight[rows], self.expected, self.information)
+        return FitGoal(self.response[rows], self.weight[rows], self.expected, self.information)
 
-    def fit(self, press: Real, local: Local) -> Fit:
+    def fit(self, press: Real, local: Local) -> LocalFit:
         """Fit of the responses by presses."""
         residual = (self.response - local.value) * self.weight
-        return Fit.of(press, residual, local.slope * self.weight[:, None]).with_prior(self.expected, self.information)
+        return LocalFit.of(press, residual, local.slope * self.weight[:, None]).with_prior(
+            self.expected, self.information
+        )
 
 
 @dataclass(frozen=True)
 class _Presses(inference.LeastSquares):
     """Responses to be explained by presses in the unit square, which no step leaves."""
 
-    target: Target
+    target: FitGoal
     model: Model
     offset: float
     damping = 1e-3
 
-    def fit(self, at: Real, rows: Index) -> Fit:
+    def fit(self, at: Real, rows: Index) -> LocalFit:
         """Fit of some samples by presses."""
         return self.target.rows(rows).fit(at, self.model(at))
 
-    def step(self, fit: Fit, damping: Real) -> Real:
+    def step(self, fit: LocalFit, damping: Real) -> Real:
         """Step to the least squares of the linear model; along an edge where it would leave the square."""
         (ff, fx), (_, xx) = fit.information.transpose(1, 2, 0)
         ff, xx = ff * (1 + damping) + _FLOOR, xx * (1 + damping) + _FLOOR
@@ -73,18 +75,18 @@ class _Presses(inference.LeastSquares):
         inside = np.where(within == force, inside, (by_position - fx * within) / xx)
         return np.stack([within, _inside(at_position, inside)], 1)
 
-    def done(self, fit: Fit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
+    def done(self, fit: LocalFit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
         """Samples within the accuracy asked for; one far below noise goes on to the end."""
         rounding = ROUNDING**2 * np.einsum("nk,nk->n", self.target.weight[rows], self.target.weight[rows])
         return np.asarray(gain <= self.offset**2 * fit.chi2 * np.minimum(fit.chi2, 1.0) + rounding)
 
 
-def descend(target: Target, model: Model, start: Real, offset: float) -> Fit:
+def descend(target: FitGoal, model: Model, start: Real, offset: float) -> LocalFit:
     """Least squares from a start in the unit square.
 
     Parameters
     ----------
-    target : Target
+    target : FitGoal
         Responses and prior.
     model : callable
         Response and derivatives at scaled presses.

@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.inference import Fit, Index, Samples, parts
-from sensorgen.prediction.inverse.descent import LOOSE, TIGHT, Target, descend
+from sensorgen.prediction.inference import Index, LocalFit, Samples, parts
+from sensorgen.prediction.inverse.descent import LOOSE, TIGHT, FitGoal, descend
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N, Forward
-from sensorgen.prediction.inverse.prior import Posterior, Prior, posterior
-from sensorgen.prediction.inverse.single import Press, Single
-from sensorgen.prediction.inverse.table import Local, Table
+from sensorgen.prediction.inverse.prior import PressPosterior, Prior, posterior
+from sensorgen.prediction.inverse.single import PressEstimate, Single
+from sensorgen.prediction.inverse.table import Local, ResponseTable
 from sensorgen.prediction.inverse.verdict import NORMAL_90, PAIR, Status, covariance, statuses
 
 NOISE = 1e-3
@@ -62,7 +62,7 @@ class Estimates(Samples):
 class _Pair(NamedTuple):
     """The best presses of a block, and others that explain it as well: rows and scaled presses."""
 
-    best: Fit
+    best: LocalFit
     rows: Index
     others: Real
 
@@ -111,7 +111,7 @@ class Estimator:
         self._forward = Forward(sensor, frequency_hz)
         self.frequency_hz, self.prior = self._forward.frequency_hz, prior
         self._sigma = _noise(noise, len(self.frequency_hz))
-        self._table = Table(self._forward, self._forward.force_limit_n(force_limit_n))
+        self._table = ResponseTable(self._forward, self._forward.force_limit_n(force_limit_n))
         self.scale = self._table.scale
         rival, gap = self._table.rivals(self._sigma)
         self._rival = np.where(gap < _RIVAL, rival, -1)
@@ -125,7 +125,7 @@ class Estimator:
             return ()
         return ("one frequency gives two numbers for two unknowns: bad readings cannot be detected",)
 
-    def one(self, impedance_ohm: ArrayLike) -> Press:
+    def one(self, impedance_ohm: ArrayLike) -> PressEstimate:
         """The press behind one reading (n_tones,) [ohm]; errors as :meth:`batch`.
 
         A complete reading that one press explains takes a shorter way to the same result.
@@ -136,7 +136,7 @@ class Estimator:
             if plain is not None:
                 return plain
         found = self._block(z)
-        return Press(
+        return PressEstimate(
             float(found.force_n[0]),
             float(found.position_m[0]),
             found.covariance[0],
@@ -175,7 +175,7 @@ class Estimator:
         measured = np.isfinite(z) & (z != 0)
         response = parts(np.log(np.where(measured, z, 1.0)))
         weight = np.tile(measured, 2) / self._sigma
-        target = Target(response, weight, self._expected, self._information)
+        target = FitGoal(response, weight, self._expected, self._information)
         found = self._least_squares(target)
         own = covariance(found.best.information - self._information)
         tones = measured.sum(1)
@@ -185,15 +185,15 @@ class Estimator:
         known = self._known(target, found.best)
         return self._in_si(found, known, status, tones)
 
-    def _known(self, target: Target, fit: Fit) -> Posterior:
+    def _known(self, target: FitGoal, fit: LocalFit) -> PressPosterior:
         """Means, covariances and intervals of scaled presses."""
         if self.prior is not None:
             return posterior(target, self._table, fit)
         spread = covariance(fit.information)
         reach = NORMAL_90 * np.sqrt(spread[:, _DIAGONAL, _DIAGONAL])
-        return Posterior(fit.at, spread, fit.at - reach, fit.at + reach)
+        return PressPosterior(fit.at, spread, fit.at - reach, fit.at + reach)
 
-    def _least_squares(self, target: Target) -> _Pair:
+    def _least_squares(self, target: FitGoal) -> _Pair:
         table = self._table
         start = table.nearest(target.response, target.weight)
         best = descend(target, self._exact, descend(target, table.at, start, LOOSE).at, TIGHT)
@@ -217,7 +217,9 @@ class Estimator:
         exact = parts(self._forward.log_impedance(force, np.minimum(position, self.scale[1])))
         return Local(exact, self._table.at(press).slope)
 
-    def _in_si(self, found: _Pair, known: Posterior, status: NDArray[np.uint8], tones: NDArray[np.intp]) -> Estimates:
+    def _in_si(
+        self, found: _Pair, known: PressPosterior, status: NDArray[np.uint8], tones: NDArray[np.intp]
+    ) -> Estimates:
         empty = status == Status.MISSING
         others = np.full((len(tones), 2), np.nan)
         others[found.rows] = found.others
@@ -249,7 +251,7 @@ def estimate(
     return Estimator(sensor, frequency_hz, noise, prior).batch(impedance_ohm)
 
 
-def _within_noise(best: Fit, rows: Index, second: Fit) -> _Pair:
+def _within_noise(best: LocalFit, rows: Index, second: LocalFit) -> _Pair:
     """Those second presses that are presses of their own and explain the reading as well."""
     first = best.rows(rows)
     apart = second.at - first.at

@@ -6,9 +6,9 @@ import numpy as np
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
-from sensorgen.prediction.inference import Fit, Samples
-from sensorgen.prediction.inverse.descent import Target
-from sensorgen.prediction.inverse.table import Table
+from sensorgen.prediction.inference import LocalFit, Samples
+from sensorgen.prediction.inverse.descent import FitGoal
+from sensorgen.prediction.inverse.table import ResponseTable
 
 GUESS_INFORMATION = 12.0  # 1/variance of a uniform guess on a unit length
 _POSITIONS, _FORCES = 32, 16
@@ -51,7 +51,7 @@ class Prior:
 
 
 @dataclass(frozen=True)
-class Posterior(Samples):
+class PressPosterior(Samples):
     """Posterior of scaled presses; rows are samples."""
 
     mean: Real
@@ -62,7 +62,7 @@ class Posterior(Samples):
     """(n, 2): 95 % lie below."""
 
 
-def posterior(target: Target, table: Table, fit: Fit) -> Posterior:
+def posterior(target: FitGoal, table: ResponseTable, fit: LocalFit) -> PressPosterior:
     """Posterior means, covariances and 90 % intervals of scaled presses.
 
     Positions are spread over what the fit leaves open, at each of them forces over what that position leaves open: the
@@ -70,19 +70,19 @@ def posterior(target: Target, table: Table, fit: Fit) -> Posterior:
 
     Parameters
     ----------
-    target : Target
+    target : FitGoal
         The responses, and the prior.
-    table : Table
+    table : ResponseTable
         The sensor.
-    fit : Fit
+    fit : LocalFit
         Its least squares.
     """
     n = len(fit.at)
     blocks = np.split(np.arange(n), range(_BLOCK, n, _BLOCK))
-    return Posterior.joined([_posterior(target.rows(rows), table, fit.rows(rows)) for rows in blocks])
+    return PressPosterior.joined([_posterior(target.rows(rows), table, fit.rows(rows)) for rows in blocks])
 
 
-def _posterior(target: Target, table: Table, fit: Fit) -> Posterior:
+def _posterior(target: FitGoal, table: ResponseTable, fit: LocalFit) -> PressPosterior:
     information = fit.information + np.eye(2) * GUESS_INFORMATION
     deviation = np.sqrt(np.linalg.inv(information)[:, 1, 1])
     x, dx = _spread(fit.at[:, 1], deviation, _POSITIONS)
@@ -103,7 +103,7 @@ def _spread(middle: Real, deviation: Real, count: int) -> tuple[Real, Real]:
     return low[:, None] + step[:, None] * (np.arange(count) + 0.5), step
 
 
-def _ridge(target: Target, table: Table, force: Real, position: Real) -> tuple[Real, Real]:
+def _ridge(target: FitGoal, table: ResponseTable, force: Real, position: Real) -> tuple[Real, Real]:
     """The most probable force at each position, and its standard error."""
     for _ in range(_STEPS):
         press = np.stack([force, position], -1)
@@ -113,12 +113,12 @@ def _ridge(target: Target, table: Table, force: Real, position: Real) -> tuple[R
     return force, 1 / np.sqrt(information)
 
 
-def _moments(press: Real, weight: Real) -> Posterior:
+def _moments(press: Real, weight: Real) -> PressPosterior:
     mean = np.einsum("nk,nki->ni", weight, press)
     off = press - mean[:, None]
     covariance = np.einsum("nk,nki,nkj->nij", weight, off, off)
     low, high = (np.stack([_quantile(press[:, :, i], weight, p) for i in (0, 1)], -1) for p in (0.05, 0.95))
-    return Posterior(mean, covariance, low, high)
+    return PressPosterior(mean, covariance, low, high)
 
 
 def _quantile(value: Real, weight: Real, share: float) -> Real:

@@ -10,7 +10,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.prediction.inference import Index, parts
 from sensorgen.prediction.inverse.descent import LOOSE, REACH, ROUNDING, TIGHT
 from sensorgen.prediction.inverse.forward import Forward, Scalar
-from sensorgen.prediction.inverse.table import Table
+from sensorgen.prediction.inverse.table import ResponseTable
 from sensorgen.prediction.inverse.verdict import PAIR, Status, chi2_limit
 
 _ROUGH = 2  # steps on the table before the exact model is used
@@ -20,7 +20,7 @@ _SAME = PAIR / 2  # far below PAIR, the table being only near the truth
 _GUESS = 1 / 12  # variance of a guess on the unit length
 
 
-class Press(NamedTuple):
+class PressEstimate(NamedTuple):
     """One estimate of a stream, as those of a batch [N], [m]."""
 
     force_n: float
@@ -70,7 +70,7 @@ class Single:
     ----------
     forward : Forward
         The exact model.
-    table : Table
+    table : ResponseTable
         Its table.
     sigma : (2 n_tones,) array
         Standard deviations of ln Z.
@@ -78,14 +78,14 @@ class Single:
         For every cell, the cell whose presses may explain its readings as well, or -1.
     """
 
-    def __init__(self, forward: Forward, table: Table, sigma: Real, rival: Index) -> None:
+    def __init__(self, forward: Forward, table: ResponseTable, sigma: Real, rival: Index) -> None:
         self._model, self._table, self._weight, self._rival = Scalar(forward), table, 1 / sigma, rival.tolist()
         self._edges = [edges.tolist() for edges in table.edges]
         self._limit = float(chi2_limit(np.array([len(sigma) - 2]))[0])
         self._rounding = ROUNDING**2 * float(self._weight @ self._weight)
         self._scale = table.scale.tolist()
 
-    def press(self, response: Real) -> Press | None:
+    def press(self, response: Real) -> PressEstimate | None:
         """The press behind ln Z (1, 2 n_tones); None where the batch has to look at it."""
         force, position = self._table.nearest(response, self._weight[None])[0].tolist()
         for _ in range(_ROUGH):
@@ -144,7 +144,7 @@ class Single:
                 return normal.chi2 - gain > best.chi2 + 2 * PAIR or apart < _SAME
         return False
 
-    def _answer(self, response: Real, force: float, position: float, normal: _Normal) -> Press | None:
+    def _answer(self, response: Real, force: float, position: float, normal: _Normal) -> PressEstimate | None:
         """The press in SI units, unless its verdict is not the plain one."""
         determinant = normal.ff * normal.xx - normal.fx**2
         variances = normal.xx / determinant, normal.ff / determinant
@@ -154,7 +154,7 @@ class Single:
             return None
         mixed = -normal.fx / determinant
         covariance = np.array([[variances[0], mixed], [mixed, variances[1]]]) * np.outer(self._scale, self._scale)
-        return Press(force * self._scale[0], position * self._scale[1], covariance, Status.OK)
+        return PressEstimate(force * self._scale[0], position * self._scale[1], covariance, Status.OK)
 
 
 def _inside(at: float, step: float) -> float:

@@ -38,7 +38,7 @@ class Local(NamedTuple):
     """(n, 2, 2 n_tones)."""
 
 
-class Table:
+class ResponseTable:
     """Responses of one sensor over the unit square.
 
     Parameters

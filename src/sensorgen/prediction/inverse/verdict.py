@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Mask, Real
-from sensorgen.prediction.inference import Fit
+from sensorgen.prediction.inference import LocalFit
 from sensorgen.prediction.inverse.statuses import Worded
 
 NORMAL_90 = 1.6448536269514722  # normal deviate of 5 %
@@ -56,12 +56,12 @@ def covariance(fisher: Real) -> Real:
     return inverse
 
 
-def statuses(fit: Fit, variance: Real, tones: NDArray[np.intp], ambiguous: Mask) -> NDArray[np.uint8]:
+def statuses(fit: LocalFit, variance: Real, tones: NDArray[np.intp], ambiguous: Mask) -> NDArray[np.uint8]:
     """Verdicts on least-squares estimates.
 
     Parameters
     ----------
-    fit : Fit
+    fit : LocalFit
         The estimates, scaled.
     variance : (n, 2) array
         Of scaled force and position, from the data alone.

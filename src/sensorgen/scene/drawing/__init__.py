@@ -18,7 +18,7 @@ from importlib import resources
 
 from sensorgen.core.findings import Finding
 from sensorgen.scene.drawing import dimensions, layers, markers, overview, panels, titleblock
-from sensorgen.scene.drawing.panels import Colours, Panel
+from sensorgen.scene.drawing.panels import Colours, ViewPanel
 from sensorgen.scene.drawing.paper import ARROWS, box, element, escaped, line
 from sensorgen.scene.drawing.view import Measure, heights, nearest, views, widths
 from sensorgen.scene.scene import Point, Scene
@@ -95,7 +95,7 @@ def svg(
     return _page(title, parts)
 
 
-def _details(scene: Scene, grid: Sequence[float]) -> tuple[Lanes, list[Panel]]:
+def _details(scene: Scene, grid: Sequence[float]) -> tuple[Lanes, list[ViewPanel]]:
     """The lanes of heights and the detail views between them and the layers' numbers."""
     height = scene.size_mm[2]
     seen = views(scene)
@@ -108,7 +108,7 @@ def _details(scene: Scene, grid: Sequence[float]) -> tuple[Lanes, list[Panel]]:
 
 
 def _sections(
-    scene: Scene, details: Sequence[Panel], lanes: Lanes, grid: Sequence[float], colours: Colours
+    scene: Scene, details: Sequence[ViewPanel], lanes: Lanes, grid: Sequence[float], colours: Colours
 ) -> Iterator[str]:
     """The sections with layer grid, dimensions, captions and letters."""
     letters = panels.letters(scene.bodies)

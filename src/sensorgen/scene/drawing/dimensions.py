@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 from itertools import accumulate, pairwise
 
-from sensorgen.scene.drawing.panels import Panel
-from sensorgen.scene.drawing.paper import Frame, line, number, seen, spread, text, width
+from sensorgen.scene.drawing.panels import ViewPanel
+from sensorgen.scene.drawing.paper import ViewFrame, line, number, seen, spread, text, width
 from sensorgen.scene.drawing.view import Gap, Measure
 from sensorgen.scene.scene import Point
 
@@ -19,7 +19,7 @@ def lane_width(lane: Sequence[Measure]) -> float:
     return max(width(number(m.value_mm)) for m in lane) + 4.5
 
 
-def beside(frame: Frame, lanes: Sequence[Sequence[Measure]]) -> Iterator[str]:
+def beside(frame: ViewFrame, lanes: Sequence[Sequence[Measure]]) -> Iterator[str]:
     """Lanes of vertical measures, left of a view."""
     places = accumulate((-lane_width(lane) for lane in lanes[:-1]), initial=frame.left - 4.0)
     lanes_at = list(zip(places, lanes, strict=True))
@@ -50,7 +50,7 @@ def _beside_lines(middle: float, passing: Sequence[float]) -> float:
     return middle if abs(near - middle) >= CLEAR else near + (CLEAR if middle >= near else -CLEAR)
 
 
-def rows(frame: Frame, found: Sequence[Sequence[Measure]], start: float, step: float) -> Iterator[str]:
+def rows(frame: ViewFrame, found: Sequence[Sequence[Measure]], start: float, step: float) -> Iterator[str]:
     """Rows of horizontal measures from ``start`` outwards; ``step`` is negative above a view [mm]."""
     rows_at = [(start + k * step, row) for k, row in enumerate(row for row in found if _fits(frame, row))]
     beyond = 1.0 if step > 0 else -1.0
@@ -66,7 +66,7 @@ def rows(frame: Frame, found: Sequence[Sequence[Measure]], start: float, step: f
             yield text("middle halo", place, y - 0.8, number(m.value_mm))
 
 
-def _fits(frame: Frame, row: Sequence[Measure]) -> bool:
+def _fits(frame: ViewFrame, row: Sequence[Measure]) -> bool:
     """True where a row can be read: its values are no longer than itself."""
     length = sum(m.value_mm for m in row) * frame.per_mm
     return length >= NARROW if len(row) == 1 else sum(width(number(m.value_mm)) for m in row) < length
@@ -77,7 +77,7 @@ def _distance(a: Point, b: Point) -> str:
     return line("dim" if length >= ARROWS else "tick", *a, *b)
 
 
-def gap(panel: Panel, found: Gap) -> tuple[str, list[Point]]:
+def gap(panel: ViewPanel, found: Gap) -> tuple[str, list[Point]]:
     """The electrode gap in its view, and the room on the page that it takes."""
     (x0, y0), (x1, y1) = panel.place(found.near), panel.place(found.far)
     words = f"gap {number(found.value_mm)}" if found.value_mm > 1e-6 else "gap 0: short"

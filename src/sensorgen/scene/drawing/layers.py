@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from sensorgen.scene.drawing.paper import Frame, element, line, number, text
+from sensorgen.scene.drawing.paper import ViewFrame, element, line, number, text
 
 LABEL_PITCH, LINE_PITCH, MID_PITCH = 2.7, 0.4, 1.4  # least distance on paper [mm]
 MANY = 60  # above so many layers every tenth number is enough
@@ -11,7 +11,7 @@ STEPS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 WIDTH = 19.0  # room for numbers and heights [mm]
 
 
-def grid(frame: Frame, boundaries_mm: Sequence[float], right: float) -> Iterator[str]:
+def grid(frame: ViewFrame, boundaries_mm: Sequence[float], right: float) -> Iterator[str]:
     """Lines at the boundaries up to ``right`` on the page [mm], and dashed ones where slicers sample."""
     pitch = _pitch(frame, boundaries_mm)
     mids = [(a + b) / 2 for a, b in pairwise(boundaries_mm)] if pitch >= MID_PITCH else []
@@ -24,7 +24,7 @@ def grid(frame: Frame, boundaries_mm: Sequence[float], right: float) -> Iterator
         yield element("path", "mid", d=_path(frame, mids, right))
 
 
-def labels(frame: Frame, boundaries_mm: Sequence[float], left: float) -> Iterator[str]:
+def labels(frame: ViewFrame, boundaries_mm: Sequence[float], left: float) -> Iterator[str]:
     """Number of each layer at its middle, height at its boundary, from ``left`` on the page [mm]."""
     step = _step(_pitch(frame, boundaries_mm), LABEL_PITCH)
     step = max(step, 10) if len(boundaries_mm) > MANY + 1 else step
@@ -39,7 +39,7 @@ def labels(frame: Frame, boundaries_mm: Sequence[float], left: float) -> Iterato
             yield line("grid", left + 7.5, frame.y(high), left + 9.5, frame.y(high))
 
 
-def words(frame: Frame, boundaries_mm: Sequence[float]) -> str:
+def words(frame: ViewFrame, boundaries_mm: Sequence[float]) -> str:
     """The layers in one line, for the title block."""
     count = len(boundaries_mm) - 1
     if count < 1:
@@ -51,7 +51,7 @@ def words(frame: Frame, boundaries_mm: Sequence[float]) -> str:
     return f"{count} layer{'s' * (count > 1)} of {number(later)} mm{other}{every}"
 
 
-def _pitch(frame: Frame, boundaries_mm: Sequence[float]) -> float:
+def _pitch(frame: ViewFrame, boundaries_mm: Sequence[float]) -> float:
     """Least height of a layer on paper [mm]."""
     return min((frame.y(a) - frame.y(b) for a, b in pairwise(boundaries_mm)), default=1.0)
 
@@ -60,5 +60,5 @@ def _step(pitch: float, least: float) -> int:
     return next((step for step in STEPS if step * pitch >= least), STEPS[-1])
 
 
-def _path(frame: Frame, heights_mm: Sequence[float], right: float) -> str:
+def _path(frame: ViewFrame, heights_mm: Sequence[float], right: float) -> str:
     return "".join(f"M{number(frame.left - 1)} {number(frame.y(z))}H{number(right)}" for z in heights_mm)

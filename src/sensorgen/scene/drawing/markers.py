@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import cos, hypot, pi, sin
 
 from sensorgen.core.findings import Finding, counted, counts, grouped
-from sensorgen.scene.drawing.panels import GUTTER, Panel, Room
+from sensorgen.scene.drawing.panels import GUTTER, Room, ViewPanel
 from sensorgen.scene.drawing.paper import element, fitted, line, spread, text, wrapped
 from sensorgen.scene.scene import AXES, Point
 
@@ -30,7 +30,7 @@ class Marked:
 
 
 @dataclass(frozen=True)
-class Entry:
+class MarkerEntry:
     """A finding in the list: its lines with their classes, and where they begin on the page [mm]."""
 
     mark: Marked
@@ -53,7 +53,7 @@ def height_mm(finding: Finding, boundaries_mm: Sequence[float]) -> float | None:
     return None
 
 
-def along_mm(finding: Finding, panel: Panel) -> float | None:
+def along_mm(finding: Finding, panel: ViewPanel) -> float | None:
     """Where along a view a finding is; None without a place or outside of the view [mm]."""
     if finding.place_mm is None:
         return None
@@ -61,7 +61,7 @@ def along_mm(finding: Finding, panel: Panel) -> float | None:
     return along if 0 <= along <= panel.view.end_mm else None
 
 
-def panel_of(finding: Finding, panels: Sequence[Panel]) -> int:
+def panel_of(finding: Finding, panels: Sequence[ViewPanel]) -> int:
     """Number of the panel that shows a finding: one whose window holds it, cut as near to it as can be."""
 
     def far(k: int) -> tuple[bool, float]:
@@ -75,7 +75,7 @@ def panel_of(finding: Finding, panels: Sequence[Panel]) -> int:
 
 
 def on_detail(
-    marked: Sequence[Marked], panels: Sequence[Panel], boundaries_mm: Sequence[float], taken: list[Point]
+    marked: Sequence[Marked], panels: Sequence[ViewPanel], boundaries_mm: Sequence[float], taken: list[Point]
 ) -> Iterator[str]:
     """Markers on the detail views, as many as fit clear of ``taken``; those without a place at the right edge."""
     edges: dict[int, list[tuple[Point, Marked]]] = {}
@@ -99,13 +99,13 @@ def on_detail(
             yield _marker(mark, spot, (frame.right + GUTTER / 2 + 0.6, y))
 
 
-def _spot(panel: Panel, along: float | None, z: float) -> Point:
+def _spot(panel: ViewPanel, along: float | None, z: float) -> Point:
     """Place of a finding on the page; the right edge where it has none, and never off the view [mm]."""
     x, y = panel.place((panel.view.end_mm if along is None else along, z))
     return x, min(max(y, panel.frame.top), panel.frame.bed)
 
 
-def on_overview(marked: Sequence[Marked], details: Sequence[Panel], wholes: Sequence[Panel]) -> Iterator[str]:
+def on_overview(marked: Sequence[Marked], details: Sequence[ViewPanel], wholes: Sequence[ViewPanel]) -> Iterator[str]:
     """Markers on the overview strips, for those that lie outside of the detail views."""
     for k, (detail, whole) in enumerate(zip(details, wholes, strict=True)):
         far = []
@@ -120,7 +120,7 @@ def on_overview(marked: Sequence[Marked], details: Sequence[Panel], wholes: Sequ
             yield _marker(mark, spot, (x, whole.frame.top - 3.2))
 
 
-def _free(spot: Point, panel: Panel, taken: Sequence[Point]) -> Point | None:
+def _free(spot: Point, panel: ViewPanel, taken: Sequence[Point]) -> Point | None:
     """A place for a marker near its spot that covers nothing else; None where there is none."""
     frame = panel.frame
     for distance in DISTANCES:
@@ -147,14 +147,14 @@ def _balloon(mark: Marked, x: float, y: float) -> str:
     return element("circle", f"balloon {mark.kind}", cx=x, cy=y, r=RADIUS) + text(ink, x, y + 0.85, str(mark.number))
 
 
-def placed(marked: Sequence[Marked], letters: Mapping[str, str], room: Room) -> list[Entry]:
+def placed(marked: Sequence[Marked], letters: Mapping[str, str], room: Room) -> list[MarkerEntry]:
     """As many findings, each with its whole text, as there is room for on the page, in two columns.
 
     Only a text longer than a column is cut.
     """
     left, top, right, bottom = room
     wide = (right - left - COLUMNS_APART) / 2
-    entries: list[Entry] = []
+    entries: list[MarkerEntry] = []
     x, y = left, top
     for mark in marked:
         rows = _rows(mark, letters, wide - INDENT, int((bottom - top) / LINE) + 1)
@@ -162,12 +162,14 @@ def placed(marked: Sequence[Marked], letters: Mapping[str, str], room: Room) -> 
             x, y = x + wide + COLUMNS_APART, top
         if x > right - wide + 1e-9:
             break
-        entries.append(Entry(mark, x, y, rows))
+        entries.append(MarkerEntry(mark, x, y, rows))
         y += len(rows) * LINE + 0.6
     return entries
 
 
-def listed(entries: Sequence[Entry], marked: Sequence[Marked], left: float, top: float, room: float) -> Iterator[str]:
+def listed(
+    entries: Sequence[MarkerEntry], marked: Sequence[Marked], left: float, top: float, room: float
+) -> Iterator[str]:
     """The list of findings under its heading [mm on the page]."""
     words = counted(counts([mark.finding for mark in marked]))
     rest = f"; {len(marked) - len(entries)} not shown: sensorgen check lists all" if len(entries) < len(marked) else ""

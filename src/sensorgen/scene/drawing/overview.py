@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from sensorgen.scene.drawing import dimensions
-from sensorgen.scene.drawing.panels import Colours, Panel, materials
-from sensorgen.scene.drawing.paper import Frame, box, fitted, number, text
+from sensorgen.scene.drawing.panels import Colours, ViewPanel, materials
+from sensorgen.scene.drawing.paper import ViewFrame, box, fitted, number, text
 from sensorgen.scene.drawing.view import Measure
 from sensorgen.scene.scene import AXES, Scene
 
@@ -15,7 +15,7 @@ MOST_CORNERS = 6000
 LEFT, RIGHT = 14.0, 4.0  # room beside a strip [mm]
 
 
-def arrange(details: Sequence[Panel], height_mm: float, left: float, right: float, top: float) -> list[Panel]:
+def arrange(details: Sequence[ViewPanel], height_mm: float, left: float, right: float, top: float) -> list[ViewPanel]:
     """A strip for each detail view, side by side on the page [mm]."""
     each = (right - left) / len(details)
     up = HEIGHT / height_mm
@@ -24,11 +24,11 @@ def arrange(details: Sequence[Panel], height_mm: float, left: float, right: floa
         view = replace(detail.view, end_mm=detail.view.extent_mm)
         along = min((each - LEFT - RIGHT) / view.extent_mm, up)
         start = left + k * each + LEFT
-        panels.append(Panel(view, Frame(start, top + HEIGHT, start + view.extent_mm * along, top, along, up)))
+        panels.append(ViewPanel(view, ViewFrame(start, top + HEIGHT, start + view.extent_mm * along, top, along, up)))
     return panels
 
 
-def draw(detail: Panel, whole: Panel, name: str, scene: Scene, colours: Colours) -> Iterator[str]:
+def draw(detail: ViewPanel, whole: ViewPanel, name: str, scene: Scene, colours: Colours) -> Iterator[str]:
     """The strip with its detail window, its length and its height."""
     frame, view = whole.frame, whole.view
     long, ratio = frame.right - frame.left, frame.per_mm_up / frame.per_mm

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import floor, log10
 
-from sensorgen.scene.drawing.paper import Frame, element, fitted, number, text
+from sensorgen.scene.drawing.paper import ViewFrame, element, fitted, number, text
 from sensorgen.scene.drawing.view import View
 from sensorgen.scene.scene import Body, Point, Scene, clipped
 
@@ -21,11 +21,11 @@ MISSING_COLOUR = "#c8c8c8"
 
 
 @dataclass(frozen=True)
-class Panel:
+class ViewPanel:
     """A view and where it stands on the page."""
 
     view: View
-    frame: Frame
+    frame: ViewFrame
 
     def place(self, at_mm: Point) -> Point:
         """Place on the page of a point (along, z) of the section [mm]."""
@@ -35,7 +35,7 @@ class Panel:
 Room = tuple[float, float, float, float]  # left, top, right, bottom on the page [mm]
 
 
-def arrange(views: Sequence[View], grid_mm: float, height_mm: float, room: Room) -> list[Panel]:
+def arrange(views: Sequence[View], grid_mm: float, height_mm: float, room: Room) -> list[ViewPanel]:
     """Views side by side at one true scale.
 
     ``grid_mm`` is the height of the highest layer boundary, which may lie over the sensor's ``height_mm``.
@@ -54,8 +54,8 @@ def arrange(views: Sequence[View], grid_mm: float, height_mm: float, room: Room)
         most = min(each / scale, MOST_REPEATS * view.repeat_mm() or each / scale)
         digit = 10.0 ** (floor(log10(most)) - 1)
         end = min(view.extent_mm, round(floor(most / digit + 1e-9) * digit, 12))  # all of it, or a round length
-        frame = Frame(left, bottom, left + end * scale, bottom - grid_mm * scale, scale, scale)
-        panels.append(Panel(replace(view, end_mm=end), frame))
+        frame = ViewFrame(left, bottom, left + end * scale, bottom - grid_mm * scale, scale, scale)
+        panels.append(ViewPanel(replace(view, end_mm=end), frame))
         left = max(frame.right + GUTTER, left + CAPTION)
     return panels
 
@@ -80,7 +80,7 @@ def scale_words(scale: float) -> str:
     return f"{number(scale)}:1" if scale >= 1 else f"1:{number(1 / scale)}"
 
 
-def materials(panel: Panel, colours: Colours, kind: str = "body") -> Iterator[str]:
+def materials(panel: ViewPanel, colours: Colours, kind: str = "body") -> Iterator[str]:
     """Cut bodies, one path for each."""
     paths: dict[str, list[str]] = {}
     bodies: dict[str, Body] = {}
@@ -107,7 +107,7 @@ def _letter(k: int) -> str:
     return chr(ord("A") + k) if k < 26 else _letter(k // 26 - 1) + _letter(k % 26)
 
 
-def letter_places(panel: Panel) -> dict[str, Point]:
+def letter_places(panel: ViewPanel) -> dict[str, Point]:
     """For each body, where its letter has most room on the page [mm]."""
     best: dict[str, tuple[float, Point]] = {}
     for column in panel.view.columns:
@@ -121,7 +121,7 @@ def letter_places(panel: Panel) -> dict[str, Point]:
     return {name: (min(max(x, left), right), y) for name, (_, (x, y)) in best.items()}
 
 
-def lettered(panel: Panel, names: Mapping[str, str], colours: Colours) -> Iterator[str]:
+def lettered(panel: ViewPanel, names: Mapping[str, str], colours: Colours) -> Iterator[str]:
     """The bodies' letters, in ink that shows on their colour."""
     materials_of = {body.name: body.material for body, _ in panel.view.regions}
     for name, (x, y) in letter_places(panel).items():
@@ -131,7 +131,7 @@ def lettered(panel: Panel, names: Mapping[str, str], colours: Colours) -> Iterat
         yield text("bold middle halo", x, y + 0.9, names[name], style=f"fill:{ink};stroke:{fill}")
 
 
-def caption(panel: Panel, name: str, y: float) -> str:
+def caption(panel: ViewPanel, name: str, y: float) -> str:
     """Caption of the view, in one line at ``y`` on the page [mm]."""
     view, scale = panel.view, panel.frame.per_mm
     words = (
@@ -141,7 +141,7 @@ def caption(panel: Panel, name: str, y: float) -> str:
     return text("bold", panel.frame.left, y, fitted(words, (CAPTION - 2) / 1.08))
 
 
-def broken(panel: Panel) -> str:
+def broken(panel: ViewPanel) -> str:
     """The break line at the right end, where the sensor goes on."""
     if panel.view.end_mm >= panel.view.extent_mm:
         return ""
@@ -152,7 +152,7 @@ def broken(panel: Panel) -> str:
     return element("path", "under", d=path) + element("path", "thin", d=path)
 
 
-def outlined(panel: Panel, printed: Scene) -> Iterator[str]:
+def outlined(panel: ViewPanel, printed: Scene) -> Iterator[str]:
     """Outlines of the printed bodies where a view cuts them, one path for each body."""
     view = panel.view
     for body in printed.bodies:

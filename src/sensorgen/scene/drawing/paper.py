@@ -25,7 +25,7 @@ ARROWS = "".join(
 
 
 @dataclass(frozen=True)
-class Frame:
+class ViewFrame:
     """Where a view stands on the page.
 
     Attributes

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from sensorgen.scene.drawing import layers
 from sensorgen.scene.drawing.panels import Colours, colour, scale_words
-from sensorgen.scene.drawing.paper import Frame, box, clean, fitted, line, number, text, wrapped
+from sensorgen.scene.drawing.paper import ViewFrame, box, clean, fitted, line, number, text, wrapped
 from sensorgen.scene.drawing.view import Gap
 from sensorgen.scene.scene import Scene
 
@@ -43,7 +43,7 @@ def block(title: str, rows: Sequence[str], left: float, bottom: float, room: flo
         y += ROW
 
 
-def rows(scene: Scene, frame: Frame, grid: Sequence[float], gap: Gap | None, notes: Sequence[str]) -> list[str]:
+def rows(scene: Scene, frame: ViewFrame, grid: Sequence[float], gap: Gap | None, notes: Sequence[str]) -> list[str]:
     """Lines of the title block."""
     size = " × ".join(number(s) for s in scene.size_mm)
     between = [] if gap is None else [f"electrode gap {number(gap.value_mm)} mm in the sections drawn"]

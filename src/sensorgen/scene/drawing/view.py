@@ -10,7 +10,7 @@ from itertools import pairwise, permutations
 from math import hypot
 
 from sensorgen.scene.scene import AXES, SLIVER_MM, Body, Outline, Point, Scene, area_mm2, clipped
-from sensorgen.scene.sections import Column, Section, alike, columns
+from sensorgen.scene.sections import Section, SectionColumn, alike, columns
 
 PLACES = 8  # places tried for a section: two periods of crossed strips change eight times
 PROBE = 64  # corners looked at for a period: enough for two repetitions of any pattern one would draw
@@ -58,7 +58,7 @@ class View:
         return replace(self.section, regions=tuple(self.regions))
 
     @property
-    def columns(self) -> list[Column]:
+    def columns(self) -> list[SectionColumn]:
         """The columns that are looked at."""
         return columns(self.cut)
 

@@ -1,8 +1,8 @@
 """Triangle meshes straight from the scene, in double precision, without a CAD kernel."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property
 from itertools import product
 from math import acos, ceil, pi, sin, sqrt
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from sensorgen.scene.revolved import Revolved
 
+_AT_ONCE = 1_000_000  # triangles
 CHORD_MM = 0.01  # of a round body, from the middle of its triangles: less than slicers resolve
 
 
@@ -45,6 +46,15 @@ class Mesh:
         a, b, c = self.corners_mm().swapaxes(0, 1)
         return np.asarray(np.cross(b - a, c - a))
 
+    def area_mm2(self) -> float:
+        """Area of the surface [mm2]."""
+        some = (Mesh(self.vertices_mm, part) for part in self._parts())
+        return sum(float(np.linalg.norm(part.normals_mm2(), axis=1).sum()) / 2 for part in some)
+
+    def _parts(self) -> Iterator[NDArray[np.int32]]:
+        """Triangles, so many at once that a sum over them takes little memory."""
+        return (self.triangles[k : k + _AT_ONCE] for k in range(0, len(self.triangles), _AT_ONCE))
+
     def edges(self) -> Whole:
         """Directed edges of the triangles (3 m, 2), those of the first triangle first."""
         return self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
@@ -67,23 +77,22 @@ class Mesh:
 
     def solid(self) -> "manifold3d.Manifold":
         """Solid of manifold3d, in double precision; look at its ``status()``."""
-        return _solid(self)
+        return self._solid
+
+    @cached_property
+    def _solid(self) -> "manifold3d.Manifold":
+        import manifold3d
+
+        data = manifold3d.Mesh64(vert_properties=self.vertices_mm, tri_verts=self.triangles.astype(np.uint64))
+        return manifold3d.Manifold(data)
 
     def volume_mm3(self) -> float:
         """Enclosed volume, by the divergence theorem [mm3]."""
         if len(self.triangles) == 0:
             return 0.0
-        origin = self.vertices_mm[0]  # near the body, so that little cancels
-        a, b, c = ((self.vertices_mm - origin)[self.triangles[:, k]] for k in range(3))
-        return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
-
-
-@lru_cache(maxsize=16)
-def _solid(mesh: Mesh) -> "manifold3d.Manifold":
-    import manifold3d
-
-    data = manifold3d.Mesh64(vert_properties=mesh.vertices_mm, tri_verts=mesh.triangles.astype(np.uint64))
-    return manifold3d.Manifold(data)
+        places = self.vertices_mm - self.vertices_mm[0]  # near the body, so that little cancels
+        some = (places[part] for part in self._parts())
+        return sum(float(np.einsum("ij,ij->", of[:, 0], np.cross(of[:, 1], of[:, 2]))) for of in some) / 6.0
 
 
 def joined(parts: Sequence[Mesh]) -> Mesh:

@@ -27,7 +27,7 @@ _NOTHING = 1e-9  # volume over surface and size below which a surface encloses n
 
 
 @dataclass(frozen=True)
-class Fault:
+class SurfaceFault:
     """Fault of a surface that cannot be put right.
 
     Attributes
@@ -53,13 +53,13 @@ class Closed:
         Connected surfaces, each edge between two triangles; cavities, which are inside out, after the outer ones.
     repairs : tuple of str
         What was put right.
-    faults : tuple of Fault
+    faults : tuple of SurfaceFault
         What was not; without shells.
     """
 
     shells: tuple[Mesh, ...]
     repairs: tuple[str, ...] = ()
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[SurfaceFault, ...] = ()
 
 
 def closed(vertices_mm: Real, triangles: Whole, weld_mm: float = WELD_MM) -> Closed:
@@ -76,7 +76,7 @@ def closed(vertices_mm: Real, triangles: Whole, weld_mm: float = WELD_MM) -> Clo
     """
     if not np.isfinite(vertices_mm).all():
         bad = vertices_mm[~np.isfinite(vertices_mm).all(1)]
-        return Closed((), (), (Fault(f"{len(bad)} corners are no numbers", "export it again", (0.0, 0.0, 0.0)),))
+        return Closed((), (), (SurfaceFault(f"{len(bad)} corners are no numbers", "export it again", (0.0, 0.0, 0.0)),))
     points, faces = _welded(vertices_mm, triangles, weld_mm)
     repairs = []
     if len(_open(faces)) and weld_mm < GAP_MM:
@@ -161,7 +161,7 @@ def _oriented(faces: Whole) -> tuple[Whole, int]:
     return np.where(turned[:, None], faces[:, ::-1], faces), int(turned.sum())
 
 
-def _filled(points: Real, faces: Whole) -> tuple[Whole, list[str], list[Fault]]:
+def _filled(points: Real, faces: Whole) -> tuple[Whole, list[str], list[SurfaceFault]]:
     """Triangles with flat openings closed, how, and the openings that are not flat."""
     edges = _edges(faces)[_open(faces)]
     if not len(edges):
@@ -183,7 +183,7 @@ def _filled(points: Real, faces: Whole) -> tuple[Whole, list[str], list[Fault]]:
         place = _place(points[ring].mean(0))
         if cap is None:
             message = f"it is open: a gap with an edge of {len(ring)} sides that is not flat"
-            faults.append(Fault(message, "close the gap in CAD, or join the faces into a solid", place))
+            faults.append(SurfaceFault(message, "close the gap in CAD, or join the faces into a solid", place))
         else:
             x, y, z = place
             repairs.append(f"a flat opening of {len(ring)} sides closed at x {x:g}, y {y:g}, z {z:g} mm")
@@ -211,7 +211,7 @@ def _cap(ring: Real) -> Whole | None:
     return np.asarray(manifold3d.triangulate([flat]), np.int64)
 
 
-def _mates(points: Real, faces: Whole) -> tuple[Whole, list[Fault]]:
+def _mates(points: Real, faces: Whole) -> tuple[Whole, list[SurfaceFault]]:
     """For each directed edge the one of the neighbouring face; faults where there is none."""
     edges = _edges(faces)
     sides = np.sort(edges, axis=1)
@@ -238,7 +238,7 @@ def _mates(points: Real, faces: Whole) -> tuple[Whole, list[Fault]]:
         place = _place(points[edges[bad[0]]].mean(0))
         many = f" and {len(bad) - 1} others" if len(bad) > 1 else ""
         message = f"no outside can be given to its faces: one edge{many} has faces that look to different sides"
-        faults.append(Fault(message, "remove faces inside the body, and export a solid", place))
+        faults.append(SurfaceFault(message, "remove faces inside the body, and export a solid", place))
     return mates, faults
 
 
@@ -278,7 +278,7 @@ def _shells(points: Real, faces: Whole, mates: Whole) -> list[Mesh]:
     return found
 
 
-def _outwards(shells: Sequence[Mesh]) -> tuple[list[Mesh], int, list[Fault]]:
+def _outwards(shells: Sequence[Mesh]) -> tuple[list[Mesh], int, list[SurfaceFault]]:
     """Shells with their outside out; one inside another that is inside out is a cavity. And how many were turned."""
     outer: list[Mesh] = []
     inner: list[Mesh] = []
@@ -289,8 +289,8 @@ def _outwards(shells: Sequence[Mesh]) -> tuple[list[Mesh], int, list[Fault]]:
         volume = shell.volume_mm3()
         if abs(volume) <= _NOTHING * area * np.linalg.norm(high - low):
             faults.append(
-                Fault("it encloses nothing: a sheet without thickness", "give it a thickness in CAD, or leave it out",
-                      _place((low + high) / 2))
+                SurfaceFault("it encloses nothing: a sheet without thickness",
+                             "give it a thickness in CAD, or leave it out", _place((low + high) / 2))
             )  # fmt: skip
         (outer if volume > 0 else inner).append(shell)
     cavities = []

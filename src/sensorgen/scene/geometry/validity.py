@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Whole
 from sensorgen.scene.geometry.meshes import CHORD_MM, Mesh
 from sensorgen.scene.scene import AXES, Body, Scene
 from sensorgen.scene.sections import overlap, sections
@@ -29,40 +31,41 @@ def faults(scene: Scene, meshes: Mapping[str, Mesh]) -> list[tuple[str, str]]:
     meshes : mapping of str to Mesh
         One for each body, by its name.
     """
-    import manifold3d
-
-    solids = {name: mesh.solid() for name, mesh in meshes.items()}
-    found = []
-    for body in scene.bodies:
-        exact, got = body.volume_mm3(), meshes[body.name].volume_mm3()
-        if solids[body.name].status() != manifold3d.Error.NoError:
-            found.append((body.name, f"not a closed oriented surface ({solids[body.name].status().name})"))
-        elif not _two_manifold(meshes[body.name]):
-            found.append((body.name, "shells are welded along an edge: programs that read 3MF refuse that"))
-        elif abs(got - exact) > _rounding_mm3(body, solids[body.name]):
-            found.append((body.name, f"encloses {got:.9g} mm3, not {exact:.9g} mm3"))
-        elif (twice := _self_overlap_mm3(meshes[body.name], solids[body.name])) > (OVERLAP_MM + _off_mm(body)) * solids[
-            body.name
-        ].surface_area():
-            found.append((body.name, f"overlaps itself by {twice:.3g} mm3"))
-        elif not np.allclose(
-            solids[body.name].bounding_box(), _box_mm(body), rtol=0.0, atol=OVERLAP_MM + _off_mm(body)
-        ):
-            found.append((body.name, "is not where it is drawn"))
+    found = [(body.name, fault) for body in scene.bodies if (fault := _fault(body, meshes[body.name]))]
     if found or _are_apart(scene):
         return found
+    solids = {name: mesh.solid() for name, mesh in meshes.items()}
     return _overlaps(solids, {body.name: _off_mm(body) for body in scene.bodies})
+
+
+def _fault(body: Body, mesh: Mesh) -> str:
+    """Fault of one body; "" if none.
+
+    A solid of many triangles takes a gigabyte: where boxes show that shells are apart, edges tell whether they close.
+    """
+    import manifold3d
+
+    exact, got, off = body.volume_mm3(), mesh.volume_mm3(), _off_mm(body)
+    is_sound = _two_manifold(mesh)
+    are_apart = is_sound and len(mesh.triangles) > _MANY and _shells_are_apart(mesh)
+    status = manifold3d.Error.NoError if are_apart else mesh.solid().status()
+    if status != manifold3d.Error.NoError:
+        return f"not a closed oriented surface ({status.name})"
+    if not is_sound:
+        return "shells are welded along an edge: programs that read 3MF refuse that"
+    area = mesh.area_mm2()
+    if abs(got - exact) > 1e-9 * exact + off * area:  # rounding, and chords in place of arcs
+        return f"encloses {got:.9g} mm3, not {exact:.9g} mm3"
+    if not are_apart and (twice := _self_overlap_mm3(mesh.solid())) > (OVERLAP_MM + off) * area:
+        return f"overlaps itself by {twice:.3g} mm3"
+    box = [*mesh.vertices_mm.min(0), *mesh.vertices_mm.max(0)]
+    return "" if np.allclose(box, _box_mm(body), rtol=0.0, atol=OVERLAP_MM + off) else "is not where it is drawn"
 
 
 def _box_mm(body: Body) -> list[float]:
     """Enclosing box: the lowest x, y and z, then the highest [mm]."""
     spans = np.array([[p.span(axis) for axis in AXES] for p in body.pieces])
     return [*spans[..., 0].min(axis=0), *spans[..., 1].max(axis=0)]
-
-
-def _rounding_mm3(body: Body, solid: "manifold3d.Manifold") -> float:
-    """Largest difference of a mesh's volume from the exact one: rounding, and chords in place of arcs [mm3]."""
-    return 1e-9 * body.volume_mm3() + _off_mm(body) * float(solid.surface_area())
 
 
 def _off_mm(body: Body) -> float:
@@ -81,17 +84,24 @@ def _are_apart(scene: Scene) -> bool:
 
 def _two_manifold(mesh: Mesh) -> bool:
     """True where every edge has one triangle on each side; manifold3d takes a seam with four and parts it."""
-    ends = mesh.edges()
-    there, back = (np.sort(ends @ way) for way in ([1, len(mesh.vertices_mm)], [len(mesh.vertices_mm), 1]))
+    there, back = (_keys(way, len(mesh.vertices_mm)) for way in (mesh.triangles, mesh.triangles[:, ::-1]))
     return bool(np.all(np.diff(there) > 0) and np.array_equal(there, back))
 
 
-def _self_overlap_mm3(mesh: Mesh, solid: "manifold3d.Manifold") -> float:
+def _keys(triangles: NDArray[np.int32], count: int) -> Whole:
+    """Number of each directed edge of triangles of ``count`` corners, sorted."""
+    keys: Whole = np.empty(3 * len(triangles), np.int64)
+    for key, start, end in zip(np.split(keys, 3), (0, 1, 2), (1, 2, 0), strict=True):
+        np.multiply(triangles[:, end], count, out=key, dtype=np.int64)
+        key += triangles[:, start]
+    keys.sort()
+    return keys
+
+
+def _self_overlap_mm3(solid: "manifold3d.Manifold") -> float:
     """Volume that the shells of one body enclose more than once [mm3]."""
     import manifold3d
 
-    if len(mesh.triangles) > _MANY and _shells_are_apart(mesh):
-        return 0.0
     shells = solid.decompose()
     united = manifold3d.Manifold.batch_boolean(shells, manifold3d.OpType.Add) if len(shells) > 1 else solid
     return float(solid.volume() - united.volume())
@@ -101,7 +111,7 @@ def _shells_are_apart(mesh: Mesh) -> bool:
     """True where the boxes around its shells share faces at most: a thousandth of the time to take it apart."""
     from sensorgen.scene.connections import groups
 
-    label = groups(len(mesh.vertices_mm), *mesh.edges().T)
+    label = groups(len(mesh.vertices_mm), *mesh.triangles[:, [0, 1, 1, 2]].reshape(-1, 2).T)
     order = np.argsort(label, kind="stable")
     starts = np.flatnonzero(np.diff(label[order], prepend=-1))
     places = mesh.vertices_mm[order]

@@ -8,10 +8,10 @@ import shapely
 from scipy.sparse import coo_matrix, csr_matrix
 
 from sensorgen.core.arrays import Mask, Real, Whole
-from sensorgen.solvers.contact.cell import Cell
+from sensorgen.solvers.contact.cell import ContactCell
 from sensorgen.solvers.contact.element import determinant, triangle_values
 from sensorgen.solvers.contact.factors import solved_by_lu
-from sensorgen.solvers.contact.mesh import Mesh
+from sensorgen.solvers.contact.mesh import TriangleMesh
 
 _THIN = 0.2  # of its area as drawn: a triangle that is pressed further is no good any more [-]
 _ROUNDING = 1e-9
@@ -23,19 +23,19 @@ class Carried:
 
     Attributes
     ----------
-    field : Mesh
+    field : TriangleMesh
         Of solids and air, as drawn.
-    solids : Mesh
+    solids : TriangleMesh
         That is pressed.
-    cell : Cell
+    cell : ContactCell
         Whose regions both have.
     """
 
-    field: Mesh
-    solids: Mesh
-    cell: Cell
+    field: TriangleMesh
+    solids: TriangleMesh
+    cell: ContactCell
 
-    def at(self, u_m: Real) -> Mesh | None:
+    def at(self, u_m: Real) -> TriangleMesh | None:
         """The mesh at displacements of the solids' nodes (2n) [m]; None where a triangle folds or is flattened."""
         moved = np.zeros((len(self.field.points_m), 2))
         moved[self._inside] = self._values @ u_m.reshape(-1, 2)

@@ -8,7 +8,7 @@ import shapely
 
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Point, Scene
-from sensorgen.scene.sections import Column, columns, sections
+from sensorgen.scene.sections import SectionColumn, columns, sections
 
 OUTSIDE = 0  # the region beyond the cell
 AIR = "air"
@@ -28,7 +28,7 @@ class Region:
 
 
 @dataclass(frozen=True)
-class Cell:
+class ContactCell:
     """A unit cell, or half of one that is its own mirror image.
 
     Attributes
@@ -56,7 +56,7 @@ class Cell:
         """Width [mm]."""
         return self.right_mm - self.left_mm
 
-    def without_block(self) -> "Cell":
+    def without_block(self) -> "ContactCell":
         """The cell without the block on its top."""
         own = [k for k, region in enumerate(self.regions, 1) if region.material == BLOCK]
         edges = {edge: tuple(OUTSIDE if k in own else k for k in sides) for edge, sides in self.edges.items()}
@@ -72,7 +72,7 @@ class Cell:
         return region != OUTSIDE and self.regions[region - 1].material != AIR
 
 
-def cell_of(scene: Scene, period_mm: float | None) -> Cell:
+def cell_of(scene: Scene, period_mm: float | None) -> ContactCell:
     """The cell of a prismatic scene: half a period between two mirrors where there are such, else a whole one.
 
     Parameters
@@ -109,7 +109,7 @@ def cell_of(scene: Scene, period_mm: float | None) -> Cell:
 Strip = tuple[float, float, list[tuple[Region, Point, Point]]]
 
 
-def _is_mirror(whole: list[Column], axis: float, period: float) -> bool:
+def _is_mirror(whole: list[SectionColumn], axis: float, period: float) -> bool:
     """Test whether the half period after ``axis`` and the one after that are mirror images."""
     middle, end = axis + period / 2, axis + period
     ahead = _strips(whole, axis, middle)
@@ -125,7 +125,7 @@ def _look(strip: Strip) -> tuple[object, ...]:
     return round(left, 6), round(right, 6), [(r, *(round(v, 6) for v in (*low, *high))) for r, low, high in layers]
 
 
-def _strips(whole: list[Column], left: float, right: float) -> list[Strip]:
+def _strips(whole: list[SectionColumn], left: float, right: float) -> list[Strip]:
     """Columns between two places, air between their layers: left, right, and each region with bottom and top line.
 
     Columns that only go on with what the one before them began are one.
@@ -160,14 +160,14 @@ def _joined(one: Strip, other: Strip) -> list[Strip]:
     return [(a, c, layers)]
 
 
-def _at(column: Column, line: Point, left: float, right: float) -> Point:
+def _at(column: SectionColumn, line: Point, left: float, right: float) -> Point:
     """The heights of a line of a column at two places in it."""
     slope = (line[1] - line[0]) / (column.right_mm - column.left_mm)
     a, b = (line[0] + slope * (u - column.left_mm) for u in (left, right))
     return (line[0] if left == column.left_mm else a, line[1] if right == column.right_mm else b)
 
 
-def _cell(whole: list[Column], left: float, right: float, *, mirrored: bool) -> Cell:
+def _cell(whole: list[SectionColumn], left: float, right: float, *, mirrored: bool) -> ContactCell:
     strips = _strips(whole, left, right)
     regions = list(dict.fromkeys(region for _, _, layers in strips for region, _, _ in layers))
     number = {region: k + 1 for k, region in enumerate(regions)}
@@ -179,10 +179,10 @@ def _cell(whole: list[Column], left: float, right: float, *, mirrored: bool) -> 
     for before, after in pairwise([None, *strips, None]):
         _uprights(edges, before, after, number)
     kept = {edge: sides for edge, sides in edges.items() if sides[0] != sides[1]}
-    return Cell(kept, tuple(regions), left, right, mirrored)
+    return ContactCell(kept, tuple(regions), left, right, mirrored)
 
 
-def partition(bodies: Mapping[Region, shapely.Geometry], whole: shapely.Polygon, *, turned: bool) -> Cell:
+def partition(bodies: Mapping[Region, shapely.Geometry], whole: shapely.Polygon, *, turned: bool) -> ContactCell:
     """A mirrored cell of regions that are polygons [mm], with air where they leave some of the whole."""
     air = whole - shapely.union_all([*bodies.values()])
     filled = {**bodies, **({Region(AIR, ""): air} if air.area > _SLIVER_MM else {})}
@@ -198,7 +198,7 @@ def partition(bodies: Mapping[Region, shapely.Geometry], whole: shapely.Polygon,
                     _add(edges, *((a, b, (number, OUTSIDE)) if a < b else (b, a, (OUTSIDE, number))))
     left, _, right, _ = (round(v, _DIGITS) for v in whole.bounds)
     kept = {edge: sides for edge, sides in edges.items() if sides[0] != sides[1]}
-    return Cell(kept, regions, left, right, mirrored=True, turned=turned)
+    return ContactCell(kept, regions, left, right, mirrored=True, turned=turned)
 
 
 def _add(edges: dict[Edge, tuple[int, int]], a: Point, b: Point, sides: tuple[int, int]) -> None:

@@ -18,7 +18,7 @@ from shapely import STRtree, box
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.solvers.contact.bricks import BrickMesh
 from sensorgen.solvers.contact.element import line_slopes, line_values
-from sensorgen.solvers.contact.mesh import Mesh, at_border
+from sensorgen.solvers.contact.mesh import TriangleMesh, at_border
 
 _STEEP = 0.3  # cosine of a face's slope, below which nothing rests on it [-]
 _PASS = 0.5  # share of the penalty that each of two faces brings [-]
@@ -34,7 +34,7 @@ _EACH = ("stiffness_pa", "length_m", "point", "sticks", "slid_m")
 
 
 @dataclass(frozen=True)
-class Pairs:
+class FacePairs:
     """Quadrature points of faces with a partner, frozen.
 
     Attributes
@@ -63,14 +63,16 @@ class Pairs:
     sticks: Mask
     slid_m: Real
 
-    def some(self, which: Mask) -> "Pairs":
+    def some(self, which: Mask) -> "FacePairs":
         """A part of them."""
-        return Pairs(self.gap[which], tuple(s[which] for s in self.slips), *(getattr(self, k)[which] for k in _EACH))
+        return FacePairs(
+            self.gap[which], tuple(s[which] for s in self.slips), *(getattr(self, k)[which] for k in _EACH)
+        )
 
 
-def _joined(parts: Sequence[Pairs]) -> Pairs:
+def _joined(parts: Sequence[FacePairs]) -> FacePairs:
     slips = zip(*(p.slips for p in parts), strict=True)
-    return Pairs(
+    return FacePairs(
         vstack([p.gap for p in parts]).tocsr(),
         tuple(vstack(rows).tocsr() for rows in slips),
         *(np.concatenate([getattr(p, key) for p in parts]) for key in _EACH),
@@ -153,7 +155,7 @@ class Faces:
         frame = [first] if self._ways == 1 else [first, np.cross(normal, first)]
         return Rays((self.shapes @ faces).reshape(-1, self._ways + 1), normal, np.stack(frame, axis=1))
 
-    def project(self, places_m: Real, penalty_pa: float, kept: Pairs | None = None) -> Pairs:
+    def project(self, places_m: Real, penalty_pa: float, kept: FacePairs | None = None) -> FacePairs:
         """Find the partner of every point at given places of the nodes (n, d); those of ``kept`` stay as they are."""
         rays = self.rays(places_m)
         # Points whose partner is on another face
@@ -170,7 +172,7 @@ class Faces:
             return _joined(made)
         return _joined([*(p.some(~np.isin(p.point, kept.point)) for p in made), kept])
 
-    def _mirrored(self, places_m: Real, rays: Rays, penalty_pa: float) -> Iterator[Pairs]:
+    def _mirrored(self, places_m: Real, rays: Rays, penalty_pa: float) -> Iterator[FacePairs]:
         """Points that look at a mirror; its image slips as they do."""
         for axis, direction, node in self.mirrors:
             looks = direction * rays.normal[:, axis]
@@ -196,7 +198,7 @@ class Faces:
 
     def _pairs(
         self, gap: csr_matrix, slips: tuple[csr_matrix, ...], point: Whole, first: int, penalty_pa: float
-    ) -> Pairs:
+    ) -> FacePairs:
         own, at = np.divmod(point, len(self._at))
         edges, length = self._edges_m[own], self._edges_m[own].min(axis=1)
         weights = np.array([np.prod(w) for w in product(_LINE_WEIGHTS / 2, repeat=self._ways)])
@@ -204,7 +206,7 @@ class Faces:
         if self.turned:
             stiffness *= 2 * np.pi * (self.shapes @ self.points_m[self.nodes, 0][..., None])[own, at, 0]
         still = np.zeros((len(point), self._ways))
-        return Pairs(gap, slips, stiffness, length, first + point, np.zeros(len(point), bool), still)
+        return FacePairs(gap, slips, stiffness, length, first + point, np.zeros(len(point), bool), still)
 
     def crossed(self, places_m: Real, outline: Whole, share: float) -> bool:
         """Test whether a face is inside two bodies, or beyond a mirror, deeper than a share of its side; in a plane.
@@ -221,7 +223,7 @@ class Faces:
         return bool(np.any(beyond) or (around > 1).any())
 
 
-def faces_of(mesh: Mesh) -> Faces:
+def faces_of(mesh: TriangleMesh) -> Faces:
     """Sides of triangles with nothing behind them, those on the straight border of the cell left out."""
     x = mesh.points_m[:, 0]
     mirrors = ((0, -1, int(x.argmin())), (0, 1, int(x.argmax())))
@@ -247,7 +249,7 @@ def brick_faces_of(mesh: BrickMesh) -> Faces:
     return Faces(mesh.points_m, np.concatenate(found), tuple(reached))
 
 
-def carrying(pairs: Pairs, loose: Mask) -> tuple[Pairs, Real]:
+def carrying(pairs: FacePairs, loose: Mask) -> tuple[FacePairs, Real]:
     """The pairs between a loose piece above and a supported one below, and the gap's change per fall [-].
 
     ``loose`` says it of each node.

@@ -6,15 +6,15 @@ import numpy as np
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
-from sensorgen.solvers.contact.cell import OUTSIDE, Cell
+from sensorgen.solvers.contact.cell import OUTSIDE, ContactCell
 from sensorgen.solvers.contact.closing import Sides, closed
 from sensorgen.solvers.contact.contact import Faces
-from sensorgen.solvers.contact.mesh import Mesh, at_border
+from sensorgen.solvers.contact.mesh import TriangleMesh, at_border
 
 _ROUND = [0, 3, 1, 4, 2, 5]  # the nodes of a triangle, in turn
 
 
-def deformed(cell: Cell, mesh: Mesh, faces: Faces, u_m: Real) -> Cell:
+def deformed(cell: ContactCell, mesh: TriangleMesh, faces: Faces, u_m: Real) -> ContactCell:
     """The cell at given displacements (2n) [m]; the sides of gaps become two straight pieces each."""
     places = (mesh.points_m + u_m.reshape(-1, 2)) / M_PER_MM
     found = _edges(cell, mesh)
@@ -28,7 +28,7 @@ def deformed(cell: Cell, mesh: Mesh, faces: Faces, u_m: Real) -> Cell:
     return replace(cell, edges=edges, right_mm=float(np.round(places[mesh.points_m[:, 0].argmax(), 0], 9)))
 
 
-def misfit(cell: Cell, mesh: Mesh, u_m: Real) -> float:
+def misfit(cell: ContactCell, mesh: TriangleMesh, u_m: Real) -> float:
     """Largest change of a solid's area by what was closed, over that area [-]; ``cell`` has the closed outlines."""
     places = (mesh.points_m + u_m.reshape(-1, 2)) / M_PER_MM
     x, y = places[mesh.outer[:, _ROUND]].transpose(2, 0, 1)
@@ -43,7 +43,7 @@ def misfit(cell: Cell, mesh: Mesh, u_m: Real) -> float:
     return float(np.abs(found[solid] / kept[solid] - 1).max())
 
 
-def _edges(cell: Cell, mesh: Mesh) -> Sides:
+def _edges(cell: ContactCell, mesh: TriangleMesh) -> Sides:
     """Sides between different regions: (node, node) to the regions on their left and right; halved but at walls."""
     found: Sides = {}
     air, x, middles = cell.air, mesh.points_m[:, 0], mesh.rim[:, 2]

@@ -25,7 +25,7 @@ _CHUNK = 2**19  # entries of element matrices at once: they stay in the cache
 
 
 @dataclass(frozen=True)
-class Reference:
+class ElementReference:
     """Shape functions of an element at its quadrature points.
 
     Attributes
@@ -91,20 +91,20 @@ def triangle_points() -> tuple[Real, Real]:
     return at, np.repeat([w / 2 for _, w in orbits], 3)
 
 
-def _triangle() -> Reference:
+def _triangle() -> ElementReference:
     at, weights = triangle_points()
     pressures = np.column_stack([np.ones(6), at - 1 / 3])
-    return Reference(triangle_gradients(at), weights, pressures, triangle_values(at))
+    return ElementReference(triangle_gradients(at), weights, pressures, triangle_values(at))
 
 
-def _brick() -> Reference:
+def _brick() -> ElementReference:
     """Gauss's 27 points; the inner node's displacement is relative to the mean of the corners'."""
     at, weight = np.polynomial.legendre.leggauss(3)
     gradients = brick_gradients(at)
     gradients[:, BRICK_CORNERS] += gradients[:, [BRICK_INNER]] / 8
     weights = np.einsum("a,b,c->abc", weight, weight, weight).ravel()
     pressures = np.column_stack([np.ones(27), np.array(list(product(at, repeat=3)))])
-    return Reference(gradients[:, [*BRICK_OUTER, BRICK_INNER]], weights, pressures, np.empty((27, 0)))
+    return ElementReference(gradients[:, [*BRICK_OUTER, BRICK_INNER]], weights, pressures, np.empty((27, 0)))
 
 
 TRIANGLE, BRICK = _triangle(), _brick()
@@ -116,7 +116,7 @@ class ElementMesh:
 
     Attributes
     ----------
-    reference : Reference
+    reference : ElementReference
         Its shape functions.
     points_m : (n, d) array
         Places of the nodes [m].
@@ -128,7 +128,7 @@ class ElementMesh:
         Whether triangles are sections of rings about the axis x = 0.
     """
 
-    reference: Reference
+    reference: ElementReference
     points_m: Real
     outer: Whole
     region: Whole
@@ -142,17 +142,17 @@ class ElementMesh:
 
 
 @dataclass(frozen=True)
-class Law:
+class ElementMaterial:
     """Material of each element: shear modulus [Pa], and 1 / lambda [1/Pa], 0 where incompressible."""
 
     mu_pa: Real
     compliance_per_pa: Real
 
 
-def law(youngs_modulus_pa: Real, poisson_ratio: Real) -> Law:
+def law(youngs_modulus_pa: Real, poisson_ratio: Real) -> ElementMaterial:
     """Lame's constants from E [Pa] and nu [-], which may be 1/2."""
     e, nu = youngs_modulus_pa, poisson_ratio
-    return Law(e / (2 * (1 + nu)), (1 + nu) * (1 - 2 * nu) / (e * nu))
+    return ElementMaterial(e / (2 * (1 + nu)), (1 + nu) * (1 - 2 * nu) / (e * nu))
 
 
 @dataclass(frozen=True)
@@ -203,7 +203,7 @@ class Elements:
     """All elements of a mesh; d is 2 or 3."""
 
     mesh: ElementMesh
-    law: Law
+    law: ElementMaterial
     _last: list[tuple[Real, Inner, Tangent]] = field(default_factory=list, repr=False, compare=False)
 
     @cached_property

@@ -9,7 +9,7 @@ from scipy.sparse import coo_matrix, csr_matrix, diags
 from scipy.sparse.csgraph import connected_components
 
 from sensorgen.core.arrays import Mask, Real, Whole
-from sensorgen.solvers.contact.contact import Faces, Pairs, carrying
+from sensorgen.solvers.contact.contact import FacePairs, Faces, carrying
 from sensorgen.solvers.contact.element import Elements, Inner, Tangent
 from sensorgen.solvers.contact.factors import by_lu
 
@@ -20,7 +20,7 @@ _STILL = 1e-10  # a step so much shorter than the displacement is rounding: nu n
 _MOST_STEPS = 15
 _LEAST_J = 0.05  # a step may not compress an element below this share of its volume at once [-]
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # of Newton's step
-_MOST_CUTS = 4  # failed load steps in all before a cell is given up
+_MOST_CUTS, _MORE_CUTS = 4, 4  # failed load steps in all before partners may stay; then before a cell is given up
 _FLAT = 1e-3  # gaps that differ by less than this share of their side close at once [-]
 _DEEPEST = 0.1  # initial penetration of a part that is lowered, over the length of a side [-]
 _ROUNDING = 1e-9
@@ -33,7 +33,7 @@ class State:
     pressure_pa: float
     u_m: Real
     inner: Inner
-    pairs: Pairs
+    pairs: FacePairs
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class Problem:
         pairs, drop = self._drops_m(state)
         return float(drop.min()) if (drop > _FLAT * pairs.length_m).all() and drop.size else 0.0
 
-    def _drops_m(self, state: State) -> tuple[Pairs, Real]:
+    def _drops_m(self, state: State) -> tuple[FacePairs, Real]:
         """Pairs of unsupported parts with what is below them, and the fall until each touches [m]."""
         pairs, share = carrying(state.pairs, self.loose)
         return pairs, self.gaps(pairs, state.u_m) / share
@@ -127,15 +127,15 @@ class Problem:
         """Places of the nodes (n, d) [m]."""
         return self.elements.mesh.points_m + u.reshape(-1, self.dimension)
 
-    def project(self, u: Real, stuck: Pairs | None = None) -> Pairs:
+    def project(self, u: Real, stuck: FacePairs | None = None) -> FacePairs:
         """Contact pairs at given displacements."""
         return self.faces.project(self.places(u), self.penalty_pa, stuck)
 
-    def gaps(self, pairs: Pairs, u: Real) -> Real:
+    def gaps(self, pairs: FacePairs, u: Real) -> Real:
         """Gap of each pair [m]."""
         return np.asarray(pairs.gap @ self.places(u).ravel())
 
-    def slips(self, pairs: Pairs, u: Real) -> Real:
+    def slips(self, pairs: FacePairs, u: Real) -> Real:
         """Displacement of each pair's partner along the tangents since they stick (k, d - 1) [m]."""
         places = self.places(u).ravel()
         return np.column_stack([slip @ places for slip in pairs.slips]) - pairs.slid_m
@@ -153,7 +153,7 @@ class Problem:
         starts = np.searchsorted(entries, n * np.arange(n + 1))
         return csr_matrix((np.zeros(len(entries)), entries % n, starts), (n, n)), kept, place
 
-    def contact_forces(self, pairs: Pairs, u: Real) -> tuple[Real, csr_matrix]:
+    def contact_forces(self, pairs: FacePairs, u: Real) -> tuple[Real, csr_matrix]:
         """Forces of the contact, and its stiffness on the free displacements."""
         gap = self.gaps(pairs, u)
         springs = [(pairs.gap, gap < 0, gap)]
@@ -175,7 +175,7 @@ class Problem:
         slip = (self.slips(state.pairs, state.u_m) ** 2).sum(axis=1) * state.pairs.sticks
         return float(0.5 * (state.pairs.stiffness_pa * (gap**2 + slip)).sum())
 
-    def residual(self, u: Real, inner: Inner, pairs: Pairs, pressure_pa: float) -> tuple[Real, csr_matrix, Tangent]:
+    def residual(self, u: Real, inner: Inner, pairs: FacePairs, pressure_pa: float) -> tuple[Real, csr_matrix, Tangent]:
         """Unbalanced forces on the free displacements, their derivative, and the elements' condensed part."""
         local, free = self.elements.tangent(u, inner), self.free
         force, stiffness = self.contact_forces(pairs, u)
@@ -186,7 +186,7 @@ class Problem:
         stiffness = whole + stiffness if stiffness.nnz else whole  # a sum forgets zeros, and the pattern with them
         return free.T @ (force - pressure_pa * self.load), stiffness, local
 
-    def newton(self, state: State, pressure_pa: float, pairs: Pairs, enough: float) -> State | None:
+    def newton(self, state: State, pressure_pa: float, pairs: FacePairs, enough: float) -> State | None:
         """Equilibrium at a pressure with frozen contact pairs, or None where Newton's method does not converge.
 
         ``enough`` is the residual to reach, over the load [-].
@@ -224,8 +224,14 @@ class Problem:
         inside_out = self.elements.volume_ratio(u, inner).min() <= _LEAST_J
         return state if inside_out else replace(state, u_m=u, inner=inner)
 
-    def stepped(self, state: State, pressure_pa: float, before: State) -> State | None:
-        """One load step: solve, update the contact pairs and solve again, until they are settled or often enough."""
+    def stepped(
+        self, state: State, pressure_pa: float, before: State, *, keeps: bool = False
+    ) -> State | None:  # fmt: skip
+        """One load step: solve, update the contact pairs and solve again, until they are settled or often enough.
+
+        With ``keeps`` the pairs of a problem with a test of its places stay where new ones have no equilibrium, as
+        where a face slides off an edge.
+        """
         start = self.extrapolated(state, before, pressure_pa)
         starts = [start] if start is state else [start, state]
         tries = (self.newton(start, pressure_pa, state.pairs, _NEARLY) for start in starts)
@@ -237,16 +243,18 @@ class Problem:
         for _ in range(self.updates):
             again = self.newton(found, pressure_pa, pairs, _ENOUGH)
             if again is None:
-                return None
+                stays = keeps and self.sound is not None
+                found = self.newton(found, pressure_pa, found.pairs, _ENOUGH) if stays else None
+                break
             found, pairs = again, self.project(again.u_m, stuck)
             depths = np.zeros((2, 1 + max(p.point.max(initial=0) for p in (found.pairs, pairs))))
             for depth, seen in zip(depths, (found.pairs, pairs), strict=True):
                 depth[seen.point] = np.maximum(-self.gaps(seen, found.u_m), 0.0) / seen.length_m
             if np.ptp(depths, axis=0).max() < self.settled:
                 break
-        return found if self.sound is None or self.sound(self.places(found.u_m)) else None
+        return found if found and (self.sound is None or self.sound(self.places(found.u_m))) else None
 
-    def _stuck(self, before: Real, state: State) -> Pairs:
+    def _stuck(self, before: Real, state: State) -> FacePairs:
         """Pairs that touch now and stick from where they first did, between the displacements before and those now."""
         pairs, free = state.pairs, replace(state.pairs, slid_m=np.zeros_like(state.pairs.slid_m))
         gaps, slips = ([of(free, u) for u in (before, state.u_m)] for of in (self.gaps, self.slips))
@@ -267,11 +275,11 @@ def curve(problem: Problem, pressures_pa: Sequence[float], longest_pa: float) ->
         while state.pressure_pa < target:
             left = target - state.pressure_pa
             aim = target if left < step * (1 + _ROUNDING) else state.pressure_pa + step
-            reached = problem.stepped(state, aim, before)
+            reached = problem.stepped(state, aim, before, keeps=cuts >= _MOST_CUTS)
             if reached is not None:
                 before, state, step = state, reached, min(2 * step, longest_pa)
                 yield state
                 continue
             cuts, step = cuts + 1, min(step, left) / 2
-            if cuts > _MOST_CUTS:
+            if cuts > _MOST_CUTS + _MORE_CUTS:
                 return

@@ -40,7 +40,7 @@ class Folded(BadInput):
 
 
 @dataclass(frozen=True)
-class Orders:
+class FieldOrders:
     """Of the polynomials of the potential and of the flux."""
 
     potential: int = 3
@@ -48,7 +48,7 @@ class Orders:
 
 
 @dataclass
-class Field:
+class MappedField:
     """Capacitance of a cell of boxes, load after load.
 
     Attributes
@@ -57,7 +57,7 @@ class Field:
         All boxes of the cell, air included.
     permittivity : mapping of str to float
         Relative permittivity by material, with "air" [-].
-    orders : Orders
+    orders : FieldOrders
         Of the polynomials.
 
     Raises
@@ -70,7 +70,7 @@ class Field:
 
     mesh: BrickMesh
     permittivity: Mapping[str, float]
-    orders: Orders
+    orders: FieldOrders
 
     def __post_init__(self) -> None:
         """Select the boxes that carry field, and number their unknowns."""

@@ -10,7 +10,7 @@ from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.scene import Point
 from sensorgen.solvers.contact import mesher, rings
-from sensorgen.solvers.contact.cell import BLOCK, OUTSIDE, Cell, Edge
+from sensorgen.solvers.contact.cell import BLOCK, OUTSIDE, ContactCell, Edge
 from sensorgen.solvers.contact.element import TRIANGLE, ElementMesh
 
 Run = tuple[int, int]
@@ -23,7 +23,7 @@ _BLOCK = 0.5  # largest triangle of a block on the top, over growth and the cell
 
 
 @dataclass(frozen=True)
-class Mesh(ElementMesh):
+class TriangleMesh(ElementMesh):
     """A mesh of straight-sided triangles: corners counter-clockwise, then the middles of the sides 01, 12, 20.
 
     Attributes
@@ -61,7 +61,7 @@ class Net:
     marked: Mapping[int, list[Run]]
 
 
-def of_triangles(points_m: Real, corners: Whole, region: Whole, *, turned: bool = False) -> Mesh:
+def of_triangles(points_m: Real, corners: Whole, region: Whole, *, turned: bool = False) -> TriangleMesh:
     """A mesh with middles on the sides of given triangles, which are counter-clockwise."""
     sides = np.concatenate([corners[:, side] for side in _SIDES])
     unique, back, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
@@ -70,10 +70,10 @@ def of_triangles(points_m: Real, corners: Whole, region: Whole, *, turned: bool 
     numbers = len(points_m) + back
     rim = np.column_stack([sides, numbers])[count[back] == 1]
     triangles = np.concatenate([corners, numbers.reshape(3, -1).T], axis=1)
-    return Mesh(TRIANGLE, np.concatenate([points_m, middles]), triangles, region, rim, turned=turned)
+    return TriangleMesh(TRIANGLE, np.concatenate([points_m, middles]), triangles, region, rim, turned=turned)
 
 
-def at_border(mesh: Mesh) -> Mask:
+def at_border(mesh: TriangleMesh) -> Mask:
     """Mask of the rim's sides on the straight border of the cell."""
     a, b = (mesh.points_m[mesh.rim[:, k]] for k in range(2))
     ends = np.array([mesh.points_m.min(axis=0), mesh.points_m.max(axis=0)])
@@ -81,7 +81,7 @@ def at_border(mesh: Mesh) -> Mask:
     return np.asarray(((abs(a - ends[:, None]) < near) & (abs(b - ends[:, None]) < near)).any(axis=(0, 2)))
 
 
-def pinches(cell: Cell) -> set[Point]:
+def pinches(cell: ContactCell) -> set[Point]:
     """Points in which solids touch: four edges of solids meet there, mirrors among them."""
     seen: dict[Point, int] = {}
     for edge, sides in cell.edges.items():
@@ -112,7 +112,7 @@ class Fineness:
         return self.scaled(1 / 2)
 
 
-def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
+def mesh_of(cell: ContactCell, fineness: Fineness) -> TriangleMesh:
     """Mesh the solid parts of a cell.
 
     The edges are cut here, because a mesher that smooths its sizes forgets the small ones at an apex.
@@ -135,7 +135,7 @@ def mesh_of(cell: Cell, fineness: Fineness) -> Mesh:
 
 
 def _cut(
-    cell: Cell, sizes: Mapping[Point, float], fineness: Fineness, wide: Fineness, blocks: set[int]
+    cell: ContactCell, sizes: Mapping[Point, float], fineness: Fineness, wide: Fineness, blocks: set[int]
 ) -> dict[Edge, tuple[int, int]]:
     """Pieces of the edges of solids, with their regions; of a block on the top they grow to ``wide``."""
     pieces: dict[Edge, tuple[int, int]] = {}
@@ -153,7 +153,7 @@ def _cut(
     return pieces
 
 
-def _is_flat(cell: Cell, place: Point) -> bool:
+def _is_flat(cell: ContactCell, place: Point) -> bool:
     """Test whether a dome and a level face meet at a point of the axis."""
     ends = [p if q == place else q for (p, q), sides in cell.edges.items() if place in (p, q) and cell.air in sides]
     return place[0] == 0 and all(abs(z - place[1]) < _LEVEL * r for r, z in ends)

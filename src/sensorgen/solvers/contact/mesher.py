@@ -31,7 +31,7 @@ class Unmeshed(BadInput):
     """No sound mesh of these outlines was found."""
 
 
-class Made(NamedTuple):
+class MesherOutput(NamedTuple):
     """Output of the mesher: places (n, 2), corners (m, 3) and regions (m,) of triangles, sides (k, 2), their edges."""
 
     points: Real
@@ -44,7 +44,7 @@ class Made(NamedTuple):
 def mesh(
     edges: Sequence[tuple[Edge, tuple[int, int]]], size: float, growth: float, sizes: Mapping[int, float], *,
     quick: bool,
-) -> Made:  # fmt: skip
+) -> MesherOutput:  # fmt: skip
     """Mesh the regions to the left and right of edges; those from 0 down are left open.
 
     Parameters
@@ -70,7 +70,7 @@ def mesh(
         answer = _exchange((list(edges), size, growth, dict(sizes), quick))
     if isinstance(answer, str):
         raise Unmeshed(f"these outlines cannot be meshed ({answer}): do bodies overlap, or leave slivers?")
-    return Made(*answer)
+    return MesherOutput(*answer)
 
 
 def check() -> None:

@@ -20,10 +20,10 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.solvers.contact import rings
-from sensorgen.solvers.contact.cell import OUTSIDE, Cell, Edge
+from sensorgen.solvers.contact.cell import OUTSIDE, ContactCell, Edge
 from sensorgen.solvers.contact.element import triangle_gradients, triangle_points, triangle_values
 from sensorgen.solvers.contact.factors import solved_by_lu
-from sensorgen.solvers.contact.mesh import Mesh, Net, nearest, of_triangles, triangulated
+from sensorgen.solvers.contact.mesh import Net, TriangleMesh, nearest, of_triangles, triangulated
 from sensorgen.solvers.contact.mesher import Unmeshed
 from sensorgen.solvers.contact.wedge import Wedge, filled, wedges
 
@@ -33,14 +33,14 @@ _ROUNDING = 1e-9
 _HOLE = 1e-6  # area that a mesh may miss, as a share
 
 
-def capacitance(cell: Cell, mesh: Mesh, permittivity: Mapping[str, float]) -> Interval:
+def capacitance(cell: ContactCell, mesh: TriangleMesh, permittivity: Mapping[str, float]) -> Interval:
     """Bounds of the capacitance per area of a cell [F/m2].
 
     Parameters
     ----------
-    cell : Cell
+    cell : ContactCell
         Mirrored.
-    mesh : Mesh
+    mesh : TriangleMesh
         From :func:`meshed`, pressed or not.
     permittivity : mapping of str to float
         Relative permittivity by material, with "air" [-].
@@ -77,7 +77,7 @@ def capacitance(cell: Cell, mesh: Mesh, permittivity: Mapping[str, float]) -> In
     return Interval(lower, upper).times(EPS0_F_PER_M)
 
 
-def _energies(mesh: Mesh, inside: Whole) -> tuple[Real, Real]:
+def _energies(mesh: TriangleMesh, inside: Whole) -> tuple[Real, Real]:
     """Quadratic forms (m, 6, 6) of some triangles: of potentials, and of stream functions."""
     at, weights = triangle_points()
     slopes, jacobians = triangle_gradients(at)[:, :6], mesh.jacobians_m[inside]
@@ -103,12 +103,12 @@ def _squares(fields: Real, weight: Real) -> Real:
     )
 
 
-def meshed(cell: Cell, coarse_mm: float, growth: float, count: int = 6) -> Mesh:
+def meshed(cell: ContactCell, coarse_mm: float, growth: float, count: int = 6) -> TriangleMesh:
     """Mesh everything but thin wedges of air, which are filled with triangles of their own.
 
     Parameters
     ----------
-    cell : Cell
+    cell : ContactCell
         Its outlines, pressed or not.
     coarse_mm, growth : float
         Largest triangle [mm], and by how much triangles grow per distance [-].

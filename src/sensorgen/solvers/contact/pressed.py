@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
-from sensorgen.core.arrays import Real
+from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.solvers.contact.boundary import CHOICES, BoundaryConditions
-from sensorgen.solvers.contact.mesh import Mesh
+from sensorgen.solvers.contact.mesh import TriangleMesh
 
 if TYPE_CHECKING:
     from sensorgen.solvers.contact.bricks import BrickMesh
@@ -37,7 +37,7 @@ _BY_LOAD = (
     "apex_m",
 )  # fmt: skip
 
-AnyMesh = TypeVar("AnyMesh", Mesh, "BrickMesh")
+AnyMesh = TypeVar("AnyMesh", TriangleMesh, "BrickMesh")
 
 
 @dataclass(frozen=True)
@@ -102,17 +102,40 @@ class Pressed:
         return float(self.stress_pa[-1])
 
     def sound(self) -> "Pressed":
-        """The part before the first pressure at which a check fails, without faults; all where it has no two."""
-        n = self.sound_loads()
-        return replace(self.first(n), faults=()) if n > 1 else self
+        """The part before the first pressure at which a check fails, without faults; all where it has no two.
+
+        Pressures of unknown capacitance, as of outlines that could not be meshed, are left out where a later one has
+        it.
+        """
+        bounds = self.capacitance_f_per_m2
+        last = max((k for k, c in enumerate(bounds) if c), default=-1)
+        holds = self._holds()
+        known = self.some([k for k in range(len(self.stress_pa)) if k > last or bounds[k] or not holds[k]])
+        n = known.sound_loads()
+        return replace(known.first(n), faults=()) if n > 1 else self
 
     def sound_loads(self) -> int:
         """Number of pressures before the first at which a check fails."""
         known = [c.middle() if c else -np.inf for c in self.capacitance_f_per_m2]
         rises = [b >= a * (1 - _LEVELS) for a, b in pairwise(known)]
-        holds = (self.volume_ratio >= _LEAST_VOLUME) & (self.penetration <= DEEPEST) & (abs(self.imbalance) <= _BALANCE)
+        holds = self._holds()
         holds[: len(known)] &= np.isfinite(known) & np.array([True, *rises])
         return len(holds) if holds.all() else int(holds.argmin())
+
+    def _holds(self) -> Mask:
+        """Pressures at which volume, penetration and balance of energy are sound."""
+        volume = self.volume_ratio >= _LEAST_VOLUME
+        return volume & (self.penetration <= DEEPEST) & (abs(self.imbalance) <= _BALANCE)
+
+    def some(self, which: Sequence[int]) -> "Pressed":
+        """Some pressures of the curve."""
+        values = {name: getattr(self, name) for name in _BY_LOAD}
+        rows: dict[str, Any] = {
+            k: v[which] if isinstance(v, np.ndarray) else tuple(v[i] for i in which)
+            for k, v in values.items()
+            if len(v)
+        }
+        return replace(self, **rows)
 
     def first(self, n: int) -> "Pressed":
         """First pressures of the curve."""
@@ -120,7 +143,7 @@ class Pressed:
 
 
 @dataclass(frozen=True)
-class Run(Generic[AnyMesh]):
+class LoadSteps(Generic[AnyMesh]):
     """A problem on a mesh and its equilibria, load by load."""
 
     problem: "Problem"
@@ -150,12 +173,12 @@ def solve(
     longest: float,
     source: str,
     step: Callable[[float], None],
-) -> tuple[Pressed, Run[AnyMesh]]:
+) -> tuple[Pressed, LoadSteps[AnyMesh]]:
     """Press a mesh of triangles or bricks as far as it converges, and check the result.
 
     Parameters
     ----------
-    mesh : Mesh or BrickMesh
+    mesh : TriangleMesh or BrickMesh
         Of the solid parts of a cell.
     solids : sequence of Elastic
         Of each element.
@@ -180,7 +203,7 @@ def solve(
     moduli, ratios = np.array([[s.youngs_modulus_pa, s.poisson_ratio] for s in solids]).T
     softest, elements = float(moduli.min()), Elements(mesh, law(moduli, ratios))
     load, penalty, stick = top_load(mesh.points_m, *mesh.top()), penalty_pa(softest), boundary.contact == "stick"
-    if isinstance(mesh, Mesh):
+    if isinstance(mesh, TriangleMesh):
         faces, outline = faces_of(mesh), mesh.outline
 
         def sound(places_m: Real) -> bool:
@@ -202,7 +225,7 @@ def solve(
         if state.pressure_pa in stress_pa:
             step(state.pressure_pa)
     found = _checked(problem, every, stress_pa, source)
-    return found, Run(problem, mesh, [state for state in every if state.pressure_pa in stress_pa])
+    return found, LoadSteps(problem, mesh, [state for state in every if state.pressure_pa in stress_pa])
 
 
 def _checked(problem: "Problem", every: "Sequence[State]", stress_pa: Sequence[float], source: str) -> Pressed:

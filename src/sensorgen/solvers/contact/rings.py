@@ -7,7 +7,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Real, Whole
 from sensorgen.scene.scene import Point
-from sensorgen.solvers.contact.cell import Cell, Edge
+from sensorgen.solvers.contact.cell import ContactCell, Edge
 
 _SHARP = 0.3  # an outline that turns by less is no corner [rad]
 _RATIO = 0.5  # of a ring to the one around it [-]
@@ -26,7 +26,7 @@ def corners(edges: Mapping[Edge, tuple[int, int]], left_mm: float, right_mm: flo
     return [place for place, found in ways.items() if len(found) != 2 or found[0] @ found[1] >= -np.cos(_SHARP)]
 
 
-def notches(cell: Cell) -> list[Point]:
+def notches(cell: ContactCell) -> list[Point]:
     """Where the solids fill more than half a turn around a corner; the walls of the cell are mirrors."""
     ways: dict[Point, list[tuple[float, bool]]] = {}
     for edge, sides in cell.edges.items():

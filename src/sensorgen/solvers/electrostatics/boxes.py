@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from sensorgen.core.arrays import Real, Whole
 from sensorgen.core.bounds import Interval
 from sensorgen.solvers.electrostatics.bricks import Grid
-from sensorgen.solvers.electrostatics.elimination import HELD, Block, Solution, least
+from sensorgen.solvers.electrostatics.elimination import HELD, Block, EnergySolution, least
 
 
 @dataclass(frozen=True)
@@ -242,7 +242,7 @@ class Boxes:
         """Number of unknowns that the boxes share."""
         return len(np.unique(self.ids[self.ids >= HELD]))
 
-    def least(self, keep: bool = False) -> Solution:
+    def least(self, keep: bool = False) -> EnergySolution:
         """The least energy; ``keep`` what finds the unknowns."""
         ids = self.ids if self.load is None else np.pad(self.ids, ((0, 0), (0, 1)), constant_values=1)
         blocks = [Block(own, partial(self._matrix, box), self.places[box]) for box, own in enumerate(ids)]

@@ -24,7 +24,7 @@ def ring_corners(tips: Real) -> Real:
 
 
 @dataclass(frozen=True)
-class Layout:
+class RingLayout:
     """Unknowns of one ring around a corner, by what they touch.
 
     Attributes
@@ -54,7 +54,7 @@ class Layout:
 
     @classmethod
     @cache
-    def of(cls, spokes: int, closed: bool, ends: tuple[bool, bool], order: int) -> "Layout":
+    def of(cls, spokes: int, closed: bool, ends: tuple[bool, bool], order: int) -> "RingLayout":
         """For so many spokes, of which the first and the last may be held."""
         fixed = np.zeros(spokes, bool)
         fixed[0], fixed[-1] = ends
@@ -99,7 +99,7 @@ class Cone:
 
     Attributes
     ----------
-    layout : Layout
+    layout : RingLayout
         Of its unknowns.
     matrix : (m, m) or (m + 1, m + 1) array
         Of the outermost unknowns, and of the held value if there is one.
@@ -111,7 +111,7 @@ class Cone:
         Unknowns at the innermost triangles' rim from what ``matrix`` takes.
     """
 
-    layout: Layout
+    layout: RingLayout
     matrix: Numbers
     in_ring: Numbers
     between: list[Numbers]
@@ -119,7 +119,7 @@ class Cone:
     at_tip: Numbers
 
     @classmethod
-    def of(cls, layout: Layout, rings: Numbers, tips: Numbers, doublings: int) -> "Cone":
+    def of(cls, layout: RingLayout, rings: Numbers, tips: Numbers, doublings: int) -> "Cone":
         """Of energies (s, 2, k, k) of one ring's triangles, and (s, k, k) of the innermost, 2 ** doublings rings."""
         m, held = layout.outer, int(layout.held)
         ring, in_ring = eliminated(_assembled(layout.ring, layout.ring_signs, rings), 2 * m + held)

@@ -40,7 +40,7 @@ class Block:
 
 
 @dataclass
-class Solution:
+class EnergySolution:
     """The least energy, or the stationary one.
 
     Attributes
@@ -104,7 +104,7 @@ def added(size: int, parts: Iterable[tuple[Whole, Numbers]]) -> Numbers:
     return found.reshape(size, size)
 
 
-def least(blocks: Sequence[Block], count: int, *, leaf: int = _LEAF, keep: bool = True) -> Solution:
+def least(blocks: Sequence[Block], count: int, *, leaf: int = _LEAF, keep: bool = True) -> EnergySolution:
     """Least energy of the sum of the blocks over ``count`` unknowns.
 
     Parameters
@@ -120,7 +120,7 @@ def least(blocks: Sequence[Block], count: int, *, leaf: int = _LEAF, keep: bool 
     """
     total = np.bincount(np.concatenate([b.ids for b in blocks]), minlength=count)
     total[:HELD] = np.iinfo(total.dtype).max
-    places, found = np.array([b.place for b in blocks]), Solution(count)
+    places, found = np.array([b.place for b in blocks]), EnergySolution(count)
 
     def joined(which: Whole) -> _Joined:
         """Some blocks without the unknowns that no other block shares."""
@@ -170,7 +170,8 @@ def _sum(parts: list[_Joined], total: Whole) -> tuple[_Joined, int]:
     if len(parts) > 2 or len(np.unique(places[0])) < len(places[0]):
         matrix = added(len(ids), zip(places, (p.matrix for p in parts), strict=True))
     else:  # large, and each unknown once
-        matrix = np.zeros((len(ids),) * 2, np.result_type(*(p.matrix.dtype for p in parts)))
+        flat = np.zeros(len(ids) ** 2, np.result_type(*(p.matrix.dtype for p in parts)))
         for place, part in zip(places, parts, strict=True):
-            matrix[place[:, None], place] += part.matrix
+            flat[(place[:, None] * len(ids) + place).ravel()] += part.matrix.ravel()
+        matrix = flat.reshape(len(ids), len(ids))
     return _Joined(ids, matrix, seen), kept

@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 
 from sensorgen.solvers.electrostatics.bounds import Unsolved
-from sensorgen.solvers.electrostatics.prisms import MITRE, Layers, beyond
+from sensorgen.solvers.electrostatics.prisms import MITRE, LayerCell, beyond
 
 _MARGIN = 1.5  # of the grid: rounding moves outlines by 0.71 of its pitch, and slivers may go to the wrong side
 _FULL = 1e-9  # share of the plan that rounding may leave out of a region that fills it
@@ -22,12 +22,12 @@ _FULL = 1e-9  # share of the plan that rounding may leave out of a region that f
 Levels = list[Any]  # regions: each conductor, then what has at least each permittivity, from the highest
 
 
-def enclosing(cell: Layers, grid_mm: float, far_mm: float, loose_mm: float, *, outwards: bool) -> Layers:
+def enclosing(cell: LayerCell, grid_mm: float, far_mm: float, loose_mm: float, *, outwards: bool) -> LayerCell:
     """A cell with outlines moved in or out, so that they may be rounded.
 
     Parameters
     ----------
-    cell : Layers
+    cell : LayerCell
         Of polygons.
     grid_mm : float
         To which its corners will be rounded [mm].
@@ -64,7 +64,7 @@ def enclosing(cell: Layers, grid_mm: float, far_mm: float, loose_mm: float, *, o
     return replace(cell, regions=[_regions(cell, levels, order) for levels in moved])
 
 
-def _levels(cell: Layers, own: dict[int, Any], order: Any) -> Levels:
+def _levels(cell: LayerCell, own: dict[int, Any], order: Any) -> Levels:
     """Of one layer."""
     last = cell.conductors + len(cell.permittivity) - 1
     own = {kind: shapely.union_all(region) for kind, region in own.items()}
@@ -79,7 +79,7 @@ def _levels(cell: Layers, own: dict[int, Any], order: Any) -> Levels:
     return levels
 
 
-def _regions(cell: Layers, levels: Levels, order: Any) -> dict[int, Any]:
+def _regions(cell: LayerCell, levels: Levels, order: Any) -> dict[int, Any]:
     """Fillings of a layer, from its levels."""
     metal = [k for k in range(cell.conductors) if not levels[k].is_empty]
     if any(shapely.intersects(levels[a], levels[b]) for a, b in combinations(metal, 2)):
@@ -94,7 +94,7 @@ def _regions(cell: Layers, levels: Levels, order: Any) -> dict[int, Any]:
     return found
 
 
-def _far(cell: Layers, far_mm: float) -> list[bool]:
+def _far(cell: LayerCell, far_mm: float) -> list[bool]:
     """Mask of the layers that are far, and no plates."""
     low, high = cell.heights_mm[:-1], cell.heights_mm[1:]
     holds = [np.array([k in own for own in cell.regions]) for k in range(cell.conductors)]
@@ -119,7 +119,7 @@ def _near(wider: Any, other: Any, outwards: bool, by_mm: float) -> bool:
     return bool(shapely.covers(shapely.buffer(shared, by_mm), union))
 
 
-def _moved(region: Any, cell: Layers, by_mm: float, loose_mm: float) -> Any:
+def _moved(region: Any, cell: LayerCell, by_mm: float, loose_mm: float) -> Any:
     """A region grown by a distance, or shrunk, inside the cell; its outline simplified to the same side."""
     area = cell.size_mm[0] * cell.size_mm[1]
     if region.is_empty or region.area > (1 - _FULL) * area:

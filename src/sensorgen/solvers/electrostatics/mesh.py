@@ -52,31 +52,52 @@ def flow(mesh: Triangles, cones: Collection[int]) -> Flow:
     loops, mirrors = _groups(rim), _groups(walls)
     held: dict[int, int] = {}
     lifts: dict[int, list[tuple[int, int]]] = defaultdict(list)
-    # a cut ends with an electrode to its left, lest it part a mirror's value
-    ends = {a for a, b in rim if a not in cones and _named((a, b)) in mesh.terminals}
-    carrying = {loops[a] for a, b in rim if _named((a, b)) in mesh.terminals}  # a hole whose rim is all mirror does not
+    starts = {a for a, b in rim if _named((a, b)) in mesh.terminals}
+    ends = starts - set(cones)  # a cut ends with an electrode to its left, lest it part a mirror's value
+    carrying = {loops[a] for a in starts}  # a hole whose rim is all mirror does not
     count = HELD
-    names = _groups((corner, spoke) for corner, fan in around.items() for spoke in fan.spokes)
-    for least in sorted(set(names.values())):  # points of each connected piece of dielectric
-        piece = {k for k, name in names.items() if name == least}
-        ground = min((mirrors[k] for k in piece if k in mirrors), default=-1)
-        for name in sorted({mirrors[k] for k in piece if k in mirrors} - {ground}):
-            held |= dict.fromkeys((k for k in piece if mirrors.get(k) == name), count)
-            count += 1
-        zero = {k for k in piece if mirrors.get(k) == ground} or {min((piece & loops.keys()) - set(cones))}
-        held |= dict.fromkeys(zero, 0)
-        start = loops[min(zero)]
+    for piece in _connected(around):
+        values, count = _on_mirrors(piece, mirrors, (piece & loops.keys()) - set(cones), count)
+        held |= values
+        start = loops[min(point for point, value in values.items() if value == 0)]
         rims = {k: loops[k] for k in piece if k in loops}
         for path in _cuts(around, rims, start, carrying & set(rims.values()) | {start}, ends, cones):
             for number, corner in _beside(around, path):
                 lifts[number].append((corner, count))
             count += 1
     top = [e for e in rim if mesh.terminals.get(_named(e)) == "top"]
+    return Flow(held, {_named(e) for e in walls}, dict(lifts), top, _rise(top, lifts, around), count)
+
+
+def _connected(around: Mapping[int, Fan]) -> list[set[int]]:
+    """Points of each connected piece of dielectric, by their least."""
+    pieces: dict[int, set[int]] = defaultdict(set)
+    for point, least in _groups((corner, spoke) for corner, fan in around.items() for spoke in fan.spokes).items():
+        pieces[least].add(point)
+    return [pieces[least] for least in sorted(pieces)]
+
+
+def _on_mirrors(
+    piece: set[int], mirrors: Mapping[int, int], rim: set[int], first: int
+) -> tuple[dict[int, int], int]:  # fmt: skip
+    """Unknown of each point on a mirror of a piece, and the next one; 0 on one mirror, else at one point of the rim."""
+    names = sorted({mirrors[k] for k in piece if k in mirrors})
+    values: dict[int, int] = {}
+    for unknown, name in enumerate(names[1:], first):
+        values |= dict.fromkeys((k for k in piece if mirrors.get(k) == name), unknown)
+    zero = {k for k in piece if mirrors.get(k) == names[0]} if names else {min(rim)}
+    return values | dict.fromkeys(zero, 0), first + max(len(names) - 1, 0)
+
+
+def _rise(
+    top: Iterable[Edge], lifts: Mapping[int, list[tuple[int, int]]], around: Mapping[int, Fan]
+) -> dict[int, int]:  # fmt: skip
+    """How often each jump adds to what flows into the electrode at 1 V."""
     rise: dict[int, int] = defaultdict(int)
     for a, b in top:
         for corner, jump in lifts.get(around[a].members[0], ()):
             rise[jump] += (corner == b) - (corner == a)
-    return Flow(held, {_named(e) for e in walls}, dict(lifts), top, rise, count)
+    return rise
 
 
 def _named(edge: Edge) -> Edge:

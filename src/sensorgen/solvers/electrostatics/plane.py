@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sensorgen.core.arrays import Real, Whole
-from sensorgen.solvers.electrostatics.cones import Cone, Layout, ring_corners
+from sensorgen.solvers.electrostatics.cones import Cone, RingLayout, ring_corners
 from sensorgen.solvers.electrostatics.elimination import HELD, Block, Numbers, least
 from sensorgen.solvers.electrostatics.mesh import Cones, Flow
 from sensorgen.solvers.electrostatics.polynomials import condensed, crossed, numbered
@@ -74,7 +74,7 @@ class _Share:
 
 
 @dataclass(frozen=True)
-class Problem:
+class PlaneProblem:
     """A function to be found: what weighs its slope, and where it is held.
 
     Attributes
@@ -153,14 +153,14 @@ class Problem:
     def _cone(self, corner: int, energies: tuple[Real, Real]) -> Cone:
         fan, (rings, tips) = self.mesh.fans[corner], energies
         ends = self._is_wall(corner, fan.spokes[0]), self._is_wall(corner, fan.spokes[-1])
-        layout = Layout.of(len(fan.spokes), fan.closed, ends, self.order)
+        layout = RingLayout.of(len(fan.spokes), fan.closed, ends, self.order)
         here = self.weight[fan.members][:, None, None]
         return Cone.of(layout, rings * here[:, None], tips * here, self.mesh.doublings[corner])
 
     def _is_wall(self, a: int, b: int) -> bool:
         return (min(a, b), max(a, b)) in self.walls
 
-    def _rim(self, corner: int, layout: Layout) -> _Share:
+    def _rim(self, corner: int, layout: RingLayout) -> _Share:
         """Values that a cone shares with its neighbours, in its own turn."""
         _, vertex, first = self._unknowns
         mesh, fan = self.mesh, self.mesh.fans[corner]
@@ -234,8 +234,8 @@ class Plane:
         size = abs(crossed(self.order))
         return self._over(f.moduli(), g.moduli(), size, [(size, size)] * len(f.cones))
 
-    def _problem(self, weight: Numbers, *held: Any) -> Problem:
-        return Problem(self.mesh, self.order, self._plain_energy, self._cone_energies, weight, *held)
+    def _problem(self, weight: Numbers, *held: Any) -> PlaneProblem:
+        return PlaneProblem(self.mesh, self.order, self._plain_energy, self._cone_energies, weight, *held)
 
     def _grounded(self, f: Field) -> Field:
         """Less the value at one end of each triangle's shortest side.

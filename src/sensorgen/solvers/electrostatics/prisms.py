@@ -31,7 +31,7 @@ MITRE = 2.0  # of lines beside outlines, in their distance
 
 
 @dataclass(frozen=True)
-class Layers:
+class LayerCell:
     """A cell of layers, each of polygons.
 
     Attributes
@@ -66,7 +66,7 @@ class Layers:
 
 
 @dataclass(frozen=True)
-class Plan:
+class PlanTriangles:
     """Triangles in plan, and what fills each in every layer.
 
     Attributes
@@ -91,12 +91,12 @@ class Plan:
         return float((area / np.hypot(*sides.T).max(0)).min())
 
 
-def plan(cell: Layers, beside_mm: Sequence[float], grid_mm: float) -> Plan:
+def plan(cell: LayerCell, beside_mm: Sequence[float], grid_mm: float) -> PlanTriangles:
     """Overlay of a cell's outlines, triangulated.
 
     Parameters
     ----------
-    cell : Layers
+    cell : LayerCell
         Of polygons.
     beside_mm : sequence of float
         Distances of further lines from the outlines of conductors [mm].
@@ -150,7 +150,7 @@ def plan(cell: Layers, beside_mm: Sequence[float], grid_mm: float) -> Plan:
     triangles = np.where((area > 0)[:, None], triangles, triangles[:, ::-1])
     if int(np.abs(area).sum()) != 2 * int(x) * int(y) or not area.all():
         raise Unsolved(f"outlines nearer to each other than the grid of {grid_mm:g} mm: triangles do not fill the plan")
-    return Plan(points * pitch, triangles, _filled(layers, faces, cell)[:, of_face])
+    return PlanTriangles(points * pitch, triangles, _filled(layers, faces, cell)[:, of_face])
 
 
 def _simpler(region: Any, by: float) -> Any:
@@ -189,7 +189,7 @@ def _repeated(noded: Any, size: Sequence[float], periodic: Sequence[bool]) -> An
     return shapely.multilinestrings(lines)
 
 
-def _filled(layers: Sequence[dict[int, Any]], faces: Any, cell: Layers) -> Whole:
+def _filled(layers: Sequence[dict[int, Any]], faces: Any, cell: LayerCell) -> Whole:
     """Filling of each face in every layer, by a place inside it."""
     inside = shapely.point_on_surface(faces)
     found = np.full((len(layers), len(faces)), cell.conductors + len(cell.permittivity) - 1)
@@ -200,14 +200,14 @@ def _filled(layers: Sequence[dict[int, Any]], faces: Any, cell: Layers) -> Whole
 
 
 @dataclass(frozen=True)
-class Mesh:
+class PrismMesh:
     """Prisms between a cell's conductors.
 
     Attributes
     ----------
-    cell : Layers
+    cell : LayerCell
         That is meshed.
-    plan : Plan
+    plan : PlanTriangles
         Its triangles.
     heights_mm : (h,) array
         Planes [mm].
@@ -217,14 +217,14 @@ class Mesh:
         That corners are rounded to [mm].
     """
 
-    cell: Layers
-    plan: Plan
+    cell: LayerCell
+    plan: PlanTriangles
     heights_mm: Real
     fill: Whole
     grid_mm: float
 
     @classmethod
-    def of(cls, cell: Layers, beside_mm: Sequence[float], grid_mm: float, reach_mm: float = np.inf) -> "Mesh":
+    def of(cls, cell: LayerCell, beside_mm: Sequence[float], grid_mm: float, reach_mm: float = np.inf) -> "PrismMesh":
         """The prisms of a cell; parameters and errors as of :func:`plan`.
 
         Planes as far from each level at which a conductor ends within the cell as the lines are from its outlines,
@@ -394,12 +394,12 @@ def _distinct(faces: Whole) -> Whole:
     return faces[np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]]
 
 
-def solved(inner: Mesh, outer: Mesh, order: int, weight: Real, *, enclosed: bool = False) -> Energies:
+def solved(inner: PrismMesh, outer: PrismMesh, order: int, weight: Real, *, enclosed: bool = False) -> Energies:
     """Both bounds over eps0 [mm], of a potential of an order and of a flux of one less.
 
     Parameters
     ----------
-    inner, outer : Mesh
+    inner, outer : PrismMesh
         Of a cell for the flux, and of the same or of one with more conductor for the potential.
     order : int
         Of the potential's polynomials.
@@ -419,7 +419,7 @@ def solved(inner: Mesh, outer: Mesh, order: int, weight: Real, *, enclosed: bool
     return Energies(lower, upper, part, unknowns, 0.0 if enclosed else moved / upper, outer is not inner)
 
 
-def _upper(mesh: Mesh, order: int, weight: Real) -> tuple[float, float, float]:
+def _upper(mesh: PrismMesh, order: int, weight: Real) -> tuple[float, float, float]:
     """Energy of the best potential, that of a part, and what the grid may have moved."""
     import ngsolve as ng
 
@@ -442,7 +442,7 @@ def _upper(mesh: Mesh, order: int, weight: Real) -> tuple[float, float, float]:
     return upper, part, moved
 
 
-def _lower(mesh: Mesh, order: int) -> tuple[float, int]:
+def _lower(mesh: PrismMesh, order: int) -> tuple[float, int]:
     """Thomson's functional of the best flux, and its unknowns."""
     import ngsolve as ng
 
@@ -471,7 +471,7 @@ def _lower(mesh: Mesh, order: int) -> tuple[float, int]:
     return lower, facet.ndof
 
 
-def _coefficients(mesh: Mesh) -> tuple[Any, list[str]]:
+def _coefficients(mesh: PrismMesh) -> tuple[Any, list[str]]:
     """Permittivity, and the boundaries of each conductor."""
     eps = mesh.netgen.MaterialCF({f"d{k}": value for k, value in enumerate(mesh.cell.permittivity)})
     return eps, [f"c{k}" for k in range(mesh.cell.conductors)]

@@ -14,13 +14,13 @@ import numpy as np
 from sensorgen.scene.revolved import Revolved
 from sensorgen.solvers.electrostatics.bounds import Energies
 from sensorgen.solvers.electrostatics.prisms import balanced, indicators
-from sensorgen.solvers.electrostatics.round_cell import Cell, profile
+from sensorgen.solvers.electrostatics.round_cell import RoundCell, profile
 from sensorgen.solvers.electrostatics.round_mesh import BETWEEN, MORE, RoundMesh, mesh_of
 
-__all__ = ["LEVELS", "Cell", "Level", "bounds", "solved"]
+__all__ = ["LEVELS", "RoundCell", "RoundLevel", "bounds", "solved"]
 
 
-class Level(NamedTuple):
+class RoundLevel(NamedTuple):
     """A mesh, as of :func:`mesh_of`, and the width that it often reaches [-]."""
 
     order: int
@@ -30,20 +30,20 @@ class Level(NamedTuple):
 
 
 LEVELS = (
-    Level(2, 2, 1e-2, 1.5e-2),
-    Level(3, 2, 4e-3, 1.5e-3),
-    Level(4, 2, 2e-3, 4.5e-4),
-    Level(5, 3, 1e-3, 6e-5),
-    Level(6, 4, 5e-4, 1e-5),
+    RoundLevel(2, 2, 1e-2, 1.5e-2),
+    RoundLevel(3, 2, 4e-3, 1.5e-3),
+    RoundLevel(4, 2, 2e-3, 4.5e-4),
+    RoundLevel(5, 3, 1e-3, 6e-5),
+    RoundLevel(6, 4, 5e-4, 1e-5),
 )
 
 
-def bounds(cell: Cell, width: float) -> Iterator[tuple[Level, int, Energies]]:
+def bounds(cell: RoundCell, width: float) -> Iterator[tuple[RoundLevel, int, Energies]]:
     """Both bounds over eps0 [mm] on finer and finer meshes, each with its number of elements, until within tolerance.
 
     Parameters
     ----------
-    cell : Cell
+    cell : RoundCell
         Between mirrors.
     width : float
         Relative width of the bounds that is wanted: the first mesh often reaches it [-].

@@ -21,7 +21,7 @@ Sized = tuple[float, float, float, float]  # a place, and the longest edge of el
 
 
 @dataclass(frozen=True)
-class Cell:
+class RoundCell:
     """A box between mirrors, with pieces in it that do not overlap.
 
     Attributes
@@ -161,7 +161,7 @@ def profile(piece: Revolved) -> list[ProfileEdge]:
 
 
 @dataclass(frozen=True)
-class Touch:
+class DomeTouch:
     """Where a dome meets a level face at a point: the gap between them ends in a cusp that no mesh fills.
 
     A flat cylinder around the point, as high as the gap is at its rim, is filled with what has the lower permittivity
@@ -193,7 +193,7 @@ class Touch:
         """Radius at which the gap has a height [mm]."""
         return sqrt(gap_mm * (2 * self.radius_mm - gap_mm))
 
-    def sizes(self, cell: Cell, gap_mm: float, times: float) -> list[Sized]:
+    def sizes(self, cell: RoundCell, gap_mm: float, times: float) -> list[Sized]:
         """Places in the gap beyond a height, by its height there, as :meth:`Cell.sizes` has them."""
         found = []
         for r in np.geomspace(self.rim_mm(gap_mm), 0.7 * self.radius_mm, 24).tolist():
@@ -213,7 +213,7 @@ def _faces(box: Real, at_mm: Real, z_mm: float, upwards: bool) -> bool:
     return bool(abs(box[2, int(upwards)] - z_mm) < SAME_MM and over.all())
 
 
-def touches(cell: Cell) -> list[Touch]:
+def touches(cell: RoundCell) -> list[DomeTouch]:
     """All places in a cell where a dome meets a level face."""
     found = []
     for own, piece, kind in cell.boxes():
@@ -227,7 +227,7 @@ def touches(cell: Cell) -> list[Touch]:
                 way = -1.0 if upwards else 1.0
                 metal = [box[2, int(upwards)] for box, its in others if its < cell.conductors]
                 apart = min((off for end in metal if (off := way * (end - z)) > SAME_MM), default=radius)
-                found.append(Touch(piece, kind, z, upwards, radius, float(apart)))
+                found.append(DomeTouch(piece, kind, z, upwards, radius, float(apart)))
     return found
 
 

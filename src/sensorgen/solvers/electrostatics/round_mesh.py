@@ -6,6 +6,7 @@ the field is infinite (hp-refinement), and where bodies are near each other.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 from math import atan2, pi
 from typing import Any
 
@@ -17,7 +18,7 @@ from sensorgen.scene.polyhedra import surface
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Piece, Prism
 from sensorgen.solvers.electrostatics.bounds import Unsolved
-from sensorgen.solvers.electrostatics.round_cell import SAME_MM, Cell, ProfileEdge, Touch, profile, touches
+from sensorgen.solvers.electrostatics.round_cell import SAME_MM, DomeTouch, ProfileEdge, RoundCell, profile, touches
 
 ROUND = "round"  # end of the name of faces that elements approach by polynomials
 SIDE, BETWEEN = "side", "between"  # names of mirrors, and of faces between dielectrics
@@ -42,29 +43,29 @@ class RoundMesh:
 
     Attributes
     ----------
-    cell : Cell
+    cell : RoundCell
         What is meshed.
     ngsolve : Mesh
         Materials are "d0p1" for part 1 of dielectric 0, and "t0" for what fills the cusp of touch 0; boundaries are
         "c0" for a conductor, "t0" around a cusp, ``SIDE`` and ``BETWEEN``.
-    touches : list of Touch
+    touches : list of DomeTouch
         Whose cusps are closed.
     round : (n,) array of bool
         Which regions of the boundary elements approach by polynomials.
     """
 
-    cell: Cell
+    cell: RoundCell
     ngsolve: Any
-    touches: list[Touch]
+    touches: list[DomeTouch]
     round: Mask
 
 
-def mesh_of(cell: Cell, order: int, layers: int, closed: float) -> RoundMesh:
+def mesh_of(cell: RoundCell, order: int, layers: int, closed: float) -> RoundMesh:
     """A mesh whose curved elements are sound.
 
     Parameters
     ----------
-    cell : Cell
+    cell : RoundCell
         What is meshed.
     order : int
         Of the potential; faces are approached by polynomials of one more.
@@ -157,7 +158,7 @@ def _middles(mesh: Any) -> Real:
     return np.array([points[[v.nr for v in element.vertices]].mean(0) for element in mesh.Elements()])
 
 
-def _shape(cell: Cell, cusps: Sequence[tuple[Touch, float]]) -> tuple[Any, "_Grading"]:
+def _shape(cell: RoundCell, cusps: Sequence[tuple[DomeTouch, float]]) -> tuple[Any, "_Grading"]:
     """All dielectrics with their common faces, named by conductor; edges and tips to be graded are marked."""
     import netgen.occ as occ
 
@@ -166,22 +167,29 @@ def _shape(cell: Cell, cusps: Sequence[tuple[Touch, float]]) -> tuple[Any, "_Gra
         for one in shape.solids:
             one.name = name
     whole = occ.Glue([one for _, shape in named for one in shape.solids]).solids
-    metal, kept = ([one for one in whole if (one.name[0] == "c") == held] for held in (True, False))
-    held: dict[str, list[Any]] = {}
-    for one in [one for one in kept if one.name[0] == "t"] + metal:
+    metal, dielectrics = ([one for one in whole if (one.name[0] == "c") == is_metal] for is_metal in (True, False))
+    faces = _named_faces([one for one in dielectrics if one.name[0] == "t"] + metal)
+    conductors = [faces.get(f"c{k}", []) for k in range(cell.conductors)]
+    places = [{_key(v.p) for face in own for v in face.vertices} for own in conductors]
+    if not dielectrics or any(a & b for a, b in combinations(places, 2)):
+        raise Unsolved("the electrodes touch: the capacitance grows without bound")
+    _refuse_open(cell, dielectrics)
+    grading = _Grading(cell)
+    grading.mark([face for name, own in faces.items() if name[0] == "c" for face in own])
+    return occ.Compound(dielectrics), grading
+
+
+def _named_faces(solids: Sequence[Any]) -> dict[str, list[Any]]:
+    """Faces of solids by their solid's name, which they get; round ones are marked."""
+    faces: dict[str, list[Any]] = {}
+    for one in solids:
         for face in one.faces:
             face.name = one.name + (ROUND if (face.name or "").endswith(ROUND) else "")
-        held.setdefault(one.name, []).extend(one.faces)
-    places = [{_key(v.p) for f in held.get(f"c{k}", ()) for v in f.vertices} for k in range(cell.conductors)]
-    if not kept or any(a & b for k, a in enumerate(places) for b in places[:k]):
-        raise Unsolved("the electrodes touch: the capacitance grows without bound")
-    _refuse_open(cell, kept)
-    grading = _Grading(cell)
-    grading.mark([face for name, faces in held.items() if name[0] == "c" for face in faces])
-    return occ.Compound(kept), grading
+        faces.setdefault(one.name, []).extend(one.faces)
+    return faces
 
 
-def _refuse_open(cell: Cell, kept: Sequence[Any]) -> None:
+def _refuse_open(cell: RoundCell, kept: Sequence[Any]) -> None:
     """Refuse a dielectric that reaches the bottom or the top of the cell."""
     for face in (face for one in kept for face in one.faces if (face.name or "x")[0] != "c"):
         low, high = face.bounding_box
@@ -190,7 +198,7 @@ def _refuse_open(cell: Cell, kept: Sequence[Any]) -> None:
                 raise Unsolved("an electrode does not cover the whole sensor")
 
 
-def _solids(cell: Cell, cusps: Sequence[tuple[Touch, float]]) -> list[tuple[str, Any]]:
+def _solids(cell: RoundCell, cusps: Sequence[tuple[DomeTouch, float]]) -> list[tuple[str, Any]]:
     """Conductors, parts of dielectrics and cusps, by name."""
     import netgen.occ as occ
 
@@ -272,7 +280,7 @@ class _Grading:
 
     Attributes
     ----------
-    cell : Cell
+    cell : RoundCell
         What is meshed.
     any : bool
         Whether some were marked.
@@ -280,7 +288,7 @@ class _Grading:
         Places on marked edges [mm].
     """
 
-    cell: Cell
+    cell: RoundCell
     any: bool = False
     along: list[tuple[float, float, float]] = field(default_factory=list)
 

@@ -6,12 +6,13 @@ from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
+from math import atan2, hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.scene.sections import ROUNDING_MM
-from sensorgen.scene.unit_cell import Cell
+from sensorgen.scene.unit_cell import SectionCell
 
 Edge = tuple[int, int]
 Triangle = tuple[int, int, int]
@@ -40,7 +41,7 @@ class Triangles:
 
 
 @lru_cache(maxsize=16)  # a cell is solved with many permittivities
-def triangles(cell: Cell) -> Triangles:
+def triangles(cell: SectionCell) -> Triangles:
     """Triangulate the dielectric of a cell between its electrodes.
 
     Raises
@@ -63,7 +64,7 @@ def triangles(cell: Cell) -> Triangles:
     return mesh
 
 
-def insulated(cell: Cell) -> Triangles:
+def insulated(cell: SectionCell) -> Triangles:
     """Triangulate a cell in which bands of no material are insulators, no matter how far the field reaches.
 
     Raises
@@ -135,7 +136,7 @@ def edges_of(corners: Triangle) -> list[Edge]:
 _Found = list[tuple[Triangle, tuple[str, float]]]
 
 
-def _all(cell: Cell) -> tuple[NDArray[np.float64], _Found]:
+def _all(cell: SectionCell) -> tuple[NDArray[np.float64], _Found]:
     """All triangles of a cell, those of electrodes with "@top" or "@bottom" for a material."""
     ends = [cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)]
     levels = []  # heights at which anything meets the line between slice k - 1 and slice k
@@ -204,7 +205,9 @@ def _piece(found: _Found, beside: dict[int, list[int]], left: set[int]) -> tuple
     return piece, ends
 
 
-def _refuse_open(points: NDArray[np.float64], owners: dict[Edge, list[int]], inside: set[int], cell: Cell) -> None:
+def _refuse_open(
+    points: NDArray[np.float64], owners: dict[Edge, list[int]], inside: set[int], cell: SectionCell
+) -> None:
     """Refuse a field that would reach the box's floor or lid: the scene does not describe what is beyond them."""
     last = cell.slices[0].bands
     ends = (last[0].bottom_mm[0], last[-1].top_mm[0])
@@ -273,13 +276,13 @@ def _is_better(a: _Point, b: _Point, c: _Point, d: _Point) -> bool:
 def _sine(a: _Point, b: _Point, c: _Point) -> float:
     """Of the angle at b, from a to c, above 0 where the three turn left."""
     (ux, uy), (vx, vy) = (b[0] - a[0], b[1] - a[1]), (c[0] - b[0], c[1] - b[1])
-    return float((ux * vy - uy * vx) / (np.hypot(ux, uy) * np.hypot(vx, vy)))
+    return (ux * vy - uy * vx) / (hypot(ux, uy) * hypot(vx, vy))
 
 
 def _angle(a: _Point, b: _Point, c: _Point) -> float:
     """At b, between a and c [rad]."""
     (ux, uy), (vx, vy) = (a[0] - b[0], a[1] - b[1]), (c[0] - b[0], c[1] - b[1])
-    return float(np.arctan2(abs(ux * vy - uy * vx), ux * vx + uy * vy))
+    return atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy)
 
 
 @dataclass(frozen=True)

@@ -223,7 +223,8 @@ def numbers(name: str, given: Any, kinds: str = "biuf") -> Real:
 def passive(name: str, given: Any) -> NDArray[Any]:
     """A quantity of a section, complex if it is an admittance; OutOfRange where a part is below 0 or not finite."""
     value = numbers(name, given, "biufc" if name == "admittance" else "biuf")
-    if not (np.isfinite(value).all() and (value.real >= 0).all() and (value.imag >= 0).all()):
+    sides = (value.real, value.imag) if value.dtype.kind == "c" else (value,)
+    if not all(_lowest(side) >= 0 and _highest(side) < math.inf for side in sides):  # nor NaN
         raise OutOfRange(f"{name} is negative or not finite; expected 0 or more")
     return value
 

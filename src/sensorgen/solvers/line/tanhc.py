@@ -55,7 +55,7 @@ def tanhc_slope(squared: Array, ratio: Array) -> Array:
     >>> round(float(tanhc_slope(np.asarray(0j), np.asarray(1 + 0j)).real), 6)
     -0.333333
     """
-    return _split(_near_slope, _far_slope, _REACH_OF_SLOPES, squared, ratio)
+    return _split(_near_slope, lambda w, t: (_far_sech_squared(w, t) - t) / (2 * w), _REACH_OF_SLOPES, squared, ratio)
 
 
 def sech_squared(squared: Array, ratio: Array) -> Array:
@@ -64,7 +64,7 @@ def sech_squared(squared: Array, ratio: Array) -> Array:
     >>> complex(sech_squared(np.asarray(0j), np.asarray(1 + 0j)))
     (1+0j)
     """
-    return _split(_near_sech_squared, _far_sech_squared, _REACH_OF_SLOPES, squared, ratio)
+    return _split(lambda _, w, t: 1 - w * t * t, _far_sech_squared, _REACH_OF_SLOPES, squared, ratio)
 
 
 def _split(near: Callable[..., Array], far: Callable[..., Array], reach: float, w: Array, *more: Array) -> Array:
@@ -93,10 +93,6 @@ def _near_slope(largest: float, w: Array, ratio: Array) -> Array:
     return np.asarray(above / _horner(under, w))
 
 
-def _near_sech_squared(_: float, w: Array, ratio: Array) -> Array:
-    return 1 - w * ratio * ratio
-
-
 def _shortest(largest: float) -> _Fraction:
     return next(fraction for fraction in _FRACTIONS if largest <= fraction.reach)
 
@@ -122,10 +118,6 @@ def _far(w: Array) -> Array:
     tanh.real = (1 - decay * decay) * (1 + square) / below
     tanh.imag = 4 * decay * tangent / below
     return np.asarray(tanh / z)
-
-
-def _far_slope(w: Array, ratio: Array) -> Array:
-    return np.asarray((_far_sech_squared(w, ratio) - ratio) / (2 * w))
 
 
 def _far_sech_squared(w: Array, _: Array) -> Array:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sensorgen.core.arrays import Real, Whole
-from sensorgen.solvers.network.nodes import Lines, Nodes, interleaved
+from sensorgen.solvers.network.nodes import Nodes, StraightLines, interleaved
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -76,7 +76,7 @@ class Links:
 
 
 @dataclass(frozen=True, eq=False)
-class Crossings:
+class LineCrossings:
     """Where lines of neighbouring layers cross: both pieces, the shares of their lengths, and the sine between them."""
 
     one: Whole
@@ -90,7 +90,7 @@ class Crossings:
         return np.concatenate([self.one, self.other]), np.concatenate([self.share_one, self.share_other])
 
 
-def near(lines: Lines) -> tuple[Whole, Whole]:
+def near(lines: StraightLines) -> tuple[Whole, Whole]:
     """Pairs of pieces, of one layer or of neighbouring ones, that may touch; the lower number first.
 
     By squares of a few widths that both pass through.
@@ -127,7 +127,7 @@ def _distinct(numbers: Whole) -> Whole:
     return np.asarray(rising[np.append(True, rising[1:] != rising[:-1])[: len(rising)]])
 
 
-def crossings(lines: Lines, pairs: tuple[Whole, Whole]) -> Crossings:
+def crossings(lines: StraightLines, pairs: tuple[Whole, Whole]) -> LineCrossings:
     """Pairs in neighbouring layers that cross at an angle."""
     i, j = pairs
     apart = lines.layer[i] != lines.layer[j]
@@ -139,10 +139,10 @@ def crossings(lines: Lines, pairs: tuple[Whole, Whole]) -> Crossings:
     gap, turn = lines.start_m[j] - lines.start_m[i], _cross(d[i], d[j])
     s, t = _cross(gap, d[j]) / turn, _cross(gap, d[i]) / turn
     hit = (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
-    return Crossings(i[hit], j[hit], s[hit], t[hit], np.abs(sine[hit]))
+    return LineCrossings(i[hit], j[hit], s[hit], t[hit], np.abs(sine[hit]))
 
 
-def gathered(lines: Lines, nodes: Nodes, pairs: tuple[Whole, Whole], crossed: Crossings) -> Links:
+def gathered(lines: StraightLines, nodes: Nodes, pairs: tuple[Whole, Whole], crossed: LineCrossings) -> Links:
     """All resistors."""
     ends = _Ends(lines, pairs)
     neighbours = _alongside(lines, pairs, same_layer=True)
@@ -163,7 +163,7 @@ class _Alongside(NamedTuple):
     high_m: Real
 
 
-def _along(lines: Lines, nodes: Nodes, neighbours: _Alongside) -> Links:
+def _along(lines: StraightLines, nodes: Nodes, neighbours: _Alongside) -> Links:
     piece, a, b = nodes.steps()
     length = (nodes.key[b] - nodes.key[a]) * lines.length_m()[piece]
     node = np.stack([nodes.number[a], nodes.number[b]] * 2, axis=1)
@@ -172,7 +172,7 @@ def _along(lines: Lines, nodes: Nodes, neighbours: _Alongside) -> Links:
     return Links(node, weight, area, length, np.zeros(len(piece)))
 
 
-def _own_width_m(lines: Lines, neighbours: _Alongside) -> Real:
+def _own_width_m(lines: StraightLines, neighbours: _Alongside) -> Real:
     """Width of each piece without half of what long neighbours overlap: one place conducts once [m]."""
     i, j, away, low, high = neighbours
     mean, stretch = (lines.width_m[i] + lines.width_m[j]) / 2, high - low
@@ -183,13 +183,13 @@ def _own_width_m(lines: Lines, neighbours: _Alongside) -> Real:
     return np.maximum(lines.width_m - lost, lines.width_m / 4)
 
 
-def _over(lines: Lines, nodes: Nodes, c: Crossings) -> Links:
+def _over(lines: StraightLines, nodes: Nodes, c: LineCrossings) -> Links:
     area = lines.width_m[c.one] * lines.width_m[c.other] / c.sine
     path = (lines.height_m[c.one] + lines.height_m[c.other]) / 2
     return Links.between(nodes, (c.one, c.share_one), (c.other, c.share_other), area, path)
 
 
-def _beside(lines: Lines, nodes: Nodes, neighbours: _Alongside, ends: "_Ends") -> Links:
+def _beside(lines: StraightLines, nodes: Nodes, neighbours: _Alongside, ends: "_Ends") -> Links:
     """Lines of one layer that run side by side."""
     i, j, away, _, _ = neighbours
     mean = (lines.width_m[i] + lines.width_m[j]) / 2
@@ -202,7 +202,7 @@ def _beside(lines: Lines, nodes: Nodes, neighbours: _Alongside, ends: "_Ends") -
     return _distributed(lines, nodes, (i, j), (low, high), height, away)
 
 
-def _stacked(lines: Lines, nodes: Nodes, above: _Alongside) -> Links:
+def _stacked(lines: StraightLines, nodes: Nodes, above: _Alongside) -> Links:
     """Lines of neighbouring layers that run on each other."""
     i, j, away, low, high = above
     fits = away < _STACKED * (lines.width_m[i] + lines.width_m[j]) / 2
@@ -211,7 +211,7 @@ def _stacked(lines: Lines, nodes: Nodes, above: _Alongside) -> Links:
     return _distributed(lines, nodes, (i, j), (low, high), wide, (lines.height_m[i] + lines.height_m[j]) / 2)
 
 
-def _alongside(lines: Lines, pairs: tuple[Whole, Whole], *, same_layer: bool) -> _Alongside:
+def _alongside(lines: StraightLines, pairs: tuple[Whole, Whole], *, same_layer: bool) -> _Alongside:
     """Parallel pairs with a common stretch."""
     i, j = pairs
     way = lines.direction()
@@ -227,7 +227,7 @@ def _alongside(lines: Lines, pairs: tuple[Whole, Whole], *, same_layer: bool) ->
 
 
 def _distributed(
-    lines: Lines, nodes: Nodes, pair: tuple[Whole, Whole], stretch: tuple[Real, Real], breadth: Real, path: Real
+    lines: StraightLines, nodes: Nodes, pair: tuple[Whole, Whole], stretch: tuple[Real, Real], breadth: Real, path: Real
 ) -> Links:
     """A contact along a stretch, as resistors at every node that either line has there, and at its ends."""
     i, j = pair
@@ -252,7 +252,7 @@ def _distributed(
 class _Ends:
     """Where pieces end on the side of another line of their layer, as infill does on a wall."""
 
-    def __init__(self, lines: Lines, pairs: tuple[Whole, Whole]) -> None:
+    def __init__(self, lines: StraightLines, pairs: tuple[Whole, Whole]) -> None:
         self.lines = lines
         # For each end of a piece the nearest line across it: piece, end (0 or 1), wall, share, distance [m] and sine
         a, b = pairs

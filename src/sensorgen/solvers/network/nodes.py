@@ -8,7 +8,7 @@ from sensorgen.core.arrays import Mask, Real, Whole
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class StraightLines:
     """Straight pieces of printed lines, in the order in which they are printed.
 
     Attributes
@@ -74,7 +74,7 @@ class Nodes:
     place_m: Real
 
     @classmethod
-    def of(cls, lines: Lines, places: tuple[Whole, Real]) -> "Nodes":
+    def of(cls, lines: StraightLines, places: tuple[Whole, Real]) -> "Nodes":
         """Nodes at the ends of all pieces and at further places (piece, share of its length)."""
         every = np.arange(len(lines))
         key = np.sort(np.concatenate([2.0 * every, 2.0 * every + 1.0, 2.0 * places[0] + np.clip(places[1], 0.0, 1.0)]))

@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Real
-from sensorgen.solvers.sheet.parts import ROUNDING, Contact, Patch, Port, Sheet
+from sensorgen.solvers.sheet.parts import ROUNDING, Contact, Port, Sheet, SheetPatch
 
 GRADING = 3.0  # cells at a corner of a contact shrink with this power: above 2, potentials as sqrt(r) cost no order
 _TABLE = 4000  # points between which the grading is inverted; any monotone choice of lines will do
 
 
 @dataclass(frozen=True)
-class Axis:
+class GridLines:
     """Grid lines along one side [m], from 0 to its length; unknowns sit on the lines."""
 
     lines_m: Real
@@ -47,7 +47,7 @@ class Axis:
         return found
 
 
-def axes(sheet: Sheet, contacts: Sequence[Contact], cells: int) -> tuple[Axis, Axis]:
+def axes(sheet: Sheet, contacts: Sequence[Contact], cells: int) -> tuple[GridLines, GridLines]:
     """Lines along x and y: on every border of a contact, and ever closer towards its corners.
 
     Parameters
@@ -71,7 +71,7 @@ def axes(sheet: Sheet, contacts: Sequence[Contact], cells: int) -> tuple[Axis, A
         _lines(size, ends, {at for pair in corners for at in pair[k]}, round(cells * (size / max(sizes)) ** 0.5))
         for k, (size, ends) in enumerate(zip(sizes, borders, strict=True))
     )
-    return Axis(x), Axis(y)
+    return GridLines(x), GridLines(y)
 
 
 def _corners(sheet: Sheet, contact: Contact) -> tuple[list[float], list[float]]:
@@ -120,7 +120,7 @@ def _crowding(at: Real, size: float, corners: set[float]) -> Real:
     return np.asarray(found)
 
 
-def folds(ports: Sequence[Port], patch: Patch | None) -> bool:
+def folds(ports: Sequence[Port], patch: SheetPatch | None) -> bool:
     """Test whether the currents in both sheets are opposite everywhere, so that only u_t - u_b counts.
 
     They are where every port joins two contacts that face each other, and the resistances have one ratio everywhere.

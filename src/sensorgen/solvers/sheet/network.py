@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Real
-from sensorgen.solvers.sheet.grid import Axis
-from sensorgen.solvers.sheet.parts import SIDES, Contact, Patch, Port, Sheet
+from sensorgen.solvers.sheet.grid import GridLines
+from sensorgen.solvers.sheet.parts import SIDES, Contact, Port, Sheet, SheetPatch
 
 Index = NDArray[np.intp]
 
@@ -17,7 +17,7 @@ BY = ("x_m", "y_m", "capacitance_factor", "top_resistance_factor", "bottom_resis
 
 
 @dataclass(frozen=True)
-class Links:
+class SheetLinks:
     """Links in a fixed order: those of the top sheet, of the bottom sheet, and through the film.
 
     Attributes
@@ -38,7 +38,7 @@ class Links:
     slopes: dict[str, Real]
 
 
-def links(sheet: Sheet, axes: tuple[Axis, Axis], patch: Patch | None) -> Links:
+def links(sheet: Sheet, axes: tuple[GridLines, GridLines], patch: SheetPatch | None) -> SheetLinks:
     """The network of a sheet on a grid, pressed or not."""
     places = np.arange(len(axes[0].lines_m) * len(axes[1].lines_m)).reshape(len(axes[0].lines_m), -1)
     pairs = (places[:-1], places[1:]), (places[:, :-1], places[:, 1:])
@@ -60,10 +60,12 @@ def links(sheet: Sheet, axes: tuple[Axis, Axis], patch: Patch | None) -> Links:
         name: np.array([np.append(by_sheet.get(name, dead), none), np.append(dead, by_film.get(name, none))])
         for name in (BY if patch else ())
     }
-    return Links(joined, np.append(conductance, leak), np.append(dead, capacitance), slopes)
+    return SheetLinks(joined, np.append(conductance, leak), np.append(dead, capacitance), slopes)
 
 
-def _film(sheet: Sheet, axes: tuple[Axis, Axis], patch: Patch | None) -> tuple[Real, Real, dict[str, Real]]:
+def _film(
+    sheet: Sheet, axes: tuple[GridLines, GridLines], patch: SheetPatch | None
+) -> tuple[Real, Real, dict[str, Real]]:
     """Leak [S] and capacitance [F] at each node, weighed by its hat function, and the derivatives of the latter."""
     c = sheet.capacitances()
     x, y = (Span(axis, n, 0.0, axis.lines_m[-1]) for axis, n in zip(axes, c.shape, strict=True))
@@ -95,7 +97,7 @@ class Span:
         an impedance by position is then as accurate as the impedance, wherever the patch lies between the lines.
     """
 
-    def __init__(self, axis: Axis, count: int, start_m: float, stop_m: float) -> None:
+    def __init__(self, axis: GridLines, count: int, start_m: float, stop_m: float) -> None:
         """Cut the axis's length into ``count`` steps and clip them to ``start_m .. stop_m``."""
         edges = np.linspace(0.0, axis.lines_m[-1], count + 1)
         clipped = np.clip(edges, start_m, stop_m)
@@ -105,13 +107,13 @@ class Span:
         self.slope = np.diff(axis.hats(clipped) * moving, axis=0)
 
 
-def _along(axis: Axis, start_m: float, stop_m: float) -> tuple[Real, Real]:
+def _along(axis: GridLines, start_m: float, stop_m: float) -> tuple[Real, Real]:
     """Share of each step that lies between two places [-], and its derivative when both move on [1/m].
 
     Weighed by hats over the middles of the steps, where the current is known, for the same reason as :class:`Span`.
     """
     lines = axis.lines_m
-    middles = Axis(np.concatenate([lines[:1], (lines[1:] + lines[:-1]) / 2, lines[-1:]]))
+    middles = GridLines(np.concatenate([lines[:1], (lines[1:] + lines[:-1]) / 2, lines[-1:]]))
     span = Span(middles, 1, start_m, stop_m)
     whole = _folded(middles.below(lines[[0, -1]])[1])
     return _folded(span.whole[0]) / whole, _folded(span.slope[0]) / whole
@@ -125,7 +127,9 @@ def _folded(values: Real) -> Real:
     return found
 
 
-def _one_way(axes: tuple[Axis, Axis], along: int, patch: Patch | None, side: int) -> tuple[Real, dict[str, Real]]:
+def _one_way(
+    axes: tuple[GridLines, GridLines], along: int, patch: SheetPatch | None, side: int
+) -> tuple[Real, dict[str, Real]]:
     """Squares in parallel over squares in series, of the links along one axis, and its derivatives.
 
     Under a patch the link is cut lengthwise: beside the patch it is as it was, and under it two parts are in series.
@@ -232,7 +236,7 @@ class Network:
 
 
 def network(
-    sheet: Sheet, axes: tuple[Axis, Axis], contacts: Sequence[Contact], ports: Sequence[Port], of: Links
+    sheet: Sheet, axes: tuple[GridLines, GridLines], contacts: Sequence[Contact], ports: Sequence[Port], of: SheetLinks
 ) -> Network:
     """Merge nodes under contacts and on perfectly conducting sheets, and number what is left."""
     count = 2 * len(axes[0].lines_m) * len(axes[1].lines_m)

@@ -124,7 +124,7 @@ Port = tuple[Contact, Contact]
 
 
 @dataclass(frozen=True)
-class Patch:
+class SheetPatch:
     """A pressed rectangle.
 
     Attributes
@@ -179,7 +179,7 @@ def contacts_of(sheet: Sheet, ports: Sequence[Port]) -> tuple[Contact, ...]:
     return found
 
 
-def check_patch(sheet: Sheet, patch: Patch) -> None:
+def check_patch(sheet: Sheet, patch: SheetPatch) -> None:
     """Raise where a patch reaches beyond the sheet."""
     x, y = (patch.x_m, patch.x_m + patch.length_m), (patch.y_m, patch.y_m + patch.width_m)
     _check_inside("the pressed patch", sheet, x, y)

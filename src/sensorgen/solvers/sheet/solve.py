@@ -11,7 +11,7 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
 from sensorgen.solvers.sheet.grid import axes, fold, folds
 from sensorgen.solvers.sheet.network import BY, links, network
-from sensorgen.solvers.sheet.parts import SIDES, Contact, Patch, Port, Sheet, check, check_patch, contacts_of
+from sensorgen.solvers.sheet.parts import SIDES, Contact, Port, Sheet, SheetPatch, check, check_patch, contacts_of
 
 COARSEST, FINEST = 10, 320  # cells between which a resolution is looked for
 _HIGHEST_HZ = 1e100
@@ -41,7 +41,7 @@ class Solution:
 
 
 def solution(
-    sheet: Sheet, ports: Sequence[Port], frequency_hz: ArrayLike, patch: Patch | None, of: Iterable[str],
+    sheet: Sheet, ports: Sequence[Port], frequency_hz: ArrayLike, patch: SheetPatch | None, of: Iterable[str],
     cells: int | None, accuracy: float,
 ) -> Solution:  # fmt: skip
     """See :func:`sensorgen.models.sheet.solve`."""
@@ -59,7 +59,7 @@ def solution(
     return _fine_enough(sheet, ports, tones, patch, names, accuracy)
 
 
-def depth_m(sheet: Sheet, frequency_hz: float, patch: Patch | None = None) -> float:
+def depth_m(sheet: Sheet, frequency_hz: float, patch: SheetPatch | None = None) -> float:
     r"""Depth to which current reaches along the sheets before it has crossed the film, 1 / sqrt(\|(R_t + R_b) y\|) [m].
 
     Under a patch, where it is smaller. Infinite where nothing crosses, or nothing resists.
@@ -86,7 +86,12 @@ def frequencies(given: ArrayLike) -> Real:
 
 
 def _once(
-    sheet: Sheet, ports: Sequence[Port], tones: NDArray[Any], patch: Patch | None, names: tuple[str, ...], cells: int
+    sheet: Sheet,
+    ports: Sequence[Port],
+    tones: NDArray[Any],
+    patch: SheetPatch | None,
+    names: tuple[str, ...],
+    cells: int,
 ) -> Solution:
     if cells < 1:
         raise OutOfRange(f"a sheet needs one cell or more, not {cells}")
@@ -101,7 +106,12 @@ def _once(
 
 
 def _unfolded(
-    sheet: Sheet, ports: Sequence[Port], tones: NDArray[Any], patch: Patch | None, names: tuple[str, ...], cells: int
+    sheet: Sheet,
+    ports: Sequence[Port],
+    tones: NDArray[Any],
+    patch: SheetPatch | None,
+    names: tuple[str, ...],
+    cells: int,
 ) -> Solution:
     contacts = contacts_of(sheet, ports)
     grid = axes(sheet, contacts, cells)
@@ -130,7 +140,7 @@ def _unfolded(
 
 
 def _fine_enough(
-    sheet: Sheet, ports: Sequence[Port], tones: NDArray[Any], patch: Patch | None, names: tuple[str, ...],
+    sheet: Sheet, ports: Sequence[Port], tones: NDArray[Any], patch: SheetPatch | None, names: tuple[str, ...],
     accuracy: float,
 ) -> Solution:  # fmt: skip
     cells = COARSEST
@@ -166,7 +176,7 @@ _SINGULAR = 1e-13  # smallest eigenvalue of a correlation of derivatives that is
 
 
 @dataclass(frozen=True)
-class Bounds:
+class PressErrors:
     """Smallest standard errors that any unbiased estimate of a press can have.
 
     Attributes
@@ -264,9 +274,9 @@ def contact_sets(sheet: Sheet) -> dict[str, tuple[Port, ...]]:
 
 
 def bounds(
-    sheet: Sheet, ports: Sequence[Port], frequency_hz: ArrayLike, press: Patch, per_newton: Mapping[str, float],
+    sheet: Sheet, ports: Sequence[Port], frequency_hz: ArrayLike, press: SheetPatch, per_newton: Mapping[str, float],
     noise: float, places: int, done: Callable[[int], object] | None,
-) -> Bounds:  # fmt: skip
+) -> PressErrors:  # fmt: skip
     """Bounds over the sheet; see :func:`sensorgen.models.sheet.localise`."""
     check("noise", noise, above=True)
     if places < 1:
@@ -299,8 +309,8 @@ def bounds(
         rows[np.abs(rows) * noise * scale < _ROUNDING] = 0.0
         information[i, j] = np.einsum("afk,bfk->fab", rows, rows)
     guess = (sheet.length_m / 12**0.5, sheet.width_m / 12**0.5)
-    return Bounds(x + press.length_m / 2, y + press.width_m / 2, tones, information, guess, cells)
+    return PressErrors(x + press.length_m / 2, y + press.width_m / 2, tones, information, guess, cells)
 
 
-def _moved(press: Patch, x_m: float, y_m: float) -> Patch:
+def _moved(press: SheetPatch, x_m: float, y_m: float) -> SheetPatch:
     return replace(press, x_m=max(x_m, 0.0), y_m=max(y_m, 0.0))

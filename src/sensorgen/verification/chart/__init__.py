@@ -9,13 +9,13 @@ from types import ModuleType
 from sensorgen import models
 from sensorgen.core import plugins as registry
 from sensorgen.verification.chart import blocks, cells, lines, membrane, networks, presses, readback, rounds, whole
-from sensorgen.verification.chart.measured import Point, Silent, with_front
+from sensorgen.verification.chart.measured import ChartPoint, SilentModel, with_front
 
 KINDS = (cells, presses, blocks, membrane, rounds, lines, readback, networks, whole)
 SCENES = tuple(name for kind in KINDS for name in kind.STANDARD)
 
 
-def points(scenes: Sequence[str], budget_s: float, started: Callable[[str], None]) -> list[Point]:
+def points(scenes: Sequence[str], budget_s: float, started: Callable[[str], None]) -> list[ChartPoint]:
     """Measure every model on the scenes that are named.
 
     Parameters
@@ -34,20 +34,20 @@ def points(scenes: Sequence[str], budget_s: float, started: Callable[[str], None
     return found
 
 
-def silent(scenes: Sequence[str], found: Sequence[Point]) -> list[Silent]:
+def silent(scenes: Sequence[str], found: Sequence[ChartPoint]) -> list[SilentModel]:
     """Models that gave nothing, scene by scene, and why.
 
     Parameters
     ----------
     scenes : sequence of str
         Of ``SCENES``.
-    found : sequence of Point
+    found : sequence of ChartPoint
         What the others gave there.
     """
     spoke = {(p.scene, p.model.partition(":")[0]) for p in found}
     refused = {scene: kind_of(scene).why_not_applicable(scene) for scene in scenes}
     return [
-        Silent(scene, name, refused[scene].get(name) or _unasked(name, kind_of(scene).ASKED))
+        SilentModel(scene, name, refused[scene].get(name) or _unasked(name, kind_of(scene).ASKED))
         for scene in scenes for name in models.names() if (scene, name) not in spoke
     ]  # fmt: skip
 

@@ -17,9 +17,9 @@ from sensorgen.design import design as designs
 from sensorgen.models import compression, press2d, press3d, springs
 from sensorgen.models.compression import Plate
 from sensorgen.models.press2d import Elastic, Fineness
-from sensorgen.models.press3d import BoundaryConditions, Pieces, Pressed
+from sensorgen.models.press3d import BoundaryConditions, BrickCounts, Pressed
 from sensorgen.scene.scene import Body, Scene, box
-from sensorgen.verification.chart.measured import DIGITS, Ladder, Point, climbed, relative
+from sensorgen.verification.chart.measured import DIGITS, ChartPoint, Ladder, climbed, relative
 from sensorgen.verification.chart.presses import has_mesher
 
 ASKED = "displacement of the top of a body"
@@ -34,7 +34,7 @@ _PIECES = (1, 2, 3)
 
 
 @dataclass(frozen=True)
-class Standard:
+class KnownBlock:
     """A body whose way under pressure is known.
 
     Attributes
@@ -70,26 +70,26 @@ class Standard:
     columns: bool = True
 
 
-def _block(stress_over_mu: Callable[[Real], Real], *, plane: bool) -> Standard:
+def _block(stress_over_mu: Callable[[Real], Real], *, plane: bool) -> KnownBlock:
     scene = designs.make({"shape": "reference"}).in_use
     stress = _RUBBER.youngs_modulus_pa / 3 * stress_over_mu(_STRETCHES)
     height = _BLOCK_MM * M_PER_MM
     laws = (compression.unconfined(_RUBBER.youngs_modulus_pa),)
     solids, held = dict.fromkeys(("x60", "etpu"), _RUBBER), BoundaryConditions("sliding", "free")
-    return Standard(scene, None, solids, held, stress, (1 - _STRETCHES) * height, DIGITS, laws, height, plane)
+    return KnownBlock(scene, None, solids, held, stress, (1 - _STRETCHES) * height, DIGITS, laws, height, plane)
 
 
-def block() -> Standard:
+def block() -> KnownBlock:
     r"""A block that widens along x only, incompressible neo-Hookean: :math:`\sigma = \mu (b^{-3} - b)`."""
     return _block(lambda b: b**-3 - b, plane=True)
 
 
-def free_block() -> Standard:
+def free_block() -> KnownBlock:
     r"""Block that widens along x and y: :math:`\sigma = \mu (b^{-2} - b)`."""
     return _block(lambda b: b**-2 - b, plane=False)
 
 
-def strip() -> Standard:
+def strip() -> KnownBlock:
     """The lower half of a strip between stiff plates to which it is bonded, in slices that are narrow at its sides."""
     cuts = 0.5 * _STRIP_MM * (1 + np.sin(np.linspace(-0.5, 0.5, 17) * np.pi)) + 0.5
     cuts, top = cuts.round(6).tolist(), _FLOOR_MM + _HALF_MM
@@ -101,21 +101,23 @@ def strip() -> Standard:
     solids = {"x60": _RUBBER, "etpu": Elastic(_RUBBER.youngs_modulus_pa * _HARD, 0.3)}
     e, strain, height = _RUBBER.youngs_modulus_pa, np.array([1e-4]), _HALF_MM * M_PER_MM
     laws = compression.unconfined(e), compression.bonded(e, _STRIP_MM * M_PER_MM, 2 * height)
-    return Standard(
+    return KnownBlock(
         scene, _STRIP_MM + 1, solids, BoundaryConditions(top="rigid"), _BONDED * e * strain, strain * height, 1e-4,
         laws, height, columns=False,
     )  # fmt: skip
 
 
-def rect() -> Standard:
+def rect() -> KnownBlock:
     """Rect with a film of 0.1 mm under 1 kPa: between the limits of first and second order of meshes in tetrahedra."""
     scene = designs.make({"shape": "rect", "parameters": {"dielectric_mm": 0.1}}).in_use
     solids = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
     laws = (compression.unconfined(6e6), compression.bonded(6e6, 10e-3, 0.7e-3))
-    return Standard(scene, None, solids, BoundaryConditions(), np.array([1e3]), np.array([_RECT_M]), 0.01, laws, 0.7e-3)
+    return KnownBlock(
+        scene, None, solids, BoundaryConditions(), np.array([1e3]), np.array([_RECT_M]), 0.01, laws, 0.7e-3
+    )
 
 
-STANDARD: dict[str, Callable[[], Standard]] = {
+STANDARD: dict[str, Callable[[], KnownBlock]] = {
     "block, free along x": block,
     "block, free all round": free_block,
     "bonded strip": strip,
@@ -123,7 +125,7 @@ STANDARD: dict[str, Callable[[], Standard]] = {
 }
 
 
-def points(name: str, budget_s: float) -> list[Point]:
+def points(name: str, budget_s: float) -> list[ChartPoint]:
     """Measure every model of compression on one body.
 
     Parameters
@@ -148,7 +150,7 @@ def why_not_applicable(name: str) -> dict[str, str]:
             "springs": "beside the strip nothing reaches the top"}  # fmt: skip
 
 
-def _models(standard: Standard) -> Iterator[Ladder]:
+def _models(standard: KnownBlock) -> Iterator[Ladder]:
     """Displacement [m] by laws of plates, by springs, and by finite elements in two and in three dimensions."""
     for law in standard.laws:
         work = partial(_by_law, standard, law)
@@ -164,19 +166,19 @@ def _models(standard: Standard) -> Iterator[Ladder]:
         yield "press3d", [(f"{n} pieces, ", partial(_deep, standard, n)) for n in _PIECES]
 
 
-def _by_law(standard: Standard, law: Plate) -> Real:
+def _by_law(standard: KnownBlock, law: Plate) -> Real:
     return np.asarray(law.capacitive_strain(standard.stress_pa)[0] * standard.height_m)
 
 
-def _flat(standard: Standard, mesh: Fineness) -> Real | None:
+def _flat(standard: KnownBlock, mesh: Fineness) -> Real | None:
     cell = press2d.cell(standard.scene, standard.period_mm)
     stress = [0.0, *standard.stress_pa]
     return _displacement_m(press2d.press(cell, standard.solids, stress, None, standard.boundary, mesh))
 
 
-def _deep(standard: Standard, pieces: int) -> Real | None:
+def _deep(standard: KnownBlock, pieces: int) -> Real | None:
     cell, stress = press3d.cell(standard.scene), [0.0, *standard.stress_pa]
-    return _displacement_m(press3d.press(cell, standard.solids, stress, None, standard.boundary, Pieces(pieces)))
+    return _displacement_m(press3d.press(cell, standard.solids, stress, None, standard.boundary, BrickCounts(pieces)))
 
 
 def _displacement_m(found: Pressed) -> Real | None:

@@ -14,8 +14,8 @@ from sensorgen.design import design as designs
 from sensorgen.models import capacitance_models, thesis_cells
 from sensorgen.verification import peers
 from sensorgen.verification.chart import exact
-from sensorgen.verification.chart.exact import Standard
-from sensorgen.verification.chart.measured import Point, timed
+from sensorgen.verification.chart.exact import KnownCapacitance
+from sensorgen.verification.chart.measured import ChartPoint, timed
 
 ASKED = "the capacitance of a cell at rest"
 _LEAST_WIDTH = 1e-9  # that is asked of a model
@@ -23,15 +23,15 @@ _NO_PEERS = ("plate, 0.6 mm",)  # exact by all of them
 _DEARER = 10.0  # by how much the next accuracy may cost more than the last
 
 
-def _designed(shape: str, dielectric_mm: float, capacitance_f_per_m2: float, known_to: float) -> Standard:
+def _designed(shape: str, dielectric_mm: float, capacitance_f_per_m2: float, known_to: float) -> KnownCapacitance:
     design = designs.make({"shape": shape, "parameters": {"dielectric_mm": dielectric_mm}})
-    return Standard(design.in_use, _EPS, capacitance_f_per_m2, known_to, shape, design.params)
+    return KnownCapacitance(design.in_use, _EPS, capacitance_f_per_m2, known_to, shape, design.params)
 
 
 # tri: hp finite elements, agreeing with two other programs; rect: H1 and H(div) elements, agreeing with finite volumes;
 # the others are exact.
 _EPS = {"x60": 4.68, "air": 1.00059}
-STANDARD: dict[str, Callable[[], Standard]] = {
+STANDARD: dict[str, Callable[[], KnownCapacitance]] = {
     "tri, 0.1 mm": lambda: _designed("tri", 0.1, 1.5965204052211506e-10 / 2e-3, 9e-10),
     "tri, 0.2 mm": lambda: _designed("tri", 0.2, 1.2851365895937111e-10 / 2e-3, 8e-10),
     "rect, 0.1 mm": lambda: _designed("rect", 0.1, 8.123429165e-13 / 4e-6, 2.7e-5),
@@ -44,7 +44,7 @@ STANDARD: dict[str, Callable[[], Standard]] = {
 }
 
 
-def points(name: str, budget_s: float) -> list[Point]:
+def points(name: str, budget_s: float) -> list[ChartPoint]:
     """Measure every model that applies to a scene.
 
     Parameters
@@ -112,11 +112,11 @@ def _rungs(
 
 
 def point(
-    scene: str, model: str, found: Interval, standard: Standard, seconds: float, *,
+    scene: str, model: str, found: Interval, standard: KnownCapacitance, seconds: float, *,
     wanted: float | None = None, bounded: bool = True,
-) -> Point:  # fmt: skip
+) -> ChartPoint:  # fmt: skip
     """Answer of a model per area, compared with the reference."""
     off = [abs(bound / standard.capacitance_f_per_m2 - 1) for bound in (found.lower, found.upper)]
     error = max(*off, standard.known_to)
     said = f"{found.lower:.9g} to {found.upper:.9g} F/m²" if bounded else f"{found.lower:.9g} F/m²"
-    return Point(scene, model, error, seconds, said, bounded, wanted, found.lower, found.upper)
+    return ChartPoint(scene, model, error, seconds, said, bounded, wanted, found.lower, found.upper)

@@ -20,7 +20,7 @@ _FLOOR_MM = 2 * _PLATE_MM
 
 
 @dataclass(frozen=True)
-class Standard:
+class KnownCapacitance:
     """A scene whose capacitance is known.
 
     Attributes
@@ -46,12 +46,12 @@ class Standard:
     params: Any = None
 
 
-def _exact(scene: Scene, capacitance_f_per_m: float, known_to: float) -> Standard:
+def _exact(scene: Scene, capacitance_f_per_m: float, known_to: float) -> KnownCapacitance:
     """A scene by its capacitance per depth [F/m]."""
-    return Standard(scene, PERMITTIVITY, capacitance_f_per_m / (scene.size_mm[0] * M_PER_MM), known_to)
+    return KnownCapacitance(scene, PERMITTIVITY, capacitance_f_per_m / (scene.size_mm[0] * M_PER_MM), known_to)
 
 
-def coaxial(corners: int = CORNERS) -> Standard:
+def coaxial(corners: int = CORNERS) -> KnownCapacitance:
     r"""A quarter of a coaxial line of radii 1 and 2 mm.
 
     .. math:: C = \frac{2 \pi \varepsilon_0}{\ln(b / a)}
@@ -61,7 +61,7 @@ def coaxial(corners: int = CORNERS) -> Standard:
     return _exact(_scene(low, high, 2.2, 2.2), 0.5 * pi * EPS0_F_PER_M / log(2), 2e-5)
 
 
-def eccentric(corners: int = CORNERS) -> Standard:
+def eccentric(corners: int = CORNERS) -> KnownCapacitance:
     r"""Half of a line of radii 1 and 2 mm whose axes are 0.5 mm apart.
 
     .. math:: C = \frac{2 \pi \varepsilon_0}{\operatorname{arcosh}((a^2 + b^2 - e^2) / (2 a b))}
@@ -71,7 +71,7 @@ def eccentric(corners: int = CORNERS) -> Standard:
     return _exact(_scene(low, high, 4.4, 2.2), pi * EPS0_F_PER_M / acosh((5 - 0.25) / 4), 2e-5)
 
 
-def stripline() -> Standard:
+def stripline() -> KnownCapacitance:
     r"""The upper half of a strip w = 1 mm wide, without thickness, midway between plates b = 1 mm apart.
 
     .. math:: C = 4 \varepsilon_0 \frac{K(k)}{K(k')}, \quad k = \tanh\frac{\pi w}{2 b}
@@ -84,7 +84,7 @@ def stripline() -> Standard:
     return _exact(Scene((low, wall, high), (8.0, 1.0, roof + _PLATE_MM)), exact, 1e-7)
 
 
-def interdigital() -> Standard:
+def interdigital() -> KnownCapacitance:
     r"""Fingers of no thickness that fill half of their plane, on a half space: from one's middle to the next one's.
 
     .. math:: C = \tfrac{1}{2} \varepsilon_0 \frac{K(k)}{K(k')}, \quad k = \sin\frac{\pi s}{2}

@@ -13,7 +13,7 @@ import numpy as np
 
 from sensorgen.solvers.line.inputs import PressedLine
 from sensorgen.verification import line_models, peers
-from sensorgen.verification.chart.measured import DIGITS, Level, Point, climbed
+from sensorgen.verification.chart.measured import DIGITS, ChartPoint, Level, climbed
 
 ASKED = "the impedance of a pressed line"
 
@@ -34,7 +34,7 @@ PLATE = {
 
 
 @dataclass(frozen=True)
-class Standard:
+class KnownPlatePress:
     """A press on the plate.
 
     Attributes
@@ -57,7 +57,7 @@ class Standard:
 
 
 STANDARD = {
-    "line, seven tones": Standard({
+    "line, seven tones": KnownPlatePress({
         1.1e3: 3000.3727298841273 - 2093949.0417808136j,
         2.3e3: 3000.3715445141763 - 1001455.2752495972j,
         5.3e3: 3000.3649204154106 - 434597.15912340827j,
@@ -66,13 +66,13 @@ STANDARD = {
         49.9e3: 2999.64993089581 - 46198.143984803854j,
         99.7e3: 2997.4895813800539 - 23180.507246802561j,
     }),
-    "line, 1 mHz to 100 MHz": Standard({
+    "line, 1 mHz to 100 MHz": KnownPlatePress({
         1e-3: 3000.3730814279532 - 2303343000759.7946j,
         1.0: 3000.3730814276627 - 2303343000.7605758j,
         1e6: 2748.5461764976843 - 2986.339472756103j,
         1e8: 322.02875456248957 - 322.02875461574191j,
     }),
-    "line under a round tip, 60 N": Standard({
+    "line under a round tip, 60 N": KnownPlatePress({
         1.1e3: 3008.3362535807886 - 2071759.8206417623j,
         2.3e3: 3008.3350669899552 - 990843.04192650195j,
         5.3e3: 3008.3284360686263 - 429991.85729211865j,
@@ -86,7 +86,7 @@ STANDARD = {
 _PIECES = (1, 4, 16, 64, 256)  # of a tip
 
 
-def points(name: str, budget_s: float) -> list[Point]:
+def points(name: str, budget_s: float) -> list[ChartPoint]:
     """Measure every model of the line.
 
     Parameters
@@ -113,7 +113,7 @@ def points(name: str, budget_s: float) -> list[Point]:
     return list(climbed(name, ladders, judge, budget_s))
 
 
-def _level(model: str, standard: Standard, fineness: Mapping[str, Any]) -> Level:
+def _level(model: str, standard: KnownPlatePress, fineness: Mapping[str, Any]) -> Level:
     said = line_models.words(fineness)
     return f"{said}, " * bool(said), lambda: line_models.impedance(model, standard.line(), **fineness)
 

@@ -25,7 +25,7 @@ Judge = Callable[[Any], tuple[float, str]]  # from a value to its error and word
 
 
 @dataclass(frozen=True)
-class Point:
+class ChartPoint:
     """Answer of one model on one scene.
 
     Attributes
@@ -61,7 +61,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Silent:
+class SilentModel:
     """A model that gave nothing on a scene, and why."""
 
     scene: str
@@ -79,7 +79,7 @@ def timed(work: Callable[[], Any]) -> tuple[Any, float]:
     return found, sorted(taken)[(len(taken) - 1) // 2]
 
 
-def climbed(scene: str, ladders: Iterable[Ladder], judge: Judge, budget_s: float) -> Iterator[Point]:
+def climbed(scene: str, ladders: Iterable[Ladder], judge: Judge, budget_s: float) -> Iterator[ChartPoint]:
     """Points of models, each from coarse to fine until the next level would take too long.
 
     Parameters
@@ -101,7 +101,7 @@ def climbed(scene: str, ladders: Iterable[Ladder], judge: Judge, budget_s: float
                 break
             if value is not None:
                 error, words = judge(value)
-                yield Point(scene, model, error, seconds, said + words)
+                yield ChartPoint(scene, model, error, seconds, said + words)
             if _DEARER * seconds > budget_s:
                 break
 
@@ -117,7 +117,7 @@ def relative(known: ArrayLike, known_to: float, words: str = "off by {:+.3g} at 
     return judge
 
 
-def with_front(found: Sequence[Point]) -> list[Point]:
+def with_front(found: Sequence[ChartPoint]) -> list[ChartPoint]:
     """Points by time, those marked than which none is quicker and at least as near."""
     ordered, best = [], math.inf
     for point in sorted(found, key=lambda p: (p.seconds, p.error)):

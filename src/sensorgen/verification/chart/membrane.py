@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from sensorgen.core.arrays import Real, Whole
-from sensorgen.verification.chart.measured import Point, climbed, relative
+from sensorgen.verification.chart.measured import ChartPoint, climbed, relative
 
 ASKED = "how far the sheared edge of a membrane moves"
 STANDARD: dict[str, float] = {"Cook's membrane": 0.077181}
@@ -18,7 +18,7 @@ _CELLS = (4, 8, 16, 32)
 _MODULUS, _RATIO = 240.565, 0.4999
 
 
-def points(name: str, budget_s: float) -> list[Point]:
+def points(name: str, budget_s: float) -> list[ChartPoint]:
     """Measure the elements on meshes from coarse to fine.
 
     Parameters

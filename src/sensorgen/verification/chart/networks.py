@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from sensorgen.models import conduction, line, sheet, stack, traxels
 from sensorgen.models.sheet import Sheet
 from sensorgen.scene.scene import Body, Scene, box
-from sensorgen.solvers.network.nodes import Lines
-from sensorgen.verification.chart.measured import DIGITS, Level, Point, climbed
+from sensorgen.solvers.network.nodes import StraightLines
+from sensorgen.verification.chart.measured import DIGITS, ChartPoint, Level, climbed
 from sensorgen.verification.chart.rectilinear import plate
 
 ASKED = "what a network of tracks, sheets or lines conducts"
@@ -25,7 +25,7 @@ Values = NDArray[Any]
 
 
 @dataclass(frozen=True)
-class Standard:
+class KnownNetwork:
     """Values that are known, and the work of each model that gives them.
 
     Attributes
@@ -66,14 +66,14 @@ _RHO_OHM_M, _CONTACTS_OHM_M2 = 0.2, (1e-6, 1e-4, 1e-2)
 _LINE_MM, _LAYER_MM, _ACROSS = 0.42, 0.1, 12
 
 
-def two_films() -> Standard:
+def two_films() -> KnownNetwork:
     """Two films with a track in common, pressed in their middle; off the diagonal what one film shows of the other."""
     tracks, films = _sections()
     together = partial(stack.impedance, tracks, [list(section.T) for section in films], _LENGTHS_M)
-    return Standard(_STACK, DIGITS, {"stack": [("", together)], "line: each film alone": [("", _alone)]})
+    return KnownNetwork(_STACK, DIGITS, {"stack": [("", together)], "line: each film alone": [("", _alone)]})
 
 
-def front_edge() -> Standard:
+def front_edge() -> KnownNetwork:
     """A sheet of 100 x 70 mm between two stretches of one edge: its rectangle as a half plane."""
     port: list[Any] = [tuple(_SHEET.edge("top", "front", *_STRETCHES_M[k : k + 2]) for k in (0, 2))]
 
@@ -82,38 +82,38 @@ def front_edge() -> Standard:
         return np.array([z.real / _SHEET.sheet_resistance_ohm[0]])
 
     levels: list[Level] = [(f"{n} cells, ", partial(between, n)) for n in _GRIDS]
-    return Standard(np.array([_SQUARES]), 1e-15, {"sheet": levels})
+    return KnownNetwork(np.array([_SQUARES]), 1e-15, {"sheet": levels})
 
 
-def stepped() -> Standard:
+def stepped() -> KnownNetwork:
     """An electrode of 0.6 and 0.3 mm in turn: squares, and for each step what its corner adds, by a conformal map."""
     k = _THIN_MM / _THICK_MM
     step = ((k * k + 1) / k * log((1 + k) / (1 - k)) - 2 * log(4 * k / (1 - k * k))) / pi
     known = _STEPS * (_STEP_MM * (1 / _THIN_MM + 1 / _THICK_MM) / 2 + step)
     works: list[Level] = [(f"width {width:g} asked, ", partial(_comb, width)) for width in _WIDTHS]
-    return Standard(np.array([known]), DIGITS, {"conduction": works})
+    return KnownNetwork(np.array([known]), DIGITS, {"conduction": works})
 
 
-def lines_across() -> Standard:
+def lines_across() -> KnownNetwork:
     """Twelve lines side by side across the current: n lines and n - 1 contacts in a row."""
     share = (_ACROSS - 1) / _ACROSS / (_RHO_OHM_M * _LINE_MM * 1e-3)
     known = 1 + share * np.array(_CONTACTS_OHM_M2)
-    return Standard(known, DIGITS, {"traxels": [("", _across)], "traxels: as a solid": [("", lambda: np.ones(3))]})
+    return KnownNetwork(known, DIGITS, {"traxels": [("", _across)], "traxels: as a solid": [("", lambda: np.ones(3))]})
 
 
-def electrode() -> Standard:
+def electrode() -> KnownNetwork:
     """Three layers of 100 x 10 mm, across, along and across, in two walls; contacts of 1e-4 ohm m2."""
 
     def printed() -> Values:
         lines = plate(100.0, 10.0, _LINE_MM, _LAYER_MM, (90, 180, 90))
         return np.array([traxels.resistance(lines, _RHO_OHM_M, 1e-4, (-48.9e-3, 48.9e-3), 3e-6).ratio])
 
-    return Standard(
+    return KnownNetwork(
         np.array([1.422]), 0.05, {"traxels": [("", printed)], "traxels: as a solid": [("", lambda: np.ones(1))]}
     )
 
 
-STANDARD: dict[str, Callable[[], Standard]] = {
+STANDARD: dict[str, Callable[[], KnownNetwork]] = {
     "two films, one track shared": two_films,
     "sheet, contacts on one edge": front_edge,
     "electrode, steps across the current": stepped,
@@ -122,7 +122,7 @@ STANDARD: dict[str, Callable[[], Standard]] = {
 }
 
 
-def points(name: str, budget_s: float) -> list[Point]:
+def points(name: str, budget_s: float) -> list[ChartPoint]:
     """Measure every model of a network.
 
     Parameters
@@ -180,7 +180,7 @@ def _across() -> Values:
     pitch, high, reach = _LINE_MM * 1e-3, _LAYER_MM * 1e-3, 5e-3
     x, full = pitch * np.arange(_ACROSS), np.ones(_ACROSS)
     start, end = (np.column_stack([x, side * reach * full]) for side in (-1, 1))
-    lines = Lines(start, end, full * pitch, full * high, np.zeros(_ACROSS, np.int64), np.zeros(_ACROSS, bool))
+    lines = StraightLines(start, end, full * pitch, full * high, np.zeros(_ACROSS, np.int64), np.zeros(_ACROSS, bool))
     span, area = (0.0, float(x[-1])), high * 2 * reach
     found = [traxels.resistance(lines, _RHO_OHM_M, contact, span, area).ratio for contact in _CONTACTS_OHM_M2]
     return (1 + (_ACROSS - 1) * np.array(found)) / _ACROSS

@@ -7,9 +7,9 @@ from textwrap import wrap
 
 from sensorgen.analysis.plots import static
 from sensorgen.analysis.plots.figure import GREY, Axis, Curve, Figure, Panel, look
-from sensorgen.analysis.plots.pages import Section, page
+from sensorgen.analysis.plots.pages import PageSection, page
 from sensorgen.verification.chart import kind_of
-from sensorgen.verification.chart.measured import Point
+from sensorgen.verification.chart.measured import ChartPoint
 
 TITLE = "Speed and accuracy of the models"
 ALT = (
@@ -23,24 +23,24 @@ OVERVIEW = (  # a cell in the plane and in 3D, a press, a line, a network, and t
 )  # fmt: skip
 
 
-def png(points: Sequence[Point]) -> bytes:
+def png(points: Sequence[ChartPoint]) -> bytes:
     """All scenes in one picture."""
     return picture("chart", TITLE, ALT, {figure.title: figure.choices[""] for figure in figures(points)})
 
 
-def overview(points: Sequence[Point]) -> bytes | None:
+def overview(points: Sequence[ChartPoint]) -> bytes | None:
     """The scenes that decide, in one picture; None where none of them was measured."""
     here = [p for name in OVERVIEW for p in points if p.scene == name]
     panels = {figure.title: figure.choices[""] for figure in figures(here)}
     return picture("overview", TITLE, ALT, panels) if here else None
 
 
-def html(points: Sequence[Point]) -> str:
+def html(points: Sequence[ChartPoint]) -> str:
     """A page with a figure per scene."""
-    return page(TITLE, [ALT], [Section(figures=tuple(figures(points)))])
+    return page(TITLE, [ALT], [PageSection(figures=tuple(figures(points)))])
 
 
-def figures(points: Sequence[Point]) -> Iterator[Figure]:
+def figures(points: Sequence[ChartPoint]) -> Iterator[Figure]:
     """A figure per scene."""
     for number, scene in enumerate(dict.fromkeys(p.scene for p in points)):
         here = [p for p in points if p.scene == scene]
@@ -84,14 +84,14 @@ def picture(key: str, title: str, alt: str, panels: Mapping[str, tuple[Panel, ..
     return static.png(Figure(key, words, alt, panels, "panel", columns=2, beside=True))
 
 
-def looks(scene: str, points: Sequence[Point]) -> dict[str, int]:
+def looks(scene: str, points: Sequence[ChartPoint]) -> dict[str, int]:
     """Models of all scenes with the same question, those with bounds first, and the number of their colour and mark."""
     alike = [p for p in points if kind_of(p.scene) is kind_of(scene)]
     names = sorted({(not p.bounded, p.model) for p in alike})
     return {model: k for k, (_, model) in enumerate(names)}
 
 
-def steps(front: Sequence[Point]) -> Iterator[tuple[float, float]]:
+def steps(front: Sequence[ChartPoint]) -> Iterator[tuple[float, float]]:
     """A staircase: an error holds until a smaller one is reached."""
     for k, point in enumerate(front):
         if k:

@@ -18,7 +18,7 @@ from sensorgen.models import compression, fem2d, press2d, press3d, springs, thes
 from sensorgen.models.press2d import Elastic, Fineness
 from sensorgen.scene.scene import Fill, Scene
 from sensorgen.solvers.contact import mesher
-from sensorgen.verification.chart.measured import Ladder, Level, Point, climbed, relative
+from sensorgen.verification.chart.measured import ChartPoint, Ladder, Level, climbed, relative
 
 _EPS = {"x60": 4.68, "air": 1.00059}
 SOLIDS = {"x60": Elastic(6e6, 0.4999), "etpu": Elastic(22e6, 0.4999)}
@@ -32,7 +32,7 @@ _MESHES = (Fineness(2.8e-3, 0.2, 0.4, 1.0), Fineness(1.4e-3, 0.1, 0.3, 0.7), Fin
 
 
 @dataclass(frozen=True)
-class Known:
+class KnownCell:
     """A cell's way under stress: neo-Hookean, without friction, base and period fixed; two programs, four meshes.
 
     Attributes
@@ -68,10 +68,10 @@ class Known:
 
 
 CELLS = {
-    "0.1 mm": Known(
+    "0.1 mm": KnownCell(
         0.1, (10, 50, 100), (6.1323, 20.6592, 33.1181), (11.215, 33.711, 52.508), (4.1e-3, 6.5e-3), 159.65204
     ),
-    "0.2 mm": Known(
+    "0.2 mm": KnownCell(
         0.2, (10, 50, 100), (6.5427, 22.5202, 36.4366), (6.641, 20.352, 32.043), (4.3e-3, 6.1e-3), 128.513659
     ),
 }  # fmt: skip
@@ -80,7 +80,7 @@ _DOWN, _RISE = "top down", "rise of C"
 STANDARD = {f"tri pressed, {film}: {what}": (film, what) for what in (_DOWN, _RISE) for film in CELLS}
 
 
-def points(name: str, budget_s: float) -> list[Point]:
+def points(name: str, budget_s: float) -> list[ChartPoint]:
     """Measure every model of compression on one cell.
 
     Parameters
@@ -106,7 +106,7 @@ def why_not_applicable(name: str) -> dict[str, str]:
     return said | {"springs": "it has a displacement and no capacitance"}
 
 
-def _down(known: Known) -> Iterator[Ladder]:
+def _down(known: KnownCell) -> Iterator[Ladder]:
     """Displacement of the top by each model, in um."""
     for law in _laws(known):
         yield f"compression: {law.name}", [("", partial(_by_law, known, law, rise=False))]
@@ -115,7 +115,7 @@ def _down(known: Known) -> Iterator[Ladder]:
     yield "press2d", _levels(known, None)
 
 
-def _rise(known: Known) -> Iterator[Ladder]:
+def _rise(known: KnownCell) -> Iterator[Ladder]:
     """Rise of the capacitance by each model, in pF/m."""
     for law in _laws(known):
         yield f"compression: {law.name}", [("", partial(_by_law, known, law, rise=True))]
@@ -125,18 +125,18 @@ def _rise(known: Known) -> Iterator[Ladder]:
     yield "press2d", _levels(known, _EPS)
 
 
-def _laws(known: Known) -> tuple[compression.Plate, ...]:
+def _laws(known: KnownCell) -> tuple[compression.Plate, ...]:
     """The film as a plate; the solved curves of :mod:`sensorgen.models.compression` are the reference here."""
     modulus = SOLIDS["x60"].youngs_modulus_pa
     return compression.unconfined(modulus), compression.bonded(modulus, _WIDTH_M, known.film_mm * M_PER_MM)
 
 
-def _by_law(known: Known, law: compression.Plate, *, rise: bool) -> Real:
+def _by_law(known: KnownCell, law: compression.Plate, *, rise: bool) -> Real:
     strain = law.capacitive_strain(known.stress_pa())[0]
     return np.asarray(known.rest_pf_per_m * (1 / (1 - strain) - 1) if rise else 1e6 * strain * known.height_m())
 
 
-def _scene(known: Known) -> Scene:
+def _scene(known: KnownCell) -> Scene:
     return designs.make({"shape": "tri", "parameters": {"dielectric_mm": known.film_mm}}).in_use
 
 
@@ -149,7 +149,7 @@ def has_mesher() -> bool:
     return True
 
 
-def _levels(known: Known, permittivity: dict[str, float] | None) -> list[Level]:
+def _levels(known: KnownCell, permittivity: dict[str, float] | None) -> list[Level]:
     """Finite elements from coarse to fine."""
     return [
         (f"triangles of {1e3 * mesh.apex_mm:g} µm at the apex, ", partial(_pressed, known, permittivity, mesh))
@@ -157,7 +157,7 @@ def _levels(known: Known, permittivity: dict[str, float] | None) -> list[Level]:
     ]  # fmt: skip
 
 
-def _pressed(known: Known, permittivity: dict[str, float] | None, mesh: Fineness) -> Real | None:
+def _pressed(known: KnownCell, permittivity: dict[str, float] | None, mesh: Fineness) -> Real | None:
     """Displacement [um], or with permittivities the rise [pF/m]; None where not the whole load was reached."""
     cell, stress = press2d.cell(_scene(known), known.params().period_mm), [0.0, *known.stress_pa()]
     found = press2d.press(cell, SOLIDS, stress, permittivity, fineness=mesh)
@@ -171,7 +171,7 @@ def _pressed(known: Known, permittivity: dict[str, float] | None, mesh: Fineness
     return np.asarray(1e12 * (per_area - per_area[0])[1:] * known.params().period_mm * M_PER_MM)
 
 
-def _swept(known: Known, work: Callable[[tri.Params], float]) -> Real:
+def _swept(known: KnownCell, work: Callable[[tri.Params], float]) -> Real:
     """Rise per depth of a period of sizes that are changed by hand to each displacement, in pF/m."""
     sizes = [thesis_cells.swept(known.params(), um * 1e-3) for um in (0.0, *known.down_um)]
     value = np.array([work(q) * q.period_mm * M_PER_MM for q in sizes])

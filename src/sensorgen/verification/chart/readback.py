@@ -12,7 +12,7 @@ from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.inverse.estimator import Estimator
 from sensorgen.verification.chart import lines
-from sensorgen.verification.chart.measured import DIGITS, Point, climbed
+from sensorgen.verification.chart.measured import DIGITS, ChartPoint, climbed
 
 ASKED = "force and position from an impedance"
 _LINE = lines.STANDARD["line, seven tones"]
@@ -25,7 +25,7 @@ STANDARD = {"inversion of a load": (_LINE.force_n, lines.PLATE["left_m"] + _TIP_
 Press = tuple[float, float]
 
 
-def points(name: str, budget_s: float) -> list[Point]:
+def points(name: str, budget_s: float) -> list[ChartPoint]:
     """Measure the inversion; what is prepared once for a sensor is not in its time.
 
     Parameters

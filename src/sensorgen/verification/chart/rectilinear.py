@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.units import M_PER_MM
-from sensorgen.solvers.network.nodes import Lines
+from sensorgen.solvers.network.nodes import StraightLines
 
 WALLS = 2
 OVERLAP = 0.25  # of a line's width, by which infill reaches into the walls (PrusaSlicer's own)
@@ -18,7 +18,7 @@ Path = list[NDArray[np.float64]]
 
 def plate(
     length_mm: float, width_mm: float, line_mm: float, layer_mm: float, degrees: Sequence[float], walls: int = WALLS
-) -> Lines:
+) -> StraightLines:
     """All lines of a plate around the origin.
 
     Parameters
@@ -39,7 +39,7 @@ def plate(
             pieces += [(*a, *b, layer, joined) for a, b, joined in steps]
     found = np.array(pieces)
     full = np.full(len(found), M_PER_MM)
-    return Lines(
+    return StraightLines(
         found[:, :2] * M_PER_MM, found[:, 2:4] * M_PER_MM, full * line_mm, full * layer_mm,
         found[:, 4].astype(np.int64), found[:, 5].astype(bool),
     )  # fmt: skip

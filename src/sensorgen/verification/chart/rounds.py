@@ -13,8 +13,8 @@ from sensorgen.models import press2d, press_round, pressure
 from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Body, Prism, Scene, box
-from sensorgen.solvers.contact.cell import Cell
-from sensorgen.verification.chart.measured import DIGITS, Ladder, Point, climbed, relative
+from sensorgen.solvers.contact.cell import ContactCell
+from sensorgen.verification.chart.measured import DIGITS, ChartPoint, Ladder, climbed, relative
 from sensorgen.verification.chart.presses import has_mesher
 
 ASKED = "how wide a round body touches"
@@ -27,7 +27,7 @@ SPHERE = "sphere on a flat"
 STANDARD = dict.fromkeys(("cylinder on a flat", SPHERE), 2 * _HALF_MM * M_PER_MM)  # length of the contact [m]
 
 
-def points(name: str, budget_s: float) -> list[Point]:
+def points(name: str, budget_s: float) -> list[ChartPoint]:
     """Measure every model of a contact.
 
     Parameters
@@ -95,7 +95,7 @@ def _turned(side_mm: float) -> float:
     return float(2 * np.sqrt(2.5 * moment))
 
 
-def _moment_m2(cell: Cell, stress_pa: float, fineness: Fineness) -> float:
+def _moment_m2(cell: ContactCell, stress_pa: float, fineness: Fineness) -> float:
     """Mean square of the distance from the middle, weighted with what the faces push [m2]."""
     boundary = BoundaryConditions(top="rigid")
     _, run = press2d._solved(cell, _SOLIDS, [0.0, stress_pa], boundary, fineness, lambda _: None)
@@ -107,7 +107,7 @@ def _moment_m2(cell: Cell, stress_pa: float, fineness: Fineness) -> float:
     return float((push * x**2).sum() / push.sum())
 
 
-def _cylinder(side_mm: float) -> Cell:
+def _cylinder(side_mm: float) -> ContactCell:
     """The lower half of a polygon about a circle, on a flat."""
     sizes = np.minimum(side_mm * np.exp(0.25 * np.maximum(np.arange(400) - 2 * _HALF_MM / side_mm, 0)), 0.1)
     angle = np.cumsum(sizes)

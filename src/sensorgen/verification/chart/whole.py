@@ -11,9 +11,9 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.prediction import bodies
 from sensorgen.prediction.query import Query
-from sensorgen.verification.apart import Answer
+from sensorgen.verification.apart import ModelAnswer
 from sensorgen.verification.chart import cells, presses
-from sensorgen.verification.chart.measured import Ladder, Point, climbed
+from sensorgen.verification.chart.measured import ChartPoint, Ladder, climbed
 from sensorgen.verification.design_chart import works
 from sensorgen.verification.design_chart.questions import DIGITS, Reference, of_modulus
 from sensorgen.verification.design_chart.results import composed
@@ -24,7 +24,7 @@ _FILM = "0.1 mm"
 STANDARD = {f"prediction of tri, {_FILM}": f"tri, {_FILM}"}
 
 
-def points(name: str, budget_s: float) -> list[Point]:
+def points(name: str, budget_s: float) -> list[ChartPoint]:
     """Measure predictions from rough to accurate, nothing stored.
 
     Parameters
@@ -45,12 +45,12 @@ def points(name: str, budget_s: float) -> list[Point]:
     }
     (reference,) = composed(body, query, best)
 
-    def judge(found: Answer) -> tuple[float, str]:
+    def judge(found: ModelAnswer) -> tuple[float, str]:
         off = of_modulus(found.value, reference.value)
         stated = f", {found.stated:.2g} stated" if found.stated is not None else ""
         return max(off, reference.doubt, DIGITS), f"off by {off:.2g}{stated}"
 
-    def of(**more: object) -> Callable[[], Answer]:
+    def of(**more: object) -> Callable[[], ModelAnswer]:
         rough = bool(more.pop("rough", False))
         return partial(works.predicted, body, Query(force_n=_FORCE_N, **more), rough=rough)  # type: ignore[arg-type]
 

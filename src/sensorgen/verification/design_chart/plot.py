@@ -32,7 +32,7 @@ def html(found: DesignChart) -> str:
     """A page: each quantity with its figure, whose axis can be chosen, and its table."""
     shown = {figure.key: figure for figure in figures(found)}
     sections = [
-        pages.Section(key, title, (shown[key],) if key in shown else (), tuple(found.parts(key)))
+        pages.PageSection(key, title, (shown[key],) if key in shown else (), tuple(found.parts(key)))
         for key, title in found.titles.items()
     ]
     return pages.page(
@@ -66,9 +66,8 @@ def _panel(points: Sequence[Point], title: str, axis: str, cold: str, warm: str)
             if cost:
                 costs, errors = [getattr(p, cost) for p in mine], [p.error for p in mine]
                 curves += marks("" if hollow else model, costs, errors, text, k, hollow=hollow)
-    ends = [getattr(p, cost) for p in points for cost in (cold, warm) if cost and getattr(p, cost) is not None]
-    for doubt in sorted({p.doubt for p in points}):
-        words = "known to" if doubt == min(p.doubt for p in points) else ""
-        curves.append(Curve("line", words, [min(ends), max(ends)], [doubt, doubt], colour=GREY, dash="dot"))
-    least, most = min(p.doubt for p in points), max(p.error for p in points)
-    return panel(curves, axis, f"relative error: {title}", (least, most), title)
+    costs = [getattr(p, cost) for p in points for cost in (cold, warm) if cost and getattr(p, cost) is not None]
+    doubts = sorted({p.doubt for p in points})
+    for words, doubt in zip(("known to", *[""] * len(doubts)), doubts, strict=False):
+        curves.append(Curve("line", words, [min(costs), max(costs)], [doubt, doubt], colour=GREY, dash="dot"))
+    return panel(curves, axis, f"relative error: {title}", (doubts[0], max(p.error for p in points)), title)

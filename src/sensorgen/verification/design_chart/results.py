@@ -13,7 +13,7 @@ from sensorgen.models.compression import Plate
 from sensorgen.prediction.planning import rough_sensor
 from sensorgen.prediction.query import Query
 from sensorgen.verification import peers
-from sensorgen.verification.apart import Run, Runner, apart
+from sensorgen.verification.apart import Runner, TimedAnswer, apart
 from sensorgen.verification.design_chart.questions import (
     DIGITS,
     OWN,
@@ -182,7 +182,7 @@ def chart(
     best: dict[str, list[Reference]] = {}
     for question in asked:
         silent += [Silent(question.key, *each) for each in question.silent]
-        runs: list[tuple[Series, str, Run]] = []
+        runs: list[tuple[Series, str, TimedAnswer]] = []
         for series in question.series:
             found, why = _climbed(series, budget_s, partial(step, f"{question.key}: {series.model}"), runner)
             runs += found
@@ -206,9 +206,9 @@ def chart(
 
 def _climbed(
     series: Series, budget_s: float, step: Callable[[], None], runner: Runner
-) -> tuple[list[tuple[Series, str, Run]], str]:
+) -> tuple[list[tuple[Series, str, TimedAnswer]], str]:
     """Runs of a model from coarse to fine until the next one would take too long; and why there are no more."""
-    found: list[tuple[Series, str, Run]] = []
+    found: list[tuple[Series, str, TimedAnswer]] = []
     for said, work, expected_s in series.levels:
         last_s = max((run.cold.cpu_s - _started_s(found) for _, _, run in found[-1:]), default=0.0)
         likely_s = max(expected_s, _DEARER * last_s if not expected_s else 0.0)
@@ -224,12 +224,12 @@ def _climbed(
     return found, ""
 
 
-def _started_s(found: Sequence[tuple[Series, str, Run]]) -> float:
+def _started_s(found: Sequence[tuple[Series, str, TimedAnswer]]) -> float:
     """Start of a process and loading of libraries, at most: the least difference of cold and warm [s]."""
     return min((run.cold.cpu_s - run.warm.cpu_s for _, _, run in found), default=0.0)
 
 
-def _from(runs: Sequence[tuple[Series, str, Run]]) -> Iterator[Reference]:
+def _from(runs: Sequence[tuple[Series, str, TimedAnswer]]) -> Iterator[Reference]:
     """References: bounds, and the finest answer of a program with its last change as its doubt."""
     bounds = [(run.answer.stated or 0.0, series, run) for series, _, run in runs if run.answer.certified]
     if bounds:
@@ -273,7 +273,7 @@ def _best(references: Sequence[Reference], program: str) -> Reference:
     return min(others or references, key=lambda r: r.doubt)
 
 
-def _point(question: Question, series: Series, said: str, run: Run, references: Sequence[Reference]) -> Point:
+def _point(question: Question, series: Series, said: str, run: TimedAnswer, references: Sequence[Reference]) -> Point:
     """A run beside the best answer of another program; beside one of its own program where there is no other."""
     reference = _best(references, series.program)
     answer = run.answer

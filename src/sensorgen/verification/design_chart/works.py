@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from sensorgen.verification.apart import Answer
+from sensorgen.verification.apart import ModelAnswer
 
 if TYPE_CHECKING:
     from sensorgen.design.body import Body
@@ -16,29 +16,29 @@ if TYPE_CHECKING:
 
 def capacitance(
     model: str, scene: "Scene", permittivity: Mapping[str, float], width: float | None, count: float
-) -> Answer:  # fmt: skip
+) -> ModelAnswer:  # fmt: skip
     """Of the whole sensor [F], by one of our models; ``width`` of the bounds is relative [-], or None."""
     module = import_module(f"sensorgen.models.{model}")
     found = module.capacitance(scene, permittivity, *([] if width is None else [width]))
     middle = (found.lower + found.upper) / 2
-    return Answer((count * middle,), (found.upper - found.lower) / 2 / middle, certified=True)
+    return ModelAnswer((count * middle,), (found.upper - found.lower) / 2 / middle, certified=True)
 
 
-def formula(name: str, params: Any, eps_r: float, area_m2: float) -> Answer:
+def formula(name: str, params: Any, eps_r: float, area_m2: float) -> ModelAnswer:
     """Capacitance of the whole sensor as drawn [F], by a formula of the thesis."""
     from sensorgen.models import thesis_cells
 
-    return Answer((area_m2 * thesis_cells.NAMED[name].value_f_per_m2(params, eps_r),))
+    return ModelAnswer((area_m2 * thesis_cells.NAMED[name].value_f_per_m2(params, eps_r),))
 
 
-def peer(name: str, scene: "Scene", permittivity: Mapping[str, float], level: int, count: float) -> Answer:
+def peer(name: str, scene: "Scene", permittivity: Mapping[str, float], level: int, count: float) -> ModelAnswer:
     """Capacitance of the whole sensor [F] by another program."""
     from sensorgen.verification import peers
 
-    return Answer((count * peers.levels(name, scene, permittivity)[level][1](),))
+    return ModelAnswer((count * peers.levels(name, scene, permittivity)[level][1](),))
 
 
-def rise_by_law(body: "Body", law: str, stress_pa: float) -> Answer:
+def rise_by_law(body: "Body", law: str, stress_pa: float) -> ModelAnswer:
     """Relative rise of the capacitance under a pressure [-], by a law that solves no field."""
     import numpy as np
 
@@ -46,10 +46,10 @@ def rise_by_law(body: "Body", law: str, stress_pa: float) -> Answer:
 
     found = rough_sensor(body, law).law.compression
     strain = float(found.capacitive_strain(np.asarray(stress_pa))[0])
-    return Answer((strain / (1 - strain),), getattr(found, "within", None))
+    return ModelAnswer((strain / (1 - strain),), getattr(found, "within", None))
 
 
-def rise_by_mesh(case: "Case", level: int, stress_pa: float, stated: float) -> Answer:
+def rise_by_mesh(case: "Case", level: int, stress_pa: float, stated: float) -> ModelAnswer:
     """Relative rise of the capacitance under a pressure [-], by finite elements."""
     from sensorgen.core.errors import OutOfRange
     from sensorgen.prediction.mesh_ladder import pressed
@@ -58,17 +58,17 @@ def rise_by_mesh(case: "Case", level: int, stress_pa: float, stated: float) -> A
     first, last = found.capacitance_f_per_m2[0], found.capacitance_f_per_m2[-1]
     if found.faults or not (first and last) or found.converged_pa < stress_pa:
         raise OutOfRange("; ".join(found.faults) or f"solved up to {found.converged_pa / 1e3:.3g} kPa only")
-    return Answer((last.middle() / first.middle() - 1,), stated)
+    return ModelAnswer((last.middle() / first.middle() - 1,), stated)
 
 
-def line(model: str, line: "PressedLine", fineness: Mapping[str, int]) -> Answer:
+def line(model: str, line: "PressedLine", fineness: Mapping[str, int]) -> ModelAnswer:
     """Impedance at every frequency [ohm] by a model of lines, or by another program."""
     from sensorgen.verification.line_models import impedance
 
-    return Answer(tuple(impedance(model, line, **fineness).ravel().tolist()))
+    return ModelAnswer(tuple(impedance(model, line, **fineness).ravel().tolist()))
 
 
-def predicted(body: "Body", query: "Query", *, rough: bool = False) -> Answer:
+def predicted(body: "Body", query: "Query", *, rough: bool = False) -> ModelAnswer:
     """Impedance of the sensor under the reference load at every frequency [ohm]."""
     from sensorgen.prediction import planning
 
@@ -79,4 +79,4 @@ def predicted(body: "Body", query: "Query", *, rough: bool = False) -> Answer:
         model, plan = planning.sensor_model(body, query)
         width = plan.width
     z = model.sensor.impedance(list(load.frequency_hz), load.force_n, load.position_m)
-    return Answer(tuple(z.tolist()), width)
+    return ModelAnswer(tuple(z.tolist()), width)

@@ -58,7 +58,7 @@ def levels(peer: str, scene: Scene, permittivity: Mapping[str, float]) -> Levels
     if peer == "FastCap":
         cells.share(geometry)  # refuses a cell that is cut
         work, words = module.capacitance, [(f"{n} panels along the height, ", (n,)) for n in _PANELS]
-    elif isinstance(geometry, cells.Plane):
+    elif isinstance(geometry, cells.PlaneSection):
         work, words = module.plane, [(f"{n} unknowns, ", (n,)) for n in _UNKNOWNS]
     else:
         of_order = ((how, "".join(f" of order {p}" for p in how[1:])) for how in _BRICKS[peer])

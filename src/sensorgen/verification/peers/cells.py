@@ -21,7 +21,7 @@ RATIO = 0.15  # of a layer's distance from an edge to the next one's
 
 
 @dataclass(frozen=True)
-class Plane:
+class PlaneSection:
     """A cross-section between two mirrors.
 
     Attributes
@@ -58,7 +58,7 @@ class Plane:
         return found
 
 
-def geometry(scene: Scene) -> Plane | Grid:
+def geometry(scene: Scene) -> PlaneSection | Grid:
     """The cell of a scene.
 
     Raises
@@ -74,7 +74,7 @@ def geometry(scene: Scene) -> Plane | Grid:
     return _plane(found[0], scene.size_mm[2])
 
 
-def _plane(section: Section, height_mm: float) -> Plane:
+def _plane(section: Section, height_mm: float) -> PlaneSection:
     """The cell of a cross-section, its bands cut into triangles around their middles."""
     piece = cell(section, height_mm)
     heights: dict[float, set[float]] = defaultdict(set)  # of corners on each vertical line
@@ -95,7 +95,7 @@ def _plane(section: Section, height_mm: float) -> Plane:
                     triangles.append([points.setdefault(p, len(points)) for p in (middle, a, b)])
                     materials.append(name)
                     shares.append(often)
-    return Plane(
+    return PlaneSection(
         np.array(list(points)), np.array(triangles), tuple(materials), np.array(shares), faces, section.depth_mm
     )
 
@@ -111,14 +111,14 @@ def _polygons(part: Slice, heights: dict[float, set[float]]) -> Iterator[tuple[s
             yield band.terminal or band.material, [*up, *down]
 
 
-def share(found: Plane | Grid) -> float:
+def share(found: PlaneSection | Grid) -> float:
     """Number of cells in the sensor [-]; raises ValueError where the sensor's end cuts the cell."""
     if np.ptp(found.shares) > ROUNDING_MM:
         raise ValueError("the sensor's end cuts its repeating cell")
     return float(np.ravel(found.shares)[0])
 
 
-def permittivities(found: Plane, permittivity: "dict[str, float]") -> Real:
+def permittivities(found: PlaneSection, permittivity: "dict[str, float]") -> Real:
     """Of each triangle, times how often it occurs [-]."""
     return np.array([permittivity[name] for name in found.materials]) * found.shares
 

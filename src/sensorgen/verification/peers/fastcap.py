@@ -35,11 +35,11 @@ class _Face:
     within_mm: Real
 
 
-def capacitance(found: cells.Plane | Grid, permittivity: Mapping[str, float], panels: int) -> float:
+def capacitance(found: cells.PlaneSection | Grid, permittivity: Mapping[str, float], panels: int) -> float:
     """Of the whole sensor [F], by so many panels along the height of the cell."""
     import fastcap2
 
-    faces = list(_of_plane(found) if isinstance(found, cells.Plane) else _of_boxes(found))
+    faces = list(_of_plane(found) if isinstance(found, cells.PlaneSection) else _of_boxes(found))
     corners = np.array([f.corner_mm + k * f.along_mm + n * f.across_mm for f in faces for k in (0, 1) for n in (0, 1)])
     low, high = corners.min(0), corners.max(0)
     height, size = high[2] - low[2], high - low
@@ -67,9 +67,9 @@ def capacitance(found: cells.Plane | Grid, permittivity: Mapping[str, float], pa
     return _charge(surfaces, permittivity) * cells.share(found) * _depths(found, size)
 
 
-def _depths(found: cells.Plane | Grid, size_mm: Real) -> float:
+def _depths(found: cells.PlaneSection | Grid, size_mm: Real) -> float:
     """Number of cells, as deep as taken, in the sensor's depth [-]."""
-    return found.depth_mm / float(size_mm[1]) if isinstance(found, cells.Plane) else 1.0
+    return found.depth_mm / float(size_mm[1]) if isinstance(found, cells.PlaneSection) else 1.0
 
 
 def _charge(surfaces: "Mapping[tuple[str, str], object]", permittivity: Mapping[str, float]) -> float:
@@ -124,7 +124,7 @@ def _panels(face: _Face, longest_mm: float) -> Iterator[list[Real]]:
             yield [face.corner_mm + a / n * face.along_mm + b / m * face.across_mm for a, b in steps]
 
 
-def _of_plane(found: cells.Plane) -> Iterator[_Face]:
+def _of_plane(found: cells.PlaneSection) -> Iterator[_Face]:
     """Edges of a cross-section, as deep as the cell is wide."""
     depth = np.array([0.0, float(np.ptp(found.points_mm[:, 0])), 0.0])
     for ((ua, va), (ub, vb)), sides in found.faces.items():

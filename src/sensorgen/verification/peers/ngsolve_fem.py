@@ -18,7 +18,7 @@ _BRICK = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 
 _SIDES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (2, 3, 7, 6), (1, 2, 6, 5), (3, 0, 4, 7))  # of a brick
 
 
-def plane(found: cells.Plane, permittivity: Mapping[str, float], unknowns: int) -> float:
+def plane(found: cells.PlaneSection, permittivity: Mapping[str, float], unknowns: int) -> float:
     """From above [F]: triangles are refined until there are that many unknowns."""
     import netgen.meshing as netgen
     import ngsolve as ng

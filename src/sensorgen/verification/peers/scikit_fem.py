@@ -14,7 +14,7 @@ _NEAR_MM = 1e-9
 _HALF = 0.5  # share of the error that refined triangles hold
 
 
-def plane(found: cells.Plane, permittivity: Mapping[str, float], unknowns: int) -> float:
+def plane(found: cells.PlaneSection, permittivity: Mapping[str, float], unknowns: int) -> float:
     """From above [F]: triangles are refined until there are that many unknowns."""
     import skfem
     from skfem.helpers import dot, grad

@@ -3,6 +3,6 @@
 from sensorgen.verification.thesis.markdown import markdown
 from sensorgen.verification.thesis.page import html
 from sensorgen.verification.thesis.plain import plain
-from sensorgen.verification.thesis.reproduced import Row, rows
+from sensorgen.verification.thesis.reproduced import ReproducedItem, rows
 
-__all__ = ["Row", "html", "markdown", "plain", "rows"]
+__all__ = ["ReproducedItem", "html", "markdown", "plain", "rows"]

@@ -19,7 +19,7 @@ KINDS: tuple[Kind, ...] = ("equation", "figure", "table", "claim")
 Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]*$", examples=["one line without control characters"])]
 
 
-class Item(Strict):
+class ThesisItem(Strict):
     """One numbered thing, or a claim of a section's text.
 
     Attributes
@@ -58,12 +58,12 @@ class Chapter(Strict):
     """A chapter or appendix with all its items."""
 
     title: Text
-    equations: list[Item] = Field(default=[])
-    figures: list[Item] = Field(default=[])
-    tables: list[Item] = Field(default=[])
-    claims: list[Item] = Field(default=[])
+    equations: list[ThesisItem] = Field(default=[])
+    figures: list[ThesisItem] = Field(default=[])
+    tables: list[ThesisItem] = Field(default=[])
+    claims: list[ThesisItem] = Field(default=[])
 
-    def items(self) -> Iterator[tuple[Kind, Item]]:
+    def items(self) -> Iterator[tuple[Kind, ThesisItem]]:
         """All of them, with what they are."""
         for kind, found in zip(KINDS, (self.equations, self.figures, self.tables, self.claims), strict=True):
             yield from ((kind, item) for item in found)

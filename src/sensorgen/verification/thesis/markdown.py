@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from sensorgen.verification.thesis import shown
 from sensorgen.verification.thesis.items import CHAPTERS, KINDS, chapter
-from sensorgen.verification.thesis.reproduced import Row
+from sensorgen.verification.thesis.reproduced import ReproducedItem
 from sensorgen.verification.thesis.verdicts import JUDGED, LOST, NOT_COVERED, TRANSCRIBED, UNEXPLAINED, WORDS
 
 ABOUT = (
@@ -25,12 +25,12 @@ VERDICTS = {
 }
 
 
-def markdown(rows: Sequence[Row]) -> str:
+def markdown(rows: Sequence[ReproducedItem]) -> str:
     """The whole page."""
     return "\n".join(_lines(rows)) + "\n"
 
 
-def lead(rows: Sequence[Row]) -> str:
+def lead(rows: Sequence[ReproducedItem]) -> str:
     """Sum of the counts, in words."""
     found = Counter(row.verdict.word for row in rows)
     copies = [sum(part.copied for part in row.parts) for row in rows if row.verdict.word in JUDGED]
@@ -44,13 +44,13 @@ def lead(rows: Sequence[Row]) -> str:
     )
 
 
-def words(rows: Sequence[Row]) -> list[str]:
+def words(rows: Sequence[ReproducedItem]) -> list[str]:
     """Verdicts in use, in their order; the one that should not occur only where it does."""
     found = {row.verdict.word for row in rows}
     return [word for word in WORDS if word != UNEXPLAINED or word in found]
 
 
-def _lines(rows: Sequence[Row]) -> Iterator[str]:
+def _lines(rows: Sequence[ReproducedItem]) -> Iterator[str]:
     yield from ("# The thesis, reproduced", "", "Written by `sensorgen thesis`; a test holds the two together.", "")
     yield from (lead(rows), "")
     yield f"| | {' | '.join(f'{kind}s' for kind in KINDS)} | all |"
@@ -74,14 +74,14 @@ def heading(name: str) -> str:
     return f"{'Chapter' if name.isdigit() else 'Appendix'} {name}: {chapter(name).title}"
 
 
-def counted(rows: Sequence[Row]) -> Iterator[tuple[str, list[int]]]:
+def counted(rows: Sequence[ReproducedItem]) -> Iterator[tuple[str, list[int]]]:
     """Each verdict, and how many equations, figures and tables, and of all, have it; last the sums."""
     for word in (*words(rows), ""):
         found = Counter(row.kind for row in rows if row.verdict.word == word or not word)
         yield word, [*(found[kind] for kind in KINDS), sum(found.values())]
 
 
-def _cells(row: Row) -> Iterator[str]:
+def _cells(row: ReproducedItem) -> Iterator[str]:
     """Without what Markdown would take for a new cell, or for HTML."""
     parts, item = row.parts, row.item
     values = "; ".join(shown.thesis(parts, item.tolerance)), "; ".join(shown.ours(parts, item.tolerance))
@@ -89,7 +89,7 @@ def _cells(row: Row) -> Iterator[str]:
         yield text.replace("|", "&#124;").replace("<", "&lt;")
 
 
-def verdict(row: Row) -> str:
+def verdict(row: ReproducedItem) -> str:
     """The verdict, and why its tolerance is what it is."""
     why = row.item.why_tolerance
     return row.verdict.text() + (f"; tolerance {row.item.tolerance:.2g}, since {why}" if why else "")

@@ -8,10 +8,10 @@ from sensorgen.analysis.plots.pages import render
 from sensorgen.verification.thesis import shown
 from sensorgen.verification.thesis.items import CHAPTERS, KINDS
 from sensorgen.verification.thesis.markdown import ABOUT, VERDICTS, counted, heading, lead, verdict, words
-from sensorgen.verification.thesis.reproduced import Row
+from sensorgen.verification.thesis.reproduced import ReproducedItem
 
 
-def html(rows: Sequence[Row]) -> str:
+def html(rows: Sequence[ReproducedItem]) -> str:
     """The whole page."""
     used = words(rows)
     return render(

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sensorgen.verification.thesis.reproduced import Row
+from sensorgen.verification.thesis.reproduced import ReproducedItem
 
 
-def plain(rows: Sequence[Row]) -> list[dict[str, Any]]:
+def plain(rows: Sequence[ReproducedItem]) -> list[dict[str, Any]]:
     """One mapping per item, with every value at full length."""
     return [
         {

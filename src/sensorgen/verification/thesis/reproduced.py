@@ -7,26 +7,26 @@ from typing import Any
 from sensorgen.core import plugins as registry
 from sensorgen.core.errors import MissingValue, SensorgenError
 from sensorgen.verification.thesis import checks
-from sensorgen.verification.thesis.items import CHAPTERS, Item, Kind, chapter
-from sensorgen.verification.thesis.verdicts import LOST, NOT_COVERED, UNEXPLAINED, Part, Verdict, judged
+from sensorgen.verification.thesis.items import CHAPTERS, Kind, ThesisItem, chapter
+from sensorgen.verification.thesis.verdicts import LOST, NOT_COVERED, UNEXPLAINED, ItemPart, ItemVerdict, judged
 
 
 @dataclass(frozen=True)
-class Row:
+class ReproducedItem:
     """An item with what came of it."""
 
     chapter: str
     kind: Kind
-    item: Item
-    parts: tuple[Part, ...]
-    verdict: Verdict
+    item: ThesisItem
+    parts: tuple[ItemPart, ...]
+    verdict: ItemVerdict
 
     def name(self) -> str:
         """As one would cite it: ``Table 3.1``."""
         return f"{'Eq.' if self.kind == 'equation' else self.kind.capitalize()} {self.item.number}"
 
 
-def rows(started: Callable[[str], None] = lambda _: None) -> list[Row]:
+def rows(started: Callable[[str], None] = lambda _: None) -> list[ReproducedItem]:
     """Every item of every chapter, in order.
 
     Parameters
@@ -41,7 +41,7 @@ def rows(started: Callable[[str], None] = lambda _: None) -> list[Row]:
     return found
 
 
-def row(of_chapter: str, kind: Kind, item: Item) -> Row:
+def row(of_chapter: str, kind: Kind, item: ThesisItem) -> ReproducedItem:
     """One item, computed.
 
     Notes
@@ -51,21 +51,21 @@ def row(of_chapter: str, kind: Kind, item: Item) -> Row:
     try:
         parts = tuple(_computed(item.check, item.given)) if item.check else ()
     except MissingValue as error:
-        return Row(of_chapter, kind, item, (), Verdict(NOT_COVERED, f"({error})"))
+        return ReproducedItem(of_chapter, kind, item, (), ItemVerdict(NOT_COVERED, f"({error})"))
     except SensorgenError as error:
-        return Row(of_chapter, kind, item, (), Verdict(UNEXPLAINED, f"({error})"))
+        return ReproducedItem(of_chapter, kind, item, (), ItemVerdict(UNEXPLAINED, f"({error})"))
     if item.lost:
-        verdict = Verdict(LOST, f"({item.lost})")
+        verdict = ItemVerdict(LOST, f"({item.lost})")
     elif item.uncovered:
-        verdict = Verdict(NOT_COVERED, f"({item.uncovered})")
+        verdict = ItemVerdict(NOT_COVERED, f"({item.uncovered})")
     else:
         verdict = judged(item, parts)
-    return Row(of_chapter, kind, item, parts, verdict)
+    return ReproducedItem(of_chapter, kind, item, parts, verdict)
 
 
-def _computed(check: str, given: Mapping[str, Any]) -> list[Part]:
+def _computed(check: str, given: Mapping[str, Any]) -> list[ItemPart]:
     name, _, check = check.partition(".")
     module = registry.load(checks, name)
     work = getattr(module, "EQUATIONS", {}).get(check) or getattr(module, check)
-    found: list[Part] = work(**given)
+    found: list[ItemPart] = work(**given)
     return found

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sensorgen.verification.thesis.verdicts import Part
+from sensorgen.verification.thesis.verdicts import ItemPart
 
 _FEW = 3  # parts, or complex values in a part, that are all shown
 _FEW_REAL = 8
@@ -18,7 +18,7 @@ _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "
 _PREFIXED = ("A", "C", "F", "Hz", "N", "Pa", "S", "V", "m", "ohm")  # units that take one, alone or over something
 
 
-def thesis(parts: Sequence[Part], tolerance: float) -> list[str]:
+def thesis(parts: Sequence[ItemPart], tolerance: float) -> list[str]:
     """The thesis's values: those that differ, or all where they are few."""
     found = []
     for part in _chosen(parts, tolerance):
@@ -29,7 +29,7 @@ def thesis(parts: Sequence[Part], tolerance: float) -> list[str]:
     return found
 
 
-def ours(parts: Sequence[Part], tolerance: float) -> list[str]:
+def ours(parts: Sequence[ItemPart], tolerance: float) -> list[str]:
     """Ours of the same, and how many more there are."""
     chosen = _chosen(parts, tolerance)
     more = sum(not part.copied for part in parts) - sum(not part.copied for part in chosen)
@@ -37,7 +37,7 @@ def ours(parts: Sequence[Part], tolerance: float) -> list[str]:
     return [f"{part.name}: {_number(part, part.ours)}" for part in chosen] + rest
 
 
-def _chosen(parts: Sequence[Part], tolerance: float) -> Sequence[Part]:
+def _chosen(parts: Sequence[ItemPart], tolerance: float) -> Sequence[ItemPart]:
     """Those that differ, or the first few; transcribed ones only where there are no others."""
     parts = [part for part in parts if not part.copied] or parts
     if len(parts) <= _FEW:
@@ -45,7 +45,7 @@ def _chosen(parts: Sequence[Part], tolerance: float) -> Sequence[Part]:
     return [part for part in parts if not abs(part.off()) <= tolerance] or parts[:_FEW]
 
 
-def _number(part: Part, values: ArrayLike) -> str:
+def _number(part: ItemPart, values: ArrayLike) -> str:
     """In the light of ours: what is nothing beside it is what rounding left."""
     return number(values, part.unit, max(part.scale, float(np.max(abs(np.asarray(part.ours))))), part.shown)
 

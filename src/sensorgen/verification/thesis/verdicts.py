@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sensorgen.verification.thesis.items import EXACT, Item
+from sensorgen.verification.thesis.items import EXACT, ThesisItem
 
 AGREES = "agrees"
 MISPRINT = "misprint confirmed"
@@ -26,7 +26,7 @@ Numbers = NDArray[Any]
 
 
 @dataclass(frozen=True)
-class Part:
+class ItemPart:
     """One quantity of an item.
 
     Attributes
@@ -83,7 +83,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ItemVerdict:
     """One of ``WORDS``, and what it rests on."""
 
     word: str
@@ -94,14 +94,14 @@ class Verdict:
         return f"{self.word}{self.why and ' '}{self.why}"
 
 
-def judged(item: Item, parts: Sequence[Part]) -> Verdict:
+def judged(item: ThesisItem, parts: Sequence[ItemPart]) -> ItemVerdict:
     """The verdict over all parts of an item: the worst of them decides.
 
     Parameters
     ----------
-    item : Item
+    item : ThesisItem
         A misprint or a difference that is announced has to be found, and one that is found has to be announced.
-    parts : sequence of Part
+    parts : sequence of ItemPart
         What was computed.
     """
     wrong = [part for part in parts if not abs(part.off()) <= item.tolerance]
@@ -110,38 +110,38 @@ def judged(item: Item, parts: Sequence[Part]) -> Verdict:
     return replace(found, why=f"{found.why}; transcribed: {copies}") if copies and found.word in JUDGED else found
 
 
-def _agreeing(item: Item, parts: Sequence[Part], copies: int) -> Verdict:
+def _agreeing(item: ThesisItem, parts: Sequence[ItemPart], copies: int) -> ItemVerdict:
     if item.off or any(part.corrected is not None for part in parts):
-        return Verdict(UNEXPLAINED, "(what is announced as wrong agrees with ours)")
+        return ItemVerdict(UNEXPLAINED, "(what is announced as wrong agrees with ours)")
     if copies and not compared(parts):
-        return Verdict(TRANSCRIBED, f"({copies} value{'s' * (copies > 1)}, which nothing else gives)")
+        return ItemVerdict(TRANSCRIBED, f"({copies} value{'s' * (copies > 1)}, which nothing else gives)")
     off = [abs(part.off()) for part in compared(parts) if not part.limit]
-    return Verdict(AGREES, f"to {digits(max(off))}" if off else "with the limit")
+    return ItemVerdict(AGREES, f"to {digits(max(off))}" if off else "with the limit")
 
 
-def _explained(item: Item, wrong: Sequence[Part]) -> Verdict:
+def _explained(item: ThesisItem, wrong: Sequence[ItemPart]) -> ItemVerdict:
     mended, copied = [part.mended() for part in wrong], any(part.copied for part in wrong)
     if all(off <= item.tolerance for off in mended) and item.erratum and not copied:
-        return Verdict(MISPRINT, f"(corrected: to {digits(max(mended))})")
+        return ItemVerdict(MISPRINT, f"(corrected: to {digits(max(mended))})")
     if item.because and not copied and all(_as_announced(part, item) for part in wrong):
         worst = max(wrong, key=lambda part: abs(part.off()))
-        return Verdict(DIFFERS, f"({_how_far(worst)}), because {item.because}")
+        return ItemVerdict(DIFFERS, f"({_how_far(worst)}), because {item.because}")
     named = ", ".join(f"{part.name} {share(part.off())}" for part in wrong)
-    return Verdict(UNEXPLAINED, f"(off: {named})")
+    return ItemVerdict(UNEXPLAINED, f"(off: {named})")
 
 
-def _how_far(part: Part) -> str:
+def _how_far(part: ItemPart) -> str:
     if part.printed is not None and np.size(part.printed) > 1:
         return f"off by {100 * part.off():.3g} % of the largest"
     return f"the thesis has {share(part.off())}"
 
 
-def _as_announced(part: Part, item: Item) -> bool:
+def _as_announced(part: ItemPart, item: ThesisItem) -> bool:
     known = item.off.get(part.name, np.nan)
     return bool(abs(part.off() - known) <= item.within * max(1.0, abs(known)))
 
 
-def compared(parts: Sequence[Part]) -> list[Part]:
+def compared(parts: Sequence[ItemPart]) -> list[ItemPart]:
     """Those that compare the thesis with something that does not come from the number itself."""
     return [part for part in parts if part.printed is not None and not part.copied]
 

@@ -21,9 +21,9 @@ from sensorgen.prediction.results import Prediction, timeless
 from sensorgen.prediction.slices import reviewed
 from sensorgen.workflows.batch import picture, printing, record, sheet, tab
 from sensorgen.workflows.batch.layout import Plate, Room, Size, column, packed, room
-from sensorgen.workflows.batch.pieces import Piece, pieces, shuffled, texts, tools
-from sensorgen.workflows.batch.plan import Plan, load
-from sensorgen.workflows.batch.record import Record, ResolvedDesign, SlicedPlate
+from sensorgen.workflows.batch.pieces import PrintPiece, pieces, shuffled, texts, tools
+from sensorgen.workflows.batch.plan import BatchPlan, load
+from sensorgen.workflows.batch.record import BatchRecord, ResolvedDesign, SlicedPlate
 from sensorgen.workflows.build import json_bytes, versions
 
 STEPS = ("plan", "checks", "predictions", "3MF", "slicing", "as printed", "record", "done")
@@ -35,9 +35,9 @@ class Arranged:
 
     Attributes
     ----------
-    plan : Plan
+    plan : BatchPlan
         As read.
-    pieces : tuple of Piece
+    pieces : tuple of PrintPiece
         In the random order in which the plate is filled.
     room : Room
         What the plate has to offer.
@@ -45,8 +45,8 @@ class Arranged:
         Place of each piece.
     """
 
-    plan: Plan
-    pieces: tuple[Piece, ...]
+    plan: BatchPlan
+    pieces: tuple[PrintPiece, ...]
     room: Room
     plate: Plate
 
@@ -69,7 +69,7 @@ class Batch:
     ----------
     folder : Path
         Where the files are.
-    record : Record
+    record : BatchRecord
         As in ``batch.json``.
     findings : dict of str to list of Finding
         Findings about each design printed alone, by its name.
@@ -78,7 +78,7 @@ class Batch:
     """
 
     folder: Path
-    record: Record
+    record: BatchRecord
     findings: dict[str, list[Finding]]
     sources: dict[str, str]
 
@@ -134,7 +134,7 @@ def arranged(path: Path) -> Arranged:
     return Arranged(plan, found, here, plates[0])
 
 
-def _size(plan: Plan, piece: Piece) -> Size:
+def _size(plan: BatchPlan, piece: PrintPiece) -> Size:
     """Length and width that a specimen takes on the plate, its tab included [mm]."""
     length, width, _ = piece.design.printed.size_mm
     return (length + tab.size_mm(piece.design, piece.name)[0], width) if plan.labels.tab else (length, width)
@@ -237,12 +237,12 @@ def _files(found: Arranged, log_head: str) -> Iterator[tuple[str, bytes]]:
 
 def _record(
     found: Arranged, predicted: dict[str, Prediction], sliced: dict[str, SlicedPlate], stage: Path
-) -> Record:  # fmt: skip
+) -> BatchRecord:  # fmt: skip
     plan, first = found.plan, found.pieces[0].design
     loaded = record.tools(plan, found.tools, texts(found.designs.values()))
     for plate in reversed(sliced.values()):
         predicted |= {key: made.prediction for key, made in plate.printed.items() if made.prediction}
-    return Record(
+    return BatchRecord(
         batch=plan.name, iteration=plan.iteration, seed=plan.seed, printer=first.machine.name,
         quality=first.layers.name, layout=plan.layout, tower=found.room.kept, tools=loaded,
         checklist=record.checklist(plan, loaded), bake=plan.bake,

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from sensorgen.design.printer import Printer
 from sensorgen.scene.drawing.paper import box, element, fitted, text
 from sensorgen.workflows.batch.layout import Plate, Rect, Room
-from sensorgen.workflows.batch.pieces import Piece
+from sensorgen.workflows.batch.pieces import PrintPiece
 
 COLOURS = ("#cfe3f5", "#f8d9c0", "#d5ecd0", "#e6d8ef", "#f6e7a8", "#d3d3d3", "#f5cfe0", "#c9ebe8")
 _ROW_MM, _COLUMN_MM, _WORDS_MM = 5.0, 95.0, 3.6  # of the list: rows, columns, height of letters
@@ -49,7 +49,7 @@ def middle(x: float, y: float, size: float, words: str, kind: str = "") -> str:
     return text(kind, x, y + 0.36 * size, words, font_size=size, text_anchor="middle")
 
 
-def svg(title: str, printer: Printer, room: Room, plate: Plate, pieces: Sequence[Piece]) -> str:
+def svg(title: str, printer: Printer, room: Room, plate: Plate, pieces: Sequence[PrintPiece]) -> str:
     """A plate of specimens, each with its number and name.
 
     Parameters
@@ -62,7 +62,7 @@ def svg(title: str, printer: Printer, room: Room, plate: Plate, pieces: Sequence
         What the plate had to offer.
     plate : mapping of int to Rect
         Place of each specimen.
-    pieces : sequence of Piece
+    pieces : sequence of PrintPiece
         The specimens, by the same numbers.
     """
     bed = bed_of(printer)
@@ -76,7 +76,7 @@ def svg(title: str, printer: Printer, room: Room, plate: Plate, pieces: Sequence
     )  # fmt: skip
 
 
-def colours(pieces: Sequence[Piece]) -> Mapping[str, str]:
+def colours(pieces: Sequence[PrintPiece]) -> Mapping[str, str]:
     """Colour of each design, by its hash, in the order of their names."""
     designs = {piece.design_id: piece.design.name for piece in pieces}
     known = sorted(designs, key=lambda key: (designs[key], key))
@@ -90,7 +90,7 @@ def _tower(tower: Rect, bed: Rect) -> str:
     return _rect(tower, bed, fill="#eee", **dashed) + middle(x, y, 3.4, "tower")
 
 
-def _specimens(plate: Plate, pieces: Sequence[Piece], bed: Rect) -> Iterator[str]:
+def _specimens(plate: Plate, pieces: Sequence[PrintPiece], bed: Rect) -> Iterator[str]:
     fills = colours(pieces)
     for order, (number, place) in enumerate(plate.items(), 1):
         length, width = place.x1 - place.x0, place.y1 - place.y0

@@ -8,17 +8,17 @@ from pathlib import Path
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.design.design import Design
 from sensorgen.design.materials import Texts
-from sensorgen.design.specimen_name import Specimen, named
-from sensorgen.workflows.batch.plan import Plan
+from sensorgen.design.specimen_name import SpecimenName, named
+from sensorgen.workflows.batch.plan import BatchPlan
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class PrintPiece:
     """One specimen to be printed.
 
     Attributes
     ----------
-    specimen : Specimen
+    specimen : SpecimenName
         Its name.
     design : Design
         What it is; copies share one.
@@ -26,7 +26,7 @@ class Piece:
         The design's hash, worked out once for all copies.
     """
 
-    specimen: Specimen
+    specimen: SpecimenName
     design: Design
     design_id: str
 
@@ -36,12 +36,12 @@ class Piece:
         return self.specimen.name
 
 
-def pieces(plan: Plan, folder: Path) -> tuple[Piece, ...]:
+def pieces(plan: BatchPlan, folder: Path) -> tuple[PrintPiece, ...]:
     """All specimens of a plan, in its own order.
 
     Parameters
     ----------
-    plan : Plan
+    plan : BatchPlan
         Checked.
     folder : Path
         What the plan's design files are relative to.
@@ -53,25 +53,25 @@ def pieces(plan: Plan, folder: Path) -> tuple[Piece, ...]:
     SensorgenError
         A design is unknown or wrong; the message names its place in the plan.
     """
-    found: list[Piece] = []
+    found: list[PrintPiece] = []
     for number, item in enumerate(plan.designs):
         try:
             design = plan.made(item, folder)
         except SensorgenError as error:
             raise error.within(f"designs.{number}") from None
         copies, key = range(item.first, item.first + item.replicates), design.id()
-        found += [Piece(named(design, plan.iteration, copy), design, key) for copy in copies]
+        found += [PrintPiece(named(design, plan.iteration, copy), design, key) for copy in copies]
     _refuse_twins(found)
     _refuse_strangers([piece.design for piece in found])
     return tuple(found)
 
 
-def shuffled(found: Sequence[Piece], seed: int) -> tuple[Piece, ...]:
+def shuffled(found: Sequence[PrintPiece], seed: int) -> tuple[PrintPiece, ...]:
     r"""The specimens in the order in which the plate is filled.
 
     Parameters
     ----------
-    found : sequence of Piece
+    found : sequence of PrintPiece
         In any order.
     seed : int
         Another seed, another order.
@@ -84,8 +84,8 @@ def shuffled(found: Sequence[Piece], seed: int) -> tuple[Piece, ...]:
     return tuple(sorted(found, key=lambda piece: sha256(f"{seed}\n{piece.name}".encode()).digest()))
 
 
-def _refuse_twins(found: Iterable[Piece]) -> None:
-    seen: dict[str, Piece] = {}
+def _refuse_twins(found: Iterable[PrintPiece]) -> None:
+    seen: dict[str, PrintPiece] = {}
     for piece in found:
         other = seen.setdefault(piece.name, piece)
         if other is not piece:

@@ -83,7 +83,7 @@ class Labels(Strict):
     sheet: bool = Field(default=True, description="A page of labels with QR codes to print.")
 
 
-class Plan(Strict):
+class BatchPlan(Strict):
     """A batch: what is on one plate, and where it all came from."""
 
     name: Name
@@ -125,7 +125,7 @@ class Plan(Strict):
         return design_files.make(packs.with_files(data, folder))
 
 
-def load(path: Path) -> Plan:
+def load(path: Path) -> BatchPlan:
     """Read a plan.
 
     Raises
@@ -135,7 +135,7 @@ def load(path: Path) -> Plan:
     """
     data = yamlfile.read(path)
     try:
-        plan = checked(Plan, {"name": path.stem} | data)
+        plan = checked(BatchPlan, {"name": path.stem} | data)
         if plan.total > MOST:
             raise BadInput(f"{plan.total} specimens; expected at most {MOST}: make several plans")
         for name in plan.filaments:

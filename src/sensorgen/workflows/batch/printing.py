@@ -19,13 +19,13 @@ from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import timeless
 from sensorgen.workflows.batch import tab
 from sensorgen.workflows.batch.layout import Plate
-from sensorgen.workflows.batch.pieces import Piece, texts, tools
-from sensorgen.workflows.batch.plan import Plan
+from sensorgen.workflows.batch.pieces import PrintPiece, texts, tools
+from sensorgen.workflows.batch.plan import BatchPlan
 from sensorgen.workflows.batch.record import PrintedDesign, SlicedPlate
 from sensorgen.workflows.build import json_bytes
 
 
-def placed(plan: Plan, pieces: Sequence[Piece], plate: Plate) -> list[Placed]:
+def placed(plan: BatchPlan, pieces: Sequence[PrintPiece], plate: Plate) -> list[Placed]:
     """The specimens of a plate as slicing knows them, each with its tab where the plan wants them."""
     return [
         Placed(

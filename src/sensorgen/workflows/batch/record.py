@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from sensorgen.checks.volumes import Row
+from sensorgen.checks.volumes import LayerVolume
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import MissingValue
 from sensorgen.core.findings import Finding
@@ -15,8 +15,8 @@ from sensorgen.design import materials
 from sensorgen.export.gcode.check import Checked
 from sensorgen.prediction.results import Prediction
 from sensorgen.workflows.batch.layout import Plate, Rect
-from sensorgen.workflows.batch.pieces import Piece
-from sensorgen.workflows.batch.plan import Bake, Filament, Layout, Plan
+from sensorgen.workflows.batch.pieces import PrintPiece
+from sensorgen.workflows.batch.plan import Bake, BatchPlan, Filament, Layout
 from sensorgen.workflows.sealed import seal
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ _COLUMNS = (
 
 
 @dataclass(frozen=True)
-class Specimen:
+class PlateSpecimen:
     """A specimen on the plate.
 
     Attributes
@@ -90,7 +90,7 @@ class PrintedDesign:
         Name of the specimen that was read, and of its design.
     prediction : Prediction or None
         Its prediction; None if the print cannot be read.
-    layers : tuple of Row
+    layers : tuple of LayerVolume
         Printed over drawn volume.
     findings : tuple of Finding
         Rule 7.
@@ -101,7 +101,7 @@ class PrintedDesign:
     specimen: str
     design: str
     prediction: Prediction | None = None  # no union of two types for read and unread: JSON would lose infinities
-    layers: tuple[Row, ...] = ()
+    layers: tuple[LayerVolume, ...] = ()
     findings: tuple[Finding, ...] = ()
     reason: str = ""
 
@@ -158,7 +158,7 @@ class SlicedPlate(Checked):
 
 
 @dataclass(frozen=True)
-class Record:
+class BatchRecord:
     """The record of a batch.
 
     Attributes
@@ -177,7 +177,7 @@ class Record:
         What is done by hand before, at and after the print.
     bake : tuple of Bake
         As in the plan.
-    specimens : dict of str to Specimen
+    specimens : dict of str to PlateSpecimen
         By name, in the order of the plate.
     predictions : dict of str to Prediction
         What each design should measure, by its identity: of the first slicer's print, else of the estimated one.
@@ -205,7 +205,7 @@ class Record:
     tools: dict[str, Spool]
     checklist: tuple[str, ...]
     bake: tuple[Bake, ...]
-    specimens: dict[str, Specimen]
+    specimens: dict[str, PlateSpecimen]
     predictions: dict[str, Prediction]
     designs: dict[str, ResolvedDesign]
     slicers: dict[str, SlicedPlate]
@@ -217,7 +217,7 @@ class Record:
         """As in ``batch.json``."""
         return _adapter().dump_json(self, indent=2).decode() + "\n"
 
-    def sealed(self) -> "Record":
+    def sealed(self) -> "BatchRecord":
         """The record with its own SHA-256."""
         return replace(self, sha256=seal(json.loads(self.to_json())))
 
@@ -244,16 +244,16 @@ def _expected(found: Prediction) -> tuple[float | None, float | None]:
 
 
 @cache
-def _adapter() -> "TypeAdapter[Record]":
+def _adapter() -> "TypeAdapter[BatchRecord]":
     from pydantic import TypeAdapter
 
-    return TypeAdapter(Record)
+    return TypeAdapter(BatchRecord)
 
 
-def specimens(pieces: Sequence[Piece], plate: Plate) -> dict[str, Specimen]:
+def specimens(pieces: Sequence[PrintPiece], plate: Plate) -> dict[str, PlateSpecimen]:
     """Every specimen by its name, in the order of the plate."""
     return {
-        (piece := pieces[number]).name: Specimen(
+        (piece := pieces[number]).name: PlateSpecimen(
             order, piece.design.name, piece.design_id, piece.specimen.iteration, piece.specimen.replicate,
             (round(place.centre_mm[0], 6), round(place.centre_mm[1], 6)),
             (round(place.x1 - place.x0, 6), round(place.y1 - place.y0, 6)),
@@ -262,7 +262,7 @@ def specimens(pieces: Sequence[Piece], plate: Plate) -> dict[str, Specimen]:
     }  # fmt: skip
 
 
-def tools(plan: Plan, loaded: Mapping[int, str], texts: materials.Texts) -> dict[str, Spool]:
+def tools(plan: BatchPlan, loaded: Mapping[int, str], texts: materials.Texts) -> dict[str, Spool]:
     """Spools by the printer's own number of the tool; ``texts`` as of :func:`sensorgen.design.materials.load`."""
     found = {}
     for tool, name in loaded.items():
@@ -276,7 +276,7 @@ def tools(plan: Plan, loaded: Mapping[int, str], texts: materials.Texts) -> dict
     return found
 
 
-def checklist(plan: Plan, loaded: Mapping[str, Spool]) -> tuple[str, ...]:
+def checklist(plan: BatchPlan, loaded: Mapping[str, Spool]) -> tuple[str, ...]:
     """Steps by hand before, at and after the print, in this order."""
     numbers = ", ".join(f"T{tool}" for tool in loaded)
     bake = [f"Bake at {b.temperature_c:g} C for {b.hours:g} h" + (f": {b.note}" if b.note else "") for b in plan.bake]

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from sensorgen.core.errors import MissingValue
-from sensorgen.workflows.batch.pieces import Piece
+from sensorgen.workflows.batch.pieces import PrintPiece
 
 _STYLE = """
 @page { size: A4; margin: 10mm }
@@ -44,7 +44,7 @@ class Label:
     log_head: str = ""
 
     @classmethod
-    def of(cls, piece: Piece, batch: str, place: int, log_head: str = "") -> "Label":
+    def of(cls, piece: PrintPiece, batch: str, place: int, log_head: str = "") -> "Label":
         """The label of a specimen."""
         return cls(piece.name, batch, piece.design.name, piece.design_id, place, log_head)
 

@@ -12,8 +12,8 @@ import numpy as np
 from sensorgen.analysis.characterise import selection
 from sensorgen.analysis.characterise.catalogue import (
     Coupon,
+    CouponTarget,
     Meters,
-    Target,
     catalogue,
     targets,
     unknowns,
@@ -89,7 +89,7 @@ class Study:
         return self.design.material(self.conductor), self.design.material(self.dielectric)
 
     @cached_property
-    def targets(self) -> tuple[Target, ...]:
+    def targets(self) -> tuple[CouponTarget, ...]:
         """Quantities that are wanted."""
         return targets(self.conductor, self.dielectric, self.design.machine.line_mm())
 
@@ -405,7 +405,7 @@ def read(path: Path, source: str = "", *, keep: bool = True, force: bool = False
     return replace(made, file=str(file))
 
 
-def _findings(piece: forms.Lines, line_mm: float) -> Iterator[str]:
+def _findings(piece: forms.LineReadings, line_mm: float) -> Iterator[str]:
     """Line width, shortest film, smallest distance and tool offset, as far as they were read."""
     walls = [(k, w) for k, w in enumerate(piece.walls_mm, 1) if w]
     if len(walls) > 1:

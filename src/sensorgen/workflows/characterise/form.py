@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from sensorgen.analysis.characterise.catalogue import Coupon, Meters, Size
+from sensorgen.analysis.characterise.catalogue import Coupon, CouponSize, Meters
 from sensorgen.analysis.characterise.posterior import Observation
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
@@ -34,7 +34,7 @@ _SIZES, _DEFECT = 3.0, 1e5  # by which a size, a reading of a dead coupon, may d
 
 
 @dataclass(frozen=True)
-class Lines:
+class LineReadings:
     """Readings of the piece for lines and shorts; None where nothing was.
 
     Attributes
@@ -278,7 +278,7 @@ def _observation(
 
 
 def _si(
-    name: str, key: str, kind: str, values: Mapping[str, float | None], sizes: Sequence[Size]
+    name: str, key: str, kind: str, values: Mapping[str, float | None], sizes: Sequence[CouponSize]
 ) -> float | None:  # fmt: skip
     """A reading in SI units: ohm, F, or the small-strain stiffness [N/m]; None for a gap."""
     value = values[f"{key}_mm"] if kind == "stiffness" else values[key]
@@ -296,7 +296,7 @@ def _si(
     return load / (value * M_PER_MM) / float(secant_stiffening(value / height))
 
 
-def lines_of(form: Form) -> Lines:
+def lines_of(form: Form) -> LineReadings:
     """Entries of the form for the piece for lines and shorts.
 
     Raises
@@ -318,7 +318,7 @@ def lines_of(form: Form) -> Lines:
         value = fields.get(key)
         if value is not None and (isinstance(value, bool) or value not in range(-5, 6)):
             raise OutOfRange(f"{LINES}.{key} is {shown(value)}; expected a whole number from -5 to 5, or ~")
-    return Lines(
+    return LineReadings(
         tuple(_number(f"{LINES}.{key}", fields.get(key)) for key in walls),
         tuple(None if fields.get(key) is None else STEP_MM * fields[key] for key in verniers),
         tuple(fields.get(key) for key in films), tuple(fields.get(key) for key in combs),

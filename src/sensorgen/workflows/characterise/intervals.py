@@ -6,8 +6,8 @@ from typing import Annotated
 
 import numpy as np
 
-from sensorgen.analysis.characterise.catalogue import Target
-from sensorgen.analysis.characterise.posterior import Interval95, Posterior
+from sensorgen.analysis.characterise.catalogue import CouponTarget
+from sensorgen.analysis.characterise.posterior import CouponPosterior, Interval95
 from sensorgen.analysis.plots.figure import BLUE, Axis, Curve, Figure, Panel
 from sensorgen.analysis.plots.static import files
 from sensorgen.core.document import Column
@@ -48,10 +48,12 @@ class IntervalRow:
         return self.high - self.low < _DETERMINED * (self.before_high - self.before_low)
 
 
-def compared(before: Posterior, after: Posterior, wanted: Sequence[Target]) -> tuple[IntervalRow, ...]:
+def compared(
+    before: CouponPosterior, after: CouponPosterior, wanted: Sequence[CouponTarget]
+) -> tuple[IntervalRow, ...]:
     """All targets, with their intervals before and after."""
 
-    def row(target: Target, was: Interval95, now: Interval95) -> IntervalRow:
+    def row(target: CouponTarget, was: Interval95, now: Interval95) -> IntervalRow:
         goal = 100 * target.goal if target.goal else np.nan
         half = 100 * now.half_width() if target.goal else np.nan
         return IntervalRow(target.quantity, target.material, was.low, was.high, now.value, now.low, now.high, half,

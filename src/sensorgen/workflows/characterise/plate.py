@@ -239,7 +239,7 @@ def picture(
         centre = [(min(a for a, _ in span) + max(b for _, b in span)) / 2 for span in spans]
         x, y = place.centre_mm[0] - bed.x0, bed.y1 - place.centre_mm[1]
         shift = x - centre[0], y + centre[1]
-        frame = paper.Frame(*shift, 0.0, 0.0, 1.0, 1.0)
+        frame = paper.ViewFrame(*shift, 0.0, 0.0, 1.0, 1.0)
         for body in pieces:
             path = "".join(frame.outline(piece.cut("z", piece.span("z")[0])[0]) for piece in body.pieces)
             shapes.append(paper.element("path", d=path, fill=fills[body.material], **_OUTLINE))

@@ -67,31 +67,40 @@ def assign(assembly: Assembly, maps: Sequence[str], terminals: Sequence[str], fo
         A body has no material.
     """
     names = [body.name for body in assembly.bodies]
-    known: dict[str, bool] = {}  # whether each material conducts
-    chosen: dict[str, tuple[str, str]] = {}  # of each body, material with source, and tool
+    materials, conducting, tools = _filling(names, maps, folder)
+    if missing := [name for name in names if name not in materials]:
+        colours = {body.name: body.given.colour for body in assembly.bodies}
+        words = " ".join(f"--map {name}={suggested(name, colours[name], folder) or 'MATERIAL'}" for name in missing)
+        raise MissingValue(f"no material for {', '.join(missing)}: give {words}")
+    conductors = {n for n in names if materials[n].partition("@")[0] in conducting}
+    ends, shorts = _electrodes(assembly, conductors, terminals)
+    filled = {n: imported.Filled.model_validate({"material": materials[n], "terminal": ends.get(n, "")}) for n in names}
+    return Assigned(filled, tools, shorts)
+
+
+def _filling(
+    names: Sequence[str], maps: Sequence[str], folder: Path
+) -> tuple[dict[str, str], set[str], dict[str, int]]:  # fmt: skip
+    """Material with source of each body that ``--map`` names, the materials that conduct, and each material's tool."""
+    materials: dict[str, str] = {}
+    conducting: set[str] = set()
+    of_bodies: dict[str, tuple[str, str]] = {}  # material and tool
     for pattern, value in _pairs(maps, "--map BODY=MATERIAL@TOOL"):
         parts = _MATERIAL.fullmatch(value)
         if not parts:
             raise BadInput(f"--map {pattern}={value}: expected BODY=MATERIAL@TOOL, as base=etpu@1")
         material, tool = parts["material"], parts["tool"]
-        known[material] = designs.material(material, folder).conductor
+        conducting |= {material} if designs.material(material, folder).conductor else set()
         for name in _matching(pattern, names):
-            chosen[name] = (material + (f"@{parts['source']}" if parts["source"] else ""), tool or "")
+            materials[name] = material + (f"@{parts['source']}" if parts["source"] else "")
+            of_bodies[name] = material, tool or ""
     tools: dict[str, int] = {}
-    for material, tool in ((slot.partition("@")[0], tool) for slot, tool in chosen.values() if tool):
+    for material, tool in (of_body for of_body in of_bodies.values() if of_body[1]):
         if tools.setdefault(material, int(tool)) != int(tool):
             raise BadInput(
                 f"--map: {material} is on tools {tools[material]} and {tool}; expected one tool for a material"
             )
-    materials = {name: slot for name, (slot, _) in chosen.items()}
-    if missing := [name for name in names if name not in materials]:
-        colours = {body.name: body.given.colour for body in assembly.bodies}
-        words = " ".join(f"--map {name}={suggested(name, colours[name], folder) or 'MATERIAL'}" for name in missing)
-        raise MissingValue(f"no material for {', '.join(missing)}: give {words}")
-    conductors = {n for n in names if known[materials[n].partition("@")[0]]}
-    ends, shorts = _electrodes(assembly, conductors, terminals)
-    filled = {n: imported.Filled.model_validate({"material": materials[n], "terminal": ends.get(n, "")}) for n in names}
-    return Assigned(filled, tools, shorts)
+    return materials, conducting, tools
 
 
 def _electrodes(

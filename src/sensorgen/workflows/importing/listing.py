@@ -29,7 +29,7 @@ class ListedBody:
 
 
 @dataclass(frozen=True)
-class Listing:
+class BodyListing:
     """Bodies of files, what was repaired or is wrong, and a map to start from.
 
     Attributes
@@ -47,7 +47,7 @@ class Listing:
     findings: tuple[Finding, ...]
 
     @classmethod
-    def of(cls, assembly: Assembly, folder: Path) -> "Listing":
+    def of(cls, assembly: Assembly, folder: Path) -> "BodyListing":
         """The listing of an assembly, with materials that ship, are beside a folder, or the user's."""
         rows = []
         for body in assembly.bodies:

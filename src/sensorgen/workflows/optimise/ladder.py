@@ -37,7 +37,7 @@ _TRIAL = 5  # version of the stored trials
 
 
 @dataclass(frozen=True)
-class Known:
+class EarlyNumber:
     """A number of one design before it is evaluated.
 
     Attributes
@@ -63,7 +63,7 @@ def rules(design: Design) -> list[tuple[str, str]]:
     return [(r, s) for r, s in cache.answer({"what": "rules", "short": design.id(), "waivers": waived}, work)]
 
 
-def known(design: Design, query: Query, solve: bool, rule: str = "") -> dict[str, Known]:
+def known(design: Design, query: Query, solve: bool, rule: str = "") -> dict[str, EarlyNumber]:
     """Numbers by the least expensive models: certified bounds at rest, and, if ``solve``, under load on a coarse mesh.
 
     Of the print by a rule for walls, the most likely one if not given. Empty where no model applies, as of a short.
@@ -79,10 +79,10 @@ def known(design: Design, query: Query, solve: bool, rule: str = "") -> dict[str
             return {}
 
     found = cache.answer(question, work)
-    return {key: Known(low, high, bool(certified)) for key, (low, high, certified) in found.items()}
+    return {key: EarlyNumber(low, high, bool(certified)) for key, (low, high, certified) in found.items()}
 
 
-def _known(body: Body, query: Query, solve: bool) -> dict[str, Known]:
+def _known(body: Body, query: Query, solve: bool) -> dict[str, EarlyNumber]:
     rule, gap_mm = next(iter(body.cells.gap_mm.items()))
     body = body.printed_otherwise(rule)
     rest = rest_state(body, ranges=False)
@@ -94,10 +94,10 @@ def _known(body: Body, query: Query, solve: bool) -> dict[str, Known]:
     for key in AT_REST:
         value = NUMBERS[key].of(numbers)
         if value:
-            found[key] = Known(value.model.lower, value.model.upper, value.certified)
+            found[key] = EarlyNumber(value.model.lower, value.model.upper, value.certified)
     if not solve:
         return found
-    return found | {k: Known(v, v, False) for k, v in _under_load(body, rest, query).items() if np.isfinite(v)}
+    return found | {k: EarlyNumber(v, v, False) for k, v in _under_load(body, rest, query).items() if np.isfinite(v)}
 
 
 def _under_load(body: Body, rest: RestState, query: Query) -> dict[str, float]:

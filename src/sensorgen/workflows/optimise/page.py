@@ -25,7 +25,7 @@ def page(result: Optimised) -> str:
     )
     blind = sum(not (c.senses(across) and c.senses(up)) for c in result.designs)
     words = [f"{blind} designs that cannot sense force or cannot locate are in the table alone"] * (blind > 0)
-    section = pages.Section("", "", figures, tuple(result.document()))
+    section = pages.PageSection("", "", figures, tuple(result.document()))
     return pages.page(f"Best designs: {result.name}", words, [section])
 
 

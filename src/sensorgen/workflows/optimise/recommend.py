@@ -18,7 +18,7 @@ from sensorgen.export.slicers import PROGRAMS
 from sensorgen.export.slicers.run import find
 from sensorgen.workflows.build import build
 from sensorgen.workflows.optimise import ladder
-from sensorgen.workflows.optimise.result import Recommended, Spread, chosen, leads
+from sensorgen.workflows.optimise.result import ObjectiveSpread, Recommended, chosen, leads
 from sensorgen.workflows.optimise.search import HERE, Row, Searched, Workers
 from sensorgen.workflows.optimise.space import grid_mm
 from sensorgen.workflows.optimise.target import NUMBERS, Target
@@ -88,7 +88,9 @@ def _named(design: Design, name: str) -> Design:
     return make(design.model_dump(mode="json", exclude_defaults=True) | {"name": name})
 
 
-def _robust(target: Target, rows: Sequence[Row], workers: Workers, *, keep: bool) -> dict[int, dict[str, Spread]]:
+def _robust(
+    target: Target, rows: Sequence[Row], workers: Workers, *, keep: bool
+) -> dict[int, dict[str, ObjectiveSpread]]:
     """Of designs by number: objectives on the coarse mesh, over walls of slicers and lengths in the plane."""
     keys, query = [key for key in target.objectives if key in ladder.COARSE], target.query()
     inputs, owners = list[tuple[Any, ...]](), list[int]()
@@ -97,7 +99,7 @@ def _robust(target: Target, rows: Sequence[Row], workers: Workers, *, keep: bool
         designs += [(design, rules(None)[0]) for design in within_tolerance(target, row.design)]
         inputs += [(design, query, bool(set(keys) - ladder.AT_REST), rule) for design, rule in designs]
         owners += [row.number] * len(designs)
-    numbers: dict[int, list[dict[str, ladder.Known]]] = {row.number: [] for row in rows}
+    numbers: dict[int, list[dict[str, ladder.EarlyNumber]]] = {row.number: [] for row in rows}
     for k, one in sorted(workers.results(ladder.known, inputs, "lost", keep=keep)):  # first its own walls
         numbers[owners[k]].append({} if isinstance(one, str) else one)
     return {row.number: dict(_spreads(target, keys, row, numbers[row.number])) for row in rows}
@@ -117,8 +119,8 @@ def within_tolerance(target: Target, design: Design) -> Iterator[Design]:
 
 
 def _spreads(
-    target: Target, keys: Sequence[str], row: Row, numbers: Sequence[dict[str, ladder.Known]]
-) -> Iterator[tuple[str, Spread]]:
+    target: Target, keys: Sequence[str], row: Row, numbers: Sequence[dict[str, ladder.EarlyNumber]]
+) -> Iterator[tuple[str, ObjectiveSpread]]:
     """The value of each objective, changed by the factor that the coarse mesh has from the first of ``numbers`` on."""
     for key in keys:
         own = NUMBERS[key].of(row.trial.printed) if row.trial else None
@@ -128,7 +130,9 @@ def _spreads(
             ends = max((own.lower, own.upper), key=partial(target.worth, key))
             yield (
                 key,
-                Spread(own.value, median(varied[1:] or varied), max(varied, key=partial(target.worth, key)), ends),
+                ObjectiveSpread(
+                    own.value, median(varied[1:] or varied), max(varied, key=partial(target.worth, key)), ends
+                ),
             )
 
 

@@ -90,7 +90,7 @@ class Chosen:
 
 
 @dataclass(frozen=True)
-class Spread:
+class ObjectiveSpread:
     """An objective over variants of a design: best value, median, worst, and the worst with all material ranges."""
 
     value: float
@@ -113,7 +113,7 @@ class Recommended:
         With its files; "" where it was not built.
     verdict : str
         Of the build.
-    robust : dict of str to Spread
+    robust : dict of str to ObjectiveSpread
         Objectives over walls of slicers, and lengths in the plane by the tolerance to both sides.
     sliced : dict of str to Bounds
         Objectives by the G-code of a real slicer.
@@ -127,7 +127,7 @@ class Recommended:
     design: Chosen
     folder: str = ""
     verdict: str = ""
-    robust: dict[str, Spread] | None = None
+    robust: dict[str, ObjectiveSpread] | None = None
     sliced: dict[str, Bounds] | None = None
     slicer: str = ""
     ties: tuple[int, ...] = ()

@@ -14,7 +14,7 @@ from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.core.parallel import Lane, open_lanes, remembered, said
 from sensorgen.design.design import Design
 from sensorgen.workflows.optimise import ladder
-from sensorgen.workflows.optimise.ladder import AT_REST, COARSE, Known
+from sensorgen.workflows.optimise.ladder import AT_REST, COARSE, EarlyNumber
 from sensorgen.workflows.optimise.space import Candidate
 from sensorgen.workflows.optimise.target import NUMBERS, Target
 from sensorgen.workflows.trial import Trial
@@ -70,7 +70,7 @@ class Row:
         Why it was not evaluated; "" if it was.
     certified : bool
         Whether the discard is proven; else it holds by the models.
-    known : dict of str to Known
+    known : dict of str to EarlyNumber
         Numbers before it was evaluated.
     trial : Trial or None
         The design tried.
@@ -82,7 +82,7 @@ class Row:
     candidate: Candidate
     discarded: str = ""
     certified: bool = True
-    known: dict[str, Known] = field(default_factory=dict)
+    known: dict[str, EarlyNumber] = field(default_factory=dict)
     trial: Trial | None = None
     violated: dict[str, float] = field(default_factory=dict)
 
@@ -309,7 +309,7 @@ def _dominate(target: Target, rows: Sequence[Row], margin: float) -> None:
             row.discard("dominated", certified=all(row.known[key].certified for key in target.objectives))
 
 
-def _hoped(target: Target, key: str, number: Known, margin: float) -> Interval:
+def _hoped(target: Target, key: str, number: EarlyNumber, margin: float) -> Interval:
     """An objective of a design that is not evaluated yet; the lower the better."""
     share = 1.0 if number.certified else margin
     return target.badness(key, Interval(number.lower / share, number.upper * share))

@@ -114,13 +114,7 @@ def space(target: Target, folder: Path = Path()) -> Space:
     base = dict(target.design) if isinstance(target.design, Mapping) else {}
     base = with_own_files({k: v for k, v in base.items() if k != "name"}, folder)
     known = frozenset(asdict(make(base).params))
-    for key, given in target.parameters.items():
-        if key not in known and key.partition(".")[0] not in Design.model_fields:
-            raise UnknownName(
-                "parameter to vary", key, [*known, "quality", "materials.film", "orientation", "nozzle_mm"]
-            )
-        if isinstance(given, Range) and key not in known and given.step is None:
-            raise BadInput(f"parameters.{key}: a range without a step; only lengths of the shape have a printable grid")
+    _refuse_unknown(target, known)
     # the grid of a length follows from quality, printer and nozzle: those are chosen first
     outer = {k: v for k, v in target.parameters.items() if k not in known}
     inner = {k: v for k, v in target.parameters.items() if k in known}
@@ -137,6 +131,17 @@ def space(target: Target, folder: Path = Path()) -> Space:
             f"no printable value of {', '.join(empty)} in its range: expected a whole layer or half line in it"
         )
     return whole
+
+
+def _refuse_unknown(target: Target, known: frozenset[str]) -> None:
+    """Refuse a parameter that no design has, and a range without a step that has no printable grid."""
+    for key, given in target.parameters.items():
+        if key not in known and key.partition(".")[0] not in Design.model_fields:
+            raise UnknownName(
+                "parameter to vary", key, [*known, "quality", "materials.film", "orientation", "nozzle_mm"]
+            )
+        if isinstance(given, Range) and key not in known and given.step is None:
+            raise BadInput(f"parameters.{key}: a range without a step; only lengths of the shape have a printable grid")
 
 
 def _combinations(space: Mapping[str, list[Value]]) -> Iterator[dict[str, Value]]:

@@ -62,7 +62,7 @@ class Smooth:
         return np.asarray(chebyshev.chebval(2 * np.asarray(x_m) / LENGTH_M - 1, terms))
 
 
-class Line:
+class ThesisLine:
     """The line of Table 3.1 at its highest tone, 1 V on its top track and the bottom one earthed."""
 
     @cached_property
@@ -106,5 +106,5 @@ class Line:
         return same * INPUT_V + a12 * self.input_a, a21 * INPUT_V + same * self.input_a
 
 
-LINE = Line()
+LINE = ThesisLine()
 PLACES_M = np.array([0.013, 0.031, 0.057, 0.086])  # where equations along the line are tried

@@ -10,7 +10,7 @@ from sensorgen.models import columns, fem2d, line
 from sensorgen.verification.thesis.checks._columns import EPS_R, FILM_MM, PERMITTIVITY, Layer, piles, piles_f
 from sensorgen.verification.thesis.checks._field import INPUT_V, LENGTH_M, OMEGA, RHO_OHM_M, TRACKS
 from sensorgen.verification.thesis.checks._text import table
-from sensorgen.verification.thesis.verdicts import Part
+from sensorgen.verification.thesis.verdicts import ItemPart
 
 _PLATE_M, _PLATE_M2 = 0.6e-3, 1e-3  # Table 3.1
 _PLATE = designs.make({"shape": "reference"})
@@ -26,41 +26,41 @@ _RUNGS: dict[int, tuple[tuple[Layer, ...], float]] = {
 }
 
 
-def plate(eps_r: float = EPS_R) -> list[Part]:
+def plate(eps_r: float = EPS_R) -> list[ItemPart]:
     """2.5, 2.7, B.9: the plate of Table 3.1, of any dielectric, by columns."""
     ours = columns.capacitance(_PLATE.in_use, {"x60": eps_r, "air": 1.0})
-    return [Part("C", "F", (ours.lower + ours.upper) / 2, EPS0_F_PER_M * eps_r * _PLATE_M2 / _PLATE_M)]
+    return [ItemPart("C", "F", (ours.lower + ours.upper) / 2, EPS0_F_PER_M * eps_r * _PLATE_M2 / _PLATE_M)]
 
 
-def earlier() -> list[Part]:
+def earlier() -> list[ItemPart]:
     """Chapter 1: the plate of Table C.1 at rest."""
     given = table("C.1")
     length, width = given["size_mm"]
     over = length * width / given["plate_mm"] * M_PER_MM
-    return [Part("C at rest", "F", EPS0_F_PER_M * given["x60"]["relative_permittivity"] * over)]
+    return [ItemPart("C at rest", "F", EPS0_F_PER_M * given["x60"]["relative_permittivity"] * over)]
 
 
-def solved_plate() -> list[Part]:
+def solved_plate() -> list[ItemPart]:
     """4.1: the same by its field."""
     found = fem2d.capacitance(_PLATE.in_use, PERMITTIVITY)
-    return [Part("C", "F", found.upper, EPS0_F_PER_M * EPS_R * _PLATE_M2 / _PLATE_M)]
+    return [ItemPart("C", "F", found.upper, EPS0_F_PER_M * EPS_R * _PLATE_M2 / _PLATE_M)]
 
 
-def slice_of_plate() -> list[Part]:
+def slice_of_plate() -> list[ItemPart]:
     """B.10: what a plate of a length gains by a slice."""
     long, short = (piles_f([(length, [("x60", 0.6)])], 10.0) for length in (100.0, 99.0))
-    return [Part("C of 1 mm", "F", long - short, EPS0_F_PER_M * EPS_R * 1e-2 * 1e-3 / _PLATE_M)]
+    return [ItemPart("C of 1 mm", "F", long - short, EPS0_F_PER_M * EPS_R * 1e-2 * 1e-3 / _PLATE_M)]
 
 
-def charge_of_plate() -> list[Part]:
+def charge_of_plate() -> list[ItemPart]:
     """6.1: charge that the line's current brings in a period, at a tone where its tracks do not count."""
     omega = 2 * np.pi * _SLOW_HZ
     z = line.impedance(line.PressedLine(**TRACKS | {"length_m": LENGTH_M, "frequency_hz": _SLOW_HZ}))
     printed = EPS0_F_PER_M * EPS_R * _PLATE_M2 / _PLATE_M * INPUT_V
-    return [Part("q at 1 V", "C", float(abs(INPUT_V / z) / omega), printed)]
+    return [ItemPart("q at 1 V", "C", float(abs(INPUT_V / z) / omega), printed)]
 
 
-def air_gaps() -> list[Part]:
+def air_gaps() -> list[ItemPart]:
     """2.8 to 2.11: strips of dielectric and of air side by side between plates, by their field."""
     beside = [(_STRIP_MM, [("x60", _HIGH_MM)]), (_GAP_MM, [("air", _HIGH_MM)])]
     depth_mm = 1.0
@@ -68,18 +68,20 @@ def air_gaps() -> list[Part]:
     c_de, c_air = (
         EPS0_F_PER_M * PERMITTIVITY[layers[0][0]] * width * depth_mm / _HIGH_MM * M_PER_MM for width, layers in beside
     )
-    return [Part("C of both", "F", (found.lower + found.upper) / 2, c_de + c_air)]
+    return [ItemPart("C of both", "F", (found.lower + found.upper) / 2, c_de + c_air)]
 
 
-def cogs() -> list[Part]:
+def cogs() -> list[ItemPart]:
     """2.5, 2.6: a conductor's teeth in the dielectric, of the rectangular design's sizes; no sizes are printed."""
     flat, teeth = _STRIP_MM + _GAP_MM, [(_STRIP_MM, [("x60", FILM_MM)]), (_GAP_MM, [("x60", FILM_MM + _HIGH_MM)])]
     plain = piles_f([(flat, [("x60", FILM_MM + _HIGH_MM)])])
     field = fem2d.capacitance(piles(teeth, 1.0), PERMITTIVITY).upper
     cog_ohm = RHO_OHM_M * _HIGH_MM / (_STRIP_MM * 1.0 * M_PER_MM)
     return [
-        Part("C with cogs over C without, by columns and by the field", "", [piles_f(teeth) / plain, field / plain]),
-        Part("a cog's resistance over the reactance below it, at 99.7 kHz", "", cog_ohm * OMEGA * field, shown=2),
+        ItemPart(
+            "C with cogs over C without, by columns and by the field", "", [piles_f(teeth) / plain, field / plain]
+        ),
+        ItemPart("a cog's resistance over the reactance below it, at 99.7 kHz", "", cog_ohm * OMEGA * field, shown=2),
     ]
 
 
@@ -89,20 +91,20 @@ def _reactance(layers: Sequence[Layer]) -> float:
     return sum(t * M_PER_MM / (OMEGA * EPS0_F_PER_M * PERMITTIVITY[name] * area) for name, t in layers)
 
 
-def rung(number: int) -> list[Part]:
+def rung(number: int) -> list[ItemPart]:
     """2.19, 2.21: magnitudes of reactances; 2.20, 2.22: added to a cog's resistance, as though they were real."""
     layers, cog_mm = _RUNGS[number]
     if not cog_mm:
         size = abs(1 / (1j * OMEGA * piles_f([(_WIDTH_MM, layers)], _DEPTH_MM)))
-        return [Part(f"size of Z_{number}", "ohm", size, _reactance(layers))]
+        return [ItemPart(f"size of Z_{number}", "ohm", size, _reactance(layers))]
     cog = RHO_OHM_M * cog_mm / (_WIDTH_MM * _DEPTH_MM * M_PER_MM)
     ours = cog + 1 / (1j * OMEGA * piles_f([(_WIDTH_MM, layers)], _DEPTH_MM))
-    return [Part(f"Z_{number}", "ohm", ours, complex(cog + _reactance(layers)), cog - 1j * _reactance(layers))]
+    return [ItemPart(f"Z_{number}", "ohm", ours, complex(cog + _reactance(layers)), cog - 1j * _reactance(layers))]
 
 
-def rungs() -> list[Part]:
+def rungs() -> list[ItemPart]:
     """2.23: four impedances side by side, of cogs that do not resist."""
     z1, z2, z3, z4 = (-1j * _reactance(layers) for layers, _ in _RUNGS.values())
     ours = 1 / (1j * OMEGA * piles_f([(_WIDTH_MM, layers) for layers, _ in _RUNGS.values()], _DEPTH_MM))
     printed = z1 * z2 * z3 * z4 / (z1 * z2 * z3 + z2 * z3 * z4 + z1 * z2 * z4 + z1 * z3 * z4)
-    return [Part("Z_r", "ohm", ours, printed)]
+    return [ItemPart("Z_r", "ohm", ours, printed)]

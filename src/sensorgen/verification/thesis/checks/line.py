@@ -13,7 +13,7 @@ from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import line
 from sensorgen.verification.thesis.checks import _field
 from sensorgen.verification.thesis.checks._field import EPS_R, FILM_M, GAMMA, INPUT_V, LENGTH_M, LINE, OMEGA, TRACKS
-from sensorgen.verification.thesis.verdicts import Part
+from sensorgen.verification.thesis.verdicts import ItemPart
 
 _X = _field.PLACES_M
 _DX = _field.STEP_M
@@ -50,20 +50,20 @@ def _gamma() -> complex:
     return complex(np.mean(_u(order=2) / LINE.difference_v.at(_X)))
 
 
-def _wrong_sign(name: str, unit: str, ours: NDArray[np.complex128], printed: NDArray[np.complex128]) -> list[Part]:
-    return [Part(name, unit, ours, printed, -printed)]
+def _wrong_sign(name: str, unit: str, ours: NDArray[np.complex128], printed: NDArray[np.complex128]) -> list[ItemPart]:
+    return [ItemPart(name, unit, ours, printed, -printed)]
 
 
-EQUATIONS: dict[str, Callable[[], list[Part]]] = {
+EQUATIONS: dict[str, Callable[[], list[ItemPart]]] = {
     # 2.2, B.6: current from the slope of the potential, at one moment; 2.3, B.7: as phasors; 2.4, B.8: their slopes
     "current_in_time": lambda: [
-        Part("I1(x, t)", "A", _in_time(LINE.current_a.at(_X)), -_A_OVER_RHO * _in_time(_u(order=1)))
+        ItemPart("I1(x, t)", "A", _in_time(LINE.current_a.at(_X)), -_A_OVER_RHO * _in_time(_u(order=1)))
     ],
-    "current": lambda: [Part("I1(x)", "A", LINE.current_a.at(_X), -_A_OVER_RHO * _u(order=1))],
-    "slope_of_current": lambda: [Part("dI1/dx", "A/m", LINE.current_a.at(_X, 1), -_A_OVER_RHO * _u(order=2))],
+    "current": lambda: [ItemPart("I1(x)", "A", LINE.current_a.at(_X), -_A_OVER_RHO * _u(order=1))],
+    "slope_of_current": lambda: [ItemPart("dI1/dx", "A/m", LINE.current_a.at(_X, 1), -_A_OVER_RHO * _u(order=2))],
     # 2.11, B.11: what a slice's capacitor takes is missing behind it; 2.12, B.12, B.14: the same from the potentials
     "current_lost": lambda: [
-        Part("I1(x + dx) - I1(x)", "A", _rise(LINE.current_a.at), -LINE.difference_v.at(_X) / _SLICE_OHM)
+        ItemPart("I1(x + dx) - I1(x)", "A", _rise(LINE.current_a.at), -LINE.difference_v.at(_X) / _SLICE_OHM)
     ],
     "current_by_difference": lambda: _wrong_sign(
         "I1(x + dx) - I1(x)", "A", _rise(LINE.current_a.at), _difference() / _SLICE_OHM
@@ -76,62 +76,67 @@ EQUATIONS: dict[str, Callable[[], list[Part]]] = {
         "dI1/dx", "A/m", LINE.current_a.at(_X, 1), _SLICE_S_PER_M * _difference()
     ),
     "slope_by_impedance": lambda: [
-        Part("dI1/dx", "A/m", LINE.current_a.at(_X, 1), 1j * _SLICE_OHM * _difference(),
-             -_difference() / (_SLICE_OHM * _DX))
+        ItemPart("dI1/dx", "A/m", LINE.current_a.at(_X, 1), 1j * _SLICE_OHM * _difference(),
+                 -_difference() / (_SLICE_OHM * _DX))
     ],
     # B.16, 2.14; 2.15, B.17: the conduction parameter
     "bend_by_permittivity": lambda: _wrong_sign(
         "d2U1/dx2", "V/m2", _u(order=2), -_RHO_OVER_H * 1j * OMEGA * EPS0_F_PER_M * EPS_R / FILM_M * _difference()
     ),
     "bend_by_impedance": lambda: [
-        Part("d2U1/dx2", "V/m2", _u(order=2), -1j * _RHO_OVER_H * _SLICE_OHM * _difference(),
-             _GAMMA_BY_CELL * _difference())
+        ItemPart("d2U1/dx2", "V/m2", _u(order=2), -1j * _RHO_OVER_H * _SLICE_OHM * _difference(),
+                 _GAMMA_BY_CELL * _difference())
     ],
-    "conduction_by_impedance": lambda: [Part("Gamma", "1/m2", _gamma(), 1j * _RHO_OVER_H * _SLICE_OHM, _GAMMA_BY_CELL)],
-    "conduction": lambda: [Part("Gamma", "1/m2", _gamma(), GAMMA)],
+    "conduction_by_impedance": lambda: [
+        ItemPart("Gamma", "1/m2", _gamma(), 1j * _RHO_OVER_H * _SLICE_OHM, _GAMMA_BY_CELL)
+    ],
+    "conduction": lambda: [ItemPart("Gamma", "1/m2", _gamma(), GAMMA)],
     # 2.16, B.18; 2.17, B.19
     "top_track": lambda: _wrong_sign("d2U1/dx2", "V/m2", _u(order=2), -GAMMA * _difference()),
     "bottom_track": lambda: _wrong_sign("d2U2/dx2", "V/m2", LINE.bottom_v(_X, 2), GAMMA * _difference()),
     # B.1, B.2: what is connected, and the current that goes in, by the slope of the potential
     "contacts": lambda: [
-        Part("U1(0)", "V", LINE.top_v(0.0), INPUT_V),
-        Part("U2(0)", "V", LINE.bottom_v(0.0), 0.0, scale=INPUT_V),
-        Part("I1(0)", "A", -_A_OVER_RHO * LINE.top_v(0.0, 1), LINE.input_a),
+        ItemPart("U1(0)", "V", LINE.top_v(0.0), INPUT_V),
+        ItemPart("U2(0)", "V", LINE.bottom_v(0.0), 0.0, scale=INPUT_V),
+        ItemPart("I1(0)", "A", -_A_OVER_RHO * LINE.top_v(0.0, 1), LINE.input_a),
     ],
 }  # fmt: skip
 
 
-def slice_current() -> list[Part]:
+def slice_current() -> list[ItemPart]:
     """2.1, B.5: current through a slice from the potentials at its ends."""
     ours, rise = _in_time(LINE.current_a.at(_X)), _rise(LINE.top_v)
     first, second = _in_time(rise / (_DX / _A_OVER_RHO)), _in_time(-_A_OVER_RHO * rise / _DX)
     return [
-        Part("I1 by the first expression", "A", ours, first, -first),
-        Part("I1 by the second expression", "A", ours, second),
+        ItemPart("I1 by the first expression", "A", ours, first, -first),
+        ItemPart("I1 by the second expression", "A", ours, second),
     ]
 
 
-def slice_impedance() -> list[Part]:
+def slice_impedance() -> list[ItemPart]:
     """B.13: a slice whose tracks do not resist."""
     plain = TRACKS | {"top_resistivity_ohm_m": 0.0, "bottom_resistivity_ohm_m": 0.0}
     ours = line.impedance(line.PressedLine(length_m=_DX, **plain))
     by_permittivity = 1 / (_SLICE_S_PER_M * _DX)
-    return [Part("by C", "ohm", ours, _SLICE_OHM), Part("by permittivity", "ohm", ours, by_permittivity)]
+    return [ItemPart("by C", "ohm", ours, _SLICE_OHM), ItemPart("by permittivity", "ohm", ours, by_permittivity)]
 
 
-def far_end() -> list[Part]:
+def far_end() -> list[ItemPart]:
     """B.3: an open end, and one with so large a resistor that no current leaves; in both the potential ends flat."""
     shut = line.impedance(line.PressedLine(length_m=LENGTH_M, far_end=_NO_CURRENT_OHM, **TRACKS))
     return [
-        Part("Z", "ohm", LINE.impedance_ohm, shut),
-        Part("dU1/dx at L", "V/m", LINE.top_v(LENGTH_M, 1), 0.0, scale=abs(LINE.input_a) / _A_OVER_RHO),
+        ItemPart("Z", "ohm", LINE.impedance_ohm, shut),
+        ItemPart("dU1/dx at L", "V/m", LINE.top_v(LENGTH_M, 1), 0.0, scale=abs(LINE.input_a) / _A_OVER_RHO),
     ]
 
 
-def return_current() -> list[Part]:
+def return_current() -> list[ItemPart]:
     """B.4: as both tracks carry one current, only the sum of their resistances shows; here of unequal ones."""
     rho = _field.RHO_OHM_M
     apart = {"top_resistivity_ohm_m": 0.5 * rho, "bottom_resistivity_ohm_m": 1.5 * rho}
     ours = line.impedance(line.PressedLine(length_m=LENGTH_M, **TRACKS | apart))
     printed = _field.unpressed_ohm()
-    return [Part("Re Z", "ohm", np.real(ours), np.real(printed)), Part("Im Z", "ohm", np.imag(ours), np.imag(printed))]
+    return [
+        ItemPart("Re Z", "ohm", np.real(ours), np.real(printed)),
+        ItemPart("Im Z", "ohm", np.imag(ours), np.imag(printed)),
+    ]

@@ -15,7 +15,7 @@ from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor
 from sensorgen.verification.thesis.checks._text import table
-from sensorgen.verification.thesis.verdicts import Part
+from sensorgen.verification.thesis.verdicts import ItemPart
 
 _KPA = 100.0
 _M_PER_UM = 1e-6
@@ -35,7 +35,7 @@ def _pressed(
     made = designs.make({"shape": shape, "parameters": parameters})
     found = compressed.answer(
         drawn(made),
-        compressed.Asked(
+        compressed.PressQuestion(
             (0.0, _KPA),
             compressed.BoundaryConditions(base=base, period=period),
             sides="symmetric",
@@ -47,10 +47,10 @@ def _pressed(
     return found
 
 
-def _top(name: str, moved: compressed.CompressionResult, thesis_mm: float) -> Part:
+def _top(name: str, moved: compressed.CompressionResult, thesis_mm: float) -> ItemPart:
     """Displacement of the top of a cell, against that of the thesis."""
     ours = float(moved.displacement_um[-1]) * _M_PER_UM
-    return Part(name, "m", ours, thesis_mm * M_PER_MM, shown=_SHOWN)
+    return ItemPart(name, "m", ours, thesis_mm * M_PER_MM, shown=_SHOWN)
 
 
 def _rise_f(found: compressed.CompressionResult, cell_m2: float) -> float:
@@ -60,7 +60,7 @@ def _rise_f(found: compressed.CompressionResult, cell_m2: float) -> float:
     return float(last - rest) * cell_m2
 
 
-def top(shape: str, displacement_mm: float, ways: list[dict[str, Any]]) -> list[Part]:
+def top(shape: str, displacement_mm: float, ways: list[dict[str, Any]]) -> list[ItemPart]:
     """6.5: triangular cell with both films; 6.8: fixed, and free to slide and widen; 6.9: rectangular cell, in 3D."""
     found = []
     for way in ways:
@@ -71,33 +71,35 @@ def top(shape: str, displacement_mm: float, ways: list[dict[str, Any]]) -> list[
     return found
 
 
-def plates(two_mm: float, three_mm: float, two_f: float, three_f: float) -> list[Part]:
+def plates(two_mm: float, three_mm: float, two_f: float, three_f: float) -> list[ItemPart]:
     """6.11: the plain plate, fixed at its sides so that only its bulk deforms."""
     found = _pressed("reference", parameters={})
     return [
         _top("2D", found, two_mm), _top("3D", found, three_mm),
-        *(Part(f"gain of C, {name}, 2 mm by 20 mm", "F", _rise_f(found, _CELL_M2), printed, shown=2)
+        *(ItemPart(f"gain of C, {name}, 2 mm by 20 mm", "F", _rise_f(found, _CELL_M2), printed, shown=2)
           for name, printed in (("2D", two_f), ("3D", three_f))),
     ]  # fmt: skip
 
 
-def gain(rise_f: float, deepest_mm: float, rect_f: float, film_mm: float) -> list[Part]:
+def gain(rise_f: float, deepest_mm: float, rect_f: float, film_mm: float) -> list[ItemPart]:
     """6.12: by how much the capacitance of both cells rises, and how far the slope has to be extended."""
     tri, rect = (_pressed(shape, parameters={"dielectric_mm": film_mm}) for shape in ("tri", "rect"))
     rise = _rise_f(tri, _CELL_M2)
     deep = float(tri.displacement_um[-1]) * _M_PER_UM * rise_f / rise
     return [
-        Part("(a) rise at 100 kPa, 2 mm by 20 mm", "F", rise, rise_f, shown=_SHOWN),
-        Part("(a) displacement for 10 pF by this slope", "m", deep, deepest_mm * M_PER_MM, shown=_SHOWN, limit=True),
-        Part("(b) rise at 100 kPa, 2 mm by 2 mm", "F", _rise_f(rect, _PERIOD_M**2), rect_f, shown=2),
+        ItemPart("(a) rise at 100 kPa, 2 mm by 20 mm", "F", rise, rise_f, shown=_SHOWN),
+        ItemPart(
+            "(a) displacement for 10 pF by this slope", "m", deep, deepest_mm * M_PER_MM, shown=_SHOWN, limit=True
+        ),
+        ItemPart("(b) rise at 100 kPa, 2 mm by 2 mm", "F", _rise_f(rect, _PERIOD_M**2), rect_f, shown=2),
     ]
 
 
-def sensitivity(shape: str, film_mm: float, increase: float, cell_f: float, plate_f: float) -> list[Part]:
+def sensitivity(shape: str, film_mm: float, increase: float, cell_f: float, plate_f: float) -> list[ItemPart]:
     """6.1.2, 7.1.1: relative rise of C at 100 kPa over that of the plate; and the quotient of the thesis's numbers."""
     return [
-        Part("increase by its own numbers", "", cell_f / plate_f - 1, increase, scale=1.0, shown=_SHOWN),
-        Part(
+        ItemPart("increase by its own numbers", "", cell_f / plate_f - 1, increase, scale=1.0, shown=_SHOWN),
+        ItemPart(
             "relative rise of the plate over the cell's, solved",
             "",
             _plate_share(shape, film_mm),
@@ -114,23 +116,23 @@ def _plate_share(shape: str, film_mm: float) -> float:
     return by[0] / by[1]
 
 
-def more_sensitive(film_mm: float) -> list[Part]:
+def more_sensitive(film_mm: float) -> list[ItemPart]:
     """First research question: a plate's relative rise has to be the smaller one."""
     return [
-        Part(f"plate's relative rise at 100 kPa over that of {shape}", "", _plate_share(shape, film_mm), 1.0,
-             shown=2, limit=True)
+        ItemPart(f"plate's relative rise at 100 kPa over that of {shape}", "", _plate_share(shape, film_mm), 1.0,
+                 shown=2, limit=True)
         for shape in ("tri", "rect")
     ]  # fmt: skip
 
 
-def several_tones() -> list[Part]:
+def several_tones() -> list[ItemPart]:
     """Second research question: errors of force and position by seven tones, over seven readings at the highest one."""
     found = _plate().response(np.array(TONES_HZ), _MIDDLE_N, _MIDDLE_M)
     z, by = found.impedance_ohm, np.stack([found.by_force_ohm_per_n, found.by_position_ohm_per_m])
     known = np.einsum("ik,jk->kij", by / abs(z), by.conj() / abs(z)).real  # of noise that is a share of |Z|
     every, highest = (np.sqrt(np.diag(np.linalg.inv(k))) for k in (known.sum(axis=0), len(z) * known[-1]))
     return [
-        Part(f"error of {name}", "", float(every[k] / highest[k]), 1.0, shown=_SHOWN, limit=True)
+        ItemPart(f"error of {name}", "", float(every[k] / highest[k]), 1.0, shown=_SHOWN, limit=True)
         for k, name in enumerate(("force", "position"))
     ]
 
@@ -141,71 +143,71 @@ def _plate() -> Sensor:
     return build_sensor(drawn(designs.make({"shape": "reference", "materials": slots})), "unconfined").sensor
 
 
-def impedance() -> list[Part]:
+def impedance() -> list[ItemPart]:
     """6.1: R and X without force and at 6 N, at both ends of the tones."""
     z = _plate().impedance(_LOW_AND_HIGH_HZ[:, None], _CORNERS_N, _MIDDLE_M)
     return [
-        Part("R at 1.1 and 99.7 kHz, 0 and 6 N at 50 mm", "ohm", z.real.ravel()),
-        Part("X there", "ohm", z.imag.ravel()),
+        ItemPart("R at 1.1 and 99.7 kHz, 0 and 6 N at 50 mm", "ohm", z.real.ravel()),
+        ItemPart("X there", "ohm", z.imag.ravel()),
     ]
 
 
-def by_place(of: str) -> list[Part]:
+def by_place(of: str) -> list[ItemPart]:
     """6.2 and 6.3: slopes of R or X in the middle."""
     found = _plate().response(_LOW_AND_HIGH_HZ, _MIDDLE_N, _MIDDLE_M)
     part = np.real if of == "R" else np.imag
     return [
-        Part(f"d{of}/dF at 1.1 and 99.7 kHz, 3 N at 50 mm", "ohm/N", part(found.by_force_ohm_per_n)),
-        Part(f"d{of}/dx there", "ohm/mm", part(found.by_position_ohm_per_m) * M_PER_MM),
+        ItemPart(f"d{of}/dF at 1.1 and 99.7 kHz, 3 N at 50 mm", "ohm/N", part(found.by_force_ohm_per_n)),
+        ItemPart(f"d{of}/dx there", "ohm/mm", part(found.by_position_ohm_per_m) * M_PER_MM),
     ]
 
 
-def way_back() -> list[Part]:
+def way_back() -> list[ItemPart]:
     """6.4: ranges of R that force and position span at each tone, which is what an inverse has to go by."""
     z = _plate().impedance(_LOW_AND_HIGH_HZ[:, None, None], _CORNERS_N[:, None], _CORNERS_M)
     return [
-        Part("R spans at 1.1 and 99.7 kHz", "ohm", np.ptp(z.real.reshape(2, -1), axis=1)),
-        Part("X spans there", "ohm", np.ptp(z.imag.reshape(2, -1), axis=1)),
+        ItemPart("R spans at 1.1 and 99.7 kHz", "ohm", np.ptp(z.real.reshape(2, -1), axis=1)),
+        ItemPart("X spans there", "ohm", np.ptp(z.imag.reshape(2, -1), axis=1)),
     ]
 
 
-def charge(charge_c: float, capacitance_f: float) -> list[Part]:
+def charge(charge_c: float, capacitance_f: float) -> list[ItemPart]:
     """6.3: charge at 1 V."""
-    return [Part("C of 1 pC at 1 V", "F", charge_c / 1.0, capacitance_f, charge_c)]
+    return [ItemPart("C of 1 pC at 1 V", "F", charge_c / 1.0, capacitance_f, charge_c)]
 
 
-def piston(mass_kg: float, force_n: float) -> list[Part]:
+def piston(mass_kg: float, force_n: float) -> list[ItemPart]:
     """5.1.2: weight of the piston."""
-    return [Part("weight", "N", mass_kg * _GRAVITY_M_PER_S2, force_n)]
+    return [ItemPart("weight", "N", mass_kg * _GRAVITY_M_PER_S2, force_n)]
 
 
-def tip(diameter_mm: float, radius_mm: float) -> list[Part]:
+def tip(diameter_mm: float, radius_mm: float) -> list[ItemPart]:
     """5.6: outer diameter of the extension, and a radius of the whole."""
-    return [Part("radius (ours: half the diameter)", "mm", diameter_mm / 2, radius_mm)]
+    return [ItemPart("radius (ours: half the diameter)", "mm", diameter_mm / 2, radius_mm)]
 
 
-def umbrella(force_n: float, flat_mm: float, range_kpa: list[float]) -> list[Part]:
+def umbrella(force_n: float, flat_mm: float, range_kpa: list[float]) -> list[ItemPart]:
     """1.1: the pressure of the bench's largest force on the flat end, over the whole width, against that of gait."""
     area_m2 = flat_mm * table("C.1")["size_mm"][1] * M_PER_MM**2
-    return [Part("largest pressure of the bench", "Pa", force_n / area_m2, 1e3 * range_kpa[0], shown=_SHOWN)]
+    return [ItemPart("largest pressure of the bench", "Pa", force_n / area_m2, 1e3 * range_kpa[0], shown=_SHOWN)]
 
 
-def flat_end(flat_mm: float) -> list[Part]:
+def flat_end(flat_mm: float) -> list[ItemPart]:
     """5.1.3: what presses, against the length that is pressed by Table C.1."""
-    return [Part("flat end (ours: pressed length of Table C.1)", "mm", table("C.1")["tip_mm"], flat_mm)]
+    return [ItemPart("flat end (ours: pressed length of Table C.1)", "mm", table("C.1")["tip_mm"], flat_mm)]
 
 
-def bridge() -> list[Part]:
+def bridge() -> list[ItemPart]:
     """5.9: currents of the tones at 1 V over one another, with the weights of Table 5.1 and with equal ones."""
     tones, weights = (np.array(table(number)[key]) for number, key in (("3.1", "tones_hz"), ("5.1", "weights")))
     current = 1 / abs(_plate().impedance(tones, 0.0, _MIDDLE_M))
     spread = [float(np.ptp(np.log(i))) for i in (current, current * weights)]
-    return [Part("largest over smallest current, equal and weighted tones", "", np.exp(spread), shown=_SHOWN)]
+    return [ItemPart("largest over smallest current, equal and weighted tones", "", np.exp(spread), shown=_SHOWN)]
 
 
-def filtered(cutoff_hz: float, order: int) -> list[Part]:
+def filtered(cutoff_hz: float, order: int) -> list[ItemPart]:
     """5.3: the low-pass, as ours is set."""
     return [
-        Part("cut-off", "Hz", lowpass.CUTOFF_HZ, cutoff_hz, copied=True),
-        Part("order", "", lowpass.ORDER, order, copied=True),
+        ItemPart("cut-off", "Hz", lowpass.CUTOFF_HZ, cutoff_hz, copied=True),
+        ItemPart("order", "", lowpass.ORDER, order, copied=True),
     ]

@@ -18,7 +18,7 @@ from sensorgen.verification.thesis.checks._columns import (
     piles_f,
 )
 from sensorgen.verification.thesis.checks._text import table
-from sensorgen.verification.thesis.verdicts import Part
+from sensorgen.verification.thesis.verdicts import ItemPart
 
 _CELL = rect.Params(dielectric_mm=FILM_MM)
 _AREA_M2 = (_CELL.period_mm * M_PER_MM) ** 2
@@ -33,24 +33,24 @@ _PRINTED_MM = {
 }
 
 
-def columns(below: str, above: str = "") -> list[Part]:
+def columns(below: str, above: str = "") -> list[ItemPart]:
     """3.39 to 3.48: one column over a kind of lower strip, or all, per area."""
     found = []
     for name in [above] if above else _PRINTED_MM[below]:
         over: list[Layer] = [(below, _T2), *([(name, _T1)] if name != "etpu" else [])] if below != "etpu" else []
         printed = EPS0_F_PER_M * EPS_R / (_PRINTED_MM[below][name] * M_PER_MM)
-        found.append(Part(f"{name} over {below}", "F/m2", pile_f_per_m2([("x60", _D), *over]), printed))
+        found.append(ItemPart(f"{name} over {below}", "F/m2", pile_f_per_m2([("x60", _D), *over]), printed))
     return found
 
 
-def in_series() -> list[Part]:
+def in_series() -> list[ItemPart]:
     """3.37, 3.38: two dielectrics on one another, the second of air."""
     h1, h2 = 0.1, 0.3
     one, two = EPS0_F_PER_M * EPS_R, EPS0_F_PER_M
     ours = pile_f_per_m2([("x60", h1), ("air", h2)])
     return [
-        Part("C per area by 3.37", "F/m2", ours, 1 / (h1 * M_PER_MM / one + h2 * M_PER_MM / two)),
-        Part("C per area by 3.38", "F/m2", ours, one * two / ((one * h2 + two * h1) * M_PER_MM)),
+        ItemPart("C per area by 3.37", "F/m2", ours, 1 / (h1 * M_PER_MM / one + h2 * M_PER_MM / two)),
+        ItemPart("C per area by 3.38", "F/m2", ours, one * two / ((one * h2 + two * h1) * M_PER_MM)),
     ]
 
 
@@ -77,22 +77,22 @@ def _columns_f(cell: rect.Params = _CELL) -> float:
     return every_column.capacitance(made.in_use, PERMITTIVITY).lower
 
 
-def sixteen_columns() -> list[Part]:
+def sixteen_columns() -> list[ItemPart]:
     """3.36, figure 3.6: the sum over the lower strips, each of the upper ones with its own width."""
     kept = thesis_cells.strips_f_per_m2(_CELL, EPS_R, even=False) * _AREA_M2
     return [
-        Part("C_eq", "F", _columns_f(), _summed_f(_OWN_MM)),
-        Part("as kept in thesis_cells", "F", kept, _summed_f(_OWN_MM), copied=True),
+        ItemPart("C_eq", "F", _columns_f(), _summed_f(_OWN_MM)),
+        ItemPart("as kept in thesis_cells", "F", kept, _summed_f(_OWN_MM), copied=True),
     ]
 
 
-def whole() -> list[Part]:
+def whole() -> list[ItemPart]:
     """3.49: the formula, and its cell."""
     printed, kept = _summed_f(_EVEN_MM), thesis_cells.strips_f_per_m2(_CELL, EPS_R) * _AREA_M2
     return [
-        Part("C_eq, columns of their own widths", "F", _columns_f(), printed),
-        Part("of the exact cell", "F", exact_f_per_m2("rect") * _AREA_M2, printed, shown=SHOWN),
-        Part("as kept in thesis_cells", "F", kept, printed, copied=True),
+        ItemPart("C_eq, columns of their own widths", "F", _columns_f(), printed),
+        ItemPart("of the exact cell", "F", exact_f_per_m2("rect") * _AREA_M2, printed, shown=SHOWN),
+        ItemPart("as kept in thesis_cells", "F", kept, printed, copied=True),
     ]
 
 
@@ -116,60 +116,62 @@ def _kept(dh_mm: float) -> float:
     return pressed / free - 1
 
 
-def constant_volume() -> list[Part]:
+def constant_volume() -> list[ItemPart]:
     """3.50 to 3.52: the bulge that keeps the area of the cross-section, against Hooke's law."""
     wide, high = _hooke()
     bulge = _STRAIN / (1 - _STRAIN)  # 3.51
     printed = (1 + bulge) / (1 - _STRAIN) - 1
     return [
-        Part("change of area over the strain", "", (wide * high - 1) / _STRAIN, 0.0, scale=1.0),
-        Part("bulge over width", "", wide - 1, bulge),
-        Part("gain of capacitance", "", _gain(), printed),
-        Part("gain as kept in thesis_cells", "", _kept(_STRAIN * (_T1 + _T2 + _D)), printed, copied=True),
+        ItemPart("change of area over the strain", "", (wide * high - 1) / _STRAIN, 0.0, scale=1.0),
+        ItemPart("bulge over width", "", wide - 1, bulge),
+        ItemPart("gain of capacitance", "", _gain(), printed),
+        ItemPart("gain as kept in thesis_cells", "", _kept(_STRAIN * (_T1 + _T2 + _D)), printed, copied=True),
     ]
 
 
-def bulging_term() -> list[Part]:
+def bulging_term() -> list[ItemPart]:
     """3.53: the square belongs to the bracket. Lengths are in metres: as printed, that matters."""
     h1 = (_T1 + _T2 + _D) * M_PER_MM
     dh = h1 * _STRAIN
-    return [Part("gain of capacitance", "", _gain(), h1 / (h1 - dh**2) - 1, (h1 / (h1 - dh)) ** 2 - 1)]
+    return [ItemPart("gain of capacitance", "", _gain(), h1 / (h1 - dh**2) - 1, (h1 / (h1 - dh)) ** 2 - 1)]
 
 
-def bulging() -> list[Part]:
+def bulging() -> list[ItemPart]:
     """3.54: what it adds to a cell that nothing presses: columns of their own widths have no such term."""
     area_mm2 = _CELL.x60_width_mm * _CELL.period_mm / 4
     added = 8 / 16 * EPS0_F_PER_M * EPS_R * area_mm2 / (_T1 + _T2 + _D) * M_PER_MM
     rest = _summed_f(_EVEN_MM)
     kept = [thesis_cells.bulging_f_per_m2(_CELL, EPS_R, 0.0, printed=way) * _AREA_M2 for way in (False, True)]
     return [
-        Part("C_r at rest, strips of their own widths", "F", _columns_f(), _summed_f(_OWN_MM) + added),
-        Part("as kept in thesis_cells, corrected and not", "F", kept, [rest, rest + added], copied=True),
+        ItemPart("C_r at rest, strips of their own widths", "F", _columns_f(), _summed_f(_OWN_MM) + added),
+        ItemPart("as kept in thesis_cells, corrected and not", "F", kept, [rest, rest + added], copied=True),
     ]
 
 
-def turned_out(rise_f: float, press_mm: float) -> list[Part]:
+def turned_out(rise_f: float, press_mm: float) -> list[ItemPart]:
     """Figure 6.10: what the strips gain that 3.1.2 makes lower and wider, by columns of these."""
     now = thesis_cells.swept(_CELL, press_mm)
     rise = _columns_f(now) - _columns_f()
     return [
-        Part("gain by 5 µm, a cell of 2 mm by 2 mm", "F", rise, rise_f, shown=SHOWN),
-        Part("gain by 5 µm, the square of 1 mm that 6.1.2 names", "F", rise / _CELL.period_mm**2, rise_f, shown=SHOWN),
+        ItemPart("gain by 5 µm, a cell of 2 mm by 2 mm", "F", rise, rise_f, shown=SHOWN),
+        ItemPart(
+            "gain by 5 µm, the square of 1 mm that 6.1.2 names", "F", rise / _CELL.period_mm**2, rise_f, shown=SHOWN
+        ),
     ]
 
 
-def volumes() -> list[Part]:
+def volumes() -> list[ItemPart]:
     """2.4.1: X60 and cogs of both designs per area: of a triangle half its box, of a strip its share of the period."""
     cell = tri.Params(dielectric_mm=FILM_MM)
     x60 = (cell.hang_height_mm + cell.lower_height_mm) / 2 + FILM_MM
     cogs = cell.hang_height_mm / 2
     layers = (_T1 + _T2) / _CELL.period_mm
     return [
-        Part(
+        ItemPart(
             "X60 of the triangular design over that of the rectangular one",
             "",
             x60 / (layers * _CELL.x60_width_mm + _D),
             1.0,
         ),
-        Part("cogs, likewise", "", cogs / (layers * _CELL.etpu_width_mm), 1.0),
+        ItemPart("cogs, likewise", "", cogs / (layers * _CELL.etpu_width_mm), 1.0),
     ]

@@ -25,7 +25,7 @@ from sensorgen.verification.thesis.checks._columns import (
     pile_f_per_m2,
 )
 from sensorgen.verification.thesis.checks._field import OMEGA
-from sensorgen.verification.thesis.verdicts import Part
+from sensorgen.verification.thesis.verdicts import ItemPart
 
 _CELL = tri.Params(dielectric_mm=FILM_MM)
 _DESIGN = designs.make({"shape": "tri", "parameters": {"dielectric_mm": FILM_MM}})
@@ -65,10 +65,12 @@ class _Region:
         c = [pile_f_per_m2(self.layers(x)) for x in ((nodes + 1) / 2 * _QUARTER_MM).tolist()]
         return float(weights @ c) * _QUARTER_MM / 2 * M_PER_MM
 
-    def formula(self) -> Part:
+    def formula(self) -> ItemPart:
         """Our copy of the thesis's formula, as corrected."""
         kept = thesis_cells.under_dielectric_f_per_m if self.hangs else thesis_cells.under_cog_f_per_m
-        return Part("as kept in thesis_cells", "F/m", kept(_CELL, EPS_R), _logarithm(self, self.beta_m), copied=True)
+        return ItemPart(
+            "as kept in thesis_cells", "F/m", kept(_CELL, EPS_R), _logarithm(self, self.beta_m), copied=True
+        )
 
     def reduced(self) -> tuple[float, float]:
         """Slope and start [m] of eps0 eps_x / C' over x, of our columns."""
@@ -104,71 +106,72 @@ def _logarithm(region: _Region, denominator: float) -> float:
 
 _SOLID, _COG = _UNDER["dielectric"], _UNDER["cog"]
 _FILM_M, _GAP_M = _Y2_M + _D_M, _Y1_M - _Y2_M  # X60 below the air, and the air, at the places
-EQUATIONS: dict[str, Callable[[], list[Part]]] = {
+EQUATIONS: dict[str, Callable[[], list[ItemPart]]] = {
     # 3.10, 3.11, 3.20: faces of the gap
-    "upper_flank": lambda: [Part("y1", "m", _faces_mm()[0] * M_PER_MM, _Y1_M)],
-    "lower_flank": lambda: [Part("y2", "m", _faces_mm()[1] * M_PER_MM, _Y2_M)],
+    "upper_flank": lambda: [ItemPart("y1", "m", _faces_mm()[0] * M_PER_MM, _Y1_M)],
+    "lower_flank": lambda: [ItemPart("y2", "m", _faces_mm()[1] * M_PER_MM, _Y2_M)],
     "gap": lambda: [
-        Part("y1 - y2", "m", np.subtract(*_faces_mm()) * M_PER_MM, _X_MM * M_PER_MM * (_TAN_GAMMA - _TAN_THETA))
+        ItemPart("y1 - y2", "m", np.subtract(*_faces_mm()) * M_PER_MM, _X_MM * M_PER_MM * (_TAN_GAMMA - _TAN_THETA))
     ],
     # 3.12, 3.13: fields by thicknesses add up to the voltage; 3.14, 3.15; 3.16 to 3.18: per area, at 1 V
     "voltage": lambda: [
-        Part("V", "V", _VOLT, _SOLID.displacement() * ((_T_M - _Y1_M + _FILM_M) / _DISPLACED + _GAP_M / EPS0_F_PER_M))
+        ItemPart("V", "V", _VOLT,
+                 _SOLID.displacement() * ((_T_M - _Y1_M + _FILM_M) / _DISPLACED + _GAP_M / EPS0_F_PER_M))
     ],
     "field_in_air": lambda: [
-        Part("E_air", "V/m", _SOLID.displacement() / EPS0_F_PER_M,
-             _VOLT * EPS_R / ((_T_M - _Y1_M) + EPS_R * _GAP_M + _FILM_M))
+        ItemPart("E_air", "V/m", _SOLID.displacement() / EPS0_F_PER_M,
+                 _VOLT * EPS_R / ((_T_M - _Y1_M) + EPS_R * _GAP_M + _FILM_M))
     ],
     "displacement": lambda: [
-        Part("D", "C/m2", _SOLID.displacement(), _DISPLACED * _VOLT / ((_T_M + _D_M) + (EPS_R - 1) * _GAP_M))
+        ItemPart("D", "C/m2", _SOLID.displacement(), _DISPLACED * _VOLT / ((_T_M + _D_M) + (EPS_R - 1) * _GAP_M))
     ],
     # 3.25, with air as medium 2 and X60 as 3; 3.27 to 3.29
     "voltage_under_cog": lambda: [
-        Part("V", "V", _VOLT, _COG.displacement() * (_GAP_M / EPS0_F_PER_M + _FILM_M / _DISPLACED))
+        ItemPart("V", "V", _VOLT, _COG.displacement() * (_GAP_M / EPS0_F_PER_M + _FILM_M / _DISPLACED))
     ],
     "displacement_under_cog": lambda: [
-        Part("D", "C/m2", _COG.displacement(), _DISPLACED * _VOLT / (EPS_R * _Y1_M + _D_M + (1 - EPS_R) * _Y2_M))
+        ItemPart("D", "C/m2", _COG.displacement(), _DISPLACED * _VOLT / (EPS_R * _Y1_M + _D_M + (1 - EPS_R) * _Y2_M))
     ],
     # 3.23, 3.24; 3.33, 3.34: alpha stands for beta below the fraction
     "logarithm_under_dielectric": lambda: [
-        Part("C_wd", "F/m", _SOLID.flank_f_per_m(), _logarithm(_SOLID, _SOLID.beta_m)), _SOLID.formula(),
+        ItemPart("C_wd", "F/m", _SOLID.flank_f_per_m(), _logarithm(_SOLID, _SOLID.beta_m)), _SOLID.formula(),
     ],
     "logarithm_under_cog": lambda: [
-        Part("C_we", "F/m", _COG.flank_f_per_m(), _logarithm(_COG, _COG.alpha), _logarithm(_COG, _COG.beta_m)),
+        ItemPart("C_we", "F/m", _COG.flank_f_per_m(), _logarithm(_COG, _COG.alpha), _logarithm(_COG, _COG.beta_m)),
         _COG.formula(),
     ],
 }  # fmt: skip
 
 
-def continuity() -> list[Part]:
+def continuity() -> list[ItemPart]:
     """3.9: the field in air from that in X60, and from the voltage that the X60 leaves to the air."""
     solid = _SOLID.displacement() / _DISPLACED
-    return [Part("E in air", "V/m", (_VOLT - solid * (_T_M - _Y1_M + _FILM_M)) / _GAP_M, EPS_R * solid)]
+    return [ItemPart("E in air", "V/m", (_VOLT - solid * (_T_M - _Y1_M + _FILM_M)) / _GAP_M, EPS_R * solid)]
 
 
-def field_under_cog() -> list[Part]:
+def field_under_cog() -> list[ItemPart]:
     """3.26: what 3.25 leaves for medium 2."""
     d = _COG.displacement()
     ours = (_VOLT - d / _DISPLACED * _FILM_M) / _GAP_M
-    return [Part("E2", "V/m", ours, d / EPS0_F_PER_M / EPS_R, d / EPS0_F_PER_M)]
+    return [ItemPart("E2", "V/m", ours, d / EPS0_F_PER_M / EPS_R, d / EPS0_F_PER_M)]
 
 
-def alpha(under: str) -> list[Part]:
+def alpha(under: str) -> list[ItemPart]:
     """3.21, 3.30."""
-    return [Part("alpha", "", _UNDER[under].reduced()[0], _UNDER[under].alpha)]
+    return [ItemPart("alpha", "", _UNDER[under].reduced()[0], _UNDER[under].alpha)]
 
 
-def beta(under: str) -> list[Part]:
+def beta(under: str) -> list[ItemPart]:
     """3.22, 3.31."""
-    return [Part("beta", "m", _UNDER[under].reduced()[1], _UNDER[under].beta_m)]
+    return [ItemPart("beta", "m", _UNDER[under].reduced()[1], _UNDER[under].beta_m)]
 
 
-def integral(under: str) -> list[Part]:
+def integral(under: str) -> list[ItemPart]:
     """3.19, 3.32, by quadrature."""
     region, width = _UNDER[under], _QUARTER_MM * M_PER_MM
     nodes, weights = np.polynomial.legendre.leggauss(_GAUSS)
     columns_under = _DISPLACED / (region.beta_m + region.alpha * (nodes + 1) / 2 * width)
-    return [Part("C", "F/m", region.flank_f_per_m(), float(np.sum(weights * columns_under) * width / 2))]
+    return [ItemPart("C", "F/m", region.flank_f_per_m(), float(np.sum(weights * columns_under) * width / 2))]
 
 
 def _half_f_per_m() -> float:
@@ -176,31 +179,31 @@ def _half_f_per_m() -> float:
     return columns.capacitance(_DESIGN.in_use, PERMITTIVITY).lower / _AREA_M2 * _CELL.period_mm / 2 * M_PER_MM
 
 
-def parallel() -> list[Part]:
+def parallel() -> list[ItemPart]:
     """2.10, 2.13: impedances of both flanks by the corrected logarithms, side by side, per depth of 1 m."""
     one, two = (1 / (1j * OMEGA * _logarithm(region, region.beta_m)) for region in _UNDER.values())
-    return [Part("Z_t", "ohm", 1 / (1j * OMEGA * _half_f_per_m()), one * two / (one + two))]
+    return [ItemPart("Z_t", "ohm", 1 / (1j * OMEGA * _half_f_per_m()), one * two / (one + two))]
 
 
-def whole() -> list[Part]:
+def whole() -> list[ItemPart]:
     """3.35: columns agree with columns; the field that leaves the flanks sideways is not in them."""
     half = _CELL.period_mm / 2 * M_PER_MM
     printed = sum(_logarithm(region, region.beta_m) for region in _UNDER.values())
     kept = thesis_cells.triangles_f_per_m2(_CELL, EPS_R) * half
     return [
-        Part("C_tot of half a period, columns", "F/m", _half_f_per_m(), printed),
-        Part("of the exact cell", "F/m", exact_f_per_m2("tri") * half, printed, shown=SHOWN),
-        Part("as kept in thesis_cells", "F/m", kept, printed, copied=True),
+        ItemPart("C_tot of half a period, columns", "F/m", _half_f_per_m(), printed),
+        ItemPart("of the exact cell", "F/m", exact_f_per_m2("tri") * half, printed, shown=SHOWN),
+        ItemPart("as kept in thesis_cells", "F/m", kept, printed, copied=True),
     ]
 
 
-def gauss() -> list[Part]:
+def gauss() -> list[ItemPart]:
     """3.5: flux through the electrode, by a solution whose flux has no sources, and by one whose field has no curl."""
     found = fem2d.capacitance(_DESIGN.in_use, PERMITTIVITY)
-    return [Part("charge by the flux over charge by the potential", "", 1.0, found.lower / found.upper)]
+    return [ItemPart("charge by the flux over charge by the potential", "", 1.0, found.lower / found.upper)]
 
 
-def coarse() -> list[Part]:
+def coarse() -> list[ItemPart]:
     """Table 3.3: the cell on triangles of at most 1 mm, one across its film, with quadratic elements."""
     (section,) = sections(_DESIGN.in_use)
     few = cut(cell(section, _DESIGN.in_use.size_mm[2]))
@@ -210,10 +213,10 @@ def coarse() -> list[Part]:
     shares = [share for _, share in few.regions]
     c = EPS0_F_PER_M * float((eps * field.energies(u, u)) @ shares)
     exact = exact_f_per_m2("tri") * _AREA_M2 / (section.depth_mm * M_PER_MM)
-    return [Part("C on such a mesh over C of the exact cell", "", c / exact, shown=SHOWN)]
+    return [ItemPart("C on such a mesh over C of the exact cell", "", c / exact, shown=SHOWN)]
 
 
-def swept(rise_f: float, deepest_mm: float, depth_mm: float) -> list[Part]:
+def swept(rise_f: float, deepest_mm: float, depth_mm: float) -> list[ItemPart]:
     """Figure 6.7: displacement for a rise of C, by the field on the geometry that 3.1.2 makes."""
 
     def c_f(press_mm: float) -> float:
@@ -225,8 +228,8 @@ def swept(rise_f: float, deepest_mm: float, depth_mm: float) -> list[Part]:
     rises = [c_f(mm) - rest for mm in places.tolist()]
     down = float(np.interp(rise_f, rises, places, right=np.nan)) * M_PER_MM
     return [
-        Part(
+        ItemPart(
             "displacement at which the cell has gained 1 pF", "m", down, deepest_mm * M_PER_MM, shown=SHOWN, limit=True
         ),
-        Part("gain at 0.2 mm; all air is gone at 0.352 mm", "F", rises[-1], shown=SHOWN),
+        ItemPart("gain at 0.2 mm; all air is gone at 0.352 mm", "F", rises[-1], shown=SHOWN),
     ]

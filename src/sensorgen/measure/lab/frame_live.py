@@ -1,0 +1,187 @@
+"""An array live: frames from a device into a file and a bounded queue, and the page with their maps.
+
+A thread reads and records every frame. Frames that wait for their inversion are few: older ones are dropped for newer
+ones, and counted.
+"""
+
+import json
+import threading
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sensorgen.core.arrays import Complex, Mask, Real
+from sensorgen.measure.lab.clock import Clock
+from sensorgen.measure.lab.devices import DeviceFault, FrameMeter
+from sensorgen.measure.lab.frame_recorder import FrameFile
+from sensorgen.measure.lab.live import LiveView
+
+if TYPE_CHECKING:
+    from sensorgen.prediction.array.frames import PressureMaps
+    from sensorgen.prediction.array.live import LiveMaps
+    from sensorgen.prediction.array.model import ArrayModel
+
+REST_S = 1.0  # that a command marks as unloaded
+_WAITING = 128  # frames
+_IDLE_S = 0.005
+
+
+@dataclass(eq=False)
+class FrameFeed:
+    """Frames of a device.
+
+    Attributes
+    ----------
+    meter : FrameMeter
+        Identified.
+    clock : Clock
+        By which it waits.
+    recorder : FrameFile, optional
+        Of every frame while ``recording``.
+    paused : bool
+        True while nothing is inverted and shown; recording goes on.
+    unloaded_s : float
+        From the next frame on nothing is on the array for so long, as the operator says [s].
+    counts : dict
+        Frames that came, were lost, damaged, dropped for newer ones, recorded; saturated readings.
+    fault : Exception, optional
+        That has ended it.
+    """
+
+    meter: FrameMeter
+    clock: Clock
+    recorder: "FrameFile | None" = None
+    unloaded_s: float = 0.0
+    recording: bool = True
+    paused: bool = False
+    fault: "Exception | None" = None
+    counts: dict[str, int] = field(
+        default_factory=lambda: dict.fromkeys(("frames", "lost", "damaged", "saturated", "dropped", "recorded"), 0)
+    )
+    _waiting: "deque[tuple[Complex, float, bool]]" = field(default_factory=lambda: deque(maxlen=_WAITING))
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+    _over: threading.Event = field(default_factory=threading.Event)
+    _until_s: float = -np.inf
+
+    def step(self) -> int:
+        """Read and record what has come; number of frames."""
+        lot = self.meter.read()
+        count = len(lot.time_s)
+        with self._lock:
+            if count and self.unloaded_s:
+                self._until_s, self.unloaded_s = lot.time_s[0] + self.unloaded_s, 0.0
+            rest = lot.time_s < self._until_s
+            recorded = count if self.recorder and self.recording else 0
+            if self.recorder and recorded:
+                self.recorder.add(lot.siemens, lot.time_s, rest)
+            dropped = max(len(self._waiting) + count - _WAITING, 0)
+            self._waiting.extend(zip(lot.siemens, lot.time_s.tolist(), rest.tolist(), strict=True))
+            for name, more in zip(
+                self.counts, (count, lot.lost, lot.damaged, lot.saturated, dropped, recorded), strict=True
+            ):
+                self.counts[name] += more
+        return count
+
+    def taken(self) -> tuple[Complex, Real, Mask]:
+        """Frames that wait."""
+        with self._lock:
+            waiting = list(self._waiting)
+            self._waiting.clear()
+        siemens, time_s, rest = zip(*waiting, strict=True) if waiting else ((), (), ())
+        return np.array(siemens).reshape(-1, *self.meter.shape), np.array(time_s), np.array(rest, bool)
+
+    def obey(self, commands: Iterable[str]) -> None:
+        """Carry out commands of the page."""
+        for name in commands:
+            if name in ("pause", "resume"):
+                self.paused = name == "pause"
+            elif name == "rest":
+                self.unloaded_s = REST_S
+            elif name == "record":
+                self.recording = not self.recording
+            else:
+                self.stop()
+
+    def run(self) -> None:
+        """Read until it is stopped, or a fault."""
+        try:
+            while not self._over.is_set():
+                if not self.step():
+                    self.clock.wait_until(self.clock.now() + _IDLE_S)
+        except OSError as error:
+            self.fault = DeviceFault(f"recording: {error.strerror or error}; record on another disk")
+        except Exception as error:  # raised where the frames are taken
+            self.fault = error
+
+    @property
+    def over(self) -> bool:
+        """True once it is stopped."""
+        return self._over.is_set()
+
+    def stop(self) -> None:
+        """End :meth:`run`."""
+        self._over.set()
+
+
+class MapView(LiveView):
+    """Live page of an array: map, trace of the centre of pressure, force, regions."""
+
+    names = ("pause", "resume", "rest", "record", "stop")
+    page = "map"
+
+    def __init__(self, title: str, model: "ArrayModel") -> None:
+        self._model, self._last_map = model, dict[str, Any]()
+        super().__init__(title, [])
+
+    def about(self) -> bytes:
+        """Title, outline and crossings, in JSON."""
+        of = self._model.layout
+        corners = [[round(float(v), 2) for v in corner] for corner in of.footprint.exterior.coords]
+        return json.dumps({
+            "title": self.title, "outline": corners, "x": of.x_mm, "y": of.y_mm, "pitch": of.params.pitch,
+            "here": of.here,
+        }).encode()  # fmt: skip
+
+    def show(self, time_s: float, maps: "PressureMaps | None", words: dict[str, Any]) -> None:
+        """Show the last frame of some maps, if there are any, and the state in words."""
+        self.keep(time_s, lambda: self._drawn(maps, words))
+
+    def _drawn(self, maps: "PressureMaps | None", words: dict[str, Any]) -> tuple[str, str]:
+        """Row and state of the last frame."""
+        row = ""
+        if maps:
+            cells = maps.table().cells[-1]
+            row = json.dumps([cells[k] for k in (0, 1, 3, 4, 5, 6)])
+            kpa = [None if v != v else round(v, 2) for v in maps.pressure_kpa[-1].ravel().tolist()]
+            regions = maps.regional(len(maps.time_s) - 1).cells if maps.regions else ()
+            self._last_map = {"kpa": kpa, "sigma": cells[2], "regions": regions}
+        return row, json.dumps(self._last_map | words)
+
+
+def follow(feed: FrameFeed, live: "LiveMaps", view: "MapView | None", clock: Clock, until_s: float) -> None:
+    """Invert and show what a feed brings, until a time, a command or a fault.
+
+    Raises
+    ------
+    Exception
+        That has ended the feed.
+    """
+    while clock.now() < until_s and not feed.over:
+        feed.obey(view.commands() if view else ())
+        frames = feed.taken()
+        maps = live.take(*frames) if len(frames[1]) and not feed.paused else None
+        if view:
+            view.show(clock.now(), maps, _words(feed, live))
+        if feed.fault:
+            raise feed.fault
+        if not len(frames[1]):
+            clock.wait_until(clock.now() + _IDLE_S)
+
+
+def _words(feed: FrameFeed, live: "LiveMaps") -> dict[str, Any]:
+    by = live.plan.words() if live.tared else "not tared: unload the array, and press Unloaded"
+    recording = None if feed.recorder is None else feed.recording
+    return {"by": by, "paused": feed.paused, "recording": recording, **feed.counts, "skipped": live.dropped}

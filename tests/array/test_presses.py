@@ -1,0 +1,61 @@
+"""Presses that an array tells apart: against presses that are fitted to maps of simulated frames."""
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from sensorgen.design.design import make
+from sensorgen.measure.virtual.array import nodal
+from sensorgen.prediction.array.frames import at_rest
+from sensorgen.prediction.array.model import array_model
+from sensorgen.prediction.array.presses import PRESS_N, count, distance_mm, pressures
+from sensorgen.prediction.array.readout import ArrayReadout
+from sensorgen.prediction.array.study import study
+
+
+@pytest.fixture(scope="module")
+def model():
+    size = {"length_mm": 80, "width_mm": 60, "between": "air"}
+    cell = {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}
+    return array_model(make({"shape": "array", "name": "a", "parameters": size, "cell": cell}))
+
+
+def test_a_press_on_squares_has_its_force(model):
+    """By shares of its area: in the middle of a square all on it, a quarter off a corner of four."""
+    x, y = model.layout.x_mm[3], model.layout.y_mm[2]
+    middle = pressures(model, np.array([[PRESS_N, x, y]]))
+    assert middle[2, 3] == pytest.approx(60e3)
+    assert middle.sum() == pytest.approx(60e3)
+    corner = pressures(model, np.array([[PRESS_N, x + 5, y + 5]]))
+    assert corner[2:4, 3:5] == pytest.approx(np.full((2, 2), 15e3))
+
+
+@pytest.mark.parametrize("noise", [1e-3, 1e-2])
+def test_fitted_presses_are_as_far_apart_as_stated(model, noise):
+    """At the distance stated the fitted one errs by less than a third of it, by the median; another network solves."""
+    readout = ArrayReadout(noise=noise)
+    distance, draw = study(model, readout, 60.0).apart_mm, np.random.default_rng(1)
+    x, y = model.layout.x_mm[4], model.layout.y_mm[3]
+    rest = nodal(model.tracks(), model.capacitances(), readout)
+    inverter, found = at_rest(model, readout, rest[None]), []
+    for phase in (0.0, 2.5, 5.0):
+        true = np.array([[PRESS_N, x + phase - distance / 2, y], [PRESS_N, x + phase + distance / 2, y]])
+        load = model.carried(pressures(model, true)[None])[0]
+        siemens = nodal(model.tracks(), model.capacitances(model.under(load)[0]), readout)
+        for _ in range(6):
+            off = noise * np.abs(siemens) * (draw.normal(size=load.shape) + 1j * draw.normal(size=load.shape))
+            maps = inverter.maps((siemens + off)[None], np.zeros(1)).on_surface()
+            one, two = 1e3 * maps.pressure_kpa[0], 1e3 * maps.sigma_kpa[0]
+            fit = least_squares(
+                lambda at, p=one, s=two: ((pressures(model, at.reshape(2, 3)) - p) / s).ravel(), true.ravel() + 0.2
+            )
+            found.append(fit.x[4] - fit.x[1])
+    assert 1.48 * np.median(np.abs(np.array(found) - distance)) < distance / 3
+    assert 10 < distance < 20
+
+
+def test_fewer_are_told_apart_with_more_noise(model):
+    far = [study(model, ArrayReadout(noise=noise), 60.0).apart_mm for noise in (1e-3, 1.5e-2, 1.0)]
+    assert far[0] < far[1] < far[2] == np.inf
+    assert count(model, 12.5) == 30
+    assert distance_mm(model, np.full(48, 1e-30)) == np.inf
