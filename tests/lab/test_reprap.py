@@ -12,7 +12,7 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.measure.lab import reprap
 from sensorgen.measure.lab.clock import RealClock, SimulatedClock
 from sensorgen.measure.lab.devices import DeviceFault, WrongDevice
-from sensorgen.measure.lab.port import HttpPort, SerialPort, SimulatedPort, _faults
+from sensorgen.measure.lab.port import HttpPort, SerialPort, SimulatedPort, faults
 from sensorgen.measure.virtual.reprap import FAULTS, RepRapFirmware
 
 WAYS = ("serial", "http")
@@ -27,7 +27,7 @@ class SimulatedWeb:
 
     def get(self, path, timeout_s):
         """Status and content of one GET request; a simulator that does not answer takes the whole time [s]."""
-        with _faults(self.address):
+        with faults(self.address):
             try:
                 return self._simulator.get(path, self._clock.now())
             except TimeoutError:

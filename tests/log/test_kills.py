@@ -82,7 +82,7 @@ def test_no_room_for_a_new_log_or_a_raw_file(tmp_path, command):
     rows = "".join(f"{k},-{k},{k}\n" for k in range(1, 40_000))
     (tmp_path / "run.csv").write_text(f"re_ohm_1kHz,im_ohm_1kHz,time_s\n{rows}")
     done = command(tmp_path / "log.db", "bench", "23 triX", tmp_path / "run.csv", limit=200_000)
-    assert_told(done, "cannot keep", "File too large")
+    assert_told(done, "cannot write", "File too large")
     assert [p for p in (tmp_path / "log.db.files").rglob("*") if p.is_file()] == []
 
 

@@ -28,6 +28,13 @@ _NO_NEW_PRIVILEGES, _SET_SECCOMP, _FILTER = 38, 22, 2
 _LANDLOCK_CREATE, _LANDLOCK_RESTRICT = 444, 446
 
 
+class Unconfined(OSError):
+    """The kernel does not confine this process."""
+
+    def __str__(self) -> str:
+        return f"did not run, since this kernel does not confine it ({super().__str__()}); expected one with seccomp"
+
+
 def available() -> bool:
     """True where :func:`confine` can do its work: Linux of 64 bit on x86_64 or aarch64."""
     return sys.platform == "linux" and os.uname().machine in _MACHINES and struct.calcsize("P") == 8
@@ -38,21 +45,21 @@ def confine() -> None:
 
     Raises
     ------
-    OSError
+    Unconfined
         The kernel refuses, or there are threads, which would stay free.
     """
     if len([*Path("/proc/self/task").iterdir()]) > 1:
-        raise OSError("other threads run")
+        raise Unconfined("other threads run")
     libc = ctypes.CDLL(None, use_errno=True)
     libc.syscall.restype = ctypes.c_long
     program = _program(*_MACHINES[os.uname().machine])
     code = ctypes.create_string_buffer(program, len(program))
     filters = ctypes.create_string_buffer(struct.pack("HxxxxxxQ", len(program) // 8, ctypes.addressof(code)))
     if libc.prctl(_NO_NEW_PRIVILEGES, *map(ctypes.c_ulong, (1, 0, 0, 0))) != 0:
-        raise OSError(ctypes.get_errno(), "no_new_privs")
+        raise Unconfined(ctypes.get_errno(), "no_new_privs")
     _landlock(libc)
     if libc.prctl(_SET_SECCOMP, ctypes.c_ulong(_FILTER), filters, ctypes.c_ulong(0), ctypes.c_ulong(0)) != 0:
-        raise OSError(ctypes.get_errno(), "seccomp")
+        raise Unconfined(ctypes.get_errno(), "seccomp")
 
 
 def _landlock(libc: ctypes.CDLL) -> None:
@@ -65,7 +72,7 @@ def _landlock(libc: ctypes.CDLL) -> None:
     rules = struct.pack("QQQ", files, 3, 3)[: 8 * (1 + (version >= 4) + (version >= 6))]
     handle = libc.syscall(number(_LANDLOCK_CREATE), rules, number(len(rules)), zero)
     if handle < 0 or libc.syscall(number(_LANDLOCK_RESTRICT), number(handle), zero) != 0:
-        raise OSError(ctypes.get_errno(), "Landlock")
+        raise Unconfined(ctypes.get_errno(), "Landlock")
     os.close(handle)
 
 

@@ -9,6 +9,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import starmap
+from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -371,9 +372,10 @@ def _check_private(address: str) -> None:
     from urllib.parse import urlsplit
 
     try:
-        url = urlsplit(address if "://" in address else f"tcp://{address}")
-    except ValueError as error:
-        raise BadInput(f"--cluster {address}: {error}; {_EXPECTED_CLUSTER}") from None
+        named = json.loads(Path(address).read_text("utf-8"))["address"] if Path(address).is_file() else address
+        url = urlsplit(named if "://" in named else f"tcp://{named}")
+    except (OSError, ValueError, KeyError, TypeError):
+        raise BadInput(f"--cluster {address}: {_EXPECTED_CLUSTER}") from None
     here = url.scheme == "inproc" or url.hostname == "localhost"
     with suppress(ValueError):
         here = here or ip_address(url.hostname or "").is_loopback
@@ -390,7 +392,6 @@ def _on_cluster(address: str) -> Iterator[Sequence[Lane]]:
     import importlib.util
     import logging
     from concurrent.futures import CancelledError
-    from pathlib import Path
 
     if importlib.util.find_spec("distributed") is None:
         raise NotInstalled("--cluster needs Dask distributed: pip install 'sensorgen[cluster]'")
@@ -399,15 +400,9 @@ def _on_cluster(address: str) -> Iterator[Sequence[Lane]]:
     loggers = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in ("distributed", "asyncio")]
     for name in loggers:  # each has a level of its own
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what goes wrong is said once, by us
-    where, scheduler = {"address": address}, address
-    if Path(address).is_file():
-        try:
-            where, scheduler = {"scheduler_file": address}, str(json.loads(Path(address).read_text("utf-8"))["address"])
-        except (OSError, ValueError, KeyError, TypeError):
-            raise BadInput(f"--cluster {address}: no scheduler's file; {_EXPECTED_CLUSTER}") from None
-    _check_private(scheduler)
+    _check_private(address)
     try:
-        client = Client(**where, timeout=_CONNECT_S)
+        client = Client(**{"scheduler_file" if Path(address).is_file() else "address": address}, timeout=_CONNECT_S)
     except (OSError, ValueError, TimeoutError) as error:
         raise SensorgenError(
             f"no Dask scheduler at {address!r} ({str(error).splitlines()[0]:.80}); {_EXPECTED_CLUSTER}"

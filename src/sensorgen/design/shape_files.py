@@ -14,7 +14,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from functools import cache, lru_cache
 from hashlib import sha256
 from importlib.util import find_spec
@@ -298,13 +298,12 @@ class _ShapeProcess:
             0
         )  # lines: one for each question, or an endless answer would fill the memory
         threading.Thread(target=_read, args=(self._process.stdout, self._wanted, self._lines), daemon=True).start()
-        try:
+        with ExitStack() as ended:
+            ended.callback(self.close)
             self.about = self._exchange({
                 "name": name, "text": text, "seconds": SECONDS, "memory_bytes": MEMORY_BYTES, "libraries": _libraries(),
             })  # fmt: skip
-        except BaseException:
-            self.close()
-            raise
+            ended.pop_all()
 
     def ask(self, question: Mapping[str, Any]) -> Any:
         """The answer to a question; to an empty one, what the file says of itself."""

@@ -41,8 +41,8 @@ _SPELLINGS = {
 _SCALES = {("rad", "deg"): Decimal(repr(math.pi / 180)), ("", "%"): Decimal("0.01")}
 _PREFIX = {name: Decimal(10) ** power for power, name in PREFIXES.items()}
 _PREFIX |= {"\u00b5": Decimal("1e-6"), "\u03bc": Decimal("1e-6"), "K": Decimal(1000)}
-_NUMBER = r"[-+]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][-+]?[0-9]{1,3})?"
-_READING = re.compile(rf"(?P<value>{_NUMBER})\s*(?:(?:±|\+/?-)\s*(?P<pm>{_NUMBER})\s*)?(?P<unit>[^\s0-9]*)")
+NUMBER = r"[-+]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][-+]?[0-9]{1,3})?"
+_READING = re.compile(rf"(?P<value>{NUMBER})\s*(?:(?:±|\+/?-)\s*(?P<pm>{NUMBER})\s*)?(?P<unit>[^\s0-9]*)")
 
 
 @dataclass(frozen=True)
@@ -104,14 +104,15 @@ def parse(quantity: str, text: str) -> tuple[AcReading, ...]:
         readings = []
         for match in matches:
             scale = factor(quantity, match["unit"] or last)
-            value, stated = (float(_decimal(match[name] or "0") * scale) for name in ("value", "pm"))
+            value, stated = (float(decimal(match[name] or "0") * scale) for name in ("value", "pm"))
             if not math.isfinite(value) or not math.isfinite(stated):
                 raise BadInput("more than a number can hold; expected a value as it was read")
             readings.append(AcReading(quantity, value, frequency, abs(stated)))
     return tuple(readings)
 
 
-def _decimal(text: str) -> Decimal:
+def decimal(text: str) -> Decimal:
+    """A number with a decimal point or comma."""
     return Decimal(text.replace(",", "."))
 
 

@@ -37,7 +37,7 @@ _ASSUMED = {
     "inductance": "inductance read as series, Ls",
 }  # fmt: skip
 _UNIT = re.compile(r"(?P<name>.+?)\s*(?:[\[(](?P<in>[^\])]*)[\])]|[/_ ](?P<after>[^/_ ]+))")
-_NUMBER = re.compile(r"(?P<number>[-+]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][-+]?[0-9]{1,3})?)\s*(?P<unit>\S*)")
+_NUMBER = re.compile(rf"(?P<number>{immittance.NUMBER})\s*(?P<unit>\S*)")
 _MISSING = re.compile(r"|[-–]+|n/?a|nan|inf|[-+]?ol|over(load|flow)?|error", re.IGNORECASE)
 _STATUS = ("status", "stat", "state", "error", "validity")
 _FUNCTIONS = {  # what primary and secondary are, by the name of a meter's function (HP 4284A and kin)
@@ -83,6 +83,9 @@ class _Column:
     head: str
 
 
+_Row = dict[_Column, tuple[float, bool] | None]
+
+
 @dataclass(frozen=True)
 class _Header:
     line: int
@@ -105,37 +108,53 @@ def read(path: Path) -> LcrTable:
         No such header, no frequency, no quantity, an unknown unit, or a cell that is no number; with file and row.
     """
     lines = _lines(path)
+    header = _found(lines, path)
+    columns, first_row = _with_units(lines, header)
+    status = [k for k, head in enumerate(header.heads) if head.casefold() in _STATUS]
+    rows, faulty = list[_Row](), 0
+    for number, cells in _rows(lines, header, first_row, path):
+        if any(cells[k].strip("+0. ") for k in status):
+            faulty += 1
+        else:
+            rows.append({column: _value(cells[column.at], column, path, number) for column in columns})
+    overloads = sum(value is None for row in rows for value in row.values())
+    readings = tuple(_readings([{c: v for c, v in row.items() if v is not None} for row in rows], columns, path))
+    if not readings:
+        raise BadInput(f"{path}: no readings below the header in row {header.line + 1}")
+    used = {column.at for column in columns} | set(status)
+    left_out = tuple(head for k, head in enumerate(header.heads) if k not in used and head)
+    return LcrTable(readings, len(rows), "\n".join(lines[: header.line]), _doubts(columns, overloads, faulty), left_out)
+
+
+def _doubts(columns: Sequence[_Column], overloads: int, faulty: int) -> tuple[str, ...]:
+    """Remarks on what was assumed or left out."""
+    names = {_name(column.head)[0] for column in columns}
+    doubts = [text for name, text in _ASSUMED.items() if name in names]
+    doubts += [f"{overloads} cells without a number"] if overloads else []
+    doubts += [f"{faulty} rows left out: the meter marked them as faulty"] if faulty else []
+    return tuple(doubts)
+
+
+def _found(lines: Sequence[str], path: Path) -> _Header:
+    """Header with a frequency."""
     header = _header(lines)
     if header is None:
         first = next((line.strip() for line in lines if line.strip()), "")
         raise BadInput(f"{path}: no table of an LCR meter, begins with {first!r:.60}; expected {EXPECTED}")
     if not any(column.quantity == "frequency" for column in header.columns):
         raise BadInput(f"{path}, row {header.line + 1}: no column of the frequency among {', '.join(header.heads)}")
-    rows, overloads, faulty = [], 0, 0
-    columns, first_row = _with_units(lines, header)
-    status = [k for k, head in enumerate(header.heads) if head.casefold() in _STATUS]
-    for number in range(first_row, len(lines)):
+    return header
+
+
+def _rows(lines: Sequence[str], header: _Header, first: int, path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Number and cells of each row of the table."""
+    for number in range(first, len(lines)):
         cells = _cells(lines[number], header.separator)
         if not any(cells) or lines[number].lstrip().startswith(_COMMENTS):
             continue
         if wrong := miscounted(cells, len(header.heads), header.separator):
             raise BadInput(f"{path}, row {number + 1}: {wrong}")
-        if any(cells[k].strip("+0. ") for k in status):
-            faulty += 1
-            continue
-        found = {column: _value(cells[column.at], column, path, number) for column in columns}
-        overloads += sum(value is None for value in found.values())
-        rows.append({column: value for column, value in found.items() if value is not None})
-    readings = tuple(_readings(rows, columns, path))
-    if not readings:
-        raise BadInput(f"{path}: no readings below the header in row {header.line + 1}")
-    named = {column.head.casefold() for column in columns}
-    doubts = [text for name, text in _ASSUMED.items() if any(_name(head)[0] == name for head in named)]
-    doubts += [f"{overloads} cells without a number"] if overloads else []
-    doubts += [f"{faulty} rows left out: the meter marked them as faulty"] if faulty else []
-    used = {column.at for column in columns} | set(status)
-    left_out = tuple(head for k, head in enumerate(header.heads) if k not in used and head)
-    return LcrTable(readings, len(rows), "\n".join(lines[: header.line]), tuple(doubts), left_out)
+        yield number, cells
 
 
 def looks_like(path: Path) -> bool:
@@ -243,7 +262,7 @@ def _value(cell: str, column: _Column, path: Path, number: int) -> tuple[float, 
     match = _NUMBER.fullmatch(cell)
     if match is None:
         raise BadInput(f"{where}: {cell!r:.40} is no number; leave the cell empty where nothing was measured")
-    value = float(match["number"].replace(",", "."))
+    value = float(immittance.decimal(match["number"]))
     if abs(value) >= OVERLOAD:
         return None
     try:

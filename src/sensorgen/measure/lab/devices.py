@@ -63,11 +63,18 @@ class Extension:
     position_mm: float
 
 
-class Actuator(Protocol):
-    """Presses the tip down, by force or to a position. Forces are those on the specimen, downwards positive."""
+class AnyDevice(Protocol):
+    """Device of any role."""
 
     def identify(self) -> Identity:
         """Ask what it is; :class:`WrongDevice` if it is another."""
+
+    def close(self) -> None:
+        """Give the connection back; never raises."""
+
+
+class Actuator(AnyDevice, Protocol):
+    """Presses the tip down, by force or to a position. Forces are those on the specimen, downwards positive."""
 
     def start(self, limit_n: float) -> None:
         """Set the device's own limit of force, switch the motor on, and begin to go to the upper end [N]."""
@@ -86,9 +93,6 @@ class Actuator(Protocol):
 
     def off(self) -> None:
         """Switch the motor off."""
-
-    def close(self) -> None:
-        """Give the connection back; never raises."""
 
 
 @runtime_checkable
@@ -121,11 +125,8 @@ class Place:
     moving: bool
 
 
-class Stage(Protocol):
+class Stage(AnyDevice, Protocol):
     """Carries the actuator along the specimen, and raises it."""
-
-    def identify(self) -> Identity:
-        """Ask what it is; :class:`WrongDevice` if it is another."""
 
     def start(self) -> None:
         """Begin to find its own zero; the actuator is raised first."""
@@ -144,9 +145,6 @@ class Stage(Protocol):
 
     def stop(self) -> None:
         """Stop at once, as far as the device can."""
-
-    def close(self) -> None:
-        """Give the connection back; never raises."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,11 +189,8 @@ class Readings:
         return cls(np.array([time_s]), row, np.array([clipped]))
 
 
-class ImpedanceMeter(Protocol):
+class ImpedanceMeter(AnyDevice, Protocol):
     """Measures the impedance at several frequencies, again and again."""
-
-    def identify(self) -> Identity:
-        """Ask what it is; :class:`WrongDevice` if it is another."""
 
     def start(self, tones_hz: Real, voltage_v: float) -> None:
         """Begin to measure at (m,) frequencies with an amplitude [Hz], [V]."""
@@ -205,9 +200,6 @@ class ImpedanceMeter(Protocol):
 
     def stop(self) -> None:
         """End the measurement and switch the output off."""
-
-    def close(self) -> None:
-        """Give the connection back; never raises."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +225,7 @@ class FrameLot:
     saturated: int = 0
 
 
-class FrameMeter(Protocol):
+class FrameMeter(AnyDevice, Protocol):
     """Reads all crossings of an array, again and again.
 
     Attributes
@@ -247,17 +239,11 @@ class FrameMeter(Protocol):
     shape: tuple[int, int]
     frequency_hz: float
 
-    def identify(self) -> Identity:
-        """Ask what it is; :class:`WrongDevice` if it is another."""
-
     def read(self) -> FrameLot:
         """Frames since the last call; none is an answer."""
 
-    def close(self) -> None:
-        """Give the connection back; never raises."""
 
-
-class Meter(Protocol):
+class Meter(AnyDevice, Protocol):
     """Measures a resistance.
 
     Attributes
@@ -268,11 +254,5 @@ class Meter(Protocol):
 
     name: str
 
-    def identify(self) -> Identity:
-        """Ask what it is; :class:`WrongDevice` if it is another."""
-
     def resistance(self, *, wires: int) -> str:
         """One reading as the meter sends it, with 2 leads or 4 [ohm]."""
-
-    def close(self) -> None:
-        """Give the connection back; never raises."""

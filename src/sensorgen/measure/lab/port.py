@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any, Protocol
 
-from sensorgen.core.errors import BadInput, NotInstalled
+from sensorgen.core.errors import BadInput, NotInstalled, SensorgenError
 from sensorgen.measure.lab.clock import Clock, RealClock
 from sensorgen.measure.lab.devices import DeviceFault
 from sensorgen.measure.virtual.plant import Simulator
@@ -58,11 +58,13 @@ class Web(Protocol):
 
 
 @contextmanager
-def _faults(address: str, what: str = "connection to {} failed", *also: type[Exception]) -> Iterator[None]:
+def faults(address: str, what: str = "connection to {} failed", *also: type[Exception]) -> Iterator[None]:
     """Translate errors of a connection to DeviceFault."""
     kinds: tuple[type[Exception], ...] = (OSError, ValueError, TypeError, http.client.HTTPException, *also)
     try:
         yield
+    except SensorgenError:
+        raise
     except kinds as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise DeviceFault(f"{what.format(address)}: {reason:.200}; check address, cable and power") from None
@@ -93,19 +95,19 @@ class SerialPort:
             raise NotInstalled("serial lines need pyserial: pip install 'sensorgen[lab]'") from None
         self.address = address
         self._received, self._least = bytearray(), _BLOCK if "://" in address else 1
-        with _faults(address):
+        with faults(address):
             self._line = serial.serial_for_url(address, baud, timeout=_POLL_S, write_timeout=1.0, exclusive=True)
 
     def write(self, data: bytes) -> None:
         """Send; DeviceFault if the line is cut."""
-        with _faults(self.address):
+        with faults(self.address):
             self._line.write(data)
 
     def read_until(self, end: bytes, timeout_s: float) -> bytes:
         """Received bytes up to and including an end, fewer when the time is over [s]."""
         clock = RealClock()
         until = clock.now() + timeout_s
-        with _faults(self.address):
+        with faults(self.address):
             while end not in self._received:
                 waiting = self._line.in_waiting
                 if not waiting and clock.now() >= until:
@@ -139,13 +141,13 @@ class SimulatedPort:
 
     def write(self, data: bytes) -> None:
         """Send; DeviceFault if the line is cut."""
-        with _faults(self.address):
+        with faults(self.address):
             self._received += self._simulator.exchange(data, self._clock.now())
 
     def read_until(self, end: bytes, timeout_s: float) -> bytes:
         """Received bytes up to and including an end, fewer when the time is over [s]."""
         until = self._clock.now() + timeout_s
-        with _faults(self.address):
+        with faults(self.address):
             self._received += self._simulator.exchange(b"", self._clock.now())
             while end not in self._received and self._clock.now() < until:
                 self._clock.wait_until(min(until, self._clock.now() + self._step_s))
@@ -188,7 +190,7 @@ class VisaPort:
         except ImportError:
             raise NotInstalled("VISA needs PyVISA: pip install 'sensorgen[lab]'") from None
         self.address, self._visa = address, pyvisa
-        self._failures = partial(_faults, repr(address), "no answer from an instrument at {}", pyvisa.errors.Error)
+        self._failures = partial(faults, repr(address), "no answer from an instrument at {}", pyvisa.errors.Error)
         self._resources: list[Any] = []
         try:
             with self._failures():
@@ -245,7 +247,7 @@ class HttpPort:
 
     def get(self, path: str, timeout_s: float) -> tuple[int, bytes]:
         """Status and content of one GET request; the firmware closes the connection after each."""
-        with _faults(self.address):
+        with faults(self.address):
             line = http.client.HTTPConnection(self._host, timeout=timeout_s)
             try:
                 line.request("GET", path)

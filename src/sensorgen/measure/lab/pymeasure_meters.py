@@ -18,11 +18,12 @@ from typing import Any
 import numpy as np
 
 from sensorgen.core.arrays import Real
-from sensorgen.core.errors import NotInstalled, OutOfRange, SensorgenError, UnknownName
+from sensorgen.core.errors import NotInstalled, OutOfRange, UnknownName
 from sensorgen.core.records import Line, Strict
 from sensorgen.measure.lab import scpi
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import PYMEASURE, DeviceFault, Identity, Readings, Role, WrongDevice
+from sensorgen.measure.lab.port import faults
 
 _HP = ("agilent", "hewlett-packard", "hp", "keysight")
 _FUNCTION = {2: "RES", 4: "FRES"}
@@ -175,17 +176,10 @@ class _Meter:
 
     @contextmanager
     def _faults(self) -> Iterator[None]:
-        """Translate errors of PyMeasure to DeviceFault."""
-        try:
-            with warnings.catch_warnings(action="ignore"):
-                yield
-        except SensorgenError:
-            raise
-        except Exception as error:  # of PyMeasure, PyVISA or the VISA library, each of many kinds
-            reason = " ".join(str(error).split()) or type(error).__name__
-            raise DeviceFault(
-                f"{self._kind.__name__} at {self._address}: {reason:.200}; check address, cable and power"
-            ) from None
+        """Translate errors of PyMeasure, PyVISA or the VISA library, each of many kinds, to DeviceFault."""
+        where = f"{self._kind.__name__} at {self._address}"
+        with warnings.catch_warnings(action="ignore"), faults(where, "{}", Exception):
+            yield
 
 
 class PyMeasureMultimeter(_Meter):

@@ -88,9 +88,12 @@ def _opened_as_possible(path: Path) -> sqlite3.Connection:
     except sqlite3.Error as error:
         if not writable or _code(error) not in _UNWRITABLE:
             raise
-    if not (wal.exists() and wal.stat().st_size):
-        return _opened(path, "immutable=1")
-    try:  # its index, for which a full disk has no room, is kept in memory
+    return _merged(path, wal) if wal.exists() and wal.stat().st_size else _opened(path, "immutable=1")
+
+
+def _merged(path: Path, wal: Path) -> sqlite3.Connection:
+    """Connection that reads the rows of a write-ahead log too, whose index, having no room, is kept in memory."""
+    try:
         return _opened(path, "mode=rw", "locking_mode = EXCLUSIVE")
     except sqlite3.Error as error:
         if _code(error) not in _UNWRITABLE:
@@ -102,14 +105,12 @@ def _copied(path: Path, wal: Path) -> sqlite3.Connection:
     """Connection to a copy in memory, with the rows of a write-ahead log on a medium that cannot be written."""
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "log.db"
-        for source, place in ((path, copy), (wal, Path(f"{copy}-wal"))):
-            shutil.copyfile(source, place)
-        with closing(sqlite3.connect(copy)) as merged:
+        shutil.copyfile(path, copy)
+        shutil.copyfile(wal, f"{copy}-wal")
+        with closing(_opened(copy, "mode=rw")) as merged:
             connection = sqlite3.connect(":memory:", isolation_level=None, factory=_Connection)
             merged.backup(connection)
     connection.file = path.stat()
-    _migrate(connection, path)
-    _check_tables(connection, path)
     connection.execute("PRAGMA query_only = ON")
     return connection
 
@@ -213,10 +214,8 @@ def _create(path: Path) -> None:
     part = part_of(path)
     left = Path(f"{path}-wal")  # SQLite would write its rows into the new log
     if left.exists() and not os.path.lexists(path):
-        raise BadInput(
-            f"{str(left)!r} is left of a log that was removed or renamed; move it to where that log is, under its "
-            f"name and '-wal', or remove it"
-        )
+        why = "is left of a log that was removed or renamed; move it beside that log, by its name, or remove it"
+        raise BadInput(f"{str(left)!r} {why}")
     try:
         with part.open("wb") as file:
             file.write(_empty())

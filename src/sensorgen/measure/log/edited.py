@@ -44,19 +44,14 @@ def corrections(log: Log, rows: Iterable[Reading], table: str) -> Iterator[Readi
         if row.uid in kept or not gone or next(log.entries(Reading, uid=row.uid), None):
             yield row
             continue
-        replaced = next(
-            log.entries(Reading, replaced=True, uid=row.uid), None
-        )  # by an edit that was taken back, perhaps
-        same = [old for old in gone.values() if _measured(old) == _measured(row) and old.specimen == row.specimen]
-        here = [old for old in gone.values() if old.source_row == row.source_row
-                and (_measured(old) == _measured(row) or (kept and old.specimen == row.specimen))]  # fmt: skip
-        old = next(iter(here if replaced else (*here, *same)), None)
+        taken_back = next(log.entries(Reading, replaced=True, uid=row.uid), None) is not None  # an edit, perhaps
+        old = _in_place(row, gone.values(), alike=bool(kept)) or (None if taken_back else _same(row, gone.values()))
         other = next((old for old in gone.values() if old.specimen == row.specimen), None)
         if old:
             del gone[old.uid]
-            uid = sha256(f"{row.uid} {old.uid}".encode()).hexdigest()[:32] if replaced else row.uid
+            uid = sha256(f"{row.uid} {old.uid}".encode()).hexdigest()[:32] if taken_back else row.uid
             yield dataclasses.replace(row, uid=uid, supersedes=old.uid)
-        elif other and not replaced:
+        elif other and not taken_back:
             raise BadInput(
                 f"{table}, row {(row.source_row or 0) + 1}: not what reading {other.number} of {other.specimen} was in "
                 f"a table of this name. If it corrects that one: sensorgen log withdraw reading {other.number} "
@@ -64,3 +59,14 @@ def corrections(log: Log, rows: Iterable[Reading], table: str) -> Iterator[Readi
             )
         else:
             yield row
+
+
+def _in_place(row: Reading, gone: Iterable[Reading], *, alike: bool) -> Reading | None:
+    """Reading in a row's place with its values, or, of a table that is ``alike`` otherwise, of its specimen."""
+    here = (old for old in gone if old.source_row == row.source_row)
+    return next((o for o in here if _measured(o) == _measured(row) or (alike and o.specimen == row.specimen)), None)
+
+
+def _same(row: Reading, gone: Iterable[Reading]) -> Reading | None:
+    """Reading of a row's specimen with its values."""
+    return next((o for o in gone if o.specimen == row.specimen and _measured(o) == _measured(row)), None)

@@ -5,19 +5,17 @@ stays quick to copy, other programs can open the files, and each is written once
 file and a folder. Copy ``log.db`` together with ``log.db.files``; ``sensorgen log verify`` reports what is missing.
 """
 
-import os
 import re
+import shutil
 from collections.abc import Iterator
-from contextlib import suppress
 from hashlib import file_digest
 from pathlib import Path
 
-from sensorgen.core.errors import BadInput, Unwritable
-from sensorgen.core.files import part_of, reading, remove_stale_parts, sync_folder
+from sensorgen.core.errors import BadInput
+from sensorgen.core.files import reading, remove_stale_parts, replacing, sync_folder
 from sensorgen.measure.log.entries import RawFile
 
 CHANGED = "changed while it was read: log it when it is complete"
-_BLOCK = 1 << 20
 _PHOTOS = (b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n", b"II*\0", b"MM\0*", b"GIF8", b"BM")
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _SUFFIX = re.compile(r"\.[A-Za-z0-9]{1,8}")
@@ -71,26 +69,15 @@ def keep(folder: Path, path: Path, known: RawFile | None = None) -> RawFile:
     """
     kept = known or raw_file(path)
     target = place(folder, kept)
-    part = part_of(target)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(target) as copy, path.open("rb") as source:
         remove_stale_parts(target.parent)
-        with path.open("rb") as source, part.open("wb") as copy:
-            while block := source.read(_BLOCK):
-                copy.write(block)
-            copy.flush()
-            os.fsync(copy.fileno())
-        if _digest(part) != kept.uid:
+        shutil.copyfileobj(source, copy)
+        copy.flush()
+        if _digest(Path(copy.name)) != kept.uid:
             raise BadInput(f"{str(path)!r} {'is not the file of that SHA-256' if known else CHANGED}")
-        part.chmod(0o444)
-        part.replace(target)
-        for made in (target.parent, folder, folder.parent):  # each may be new
-            sync_folder(made)
-    except OSError as error:
-        raise Unwritable(f"cannot keep {str(path)!r} in {str(folder)!r}: {error.strerror or error}") from None
-    finally:
-        with suppress(OSError):
-            part.unlink()
+        Path(copy.name).chmod(0o444)
+    for made in (target.parent, folder, folder.parent):  # each may be new
+        sync_folder(made)
     return kept
 
 

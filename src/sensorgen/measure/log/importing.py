@@ -87,10 +87,9 @@ def lcr_export(
     kept = files.keep(log.files, path)
     found = next((name for name in accuracy.names() if accuracy.is_named(name, table.preamble)), "")
     row = replace(
-        of, uid=sha256(f"{of.specimen} {kept.uid}".encode()).hexdigest()[:32], file=kept.uid,
-        quantity=tuple(one.quantity for one in table.readings), value=tuple(one.value for one in table.readings),
-        frequency_hz=tuple(one.frequency_hz for one in table.readings), instrument=instrument or found,
-        doubts=(*of.doubts, *table.doubts, *notes.implausible(table.readings)[:_MOST_DOUBTS]),
+        notes.with_readings(replace(of, doubts=(*of.doubts, *table.doubts)), table.readings, _MOST_DOUBTS),
+        uid=sha256(f"{of.specimen} {kept.uid}".encode()).hexdigest()[:32], file=kept.uid,
+        instrument=instrument or found,
     )  # fmt: skip
     new = [row for row in log.add([kept, row]) if isinstance(row, Reading)]
     return ImportedRecording(

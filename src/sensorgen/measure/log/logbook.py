@@ -471,11 +471,11 @@ class Log:
         """Corrections that two machines have made of one row, until the one that does not count is withdrawn."""
         sql = (
             "SELECT row.kind, row.content, row.number, row.logged_at, other.number "  # noqa: S608
-            "FROM record row, record other "
-            f"WHERE row.kind = ?1 AND row.number IS NOT NULL AND row.supersedes IS NOT NULL AND {_PREFERRED}"
+            "FROM record row, record other WHERE row.kind = ?1 AND row.number IS NOT NULL "
+            f"AND row.supersedes IS NOT NULL AND {_PREFERRED}"
         )
         return [
-            f"conflict: {word(kind)}s {row[2]} and {other} correct the same row; {other} counts; withdraw one of them"
+            f"conflict: {word(kind)}s {row[2]} and {other} correct the same row; {other} counts: withdraw one of them"
             for kind in (Reading, BenchRun)
             for *row, other in self._rows(sql, [NAMES[kind]])
             if not self._withdrawn(self._row(*row))

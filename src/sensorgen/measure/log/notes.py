@@ -137,12 +137,16 @@ def with_ac(of: Reading, typed: Mapping[str, Sequence[str]]) -> Reading:
     >>> found.quantity, found.frequency_hz
     (('Cp', 'D', 'D'), (1000.0, 1000.0, 10000.0))
     """
-    every = [one for name, texts in typed.items() for text in texts for one in immittance.parse(name, text)]
+    return with_readings(of, [a for name, texts in typed.items() for t in texts for a in immittance.parse(name, t)])
+
+
+def with_readings(of: Reading, every: Sequence[immittance.AcReading], most: int | None = None) -> Reading:
+    """Reading with AC readings, and doubts about the implausible ones, ``most`` of them."""
     stated = tuple(one.uncertainty for one in every)
     return dataclasses.replace(
         of, quantity=tuple(one.quantity for one in every), value=tuple(one.value for one in every),
         frequency_hz=tuple(one.frequency_hz for one in every), uncertainty=stated if any(stated) else (),
-        doubts=(*of.doubts, *implausible(every)),
+        doubts=(*of.doubts, *implausible(every)[:most]),
     )  # fmt: skip
 
 

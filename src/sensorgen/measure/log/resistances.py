@@ -9,6 +9,7 @@ from functools import lru_cache
 
 from sensorgen.core.errors import BadInput
 from sensorgen.core.records import shown
+from sensorgen.measure.immittance import NUMBER, decimal
 
 OVERLOAD = math.inf  # beyond the meter's range [ohm]
 SCPI_OVERLOAD_OHM = 9.9e37  # SCPI 1999, 7.2.1.4: what an instrument sends for infinity
@@ -17,11 +18,7 @@ LEADS_OHM = 1.0  # typical resistance of leads and contacts
 MAX_CHARACTERS = 200
 EXPECTED = "a resistance such as 650, 0.65k, 2.3k / 3.8k, 1.2M or OL"
 
-_NUMBER = re.compile(
-    r"(?P<number>[-+]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:e[-+]?[0-9]{1,3})?)\s*(?P<prefix>meg|[kmg])?"
-    r"\s*(?:Ω|ω|ohms?|r)?",
-    re.IGNORECASE,
-)
+_NUMBER = re.compile(rf"(?P<number>{NUMBER})\s*(?P<prefix>meg|[kmg])?\s*(?:Ω|ω|ohms?|r)?", re.IGNORECASE)
 _LETTER_AS_POINT = re.compile(r"([0-9]+)([kKMGR])([0-9]+)")  # IEC 60062: 4k7
 _OVERLOAD = re.compile(r"\+?(o\.?l\.?|0\.?l|ovld|ovrld|overload|over ?range|inf(inity)?|∞|open)|>.*", re.IGNORECASE)
 _NO_READING = re.compile(r"[-–—]*|n\.?/?a\.?|nan|none|\?+", re.IGNORECASE)
@@ -98,7 +95,7 @@ def parse(text: str, *, mega: bool = False) -> Resistances:
 
 def _ohm(match: re.Match[str], text: str) -> float:
     """The number, rounded once [ohm]."""
-    ohm = float(Decimal(match["number"].replace(",", ".")) * Decimal(_FACTOR[(match["prefix"] or "").lower()]))
+    ohm = float(decimal(match["number"]) * Decimal(_FACTOR[(match["prefix"] or "").lower()]))
     if math.isclose(ohm, SCPI_OVERLOAD_OHM):
         return OVERLOAD
     if abs(ohm) > MOST_OHM:

@@ -23,6 +23,8 @@ WINDOW_S, RATE_HZ, BITS = 0.01, 1e6, 14
 RANGES_V = (0.2, 0.4, 0.8, 2.0, 4.0, 8.0, 20.0, 40.0, 80.0)
 SERIAL = 28734
 _NAME = "Handyscope HS5-540XM"
+_ENDS = {"unplugged": f"Handyscope {SERIAL} was unplugged",
+         "generator off": f"generator of Handyscope {SERIAL} has stopped"}  # fmt: skip
 _TIMEOUT_S = 1.0
 _LOSSES = 3  # calls of read() one after the other
 INPUT_LSB = 0.5  # noise of an input
@@ -151,10 +153,8 @@ class PhasorMeter:
         if self._windows is None:
             raise DeviceFault(f"Handyscope {SERIAL} does not measure; start it first")
         now = self._clock.now()
-        if self.fault == "unplugged":
-            raise DeviceFault(f"Handyscope {SERIAL} was unplugged")
-        if self.fault == "generator off":
-            raise DeviceFault(f"generator of Handyscope {SERIAL} has stopped")
+        if self.fault in _ENDS:
+            raise DeviceFault(_ENDS[self.fault])
         if self.fault == "hung" and now - self._heard > _TIMEOUT_S:
             raise DeviceFault(f"no samples from Handyscope {SERIAL} for {now - self._heard:.1f} s")
         count = 0 if self.fault == "hung" else self._windows.due()
