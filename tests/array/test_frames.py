@@ -28,7 +28,7 @@ def model():
 
 
 def frames_of(model, readout, ohm=1.0, pressures_pa=PRESSURE):
-    """Three frames at rest and one for each map, of cells that differ at rest by 10 %, without noise."""
+    """Three frames at rest and one for each map of what cells carry; they differ at rest by 10 %; without noise."""
     rest = model.capacitances(1 + 0.1 * np.random.default_rng(2).normal(size=(5, 6)))
     ratios = [np.ones((5, 6))] * 3 + [model.under(p)[0] for p in pressures_pa]
     tracks = model.tracks(ohm=ohm)
@@ -41,7 +41,9 @@ def frames_of(model, readout, ohm=1.0, pressures_pa=PRESSURE):
 
 def maps(model, readout, frames, **more):
     rest = np.arange(len(frames)) < 3
-    return inverted(model, readout, frames, rest, np.arange(len(frames)) / 100, **{"scatter": 0.0} | more)
+    return inverted(
+        model, readout, frames, rest, np.arange(len(frames)) / 100, **{"scatter": 0.0, "surface": False} | more
+    )
 
 
 @pytest.mark.parametrize(
@@ -91,7 +93,7 @@ def test_intervals_hold_and_the_foot_is_found(model, kind):
     readout, pressure = ArrayReadout(kind), np.concatenate([np.zeros((3, 5, 6)), PRESSURE / 1e3])
     inside, off = [], []
     for seed in range(8):
-        found = maps(model, readout, simulated(model, readout, pressure, seed=seed), scatter=0.05)
+        found = maps(model, readout, simulated(model, readout, pressure, seed=seed), scatter=0.05, surface=True)
         low, high = found.interval_kpa
         inside.append((low < PRESSURE / 1e3) & (high > PRESSURE / 1e3))
         off.append((found.force_n[0] - pressure[3:].sum((1, 2)) * 0.1) / found.force_n[1])
@@ -169,7 +171,7 @@ def test_a_standing_load_is_never_taken_for_rest(model):
         inverted(model, readout, frames[3:], np.zeros(2, bool), np.arange(2.0))
     with pytest.raises(BadInput, match="all frames are at rest"):
         inverted(model, readout, frames[:3], np.ones(3, bool), np.arange(3.0))
-    apart = inverted(model, readout, frames[3:], np.zeros(2, bool), np.arange(2.0), 0.0, frames[:3])
+    apart = inverted(model, readout, frames[3:], np.zeros(2, bool), np.arange(2.0), 0.0, frames[:3], surface=False)
     assert np.abs(apart.pressure_kpa - maps(model, readout, frames).pressure_kpa).max() < 1e-6
 
 

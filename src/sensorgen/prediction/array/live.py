@@ -59,7 +59,7 @@ class LiveMaps:
         return bool(self._rest)
 
     def take(self, siemens: Complex, time_s: Real, rest: Mask) -> "PressureMaps | None":
-        """Maps of a lot's loaded frames, (k, m, n) [S]; None without any.
+        """Maps of what cells carry in a lot's loaded frames, (k, m, n) [S], the cover's spread left; None without any.
 
         Raises
         ------
