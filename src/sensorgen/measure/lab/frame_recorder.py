@@ -38,7 +38,7 @@ def recorder(path: Path, shape: tuple[int, int], frequency_hz: float) -> FrameFi
     if path.exists():
         raise BadInput(f"{path} exists; expected a new name: recordings are not overwritten")
     kind = (
-        _Table if path.suffix == ".csv" else _Hdf if path.suffix in _HDF else _Packed if path.suffix == ".npz" else None
+        _Csv if path.suffix == ".csv" else _Hdf if path.suffix in _HDF else _Packed if path.suffix == ".npz" else None
     )
     if kind is None:
         raise BadInput(f"{path}: expected a name that ends in .csv, .h5 or .npz")
@@ -46,7 +46,7 @@ def recorder(path: Path, shape: tuple[int, int], frequency_hz: float) -> FrameFi
         return kind(path, shape, frequency_hz)
 
 
-class _Table:
+class _Csv:
     """CSV of capacitances."""
 
     def __init__(self, path: Path, shape: tuple[int, int], frequency_hz: float) -> None:

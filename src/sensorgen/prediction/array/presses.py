@@ -30,7 +30,7 @@ def pressures(model: ArrayModel, presses: Real) -> Real:
 
 
 def distance_mm(model: ArrayModel, information: Real) -> float:
-    """Distance from which two equal presses are told apart, wherever they lie; infinite if none of six pitches does.
+    """Distance from which two equal presses are seen as two, wherever they lie; infinite if none of six pitches does.
 
     Presses of unknown force and place, along rows and along columns: the difference of their places is above
     ``APART`` standard errors, by the Cramer-Rao bound with priors of a press's own force and of the array's size.

@@ -46,7 +46,7 @@ class ArrayStudy:
     faults : tuple of str
         That the network has.
     apart_mm : float
-        Distance from which two presses are told apart; infinite of none [mm].
+        Distance from which two presses are seen as two; infinite of none [mm].
     short : float
         Probability that a crossing is shorted, P(short) of its print [-].
     """
@@ -156,10 +156,10 @@ class ArrayStudy:
         )
         press = f"of {PRESS_N:g} N on {PRESS_MM:g} x {PRESS_MM:g} mm"
         yield (
-            f"two presses {press} are told apart from {self.apart_mm:.3g} mm on, wherever they lie: "
+            f"two presses {press} are seen as two from {self.apart_mm:.3g} mm on, wherever they lie: "
             f"{count(self.model, self.apart_mm)} at once"
             if np.isfinite(self.apart_mm)
-            else f"two presses {press} are not told apart at every place, however far"
+            else f"two presses {press} are not seen as two at every place, however far"
         )
         yield from self.model.shared()
         yield from self.model.beyond(np.array([self.pressure_kpa]))

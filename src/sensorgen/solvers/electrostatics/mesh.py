@@ -92,7 +92,7 @@ def _on_mirrors(
 def _rise(
     top: Iterable[Edge], lifts: Mapping[int, list[tuple[int, int]]], around: Mapping[int, Fan]
 ) -> dict[int, int]:  # fmt: skip
-    """How often each jump adds to what flows into the electrode at 1 V."""
+    """Number of times that each jump adds to what flows into the electrode at 1 V."""
     rise: dict[int, int] = defaultdict(int)
     for a, b in top:
         for corner, jump in lifts.get(around[a].members[0], ()):
