@@ -55,7 +55,7 @@ def test_lots_give_what_the_whole_recording_gives(model, hertz):
     """By C/C0, and by the network, which the heaviest frame needs: earlier ones are by what sufficed for them."""
     readout = ArrayReadout(frequency_hz=(hertz,))
     siemens, time_s, rest = recording(model, readout)
-    whole, live, parts = inverted(model, readout, siemens, rest, time_s), LiveMaps(model, readout), []
+    whole, live, parts = inverted(model, readout, siemens, rest, time_s, surface=False), LiveMaps(model, readout), []
     lot_s = np.array_split(np.arange(len(time_s)), 8)
     parts.extend(filter(None, (live.take(siemens[part], time_s[part], rest[part]) for part in lot_s)))
     assert live.plan.network == whole.by.startswith("the network")
@@ -80,7 +80,7 @@ def test_nothing_before_a_tare_another_tare_and_only_the_newest_by_the_network(m
     assert live.dropped == 29
     live.take(1.5 * siemens[:2], time_s[:2], rest[:2])  # the zero has moved: C/C0 is by the new one
     again = live.take(1.5 * siemens[20:21], time_s[20:21], rest[20:21])
-    first = inverted(model, readout, siemens, rest, time_s).pressure_kpa[10]
+    first = inverted(model, readout, siemens, rest, time_s, surface=False).pressure_kpa[10]
     assert np.nanmax(np.abs(again.pressure_kpa[0] - first)) < 0.1 * np.nanmax(first) + 10
 
 
