@@ -126,6 +126,7 @@ def test_a_file_with_every_key(taken, tmp_path):
         "border",
         "cell",
         "geometry",
+        "regions",
     } == {  # of imports and arrays: their own tests
         line.partition(":")[0] for line in WHOLE.splitlines() if line and line[0] != " "
     }

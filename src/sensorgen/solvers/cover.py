@@ -60,9 +60,10 @@ def transfer(k: Real, layers: Sequence[ElasticLayer], spring_pa_per_m: float) ->
 
     Examples
     --------
+    >>> import numpy as np
     >>> plate = ElasticLayer(1e-4, 1e9, 0.0)  # D = 83 uN m
     >>> transfer(np.array([0.0, 1000.0]), [plate], 1e9).round(3).tolist()
-    [1.0, 0.92]
+    [1.0, 0.923]
     """
     k = np.maximum(k, 1e-6)
     found, soft = np.ones_like(k), np.full_like(k, 1 / spring_pa_per_m)
