@@ -19,7 +19,7 @@ PAGES = (
     ["predict"], ["predict", "tri"], ["cell"], ["cell", "tri"], ["chart"], ["chart", "tri"],
     ["compress"], ["compress", "tri"],
     ["invert"], ["array"], ["sheet"], ["stack"],
-    ["bench"], ["bench", "plan"], ["bench", "plan", "tri"], ["bench", "show"],
+    ["bench"], ["bench", "run"], ["bench", "array"], ["bench", "plan"], ["bench", "plan", "tri"], ["bench", "show"],
     ["bench", "hysteresis"], ["bench", "sets"], ["bench", "live"],
     ["log"],
     *(["log", w] for w in ("specimen", "add", "import", "bench", "predict", "list", "show", "export", "verify")),

@@ -8,7 +8,8 @@ from sensorgen.cli import render
 from sensorgen.cli.designs import of_design
 from sensorgen.cli.options import InputResistance, Readout, refuse_input
 from sensorgen.core.options import Option
-from sensorgen.prediction.query import Frequencies, Noise
+from sensorgen.core.units import FREQUENCY_HZ
+from sensorgen.prediction.query import Noise
 
 if TYPE_CHECKING:
     from sensorgen.core.arrays import Real
@@ -18,6 +19,11 @@ if TYPE_CHECKING:
     from sensorgen.prediction.array.readout import ArrayReadout
     from sensorgen.prediction.array.study import ArrayStudy
 
+Frequencies = Annotated[
+    tuple[float, ...],
+    Option("Frequencies, as in 10kHz,100kHz; 10 kHz if not given.", ("--frequencies",), FREQUENCY_HZ),
+]
+Short = Annotated[float | None, Option(kind="proper share")]
 Pressure = Annotated[float, Option(kind="ratio", typed="100")]
 
 
@@ -25,7 +31,7 @@ Pressure = Annotated[float, Option(kind="ratio", typed="100")]
 def command(
     design: "Design", *, readout: Readout = "guarded", input_ohm: InputResistance, frequency_hz: Frequencies = (10e3,),
     noise: Noise, noise_s: Annotated[float | None, Option(kind="ratio")] = None, pressure_kpa: Pressure,
-    faults: tuple[str, ...] = (), short: Annotated[float, Option(kind="share")] = 0.0, simulate: Path | None = None,
+    faults: tuple[str, ...] = (), short: Short = None, simulate: Path | None = None,
     plot: Path | None = None,
 ) -> "ArrayStudy":  # fmt: skip
     """Resolution of an array of crossing tracks: pressure and force of every crossing, crosstalk, faults.
@@ -53,7 +59,7 @@ def command(
     refuse_input(readout)
     how = ArrayReadout(readout, input_ohm, frequency_hz, noise, noise_s or 0.0)  # type: ignore[arg-type]
     model = array_model(design)
-    resolution = study(model, how, pressure_kpa, faults, short)
+    resolution = study(model, how, pressure_kpa, faults, short or 0.0)
     if simulate is not None:
         from sensorgen.measure.virtual.array import step
 

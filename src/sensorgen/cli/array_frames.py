@@ -40,11 +40,12 @@ def invert(design: "Design", task: "Task", frames: ArrayFrames, *, perfect: bool
         from sensorgen.analysis.plots import array
 
         true = None if read_in.pressure_kpa is None else read_in.pressure_kpa[~read_in.rest]
+        true = model.carried(true) if true is not None and frames.cells else true
         render.file(frames.plot / f"{design.name}-map.png", array.maps(maps, true), "wrote ")
     for piece in render.pieces(maps, render.form()):
         render.say(piece, nl=False, err=task.terminal)
     if not output:
-        render.say("--output FILE.npz writes the maps, FILE.csv force and centre of pressure of every frame")
+        render.say("--output FILE.npz writes the maps, FILE.csv force and centre of pressure of every frame", err=True)
     return 0
 
 

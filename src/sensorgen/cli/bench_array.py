@@ -45,7 +45,7 @@ def _array(
     kind
         Of the device, one of 'sensorgen list devices' for arrays.
     simulate
-        A virtual array: three seconds at rest, then a step each second.
+        A virtual array: three seconds at rest (--unloaded 2 takes them for it), then a step each second.
     rate_hz : HZ
         Frames per second of the virtual array.
     faults, --fault
@@ -75,8 +75,11 @@ def _array(
 
     if bool(port) == simulate:
         raise BadInput(f"{'both' if port else 'neither'} of --port and --simulate; expected one of them")
+    if not (seconds > 0 and 0 <= unloaded_s < inf):
+        raise BadInput(f"--seconds {seconds:g}, --unloaded {unloaded_s:g}; expected seconds above 0, and 0 or more")
     refuse_input(readout)
     model, clock = array_model(design), RealClock()
+    _ = model.regions  # refused before a device is opened
     how = ArrayReadout(readout, input_ohm, (_FREQUENCY_HZ,), noise)  # type: ignore[arg-type]
     meter = _virtual(model, how, rate_hz, faults, clock) if simulate else _device(kind, port, clock)
     with ExitStack() as stack:
@@ -99,7 +102,8 @@ def _array(
         with suppress(KeyboardInterrupt):
             follow(feed, live, view, clock, clock.now() + seconds)
     counts = ", ".join(f"{count} {name}" for name, count in feed.counts.items())
-    render.say(f"{counts}, {live.dropped} not inverted; by {live.plan.words()}", err=True)
+    by = f"by {live.plan.words()}" if live.tared else "no frame at rest: give --unloaded S, seconds without a load"
+    render.say(f"{counts}, {live.dropped} not inverted; {by}", err=True)
     return 0
 
 

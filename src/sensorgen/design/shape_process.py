@@ -66,7 +66,11 @@ def fault(error: BaseException, file: str) -> str:
     while trace is not None:
         line = trace.tb_lineno if trace.tb_frame.f_code.co_filename == file else line
         trace = trace.tb_next
+    from sensorgen.core.confine import Unconfined  # known by then: a process that is confined finds no module
+
     where = f"{file}, line {line}" if line else file
+    if isinstance(error, Unconfined):
+        return f"{file}: {error}"
     if isinstance(error, MemoryError):
         return f"{where}: needs more memory than a shape may have"
     if isinstance(error, TooLong):

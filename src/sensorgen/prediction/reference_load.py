@@ -18,6 +18,7 @@ from sensorgen.prediction.results import Changes, Term
 
 SOURCES = "sources"
 _STEPS = 4  # of Gauss and Newton, to a press that is misread
+_SETTLED = 1e-6  # relative step that is the last one, as the next would be about its square
 _PARALLEL = 1e-9  # of the larger direction, below which another one does not tell; of a press, what is rounding
 _MOST = 20.0  # force that a press is misread as, over its own [-]
 
@@ -124,6 +125,9 @@ class ReferenceLoad:
             by = np.column_stack([_parts(own.by_force / own.pressed), _parts(own.by_position / own.pressed)])
             step = np.linalg.lstsq(by * scale, sought - own.shift(), rcond=_PARALLEL)[0]
             after = np.clip(at + step * scale, 0.0, [_MOST * force, self.sensor.length_m])
+            if np.abs(step).max() < _SETTLED:
+                at = after
+                break
             try:
                 pressed = self.sensor.response(self._frequency, *after.tolist())
             except OutOfRange:

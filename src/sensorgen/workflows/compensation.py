@@ -84,7 +84,7 @@ class CompensatedDesign:
         return _off(self.capacitance_pf, asked.capacitance_pf)
 
     def stiffer(self, asked: "CompensatedDesign") -> float:
-        """Request for the stiffness."""
+        """Ln of the stiffness over the one asked for, as of the capacitance."""
         return _off(self.stiffness_kpa_per_mm, asked.stiffness_kpa_per_mm)
 
     def words(self) -> str:

@@ -25,6 +25,11 @@ class FrameFile(Protocol):
         """Complete the file."""
 
 
+def _part(path: Path) -> Path:
+    """File with the frames of an NPZ until it is packed; what a killed run leaves."""
+    return path.with_name(path.name + ".part")
+
+
 def recorder(path: Path, shape: tuple[int, int], frequency_hz: float) -> FrameFile:
     """A new file of frames, of the kind that its name ends in.
 
@@ -35,8 +40,8 @@ def recorder(path: Path, shape: tuple[int, int], frequency_hz: float) -> FrameFi
     MissingValue
         HDF5 without h5py.
     """
-    if path.exists():
-        raise BadInput(f"{path} exists; expected a new name: recordings are not overwritten")
+    if there := [one for one in (path, _part(path)) if one.exists()]:
+        raise BadInput(f"{there[0]} exists; expected a new name: recordings are not overwritten")
     kind = (
         _Csv if path.suffix == ".csv" else _Hdf if path.suffix in _HDF else _Packed if path.suffix == ".npz" else None
     )
@@ -93,7 +98,7 @@ class _Packed:
     """NPZ, packed at the end; until then frames are in a file beside it."""
 
     def __init__(self, path: Path, shape: tuple[int, int], frequency_hz: float) -> None:
-        self._path, self._part, self._hertz = path, path.with_name(path.name + ".part"), frequency_hz
+        self._path, self._part, self._hertz = path, _part(path), frequency_hz
         self._type = np.dtype([("time_s", float), ("rest", np.uint8), ("siemens", _COMPLEX, shape)])
         self._file: IO[bytes] = self._part.open("wb")
 

@@ -16,8 +16,9 @@ many frames.
 import re
 import zlib
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from math import nan
+from math import inf, nan
 
 import numpy as np
 
@@ -73,9 +74,12 @@ class FrameForm:
     def of(cls, text: str) -> "FrameForm | None":
         """Form by a header without its checksum; None of any other line."""
         found = _HEADER.fullmatch(text)
-        if found is None or _UNITS[found[3]] != found[5] or not float(found[6]) > 0:
+        if found is None or _UNITS[found[3]] != found[5]:
             return None
-        return cls(int(found[1]), int(found[2]), found[3], found[4], float(found[6]))
+        with suppress(ValueError):
+            if 0 < (frequency_hz := float(found[6])) < inf:
+                return cls(int(found[1]), int(found[2]), found[3], found[4], frequency_hz)
+        return None
 
     @property
     def count(self) -> int:

@@ -69,7 +69,9 @@ def keep(folder: Path, path: Path, known: RawFile | None = None) -> RawFile:
     """
     kept = known or raw_file(path)
     target = place(folder, kept)
-    with replacing(target) as copy, path.open("rb") as source:
+    with reading(path):
+        source = path.open("rb")
+    with source, replacing(target) as copy:
         remove_stale_parts(target.parent)
         shutil.copyfileobj(source, copy)
         copy.flush()

@@ -52,7 +52,8 @@ class PressureMaps:
     time_s : (k,) array
         Of each frame; nan where it is not known [s].
     pressure_kpa, sigma_kpa : (k, m, n) array
-        Pressure on the surface and its standard error of noise and scatter alone; nan where it is not determined [kPa].
+        Pressure on the surface, or that cells carry, and its standard error of noise and scatter alone; nan where it is
+        not determined [kPa].
     calibration : ArrayCalibration or None
         That gave the pressures; its errors are in the standard errors.
     """

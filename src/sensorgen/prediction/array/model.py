@@ -105,6 +105,8 @@ class ArrayModel:
         x = np.array(of.x_mm) - of.x_mm[0] + (p.length_mm - (n - 1) * px) / 2  # from the outline's corner
         y = np.array(of.y_mm) - of.y_mm[0] + (p.width_mm - (m - 1) * py) / 2
         for name, corners in self.design.regions.items():
+            if name in ("force", "sigma", "centre"):
+                raise BadInput(f"regions.{name}: results have a column of that name; expected another one")
             region = shapely.MultiPoint(corners) if {*map(len, corners)} == {2} else shapely.Point()
             area = region.envelope if len(corners) == 2 else shapely.Polygon(corners) if len(corners) > 2 else region
             inside = self.here & shapely.intersects_xy(area, x[None], y[:, None])

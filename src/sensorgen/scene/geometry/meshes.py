@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from math import acos, ceil, pi, sin, sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,9 @@ class Mesh:
 
         data = manifold3d.Mesh64(vert_properties=self.vertices_mm, tri_verts=self.triangles.astype(np.uint64))
         return manifold3d.Manifold(data)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {key: value for key, value in vars(self).items() if key != "_solid"}  # a solid cannot be pickled
 
     def volume_mm3(self) -> float:
         """Enclosed volume, by the divergence theorem [mm3]."""
