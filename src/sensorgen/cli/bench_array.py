@@ -75,8 +75,7 @@ def _array(
 
     if bool(port) == simulate:
         raise BadInput(f"{'both' if port else 'neither'} of --port and --simulate; expected one of them")
-    if not (seconds > 0 and 0 <= unloaded_s < inf):
-        raise BadInput(f"--seconds {seconds:g}, --unloaded {unloaded_s:g}; expected seconds above 0, and 0 or more")
+    _refuse_times(seconds, unloaded_s)
     refuse_input(readout)
     model, clock = array_model(design), RealClock()
     _ = model.regions  # refused before a device is opened
@@ -105,6 +104,11 @@ def _array(
     by = f"by {live.plan.words()}" if live.tared else "no frame at rest: give --unloaded S, seconds without a load"
     render.say(f"{counts}, {live.dropped} not inverted; {by}", err=True)
     return 0
+
+
+def _refuse_times(seconds: float, unloaded_s: float) -> None:
+    if not (seconds > 0 and 0 <= unloaded_s < inf):
+        raise BadInput(f"--seconds {seconds:g}, --unloaded {unloaded_s:g}; expected seconds above 0, and 0 or more")
 
 
 def _refuse_shape(meter: "FrameMeter", model: "ArrayModel") -> None:

@@ -59,15 +59,21 @@ def described(module: ModuleType) -> dict[str, Any]:
     }
 
 
-def fault(error: BaseException, file: str) -> str:
-    """An error as one line with the file's line that it comes from."""
+def _line(error: BaseException, file: str) -> int | None:
+    """The last line of a file that an error comes through."""
     line: int | None = error.lineno if isinstance(error, SyntaxError) else None
     trace = error.__traceback__
     while trace is not None:
         line = trace.tb_lineno if trace.tb_frame.f_code.co_filename == file else line
         trace = trace.tb_next
+    return line
+
+
+def fault(error: BaseException, file: str) -> str:
+    """An error as one line with the file's line that it comes from."""
     from sensorgen.core.confine import Unconfined  # known by then: a process that is confined finds no module
 
+    line = _line(error, file)
     where = f"{file}, line {line}" if line else file
     if isinstance(error, Unconfined):
         return f"{file}: {error}"
