@@ -32,6 +32,13 @@ def test_closed_pipes_and_outputs_are_no_news(words, way, tmp_path):
         assert word not in done.stdout + done.stderr
 
 
+def test_a_build_whose_reader_has_gone_writes_its_files(tmp_path):
+    script = f"{sys.executable} -m sensorgen build reference --length 20 --no-cad --name plate | true"
+    done = subprocess.run(["bash", "-c", script], cwd=tmp_path, capture_output=True, encoding="utf-8", check=False)
+    assert "cannot" not in done.stderr
+    assert (tmp_path / "out" / "plate" / "manifest.json").is_file()
+
+
 def test_a_command_that_is_stopped_with_words_in_its_buffer(start):
     """SIGTERM after a reader has gone: the end of the interpreter has nothing left to write, and says nothing."""
     before = (

@@ -203,6 +203,15 @@ def _stoppable() -> Iterator[None]:
             signal.signal(number, handler)
 
 
+@contextmanager
+def unread() -> Iterator[None]:
+    """Go on in silence where the reader of a pipe has gone: what is left to do are files."""
+    try:
+        yield
+    except BrokenPipeError:
+        _silence()
+
+
 def _silence() -> int:
     """Let what is still in the output's buffer go nowhere."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

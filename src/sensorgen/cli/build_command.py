@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sensorgen.cli import FOUND_ERRORS, body_options, render, show
+from sensorgen.cli import FOUND_ERRORS, body_options, render, show, unread
 from sensorgen.cli.body_options import Compensate
 from sensorgen.cli.designs import of_design
 from sensorgen.cli.options import Advising, Strict
@@ -63,7 +63,8 @@ def command(
 
     def decided(built: Built) -> None:  # before the files, which take longer
         show.clear()
-        render.deliver(kind(**vars(built)))
+        with unread():
+            render.deliver(kind(**vars(built)))
 
     try:
         with show.progress(STEPS) as step:
