@@ -197,5 +197,6 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_collection_finish():
-    """Ten thousand tests stay: the garbage collector need not look at them again and again."""
+    """Ten thousand tests stay: the garbage collector need not look at them again and again, nor at each small result."""
     gc.freeze()
+    gc.set_threshold(10_000, 20, 20)
