@@ -197,6 +197,6 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_collection_finish():
-    """Ten thousand tests stay: the garbage collector need not look at them again and again, nor at each small result."""
+    """Ten thousand tests stay: the garbage collector need not look at them again and again."""
     gc.freeze()
     gc.set_threshold(10_000, 20, 20)
