@@ -17,7 +17,7 @@ from sensorgen.core.options import Argument, Option
 if TYPE_CHECKING:
     from sensorgen.core.document import Documented
     from sensorgen.measure.readings import Readings
-    from sensorgen.prediction.inverse.prior import Prior
+    from sensorgen.prediction.inverse.estimator import Prior
 
 _NORMAL = re.compile(r"(force|position)=(.+?)(?:\+-|±)(.+)")
 
@@ -65,7 +65,7 @@ class Task:
     @cached_property
     def distribution(self) -> "Prior | None":
         """The prior as typed."""
-        from sensorgen.prediction.inverse.prior import Prior
+        from sensorgen.prediction.inverse.estimator import Prior
 
         if self.prior is None or self.prior.strip() == "uniform":
             return None if self.prior is None else Prior()
