@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sensorgen.cli import FOUND_ERRORS, body_options, render, show, unread
+from sensorgen.cli import FOUND_ERRORS, body_options, render, unread
 from sensorgen.cli.body_options import Compensate
 from sensorgen.cli.designs import of_design
 from sensorgen.cli.options import Advising, Strict
@@ -62,12 +62,12 @@ def command(
     kind, budget_s = DetailedBuild if details else Built, advising.budget if advise or advising.apply else None
 
     def decided(built: Built) -> None:  # before the files, which take longer
-        show.clear()
+        render.clear()
         with unread():
             render.deliver(kind(**vars(built)))
 
     try:
-        with show.progress(STEPS) as step:
+        with render.progress(STEPS) as step:
             built = build(
                 design, out, cad=not no_cad, force=force, strict=strict, compensated=changes, budget_s=budget_s,
                 step=step, decided=decided if render.early() else lambda _: None,
@@ -87,7 +87,7 @@ def _refuse(design: "Design", error: Unprintable, budget_s: float | None, advisi
     from sensorgen.prediction.slices import reviewed
     from sensorgen.workflows.decision import STEPS, RefusedBuild, decision
 
-    with show.progress(STEPS) as step:
+    with render.progress(STEPS) as step:
         advice = decision(design, reviewed(design), budget_s, predict=bool(budget_s), step=step).advice
     render.deliver(RefusedBuild(design.name, tuple(error.findings), len(error.stopping), advice=advice))
     advising.write(design, advice)
@@ -97,10 +97,10 @@ def _refuse(design: "Design", error: Unprintable, budget_s: float | None, advisi
 
 
 def _verify(design: "Design", folder: Path) -> int:
-    from sensorgen.cli import log_words
+    from sensorgen.cli.options import LogFile
     from sensorgen.workflows.sealed import build_differences
 
-    with log_words.LogFile().existing() as log:
+    with LogFile().existing() as log:
         differences = build_differences(folder, design, log)
     render.deliver(differences)
     return FOUND_ERRORS if differences else 0

@@ -5,12 +5,11 @@ from typing import Annotated
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, array_calibrate, options, render, show
-from sensorgen.cli.array_calibrate import ArrayOptions
+from sensorgen.cli import FOUND_ERRORS, array_inversion, options, render
+from sensorgen.cli.array_inversion import ArrayOptions
 from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import command as of_function
-from sensorgen.cli.log_words import LogFile
-from sensorgen.cli.options import BenchTip
+from sensorgen.cli.options import BenchTip, LogFile
 from sensorgen.core.errors import BadInput
 from sensorgen.core.options import Option
 
@@ -55,17 +54,17 @@ def command(
     dry_run
         Log nothing.
     """
-    files = array_calibrate.are_files(specimens)
+    files = array_inversion.are_files(specimens)
     wrong = _OF_SPECIMENS if files else _OF_ARRAYS
     if refused := next((flag for name, flag in wrong.items() if options.typed(name)), None):
         raise BadInput(f"{refused} is for {'specimens' if files else 'files of an array'}, not for what is given")
     if files:
-        return array_calibrate.calibrate(specimens, of_array)
+        return array_inversion.calibrate(specimens, of_array)
     from sensorgen.analysis import calibration
 
     pressed = bench.bench()
     _refuse(len(specimens), again=again, source=bool(source))
-    with log.opened() as rows, show.progress(["calibrating"]) as step:
+    with log.opened() as rows, render.progress(["calibrating"]) as step:
         if again:
             results = calibration.Together((calibration.recheck(rows, specimens[0], recordings),))
         else:

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from sensorgen.cli import render, show
+from sensorgen.cli import render
 from sensorgen.cli.designs import of_design
 from sensorgen.cli.options import Advising, Strict
 
@@ -29,7 +29,7 @@ def command(design: "Design", advising: Advising, *, strict: Strict = False) -> 
     from sensorgen.prediction.slices import reviewed
     from sensorgen.workflows import decision
 
-    with show.progress((*STEPS, *decision.STEPS)) as step:
+    with render.progress((*STEPS, *decision.STEPS)) as step:
         review = reviewed(design, step)
         decided = decision.decision(design, review, advising.budget, predict=advising.budget > 0, step=step)
     render.deliver(decided)

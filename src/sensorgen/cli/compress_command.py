@@ -5,7 +5,7 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from sensorgen.cli import options, render, show
+from sensorgen.cli import options, render
 from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import ended
 from sensorgen.cli.designs import of_design
@@ -90,7 +90,7 @@ def command(
     asked = question.asked()
     if sweeping.sweep:
         return ended(sweeping.over(design, body, compression.sweep, asked))
-    with show.pressing(asked.stress_kpa) as step:
+    with render.pressing(asked.stress_kpa) as step:
         result: Any = compression.answer(body(design), asked, step=step)
     if plot:
         from sensorgen.analysis.plots import compression as figures

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from sensorgen.cli import render, show
+from sensorgen.cli import render
 from sensorgen.core import files as store
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput, within
@@ -87,7 +87,7 @@ class Task:
             inversion = method(source)
             to_file = self.output and not self.terminal
             file = stack.enter_context(store.replacing(Path(self.output))) if to_file else None
-            step = stack.enter_context(show.progress(["reading"]))
+            step = stack.enter_context(render.progress(["reading"]))
 
             def write(text: str) -> None:
                 if file:

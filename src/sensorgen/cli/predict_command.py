@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from sensorgen.cli import WRONG_INPUT, options, render, show
+from sensorgen.cli import WRONG_INPUT, options, render
 from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import ended
 from sensorgen.cli.designs import of_design
@@ -88,7 +88,7 @@ def command(
     query = pressing.of(query, design)
     if sweeping.sweep:
         return _swept(design, body, query, sweeping, alone=not (pressing.loads() or plot))
-    with show.progress(_WORK) as step:
+    with render.progress(_WORK) as step:
         step(_WORK[0])
         result = _answer(body(design), query, pressing, whole=bool(plot))
     prediction = result if isinstance(result, Prediction) else result.prediction
@@ -138,7 +138,7 @@ def _plot(result: "Loaded", folder: Path) -> None:
     from sensorgen.analysis import plots
     from sensorgen.core import files
 
-    with show.progress(plots.STEPS) as step:
+    with render.progress(plots.STEPS) as step:
         for file, content in plots.files(result.model.sensor, *result.axes, result.prediction.design):
             step(file)
             files.replace(folder / file, content)

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from sensorgen.cli import body_options, render, show
+from sensorgen.cli import body_options, render
 from sensorgen.cli.body_options import Compensate
 from sensorgen.cli.designs import of_design
 from sensorgen.cli.options import Out, Strict, TimeLimit
@@ -40,7 +40,7 @@ def command(
 
     walls = rule(slicer, design.walls)
     design, changes = body_options.compensated(design, compensate, walls, slicer, program)
-    with render.refused(design.name), show.progress(("checks", *STEPS)) as step:
+    with render.refused(design.name), render.progress(("checks", *STEPS)) as step:
         gcode = slice_design(
             design, out, slicer, program=program, time_limit_s=time_limit_s, force=force, strict=strict,
             compensated=changes, step=step,

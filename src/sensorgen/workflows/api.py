@@ -316,11 +316,11 @@ def export_design(design: Design, path: str | Path, gcode: str | Path | None = N
 
 def show(design: Design, path: str | Path = "") -> Path:
     """Write a design as one offline page, as ``sensorgen show`` does, and give its name: ``NAME.html`` if not given."""
-    from sensorgen.workflows import preview
+    from sensorgen.workflows import decision
 
     design = _named(design)
     file = Path(path or f"{design.name}.html")
-    files.replace(file, preview.page_of(design).encode())
+    files.replace(file, decision.page_of(design).encode())
     return file
 
 

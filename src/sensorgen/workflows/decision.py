@@ -1,16 +1,20 @@
-"""Decision to print a design: verdict, the numbers that decide, each finding once, and changes that were tried."""
+"""Decision to print a design: verdict, the numbers that decide, findings, changes that were tried; and its page."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from sensorgen.checks.review import CheckReport, Review, report, review
+from sensorgen.checks.review import STEPS as CHECKS
+from sensorgen.checks.review import CheckReport, Review, Step, report, review
 from sensorgen.core.document import Part
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Refused, Verdict, headline, listed
 from sensorgen.design.design import Design
-from sensorgen.prediction.slices import PrintReview
+from sensorgen.prediction import bodies
+from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.slices import PrintReview, reviewed
 from sensorgen.workflows.changes import Advice
 from sensorgen.workflows.moves import changed
 from sensorgen.workflows.trial import Trial, table, trial
@@ -19,8 +23,8 @@ if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
     from sensorgen.prediction.results import Prediction
 
+
 STEPS = ("prediction", "changes", "done")
-Step = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -149,3 +153,30 @@ def _turned_by(design: Design, said: Verdict) -> str:
     except SensorgenError as error:
         return f"{fault}: {error}"
     return next((f"{fault}: {f.message}" for f in found if f.severity == "error" and not f.waiver), "")
+
+
+PAGE_STEPS = (*CHECKS, "prediction", "page", "done")
+
+
+def page_of(design: Design, *, folder: Path | None = None, step: Step = lambda _: None) -> str:
+    """The page of a design, as HTML, with advice where it is stored.
+
+    Parameters
+    ----------
+    design : Design
+        What is shown.
+    folder : Path, optional
+        With the design's files, as of :func:`sensorgen.workflows.trial.trial`.
+    step : callable
+        Called with the next step, for a progress display.
+
+    Raises
+    ------
+    SensorgenError
+        A name or value of the design is missing.
+    """
+    held = reviewed(design, step, folder=folder)
+    decided = decision(design, held, 0.0, step=step)
+    predicted = evaluate(bodies.of_file(design, held.file))
+    step("page")
+    return decided.page(held.printed(design), held, predicted)

@@ -17,7 +17,7 @@ from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, within
 from sensorgen.core.version import __version__
 from sensorgen.design.body import BodyOf
 from sensorgen.design.design import Design
-from sensorgen.measure.log import BenchRun, Log, Reading, batches, notes
+from sensorgen.measure.log import BenchRun, Log, Reading, notes, prints
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log.entries import Specimen
 from sensorgen.prediction import bodies
@@ -130,7 +130,7 @@ def design_of(log: Log, specimen: str) -> tuple[str, Design]:
     if bound is None:
         with suppress(BadInput):
             name = notes.specimen(specimen).specimen
-    found = batches.designs(log).get(bound.design_id) if bound else None
+    found = prints.designs(log).get(bound.design_id) if bound else None
     if found is None:
         with suppress(BadInput):
             found = notes.design_of(specimen)

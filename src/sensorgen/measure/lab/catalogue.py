@@ -253,21 +253,21 @@ def _handyscope() -> Kind:
 
 
 def _scpi(name: str) -> Kind:
-    from sensorgen.measure.lab import lcr_meter, multimeter, port
+    from sensorgen.measure.lab import meters, port
     from sensorgen.measure.virtual import scpi
 
     def at(address: str, _: Strict) -> port.VisaPort:
         return port.VisaPort(address)
 
-    model = {"hp-4284a": lcr_meter.HP_4284A, "keysight-e4980a": lcr_meter.E4980A}.get(name)
+    model = {"hp-4284a": meters.HP_4284A, "keysight-e4980a": meters.E4980A}.get(name)
     if model:
         return _at_port(
-            "impedance", lcr_meter.Settings, lambda line, clock, given: lcr_meter.LcrMeter(line, clock, model, given),
+            "impedance", meters.LcrSettings, lambda line, clock, given: meters.LcrMeter(line, clock, model, given),
             at, lambda plant, _: scpi.SimulatedLcrMeter(plant, name),
         )  # fmt: skip
     key = {"hp-34401a": "34401A", "keithley-2000": "MODEL 2000"}[name]
     return _at_port(
-        "meter", NoSettings, lambda line, *_: multimeter.Multimeter(line, {key: multimeter.KNOWN[key]}), at,
+        "meter", NoSettings, lambda line, *_: meters.Multimeter(line, {key: meters.KNOWN[key]}), at,
         lambda plant, _: scpi.SimulatedMultimeter(plant, name),
     )  # fmt: skip
 

@@ -34,7 +34,7 @@ from sensorgen.core.records import Strict, checked
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings, WrongDevice
 from sensorgen.measure.signal import waveform
-from sensorgen.measure.signal.multisine import multisine
+from sensorgen.measure.signal.waveform import multisine
 
 RATE_HZ = 1e6
 DEMO = "demo"

@@ -15,8 +15,7 @@ from sensorgen.measure.lab.experiment import Experiment
 from sensorgen.measure.lab.live import Sample
 from sensorgen.measure.lab.recorder import Recorder
 from sensorgen.measure.lab.safety import UP_MM, Ended, RunDevices
-from sensorgen.measure.lab.sweeps import Sweeps
-from sensorgen.measure.lab.watch import Watch
+from sensorgen.measure.lab.watch import Sweeps, Watch
 
 PERIOD_S = 0.01
 _STAGE, _RIG_ROW, _VIEW = 10, 4, 5  # periods from one reading, row or picture to the next

@@ -20,7 +20,7 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import NotInstalled, OutOfRange, UnknownName
 from sensorgen.core.records import Line, Strict
-from sensorgen.measure.lab import scpi
+from sensorgen.measure.lab import meters
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import PYMEASURE, DeviceFault, Identity, Readings, Role, WrongDevice
 from sensorgen.measure.lab.port import faults
@@ -143,7 +143,7 @@ class _Meter:
             self._meter = type(model, (self._kind,), {"write": write})(self._address)
             if not self.name:
                 self._ask(self._meter)
-        return scpi.identity(model, self.name.rstrip(")"))
+        return meters.identity(model, self.name.rstrip(")"))
 
     def _ask(self, meter: Any) -> None:
         """Ask a meter that was sent nothing yet."""

@@ -11,7 +11,7 @@ from sensorgen.measure.lab import catalogue
 from sensorgen.measure.lab.clock import Clock, RealClock
 from sensorgen.measure.lab.devices import Meter
 from sensorgen.measure.lab.experiment import Device, Devices, Experiment
-from sensorgen.measure.lab.multimeter import Multimeter
+from sensorgen.measure.lab.meters import Multimeter
 from sensorgen.measure.lab.port import VisaPort
 from sensorgen.measure.lab.safety import RunDevices
 from sensorgen.measure.virtual import faults, mechanics, rig

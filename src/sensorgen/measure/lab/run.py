@@ -17,7 +17,7 @@ from sensorgen.core.errors import BadInput, SensorgenError, within
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design, load, make
 from sensorgen.measure.lab import experiment as experiments
-from sensorgen.measure.lab import plans, preflight, press, recorder, safety
+from sensorgen.measure.lab import plans, press, recorder, safety
 from sensorgen.measure.lab.clock import Clock, SimulatedClock
 from sensorgen.measure.lab.controls import Controls
 from sensorgen.measure.lab.devices import Identity, SelfLifting
@@ -154,14 +154,14 @@ def planned(experiment: Experiment, log: "Log | None" = None) -> PlannedRun:
 
 def design_of(experiment: Experiment, log: "Log | None") -> Design | None:
     """Design of the specimen: the virtual one's own, else that in the log, else the one that its name stands for."""
-    from sensorgen.measure.log import batches
+    from sensorgen.measure.log import prints
 
     if experiment.virtual and experiment.virtual.design:
         named = experiment.virtual.design
         with within("virtual.design"):
             return load(Path(named)) if Path(named).suffix else make({"shape": named})
     design_id, _ = notes.design_fields(experiment.specimen, log)
-    found = batches.designs(log).get(design_id) if log else None
+    found = prints.designs(log).get(design_id) if log else None
     try:
         return found or notes.design_of(experiment.specimen)
     except BadInput:
@@ -297,7 +297,7 @@ class _Attempt:
 
     def _worked(self, loop: Loop, listening: ExitStack) -> tuple[str, str]:
         """All of the run, but for its end."""
-        self.identities = preflight.identified(self.rig)
+        self.identities = press.identified(self.rig)
         loop.recorder.journal.note("identified", **{role: asdict(who) for role, who in self.identities.items()})
         if not self.confirm(self.plan, self.identities):
             raise Ended("abort", "not confirmed; nothing has moved")
@@ -315,7 +315,7 @@ class _Attempt:
         experiment = self.plan.experiment
         low, high = self._places_mm
         middle = experiment.approach.place_mm
-        preflight.prepared(loop, (low + high) / 2 if middle is None else middle)
+        press.prepared(loop, (low + high) / 2 if middle is None else middle)
         for step in self.plan.steps:
             loop.step = step.number
             if step.number not in self.done and not self._step(loop, step):

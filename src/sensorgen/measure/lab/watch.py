@@ -1,6 +1,7 @@
 """Watch the impedances of a run: means at rest and under a press, drift, short and open circuits, silence."""
 
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import nan
 
@@ -9,6 +10,40 @@ import numpy as np
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.measure.lab.devices import DeviceFault, Readings
 from sensorgen.measure.signal.presses import WINDOW_S
+
+
+@dataclass
+class Sweeps:
+    """Rows with some frequencies missing are put together; whole rows, and those without any number, pass as they are.
+
+    A row of several has the mean of their times; it waits until each of its frequencies was measured.
+    """
+
+    _row: Complex | None = None
+    _times: list[float] = field(default_factory=list)
+    _clipped: bool = False
+
+    def whole(self, found: Readings) -> Readings:
+        """Rows that are whole now."""
+        known = np.isfinite(found.impedance_ohm)
+        if (known.all(axis=1) | ~known.any(axis=1)).all():
+            return found
+        rows = zip(found.time_s.tolist(), found.impedance_ohm, found.clipped.tolist(), strict=True)
+        whole = [row for each in rows for row in self._taken(*each)]
+        return Readings.joined(whole, found.impedance_ohm.shape[1], found.lost)
+
+    def _taken(self, time_s: float, row: Complex, clipped: bool) -> Iterator[Readings]:
+        known = np.isfinite(row)
+        if not known.all() and known.any():
+            self._row = row if self._row is None else np.where(known, row, self._row)
+            self._times.append(time_s)
+            self._clipped |= clipped
+            if not np.isfinite(self._row).all():
+                return
+            time_s, row, clipped = float(np.mean(self._times)), self._row, self._clipped
+            self._row, self._times, self._clipped = None, [], False
+        yield Readings(np.array([time_s]), row[None], np.array([clipped]))
+
 
 SILENT_S = 5.0  # without a sound reading, a fault
 _OPEN_F = 0.3e-12  # less than any specimen with its leads

@@ -10,7 +10,7 @@ from typing import Any
 from sensorgen.core.document import Cell, Column, Facts, Part, Table
 from sensorgen.core.units import frequency_text, si
 from sensorgen.measure.immittance import shown_value
-from sensorgen.measure.log import facts
+from sensorgen.measure.log import bench
 from sensorgen.measure.log.entries import BenchRun, Entry, Prediction, Print, Reading, Withdrawal
 from sensorgen.measure.log.logbook import Log, conflict
 
@@ -94,7 +94,7 @@ class Detail:
             ("claimed", row.claimed_at),
         )
         doubts = (("doubtful", doubt) for doubt in getattr(row, "doubts", ()))
-        summary = facts.from_json(row.facts).words() if isinstance(row, BenchRun) else ()
+        summary = bench.from_json(row.facts).words() if isinstance(row, BenchRun) else ()
         rows = ((name, fact) for name, fact in (*known, *doubts, *summary, *self.remarks) if fact)
         yield Facts(tuple((f"  {name}", fact) for name, fact in rows))
 

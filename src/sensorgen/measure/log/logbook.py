@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import uuid
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -12,9 +13,10 @@ from typing import Any, Self, TypeVar
 
 from sensorgen.core import paths
 from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, UnknownName, within
-from sensorgen.measure.log import chain, database, files, schema
+from sensorgen.measure.log import chain, database, files
 from sensorgen.measure.log.chain import Record
 from sensorgen.measure.log.entries import (
+    INDEXED,
     KINDS,
     NAMES,
     REFERENCES,
@@ -31,9 +33,13 @@ from sensorgen.measure.log.entries import (
     RawFile,
     Reading,
     Specimen,
+    Value,
     Withdrawal,
+    columns,
+    decode,
+    encode,
+    word,
 )
-from sensorgen.measure.log.fields import INDEXED, Value, columns, decode, encode, word
 
 PLACE = "SENSORGEN_LOG"  # environment variable with another file
 _FROM_PRINT = ("batch", "design_id", "design")
@@ -583,7 +589,7 @@ class _Appender:
         self._numbers[record.kind] += not copy
         number = None if copy else self._numbers[record.kind]
         self.sequence, self.head = self.sequence + 1, record.id
-        schema.insert(self._connection, record, self.sequence, number)
+        database.insert(self._connection, record, self.sequence, number)
         return number or 0
 
     def finish(self) -> None:
@@ -635,3 +641,33 @@ def _record(row: Sequence[Any]) -> Record:
 
 def _parents(text: str) -> tuple[str, ...]:
     return tuple(text.split(",")) if text else ()
+
+
+def withdraw(log: Log, kind: str, number: int, reason: str) -> Entry:
+    """Log that a row is withdrawn.
+
+    Parameters
+    ----------
+    log : Log
+        An open log.
+    kind : str
+        Kind of the row: reading, recording, prediction, calibration, print, batch, design or raw-file.
+    number : int
+        Its number among its kind.
+    reason : str
+        Why; must not be empty.
+
+    Raises
+    ------
+    BadInput
+        No reason, no such row, or one that is out of use already.
+    """
+    if not reason.strip():
+        raise BadInput("an empty reason; expected why the row is withdrawn")
+    name = {"recording": "bench_run"}.get(kind, kind.replace("-", "_"))
+    row = next(log.entries(KINDS[name], superseded=True, number=number), None)
+    if row is None:
+        raise BadInput(
+            f"no {kind} {number} in the log {str(log.path)!r}; sensorgen log list and log show have the numbers"
+        )
+    return log.add([Withdrawal(uid=uuid.uuid4().hex, of=name, supersedes=row.uid, reason=reason)])[0]

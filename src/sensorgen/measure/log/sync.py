@@ -23,8 +23,7 @@ from sensorgen.core.errors import BadInput, Unwritable
 from sensorgen.core.records import shown
 from sensorgen.measure.log import files
 from sensorgen.measure.log.chain import Record
-from sensorgen.measure.log.entries import NAMES, RawFile
-from sensorgen.measure.log.fields import decode
+from sensorgen.measure.log.entries import NAMES, RawFile, decode
 from sensorgen.measure.log.logbook import Log
 
 MOST_BYTES = 2_000_000_000  # of an archive when unpacked

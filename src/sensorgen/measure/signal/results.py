@@ -8,12 +8,11 @@ import numpy as np
 
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.units import frequency_text
-from sensorgen.measure.log import facts
+from sensorgen.measure.log import bench
 from sensorgen.measure.recording import RigLog
 from sensorgen.measure.recording.samples import Complex, Real
-from sensorgen.measure.signal.hysteresis import Hysteresis, Ways
 from sensorgen.measure.signal.presses import Pairs
-from sensorgen.measure.signal.run import Processed
+from sensorgen.measure.signal.run import Hysteresis, Processed, Ways
 
 Values = tuple[float, ...]
 
@@ -120,10 +119,10 @@ class RecordingResult:
 
     def document(self) -> Iterator[Part]:
         """Samples, rig, drift, and a line for each press, or for each frequency at rest."""
-        lockin = facts.LockIn(self.tones_hz, self.counts, self.seconds, self.program, lockin=self.lockin)
+        lockin = bench.LockIn(self.tones_hz, self.counts, self.seconds, self.program, lockin=self.lockin)
         rig: Iterable[tuple[str, str]] = [("rig", "no log: forces and positions are not known")]
         if self.rig:
-            rig = facts.RigDay(self.rig["rows"], self.rig["errors"]).words()
+            rig = bench.RigDay(self.rig["rows"], self.rig["errors"]).words()
         rows = [*lockin.words(), *rig, *(("", note) for note in self.notes)]
         if self.drift is not None:
             rows.append(("drift", f"{self.drift:.2%} of Z over the run, fitted to the rest, taken out of the presses"))

@@ -15,7 +15,7 @@ import numpy as np
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings, WrongDevice
-from sensorgen.measure.signal.multisine import multisine
+from sensorgen.measure.signal.waveform import multisine
 from sensorgen.measure.virtual.plant import Plant
 
 FAULTS = ("unplugged", "hung", "data loss", "clipped", "nan", "silent", "generator off", "in use", "wrong device")

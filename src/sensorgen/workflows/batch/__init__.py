@@ -19,10 +19,9 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless
 from sensorgen.prediction.slices import reviewed
-from sensorgen.workflows.batch import picture, printing, record, sheet, tab
+from sensorgen.workflows.batch import labelling, layout, printing, record
 from sensorgen.workflows.batch.layout import Plate, Room, Size, column, packed, room
-from sensorgen.workflows.batch.pieces import PrintPiece, pieces, shuffled, texts, tools
-from sensorgen.workflows.batch.plan import BatchPlan, load
+from sensorgen.workflows.batch.plan import BatchPlan, PrintPiece, load, pieces, shuffled, texts, tools
 from sensorgen.workflows.batch.record import BatchRecord, ResolvedDesign, SlicedPlate
 from sensorgen.workflows.build import json_bytes, versions
 
@@ -137,7 +136,7 @@ def arranged(path: Path) -> Arranged:
 def _size(plan: BatchPlan, piece: PrintPiece) -> Size:
     """Length and width that a specimen takes on the plate, its tab included [mm]."""
     length, width, _ = piece.design.printed.size_mm
-    return (length + tab.size_mm(piece.design, piece.name)[0], width) if plan.labels.tab else (length, width)
+    return (length + labelling.size_mm(piece.design, piece.name)[0], width) if plan.labels.tab else (length, width)
 
 
 def make(
@@ -228,11 +227,11 @@ def _files(found: Arranged, log_head: str) -> Iterator[tuple[str, bytes]]:
     plan, machine = found.plan, found.pieces[0].design.machine
     for key, design in found.designs.items():
         yield f"designs/{key}.json", json_bytes(design.model_dump(mode="json"))
-    yield "plate.svg", picture.svg(plan.name, machine, found.room, found.plate, found.pieces).encode()
+    yield "plate.svg", layout.svg(plan.name, machine, found.room, found.plate, found.pieces).encode()
     if plan.labels.sheet:
         places = enumerate(found.plate, 1)
-        labels = [sheet.Label.of(found.pieces[n], plan.name, order, log_head) for order, n in places]
-        yield "labels.html", sheet.page(labels, plan.name).encode()
+        labels = [labelling.Label.of(found.pieces[n], plan.name, order, log_head) for order, n in places]
+        yield "labels.html", labelling.page(labels, plan.name).encode()
 
 
 def _record(

@@ -17,10 +17,9 @@ from sensorgen.export.slicing import Placed, Sliced
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import timeless
-from sensorgen.workflows.batch import tab
+from sensorgen.workflows.batch import labelling
 from sensorgen.workflows.batch.layout import Plate
-from sensorgen.workflows.batch.pieces import PrintPiece, texts, tools
-from sensorgen.workflows.batch.plan import BatchPlan
+from sensorgen.workflows.batch.plan import BatchPlan, PrintPiece, texts, tools
 from sensorgen.workflows.batch.record import PrintedDesign, SlicedPlate
 from sensorgen.workflows.build import json_bytes
 
@@ -30,7 +29,7 @@ def placed(plan: BatchPlan, pieces: Sequence[PrintPiece], plate: Plate) -> list[
     return [
         Placed(
             pieces[number].design, place.centre_mm, pieces[number].name,
-            tab.bodies(pieces[number].design, pieces[number].name) if plan.labels.tab else (),
+            labelling.bodies(pieces[number].design, pieces[number].name) if plan.labels.tab else (),
         )
         for number, place in plate.items()
     ]  # fmt: skip

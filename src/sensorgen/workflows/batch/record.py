@@ -15,8 +15,7 @@ from sensorgen.design import materials
 from sensorgen.export.gcode.check import Checked
 from sensorgen.prediction.results import Prediction
 from sensorgen.workflows.batch.layout import Plate, Rect
-from sensorgen.workflows.batch.pieces import PrintPiece
-from sensorgen.workflows.batch.plan import Bake, BatchPlan, Filament, Layout
+from sensorgen.workflows.batch.plan import Bake, BatchPlan, Filament, Layout, PrintPiece
 from sensorgen.workflows.sealed import seal
 
 if TYPE_CHECKING:

@@ -34,8 +34,7 @@ from sensorgen.export.threemf.part import part_of
 from sensorgen.scene.drawing import paper
 from sensorgen.scene.geometry import meshes
 from sensorgen.scene.scene import Body, Prism, box
-from sensorgen.workflows.batch.layout import Plate, packed, room
-from sensorgen.workflows.batch.picture import bed_of, bed_svg, middle
+from sensorgen.workflows.batch.layout import Plate, bed_of, bed_svg, middle, packed, room
 
 if TYPE_CHECKING:
     from shapely import Polygon

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import yaml
@@ -21,9 +21,6 @@ from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.scene import Piece
 from sensorgen.workflows.importing.assigning import Assigned
 from sensorgen.workflows.importing.reading import Assembly, ReadBody
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)

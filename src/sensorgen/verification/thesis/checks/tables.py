@@ -13,7 +13,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design import materials, printer
 from sensorgen.design.shapes import reference
-from sensorgen.measure.log import tables as readings
+from sensorgen.measure.log import importing as readings
 from sensorgen.measure.log.entries import Reading
 from sensorgen.measure.signal.verdicts import Evidence, verdict
 from sensorgen.prediction import electrodes
@@ -36,7 +36,7 @@ Printed = dict[str, float]
 @cache
 def _prints() -> list[Reading]:
     """Table D.1."""
-    return readings.thesis()
+    return readings.thesis_readings()
 
 
 def _named(material: str, quantity: str) -> tuple[str, str]:

@@ -1,6 +1,9 @@
-"""Impedance analysers HP (Agilent) 4284A and Keysight (Agilent) E4980A through VISA.
+"""Drivers of meters with SCPI: multimeters HP 34401A and Keithley 2000, analysers HP 4284A and Keysight E4980A.
 
-One frequency after the other: ``FREQ``, ``TRIG``, and when the time of the measurement is over ``FETC?``, which
+Multimeters: ``MEAS:RES?`` with two leads, ``MEAS:FRES?`` with four; both send 9.9E37 for an overload. PyMeasure's
+classes send other commands, some before ``*IDN?``, and give numbers, not the meter's words, which the log keeps.
+
+Analysers, one frequency after the other: ``FREQ``, ``TRIG``, and when the measurement's time is over ``FETC?``, which
 answers resistance, reactance and a status (0 good; -1, 1, 2 no value, which reads 9.9E37; 3, 4 signal not as set).
 ``FREQ?`` says that the value is of this frequency, to which the nearest of the instrument's is set. Each frequency is a
 row of its own, since a sweep of seven takes a second, in which a force changes. The level is an rms value for the
@@ -12,6 +15,7 @@ since the drivers of PyMeasure and QCoDeS block until a value is there, and each
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -20,10 +24,138 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.core.records import Strict
-from sensorgen.measure.lab import scpi
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings, WrongDevice
 from sensorgen.measure.lab.port import Port
+
+_READING = re.compile(r'[-+0-9.,E\s]*|[-+]?[0-9]+,".*"')  # numbers, or an entry of the list of errors
+_STALE = 4
+
+
+class ScpiInstrument:
+    """Part that all drivers share.
+
+    Parameters
+    ----------
+    port : Port
+        VISA, or a simulator.
+    timeout_s : float
+        Of one answer [s].
+    """
+
+    def __init__(self, port: Port, timeout_s: float) -> None:
+        self._port, self._timeout_s = port, timeout_s
+
+    def close(self) -> None:
+        """Give the connection back."""
+        self._port.close()
+
+    def _write(self, command: str) -> None:
+        self._port.write(command.encode() + b"\n")
+
+    def _query(self, command: str) -> str:
+        """Answer to a command, without its end; DeviceFault if none comes in time, or one that does not end."""
+        self._write(command)
+        return self._answer(command)
+
+    def _asked(self) -> str:
+        """Answer to ``*IDN?``, after readings that a program which has died did not fetch."""
+        said = self._query("*IDN?")
+        for _ in range(_STALE):
+            if not _READING.fullmatch(said):
+                break
+            said = self._answer("*IDN?")
+        return said
+
+    def _check(self, name: str) -> None:
+        """Refuse an error of the instrument."""
+        status = self._query("SYST:ERR?")
+        if not re.match(r"[-+]?0\b", status):
+            raise DeviceFault(f"{name} at {self._port.address} reports {status!r:.100}")
+
+    def _answer(self, command: str) -> str:
+        line = self._port.read_until(b"\n", self._timeout_s)
+        if not line.endswith(b"\n"):
+            said = f" to its end: {line!r:.60}" if line else ""
+            raise DeviceFault(f"{self._port.address} does not answer {command}{said}; check cable and power")
+        return line.decode("utf-8", "replace").strip()
+
+
+def identity(model: str, said: str) -> Identity:
+    """Identity by an answer to ``*IDN?``."""
+    serial, firmware = (*[field.strip() for field in said.split(",")][2:4], "", "")[:2]
+    return Identity(model, serial, firmware)
+
+
+TIMEOUT_S = 10.0  # an autoranging reading takes up to three
+KNOWN = {"34401A": "HP 34401A", "MODEL 2000": "Keithley 2000"}
+_QUERY = {2: "MEAS:RES?", 4: "MEAS:FRES?"}
+_NUMBER = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?(E[-+]?[0-9]{1,3})?", re.IGNORECASE)
+
+
+class Multimeter(ScpiInstrument):
+    """Driver of a multimeter.
+
+    Parameters
+    ----------
+    port : Port
+        VISA, or a simulator.
+    models : mapping of str to str
+        Which are expected: model in the answer to ``*IDN?``, and its name.
+
+    Attributes
+    ----------
+    name : str
+        Name and full answer to ``*IDN?``, once identified.
+    """
+
+    def __init__(self, port: Port, models: Mapping[str, str] = KNOWN) -> None:
+        super().__init__(port, TIMEOUT_S)
+        self.name, self._models = "", models
+
+    def identify(self) -> Identity:
+        """Ask ``*IDN?``, and forget errors from before.
+
+        Over RS-232, ``SYST:REM`` comes first: the 34401A accepts no other command before that.
+
+        Raises
+        ------
+        WrongDevice
+            Another instrument answers.
+        """
+        if self._port.address.upper().startswith("ASRL"):
+            self._write("SYST:REM")
+        said = self._asked()
+        fields = re.sub(r"\s*,\s*", ",", said)
+        name = next((name for model, name in self._models.items() if f",{model}," in fields.upper()), "")
+        if not name:
+            expected = " or ".join(self._models.values())
+            raise WrongDevice(f"{self._port.address} is {said!r:.80}; expected {expected}: or type it with --y, --z")
+        self.name = f"{name} ({said})"
+        self._write("*CLS")
+        return identity(name, said)
+
+    def resistance(self, *, wires: int) -> str:
+        """One autoranged reading as the meter sends it, as ``+6.50000000E+02`` [ohm].
+
+        Parameters
+        ----------
+        wires : int
+            2, or 4 with sense leads.
+
+        Raises
+        ------
+        DeviceFault
+            No answer in time, an answer that is no number, or an error of the meter.
+        """
+        if not self.name:
+            self.identify()
+        reply = self._query(_QUERY[wires])
+        if not _NUMBER.fullmatch(reply):
+            raise DeviceFault(f"{self.name} at {self._port.address} answers {reply!r:.60}; expected a resistance")
+        self._check(self.name)
+        return reply
+
 
 _ANSWER_S = 3.0
 _OVERLOAD = 9e37
@@ -56,7 +188,7 @@ E4980A = Model("E4980A", 2e6, {"SHOR": (0.016, 9), "MED": (0.1, 9), "LONG": (0.2
 LOWEST_HZ, LOWEST_V, HIGHEST_V = 20.0, 0.005, 2.0  # rms, without the option of 20 V
 
 
-class Settings(Strict):
+class LcrSettings(Strict):
     """Settings of the measurement.
 
     Attributes
@@ -68,7 +200,7 @@ class Settings(Strict):
     aperture: Literal["SHOR", "MED", "LONG"] = "MED"
 
 
-class LcrMeter(scpi.ScpiInstrument):
+class LcrMeter(ScpiInstrument):
     """Driver of an analyser.
 
     Parameters
@@ -83,9 +215,9 @@ class LcrMeter(scpi.ScpiInstrument):
         How it measures.
     """
 
-    def __init__(self, port: Port, clock: Clock, model: Model, settings: Settings | None = None) -> None:
+    def __init__(self, port: Port, clock: Clock, model: Model, settings: LcrSettings | None = None) -> None:
         super().__init__(port, _ANSWER_S)
-        self.model, self.settings, self._clock = model, settings or Settings(), clock
+        self.model, self.settings, self._clock = model, settings or LcrSettings(), clock
         self._tones_hz: Real = np.empty(0)
         self._next = 0
         self._begin_s = math.nan
@@ -104,7 +236,7 @@ class LcrMeter(scpi.ScpiInstrument):
         if len(fields) < 2 or fields[1].upper() not in (self.model.name, f"{self.model.name}L"):
             raise WrongDevice(f"{self._port.address} is {said!r:.80}; expected {self.model.name}")
         self._known = True
-        return scpi.identity(f"{fields[0]} {fields[1]}", said)
+        return identity(f"{fields[0]} {fields[1]}", said)
 
     def start(self, tones_hz: Real, voltage_v: float) -> None:
         """Begin to measure at (m,) frequencies with an amplitude, which is the rms level times the root of 2 [Hz], [V].
