@@ -81,7 +81,7 @@ def advise(
         Of the budget, by the prediction of the design itself [s].
     """
     search = AdviceSearch(design, now, budget_s, step, time.process_time() - spent_s)
-    search.run()
+    search.run(search.start())
     return search.advice()
 
 
@@ -94,10 +94,8 @@ class AdviceSearch(Nearest):
         self.kept, self.nearest, self.untried = list[Candidate](), list[Candidate](), list[Candidate]()
         self.checked = self.predicted = 0
 
-    def more(self) -> Iterator[Candidate]:
+    def start(self) -> Iterator[Candidate]:
         """The best known designs of the shape, those of the shortest prediction first; the design; it on the grid."""
-        if self.seen:
-            return
         for known in sorted(best.of(self.base.shape), key=lambda known: known.seconds):
             yield from (one for one in self.changed(dict(known.changes()), origin=known) if one.values)
         starts = moves.onto_grid(self.base) if "grid" in moves.kinds(self.now.findings) else []

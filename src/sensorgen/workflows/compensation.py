@@ -117,7 +117,7 @@ def compensated(
     wanted = dict(asked) | {GAP: _attainable_mm(now, asked[GAP])}
     is_near = abs(_off(wanted, asked, GAP)) <= WITHIN[GAP]
     search = CompensationSearch(now, wanted, walls, sliced if is_near else None, step)
-    search.run()
+    search.run(search.changed({}))
     before, after = search.first, search.best or search.nearest()
     printed = search.quantities(after)
     if not (search.best and is_near):
@@ -261,10 +261,6 @@ class CompensationSearch(Nearest):
             return round(gap, 6), sum(others)
 
         return min(self.prints or self.estimates, key=distance)
-
-    def more(self) -> Iterable[Candidate]:
-        """The design as it is."""
-        return () if self.seen else self.changed({})
 
     def order(self, one: Candidate) -> tuple[float, ...]:
         """Distance; of a width that a capacitance leads to, half way from the design before."""

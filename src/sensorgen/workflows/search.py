@@ -106,10 +106,6 @@ class Search:
         self.heap: list[tuple[tuple[float, ...], int, Candidate]] = []
         self.pushed = 0
 
-    def more(self) -> Iterable[Candidate]:
-        """Candidates to go on with where none is left; none ends the search."""
-        raise NotImplementedError
-
     def order(self, one: Candidate) -> tuple[float, ...]:
         """Key of a candidate: the least is next."""
         raise NotImplementedError
@@ -130,8 +126,8 @@ class Search:
         """Test whether nothing more is to be looked at."""
         return False
 
-    def batch(self, first: Candidate) -> int:  # noqa: ARG002
-        """Number of candidates that are looked at together with one [-]."""
+    def batch(self, stage: int) -> int:  # noqa: ARG002
+        """Number of candidates at a step that are looked at together [-]."""
         return 1
 
     def results(self, some: Sequence[Candidate]) -> Iterator[tuple[Candidate, Any]]:
@@ -149,28 +145,17 @@ class Search:
             self.pushed += 1
             heappush(self.heap, (self.order(one), self.pushed, one))
 
-    def run(self) -> None:
-        """Look at candidates until none is left, or the target has enough."""
-        self.push(self.more())
+    def run(self, start: Iterable[Candidate]) -> None:
+        """Look at candidates, from some on, until none is left, or the target has enough."""
+        self.push(start)
         while self.heap and not self.is_over():
-            for one, answer in self.results(self._next()):
+            stage, some = self.heap[0][-1].stage, list[Candidate]()
+            while self.heap and self.heap[0][-1].stage == stage and len(some) < self.batch(stage):
+                one = heappop(self.heap)[-1]
+                some += [one] * self.is_wanted(one)
+            for one, answer in self.results(some):
                 one.stage += 1
                 self.push(self.take(one, answer))
-            if not self.heap:
-                self.push(self.more())
-
-    def _next(self) -> list[Candidate]:
-        """The first of those that are open, and others at the same step."""
-        some: list[Candidate] = []
-        while self.heap and (not some or self._is_alike(some)):
-            one = heappop(self.heap)[-1]
-            if self.is_wanted(one):
-                some.append(one)
-        return some
-
-    def _is_alike(self, some: Sequence[Candidate]) -> bool:
-        """Test whether the next candidate is looked at together with some."""
-        return len(some) < self.batch(some[0]) and self.heap[0][-1].stage == some[0].stage
 
 
 class Nearest(Search):
