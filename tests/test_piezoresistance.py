@@ -18,11 +18,11 @@ from sensorgen.models import compression, line
 from sensorgen.models.pressure import bed, hertz
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.bodies import drawn as drawn_body
-from sensorgen.prediction.double_layer.designs import stack_of
+from sensorgen.prediction.double_layer import stack_of
 from sensorgen.prediction.error_budget import error_budget
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.grid import check_presses
 from sensorgen.prediction.inverse.forward import Forward
+from sensorgen.prediction.loaded import check_presses
 from sensorgen.prediction.query import Load, Query
 from sensorgen.prediction.sheet_study import _press
 

@@ -18,7 +18,7 @@ from sensorgen.models.overlap import edge_fringe_f
 from sensorgen.prediction import bodies, compression_law
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.inverse.forward import Forward
-from sensorgen.prediction.narrowing import MULTIMETER, WEIGHT, WIDE
+from sensorgen.prediction.quantities import MULTIMETER, WEIGHT, WIDE
 from sensorgen.prediction.results import _change
 
 pytestmark = pytest.mark.usefixtures("shared_cache")
