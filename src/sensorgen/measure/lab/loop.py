@@ -9,10 +9,9 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex
 from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.controls import Controls
 from sensorgen.measure.lab.devices import DeviceFault, Extension, Place
 from sensorgen.measure.lab.experiment import Experiment
-from sensorgen.measure.lab.live import Sample
+from sensorgen.measure.lab.live import Controls, Sample
 from sensorgen.measure.lab.recorder import Recorder
 from sensorgen.measure.lab.safety import UP_MM, Ended, RunDevices
 from sensorgen.measure.lab.watch import Sweeps, Watch

@@ -6,8 +6,8 @@ import numpy as np
 
 from sensorgen.core.errors import within
 from sensorgen.measure.lab.devices import DeviceFault, Identity
+from sensorgen.measure.lab.experiment import AVERAGED_S, DonePress, PlannedPress
 from sensorgen.measure.lab.loop import Loop
-from sensorgen.measure.lab.plans import AVERAGED_S, DonePress, PlannedPress
 from sensorgen.measure.lab.safety import RAISED_MM, UP_MM, Ended, RunDevices
 
 _STUCK_S, _TRAVEL_S, _LAND_S = 0.5, 120.0, 60.0  # a piston that rises not at all; longest move and landing

@@ -17,13 +17,12 @@ from sensorgen.core.errors import BadInput, SensorgenError, within
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design, load, make
 from sensorgen.measure.lab import experiment as experiments
-from sensorgen.measure.lab import plans, press, recorder, safety
+from sensorgen.measure.lab import press, recorder, safety
 from sensorgen.measure.lab.clock import Clock, SimulatedClock
-from sensorgen.measure.lab.controls import Controls
 from sensorgen.measure.lab.devices import Identity, SelfLifting
-from sensorgen.measure.lab.experiment import Experiment, Next
+from sensorgen.measure.lab.experiment import Choice, DonePress, Experiment, Next, NextPress, PlannedPress
+from sensorgen.measure.lab.live import Controls
 from sensorgen.measure.lab.loop import Alive, Loop, Paused, Predicted, RunView
-from sensorgen.measure.lab.plans import Choice, DonePress, NextPress, PlannedPress
 from sensorgen.measure.lab.recorder import Recorder, RunFolder
 from sensorgen.measure.lab.safety import Ended, RunDevices
 from sensorgen.measure.lab.watch import Watch
@@ -145,9 +144,9 @@ def planned(experiment: Experiment, log: "Log | None" = None) -> PlannedRun:
         notes.specimen(experiment.specimen, log)
     length = experiment.length_mm or _length_mm(design_of(experiment, log))
     experiments.check(experiment, length, 0.0)  # its places, before presses are made of them
-    steps = plans.steps(experiment, length)
+    steps = experiments.steps(experiment, length)
     holds = [part.content.hold_s[1] for part in experiment.plan if isinstance(part.content, Next)]
-    seconds = plans.seconds(steps, max(holds, default=0.0))
+    seconds = experiments.seconds(steps, max(holds, default=0.0))
     experiments.check(experiment, length, seconds)
     return PlannedRun(experiment, length, tuple(steps), seconds)
 
@@ -324,7 +323,7 @@ class _Attempt:
             if most and loop.presses >= most and self.done < {each.number for each in self.plan.steps}:
                 raise Ended("rule", f"stop.presses: {most} presses are done")
         loop.message = "last rest"
-        loop.wait(plans.AVERAGED_S)
+        loop.wait(experiments.AVERAGED_S)
         return "done", "all presses are done"
 
     @property
@@ -367,7 +366,7 @@ class _Attempt:
         interval = self.plan.experiment.stop.interval
         if interval and choice.interval <= interval:
             return None
-        made = plans.chosen(step, choice, self.plan.experiment.approach)
+        made = experiments.chosen(step, choice, self.plan.experiment.approach)
         experiments.check_press(
             self.plan.experiment, max(made.force_n, made.peak_n), made.place_mm, self.plan.length_mm
         )  # fmt: skip

@@ -19,10 +19,9 @@ from sensorgen.measure.lab import experiment as experiments
 from sensorgen.measure.lab import recorder, rigs
 from sensorgen.measure.lab.clock import Clock, RealClock, SimulatedClock
 from sensorgen.measure.lab.devices import DeviceFault, Identity, ImpedanceMeter, Readings
-from sensorgen.measure.lab.experiment import Experiment, Next
+from sensorgen.measure.lab.experiment import Choice, DonePress, Experiment, Next
 from sensorgen.measure.lab.guardian import Guardian, Orders
 from sensorgen.measure.lab.live import LiveText, LiveView, Sample
-from sensorgen.measure.lab.plans import Choice, DonePress
 from sensorgen.measure.lab.run import Confirm, RunResult, design_of, planned, run
 from sensorgen.measure.lab.safety import RunDevices
 from sensorgen.prediction.calibration.fitting import NOISE, Data, Posterior, by_rest, calibrated
@@ -111,7 +110,7 @@ _OF = {"resistance": "resistance", "capacitance": "capacitance", "rise": "law"} 
 
 @dataclass(frozen=True, eq=False)
 class ByModel:
-    """The choice by a specimen's model; a :data:`sensorgen.measure.lab.plans.NextPress`.
+    """The choice by a specimen's model; a :data:`sensorgen.measure.lab.experiment.NextPress`.
 
     Attributes
     ----------

@@ -9,7 +9,7 @@ import numpy as np
 
 from sensorgen.core.errors import BadInput, within
 from sensorgen.measure.input_file import checked_head
-from sensorgen.measure.recording import clock
+from sensorgen.measure.recording import samples
 from sensorgen.measure.recording.samples import (
     MOST_TONES,
     MOST_VALUES,
@@ -71,7 +71,7 @@ def _stretch(path: Path, file: "Readings", held: list[tuple[Complex, Real]]) -> 
     beside = dict(zip(file.numbers, np.concatenate([numbers for _, numbers in held]).T, strict=True))
     held.clear()
     with within(str(path)):
-        rebuilt = clock.rebuilt(len(impedance), beside.get(TIME), beside.get(STAMP))
+        rebuilt = samples.rebuilt(len(impedance), beside.get(TIME), beside.get(STAMP))
     marks = blank(len(impedance)) | rebuilt.marks | sifted(impedance)
     if CLIPPED in beside:
         marks["clipped"] = beside[CLIPPED] == 1

@@ -18,9 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording.clock import MAX_SKEW
 from sensorgen.measure.recording.rig import RigLog
-from sensorgen.measure.recording.samples import Complex, Real, Recording
+from sensorgen.measure.recording.samples import MAX_SKEW, Complex, Real, Recording
 
 _FINE_S = 0.02  # grid of a relaxation
 _MOST_GRID = 1 << 21  # 11.6 h of the fine one

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import BadInput, within
-from sensorgen.measure.recording import clock
+from sensorgen.measure.recording import samples
 from sensorgen.measure.recording.matfive import Split
 from sensorgen.measure.recording.samples import (
     MOST_TONES,
@@ -204,7 +204,7 @@ class _LockIn:
         for half, part in zip((z.real, z.imag), self.parts, strict=False):
             half[:] = part[at]
         with within(f"impedance_time of {self.name}"):
-            rebuilt = clock.rebuilt(len(z), time, stamps)
+            rebuilt = samples.rebuilt(len(z), time, stamps)
         rate, bandwidth = rate_hz(rebuilt.time_s), _number(self.settings, "bandwidth")
         marks = blank(len(z)) | rebuilt.marks | sifted(z) | {"clipped": self.clipping(np.asarray(time))}
         if at.start == 0 and bandwidth > 0 and np.isfinite(rate):  # until the demodulator's filter has settled

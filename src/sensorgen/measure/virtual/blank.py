@@ -16,9 +16,8 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design, Slots
 from sensorgen.design.values import film, material_value, of_all_materials, resistivities
-from sensorgen.measure.virtual.bricks import bricks
 from sensorgen.measure.virtual.cell import AIR, CellBricks, SectionRaster, Solid, capacitance, conductance, pressed
-from sensorgen.measure.virtual.section import FINE_MM, raster, section_of
+from sensorgen.measure.virtual.section import FINE_MM, bricks, raster, section_of
 from sensorgen.scene.scene import Scene
 
 if TYPE_CHECKING:
