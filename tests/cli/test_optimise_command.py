@@ -162,9 +162,7 @@ def test_discards_on_a_coarse_mesh_hold_or_are_taken_back(monkeypatch):
 
     def lying(design, query, solve):
         film = design.params.dielectric_mm
-        return {
-            "force_resolution_n": EarlyNumber(film if film != 0.4 else 9.0, film if film != 0.4 else 9.0, False)
-        }
+        return {"force_resolution_n": EarlyNumber(film if film != 0.4 else 9.0, film if film != 0.4 else 9.0, False)}
 
     monkeypatch.setattr(ladder, "known", lying)
     search_ = found(objectives={"force_resolution_n": "minimise"})

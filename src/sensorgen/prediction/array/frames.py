@@ -358,8 +358,8 @@ class MapInverter:
         phase = float(np.degrees(np.arctan2(np.abs(nominal.imag), np.abs(nominal.real)).min()))
         if not self.parts[0].any() and phase < _LEAST_PHASE:
             raise BadInput(
-                f"capacitances alone at {si(self.readout.frequency_hz[0], 'Hz')}: resistance of the tracks turns the phase "
-                f"to {phase:.0f} degrees, where two of them give one reading; expected siemens, or a lower frequency"
+                f"capacitances alone at {si(self.readout.frequency_hz[0], 'Hz')}: resistance of the tracks turns the "
+                f"phase to {phase:.0f} degrees, where two of them give one reading; expected siemens, or a lower frequency"
             )
 
     def _median(self, siemens: Complex) -> str:
