@@ -359,7 +359,8 @@ class MapInverter:
         if not self.parts[0].any() and phase < _LEAST_PHASE:
             raise BadInput(
                 f"capacitances alone at {si(self.readout.frequency_hz[0], 'Hz')}: resistance of the tracks turns the "
-                f"phase to {phase:.0f} degrees, where two of them give one reading; expected siemens, or a lower frequency"
+                f"phase to {phase:.0f} degrees, where two of them give one reading; "
+                "expected siemens, or a lower frequency"
             )
 
     def _median(self, siemens: Complex) -> str:
