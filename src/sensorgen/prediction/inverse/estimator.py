@@ -391,8 +391,7 @@ class Estimator:
         ambiguous = np.zeros(len(z), bool)
         ambiguous[found.rows] = True
         status = statuses(found.best, own[:, _DIAGONAL, _DIAGONAL], tones, ambiguous)
-        known = self._known(target, found.best)
-        return self._in_si(found, known, status, tones)
+        return self._in_si(found, self._known(target, found.best), status, tones)
 
     def _known(self, target: FitGoal, fit: LocalFit) -> PressPosterior:
         """Means, covariances and intervals of scaled presses."""
