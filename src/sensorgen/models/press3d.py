@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Scene
@@ -33,19 +32,15 @@ __all__ = [
     "BoundaryConditions",
     "BrickCounts",
     "Elastic",
-    "MeshLimit",
     "Pressed",
     "cell",
     "compared",
-    "limit",
     "press",
     "why_not_applicable",
 ]  # fmt: skip
 
 _STEP = 1 / 60  # longest load step over the least Young's modulus: 100 kPa for 6 MPa [-]
 _MOST = 4000  # solid bricks: more would take hours
-_ORDER = 2  # power of the number of pieces with which the mesh's error falls, as another program shows it [-]
-_DOUBT = 0.5  # error of where two meshes lead, over how far that is beyond the finer one; 0.25 was seen [-]
 _OPEN = (1e-4, 1e-3, 1e-2, 5e-2, 0.15)  # least height of a gap in the field over that as drawn, tried in turn [-]
 
 
@@ -56,64 +51,6 @@ class BrickCounts:
     pieces: int = 3
     shrink: float = 0.3
     orders: FieldOrders = field(default_factory=FieldOrders)
-
-
-@dataclass(frozen=True)
-class MeshLimit:
-    """Where two meshes lead (Richardson's extrapolation), and by how much that may be off: an estimate.
-
-    Attributes
-    ----------
-    found : Pressed
-        Displacement and rise of the capacitance for pieces without end; bounds of the field as on the finer mesh.
-    displacement_error_m : (n,) array
-        Of the displacement [m]; infinite above the coarser mesh's last pressure, and where both meshes are one.
-    rise_f_per_m2, rise_error_f_per_m2 : (n,) array
-        C(p) - C(0), NaN where unknown, and its error [F/m2].
-    """
-
-    found: Pressed
-    displacement_error_m: Real
-    rise_f_per_m2: Real
-    rise_error_f_per_m2: Real
-
-
-def limit(fine: Pressed, coarse: Pressed, pieces: int) -> MeshLimit:
-    """Extrapolate displacement and rise from two meshes.
-
-    Parameters
-    ----------
-    fine, coarse : Pressed
-        With ``pieces`` and with one piece less; the coarser one at some of the pressures, 0 among them.
-    pieces : int
-        2 or more.
-
-    Notes
-    -----
-    The rise is nearer than the capacitance: one mesh is deformed, so that its bounds err alike before and after. Half
-    of the difference of their rises counts as the field's error.
-    """
-    n, at = len(fine.stress_pa), np.searchsorted(fine.stress_pa, coarse.stress_pa)
-    following = np.searchsorted(at, np.arange(n))  # the next shared pressure
-    further = (pieces - 1) ** _ORDER / (pieces**_ORDER - (pieces - 1) ** _ORDER)
-    down = fine.displacement_m - fine.fall_m
-    bounds = [np.array([(c.lower, c.upper) if c else (np.nan,) * 2 for c in f.capacitance_f_per_m2])
-              for f in (fine, coarse)]  # fmt: skip
-    rises, others = (found - found[0] for found in bounds)
-    same = np.array_equal(fine.displacement_m[at], coarse.displacement_m)
-    ways, errors = [], []
-    for own, other in ((down, coarse.displacement_m - coarse.fall_m), (rises.mean(axis=1), others.mean(axis=1))):
-        shares = further * (1 - np.divide(other[1:], own[at][1:]))
-        ways.append(np.append(np.append(0.0, shares), shares[-1:])[following] * own if shares.size else 0.0 * own)
-        doubts = np.append(np.append(0.0, abs(shares)), np.inf)[following]
-        errors.append(np.where(np.arange(n), np.inf if same else _DOUBT * doubts * abs(own), 0.0))
-    shifted = tuple(
-        Interval(c.lower + way, c.upper + way) if c else None
-        for c, way in zip(fine.capacitance_f_per_m2, ways[1].tolist(), strict=True)
-    )
-    found = replace(fine, displacement_m=fine.displacement_m + ways[0], capacitance_f_per_m2=shifted)
-    field = abs(np.diff(rises)[:, 0]) / 2
-    return MeshLimit(found, errors[0], rises.mean(axis=1) + ways[1], errors[1] + field)
 
 
 def why_not_applicable(scene: Scene) -> str | None:

@@ -1,10 +1,9 @@
 """Capacitance per area of a body between bounds, unloaded: the result of ``sensorgen cell``."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from math import inf
-from typing import Annotated, Any
+from typing import Annotated
 
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Facts, Part, Table
@@ -14,8 +13,7 @@ from sensorgen.design.values import MaterialValue
 from sensorgen.prediction import rest_state
 from sensorgen.prediction.capacitance import Unpredictable, default_width, of_sensor
 from sensorgen.prediction.plan import PlanCandidate, candidates_table
-from sensorgen.prediction.sweep import Sweep
-from sensorgen.prediction.sweep import sweep as swept
+from sensorgen.prediction.sweep import Sweeper
 
 QUANTITIES = {
     "relative_permittivity": "relative permittivity",
@@ -194,19 +192,8 @@ def answer(body: Body, asked: CapacitanceQuestion) -> CellCapacitance:
     )  # fmt: skip
 
 
-def sweep(
-    key: str | tuple[str, ...], points: Sequence[tuple[Any, Body]], asked: CapacitanceQuestion, jobs: int,
-    done: Callable[[], None], cluster: str = "",
-) -> Sweep[CellCapacitance]:  # fmt: skip
-    """Answers along a sweep; a reason stands in place of what no model applies to, or at which one fails.
-
-    Parameters and errors as of :func:`answer` and :func:`sensorgen.prediction.sweep.sweep`.
-    """
-    work = partial(answer, asked=asked)
-    return swept(
-        key, points, work, _failed, refused=(Unpredictable,), keep=asked.keep, jobs=jobs, cluster=cluster, done=done
-    )
-
-
 def _failed(body: Body, reason: str) -> CellCapacitance:
     return CellCapacitance(design=body.design.name, body=body.provenance, reason=reason)
+
+
+sweep = Sweeper(answer, _failed, refused=(Unpredictable,))

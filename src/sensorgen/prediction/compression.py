@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
 from math import inf, isfinite, nan
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +40,7 @@ from sensorgen.prediction.mesh_ladder import (
 )
 from sensorgen.prediction.plan import Level, Plan, PlanCandidate, cheapest, run_until_within
 from sensorgen.prediction.sensor_model import piece as piece_of
-from sensorgen.prediction.sweep import Sweep
-from sensorgen.prediction.sweep import sweep as swept
+from sensorgen.prediction.sweep import Sweeper
 
 
 @dataclass(frozen=True)
@@ -359,25 +357,11 @@ def answer(body: Body, asked: PressQuestion, *, step: Step | None = None) -> Com
         return _unsolved(body, asked, str(error))
 
 
-def sweep(
-    key: str | tuple[str, ...],
-    points: Sequence[tuple[Any, Body]],
-    asked: PressQuestion,
-    jobs: int,
-    done: Callable[[], None],
-    cluster: str = "",
-) -> Sweep[CompressionResult]:
-    """Answers along a sweep; a reason stands in place of a point that has no answer.
-
-    Parameters and errors as of :func:`answer` and :func:`sensorgen.prediction.sweep.sweep`.
-    """
-    alone = (BadInput, MissingValue, OutOfRange, Unpredictable)
-    work = partial(answer, asked=asked)
-    return swept(key, points, work, _failed, refused=alone, keep=asked.keep, jobs=jobs, cluster=cluster, done=done)
-
-
 def _failed(body: Body, reason: str) -> CompressionResult:
     return CompressionResult(design=body.design.name, body=body.provenance, reason=reason)
+
+
+sweep = Sweeper(answer, _failed, refused=(BadInput, MissingValue, OutOfRange, Unpredictable))
 
 
 def planned(body: Body, asked: PressQuestion) -> Plan:
@@ -394,17 +378,22 @@ def planned(body: Body, asked: PressQuestion) -> Plan:
     if model in CLOSED_FORMS:
         why = f"--model {model}" if asked.model else why_not_applicable(piece, MODELS[0])
         raise BadInput(f"an accuracy of C, and {why}: {model} tells {_NO_C}; leave out --accuracy")
-    candidates = []
-    for name in ALL:
-        if name != model:
-            without_c = _NO_C if name in CLOSED_FORMS else ""
-            unfit = without_c or why_not_applicable(piece, name) or "the model before it applies to the cell"
-            candidates.append(PlanCandidate(name, passed_over=f"--model {model}" if asked.model else unfit))
+    passed_over = [
+        PlanCandidate(name, passed_over=f"--model {model}" if asked.model else _unfit(piece, name))
+        for name in ALL if name != model
+    ]  # fmt: skip
     meshes = _mesh_levels(piece, model, asked)
-    candidates += [PlanCandidate(mesh.name, max(mesh.rise_error, VERIFIED), mesh.seconds) for mesh in meshes]
-    chosen = cheapest(tuple(candidates), asked.accuracy)
-    level = Level("compression", _MEASURE, asked.accuracy, tuple(candidates), chosen)
+    reach = [PlanCandidate(mesh.name, max(mesh.rise_error, VERIFIED), mesh.seconds) for mesh in meshes]
+    candidates = (*passed_over, *reach)
+    level = Level("compression", _MEASURE, asked.accuracy, candidates, cheapest(candidates, asked.accuracy))
     return Plan(asked.accuracy, f"the rise of C up to {asked.stress_kpa[-1]:g} kPa", (level,))
+
+
+def _unfit(piece: PressedPiece, name: str) -> str:
+    """Why a model is not the one of a piece whose capacitance is to reach an accuracy."""
+    if name in CLOSED_FORMS:
+        return _NO_C
+    return why_not_applicable(piece, name) or "the model before it applies to the cell"
 
 
 def _model(body: Body, asked: PressQuestion) -> str:
@@ -465,32 +454,38 @@ def _result(body: Body, case: Case, estimate: Estimate, asked: PressQuestion) ->
     """
     from sensorgen.solvers.contact.cell import BLOCK
 
-    found, first, tip = estimate.found, estimate.found.capacitance_f_per_m2[0], asked.tip or body.design.tip.tip()
-    try:
-        rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
-    except Unpredictable:
-        rest = None
-    known, factor = first, 1.0
-    if first and rest and rest.lower_f_per_m2 is not None and rest.upper_f_per_m2 is not None:
-        known = Interval(rest.lower_f_per_m2, rest.upper_f_per_m2)
-        apart = known.upper < first.lower or first.upper < known.lower
-        factor = known.middle() / first.middle() if apart else 1.0
+    solution, tip = estimate.found, asked.tip or body.design.tip.tip()
+    rest, factor = _known_at_rest(body, asked, solution.capacitance_f_per_m2[0])
     rise, off = factor * estimate.rise_f_per_m2, factor * estimate.rise_error_f_per_m2
-    lower, upper = (rise - off + known.lower, rise + off + known.upper) if known else (nan + rise, nan + rise)
-    down, up = estimate.relative() if not found.faults else (inf, inf)
+    lower, upper = (rise - off + rest.lower, rise + off + rest.upper) if rest else (nan + rise, nan + rise)
+    errors = (inf, inf) if solution.faults else estimate.relative()
+    displacement_error, rise_error = (error if error < inf else None for error in errors)
     return CompressionResult(
         design=body.design.name, body=body.provenance, model=case.model,
         held=vars(case.boundary) | ({"top": tip.material} if BLOCK in case.solids else {}),
-        stress_kpa=tuple(p / _PA_PER_KPA for p in found.stress_pa.tolist()),
-        displacement_um=tuple(d * _UM_PER_M for d in found.displacement_m.tolist()),
+        stress_kpa=tuple(p / _PA_PER_KPA for p in solution.stress_pa.tolist()),
+        displacement_um=tuple(d * _UM_PER_M for d in solution.displacement_m.tolist()),
         displacement_error_um=_known(_UM_PER_M * estimate.displacement_error_m),
         rise_f_per_m2=_known(rise), rise_error_f_per_m2=_known(off),
         lower_f_per_m2=_known(lower), upper_f_per_m2=_known(upper),
-        converged_kpa=found.converged_pa / _PA_PER_KPA, faults=found.faults, bounds=_OF_BOTH,
-        doubts=(*found.doubts, *_assumed(body.design)),
-        largest_rise_error=up if up < inf else None, largest_displacement_error=down if down < inf else None,
+        converged_kpa=solution.converged_pa / _PA_PER_KPA, faults=solution.faults, bounds=_OF_BOTH,
+        doubts=(*solution.doubts, *_assumed(body.design)),
+        largest_rise_error=rise_error, largest_displacement_error=displacement_error,
         tops=dict(_under_tops(body, case, estimate, tip)),
     )  # fmt: skip
+
+
+def _known_at_rest(body: Body, asked: PressQuestion, first: Interval | None) -> tuple[Interval | None, float]:
+    """Capacitance at rest per area, and its ratio to the ``first`` of a pressed period: 1 where both may be equal."""
+    try:
+        rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
+    except Unpredictable:
+        return first, 1.0
+    if not first or rest.lower_f_per_m2 is None or rest.upper_f_per_m2 is None:
+        return first, 1.0
+    known = Interval(rest.lower_f_per_m2, rest.upper_f_per_m2)
+    apart = known.upper < first.lower or first.upper < known.lower
+    return known, known.middle() / first.middle() if apart else 1.0
 
 
 def _under_tops(

@@ -40,6 +40,8 @@ _AT_APEX = 8.0  # added error where triangles at an apex are as large as the dis
 _AT_APEX_POWER = 2  # of their size over the displacement
 VERIFIED = 7.5e-3  # error of the rise below which nothing is stated: other programs agree with this one to 0.6 % [-]
 _OF_DISPLACEMENT = 0.6  # error of the displacement over that of the rise, as expected [-]
+_PIECES_ORDER = 2  # power of the number of pieces with which the mesh's error falls, as another program shows it [-]
+_DOUBT = 0.5  # error of where two meshes lead, over how far that is beyond the finer one; 0.25 was seen [-]
 _APART = 4  # loads of the fine mesh to one of the coarse mesh
 _ARRAYS = ("stress_pa", "displacement_m", "volume_ratio", "penetration", "imbalance")
 _TUPLES = ("faults", "doubts", "carried", "apex_m")
@@ -294,11 +296,50 @@ def estimated(
     return (_limit if case.model == "press3d" else _errors)(case, found, coarse, level)
 
 
+def limit(fine: "Pressed", coarse: "Pressed", pieces: int) -> Estimate:
+    """Extrapolate displacement and rise from two meshes of boxes (Richardson), to pieces without end.
+
+    Bounds of the field are as wide as on the finer mesh. An error is infinite above the coarser mesh's last pressure,
+    and where both meshes are one.
+
+    Parameters
+    ----------
+    fine, coarse : Pressed
+        With ``pieces`` and with one piece less; the coarser one at some of the pressures, 0 among them.
+    pieces : int
+        2 or more.
+
+    Notes
+    -----
+    The rise is nearer than the capacitance: one mesh is deformed, so that its bounds err alike before and after. Half
+    of the difference of their rises counts as the field's error.
+    """
+    n, at = len(fine.stress_pa), np.searchsorted(fine.stress_pa, coarse.stress_pa)
+    following = np.searchsorted(at, np.arange(n))  # the next shared pressure
+    further = (pieces - 1) ** _PIECES_ORDER / (pieces**_PIECES_ORDER - (pieces - 1) ** _PIECES_ORDER)
+    down = fine.displacement_m - fine.fall_m
+    rises, others = (ends - ends[0] for ends in map(_ends, (fine, coarse)))
+    same = np.array_equal(fine.displacement_m[at], coarse.displacement_m)
+    ways, errors = [], []
+    for own, other in ((down, coarse.displacement_m - coarse.fall_m), (rises.mean(axis=1), others.mean(axis=1))):
+        shares = further * (1 - np.divide(other[1:], own[at][1:]))
+        ways.append(np.append(np.append(0.0, shares), shares[-1:])[following] * own if shares.size else 0.0 * own)
+        doubts = np.append(np.append(0.0, abs(shares)), np.inf)[following]
+        errors.append(np.where(np.arange(n), np.inf if same else _DOUBT * doubts * abs(own), 0.0))
+    shifted = tuple(
+        Interval(c.lower + way, c.upper + way) if c else None
+        for c, way in zip(fine.capacitance_f_per_m2, ways[1].tolist(), strict=True)
+    )
+    found = replace(fine, displacement_m=fine.displacement_m + ways[0], capacitance_f_per_m2=shifted)
+    field = abs(np.diff(rises)[:, 0]) / 2
+    return Estimate(found, errors[0], rises.mean(axis=1) + ways[1], errors[1] + field)
+
+
 def _limit(case: Case, fine: "Pressed", coarse: "Pressed", level: int) -> Estimate:
     """Where two meshes of boxes lead, with at least the error that this has on other cells."""
     from sensorgen.models import press3d
 
-    ahead = press3d.limit(fine, coarse, press3d.BrickCounts().pieces + level)
+    ahead = limit(fine, coarse, press3d.BrickCounts().pieces + level)
     least = max(_expected(case, level), VERIFIED)
     down = ahead.found.displacement_m - fine.fall_m
     moved = np.maximum(ahead.displacement_error_m, _OF_DISPLACEMENT * least * down)
@@ -353,13 +394,18 @@ def _safety(case: Case, apex: bool, level: int) -> float:
     return _SHARP if apex else _BLUNT
 
 
+def _ends(found: "Pressed") -> Real:
+    """Bounds of the capacitance at each pressure (n, 2) [F/m2]; NaN where unknown."""
+    bounds = [(c.lower, c.upper) if c else (np.nan, np.nan) for c in found.capacitance_f_per_m2]
+    return np.array(bounds).reshape(-1, 2)
+
+
 def _rise(found: "Pressed") -> tuple[Real, Real]:
     """Rise of the capacitance, and by how much its field's bounds leave it open [F/m2].
 
     Where the field is meshed anew, bounds are independent; on one mesh they err alike before and after.
     """
-    bounds = [(c.lower, c.upper) if c else (np.nan, np.nan) for c in found.capacitance_f_per_m2]
-    lower, upper = np.array(bounds).reshape(-1, 2).T
+    lower, upper = _ends(found).T
     middle = (lower + upper) / 2
     width = upper - lower
     alike = np.array(found.carried) if found.carried else np.zeros(len(middle), bool)

@@ -294,25 +294,17 @@ def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -
     values, rho = permittivities(body.design), resistivities(body.design)
     eps = {v.material: v.value for v in values}
     cells = body.cells
-    scene, *others = dict.fromkeys(cells.scenes.values())
+    scene = cells.first()
     ranges = ranges and width != inf
     wanted = inf if width == inf else min(width or inf, default_width(scene))
-    said = cells.remarks.get(next(iter(cells.scenes)), ())
+    remarks = cells.remarks.get(next(iter(cells.scenes)), ())
     try:
         answer = of_sensor(cells, eps, wanted)
     except Unpredictable as error:
-        raise Unpredictable("; ".join((*said, str(error)))) from None
+        raise Unpredictable("; ".join((*remarks, str(error)))) from None
     c = answer.capacitance_f
-    found, doubts, unbounded = [c.middle()], list(said), False
-    coarse = 2 * wanted if is_open(scene) else wanted  # whole sensors take long
-    for other in others if ranges else ():
-        try:
-            found.append(capacitance(other, eps, coarse).capacitance_f.middle() * cells.count)
-        except Unpredictable as error:
-            unbounded = unbounded or cells.gap_mm.get(_rule(cells, other)) == 0
-            rule = _rule(cells, other)
-            doubts.append(f"printed by the rule {rule!r} it has no capacitance: {error}")
-    by_width = Interval(min(found), max(found))
+    others, unknown, unbounded = _other_prints(cells, eps, wanted) if ranges else ([], [], False)
+    by_width = Interval(min([c.middle(), *others]), max([c.middle(), *others]))
     thick, thin = _film_ratios(cells, eps) if ranges else (1.0, 1.0)
     by_film = Interval(c.middle() * thick, c.middle() * (thin or 1.0))
     by_print = Interval(by_width.lower * thick, by_width.upper * (thin or 1.0))
@@ -322,9 +314,24 @@ def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -
         material=_permittivity_range(body.design, scene, c.middle()) if ranges else Interval(c.middle(), c.middle()),
     )  # fmt: skip
     ends = (rho["top"].value, rho["bottom"].value)
-    resistance, unknown = _resistance(body)
-    doubts += unknown
-    return RestState(answer, bounds, resistance, ends, (*values, *rho.values()), by_width, by_film, tuple(doubts))
+    resistance, missing = _resistance(body)
+    doubts = (*remarks, *unknown, *missing)
+    return RestState(answer, bounds, resistance, ends, (*values, *rho.values()), by_width, by_film, doubts)
+
+
+def _other_prints(cells: Cells, eps: Mapping[str, float], width: float) -> tuple[list[float], list[str], bool]:
+    """Capacitances of other ways to print it [F], why some have none, and True where one of these is a short."""
+    first, *others = dict.fromkeys(cells.scenes.values())
+    coarse = 2 * width if is_open(first) else width  # whole sensors take long
+    values, doubts, unbounded = [], [], False
+    for scene in others:
+        rule = next(name for name, cell in cells.scenes.items() if cell == scene)
+        try:
+            values.append(capacitance(scene, eps, coarse).capacitance_f.middle() * cells.count)
+        except Unpredictable as error:
+            unbounded |= cells.gap_mm.get(rule) == 0
+            doubts.append(f"printed by the rule {rule!r} it has no capacitance: {error}")
+    return values, doubts, unbounded
 
 
 def _resistance(body: Body) -> tuple[dict[str, Bounds], list[str]]:
@@ -336,10 +343,6 @@ def _resistance(body: Body) -> tuple[dict[str, Bounds], list[str]]:
         except OutOfRange as error:
             said.append(f"no resistance: {error}")
     return found, said
-
-
-def _rule(cells: Cells, scene: Scene) -> str:
-    return next(name for name, cell in cells.scenes.items() if cell == scene)
 
 
 def _film_ratios(cells: Cells, eps: Mapping[str, float]) -> tuple[float, float | None]:
