@@ -70,11 +70,11 @@ def cell(scene: Scene) -> Bricks:
     BadInput
         A prism is no box, bodies overlap, or the cell has too many boxes.
     """
-    found = bricks_of(scene)
-    boxes = int((found.fill > 0).sum())
+    bricks = bricks_of(scene)
+    boxes = int((bricks.fill > 0).sum())
     if boxes > _MOST:
         raise BadInput(f"its cell has {boxes} boxes; at most {_MOST} can be pressed in 3D")
-    return found
+    return bricks
 
 
 def press(
@@ -116,13 +116,13 @@ def press(
     check(stress_pa, boundary)
     most = int((_MOST / max((bricks.fill > 0).sum(), 1)) ** (1 / 3))
     fineness = replace(wanted, pieces=min(wanted.pieces, max(most, 1)))
-    found, run = _solved(
+    pressed, run = _solved(
         bricks.cut(fineness.pieces, fineness.shrink), solids, stress_pa, boundary, step or (lambda _: None)
     )
     if fineness != wanted:
-        said = f"every box cut into {fineness.pieces} pieces along each axis, not {wanted.pieces}: there are many"
-        found = replace(found, doubts=(*found.doubts, said))
-    return _with_fields(found, run, permittivity, fineness.orders) if permittivity else found
+        remark = f"every box cut into {fineness.pieces} pieces along each axis, not {wanted.pieces}: there are many"
+        pressed = replace(pressed, doubts=(*pressed.doubts, remark))
+    return _with_fields(pressed, run, permittivity, fineness.orders) if permittivity else pressed
 
 
 def _solved(
@@ -136,16 +136,16 @@ def _solved(
 
     mesh = mesh_of(cut, cut.fill > 0)
     materials = [cut.regions[k].material for k in mesh.region.tolist()]
-    found, run = solve(mesh, [solids[m] for m in materials], stress_pa, boundary, _STEP, SOURCE, step)
+    pressed, run = solve(mesh, [solids[m] for m in materials], stress_pa, boundary, _STEP, SOURCE, step)
     last = run.states[-1]
     if (run.problem.gaps(last.pairs, last.u_m) < 0).any():
         how = "and hold fast" if boundary.contact == "stick" else "without friction"
-        found = replace(found, doubts=(*found.doubts, f"faces of gaps touch, {how}"))
-    return found, run
+        pressed = replace(pressed, doubts=(*pressed.doubts, f"faces of gaps touch, {how}"))
+    return pressed, run
 
 
 def _with_fields(
-    found: Pressed, run: "LoadSteps[BrickMesh]", permittivity: Mapping[str, float], orders: FieldOrders
+    pressed: Pressed, run: "LoadSteps[BrickMesh]", permittivity: Mapping[str, float], orders: FieldOrders
 ) -> Pressed:
     """Add the capacitance of the deformed boxes; gaps that are shut are boundary open by a little."""
     from sensorgen.solvers.contact.air import AirMap
@@ -165,4 +165,4 @@ def _with_fields(
                 continue
         return None
 
-    return with_capacitances(found, [bounds(state) for state in run.states])
+    return with_capacitances(pressed, [bounds(state) for state in run.states])

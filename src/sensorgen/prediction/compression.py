@@ -71,13 +71,13 @@ def _springs(design: Design, piece: PressedPiece, stress_pa: Sequence[float]) ->
     solids = elastic(design, scene)
     moduli = {n: s.youngs_modulus_pa / (1.0 if why else 1 - s.poisson_ratio**2) for n, s in solids.items()}
     boxes = all(p.is_box() for body in scene.bodies for p in body.pieces)
-    said = (
+    meaning = (
         "at most this, at small strain under a stiff plate"
         if boxes
         else "an estimate: columns without their neighbours"
     )
     doubts = (
-        f"displacement: {said}", "no capacitance under stress: springs have no outlines", *([why] if why else [])
+        f"displacement: {meaning}", "no capacitance under stress: springs have no outlines", *([why] if why else [])
     )  # fmt: skip
     return ClosedForm(springs.displacement_m(scene, moduli, stress_pa), {"top": "rigid"}, doubts)
 
@@ -276,8 +276,8 @@ class CompressionResult(Displayed):
             self.stress_kpa, self.displacement_um, self.displacement_error_um, self.rise_f_per_m2,
             self.rise_error_f_per_m2, self.lower_f_per_m2, self.upper_f_per_m2, *under.values(), strict=True,
         )  # fmt: skip
-        said = self.reason or "; ".join(self.faults)
-        more = self.converged_kpa, self.largest_rise_error, self.model, self.reached, said
+        reason = self.reason or "; ".join(self.faults)
+        more = self.converged_kpa, self.largest_rise_error, self.model, self.reached, reason
         rows = curve if self.model else [(None,) * 9]
         return Table("compression", "", (*COLUMNS, *columns, *HIDDEN), tuple((*row, *more) for row in rows))
 
@@ -346,11 +346,11 @@ def answer(body: Body, asked: PressQuestion, *, step: Step | None = None) -> Com
         if model in CLOSED_FORMS:
             return _closed_form(body, asked, model)
         case = _case(body, asked)
-        found = _estimated(case, asked, USUAL, step)
+        estimate = _estimated(case, asked, USUAL, step)
         if asked.check_mesh:
             finer = _estimated(case, asked, USUAL + 1, step)
-            found = replace(finer, found=press2d.compared(found.found, finer.found))
-        return _result(body, case, found, asked)
+            estimate = replace(finer, found=press2d.compared(estimate.found, finer.found))
+        return _result(body, case, estimate, asked)
     except NotInstalled as error:
         if asked.model:
             raise
@@ -414,18 +414,18 @@ def _within(body: Body, asked: PressQuestion, step: Step | None) -> CompressionR
         mesh.name: partial(_estimated, case, asked, mesh.level, step)
         for mesh in _mesh_levels(case.piece, case.model, asked)
     }
-    found, level = run_until_within(plan.levels[0], find, _rise_error)
+    estimate, level = run_until_within(plan.levels[0], find, _rise_error)
     return replace(
-        _result(body, case, found, asked),
+        _result(body, case, estimate, asked),
         accuracy=asked.accuracy,
-        reached=_rise_error(found) <= asked.accuracy,
+        reached=_rise_error(estimate) <= asked.accuracy,
         plan=replace(plan, levels=(level,)),
     )
 
 
-def _rise_error(found: Estimate) -> float:
+def _rise_error(estimate: Estimate) -> float:
     """Largest relative error of the rise; infinite where the solution is not to be trusted [-]."""
-    return inf if found.found.faults else found.relative()[1]
+    return inf if estimate.found.faults else estimate.relative()[1]
 
 
 def _case(body: Body, asked: PressQuestion) -> Case:
@@ -494,12 +494,12 @@ def _under_tops(
     """Rise of C under an even pressure and a stiff plate, where it differs by more than the error."""
     try:
         own = curve_of(estimate.found)
-        found = under_tops(body.design, piece_of(body), case.model, tip, own, case.boundary)
+        laws = under_tops(body.design, piece_of(body), case.model, tip, own, case.boundary)
     except SensorgenError:
         return
     stress, at_rest = estimate.found.stress_pa, estimate.found.capacitance_f_per_m2[0]
     at_rest_f_per_m2 = at_rest.middle() if at_rest else nan
-    for name, law in found.items():
+    for name, law in laws.items():
         strain = law.capacitive_strain(stress)[0]
         rise = np.where(stress <= law.stress_pa[-1], at_rest_f_per_m2 * strain / (1 - strain), nan)
         if name != tip.block and (abs(rise - estimate.rise_f_per_m2) > estimate.rise_error_f_per_m2).any():
@@ -519,51 +519,51 @@ def _known(values: Real) -> tuple[float | None, ...]:
 
 def _closed_form(body: Body, asked: PressQuestion, model: str) -> CompressionResult:
     """Displacement, and of a plate or infill the capacitance, by a law that solves no field."""
-    found = CLOSED_FORMS[model](body.design, piece_of(body), [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
+    estimate = CLOSED_FORMS[model](body.design, piece_of(body), [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
     unknown = np.full(len(asked.stress_kpa), nan)
     rise = off = lower = upper = unknown
-    if found.rises:
+    if estimate.rises:
         rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
         ends = rest.lower_f_per_m2 or nan, rest.upper_f_per_m2 or nan
-        rises = np.array(found.rises)
+        rises = np.array(estimate.rises)
         rise, off = sum(ends) / 2 * rises[0], sum(ends) / 2 * abs(rises - rises[0]).max(0)
         lower, upper = ends[0] * (1 + rises.min(0)), ends[1] * (1 + rises.max(0))
     return CompressionResult(
-        design=body.design.name, body=body.provenance, model=model, held=found.boundary, stress_kpa=asked.stress_kpa,
-        displacement_um=tuple((found.displacement_m * _UM_PER_M).tolist()), displacement_error_um=_known(unknown),
+        design=body.design.name, body=body.provenance, model=model, held=estimate.boundary, stress_kpa=asked.stress_kpa,
+        displacement_um=tuple((estimate.displacement_m * _UM_PER_M).tolist()), displacement_error_um=_known(unknown),
         rise_f_per_m2=_known(rise), rise_error_f_per_m2=_known(off), lower_f_per_m2=_known(lower),
         upper_f_per_m2=_known(upper), converged_kpa=asked.stress_kpa[-1],
-        doubts=(*found.doubts, *_assumed(body.design)),
-        bounds="of the capacitance, by the law between its bounds" if found.rises else "none",
+        doubts=(*estimate.doubts, *_assumed(body.design)),
+        bounds="of the capacitance, by the law between its bounds" if estimate.rises else "none",
     )  # fmt: skip
 
 
 def _unsolved(body: Body, asked: PressQuestion, why: str) -> CompressionResult:
     """Without the library for fields: a closed-form estimate, the capacitance at rest, and no accuracy."""
-    found = _closed_form(body, asked, FIRST)
+    result = _closed_form(body, asked, FIRST)
     rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
     unknown = (None,) * (len(asked.stress_kpa) - 1)
-    found = replace(
-        found, doubts=(*found.doubts, f"not solved: {why}"), lower_f_per_m2=(rest.lower_f_per_m2, *unknown),
+    result = replace(
+        result, doubts=(*result.doubts, f"not solved: {why}"), lower_f_per_m2=(rest.lower_f_per_m2, *unknown),
         upper_f_per_m2=(rest.upper_f_per_m2, *unknown),
         bounds=f"of the capacitance at rest, by {rest.model}; none under stress",
     )  # fmt: skip
     if asked.accuracy == inf:
-        return found
+        return result
     plan = planned(body, asked)
     (level,) = plan.levels
     candidates = tuple(replace(c, passed_over=c.passed_over or why) for c in level.candidates)
     plan = replace(plan, levels=(replace(level, chosen="", candidates=candidates),))
-    return replace(found, accuracy=asked.accuracy, reached=False, plan=plan)
+    return replace(result, accuracy=asked.accuracy, reached=False, plan=plan)
 
 
-def stresses_kpa(found: Sequence[float]) -> tuple[float, ...]:
+def stresses_kpa(given_kpa: Sequence[float]) -> tuple[float, ...]:
     """Stresses with 0 before them where it is not the first [kPa].
 
     >>> stresses_kpa((50.0, 100.0)), stresses_kpa((0.0, 10.0))
     ((0.0, 50.0, 100.0), (0.0, 10.0))
     """
-    whole = tuple(found) if found[0] == 0 else (0.0, *found)
+    whole = tuple(given_kpa) if given_kpa[0] == 0 else (0.0, *given_kpa)
     if len(whole) < 2:
         raise OutOfRange("--stress 0: expected a stress above 0, as in 0:100:10")
     return whole

@@ -123,8 +123,10 @@ def law_of(
     if is_plate(answer, piece.scene):
         return _plate(design, moduli, name, piece)
     if name in ("bonded", "free"):
-        held = "the law 'bonded' applies to a solid plate" if name == "bonded" else "cells are held by their neighbours"
-        raise OutOfRange(f"{held}; {design.shape} has gaps: expected 'unconfined' or the sides symmetric")
+        condition = (
+            "the law 'bonded' applies to a solid plate" if name == "bonded" else "cells are held by their neighbours"
+        )
+        raise OutOfRange(f"{condition}; {design.shape} has gaps: expected 'unconfined' or the sides symmetric")
     stored = None if name in ("unconfined", "infill") else _stored(design, printed)
     if stored and until_pa <= _PAST * stored.stress_pa[-1]:
         return _stored_law(stored, moduli, tip, usual=_is_usual(design, tip))
@@ -217,16 +219,16 @@ def infill(design: Design, piece: PressedPiece) -> Law | None:
     from sensorgen.models import porous
 
     moduli = of_all_materials(design, "youngs_modulus_pa")
-    found = porous.filling(piece.scene, {n: t.value for n, t in moduli.items()})
-    if not found:
+    filling = porous.filling(piece.scene, {n: t.value for n, t in moduli.items()})
+    if not filling:
         return None
     eps = {t.material: t.value for t in permittivities(design)}
-    modulus_pa, power = found.modulus_pa, found.rise_powers(eps[film(design)])
+    modulus_pa, power = filling.modulus_pa, filling.rise_powers(eps[film(design)])
 
     def law(modulus: float, power: float) -> CapacitanceCurve:
         ratio = (1 - _STRAIN) ** -power
         own = compression.curve("infill", porous.SOURCE, (modulus * _STRAIN).tolist(), ratio.tolist())
-        return replace(own, displacement_m=float(_STRAIN[-1]) * found.gap_mm * M_PER_MM)
+        return replace(own, displacement_m=float(_STRAIN[-1]) * filling.gap_mm * M_PER_MM)
 
     others = law(modulus_pa.lower, power.upper), law(modulus_pa.upper, power.lower)
     return Law(law(modulus_pa.middle(), power.middle()), tuple(moduli.values()), others=others)
@@ -337,12 +339,12 @@ def _electrode(moduli: Mapping[str, MaterialValue], scene: Scene, end: str) -> t
 
 
 def _cell(
-    found: CapacitanceCurve, moduli: Mapping[str, MaterialValue], tops: Mapping[str, CapacitanceCurve] | None = None
+    curve: CapacitanceCurve, moduli: Mapping[str, MaterialValue], tops: Mapping[str, CapacitanceCurve] | None = None
 ) -> Law:
     """Law of a solved cell, with the errors of its rise and onset, and under other boundary conditions."""
-    others = tuple(replace(found.scaled_rise(1 + sign * found.within), onset=1 + sign * _ONSET) for sign in (-1, 1))
-    other_boundaries = tuple(found.scaled_rise(1 + change) for change in found.boundary_changes)
-    return Law(found, tuple(moduli.values()), found.doubts, others, tops or {}, other_boundaries)
+    others = tuple(replace(curve.scaled_rise(1 + sign * curve.within), onset=1 + sign * _ONSET) for sign in (-1, 1))
+    other_boundaries = tuple(curve.scaled_rise(1 + change) for change in curve.boundary_changes)
+    return Law(curve, tuple(moduli.values()), curve.doubts, others, tops or {}, other_boundaries)
 
 
 def _stored_law(even: CapacitanceCurve, moduli: Mapping[str, MaterialValue], tip: Tip, *, usual: bool) -> Law:
@@ -403,18 +405,20 @@ def solved(
     loads = stresses_pa(until_pa)
     case = _case(design, piece, model, boundary) if boundary else case_of(design, piece, model, tip)
     estimate = estimated(case, loads, level, sound=True)
-    found = estimate.found
-    if found.converged_pa < _ENOUGH * max(until_pa, STRESS_PA[-1]):
-        found = pressed(case, loads, level)
-    curve = curve_of(found)
+    solution = estimate.found
+    if solution.converged_pa < _ENOUGH * max(until_pa, STRESS_PA[-1]):
+        solution = pressed(case, loads, level)
+    curve = curve_of(solution)
     shares = estimate.rise_error_f_per_m2[1:] / estimate.rise_f_per_m2[1:]
     known = shares[np.isfinite(shares)]
     if not known.size:
         raise OutOfRange("the error of the solved cell is unknown: the next coarser mesh did not converge")
-    curve = replace(curve, within=float(known.max()), displacement_m=float(found.displacement_m[-1]) - found.fall_m)
+    curve = replace(
+        curve, within=float(known.max()), displacement_m=float(solution.displacement_m[-1]) - solution.fall_m
+    )
     short = curve.stress_pa[-1] < loads[-1]
     ended = [f"the solution of the cell ended at {curve.stress_pa[-1] / 1e3:.3g} kPa"] if short else []
-    doubts = (*found.doubts, *([_LANDING] if found.fall_m else []), *ended)
+    doubts = (*solution.doubts, *([_LANDING] if solution.fall_m else []), *ended)
     tops = {} if boundary else under_tops(design, piece, model, tip, curve)
     return _cell(replace(curve, doubts=doubts), {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, tops)
 
@@ -436,10 +440,10 @@ def under_tops(
 
     def rise(block: str) -> Real:
         try:
-            found = pressed(case_of(design, piece, model, replace(tip, block=block), boundary), loads, level).sound()
+            solution = pressed(case_of(design, piece, model, replace(tip, block=block), boundary), loads, level).sound()
         except SensorgenError:
             return np.zeros(0)
-        values = np.array([c.middle() if c else np.nan for c in found.capacitance_f_per_m2])
+        values = np.array([c.middle() if c else np.nan for c in solution.capacitance_f_per_m2])
         rises: Real = values[1:] - values[0]
         return rises
 
@@ -492,11 +496,11 @@ def at_a_few_pressures(
         return infill(design, printed)
     try:
         case = case_of(design, printed, model, tip)
-        found = pressed(case, [stress_pa * part for part in (0, 0.5, 1, 1.25)], COARSEST)
-        curve = curve_of(found)
+        solution = pressed(case, [stress_pa * part for part in (0, 0.5, 1, 1.25)], COARSEST)
+        curve = curve_of(solution)
     except SensorgenError:
         return None
-    fallen_m = float(found.displacement_m[-1]) - found.fall_m
+    fallen_m = float(solution.displacement_m[-1]) - solution.fall_m
     return replace(known, compression=replace(curve, displacement_m=fallen_m), doubts=())
 
 

@@ -65,17 +65,17 @@ class ImpedanceGrid:
             Per frequency: over force at the middle position, over position at the largest force [-]; None along an
             axis of one value.
         """
-        found = []
+        changes = []
         for z in self.impedance_ohm:
             deviation, middle = noise * np.abs(z).max(), z.shape[1] // 2
-            found.append(
+            changes.append(
                 {
                     f"{name}_by_{axis}": float(np.ptp(part) / deviation) if len(part) > 1 else None
                     for name, values in (("re", z.real), ("im", z.imag))
                     for axis, part in (("force", values[:, middle]), ("position", values[-1]))
                 }
             )
-        return found
+        return changes
 
 
 def impedance_grid(
@@ -129,8 +129,8 @@ def grid(sensor: Sensor, frequency_hz: ArrayLike, force_n: ArrayLike, position_m
     check_presses(sensor, force, at)
     ends = [0, *(np.flatnonzero(np.diff(sensor.whole(at))) + 1).tolist(), at.size]
     runs = [at[start:end] for start, end in pairwise(ends)]  # tips that lie whole on the sensor all press alike
-    found = [sensor.impedance(f[:, None, None], force[:, None], run) for run in runs]
-    return found[0] if len(found) == 1 else np.concatenate(found, axis=-1)
+    blocks = [sensor.impedance(f[:, None, None], force[:, None], run) for run in runs]
+    return blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=-1)
 
 
 def check_presses(sensor: Sensor, force_n: ArrayLike, position_m: ArrayLike) -> None:
@@ -254,18 +254,18 @@ class PredictedPoint:
         return Table("predictions", "", (*columns, Column("status"), Column("source")), (tuple(self._cells()),))
 
     def _cells(self) -> Iterator[Cell]:
-        found = self.prediction
-        if found is None:
+        prediction = self.prediction
+        if prediction is None:
             yield from (*[None] * 3 * len(_SHOWN), "not predicted", "")
             return
-        values = (found.capacitance, found.sensitivity, *found.bench())
-        for (_, _, size), bounds, words in zip(_SHOWN, values, ("", "", *found.resolved()), strict=True):
+        values = (prediction.capacitance, prediction.sensitivity, *prediction.bench())
+        for (_, _, size), bounds, words in zip(_SHOWN, values, ("", "", *prediction.resolved()), strict=True):
             if bounds is None:
                 yield from (None, None, None)
                 continue
             yield words if words in (CANNOT_SENSE, CANNOT_LOCATE) else bounds.value / size
             yield from (bounds.lower / size, bounds.upper / size)
-        yield from (found.status, self.source)
+        yield from (prediction.status, self.source)
 
     def remarks(self) -> Sequence[str]:
         """Source, and what is doubtful."""

@@ -114,8 +114,8 @@ class MeshLevel:
 @lru_cache(maxsize=16)
 def why_not_applicable(piece: PressedPiece, model: str) -> str | None:
     """Why a model does not apply to a piece, or None."""
-    said: str | None = import_module(f"sensorgen.models.{model}").why_not_applicable(piece.scene)
-    return said
+    reason: str | None = import_module(f"sensorgen.models.{model}").why_not_applicable(piece.scene)
+    return reason
 
 
 def model_of(piece: PressedPiece, *, quick: bool = False) -> str:
@@ -283,17 +283,17 @@ def estimated(
     MissingValue, BadInput, OutOfRange
         As :func:`pressed`.
     """
-    found = pressed(case, stress_pa, level, keep=keep, step=step)
-    found = found.sound() if sound else found
-    last = len(found.stress_pa) - 1
+    fine = pressed(case, stress_pa, level, keep=keep, step=step)
+    fine = fine.sound() if sound else fine
+    last = len(fine.stress_pa) - 1
     shared = sorted({0, min(1, last), *range(last, 0, -_APART)})
-    some = [float(found.stress_pa[k]) for k in shared]
+    some = [float(fine.stress_pa[k]) for k in shared]
     alone = last == 0 or _size(case.model, level - 1) == inf
-    coarse = found.first(1) if alone else pressed(case, some, level - 1, keep=keep).sound()
+    coarse = fine.first(1) if alone else pressed(case, some, level - 1, keep=keep).sound()
     if not alone and coarse.stress_pa[-1] < some[-1]:  # shorter steps
-        coarse = pressed(case, [float(p) for p in found.stress_pa], level - 1, keep=keep).sound()
-    coarse = coarse.some(np.flatnonzero(np.isin(coarse.stress_pa, found.stress_pa)).tolist())
-    return (_limit if case.model == "press3d" else _errors)(case, found, coarse, level)
+        coarse = pressed(case, [float(p) for p in fine.stress_pa], level - 1, keep=keep).sound()
+    coarse = coarse.some(np.flatnonzero(np.isin(coarse.stress_pa, fine.stress_pa)).tolist())
+    return (_limit if case.model == "press3d" else _errors)(case, fine, coarse, level)
 
 
 def limit(fine: "Pressed", coarse: "Pressed", pieces: int) -> Estimate:
@@ -330,9 +330,9 @@ def limit(fine: "Pressed", coarse: "Pressed", pieces: int) -> Estimate:
         Interval(c.lower + way, c.upper + way) if c else None
         for c, way in zip(fine.capacitance_f_per_m2, ways[1].tolist(), strict=True)
     )
-    found = replace(fine, displacement_m=fine.displacement_m + ways[0], capacitance_f_per_m2=shifted)
+    extrapolated = replace(fine, displacement_m=fine.displacement_m + ways[0], capacitance_f_per_m2=shifted)
     field = abs(np.diff(rises)[:, 0]) / 2
-    return Estimate(found, errors[0], rises.mean(axis=1) + ways[1], errors[1] + field)
+    return Estimate(extrapolated, errors[0], rises.mean(axis=1) + ways[1], errors[1] + field)
 
 
 def _limit(case: Case, fine: "Pressed", coarse: "Pressed", level: int) -> Estimate:
@@ -394,21 +394,21 @@ def _safety(case: Case, apex: bool, level: int) -> float:
     return _SHARP if apex else _BLUNT
 
 
-def _ends(found: "Pressed") -> Real:
+def _ends(solution: "Pressed") -> Real:
     """Bounds of the capacitance at each pressure (n, 2) [F/m2]; NaN where unknown."""
-    bounds = [(c.lower, c.upper) if c else (np.nan, np.nan) for c in found.capacitance_f_per_m2]
+    bounds = [(c.lower, c.upper) if c else (np.nan, np.nan) for c in solution.capacitance_f_per_m2]
     return np.array(bounds).reshape(-1, 2)
 
 
-def _rise(found: "Pressed") -> tuple[Real, Real]:
+def _rise(solution: "Pressed") -> tuple[Real, Real]:
     """Rise of the capacitance, and by how much its field's bounds leave it open [F/m2].
 
     Where the field is meshed anew, bounds are independent; on one mesh they err alike before and after.
     """
-    lower, upper = _ends(found).T
+    lower, upper = _ends(solution).T
     middle = (lower + upper) / 2
     width = upper - lower
-    alike = np.array(found.carried) if found.carried else np.zeros(len(middle), bool)
+    alike = np.array(solution.carried) if solution.carried else np.zeros(len(middle), bool)
     return middle - middle[:1], np.where(alike, abs(width - width[:1]), width + width[:1]) / 2
 
 
@@ -426,11 +426,11 @@ def _press(case: Case) -> "tuple[Callable[..., Pressed], str]":
     return partial(press2d.press, cell), repr(cell)
 
 
-def _plain(found: "Pressed") -> Data:
+def _plain(solution: "Pressed") -> Data:
     """As JSON holds it."""
-    data = vars(found)
-    bounds = [[c.lower, c.upper] if c else None for c in found.capacitance_f_per_m2]
-    lists = {name: getattr(found, name).tolist() for name in _ARRAYS}
+    data = vars(solution)
+    bounds = [[c.lower, c.upper] if c else None for c in solution.capacitance_f_per_m2]
+    lists = {name: getattr(solution, name).tolist() for name in _ARRAYS}
     return data | lists | {"capacitance_f_per_m2": bounds}
 
 

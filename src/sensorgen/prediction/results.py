@@ -613,11 +613,11 @@ def from_json(text: str) -> Prediction:
 
 def _of_schema_2(data: dict[str, Any]) -> dict[str, Any]:
     """Resolutions were numbers, without what ways to print differ by."""
-    found = {"schema": SCHEMA, **{k: v for k, v in data.items() if k not in ("schema", "drawn")}}
+    fields = {"schema": SCHEMA, **{k: v for k, v in data.items() if k not in ("schema", "drawn")}}
     for name, unit in (("force_resolution", "N"), ("position_resolution", "m")):
-        value = found.pop(f"{name}_{unit.lower()}", None)
-        found[name] = value and Bounds.of(float(value), unit)
-    return {**found, "drawn": data.get("drawn") and _of_schema_2(data["drawn"])}
+        value = fields.pop(f"{name}_{unit.lower()}", None)
+        fields[name] = value and Bounds.of(float(value), unit)
+    return {**fields, "drawn": data.get("drawn") and _of_schema_2(data["drawn"])}
 
 
 def _of_schema_1(data: dict[str, Any]) -> Prediction:

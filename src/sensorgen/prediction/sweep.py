@@ -82,9 +82,9 @@ class Sweep(Displayed, Generic[Result]):
 
     def problems(self) -> Sequence[str]:
         """Problem of the first that has one, and the number of those that have."""
-        found = [(result.design, problem) for result in self.results for problem in result.problems()[:1]]
-        more = f" ({len(found)} of {len(self.results)} like this)" if len(found) > 1 else ""
-        return [f"{design}: {problem}{more}" for design, problem in found[:1]]
+        problems = [(result.design, problem) for result in self.results for problem in result.problems()[:1]]
+        more = f" ({len(problems)} of {len(self.results)} like this)" if len(problems) > 1 else ""
+        return [f"{design}: {problem}{more}" for design, problem in problems[:1]]
 
     def to_json(self) -> str:
         """A list of the results, each with the value of the setting before it."""
