@@ -32,9 +32,8 @@ from sensorgen.models import columns
 from sensorgen.prediction import capacitance as prediction_of_c
 from sensorgen.prediction.bodies import default_body, drawn
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.losses import lost
 from sensorgen.prediction.query import Query
-from sensorgen.prediction.rest_state import rest_state
+from sensorgen.prediction.rest_state import lost, rest_state
 
 
 @pytest.fixture(autouse=True)

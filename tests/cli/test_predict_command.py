@@ -214,7 +214,7 @@ def test_a_file_holds_what_the_terminal_would_show(run, tmp_path, form, press):
 
 
 def test_a_file_that_fails_leaves_the_old_one(run, tmp_path, monkeypatch):
-    from sensorgen.prediction import grid as predict
+    from sensorgen.prediction import loaded as predict
 
     def half(*_):
         yield "half"

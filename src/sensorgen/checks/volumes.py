@@ -164,8 +164,9 @@ def _of_body(body: Body, outside: Sequence[LayerVolume]) -> Iterator[Finding]:
         ratios = sorted({f"{row.ratio:.2f}" for row in here})
         what = fault or f"prints {' to '.join(ratios[:: max(len(ratios) - 1, 1)])} times its volume"
         vanished = max(here, key=lambda row: row.vanished)
+        fused = max(row.fused for row in here)
         more = [f"{vanished.vanished} of {vanished.strips} strips vanish"] if vanished.vanished and not fault else []
-        more += [f"{max(row.fused for row in here)} fuse"] if any(row.fused for row in here) else []
+        more += [f"{fused} fuse"] if fused else []
         yield Finding(
             "7-printed", "error" if severe else "warning", body.name,
             f"from {first.bottom_mm:g} to {last.top_mm:g} mm it {', '.join([what, *more])}",

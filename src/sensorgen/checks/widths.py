@@ -7,7 +7,8 @@ the edge across.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, pairwise
+from math import inf
 
 import numpy as np
 import shapely
@@ -103,28 +104,32 @@ def _by_band(
     bands: Sequence[_Band], body: Body, layer: int, found: Sequence[Stretch], slices: Slices
 ) -> Iterator[tuple[_Band, list[Stretch]]]:
     """Stretches by band. What vanishes is no error at tips, which taper out within their layer, and in support."""
-    for below, band in zip((None, *bands), bands, strict=False):
-        here = [s for s in found if s.width_mm <= band.upto_mm + TOUCH_MM]
-        here = [s for s in here if below is None or s.width_mm > below.upto_mm + TOUCH_MM]
+    limits = pairwise((-inf, *(band.upto_mm + TOUCH_MM for band in bands)))
+    for band, (least, most) in zip(bands, limits, strict=True):
+        here = [s for s in found if least < s.width_mm <= most]
         if band.severity == "error" and here:
-            half = slices.layers.mids_mm[layer] - slices.layers.boundaries_mm[layer]
-            # Tips lose half of their width up to the layer's boundary, and so all of it up to the next sample.
-            width, middle, way = (np.array([getattr(s, k) for s in here]) for k in ("width_mm", "middle_mm", "way"))
-            reach = 0.75 * width[:, None] * way
-            lines = shapely.linestrings(np.stack([middle - reach, middle + reach], axis=1))
-            lengths = []
-            for sign in (-1, 1):
-                polygons = shapely.get_parts(slices.near(body, layer, sign * _NEAR * half))
-                line, part = shapely.STRtree(polygons).query(lines)
-                inside = shapely.length(shapely.intersection(lines[line], polygons[part]))
-                lengths.append(np.bincount(line, inside, len(lines)))
-            tapers: list[bool] = (abs(lengths[1] - lengths[0]) / 2 / _NEAR > 0.49 * width).tolist()
-            tips = [s for s, ends in zip(here, tapers, strict=True) if ends]
-            here = [s for s, ends in zip(here, tapers, strict=True) if not ends]
-            if tips:
+            tapers = _tapers(here, body, layer, slices)
+            if tips := [s for s, ends in zip(here, tapers, strict=True) if ends]:
                 yield replace(band, severity="warning", noun="tip"), tips
+            here = [s for s, ends in zip(here, tapers, strict=True) if not ends]
         if here:
             yield replace(band, severity="warning") if band.severity == "error" and body.is_support() else band, here
+
+
+def _tapers(here: Sequence[Stretch], body: Body, layer: int, slices: Slices) -> list[bool]:
+    """Mark tips, which lose half of their width up to the layer's boundary, and so all of it up to the next sample."""
+    half = slices.layers.mids_mm[layer] - slices.layers.boundaries_mm[layer]
+    width, middle, way = (np.array([getattr(s, k) for s in here]) for k in ("width_mm", "middle_mm", "way"))
+    reach = 0.75 * width[:, None] * way
+    lines = shapely.linestrings(np.stack([middle - reach, middle + reach], axis=1))
+    lengths = []
+    for sign in (-1, 1):
+        polygons = shapely.get_parts(slices.near(body, layer, sign * _NEAR * half))
+        line, part = shapely.STRtree(polygons).query(lines)
+        inside = shapely.length(shapely.intersection(lines[line], polygons[part]))
+        lengths.append(np.bincount(line, inside, len(lines)))
+    tips: list[bool] = (abs(lengths[1] - lengths[0]) / 2 / _NEAR > 0.49 * width).tolist()
+    return tips
 
 
 def _findings(rule: str, body: Body, found: Sequence[_Narrow]) -> Iterator[Finding]:

@@ -86,7 +86,7 @@ def _array(
         render.say(meter.identify().model, err=True)
         _refuse_shape(meter, model)
         how = ArrayReadout(readout, input_ohm, (meter.frequency_hz,), noise)  # type: ignore[arg-type]
-        live = LiveMaps(model, how, scatter, known(calibration), day, newest=True)
+        live = LiveMaps(model, how, scatter, known(calibration), day)
         file = recorder(record, meter.shape, meter.frequency_hz) if record else None
         if file:
             stack.callback(file.close)

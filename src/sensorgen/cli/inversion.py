@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from sensorgen.measure.readings import Readings
     from sensorgen.prediction.array.frames import PressureMaps
     from sensorgen.prediction.array.sessions import ArrayCalibration
-    from sensorgen.prediction.inverse.prior import Prior
+    from sensorgen.prediction.inverse.estimator import Prior
 
 
 _NORMAL = re.compile(r"(force|position)=(.+?)(?:\+-|±)(.+)")
@@ -71,7 +71,7 @@ class Task:
     @cached_property
     def distribution(self) -> "Prior | None":
         """The prior as typed."""
-        from sensorgen.prediction.inverse.prior import Prior
+        from sensorgen.prediction.inverse.estimator import Prior
 
         if self.prior is None or self.prior.strip() == "uniform":
             return None if self.prior is None else Prior()

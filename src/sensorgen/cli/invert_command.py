@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from sensorgen.core.document import Documented
     from sensorgen.design.design import Design
     from sensorgen.measure.readings import FileRows, Readings
-    from sensorgen.prediction.calibration.baseline import Baseline
     from sensorgen.prediction.calibration.inversion import Inverter
+    from sensorgen.prediction.calibration.rest import Baseline
     from sensorgen.prediction.query import Query
 
 _REST, _TIME = "rest", "time_s"

@@ -36,12 +36,12 @@ def command(
     no_gcode
         Do not slice them.
     """
-    from sensorgen.workflows.optimise import search
+    from sensorgen.workflows.optimise.front import Workers
     from sensorgen.workflows.optimise.run import optimise
 
     with render.counted() as step:
         designs = optimise(
-            target, out, search.Workers(render.at_once(jobs), cluster), count=sample or 0,
+            target, out, Workers(render.at_once(jobs), cluster), count=sample or 0,
             keep=not no_cache, built=not no_build, sliced=not no_gcode, tip=tip, progress=step,
         )  # fmt: skip
     render.deliver(designs)

@@ -109,11 +109,11 @@ def predict_command(
 
 def _swept(design: "Design", body: BodyChoice, query: Query, sweeping: Sweeping, *, alone: bool) -> int:
     """A prediction at the reference load for each value of a setting."""
-    from sensorgen.prediction import swept_prediction
+    from sensorgen.prediction.loaded import sweep
 
     if not alone:
         raise BadInput("--sweep predicts each design at the reference load; leave out --force, --position and --plot")
-    return ended(sweeping.over(design, body, swept_prediction.sweep, query))
+    return ended(sweeping.over(design, body, sweep, query))
 
 
 def _answer(body: "Body", query: Query, pressing: Pressing, *, whole: bool) -> Any:

@@ -222,11 +222,10 @@ def _facts(part: Facts) -> Iterator[str]:
 
 def _aligned(table: Table) -> Iterator[str]:
     """Numbers to the right, words to the left; words of the last column are wrapped."""
-    rows = [[visible(c.words(v)) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
-    worded = _worded(table)
-    lines = [[c.head for c in table.columns], *rows]
-    wide = [max(len(line[k]) for line in lines) for k in range(len(table.columns))]
-    before = sum(wide[:-1]) + 2 * len(wide[:-1])
+    rows = ([visible(c.words(v)) for v, c in zip(row, table.columns, strict=True)] for row in table.cells)
+    worded, lines = _worded(table), [[c.head for c in table.columns], *rows]
+    wide = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    before = sum(width + 2 for width in wide[:-1])
     for line in lines:
         cells = [f"{v:<{w}}" if words else f"{v:>{w}}" for v, w, words in zip(line, wide, worded, strict=True)]
         if not worded[-1]:

@@ -26,7 +26,6 @@ from sensorgen.scene.repetition import Repeat, halved, repeat, widened
 from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene, seen_from_above
 from sensorgen.scene.slabs import is_open, slabs
 from sensorgen.solvers.electrostatics import bounds as fem
-from sensorgen.solvers.electrostatics.enclosed import enclosing
 from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, LayerCell, PrismMesh, plan, solved
 
 SOURCE = "Dirichlet's and Thomson's principles; prisms of triangles, H1 and hybrid H(div) by NGSolve"
@@ -124,6 +123,8 @@ def _meshes(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> tup
 
     With air around it, the flux stays in that air, and the potential is constant beyond: a conductor that floats.
     """
+    from sensorgen.solvers.electrostatics.enclosed import enclosing
+
     far_mm, loose_mm = np.inf if cell.air_mm else _FAR * cell.gap_mm, _LOOSE * cell.gap_mm
     is_sound = False
     with suppress(fem.Unsolved):  # the grid is too fine, as coarser ones below may not be

@@ -11,7 +11,7 @@ from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.units import M_PER_MM, si
 from sensorgen.design.body import Body
 from sensorgen.design.values import MaterialValue
-from sensorgen.prediction import losses
+from sensorgen.prediction import rest_state
 from sensorgen.prediction.capacitance import Unpredictable, default_width, of_sensor
 from sensorgen.prediction.plan import PlanCandidate, candidates_table
 from sensorgen.prediction.sweep import Sweep
@@ -172,7 +172,7 @@ def answer(body: Body, asked: CapacitanceQuestion) -> CellCapacitance:
     """
     design, cells = body.design, body.cells
     scene = cells.first()
-    permittivity, values = losses.permittivity(design, asked.frequency_hz)
+    permittivity, values = rest_state.permittivity(design, asked.frequency_hz)
     width = default_width(scene) if asked.width is None else asked.width
     found = of_sensor(cells, permittivity, width, asked.model, asked.keep)
     area_m2 = design.area_mm2 * M_PER_MM**2

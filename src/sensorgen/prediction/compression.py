@@ -1,6 +1,7 @@
 """Displacement and capacitance of a design's cell under pressure: results of ``sensorgen compress``."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
@@ -8,6 +9,7 @@ from math import inf, isfinite, nan
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
@@ -17,14 +19,13 @@ from sensorgen.core.errors import BadInput, MissingValue, NotInstalled, OutOfRan
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.tip import TOPS, WORDS, Tip
-from sensorgen.design.values import assumed, of_all_materials, permittivities
-from sensorgen.models import press2d
+from sensorgen.design.values import assumed, film, of_all_materials, permittivities
+from sensorgen.models import press2d, springs
 from sensorgen.models.compression import curve_of
 from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.prediction import capacitance_answer as at_rest
-from sensorgen.prediction import closed_form_compression as closed_form
-from sensorgen.prediction.capacitance import Unpredictable
-from sensorgen.prediction.compression_law import case_of, under_tops
+from sensorgen.prediction.capacitance import Answer, Unpredictable, capacitance, is_plate
+from sensorgen.prediction.compression_law import case_of, elastic, gap_m, infill, law_of, under_tops
 from sensorgen.prediction.mesh_ladder import (
     MODELS,
     USUAL,
@@ -35,12 +36,102 @@ from sensorgen.prediction.mesh_ladder import (
     PressedPiece,
     estimated,
     mesh_levels,
+    refuse_crushing,
     why_not_applicable,
 )
 from sensorgen.prediction.plan import Level, Plan, PlanCandidate, cheapest, run_until_within
 from sensorgen.prediction.sensor_model import piece as piece_of
 from sensorgen.prediction.sweep import Sweep
 from sensorgen.prediction.sweep import sweep as swept
+
+
+@dataclass(frozen=True)
+class ClosedForm:
+    """A closed-form estimate of the displacement.
+
+    Attributes
+    ----------
+    displacement_m : (n,) array
+        Of the top, at every stress [m].
+    boundary : dict of str to str
+        Boundary conditions that the law assumes.
+    doubts : tuple of str
+        Limits of its validity.
+    rises : tuple of (n,) array
+        C'(p)/C'(0) - 1, by the law and by each within its error; none of springs [-].
+    """
+
+    displacement_m: NDArray[np.float64]
+    boundary: dict[str, str]
+    doubts: tuple[str, ...]
+    rises: tuple[NDArray[np.float64], ...] = ()
+
+
+def _springs(design: Design, piece: PressedPiece, stress_pa: Sequence[float]) -> ClosedForm:
+    """Samples as springs side by side, for any scene."""
+    scene, why = piece.scene, press2d.why_not_applicable(piece.scene)
+    solids = elastic(design, scene)
+    moduli = {n: s.youngs_modulus_pa / (1.0 if why else 1 - s.poisson_ratio**2) for n, s in solids.items()}
+    boxes = all(p.is_box() for body in scene.bodies for p in body.pieces)
+    said = (
+        "at most this, at small strain under a stiff plate"
+        if boxes
+        else "an estimate: columns without their neighbours"
+    )
+    doubts = (
+        f"displacement: {said}", "no capacitance under stress: springs have no outlines", *([why] if why else [])
+    )  # fmt: skip
+    return ClosedForm(springs.displacement_m(scene, moduli, stress_pa), {"top": "rigid"}, doubts)
+
+
+PLATES = {"unconfined": "free", "bonded": "bonded to both electrodes"}
+
+
+def law_name(design: Design, piece: PressedPiece) -> str:
+    """Law in closed form of a plate of one material, or of infill; "" of other cells, which are solved."""
+    try:
+        if piece.period_mm is not None or len({b.terminal for b in piece.scene.bodies} - {""}) != 2:
+            return ""
+        known = _at_rest(design, piece)
+        if is_plate(known, piece.scene):
+            return "bonded" if _between(piece) == {film(design)} else ""
+        return "infill" if infill(design, piece) else ""
+    except SensorgenError:
+        return ""
+
+
+def _at_rest(design: Design, piece: PressedPiece) -> Answer:
+    eps = {t.material: t.value for t in permittivities(design)}
+    return capacitance(piece.scene, eps, model="columns", keep=False)
+
+
+def _between(piece: PressedPiece) -> set[str]:
+    return {body.material for body in piece.scene.bodies if not body.terminal}
+
+
+def _law(name: str, design: Design, piece: PressedPiece, stress_pa: Sequence[float]) -> ClosedForm:
+    """A law of solid plates or of infill."""
+    known = _at_rest(design, piece)
+    if name in PLATES and (not is_plate(known, piece.scene) or _between(piece) != {film(design)}):
+        raise BadInput(f"--model {name} applies to a solid plate of one material, {design.shape} is none: try springs")
+    refuse_crushing(
+        stress_pa[-1], {n: taken.value for n, taken in of_all_materials(design, "youngs_modulus_pa").items()}
+    )
+    law, gap, stress = law_of(design, known, name, printed=piece), gap_m(piece.scene), np.asarray(stress_pa)
+    with suppress(OutOfRange):  # of the softest, whose electrodes would touch
+        strains = [each.capacitive_strain(stress)[0] for each in (law.compression, *law.others)]
+        rises = tuple(strain / (1 - strain) for strain in strains)
+        displacement_m = stress / law.compression.foundation_stiffness_pa_per_m(gap)
+        doubts = (f"displacement: of the film between its electrodes, {law.compression.source}", *law.doubts)
+        return ClosedForm(displacement_m, {"sides": PLATES.get(name, "as infill")}, doubts, rises)
+    raise OutOfRange(f"{stress_pa[-1] / 1e3:g} kPa: by the softest law the electrodes touch; expected less")
+
+
+CLOSED_FORMS: dict[str, Callable[[Design, PressedPiece, Sequence[float]], ClosedForm]] = {
+    "springs": _springs, **{name: partial(_law, name) for name in (*PLATES, "infill")},
+}  # fmt: skip
+FIRST = "springs"  # applies to any scene: the default where no field can be solved
+
 
 __all__ = [
     "ALL",
@@ -54,7 +145,7 @@ __all__ = [
 ]
 
 Step = Callable[[float], None]
-ALL = (*MODELS, *closed_form.MODELS)
+ALL = (*MODELS, *CLOSED_FORMS)
 
 COLUMNS = (
     Column("stress", "kPa", key="stress_kpa"), Column("displacement", "um", key="displacement_um"),
@@ -254,7 +345,7 @@ def answer(body: Body, asked: PressQuestion, *, step: Step | None = None) -> Com
         if asked.accuracy < inf:
             return _within(body, asked, step)
         model = _model(body, asked)
-        if model in closed_form.MODELS:
+        if model in CLOSED_FORMS:
             return _closed_form(body, asked, model)
         case = _case(body, asked)
         found = _estimated(case, asked, USUAL, step)
@@ -295,18 +386,18 @@ def planned(body: Body, asked: PressQuestion) -> Plan:
         raise OutOfRange(f"an accuracy of {asked.accuracy:g}; expected a number above 0, as 1e-2")
     piece = piece_of(body)
     model = _model(body, asked)
-    if model in (*closed_form.PLATES, "infill"):
+    if model in (*PLATES, "infill"):
         raise BadInput(
             f"an accuracy of C, which follows the law {model}, a closed form, between its bounds: leave out "
             "--accuracy, or solve one of unlimited cells with --sides symmetric"
         )
-    if model in closed_form.MODELS:
+    if model in CLOSED_FORMS:
         why = f"--model {model}" if asked.model else why_not_applicable(piece, MODELS[0])
         raise BadInput(f"an accuracy of C, and {why}: {model} tells {_NO_C}; leave out --accuracy")
     candidates = []
     for name in ALL:
         if name != model:
-            without_c = _NO_C if name in closed_form.MODELS else ""
+            without_c = _NO_C if name in CLOSED_FORMS else ""
             unfit = without_c or why_not_applicable(piece, name) or "the model before it applies to the cell"
             candidates.append(PlanCandidate(name, passed_over=f"--model {model}" if asked.model else unfit))
     meshes = _mesh_levels(piece, model, asked)
@@ -319,10 +410,8 @@ def planned(body: Body, asked: PressQuestion) -> Plan:
 def _model(body: Body, asked: PressQuestion) -> str:
     piece = piece_of(body)
     usual = asked.sides == "bonded" and asked.boundary.period == "fixed"
-    law = closed_form.law_name(body.design, piece) if usual and not asked.model and not asked.check_mesh else ""
-    return (
-        law or asked.model or next((name for name in MODELS if not why_not_applicable(piece, name)), closed_form.FIRST)
-    )
+    law = law_name(body.design, piece) if usual and not asked.model and not asked.check_mesh else ""
+    return law or asked.model or next((name for name in MODELS if not why_not_applicable(piece, name)), FIRST)
 
 
 def _mesh_levels(piece: PressedPiece, model: str, asked: PressQuestion) -> list[MeshLevel]:
@@ -435,7 +524,7 @@ def _known(values: Real) -> tuple[float | None, ...]:
 
 def _closed_form(body: Body, asked: PressQuestion, model: str) -> CompressionResult:
     """Displacement, and of a plate or infill the capacitance, by a law that solves no field."""
-    found = closed_form.MODELS[model](body.design, piece_of(body), [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
+    found = CLOSED_FORMS[model](body.design, piece_of(body), [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
     unknown = np.full(len(asked.stress_kpa), nan)
     rise = off = lower = upper = unknown
     if found.rises:
@@ -456,7 +545,7 @@ def _closed_form(body: Body, asked: PressQuestion, model: str) -> CompressionRes
 
 def _unsolved(body: Body, asked: PressQuestion, why: str) -> CompressionResult:
     """Without the library for fields: a closed-form estimate, the capacitance at rest, and no accuracy."""
-    found = _closed_form(body, asked, closed_form.FIRST)
+    found = _closed_form(body, asked, FIRST)
     rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
     unknown = (None,) * (len(asked.stress_kpa) - 1)
     found = replace(

@@ -20,7 +20,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.tip import EVEN, STIFF, Tip
 from sensorgen.design.values import MaterialValue, film, material_value, of_all_materials, permittivities
-from sensorgen.models import compression, sandwich
+from sensorgen.models import compression
 from sensorgen.models.compression import CapacitanceCurve, Compression, curve_of
 from sensorgen.prediction.capacitance import Answer, is_plate
 from sensorgen.prediction.mesh_ladder import (
@@ -308,6 +308,8 @@ def _bonded(
 
 def _between(rubber: tuple[float, ...], ends: Sequence[tuple[float, float]], base: str) -> compression.Plate:
     """A film between its electrodes on a base."""
+    from sensorgen.models import sandwich
+
     (low_pa, low_m), (top_pa, top_m) = ends
     modulus = sandwich.modulus_pa(*rubber, electrode_pa=(low_pa, top_pa), electrode_m=(low_m, top_m), base=base)
     return compression.Plate("bonded", f"bonded to both electrodes: {modulus / rubber[0]:.4g} E", modulus)
@@ -477,9 +479,11 @@ def at_a_few_pressures(
     if name in ("bonded", "symmetric") and not is_plate(answer, printed.scene):
         name = ""
     known = law_of(design, answer, name, printed=printed, tip=tip, until_pa=stress_pa)
+    if known.bounded:
+        return known
     model = model_of(printed, quick=True)
-    if known.bounded or model == "press3d":
-        return known if known.bounded else infill(design, printed)
+    if model == "press3d":
+        return infill(design, printed)
     try:
         case = case_of(design, printed, model, tip)
         found = pressed(case, [stress_pa * part for part in (0, 0.5, 1, 1.25)], COARSEST)

@@ -18,7 +18,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.design.design import Design
-from sensorgen.prediction import cost_model as expectations
+from sensorgen.prediction.capacitance import points
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import overlap
 
@@ -134,11 +134,11 @@ def mesh_levels(piece: PressedPiece, model: str, loads: int) -> list[MeshLevel]:
     loads : int
         Pressures above 0 that are asked for.
     """
-    points, share = expectations.points(model, piece.scene), loads / _MEASURED_LOADS
+    reached, share = points(model, piece.scene), loads / _MEASURED_LOADS
     area = _area_error(model)
     return [
         MeshLevel(_name(model, level), model, level, SAFETY * rise + area, (seconds + before) * share)
-        for level, ((_, before), (rise, seconds)) in enumerate(pairwise(points), COARSEST + 1)
+        for level, ((_, before), (rise, seconds)) in enumerate(pairwise(reached), COARSEST + 1)
     ]
 
 

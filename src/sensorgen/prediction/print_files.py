@@ -19,8 +19,6 @@ from sensorgen.core.errors import SensorgenError, UnknownName
 from sensorgen.design.design import Design
 from sensorgen.design.printer import folder as profiles
 from sensorgen.export.slicers import PROGRAMS, SLICERS
-from sensorgen.export.slicers.loads import loads
-from sensorgen.export.slicers.run import find
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
@@ -109,6 +107,8 @@ def at_hand(
     decides = slicer or deciding()
     if decides == NONE:
         return None, "no slicer installed" if not slicer and not os.environ.get(VARIABLE) else ""
+    from sensorgen.export.slicers.run import find
+
     try:
         program = find(*PROGRAMS[decides], program)
         question = _question(design, decides, program)
@@ -144,6 +144,7 @@ def _sliced(design: Design, slicer: str, program: str, question: dict[str, Any],
 def _question(design: Design, slicer: str, program: str) -> dict[str, Any]:
     """All that decides a slice and its findings: files and values that a profile is written by, not its text."""
     from sensorgen.export.slicers import versions
+    from sensorgen.export.slicers.loads import loads
 
     changed = Path(program).stat().st_mtime_ns
     version = tuple(

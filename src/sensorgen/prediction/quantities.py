@@ -5,7 +5,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from itertools import product
-from math import inf, isnan, nan, pi, prod, tan
+from math import inf, isfinite, isnan, nan, pi, prod, tan
 from typing import Any
 
 import numpy as np
@@ -23,20 +23,87 @@ from sensorgen.models.compression import Compression
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.capacitance import Unpredictable
 from sensorgen.prediction.compression_law import CLOSED_FORM, at_a_few_pressures
-from sensorgen.prediction.electrodes import electrode_resistance
 from sensorgen.prediction.error_budget import error_budget, material_ends, modulus_range
 from sensorgen.prediction.identifiability.fisher import Setup
 from sensorgen.prediction.identifiability.identify import identify
-from sensorgen.prediction.losses import LARGEST_TANGENT, LOWEST_HZ, Lost, lost
-from sensorgen.prediction.narrowing import narrowings
 from sensorgen.prediction.plan import Plan
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import FORCE_N, Load, Query
 from sensorgen.prediction.reference_load import ReferenceLoad
-from sensorgen.prediction.rest_state import Added, RestState, added, rest_state
-from sensorgen.prediction.results import SCHEMA, Impedance, Prediction, UnderTop
+from sensorgen.prediction.rest_state import (
+    LARGEST_TANGENT,
+    LOWEST_HZ,
+    Added,
+    Lost,
+    RestState,
+    added,
+    electrode_resistance,
+    lost,
+    rest_state,
+)
+from sensorgen.prediction.results import SCHEMA, Impedance, Narrowing, Prediction, UnderTop
 from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
 from sensorgen.scene.slabs import is_open
+
+WIDE = 3.0  # upper over lower end, from which on a measurement is advised
+_METER, _PRESS = 1.02, 1.1  # upper over lower end of what a meter, and what a known weight, leave of what they measure
+MULTIMETER, LCR = "multimeter, four wires", "LCR meter at rest, open leads subtracted"
+WEIGHT, GCODE = "known weight on it", "G-code (sensorgen slice)"
+_REMOVES = {  # causes by what they no longer count after
+    MULTIMETER: ("resistivity", "contact resistance"),
+    LCR: ("permittivity", "lead capacitance"),
+    WEIGHT: ("law", "width", "film", "stiffness"),
+    GCODE: ("width",),
+}
+
+
+def narrowings(
+    found: Prediction, body: Body, of_force: Mapping[str, Interval], of_position: Mapping[str, Interval]
+) -> Iterator[Narrowing]:
+    """Measurements for all ranges that span more than ``WIDE``.
+
+    Parameters
+    ----------
+    found : Prediction
+        With its ranges.
+    body : Body
+        That is predicted: of G-code, there is none to narrow it.
+    of_force, of_position : mapping of str to Interval
+        Ends of the resolutions by each cause [N], [m].
+    """
+    for end, r in found.resistance.items():
+        yield from _narrowing(f"{end} electrode", r, {MULTIMETER: _METER, GCODE: _without_print(r)}, body)
+    if c := found.capacitance:
+        yield from _narrowing("capacitance", c, {LCR: _METER, GCODE: _without_print(c)}, body)
+    if s := found.sensitivity:
+        yield from _narrowing("sensitivity", s, {WEIGHT: _PRESS, GCODE: _without_print(s)}, body)
+    for name, resolution, causes in (
+        ("force resolution", found.force_resolution, of_force),
+        ("position resolution", found.position_resolution, of_position),
+    ):
+        if resolution:
+            left = {
+                by: prod(_factor(part) for cause, part in causes.items() if not cause.startswith(removed))
+                for by, removed in _REMOVES.items()
+            }
+            yield from _narrowing(name, resolution, left, body)
+
+
+def _narrowing(name: str, of: Bounds, left: Mapping[str, float], body: Body) -> Iterator[Narrowing]:
+    now = _factor(of)
+    possible = {by: factor for by, factor in left.items() if by != GCODE or body.kind == "estimated"}
+    if now > WIDE and possible:
+        best = min(possible, key=possible.__getitem__)
+        yield Narrowing(name, best, now, min(possible[best], now))
+
+
+def _factor(of: Bounds | Interval) -> float:
+    return of.upper / of.lower if of.lower > 0 and isfinite(of.upper) else inf
+
+
+def _without_print(of: Bounds) -> float:
+    return _factor(of) / _factor(of.print)
+
 
 Otherwise = tuple[Sequence[Sensor | None], Sequence[Sensor | None]]  # by other walls; with other films
 

@@ -11,10 +11,9 @@ from sensorgen.design.values import film as film_of
 from sensorgen.models import pressure
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.compression_law import Law, gap_m, law_of
-from sensorgen.prediction.losses import Lost, lost
 from sensorgen.prediction.mesh_ladder import PressedPiece
 from sensorgen.prediction.query import FLAT, Tip
-from sensorgen.prediction.rest_state import RestState, rest_state
+from sensorgen.prediction.rest_state import Lost, RestState, lost, rest_state
 from sensorgen.scene.sections import square_to
 from sensorgen.scene.slabs import is_open
 

@@ -21,17 +21,17 @@ from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.settings import varied
 from sensorgen.measure.log import Log
-from sensorgen.prediction import bodies, compression, evaluate, swept_prediction
+from sensorgen.prediction import bodies, compression, evaluate
 from sensorgen.prediction import capacitance_answer as at_rest
 from sensorgen.prediction.calibration.calibration import Calibration
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
-from sensorgen.prediction.loaded import Loaded, loaded
+from sensorgen.prediction.loaded import Loaded, PredictedPoint, loaded
+from sensorgen.prediction.loaded import sweep as predicted_sweep
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import DEFAULT, NOISE, TONES_HZ, Query, Tip
 from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.slices import reviewed
 from sensorgen.prediction.sweep import Sweep
-from sensorgen.prediction.swept_prediction import PredictedPoint
 from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.workflows import build as builds
 from sensorgen.workflows import display as display
@@ -136,7 +136,7 @@ def predict(
     if not isinstance(what, Design | Body):
         if forces or positions:
             raise BadInput("force_n and position_mm are of one design; expected Design or Body, or neither of them")
-        return swept_prediction.sweep("design", _points(what), query, 1, _silent)
+        return predicted_sweep("design", _points(what), query, 1, _silent)
     if not forces and not positions:
         return evaluate.evaluate(_body(what), query)
     return loaded(_body(what), query, forces, positions)
@@ -171,7 +171,7 @@ def sweep(
     points = [(chosen, _body(one)) for chosen, one in varied(_named(design), values)]
     if unloaded:
         return at_rest.sweep(tuple(values), points, at_rest.CapacitanceQuestion(query.accuracy), jobs, _silent)
-    return swept_prediction.sweep(tuple(values), points, query, jobs, _silent)
+    return predicted_sweep(tuple(values), points, query, jobs, _silent)
 
 
 def cell(

@@ -21,13 +21,11 @@ from sensorgen.measure.log import BenchRun, Log, Reading, notes, prints
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log.entries import Specimen
 from sensorgen.prediction import bodies
-from sensorgen.prediction.calibration.baseline import RestChange
-from sensorgen.prediction.calibration.calibration import BEYOND, Calibration, from_json
-from sensorgen.prediction.calibration.coverage import coverage_of, held_out
+from sensorgen.prediction.calibration.calibration import BEYOND, Calibration, coverage_of, from_json, held_out
 from sensorgen.prediction.calibration.fitting import Data, calibrated, gain, loosened, shared, widened
 from sensorgen.prediction.calibration.inversion import InvertedPresses
 from sensorgen.prediction.calibration.materials import links
-from sensorgen.prediction.calibration.rest import checked
+from sensorgen.prediction.calibration.rest import RestChange, checked
 from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, Spread, spread_at
 from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
 from sensorgen.prediction.planning import sensor_model

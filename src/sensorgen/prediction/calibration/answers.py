@@ -10,7 +10,7 @@ from sensorgen.core.document import Part
 from sensorgen.core.units import M_PER_MM
 from sensorgen.prediction.calibration.inversion import WIDE, InvertedPresses, Verdict
 from sensorgen.prediction.calibration.rest import STALE_S
-from sensorgen.prediction.inverse import statuses
+from sensorgen.prediction.inverse import verdict
 
 COLUMNS = (
     "force_n", "force_low_n", "force_high_n", "position_mm", "position_low_mm", "position_high_mm", "chi2", "tones",
@@ -21,7 +21,7 @@ REST = "rest"
 
 def header(given: Sequence[str]) -> str:
     """Names of the columns, those of the input before."""
-    return statuses.header(given, COLUMNS)
+    return verdict.header(given, COLUMNS)
 
 
 def rows(given: Sequence[Sequence[str]], found: InvertedPresses, rest: Mask) -> str:
@@ -39,7 +39,7 @@ def rows(given: Sequence[Sequence[str]], found: InvertedPresses, rest: Mask) -> 
     force, place = found.force_90_n, found.position_90_m / M_PER_MM
     numbers = np.column_stack([found.force_n, force, found.position_m / M_PER_MM, place, found.chi2])
     words = np.where(rest, REST, np.array([v.words for v in Verdict])[found.verdict])
-    return statuses.rows(given, numbers, found.tones, words)
+    return verdict.rows(given, numbers, found.tones, words)
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class CalibratedSummary:
     """Counts blocks of results; of widths each block's median is kept."""
 
     def __init__(self) -> None:
-        self._statuses = statuses.Counts(Verdict)
+        self._statuses = verdict.Counts(Verdict)
         self._widths: list[tuple[float, float]] = []
         self.at_rest = 0
 

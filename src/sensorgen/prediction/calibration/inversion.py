@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.prediction.calibration.fitting import Data, Posterior, covariances
+from sensorgen.prediction.calibration.fitting import Posterior, pairs, readings, usual_presses
 from sensorgen.prediction.calibration.rest import STALE_S
-from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel
+from sensorgen.prediction.calibration.specimen import SpecimenModel
 from sensorgen.prediction.inference import Index, Samples, cramer_rao, parts, whitening
+from sensorgen.prediction.inverse.estimator import Prior
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
-from sensorgen.prediction.inverse.prior import Prior
-from sensorgen.prediction.inverse.statuses import Worded
-from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
+from sensorgen.prediction.inverse.verdict import NORMAL_90, Worded, chi2_limit
 
 LEVEL = 0.9  # probability of the intervals
 _COARSE = 20, 16  # forces and positions at which covariances are worked out
@@ -151,11 +150,11 @@ class Inverter:
         self._means, self._covariances = (
             _refined(coarse, (self.force_n, self.position_m), v) for v in (mean, covariance)
         )
-        self._mean = parts(model.ratio(posterior.at, _of(posterior, *_pairs(self.force_n, self.position_m))))
+        self._mean = parts(model.ratio(posterior.at, usual_presses(posterior, *pairs(self.force_n, self.position_m))))
         self._weight = np.log(_steps(self.force_n)[:, None] * _steps(self.position_m)).ravel()
         for axis, normal in enumerate(() if prior is None else (prior.force_n, prior.position_m)):
             if normal is not None:
-                at = _pairs(self.force_n, self.position_m)[axis]
+                at = pairs(self.force_n, self.position_m)[axis]
                 self._weight = self._weight - ((at - normal[0]) / normal[1]) ** 2 / 2
         self._tables: dict[bytes, _Table] = {}
         shaped = self._mean.reshape(len(self.force_n), len(self.position_m), -1)
@@ -164,7 +163,9 @@ class Inverter:
             *self._mean.shape, 2
         )
         self._elsewhere = _elsewhere(model, posterior, force_limit_n)
-        fall = -model.scatters(posterior.at, _of(posterior, np.zeros(1), np.full(1, self._length / 2)))[0, :, 1]
+        fall = -model.scatters(posterior.at, usual_presses(posterior, np.zeros(1), np.full(1, self._length / 2)))[
+            0, :, 1
+        ]
         weighted = np.linalg.solve(self._covariances[0], fall)
         self._fall = weighted / np.sqrt(fall @ weighted)
 
@@ -344,40 +345,6 @@ def nothing(n: int) -> InvertedPresses:
     return InvertedPresses(force, place, ends[0], ends[1], others[0], others[1], others[2], tones, verdict)
 
 
-def _pairs(force_n: Real, position_m: Real) -> tuple[Real, Real]:
-    force, position = np.meshgrid(force_n, position_m, indexing="ij")
-    return force.ravel(), position.ravel()
-
-
-def _of(posterior: Posterior, force_n: Real, position_m: Real) -> Presses:
-    """Presses with the usual course."""
-    unloading, decades = (np.full(len(force_n), mean) for mean, _ in (posterior.unloading, posterior.decades))
-    return Presses(force_n, position_m, unloading, decades)
-
-
-def readings(model: SpecimenModel, posterior: Posterior, force_n: Real, position_m: Real) -> tuple[Real, Real]:
-    """Expected parts of ratios (points, 2 m), and their covariance with all that is open (points, 2 m, 2 m).
-
-    Parameters
-    ----------
-    model, posterior
-        Of the specimen.
-    force_n, position_m : (f,), (x,) array
-        Of a grid, whose points go along positions first [N], [m].
-    """
-    force, position = _pairs(force_n, position_m)
-    presses = _of(posterior, force, position)
-    slopes = model.slopes(posterior.at, presses)
-    vectors = model.scatters(posterior.at, presses)
-    components = posterior.components.copy()
-    courses = (("hysteresis", posterior.unloading[1]), ("creep", posterior.decades[1]))
-    unknown_course = [model.value(name, posterior.at) * sd for name, sd in courses]
-    components[0] = np.sqrt(components[0] ** 2 + np.sum(np.square(unknown_course)))
-    own = covariances(model, posterior.at, Data.unread(presses, posterior.noise), components, vectors)
-    shared = slopes @ posterior.covariance @ slopes.transpose(0, 2, 1)
-    return parts(model.ratio(posterior.at, presses)), own + shared
-
-
 def _position_errors(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> Real:
     """Standard error of the position at each force of a grid, the median over positions [m]."""
     shape = len(coarse[0]), len(coarse[1])
@@ -417,7 +384,7 @@ def _refined(coarse: tuple[Real, Real], fine: tuple[Real, Real], values: Real) -
 def _elsewhere(model: SpecimenModel, posterior: Posterior, force_n: float) -> Real:
     """Parts that a hand at the contacts, and presses along the sensor, add to a reading (2 m, 1 + places)."""
     places = np.linspace(0, model.sensor.length_m, _PLACES)
-    presses = model.ratio(posterior.at, _of(posterior, np.full(_PLACES, force_n / 4), places))
+    presses = model.ratio(posterior.at, usual_presses(posterior, np.full(_PLACES, force_n / 4), places))
     omega = 2 * np.pi * model.frequency_hz
     by_hand = -1j * omega * np.exp(model.rest(posterior.at)) * model.spread.stray_f
     return parts(np.concatenate([by_hand[None], presses])).T

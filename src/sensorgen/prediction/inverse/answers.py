@@ -9,7 +9,7 @@ import numpy as np
 
 from sensorgen.core.document import Part
 from sensorgen.core.units import M_PER_MM
-from sensorgen.prediction.inverse import statuses
+from sensorgen.prediction.inverse import verdict
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
 from sensorgen.prediction.inverse.verdict import Status
 
@@ -23,7 +23,7 @@ _DIAGONAL = np.arange(2)
 
 def header(given: Sequence[str]) -> str:
     """Names of the columns, those of the input before."""
-    return statuses.header(given, COLUMNS)
+    return verdict.header(given, COLUMNS)
 
 
 def rows(given: Sequence[Sequence[str]], estimates: Estimates, *, prior: bool = False) -> str:
@@ -39,7 +39,7 @@ def rows(given: Sequence[Sequence[str]], estimates: Estimates, *, prior: bool = 
         A prior was stated: results then count even where the reading has little information.
     """
     words = np.array([status.words for status in Status])[estimates.status]
-    return statuses.rows(given, _numbers(estimates, prior), estimates.tones, words)
+    return verdict.rows(given, _numbers(estimates, prior), estimates.tones, words)
 
 
 def _numbers(found: Estimates, prior: bool) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -117,7 +117,7 @@ class Summary:
 
     def __init__(self, estimator: Estimator, doubts: Sequence[str] = ()) -> None:
         self._estimator, self._doubts = estimator, (*doubts, *estimator.doubts)
-        self._statuses = statuses.Counts(Status)
+        self._statuses = verdict.Counts(Status)
         self._errors: list[tuple[float, float]] = []
         self._excess: list[float] = []
 
