@@ -65,7 +65,7 @@ def _array(
     page, --page/--no-page
         Show it in the browser.
     """
-    from sensorgen.cli.array_inversion import known
+    from sensorgen.cli.inversion import known
     from sensorgen.measure.lab.clock import RealClock
     from sensorgen.measure.lab.frame_live import FrameFeed, MapView, follow
     from sensorgen.measure.lab.frame_recorder import recorder

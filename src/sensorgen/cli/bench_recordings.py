@@ -382,9 +382,9 @@ def _header(source: "Readings") -> str:
 
 
 def _rows(block: "FileRows", smooth: "Complex") -> Iterator[str]:
-    for kept, row in zip(block.kept, smooth.tolist(), strict=True):
+    for beside, row in zip(block.kept, smooth.tolist(), strict=True):
         parts = (f"{part:.12g}" if isfinite(z.real) else "" for z in row for part in (z.real, z.imag))
-        yield ",".join([*map(_cell, kept), *parts]) + "\n"
+        yield ",".join([*map(_cell, beside), *parts]) + "\n"
 
 
 def _cell(text: str) -> str:

@@ -1,6 +1,6 @@
 """Options that several commands have: each a type, to annotate a parameter with, or a record of several."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -219,6 +219,13 @@ def _setting(change: "Change") -> str:
 def typed(name: str) -> bool:
     """Test whether an option was given on the command line, by the name of its parameter."""
     return click.get_current_context().get_parameter_source(name) is ParameterSource.COMMANDLINE
+
+
+def refuse_typed(names: Collection[str], why: str) -> None:
+    """Raise BadInput for the first option that was given, by the names of their parameters."""
+    for option in click.get_current_context().command.params:
+        if option.name in names and typed(option.name):
+            raise BadInput(f"{option.opts[0]} {why}")
 
 
 def refuse_explain(given: bool, *, many: bool) -> None:

@@ -8,7 +8,6 @@ from click.shell_completion import get_completion_class
 
 from sensorgen.cli import FOUND_ERRORS, render
 from sensorgen.cli.commands import command as of_function
-from sensorgen.cli.words import OneOf
 from sensorgen.core.options import Argument
 
 if TYPE_CHECKING:
@@ -130,9 +129,8 @@ def schema_command(
     render.write([json.dumps(schema, indent=2, ensure_ascii=False), "\n"])
 
 
-@click.command("completion")
-@click.argument("shell", type=OneOf(["bash", "zsh", "fish"]))
-def completion_command(shell: str) -> None:
+@of_function("completion")
+def completion_command(shell: Annotated[str, Argument(kind=("bash", "zsh", "fish"))]) -> None:
     """Print the completion script for a shell.
 
     \b

@@ -92,8 +92,8 @@ def export_command(
     """
     from sensorgen.workflows.export import export
 
-    made, _ = body.printed(design)
-    assert made is not None  # noqa: S101  (there is no --drawn)
-    render.say(made.provenance)
-    for path in export(made, output or Path(f"{design.name}.3mf"), voxel_mm):
+    body_printed, _ = body.printed(design)
+    assert body_printed is not None  # noqa: S101  (there is no --drawn)
+    render.say(body_printed.provenance)
+    for path in export(body_printed, output or Path(f"{design.name}.3mf"), voxel_mm):
         render.say(path)

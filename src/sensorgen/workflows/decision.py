@@ -118,41 +118,41 @@ def decision(
     step : callable
         Called with the next step, for a progress display.
     """
-    made, advice, start_s = None, None, time.process_time()
+    tried, advice, start_s = None, None, time.process_time()
     reason = "" if predict else "checks alone (--budget 0)"
     if predict and held.meshes:
         step("prediction")
         try:
-            made = trial(design, held=held)
+            tried = trial(design, held=held)
         except SensorgenError as error:
             reason = str(error)
-    if made:
-        reason = made.reason if made.status == "not predicted" else ""
+    if tried:
+        reason = tried.reason if tried.status == "not predicted" else ""
         if budget_s is not None:
             from sensorgen.workflows.advice import advised
 
             step("changes")
-            advice = advised(design, made, budget_s, step, time.process_time() - start_s)
+            advice = advised(design, tried, budget_s, step, time.process_time() - start_s)
     return Decision(
-        **vars(report(design, held)), trial=made, reason=reason, advice=advice,
+        **vars(report(design, held)), trial=tried, reason=reason, advice=advice,
         turned_by=_turned_by(design, held.verdict),
     )  # fmt: skip
 
 
-def _turned_by(design: Design, said: Verdict) -> str:
+def _turned_by(design: Design, verdict: Verdict) -> str:
     """A film one layer thinner than drawn, where the checks then have an error, and that error; else ""."""
     film_mm = getattr(design.params, "dielectric_mm", 0.0)
     thinner = round(film_mm - design.layers.layer_mm, 9)
-    if not film_mm or said == "CHANGE":
+    if not film_mm or verdict == "CHANGE":
         return ""
     fault = "a film one layer thinner"
     if thinner <= 0:
         return f"{fault}: none is left"
     try:
-        found = review(changed(design, {("parameters", "dielectric_mm"): thinner})).findings
+        findings = review(changed(design, {("parameters", "dielectric_mm"): thinner})).findings
     except SensorgenError as error:
         return f"{fault}: {error}"
-    return next((f"{fault}: {f.message}" for f in found if f.severity == "error" and not f.waiver), "")
+    return next((f"{fault}: {f.message}" for f in findings if f.severity == "error" and not f.waiver), "")
 
 
 PAGE_STEPS = (*CHECKS, "prediction", "page", "done")
@@ -175,8 +175,8 @@ def page_of(design: Design, *, folder: Path | None = None, step: Step = lambda _
     SensorgenError
         A name or value of the design is missing.
     """
-    held = reviewed(design, step, folder=folder)
-    decided = decision(design, held, 0.0, step=step)
-    predicted = evaluate(bodies.of_file(design, held.file))
+    printing = reviewed(design, step, folder=folder)
+    decided = decision(design, printing, 0.0, step=step)
+    predicted = evaluate(bodies.of_file(design, printing.file))
     step("page")
-    return decided.page(held.printed(design), held, predicted)
+    return decided.page(printing.printed(design), printing, predicted)

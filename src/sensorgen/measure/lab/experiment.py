@@ -228,8 +228,8 @@ class ExperimentPart(Strict):
     @property
     def content(self) -> Kind:
         """Value of that key."""
-        found: Kind = getattr(self, self.kind)
-        return found
+        value: Kind = getattr(self, self.kind)
+        return value
 
 
 class Stop(Strict):
@@ -516,11 +516,11 @@ NextPress = Callable[[Next, Sequence[DonePress], Complex], Choice]
 def steps(experiment: Experiment, length_mm: float) -> list[PlannedPress]:
     """All presses of an experiment on a specimen of a length [mm]."""
     places = experiment.places_mm(length_mm)
-    found: list[PlannedPress] = []
+    presses: list[PlannedPress] = []
     for k, part in enumerate(experiment.plan):
         for step in _presses(part.content, experiment, places):
-            found.append(replace(step, number=len(found) + 1, part=k, kind=part.kind))
-    return found
+            presses.append(replace(step, number=len(presses) + 1, part=k, kind=part.kind))
+    return presses
 
 
 def seconds(planned: Sequence[PlannedPress], longest_hold_s: float = 30.0) -> float:
@@ -531,8 +531,8 @@ def seconds(planned: Sequence[PlannedPress], longest_hold_s: float = 30.0) -> fl
 
 def chosen(step: PlannedPress, choice: Choice, approach: Approach) -> PlannedPress:
     """A step with what was chosen for it."""
-    made = _press(approach, choice.position_mm, choice.force_n, choice.peak_n, choice.hold_s, step.rest_s)
-    return replace(made, number=step.number, part=step.part, kind=step.kind)
+    press = _press(approach, choice.position_mm, choice.force_n, choice.peak_n, choice.hold_s, step.rest_s)
+    return replace(press, number=step.number, part=step.part, kind=step.kind)
 
 
 def _presses(

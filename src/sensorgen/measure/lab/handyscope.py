@@ -235,8 +235,8 @@ class Handyscope:
         lost = self._missing(heard=bool(parts))
         if parts and not self._settled:
             self._settled, parts = True, parts[1:]
-        found, gap_s = Readings.joined(parts, len(self._tones), lost), lost * self._window / RATE_HZ
-        return replace(found, time_s=found.time_s + gap_s)
+        readings, gap_s = Readings.joined(parts, len(self._tones), lost), lost * self._window / RATE_HZ
+        return replace(readings, time_s=readings.time_s + gap_s)
 
     def stop(self) -> None:
         """End the measurement and switch the generator off."""

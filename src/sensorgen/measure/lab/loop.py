@@ -269,8 +269,8 @@ class Loop:
         stop, now = self.experiment.stop, self.clock.now()
         if stop.minutes and now - self.begun_s > stop.minutes * 60:
             raise Ended("rule", f"stop.minutes: {stop.minutes:g} min have passed")
-        found = self.watch.circuit()
-        if found == "open":
+        circuit = self.watch.circuit()
+        if circuit == "open":
             raise DeviceFault("specimen: open circuit; check the cables to it")
-        if found and stop.short:
+        if circuit and stop.short:
             raise Ended("rule", "stop.short: at the lowest frequency the specimen conducts")

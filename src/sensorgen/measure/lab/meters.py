@@ -60,12 +60,12 @@ class ScpiInstrument:
 
     def _asked(self) -> str:
         """Answer to ``*IDN?``, after readings that a program which has died did not fetch."""
-        said = self._query("*IDN?")
+        answer = self._query("*IDN?")
         for _ in range(_STALE):
-            if not _READING.fullmatch(said):
+            if not _READING.fullmatch(answer):
                 break
-            said = self._answer("*IDN?")
-        return said
+            answer = self._answer("*IDN?")
+        return answer
 
     def _check(self, name: str) -> None:
         """Refuse an error of the instrument."""
@@ -76,14 +76,14 @@ class ScpiInstrument:
     def _answer(self, command: str) -> str:
         line = self._port.read_until(b"\n", self._timeout_s)
         if not line.endswith(b"\n"):
-            said = f" to its end: {line!r:.60}" if line else ""
-            raise DeviceFault(f"{self._port.address} does not answer {command}{said}; check cable and power")
+            so_far = f" to its end: {line!r:.60}" if line else ""
+            raise DeviceFault(f"{self._port.address} does not answer {command}{so_far}; check cable and power")
         return line.decode("utf-8", "replace").strip()
 
 
-def identity(model: str, said: str) -> Identity:
+def identity(model: str, answer: str) -> Identity:
     """Identity by an answer to ``*IDN?``."""
-    serial, firmware = (*[field.strip() for field in said.split(",")][2:4], "", "")[:2]
+    serial, firmware = (*[field.strip() for field in answer.split(",")][2:4], "", "")[:2]
     return Identity(model, serial, firmware)
 
 
@@ -125,15 +125,15 @@ class Multimeter(ScpiInstrument):
         """
         if self._port.address.upper().startswith("ASRL"):
             self._write("SYST:REM")
-        said = self._asked()
-        fields = re.sub(r"\s*,\s*", ",", said)
+        answer = self._asked()
+        fields = re.sub(r"\s*,\s*", ",", answer)
         name = next((name for model, name in self._models.items() if f",{model}," in fields.upper()), "")
         if not name:
             expected = " or ".join(self._models.values())
-            raise WrongDevice(f"{self._port.address} is {said!r:.80}; expected {expected}: or type it with --y, --z")
-        self.name = f"{name} ({said})"
+            raise WrongDevice(f"{self._port.address} is {answer!r:.80}; expected {expected}: or type it with --y, --z")
+        self.name = f"{name} ({answer})"
         self._write("*CLS")
-        return identity(name, said)
+        return identity(name, answer)
 
     def resistance(self, *, wires: int) -> str:
         """One autoranged reading as the meter sends it, as ``+6.50000000E+02`` [ohm].
@@ -231,12 +231,12 @@ class LcrMeter(ScpiInstrument):
         WrongDevice
             Another instrument answers.
         """
-        said = self._asked()
-        fields = [field.strip() for field in said.split(",")]
+        answer = self._asked()
+        fields = [field.strip() for field in answer.split(",")]
         if len(fields) < 2 or fields[1].upper() not in (self.model.name, f"{self.model.name}L"):
-            raise WrongDevice(f"{self._port.address} is {said!r:.80}; expected {self.model.name}")
+            raise WrongDevice(f"{self._port.address} is {answer!r:.80}; expected {self.model.name}")
         self._known = True
-        return identity(f"{fields[0]} {fields[1]}", said)
+        return identity(f"{fields[0]} {fields[1]}", answer)
 
     def start(self, tones_hz: Real, voltage_v: float) -> None:
         """Begin to measure at (m,) frequencies with an amplitude, which is the rms level times the root of 2 [Hz], [V].
@@ -280,18 +280,18 @@ class LcrMeter(ScpiInstrument):
         k = self._next
         if not count or self._clock.now() < self._begin_s + self._duration(k):
             return Readings.joined((), count)
-        said = self._query("FETC?")
-        numbers = _NUMBERS.fullmatch(said)
+        answer = self._query("FETC?")
+        numbers = _NUMBERS.fullmatch(answer)
         if not numbers:
-            raise DeviceFault(f"{self.model.name} at {self._port.address} answers {said!r:.60}; expected R,X,STATUS")
+            raise DeviceFault(f"{self.model.name} at {self._port.address} answers {answer!r:.60}; expected R,X,STATUS")
         self._at(float(self._tones_hz[k]))
         resistance, reactance, status = float(numbers[1]), float(numbers[2]), int(numbers[3])
         sound = (status == _GOOD or status in _SIGNAL) and max(abs(resistance), abs(reactance)) < _OVERLOAD
         value = complex(resistance, reactance) if sound else None
-        found = Readings.of_tone(self._begin_s + self._duration(k) / 2, k, count, value, clipped=status != _GOOD)
+        readings = Readings.of_tone(self._begin_s + self._duration(k) / 2, k, count, value, clipped=status != _GOOD)
         self._next = (k + 1) % count
         self._trigger()
-        return found
+        return readings
 
     def stop(self) -> None:
         """End the measurement, with the level at its lowest: it has no switch."""
@@ -301,14 +301,14 @@ class LcrMeter(ScpiInstrument):
 
     def _at(self, tone_hz: float) -> None:
         """Refuse a value of another frequency."""
-        said = self._query("FREQ?")
+        answer = self._query("FREQ?")
         try:
-            off = abs(float(said) / tone_hz - 1)
+            off = abs(float(answer) / tone_hz - 1)
         except ValueError:
             off = math.inf
         if not off <= _NEAR:
             raise DeviceFault(
-                f"{self.model.name} at {self._port.address} measures at {said!r:.40} Hz, not {tone_hz:g} Hz"
+                f"{self.model.name} at {self._port.address} measures at {answer!r:.40} Hz, not {tone_hz:g} Hz"
             )
 
     def _trigger(self) -> None:

@@ -184,11 +184,11 @@ def identified(rig: RunDevices) -> dict[str, Identity]:
     DeviceFault
         One does not answer, or is another device.
     """
-    found = {}
+    identities = {}
     for role, device in (("actuator", rig.actuator), ("stage", rig.stage), ("impedance", rig.impedance)):
         with within(role):
-            found[role] = device.identify()
-    return found
+            identities[role] = device.identify()
+    return identities
 
 
 def prepared(loop: Loop, middle_mm: float) -> None:

@@ -71,14 +71,14 @@ def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Run
     return RunDevices(**_drivers(devices, made)), plant
 
 
-def _drivers(devices: Devices, made: Callable[[Device], Any]) -> dict[str, Any]:
+def _drivers(devices: Devices, driver_of: Callable[[Device], Any]) -> dict[str, Any]:
     """Drivers by role; where one cannot be made, the others are closed."""
     drivers: dict[str, Any] = {}
     try:
         for role in ROLES:
             with within(f"devices.{role}"):
                 _has_role(role, getattr(devices, role))
-                drivers[role] = made(getattr(devices, role))
+                drivers[role] = driver_of(getattr(devices, role))
     except BaseException:
         for driver in drivers.values():
             driver.close()

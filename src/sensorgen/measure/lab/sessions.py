@@ -95,9 +95,9 @@ class Background:
     def _work(self) -> None:
         try:
             while not self._end.wait(_POLL_S):
-                found = self._meter.read()
-                if len(found.time_s) or found.lost:
-                    self._found.put(found)
+                readings = self._meter.read()
+                if len(readings.time_s) or readings.lost:
+                    self._found.put(readings)
         except BaseException as error:  # for the run, which lifts the tip
             self._fault = error
 
@@ -204,10 +204,10 @@ def new(path: Path, *, simulate: bool) -> SessionTask:
     BadInput
         The file is wrong, or has no devices although real ones are meant.
     """
-    found = experiments.read(path)
-    if not simulate and found.devices is None:
+    experiment = experiments.read(path)
+    if not simulate and experiment.devices is None:
         raise BadInput(f"{path}: devices is missing; expected actuator, stage and impedance, or --simulate")
-    return SessionTask(found, simulate)
+    return SessionTask(experiment, simulate)
 
 
 def again(log: "Log", name: str) -> SessionTask:
@@ -341,8 +341,8 @@ class Session:
 
 
 def _design(experiment: Experiment, log: "Log") -> Design:
-    found = design_of(experiment, log)
-    if found is None:
+    design = design_of(experiment, log)
+    if design is None:
         raise BadInput(f"no design is known of {experiment.specimen!r:.80}; give virtual.design, or bind it to one: "
                        "sensorgen log specimen NAME --design FILE")  # fmt: skip
-    return found
+    return design

@@ -23,14 +23,14 @@ class Sweeps:
     _times: list[float] = field(default_factory=list)
     _clipped: bool = False
 
-    def whole(self, found: Readings) -> Readings:
+    def whole(self, readings: Readings) -> Readings:
         """Rows that are whole now."""
-        known = np.isfinite(found.impedance_ohm)
+        known = np.isfinite(readings.impedance_ohm)
         if (known.all(axis=1) | ~known.any(axis=1)).all():
-            return found
-        rows = zip(found.time_s.tolist(), found.impedance_ohm, found.clipped.tolist(), strict=True)
+            return readings
+        rows = zip(readings.time_s.tolist(), readings.impedance_ohm, readings.clipped.tolist(), strict=True)
         whole = [row for each in rows for row in self._taken(*each)]
-        return Readings.joined(whole, found.impedance_ohm.shape[1], found.lost)
+        return Readings.joined(whole, readings.impedance_ohm.shape[1], readings.lost)
 
     def _taken(self, time_s: float, row: Complex, clipped: bool) -> Iterator[Readings]:
         known = np.isfinite(row)
@@ -96,7 +96,7 @@ class Watch:
     def __post_init__(self) -> None:
         self.latest_ohm = np.full(len(self.tones_hz), complex(nan, nan))
 
-    def take(self, found: Readings, now_s: float) -> None:
+    def take(self, readings: Readings, now_s: float) -> None:
         """Take readings that came just now.
 
         Raises
@@ -104,20 +104,20 @@ class Watch:
         DeviceFault
             No sound reading for :data:`SILENT_S`.
         """
-        sound = np.isfinite(found.impedance_ohm).all(axis=1) & (found.impedance_ohm != 0).all(axis=1)
+        sound = np.isfinite(readings.impedance_ohm).all(axis=1) & (readings.impedance_ohm != 0).all(axis=1)
         self.count += len(sound)
-        self.lost += found.lost
-        self.clipped += int(np.count_nonzero(found.clipped))
+        self.lost += readings.lost
+        self.clipped += int(np.count_nonzero(readings.clipped))
         self.invalid += int(np.count_nonzero(~sound))
-        self._course.extend(found.impedance_ohm[sound])
-        for row in found.impedance_ohm[sound & ~found.clipped]:
+        self._course.extend(readings.impedance_ohm[sound])
+        for row in readings.impedance_ohm[sound & ~readings.clipped]:
             self.latest_ohm = row
             self._recent.append((now_s, row))
             self.sound_s = now_s
         while self._recent and self._recent[0][0] < now_s - WINDOW_S:
             self._recent.popleft()
         if now_s - self.sound_s > SILENT_S:
-            what = "clipped" if found.clipped.any() else "no"
+            what = "clipped" if readings.clipped.any() else "no"
             raise DeviceFault(f"impedance meter: {what} readings for {SILENT_S:g} s; check cables, range and specimen")
 
     def circuit(self) -> str:

@@ -272,16 +272,16 @@ def log_recording(
     before = [files.raw_file(path) for path in paths]
     rig_log = recordings.rig(rig, rig_columns) if rig else None
     summary = summarised(recordings.parts(recording, columns), dict(columns), rig_log, dict(rig_columns))
-    kept = [files.keep(log.files, path) for path in paths]
-    if kept != before:
+    raw_files = [files.keep(log.files, path) for path in paths]
+    if raw_files != before:
         raise BadInput(f"{str(recording)!r} {files.CHANGED}")
-    identity = " ".join(filter(None, (of.specimen, *(file.uid for file in kept), supersedes)))
+    identity = " ".join(filter(None, (of.specimen, *(file.uid for file in raw_files), supersedes)))
     run = BenchRun(
         **vars(of), uid=sha256(identity.encode()).hexdigest()[:32], written=specimen, design_id=design_id,
-        design=design, source=recording.name, remark=remark, supersedes=supersedes, file=kept[0].uid,
-        rig_file=kept[1].uid if rig else "", facts=to_json(summary),
+        design=design, source=recording.name, remark=remark, supersedes=supersedes, file=raw_files[0].uid,
+        rig_file=raw_files[1].uid if rig else "", facts=to_json(summary),
     )  # fmt: skip
-    return [row for row in log.add([*kept, run]) if isinstance(row, BenchRun)]
+    return [row for row in log.add([*raw_files, run]) if isinstance(row, BenchRun)]
 
 
 def read_again(log: Log, run: BenchRun) -> "tuple[Iterator[tuple[Recording, ...]], RigLog | None]":

@@ -14,7 +14,7 @@ from dataclasses import MISSING, dataclass, fields
 from functools import cache, lru_cache
 from operator import eq
 from types import NoneType
-from typing import Any, TypeVar, cast, get_args, get_type_hints
+from typing import Any, Self, TypeVar, cast, get_args, get_type_hints
 
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.immittance import QUANTITIES
@@ -42,6 +42,12 @@ class Entry:
     logged_at: str = ""
     claimed_at: str = ""
     number: int = 0
+
+    def numbered(self, number: int, logged_at: str) -> Self:
+        """The row as the log has it; what makes it a row was checked before, and is not again."""
+        row = object.__new__(type(self))
+        vars(row).update(vars(self), number=number, logged_at=logged_at)
+        return row
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -444,15 +450,15 @@ def decode(kind: type[_Kind], content: str, number: int, logged_at: str) -> _Kin
     BadInput
         Content that no version of sensorgen writes for this kind.
     """
-    data, held = _object(content), _HELD[kind]
+    data, kinds = _object(content), _HELD[kind]
     if data is None:
         raise BadInput(f"a {kind.__name__} of which the content is no JSON object: {content!r:.60}")
-    if not (data.keys() <= held.keys() and _REQUIRED[kind] <= data.keys()):
-        strange, missing = data.keys() - held.keys(), [name for name in held if name in _REQUIRED[kind] - data.keys()]
+    if not (data.keys() <= kinds.keys() and _REQUIRED[kind] <= data.keys()):
+        strange, missing = data.keys() - kinds.keys(), [name for name in kinds if name in _REQUIRED[kind] - data.keys()]
         wrong = f"has {min(strange)!r:.40}" if strange else f"lacks {missing[0]!r}"
-        raise BadInput(f"a {kind.__name__} {wrong}; expected {', '.join(held)}")
+        raise BadInput(f"a {kind.__name__} {wrong}; expected {', '.join(kinds)}")
     values = {
-        name: value if held[name][0] is _TEXT and type(value) is str else _checked(name, held[name][0], value, kind)
+        name: value if kinds[name][0] is _TEXT and type(value) is str else _checked(name, kinds[name][0], value, kind)
         for name, value in data.items()
     }
     return kind(**values, number=number, logged_at=logged_at)  # type: ignore[arg-type]
@@ -460,8 +466,8 @@ def decode(kind: type[_Kind], content: str, number: int, logged_at: str) -> _Kin
 
 def indexed(content: str) -> tuple[str | int | None, ...]:
     """Entries of the log's index for a record's content: the fields of ``INDEXED``, None for those that it has not."""
-    held = _object(content) or {}
-    return tuple([held[name] if type(held.get(name)) is kind else None for name, kind in INDEXED.items()])
+    fields_ = _object(content) or {}
+    return tuple([fields_[name] if type(fields_.get(name)) is kind else None for name, kind in INDEXED.items()])
 
 
 @lru_cache(maxsize=1)  # a record is decoded, and then indexed
@@ -522,11 +528,16 @@ def _value(kinds: _Kinds, value: Any) -> Value:
     if value is None and optional:
         return None
     if kind is list:
-        if type(value) is not list or not items.issuperset(map(type, value)) or not all(map(eq, value, value)):
-            raise ValueError(f"{value!r:.60} is no list of {'texts' if str in items else 'numbers'}")
-        return tuple(value) if str in items else tuple(map(float, value))
+        return _listed(items, value)
     if kind is float and type(value) in (float, int) and math.isfinite(value):
         return float(value)
     if type(value) is not kind or kind is float:
         raise TypeError(f"{value!r:.60} is no {kind.__name__}")
     return cast(Value, value)
+
+
+def _listed(items: frozenset[type], value: Any) -> Value:
+    """Numbers without nan, or texts."""
+    if type(value) is not list or not items.issuperset(map(type, value)) or not all(map(eq, value, value)):
+        raise ValueError(f"{value!r:.60} is no list of {'texts' if str in items else 'numbers'}")
+    return tuple(value) if str in items else tuple(map(float, value))

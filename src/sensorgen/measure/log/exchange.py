@@ -164,13 +164,13 @@ def from_csv(kind: type[Entry], table: CsvTable) -> Iterator[Entry]:
 def _entry(
     kind: type[Entry], values: Mapping[str, Any], where: str, convert: Callable[[Any, Any], Value]
 ) -> Entry:  # fmt: skip
-    wanted, found = columns(kind), dict[str, Any]()
+    wanted, row = columns(kind), dict[str, Any]()
     for name, value in values.items():
         try:
-            found[name] = convert(wanted[name], value)
+            row[name] = convert(wanted[name], value)
         except (TypeError, ValueError, KeyError, OverflowError, RecursionError):
             raise BadInput(f"{where}, column {name}: {value!r:.60} is not what the log writes there") from None
-    return kind(**found)
+    return kind(**row)
 
 
 def parquet(kind: type[Entry], rows: list[Entry]) -> bytes:

@@ -1,6 +1,5 @@
 """Import files into the log: tables of readings, print beds, and exported logs; each file as a whole or not at all."""
 
-import dataclasses
 import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -86,19 +85,15 @@ def _rows(table: CsvTable, places: Mapping[str, int], source: str) -> Iterator[R
 def _places(table: CsvTable, columns: Mapping[str, str]) -> dict[str, int]:
     """Position of each of our columns in the table."""
     position = {name.casefold(): k for k, name in enumerate(table.names)}
-    places = {}
+    places = {ours: position[name] for ours, names in NAMES.items() for name in reversed(names) if name in position}
     for ours, theirs in columns.items():
         if ours not in NAMES:
             raise UnknownName("column of --column", ours, NAMES)
         if theirs.casefold() not in position:
             raise UnknownName(f"column of {table.name}", theirs, table.names)
         places[ours] = position[theirs.casefold()]
-    for ours, names in NAMES.items():
-        recognised = [position[name] for name in names if name in position]
-        if ours not in places and recognised:
-            places[ours] = recognised[0]
     for needed in (("specimen",), ("y", "z")):
-        if not any(ours in places for ours in needed):
+        if not places.keys() & {*needed}:
             raise BadInput(
                 f"{table.name}, row 1: no column {' or '.join(needed)} among {shown(', '.join(table.names))}; "
                 f"name it, as --column {needed[0]}=NAME"
@@ -162,28 +157,33 @@ def corrections(log: Log, rows: Iterable[Reading], table: str) -> Iterator[Readi
         A row that may be another measurement, or an edit.
     """
     current = {reading.uid: reading for reading in log.entries(Reading, source=table)}
-    rows = list(rows) if current else rows
-    kept = {row.uid for row in rows} & current.keys() if current else set()
-    gone = {reading.uid: reading for reading in current.values() if reading.uid not in kept}
+    if not current:
+        yield from rows
+        return
+    rows = list(rows)
+    unchanged = {row.uid for row in rows} & current.keys()
+    gone = {uid: reading for uid, reading in current.items() if uid not in unchanged}
     for row in rows:
-        if row.uid in kept or not gone or next(log.entries(Reading, uid=row.uid), None):
-            yield row
-            continue
-        taken_back = next(log.entries(Reading, replaced=True, uid=row.uid), None) is not None  # an edit, perhaps
-        old = _in_place(row, gone.values(), alike=bool(kept)) or (None if taken_back else _same(row, gone.values()))
-        other = next((old for old in gone.values() if old.specimen == row.specimen), None)
-        if old:
-            del gone[old.uid]
-            uid = sha256(f"{row.uid} {old.uid}".encode()).hexdigest()[:32] if taken_back else row.uid
-            yield dataclasses.replace(row, uid=uid, supersedes=old.uid)
-        elif other and not taken_back:
-            raise BadInput(
-                f"{table}, row {(row.source_row or 0) + 1}: not what reading {other.number} of {other.specimen} was in "
-                f"a table of this name. If it corrects that one: sensorgen log withdraw reading {other.number} "
-                "--reason corrected, and import again. If it is another table: give the file another name"
-            )
-        else:
-            yield row
+        known = row.uid in unchanged or not gone or next(log.entries(Reading, uid=row.uid), None)
+        yield row if known else _correction(log, row, gone, table, alike=bool(unchanged))
+
+
+def _correction(log: Log, row: Reading, gone: dict[str, Reading], table: str, *, alike: bool) -> Reading:
+    """Row as the correction of one that has gone from its table, and is taken out of these; itself if it is new."""
+    taken_back = next(log.entries(Reading, replaced=True, uid=row.uid), None) is not None  # an edit, perhaps
+    old = _in_place(row, gone.values(), alike=alike) or (None if taken_back else _same(row, gone.values()))
+    if old:
+        del gone[old.uid]
+        uid = sha256(f"{row.uid} {old.uid}".encode()).hexdigest()[:32] if taken_back else row.uid
+        return replace(row, uid=uid, supersedes=old.uid)
+    other = next((old for old in gone.values() if old.specimen == row.specimen), None)
+    if other and not taken_back:
+        raise BadInput(
+            f"{table}, row {(row.source_row or 0) + 1}: not what reading {other.number} of {other.specimen} was in "
+            f"a table of this name. If it corrects that one: sensorgen log withdraw reading {other.number} "
+            "--reason corrected, and import again. If it is another table: give the file another name"
+        )
+    return row
 
 
 def _in_place(row: Reading, gone: Iterable[Reading], *, alike: bool) -> Reading | None:
@@ -267,14 +267,14 @@ def lcr_export(
     """
     table = lcr.read(path)
     of = notes.reading(specimen, remark=remark, baked=baked, source=path.name, log=log)
-    kept = files.keep(log.files, path)
-    found = next((name for name in accuracy.names() if accuracy.is_named(name, table.preamble)), "")
+    raw_file = files.keep(log.files, path)
+    meter = next((name for name in accuracy.names() if accuracy.is_named(name, table.preamble)), "")
     row = replace(
         notes.with_readings(replace(of, doubts=(*of.doubts, *table.doubts)), table.readings, _MOST_DOUBTS),
-        uid=sha256(f"{of.specimen} {kept.uid}".encode()).hexdigest()[:32], file=kept.uid,
-        instrument=instrument or found,
+        uid=sha256(f"{of.specimen} {raw_file.uid}".encode()).hexdigest()[:32], file=raw_file.uid,
+        instrument=instrument or meter,
     )  # fmt: skip
-    new = [row for row in log.add([kept, row]) if isinstance(row, Reading)]
+    new = [row for row in log.add([raw_file, row]) if isinstance(row, Reading)]
     return ImportedRecording(
         table.rows, table.rows * len(new), sum(bool(row.doubts) for row in new), left_out=table.left_out
     )
@@ -299,9 +299,14 @@ def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> ImportedRec
     """
     if path.suffix.lower() == ".json":
         return _add(log, list(prints.rows(path, files.keep(log.files, path))))
-    if not path.is_dir():
-        with _table(log, path, columns) as (rows, left_out):
-            return _add(log, rows, left_out)
+    if path.is_dir():
+        return _add(log, _exported(log, path))
+    with _table(log, path, columns) as (rows, left_out):
+        return _add(log, rows, left_out)
+
+
+def _exported(log: Log, path: Path) -> list[Entry]:
+    """Rows of an exported log, whose raw files are kept."""
     exported: list[Entry] = []
     for kind, name in exchange.FILES.items():
         file = next((p for suffix in exchange.FORMATS if (p := path / f"{name}.{suffix}").is_file()), None)
@@ -309,15 +314,15 @@ def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> ImportedRec
             continue
         if file is None:
             raise BadInput(f"{str(path)!r} has no {name}.csv; expected the folder of an exported log")
-        with _table(log, file, {}) as (found, _):
-            rows = list(found)
+        with _table(log, file, {}) as (table, _):
+            rows = list(table)
         if not all(isinstance(row, kind) for row in rows):
             raise BadInput(f"{file}: columns of another table; expected those of {name}")
         exported += rows
     for row in exported:
         if isinstance(row, RawFile):
             files.keep(log.files, path / "files" / row.uid, row)
-    return _add(log, exported)
+    return exported
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import lru_cache
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from sensorgen.core.errors import BadInput, SensorgenError, within
@@ -87,22 +88,23 @@ def parse(text: str, *, mega: bool = False) -> Resistances:
     stripped = text.translate(_SIGNS).strip()
     if _NO_READING.fullmatch(stripped):
         return Resistances((), (f"{shown(stripped)} taken for no reading",) if stripped else ())
-    ohm, doubts, small_m = [], [], []
-    for part in map(str.strip, re.split("[/;|]", stripped)):
-        if _OVERLOAD.fullmatch(part):
-            ohm.append(OVERLOAD)
-            doubts += [] if part.upper() == "OL" else [f"{shown(part)} taken for overload"]
-            continue
-        match = _NUMBER.fullmatch(_LETTER_AS_POINT.sub(r"\1.\3\2", part))
-        if not match:
-            hint = "; between readings write /" if "," in part else ""
-            raise BadInput(f"{shown(text)} is no resistance; expected {EXPECTED}{hint}")
-        ohm.append(_ohm(match, text))
-        doubts += _doubts(part, "" if mega and match["prefix"] == "m" else match["prefix"] or "", ohm[-1])
-        small_m += [part] if match["prefix"] == "m" else []
-    if len(ohm) > 1:
-        doubts.append(f"{len(ohm)} readings: repeats, or several points of contact")
-    return Resistances(tuple(ohm), tuple(dict.fromkeys(doubts)), tuple(small_m))
+    parts = [_parsed(part.strip(), text, mega=mega) for part in re.split("[/;|]", stripped)]
+    ohm, doubts, small_m = zip(*parts, strict=True)
+    repeats = [f"{len(ohm)} readings: repeats, or several points of contact"] if len(ohm) > 1 else []
+    return Resistances(ohm, tuple(dict.fromkeys(chain(*doubts, repeats))), tuple(filter(None, small_m)))
+
+
+def _parsed(part: str, text: str, *, mega: bool) -> tuple[float, Sequence[str], str]:
+    """A reading of a text [ohm], doubts about it, and its word where a small m stands for mega."""
+    if _OVERLOAD.fullmatch(part):
+        return OVERLOAD, [] if part.upper() == "OL" else [f"{shown(part)} taken for overload"], ""
+    match = _NUMBER.fullmatch(_LETTER_AS_POINT.sub(r"\1.\3\2", part))
+    if not match:
+        hint = "; between readings write /" if "," in part else ""
+        raise BadInput(f"{shown(text)} is no resistance; expected {EXPECTED}{hint}")
+    ohm, prefix = _ohm(match, text), match["prefix"] or ""
+    doubts = list(_doubts(part, "" if mega and prefix == "m" else prefix, ohm))
+    return ohm, doubts, part if prefix == "m" else ""
 
 
 def _ohm(match: re.Match[str], text: str) -> float:
@@ -205,27 +207,35 @@ def reading(
     """
     if len(remark) > MAX_REMARK:
         raise BadInput(f"a remark of {len(remark)} characters; expected at most {MAX_REMARK}")
-    if any("\0" in text for text in (remark, written, y_words, z_words)):
+    if "\0" in "".join((remark, written, y_words, z_words)):
         raise BadInput("a zero byte in a name, a value or a remark; expected text")
-    of, bound = specimen(written, log), _bound(written, log)
+    of, (design_id, design) = specimen(written, log), design_fields(written, log)
     y, z = resistance("y", y_words, mega=mega), resistance("z", z_words, mega=mega)
-    unbaked = bool(_UNBAKED.search(remark))
-    film_expected = (of.iteration or 0) < FIRST_WITH_FILMS
-    assumed = () if bound else _by_name(written)[2]
-    doubts = [doubt for doubt in assumed if doubt != specimen_name.NO_FILM or film_expected]
+    doubts = [] if _bound(written, log) else _assumed(written, of)
     doubts += [f"{axis}: {doubt}" for axis, parsed in (("y", y), ("z", z)) for doubt in parsed.doubts]
-    if table and not (y.ohm and z.ohm):
-        blank = f"{'z' if y.ohm else 'y'} blank: not measured, or an overload"
-        doubts.append(blank if y.ohm or z.ohm else "no measurement")
-    if unbaked and baked:
-        doubts.append("baked, but the remark says that it is not")
-    design_id, design = design_fields(written, log)
+    doubts += _blanks(y, z) if table else []
+    if _UNBAKED.search(remark):
+        doubts += ["baked, but the remark says that it is not"] if baked else []
+        baked = bool(baked)
     return Reading(
         **vars(of), uid=uid or uuid.uuid4().hex, design_id=design_id, design=design, written=written,
         y_words=y_words, z_words=z_words, y_ohm=y.ohm, z_ohm=z.ohm, remark=remark, doubts=tuple(doubts),
-        baked=False if baked is None and unbaked else baked, measured_at=measured_at, instrument=instrument,
+        baked=baked, measured_at=measured_at, instrument=instrument,
         source=source, source_row=source_row, supersedes=supersedes,
     )  # fmt: skip
+
+
+def _blanks(y: Resistances, z: Resistances) -> list[str]:
+    """Doubt about a row of a table without one of its readings, or both."""
+    if not (y.ohm or z.ohm):
+        return ["no measurement"]
+    return [] if y.ohm and z.ohm else [f"{'z' if y.ohm else 'y'} blank: not measured, or an overload"]
+
+
+def _assumed(written: str, of: Specimen) -> list[str]:
+    """Doubts about a name that is bound to no design; one without a film is usual in early iterations only."""
+    film_expected = (of.iteration or 0) < FIRST_WITH_FILMS
+    return [doubt for doubt in _by_name(written)[2] if doubt != specimen_name.NO_FILM or film_expected]
 
 
 def with_ac(of: Reading, typed: Mapping[str, Sequence[str]]) -> Reading:

@@ -6,6 +6,7 @@ import re
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -105,7 +106,7 @@ def designs(log: "Log", refused: dict[str, str] | None = None) -> dict[str, Desi
 
     Of those whose shape the user has not trusted, ``refused`` gets the reason.
     """
-    found = dict[str, Design]()
+    by_identity = dict[str, Design]()
     recorded = [(row.uid, row.design, row.data) for row in log.entries(DesignRow)]
     for batch in log.batches():  # before version 3 the log had them in the files of batches only
         with suppress(SensorgenError):
@@ -113,13 +114,13 @@ def designs(log: "Log", refused: dict[str, str] | None = None) -> dict[str, Desi
             recorded += [(key, of["name"], json.dumps(of["resolved"])) for key, of in data.items()]
     for key, name, data in recorded:
         try:
-            found.setdefault(key, of_resolved(name, json.loads(data)))
+            by_identity.setdefault(key, of_resolved(name, json.loads(data)))
         except NotTrusted as error:
             if refused is not None:
                 refused[key] = str(error)
         except (SensorgenError, KeyError, TypeError):
             continue
-    return found
+    return by_identity
 
 
 def design_row(design_id: str, name: str, resolved: Mapping[str, Any]) -> DesignRow:
@@ -193,34 +194,41 @@ def bind(
         raise BadInput(f"--printed {shown(printed)} is one specimen; expected one name for it, not {len(names)}")
     on_bed = _on_bed(log, printed) if printed else None
     of = _logged(log, on_bed.design_id) if on_bed else _design(log, design)
-    if iteration is None and on_bed:
-        iteration = on_bed.iteration
-    rows: list[Entry] = [design_row(of.id(), of.name, of.resolved())]
+    rows = list(_prints(log, names, of, on_bed, iteration))
+    new = log.add([design_row(of.id(), of.name, of.resolved()), *rows]) if rows else []
+    return [row for row in new if isinstance(row, Print)]
+
+
+def _prints(
+    log: Log, names: Sequence[str], of: Design, on_bed: Print | None, iteration: int | None
+) -> Iterator[Print]:  # fmt: skip
+    """Row of each name that is not bound to a design yet, or to the print on its bed."""
+    design_id = on_bed.design_id if on_bed else of.id()
+    film_mm = getattr(of.params, "dielectric_mm", None)
     for written in names:
         name = " ".join(written.split())
         if not _NAME.fullmatch(name):
             raise BadInput(f"{shown(written)} cannot be a specimen's name; expected {_EXPECTED}")
         bound = log.bound(name)
-        design_id = on_bed.design_id if on_bed else of.id()
         if bound and bound.design_id == design_id:
             continue
         _check_measured(log, name, design_id, of.name)
-        params = of.params
-        film_mm = getattr(params, "dielectric_mm", None)
-        rows.append(Print(
+        one = Print(
             uid=uuid.uuid4().hex, specimen=name, iteration=iteration, shape=of.shape,
-            axes=str(getattr(params, "along", "")).upper(), film_mm=None if film_mm is None else float(film_mm),
-            batch_uid=on_bed.batch_uid if on_bed else "", design_id=design_id, design=of.name,
-            printed=on_bed.specimen if on_bed else "",
-        ))  # fmt: skip
-    return [row for row in log.add(rows) if isinstance(row, Print)] if len(rows) > 1 else []
+            axes=str(getattr(of.params, "along", "")).upper(), film_mm=None if film_mm is None else float(film_mm),
+            batch_uid="", design_id=design_id, design=of.name,
+        )  # fmt: skip
+        yield one if on_bed is None else replace(
+            one, batch_uid=on_bed.batch_uid, printed=on_bed.specimen,
+            iteration=on_bed.iteration if iteration is None else iteration,
+        )  # fmt: skip
 
 
 def _on_bed(log: Log, printed: str) -> Print:
-    found = log.bound(" ".join(printed.split())) or log.bound(notes.specimen(printed).specimen)
-    if found is None:
+    on_bed = log.bound(" ".join(printed.split())) or log.bound(notes.specimen(printed).specimen)
+    if on_bed is None:
         raise BadInput(f"no print {shown(printed)} in the log; sensorgen log import batch.json logs those of a bed")
-    return found
+    return on_bed
 
 
 def _design(log: Log, design: str) -> Design:
@@ -236,10 +244,10 @@ def _design(log: Log, design: str) -> Design:
 
 
 def _logged(log: Log, design_id: str) -> Design:
-    found = designs(log).get(design_id)
-    if found is None:
+    design = designs(log).get(design_id)
+    if design is None:
         raise MissingValue(f"the log has design {design_id} by its identity alone; give its file: --design FILE")
-    return found
+    return design
 
 
 def _check_measured(log: Log, name: str, design_id: str, design: str) -> None:

@@ -15,7 +15,7 @@ from sensorgen.core.document import Part
 from sensorgen.core.errors import BadInput, Unwritable
 from sensorgen.core.files import reading
 from sensorgen.measure.log import chain, files
-from sensorgen.measure.log.entries import KINDS, REFERENCES, ROWS, Anchor, Entry, RawFile, indexed, word
+from sensorgen.measure.log.entries import KINDS, REFERENCES, ROWS, Anchor, Entry, RawFile, Value, indexed, word
 from sensorgen.measure.log.logbook import Log
 
 
@@ -65,17 +65,17 @@ def anchor(log: Log, file: Path) -> Head:
     Unwritable
         The file cannot be written.
     """
-    found = head(log)
-    if not found.head:
+    last = head(log)
+    if not last.head:
         raise BadInput(f"the log {str(log.path)!r} is empty: nothing to anchor")
     now = datetime.now(UTC).isoformat(timespec="seconds")
     try:
         with file.open("a", encoding="utf-8") as text:
-            text.write(f"{now} record {found.records} {found.head} {log.path.name}\n")
+            text.write(f"{now} record {last.records} {last.head} {log.path.name}\n")
     except OSError as error:
         raise Unwritable(f"cannot write to {str(file)!r}: {error.strerror or error}") from None
-    log.add([Anchor(uid=uuid.uuid4().hex, head=found.head, file=file.name)])
-    return found
+    log.add([Anchor(uid=uuid.uuid4().hex, head=last.head, file=file.name)])
+    return last
 
 
 MOST_FAULTS = 40  # that are shown to people; JSON has all
@@ -128,9 +128,9 @@ def verified(log: Log, anchors: Path | None = None) -> Verified:
         A text file with heads of the log, as ``sensorgen log anchor`` writes it, or a mail that has them.
     """
     notes: list[str] = []
-    found = (*faults(log, notes), *(_anchor_faults(log, anchors, notes) if anchors else ()))
-    rows = 0 if found else sum(log.count(kind, superseded=True) for kind in ROWS)
-    return Verified(str(log.path), rows, found, "" if found else log.head()[1], tuple(notes))
+    wrong = (*faults(log, notes), *(_anchor_faults(log, anchors, notes) if anchors else ()))
+    rows = 0 if wrong else sum(log.count(kind, superseded=True) for kind in ROWS)
+    return Verified(str(log.path), rows, wrong, "" if wrong else log.head()[1], tuple(notes))
 
 
 def faults(log: Log, notes: list[str] | None = None) -> Iterator[str]:
@@ -160,17 +160,9 @@ def _chain_faults(log: Log, notes: list[str]) -> Iterator[str]:
     """Records that are changed, missing or out of order."""
     counts: Counter[str] = Counter()
     before, clock, place, late = "", "", 0, list[int]()
-    for record, sequence, number, index in log.stored():
-        place += 1
-        if not chain.sound(record) or record.kind not in KINDS:
-            yield f"record {place}, a {record.kind!r:.40}, is not what was logged"
-        if index != indexed(record.content):
-            yield f"record {place}: the index does not have what the record holds"
-        if sequence != place or not _follows(log, record, sequence, before):
-            yield f"record {place} follows one that is missing or was moved"
-        counts[record.kind] += number is not None
-        if number != counts[record.kind] and not (number is None and log.is_copy(sequence)):
-            yield f"record {place} has number {number} among its kind; expected {counts[record.kind]}"
+    for place, stored in enumerate(log.stored(), 1):
+        record = stored[0]
+        yield from _record_faults(log, place, before, counts, *stored)
         if record.parents == (before,) and record.logged_at < clock:
             late.append(place)
         before, clock = record.id, record.logged_at
@@ -180,6 +172,22 @@ def _chain_faults(log: Log, notes: list[str]) -> Iterator[str]:
     if late:
         back = "the clock was set back; the order of the records holds"
         notes.append(f"{len(late)} records are dated before the one that they follow, the first is {late[0]}: {back}")
+
+
+def _record_faults(
+    log: Log, place: int, before: str, counts: Counter[str], record: chain.Record, sequence: int, number: int | None,
+    index: tuple[Value, ...],
+) -> Iterator[str]:  # fmt: skip
+    """Faults of one record, by its place and the record before; the counts by kind rise with it."""
+    if not chain.sound(record) or record.kind not in KINDS:
+        yield f"record {place}, a {record.kind!r:.40}, is not what was logged"
+    if index != indexed(record.content):
+        yield f"record {place}: the index does not have what the record holds"
+    if sequence != place or not _follows(log, record, sequence, before):
+        yield f"record {place} follows one that is missing or was moved"
+    counts[record.kind] += number is not None
+    if number != counts[record.kind] and not (number is None and log.is_copy(sequence)):
+        yield f"record {place} has number {number} among its kind; expected {counts[record.kind]}"
 
 
 def _follows(log: Log, record: chain.Record, sequence: int, before: str) -> bool:

@@ -55,21 +55,21 @@ def recordings(path: Path, columns: Mapping[str, str]) -> Iterator[tuple[Recordi
             raise BadInput(f"{path}: {message}")
         if len(file.frequency_hz) > MOST_TONES:
             raise BadInput(f"{path}: {len(file.frequency_hz)} frequencies; expected up to {MOST_TONES}")
-        most, held, count = MOST_VALUES // (len(file.frequency_hz) + 2), [], 0
+        most, blocks, count = MOST_VALUES // (len(file.frequency_hz) + 2), [], 0
         for block in file.blocks():
-            held.append((block.impedance_ohm, block.numbers))
+            blocks.append((block.impedance_ohm, block.numbers))
             count += len(block.rows)
             if count >= most:
-                yield (_stretch(path, file, held),)
-                held, count = [], 0
-        if held:
-            yield (_stretch(path, file, held),)
+                yield (_stretch(path, file, blocks),)
+                blocks, count = [], 0
+        if blocks:
+            yield (_stretch(path, file, blocks),)
 
 
-def _stretch(path: Path, file: "Readings", held: list[tuple[Complex, Real]]) -> Recording:
-    impedance = np.concatenate([z for z, _ in held])
-    beside = dict(zip(file.numbers, np.concatenate([numbers for _, numbers in held]).T, strict=True))
-    held.clear()
+def _stretch(path: Path, file: "Readings", blocks: list[tuple[Complex, Real]]) -> Recording:
+    impedance = np.concatenate([z for z, _ in blocks])
+    beside = dict(zip(file.numbers, np.concatenate([numbers for _, numbers in blocks]).T, strict=True))
+    blocks.clear()
     with within(str(path)):
         rebuilt = samples.rebuilt(len(impedance), beside.get(TIME), beside.get(STAMP))
     marks = blank(len(impedance)) | rebuilt.marks | sifted(impedance)

@@ -46,18 +46,18 @@ def principal_component(impedance_ohm: Complex) -> Real:
     """
     t = np.linspace(-1, 1, len(impedance_ohm))
     basis = np.column_stack([np.ones_like(t), t])
-    found: list[Real] = []
+    channels: list[Real] = []
     for parts in ((np.log(np.abs(z)), np.unwrap(np.angle(z))) for z in impedance_ohm.T):  # one by one, to save memory
         for channel in parts:
             noise, spread = float(np.median(np.abs(np.diff(channel)))), float(np.ptp(channel))
             if spread > 0:
                 channel = channel / (noise if noise > _NOISELESS * spread else spread)
-                found.append(channel - basis @ np.linalg.lstsq(basis, channel, rcond=None)[0])
-    if not found:
+                channels.append(channel - basis @ np.linalg.lstsq(basis, channel, rcond=None)[0])
+    if not channels:
         raise BadInput("the readings do not change: they show no presses")
-    directions = np.linalg.svd([[a @ b for b in found] for a in found])[2]
+    directions = np.linalg.svd([[a @ b for b in channels] for a in channels])[2]
     component = np.zeros_like(t)
-    for weight, channel in zip(directions[0], found, strict=True):
+    for weight, channel in zip(directions[0], channels, strict=True):
         component += weight * channel
     return component
 
@@ -84,8 +84,8 @@ def relaxation(time_s: Real, force_n: Real, tau_s: float) -> Callable[[Real], Re
         return np.zeros_like
     step = max(_FINE_S, float(time_s[-1] - time_s[0]) / _MOST_GRID)
     grid = np.arange(time_s[0], time_s[-1] + step, step)
-    kept = np.exp(-step / tau_s)
-    response = lfilter([(1 - kept) / 2] * 2, [1, -kept], np.interp(grid, time_s[known], force_n[known]))
+    decay = np.exp(-step / tau_s)
+    response = lfilter([(1 - decay) / 2] * 2, [1, -decay], np.interp(grid, time_s[known], force_n[known]))
     return lambda at_s: np.interp(at_s, grid, response)
 
 

@@ -123,16 +123,16 @@ def _vector(value: Any, name: str) -> Vector:
     numeric = isinstance(value, np.ndarray | Split) and value.dtype.kind in "iufcb"
     if not numeric or value.size != max(value.shape, default=1):
         raise BadInput(f"{name} is {_described(value)}; expected numbers one after the other")
-    found: Vector = value.real.reshape(-1)
-    return found
+    vector: Vector = value.real.reshape(-1)
+    return vector
 
 
 def _few(value: Any, name: str) -> Real:
     """A setting of some numbers."""
-    found = _vector(value, name)
-    if len(found) > MOST_TONES:
-        raise BadInput(f"{name}: {len(found)} numbers; expected up to {MOST_TONES}")
-    return np.asarray(found, float)
+    vector = _vector(value, name)
+    if len(vector) > MOST_TONES:
+        raise BadInput(f"{name}: {len(vector)} numbers; expected up to {MOST_TONES}")
+    return np.asarray(vector, float)
 
 
 def _number(settings: Tree, name: str) -> float:

@@ -16,7 +16,7 @@ force convolved with an exponential describes the recovery. A random walk is kno
 linearly from rest to rest.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from math import inf, log
 
@@ -243,6 +243,7 @@ LAWS = {
 }
 """Laws of drift, and their terms."""
 
+_BELOW = {"wandering": "smooth", "memory+wandering": "memory"}  # laws with a random walk, and those without
 BY_TIME = ("line", "smooth", "wandering")
 """Laws that need no force."""
 
@@ -277,11 +278,11 @@ class Drift:
 
     def removed(self, time_s: Real, impedance_ohm: Complex) -> Complex:
         """Readings without drift [ohm]."""
-        found = np.empty_like(impedance_ohm)
+        clean = np.empty_like(impedance_ohm)
         for k in range(0, len(time_s), _BLOCK):
             at = slice(k, k + _BLOCK)
-            found[at] = impedance_ohm[at] * np.exp(-self.at(time_s[at]))
-        return found
+            clean[at] = impedance_ohm[at] * np.exp(-self.at(time_s[at]))
+        return clean
 
     def rest_ohm(self) -> Complex:
         """Impedance at rest at the first reading (m,) [ohm]."""
@@ -316,10 +317,10 @@ def fitted(
     UnknownName
         No such law.
     """
-    for name in among:
-        check(name)
     if not among:
         raise BadInput(f"no law of drift to choose from; expected some of {', '.join(LAWS)}")
+    for name in among:
+        check(name)
     rest = valid & ~_disturbed(time_s, force_n, settle_s)
     if np.count_nonzero(rest) < _LEAST:
         raise BadInput(f"{np.count_nonzero(rest)} readings at rest; expected {_LEAST} or more to fit a drift to")
@@ -330,16 +331,18 @@ def fitted(
     seconds = max(float(time_s[-1]) - start, 1e-9)
     by_time = explained(bins, (smooth(start, seconds),))
     fits = {"line": explained(bins, (linear(start, seconds),)), "smooth": by_time}
-    if any("memory" in name for name in among):
+    if "memory" in "".join(among):
         fits["memory"] = relaxing(bins, by_time, time_s, force_n, settle_s / 2)
-    for name in among:
-        if "wandering" in name:
-            fits[name] = wandering(bins, fits["memory" if "memory" in name else "smooth"])
+    fits |= {name: wandering(bins, fits[_BELOW[name]]) for name in _BELOW if name in among}
     scores = {name: fits[name].bic() for name in LAWS if name in among}
     best = min(scores, key=lambda name: scores[name])
+    return Drift(best, f"{LAWS[best]} ({_reason(scores, best)})", start, fits[best])
+
+
+def _reason(scores: Mapping[str, float], best: str) -> str:
+    """Criteria of the other laws, above that of the best."""
     others = [f"{other} {scores[other] - scores[best]:.0f}" for other in scores if scores[other] > scores[best]]
-    reason = f"BIC higher of {', '.join(others)}" if others else "the only law"
-    return Drift(best, f"{LAWS[best]} ({reason})", start, fits[best])
+    return f"BIC higher of {', '.join(others)}" if others else "the only law"
 
 
 def check(law: str) -> None:

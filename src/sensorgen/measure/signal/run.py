@@ -75,12 +75,7 @@ def processed(
     """
     if law:
         drift.check(law)
-    notes, one = list(recording.source.notes), recording
-    force = position = np.full(len(one.time_s), np.nan)
-    if rig is not None:
-        beside = joined(one, rig) if isinstance(rig, RigLog) else rig
-        one, force, position = beside.recording, beside.force_n, beside.set_position_mm
-        notes += [beside.clock_text(), *beside.notes]
+    one, force, position, notes = _beside(recording, rig)
     valid = one.valid()
     filtered = lowpass.filtered(one, cutoff_hz)
     if rig:
@@ -89,13 +84,8 @@ def processed(
         spans = presses.by_readings(one.time_s[valid], one.impedance_ohm[valid])
     removed, pairs, z = None, None, one.impedance_ohm
     if remove_drift and spans:
-        among = (law,) if law else drift.LAWS if rig else drift.BY_TIME
-        unit = np.zeros(len(one.time_s))
-        for start, end in spans:
-            unit[np.searchsorted(one.time_s, start) : np.searchsorted(one.time_s, end, side="right")] = 1.0
-        pressing = force if rig else unit  # 1 N, for laws of drift that need only the times of presses
         try:
-            removed = drift.fitted(one.time_s, z, valid, pressing, among=tuple(among))
+            removed = _drift(one, spans, force if rig else None, law)
             z = removed.removed(one.time_s, z)
         except BadInput as error:
             notes.append(f"drift not removed: {error}")
@@ -105,6 +95,27 @@ def processed(
     except BadInput as error:
         notes.append(f"no presses: {error}")
     return Processed(one, force, *filtered, removed, pairs, rig is not None, tuple(notes))
+
+
+def _beside(recording: Recording, rig: RigLog | Joined | None) -> tuple[Recording, Real, Real, list[str]]:
+    """A recording with force and position, nan without a rig [N], [mm]; and remarks."""
+    notes = list(recording.source.notes)
+    if rig is None:
+        unknown = np.full(len(recording.time_s), np.nan)
+        return recording, unknown, unknown, notes
+    beside = joined(recording, rig) if isinstance(rig, RigLog) else rig
+    notes += [beside.clock_text(), *beside.notes]
+    return beside.recording, beside.force_n, beside.set_position_mm, notes
+
+
+def _drift(one: Recording, spans: list[presses.PressTimes], force_n: Real | None, law: str) -> drift.Drift:
+    """Drift between presses; without a force [N] by a law that needs their times alone."""
+    among = (law,) if law else drift.BY_TIME if force_n is None else tuple(drift.LAWS)
+    if force_n is None:
+        force_n = np.zeros(len(one.time_s))
+        for start, end in spans:
+            force_n[np.searchsorted(one.time_s, start) : np.searchsorted(one.time_s, end, side="right")] = 1.0
+    return drift.fitted(one.time_s, one.impedance_ohm, one.valid(), force_n, among=among)
 
 
 _FORCES = 41

@@ -239,13 +239,13 @@ class VirtualRig:
             lift = self._lift(ends[1] - ends[0])
         shorted = self.force_n <= truth.short_opens_n
         c, r = self._drift * (truth.drift_c, truth.drift_r)
-        found = self._lines[key].impedance(lift, ends if lift else (0.0, 0.0), c, r, shorted=shorted)
+        impedance = self._lines[key].impedance(lift, ends if lift else (0.0, 0.0), c, r, shorted=shorted)
         if self.fault == "short" and self.force_n < _OPENS_N:
-            found = np.asarray(found * _SHORT_OHM / (found + _SHORT_OHM))
+            impedance = np.asarray(impedance * _SHORT_OHM / (impedance + _SHORT_OHM))
         if self.noise:
             real, imaginary = self.noise * self._interference.standard_normal((2, len(frequency)))
-            found = found * (1 + real + 1j * imaginary)
-        return found
+            impedance = impedance * (1 + real + 1j * imaginary)
+        return impedance
 
     def resistance(self, *, wires: int) -> float:
         """Reading of an ideal multimeter across the bottom electrode [ohm]."""
@@ -321,8 +321,8 @@ class VirtualRig:
         if what not in self._open:
             self._open[what] = Violation(self.time_s, what, self.force_n)
             self.violations.append(self._open[what])
-        found = self._open[what]
-        found.value, found.duration_s = max(found.value, self.force_n), found.duration_s + dt
+        state = self._open[what]
+        state.value, state.duration_s = max(state.value, self.force_n), state.duration_s + dt
 
 
 def _relaxed(dt: float) -> Real:

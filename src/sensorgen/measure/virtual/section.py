@@ -28,10 +28,10 @@ TERMINALS = {"bottom": 1, "top": 2, FLOATING: 3}
 def section_of(scene: Scene) -> Section | None:
     """The one cross-section of a scene; None where it has none, or several."""
     try:
-        found = sections(scene)
+        sections_ = sections(scene)
     except ValueError:
         return None
-    return found[0] if len(found) == 1 else None
+    return sections_[0] if len(sections_) == 1 else None
 
 
 def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM) -> SectionRaster:
@@ -55,16 +55,16 @@ def raster(scene: Scene, materials: Mapping[str, int], fine_mm: float = FINE_MM)
     if section is None:
         raise OutOfRange("a raster of a body with several cross-sections; expected one along the sensor or across it")
     across = "xy".index(section.across)
-    found = columns(section)
-    sides = [found[0].left_mm, *(c.right_mm for c in found)]
+    columns_ = columns(section)
+    sides = [columns_[0].left_mm, *(c.right_mm for c in columns_)]
     widest = max(fine_mm, (sides[-1] - sides[0]) / _MOST_COLUMNS)
-    lines = _interfaces(found)
+    lines = _interfaces(columns_)
     rows = [max(round(np.max([of[k + 1] - of[k] for of in lines]) / fine_mm), 1) for k in range(len(lines[0]) - 1)]
-    pieces = [1] if len(found) == 1 else [max(int(np.ceil((b - a) / widest - 1e-6)), 1) for a, b in pairwise(sides)]
+    pieces = [1] if len(columns_) == 1 else [max(int(np.ceil((b - a) / widest - 1e-6)), 1) for a, b in pairwise(sides)]
     shares = np.concatenate([[0.0], *(k + graded(n) for k, n in enumerate(rows))])
     x, material, electrode = [sides[0]], [], []
     z = list[Real]()
-    for column, of, n in zip(found, lines, pieces, strict=True):
+    for column, of, n in zip(columns_, lines, pieces, strict=True):
         x += (column.left_mm + (column.right_mm - column.left_mm) * graded(n)).tolist()
         ends = [np.interp(shares, np.arange(len(of)), of[:, side]) for side in (0, 1)]
         at = [0.0, *graded(n).tolist()]
@@ -85,10 +85,10 @@ def graded(count: int) -> Real:
     return np.asarray(_GRADED * (1 - np.cos(np.pi * even)) / 2 + (1 - _GRADED) * even)
 
 
-def _interfaces(found: Sequence[SectionColumn]) -> list[Real]:
+def _interfaces(columns_: Sequence[SectionColumn]) -> list[Real]:
     """Heights of the interfaces of all columns at their sides, the same ones from side to side [mm]."""
-    levels = _levels(found)
-    lines = [_lines(c, levels) for c in found]
+    levels = _levels(columns_)
+    lines = [_lines(c, levels) for c in columns_]
     if len({len(of) for of in lines}) > 1 or not _joined(lines):
         raise OutOfRange(
             "a virtual specimen of a section whose sloping interfaces end inside it; print it: what is printed in "
@@ -97,9 +97,9 @@ def _interfaces(found: Sequence[SectionColumn]) -> list[Real]:
     return lines
 
 
-def _levels(found: Sequence[SectionColumn]) -> list[float]:
+def _levels(columns_: Sequence[SectionColumn]) -> list[float]:
     """Heights at which some interface is level."""
-    ends = (end for column in found for layer in column.layers for end in (layer.bottom_mm, layer.top_mm))
+    ends = (end for column in columns_ for layer in column.layers for end in (layer.bottom_mm, layer.top_mm))
     level = sorted({round(a, 9) for a, b in ends if abs(a - b) < _NONE_MM})
     return [0.0, *(z for z in level if z > _NONE_MM)]
 
@@ -217,11 +217,11 @@ def _covered(outline: Outline, x: Real, y: Real) -> Mask:
 
 def _edges(outlines: Sequence[Outline], axis: int, size_mm: float) -> Real:
     """Places of the sides of a cell, of its middle, and of the extents and edges of outlines along an axis [mm]."""
-    found = [0.0, size_mm / 2, size_mm]
+    edges = [0.0, size_mm / 2, size_mm]
     for corners in outlines:
         at = np.array(corners)[:, axis]
-        found += [at.min(), at.max(), *at[np.abs(at - np.roll(at, 1)) < _STEP_MM]]
-    places = np.unique(np.round(found, 9))
+        edges += [at.min(), at.max(), *at[np.abs(at - np.roll(at, 1)) < _STEP_MM]]
+    places = np.unique(np.round(edges, 9))
     return np.asarray(places[np.append(True, np.diff(places) > _STEP_MM)])
 
 

@@ -99,8 +99,8 @@ def room(printer: Printer, quality: Quality, tools: int, spacing_mm: float, brim
     edge = EDGE_MM + brim_mm
     area = Rect(x - width / 2 + edge, y - depth / 2 + edge, x + width / 2 - edge, y + depth / 2 - edge)
     at = tower(printer, quality, tools)
-    kept = Rect(at.x_mm, at.y_mm, at.x_mm + at.side_mm, at.y_mm + at.side_mm).grown(*[TOWER_BRIM_MM] * 4)
-    return Room(area, (kept,) if tools > 1 else (), spacing_mm + 2 * brim_mm)
+    around = Rect(at.x_mm, at.y_mm, at.x_mm + at.side_mm, at.y_mm + at.side_mm).grown(*[TOWER_BRIM_MM] * 4)
+    return Room(area, (around,) if tools > 1 else (), spacing_mm + 2 * brim_mm)
 
 
 def packed(sizes: Sequence[Size], room: Room) -> list[Plate]:
@@ -149,8 +149,8 @@ def _packed(sizes: Sequence[Size], order: Sequence[int], room: Room) -> list[Pla
 def _all_free(room: Room) -> list[Rect]:
     """The empty plate; each specimen takes its gap along, to the right and the back."""
     free = [room.area.grown(0, 0, room.gap_mm, room.gap_mm)]
-    for kept in room.kept:
-        free = _without(free, kept.grown(0, 0, room.gap_mm, room.gap_mm))
+    for taken in room.kept:
+        free = _without(free, taken.grown(0, 0, room.gap_mm, room.gap_mm))
     return free
 
 
@@ -162,11 +162,11 @@ def _corners(free: Sequence[Rect], length: float, width: float) -> list[tuple[fl
 def _without(free: Sequence[Rect], taken: Rect) -> list[Rect]:
     """The largest free rectangles after a place is taken; those inside others are left out."""
     pieces = sorted({p for r in free for p in _around(r, taken)}, key=lambda r: (r.y0, r.x0, r.y1, r.x1))
-    kept: list[Rect] = []
+    largest: list[Rect] = []
     for piece in sorted(pieces, key=lambda r: -(r.x1 - r.x0) * (r.y1 - r.y0)):
-        if not any(k.holds(piece) for k in kept):
-            kept.append(piece)
-    return kept
+        if not any(k.holds(piece) for k in largest):
+            largest.append(piece)
+    return largest
 
 
 def _around(r: Rect, taken: Rect) -> Iterator[Rect]:

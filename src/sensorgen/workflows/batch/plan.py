@@ -204,25 +204,25 @@ def pieces(plan: BatchPlan, folder: Path) -> tuple[PrintPiece, ...]:
     SensorgenError
         A design is unknown or wrong; the message names its place in the plan.
     """
-    found: list[PrintPiece] = []
+    specimens: list[PrintPiece] = []
     for number, item in enumerate(plan.designs):
         try:
             design = plan.made(item, folder)
         except SensorgenError as error:
             raise error.within(f"designs.{number}") from None
         copies, key = range(item.first, item.first + item.replicates), design.id()
-        found += [PrintPiece(named(design, plan.iteration, copy), design, key) for copy in copies]
-    _refuse_twins(found)
-    _refuse_strangers([piece.design for piece in found])
-    return tuple(found)
+        specimens += [PrintPiece(named(design, plan.iteration, copy), design, key) for copy in copies]
+    _refuse_twins(specimens)
+    _refuse_strangers([piece.design for piece in specimens])
+    return tuple(specimens)
 
 
-def shuffled(found: Sequence[PrintPiece], seed: int) -> tuple[PrintPiece, ...]:
+def shuffled(specimens: Sequence[PrintPiece], seed: int) -> tuple[PrintPiece, ...]:
     r"""The specimens in the order in which the plate is filled.
 
     Parameters
     ----------
-    found : sequence of PrintPiece
+    specimens : sequence of PrintPiece
         In any order.
     seed : int
         Another seed, another order.
@@ -232,12 +232,12 @@ def shuffled(found: Sequence[PrintPiece], seed: int) -> tuple[PrintPiece, ...]:
     They are sorted by the SHA-256 of seed and name, ``"7\n26 triX .2mm 1 fine"`` in UTF-8: no generator of random
     numbers whose next version draws otherwise, and the order in the plan does not count.
     """
-    return tuple(sorted(found, key=lambda piece: sha256(f"{seed}\n{piece.name}".encode()).digest()))
+    return tuple(sorted(specimens, key=lambda piece: sha256(f"{seed}\n{piece.name}".encode()).digest()))
 
 
-def _refuse_twins(found: Iterable[PrintPiece]) -> None:
+def _refuse_twins(specimens: Iterable[PrintPiece]) -> None:
     seen: dict[str, PrintPiece] = {}
-    for piece in found:
+    for piece in specimens:
         other = seen.setdefault(piece.name, piece)
         if other is not piece:
             raise BadInput(
@@ -273,12 +273,12 @@ def texts(designs: Iterable[Design]) -> Texts:
     BadInput
         Two of one name that differ.
     """
-    found: dict[str, str] = {}
+    by_name: dict[str, str] = {}
     for design in designs:
         for name, text in design.own.get("materials", {}).items():
-            if found.setdefault(name, text) != text:
+            if by_name.setdefault(name, text) != text:
                 raise BadInput(f"one plate, two materials {name}, from different files: give each a name of its own")
-    return {"materials": found}
+    return {"materials": by_name}
 
 
 def tools(designs: Iterable[Design]) -> dict[int, str]:
@@ -289,16 +289,16 @@ def tools(designs: Iterable[Design]) -> dict[int, str]:
     BadInput
         Two materials on one tool, or one on two.
     """
-    found: dict[int, str] = {}
+    by_tool: dict[int, str] = {}
     for design in designs:
         for material in design.used():
             tool = design.tool(material)
-            clash = {t: m for t, m in found.items() if (t == tool) != (m == material)}
+            clash = {t: m for t, m in by_tool.items() if (t == tool) != (m == material)}
             if clash:
                 other, loaded = clash.popitem()
                 raise BadInput(
                     f"{design.name} wants {material} on tool {tool}, but {loaded} is on tool {other}: "
                     "one plate has one spool on each tool"
                 )
-            found[tool] = material
-    return dict(sorted(found.items()))
+            by_tool[tool] = material
+    return dict(sorted(by_tool.items()))

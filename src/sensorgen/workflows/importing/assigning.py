@@ -132,10 +132,10 @@ def _pairs(words: Sequence[str], form: str) -> list[tuple[str, str]]:
 
 
 def _matching(pattern: str, names: Sequence[str]) -> list[str]:
-    found = [pattern] if pattern in names else [name for name in names if fnmatchcase(name, pattern)]
-    if not found:
+    matching = [pattern] if pattern in names else [name for name in names if fnmatchcase(name, pattern)]
+    if not matching:
         raise UnknownName("body", pattern, names)
-    return found
+    return matching
 
 
 def _terminals(

@@ -1,13 +1,16 @@
-"""``sensorgen build``: all files of a design."""
+"""``sensorgen check|build|slice``: whether to print a design, and all files that its print needs."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from sensorgen.cli import FOUND_ERRORS, body_options, render, unread
 from sensorgen.cli.body_options import Compensate
 from sensorgen.cli.designs import of_design
-from sensorgen.cli.options import Advising, Strict
+from sensorgen.cli.options import Advising, Out, Strict, TimeLimit
 from sensorgen.core.errors import Unprintable
+from sensorgen.core.options import Option
+from sensorgen.design.walls import rule
+from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,7 +18,34 @@ if TYPE_CHECKING:
     from sensorgen.design.design import Design
 
 
-def _tiles(design: "Design", given: dict[str, Any]) -> "Sequence[Design]":
+def _tiles(design: "Design", _: dict[str, Any]) -> "Sequence[Design]":
+    """Tiles of an array that the bed does not hold, one of each kind; else the design."""
+    if not design.layout:
+        return (design,)
+    from sensorgen.workflows.tiles import tiles
+
+    kinds = {(t.rows, t.columns, str(each.parameters["seams"])): each for t, each in reversed(tiles(design))}
+    return sorted(kinds.values(), key=lambda each: each.parameters["tile"]) or (design,)
+
+
+@of_design("check", *render.options(), tip=True, parts=_tiles)
+def check_command(design: "Design", advising: Advising, *, strict: Strict = False) -> int:
+    """Decide whether to print a design: check it against nozzle, layers and bed, predict it, and try changes."""
+    from sensorgen.checks.review import STEPS
+    from sensorgen.prediction.slices import reviewed
+    from sensorgen.workflows import decision
+
+    with render.progress((*STEPS, *decision.STEPS)) as step:
+        review = reviewed(design, step)
+        decided = decision.decision(design, review, advising.budget, predict=advising.budget > 0, step=step)
+    render.deliver(decided)
+    if decided.findings and render.early():
+        render.say("each finding in its place, in 3D, drawing and layers: sensorgen show")
+    advising.write(design, decided.advice)
+    return 1 if review.errors(strict) or review.verdict == "CHANGE" else 0
+
+
+def _all_tiles(design: "Design", given: dict[str, Any]) -> "Sequence[Design]":
     """Tiles of an array that the bed does not hold, with a table of their places; else the design."""
     if not design.layout:
         return (design,)
@@ -31,8 +61,8 @@ def _tiles(design: "Design", given: dict[str, Any]) -> "Sequence[Design]":
     return [tile for _, tile in placed]
 
 
-@of_design("build", *render.options("json", "markdown", outputs=("--output",)), parts=_tiles)
-def command(
+@of_design("build", *render.options("json", "markdown", outputs=("--output",)), parts=_all_tiles)
+def build_command(
     design: "Design", *, out: Path = Path("out"), no_cad: bool = False, force: bool = False, strict: Strict = False,
     compensate: Compensate = "", verify: bool = False, details: bool = False, advise: bool = False, advising: Advising,
 ) -> int:  # fmt: skip
@@ -104,3 +134,37 @@ def _verify(design: "Design", folder: Path) -> int:
         differences = build_differences(folder, design, log)
     render.deliver(differences)
     return FOUND_ERRORS if differences else 0
+
+
+@of_design("slice", *render.options("json", "markdown"))
+def slice_command(
+    design: "Design", *, slicer: Annotated[str, Option(kind=tuple(SLICERS))] = "prusa", program: str = "",
+    time_limit_s: TimeLimit = TIME_LIMIT_S, out: Out = Path("out"), force: bool = False, strict: Strict = False,
+    compensate: Compensate = "",
+) -> int:  # fmt: skip
+    """Slice a design with a real slicer, and write G-code that the printer takes as it is.
+
+    The file is checked, also against the design. One with errors is written as NAME.SLICER.refused.gcode, whatever
+    --force says, and an earlier NAME.SLICER.gcode is removed: a file of that name has always passed.
+
+    Parameters
+    ----------
+    slicer
+        PrusaSlicer (2.5 or later), or CuraEngine (4.13 or later).
+    program : PATH
+        The slicer's program; the one on PATH if not given.
+    force
+        Slice even if checks of the design report errors.
+    """
+    from sensorgen.export.slicing import STEPS
+    from sensorgen.workflows.slice import slice_design
+
+    walls = rule(slicer, design.walls)
+    design, changes = body_options.compensated(design, compensate, walls, slicer, program)
+    with render.refused(design.name), render.progress(("checks", *STEPS)) as step:
+        gcode = slice_design(
+            design, out, slicer, program=program, time_limit_s=time_limit_s, force=force, strict=strict,
+            compensated=changes, step=step,
+        )  # fmt: skip
+    render.deliver(gcode)
+    return 1 if gcode.refused or (gcode.verdict == "CHANGE" and not force) else 0
