@@ -21,8 +21,7 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import Region, parts
-from sensorgen.scene.raster import raster
-from sensorgen.scene.repetition import Repeat, halved, repeat, widened
+from sensorgen.scene.repetition import Repeat, halved, raster, repeat, widened
 from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene, seen_from_above
 from sensorgen.scene.slabs import is_open, slabs
 from sensorgen.solvers.electrostatics import bounds as fem
