@@ -7,7 +7,8 @@ import pytest
 
 from sensorgen.design.design import make
 from sensorgen.scene.scene import Body, Prism, Scene, rectangle
-from sensorgen.scene.sections import columns, sections
+from sensorgen.scene.sections import sections
+from sensorgen.scene.unit_cell import slices
 
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import press2d
@@ -29,7 +30,8 @@ def cell_of(high, left, right, *outlines):
         Body("shape", "x60", tuple(Prism("y", tuple(o), 0.0, 10.0) for o in outlines)),
         Body("top_electrode", "etpu", (Prism("y", rectangle(0, wide, top, top + 0.3), 0.0, 10.0),), "top"),
     )
-    return cells._cell(columns(sections(Scene(bodies, (wide, 10.0, top + 0.3)))[0]), left, right, mirrored=True)
+    whole = slices(sections(Scene(bodies, (wide, 10.0, top + 0.3)))[0], 0.0, metal=True)
+    return cells.between(whole, left, right, mirrored=True)
 
 
 def box(left, right, low, high):
