@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Whole
 from sensorgen.design.materials import Material
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import allowed, macros
-from sensorgen.export.gcode.found import Findings, GcodeFinding
+from sensorgen.export.gcode.found import Findings
 from sensorgen.export.gcode.heat import Heaters
 from sensorgen.export.gcode.moves import NO_TOOL, Event, Motion, ToolChange
 from sensorgen.export.gcode.reading import macro_name
@@ -55,7 +55,7 @@ class _Simulation:
         self.heaters, self.turning = Heaters(machine, loaded, self.found), macros.of_change(machine)
         self.homed: set[str] = set()
         self.levelled = not self.control.levels
-        self.relative, self.absolute_e = False, True
+        self.relative, self.absolute_e, self.fan_missed = False, True, False
         self.row = 0
         self.ended, self.end_line = "", 0
         self.seen: set[str] = set()
@@ -75,7 +75,7 @@ class _Simulation:
         if moved and self.ended:
             self.found.warning("end", moved, f"moves after {self.ended} are never reached", "remove them")
 
-    def _first(self, rows: NDArray[np.int64], start: int, end: int) -> int:
+    def _first(self, rows: Whole, start: int, end: int) -> int:
         """Line of the first of some moves in a stretch; 0 if there is none."""
         place = int(np.searchsorted(rows, start))
         return int(self.motion.rows[rows[place], 9]) if place < len(rows) and rows[place] < end else 0
@@ -89,8 +89,7 @@ class _Simulation:
         else:
             self.heaters.check_cold(self.tool, number)
         if self.absolute_e and self.control.relative_e:
-            advice = "write M83 at the start, and relative E"
-            error("absolute-e", number, "filament is moved with absolute E", advice)
+            error("absolute-e", number, "filament is moved with absolute E", "write M83 at the start, and relative E")
 
     def _printing(self, number: int) -> None:
         error = self.found.error
@@ -100,8 +99,8 @@ class _Simulation:
         if self.relative:
             error("relative", number, "the file prints in relative coordinates (G91)", "write G90 before it")
         if self.ended:
-            message = f"lines after {self.ended} are never printed: it ends the print"
-            error("end", number, message, "end the print after its last line")
+            what = f"lines after {self.ended} are never printed: it ends the print"
+            error("end", number, what, "end the print after its last line")
 
     def _not_homed(self, what: str, number: int) -> None:
         homes = " or ".join(self.control.homes)
@@ -115,23 +114,19 @@ class _Simulation:
             self._take(change)
         if code in self.control.homes:
             self.homed |= {axis for axis in AXES if event.command.has(axis) or not event.command.has(AXES)}
-        self._level(event)
+        if code in self.control.levels:
+            self.levelled = True
+            if self.homed != set(AXES):
+                self._not_homed(f"{code} probes the bed", event.number)
         if code in self.control.ends and not self.ended:
             self.ended, self.end_line = str(event.command), event.number
         if code in PAUSES:
-            amid = len(self.lines) and self.lines[0] < event.row <= self.lines[-1]
-            message = f"{code} waits for a person to continue" + (", with the nozzle at the part" if amid else "")
-            severity = "error" if amid else "info"
-            self.found.append(GcodeFinding("pause", severity, event.number, message, "be there, or leave it out"))
+            self._pause(event)
         self.heaters.obey(event, self.tool)
         self._modes(event)
-        self._machine(event)
-
-    def _level(self, event: Event) -> None:
-        code = event.command.code
-        if code in self.control.levels and self.homed != set(AXES):
-            self._not_homed(f"{code} probes the bed", event.number)
-        self.levelled |= code in self.control.levels
+        self._fan(event)
+        self._macro(event)
+        self._height(event)
 
     def _take(self, change: ToolChange) -> None:
         if change.tool != NO_TOOL:
@@ -159,20 +154,31 @@ class _Simulation:
         elif code in ("M18", "M84") and not command.has("S"):  # the axes may drift; S only sets when that happens
             self.homed -= {axis for axis in AXES if command.has(axis) or not command.has(f"{AXES}E")}
 
-    def _machine(self, event: Event) -> None:
-        """Fans, macros, and M290, which shifts all heights as for a tool whose nozzle stands higher than others."""
-        code, command, fan = event.command.code, event.command, self.control.layer_fan
-        if code in ("M106", "M107") and fan is not None and not command.has("P"):
+    def _pause(self, event: Event) -> None:
+        amid = len(self.lines) and self.lines[0] < event.row <= self.lines[-1]
+        message = f"{event.command.code} waits for a person to continue"
+        message, severity = (f"{message}, with the nozzle at the part", "error") if amid else (message, "info")
+        self.found.add(severity, "pause", event.number, message, "be there, or leave it out")
+
+    def _fan(self, event: Event) -> None:
+        code, fan = event.command.code, self.control.layer_fan
+        if code in ("M106", "M107") and fan is not None and not event.command.has("P"):
             message = f"{code} names no fan, and may miss the one on the part"
+            self.fan_missed = True
             self.found.warning("fan", event.number, message, f"name it: M106 P{fan} S..")
-        name = macro_name(command) if code == "M98" and event.number not in self.changes else None
-        if name is not None and name not in self.control.macros:
+
+    def _macro(self, event: Event) -> None:
+        called = event.command.code == "M98" and event.number not in self.changes
+        if called and (name := macro_name(event.command)) not in self.control.macros:
             known = ", ".join(filter(None, (self.control.prime_macro, *self.control.macros))) or "none"
             message = f"unknown macro {name[:60]!r}; {self.machine.name} has {known}"
             advice = "leave it out, or add it to the printer's file (control: macros)"
             self.found.error("macro", event.number, message, advice)
-        meant_mm = self.control.tool_offsets_mm.get(self.tool, 0.0)
-        given_mm = next((command.number(letter) for letter in "SZ" if code == "M290" and command.has(letter)), None)
+
+    def _height(self, event: Event) -> None:
+        """Check M290, which shifts all heights as for a tool whose nozzle stands higher than others."""
+        command, meant_mm = event.command, self.control.tool_offsets_mm.get(self.tool, 0.0)
+        given_mm = command.number("S" if command.has("S") else "Z") if command.code == "M290" else None
         if given_mm is not None and (given_mm != meant_mm or command.number("R") != 0):
             message = f"M290 shifts all heights; the printer's file says {meant_mm:g} mm for tool {self.tool}"
             self.found.warning("height", event.number, message, f"write M290 S{meant_mm:g} R0, or leave it out")
@@ -185,11 +191,14 @@ class _Simulation:
         last = max(1, self.motion.lines)
         self._ends(last)
         self._left_on(last)
+        self._raw()
+
+    def _raw(self) -> None:
+        """Report PrusaSlicer's own file: those of its tools that the printer has too would be the wrong ones."""
+        if not self.control.names_tools or self.motion.maker != PRUSA or not self.fan_missed:
+            return
         settings = [e.command for e in self.motion.events if e.command.code == "G10" and e.command.has("S")]
-        untouched = settings and not any(command.has("R") for command in settings)
-        fan_missed = any(f.rule == "fan" for f in self.found)
-        if self.control.names_tools and self.motion.maker == PRUSA and untouched and fan_missed:
-            # those of its tools that the printer has too would be the wrong ones
+        if settings and not any(command.has("R") for command in settings):
             message = "this is PrusaSlicer's own file: it counts tools from 0, and the printer from 1"
             self.found.error("raw", 1, message, "let sensorgen slice write it")
 
@@ -213,7 +222,7 @@ class _Simulation:
         if names and self.ended:
             message = f"tools {names} are left on to the macro of {self.ended}"
             advice = "switch them off in the file (G10 P.. S0 R0) if that macro does not"
-            self.found.append(GcodeFinding("heat-left", "info", last, message, advice))
+            self.found.info("heat-left", last, message, advice)
         elif names:
             self.found.error(
                 "heat-left", last, f"tools {names} are still heated at the end of the file",

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import partialmethod
 
 from sensorgen.core.findings import SEVERITIES
 
@@ -37,13 +38,11 @@ class GcodeFinding:
 class Findings(list[GcodeFinding]):
     """Findings of a check as it goes on."""
 
-    def error(self, rule: str, line: int, message: str, advice: str) -> None:
-        """Add a finding that refuses the file."""
-        self.append(GcodeFinding(rule, "error", line, message, advice))
+    def add(self, severity: str, rule: str, line: int, message: str, advice: str) -> None:
+        """Add one; an error refuses the file."""
+        self.append(GcodeFinding(rule, severity, line, message, advice))
 
-    def warning(self, rule: str, line: int, message: str, advice: str) -> None:
-        """Add a finding that does not."""
-        self.append(GcodeFinding(rule, "warning", line, message, advice))
+    error, warning, info = partialmethod(add, "error"), partialmethod(add, "warning"), partialmethod(add, "info")
 
 
 def merged(found: Iterable[GcodeFinding]) -> tuple[GcodeFinding, ...]:

@@ -4,10 +4,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import macros
 from sensorgen.export.gcode.arcs import Arcs, centres_of_radius
-from sensorgen.export.gcode.columns import WORDS, Floats, Ints, Mask
+from sensorgen.export.gcode.columns import WORDS
 from sensorgen.export.gcode.files import Source, text_of
 from sensorgen.export.gcode.macros import Effect
 from sensorgen.export.gcode.moves import NO_TOOL, Event, FileFault, ModalValues, Motion, ToolChange
@@ -90,7 +91,7 @@ class _Steps:
             said.lines, said.maker, self._z_stated(),
         )  # fmt: skip
 
-    def _columns(self) -> Iterator[Floats]:
+    def _columns(self) -> Iterator[Real]:
         """Columns of ``Motion.rows``, for each step; one by one, since a million moves take room."""
         for axis in "XYZ":
             yield _before(_state(self.words[axis], self.sets))
@@ -112,12 +113,12 @@ class _Steps:
         stated = _last(self.sets & ~np.isnan(self.words["Z"]))
         return np.asarray(stated >= _last(turned[:-1]))[self.moves]
 
-    def _held(self, holding: Holding, before: float) -> Floats:
+    def _held(self, holding: Holding, before: float) -> Real:
         """Value that applies to each step."""
         rows = np.searchsorted(self.place, np.array(holding.places, np.int64))
         return ModalValues(rows.tolist(), holding.values.tolist()).column(len(self.place), before)
 
-    def _arcs(self, rows: Floats) -> tuple[Arcs, list[FileFault]]:
+    def _arcs(self, rows: Real) -> tuple[Arcs, list[FileFault]]:
         """Moves that are arcs, and what is wrong with those that cannot be."""
         code = self.code[self.moves]
         row = np.flatnonzero((code == 2) | (code == 3))
@@ -147,24 +148,24 @@ class _Steps:
         return ModalValues(self._rows(holding.places), holding.values.tolist())
 
 
-def _last(given: Mask) -> Ints:
+def _last(given: Mask) -> Whole:
     """For each step the last one until it that is marked; -1 before the first."""
     return np.asarray(np.maximum.accumulate(np.where(given, np.arange(len(given)), -1)))
 
 
-def _state(given: Floats, sets: Mask) -> Floats:
+def _state(given: Real, sets: Mask) -> Real:
     """Where an axis is after each step, which sets it to what is given or moves it by that; 0 at the start."""
     by = np.where(np.isnan(given) | sets, 0.0, given).cumsum()
     last = _last(sets & ~np.isnan(given))
     return np.asarray(np.where(last < 0, by, given[last] + (by - by[last])))
 
 
-def _before(state: Floats) -> Floats:
+def _before(state: Real) -> Real:
     """The state before each step."""
     return np.concatenate([np.zeros_like(state[:1]), state[:-1]])
 
 
-def _extruded(filament: Floats, tool: Floats) -> Floats:
+def _extruded(filament: Real, tool: Real) -> Real:
     """Filament that each step extrudes: what goes beyond making good for what its tool has drawn back [mm]."""
     extruded = np.maximum(filament, 0.0)
     for one in np.unique(tool[filament < 0]):
@@ -182,7 +183,7 @@ def _extruded(filament: Floats, tool: Floats) -> Floats:
     return extruded
 
 
-def _fitting(centre: Floats, start: Floats, end: Floats) -> Floats:
+def _fitting(centre: Real, start: Real, end: Real) -> Real:
     """Middles that are about as far from the start as from the end of their arc; nan for others."""
     radii = np.array([np.hypot(*(centre - place[:, :2]).T) for place in (start, end)])
     near, far = radii.min(axis=0), radii.max(axis=0)

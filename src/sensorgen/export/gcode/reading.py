@@ -11,8 +11,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from sensorgen.core.arrays import Real, Whole
 from sensorgen.export.gcode import columns, remarks, words
-from sensorgen.export.gcode.columns import Floats, Ints
 from sensorgen.export.gcode.macros import Effect
 from sensorgen.export.gcode.moves import NO_TOOL, FileFault
 from sensorgen.export.gcode.words import Command
@@ -83,8 +83,8 @@ class GcodeFile:
         head, _, tail = prime_macro.partition("{tool}")
         self._macro = re.compile(f"{re.escape(head)}([0-9]+){re.escape(tail)}") if prime_macro else None
         self._change = change
-        self._places: list[Ints] = []
-        self._rows: list[Floats] = []
+        self._places: list[Whole] = []
+        self._rows: list[Real] = []
         self._own_places, self._own_rows = array("q"), array("d")
         self._sets = {
             "G17": (self.level, 1.0), "G18": (self.level, 0.0), "G19": (self.level, 0.0),
@@ -97,7 +97,7 @@ class GcodeFile:
             self._read(text[start:end])
             start = end
 
-    def table(self) -> tuple[Ints, Floats]:
+    def table(self) -> tuple[Whole, Real]:
         """Places and rows of all moves, in order: the code, and the numbers of ``columns.WORDS``; once."""
         own = np.array(self._own_rows).reshape(-1, 1 + len(columns.WORDS))
         places, rows = (
@@ -169,18 +169,17 @@ class GcodeFile:
     def _position(self, command: Command, place: int) -> None:
         """Add a row for a move, or for a command that names the place anew."""
         if command.code in _MOVES:
-            numbers = [self._number(command, letter, place) for letter in columns.WORDS]
+            self._row(place, float(command.code[1:]), [self._number(command, name, place) for name in columns.WORDS])
             if any(letter not in columns.WORDS for letter, _ in command.words):
                 self.odd.append((place, command))
             if command.has("H") and command.number("H") != 0:
                 self._fault(place, f"H{command.text('H')} of {command.code}: an axis goes until it meets something")
         elif command.code == "G92":
-            numbers = [0.0 if not command.has("XYZE") else self._number(command, letter, place) for letter in "XYZE"]
+            named = command.has("XYZE")
+            self._row(place, PLACE, [self._number(command, name, place) if named else 0.0 for name in "XYZE"])
         elif command.code == "G28":
-            numbers = [0.0 if not command.has("XYZ") or command.has(letter) else np.nan for letter in "XYZ"]
-        else:
-            return
-        self._row(place, float(command.code[1:]) if command.code in _MOVES else PLACE, numbers)
+            homed = [name for name in "XYZ" if command.has(name)] or "XYZ"
+            self._row(place, PLACE, [0.0 if name in homed else np.nan for name in "XYZ"])
 
     def _row(self, place: int, code: float, numbers: Sequence[float]) -> None:
         self._own_places.append(place)

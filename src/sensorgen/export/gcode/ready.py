@@ -24,8 +24,7 @@ import numpy as np
 from sensorgen.core.errors import BadInput
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import words
-from sensorgen.export.gcode.moves import NO_TOOL, Motion
-from sensorgen.export.gcode.timing import seconds
+from sensorgen.export.gcode.moves import NO_TOOL, Motion, seconds
 from sensorgen.export.gcode.words import Command
 
 
