@@ -66,13 +66,13 @@ def commands(machine: Printer) -> Commands:
     BadInput
         The printer's file has words that cannot be read.
     """
-    found = dict(_of_firmware(machine.gcode_flavour).allowed)
+    entries = dict(_of_firmware(machine.gcode_flavour).allowed)
     for code, text in machine.control.commands.items():
         if text is None:
-            found.pop(code, None)
+            entries.pop(code, None)
         else:
-            found[code] = _allowed(code, text, outside=code in found and found[code].outside)
-    return Commands(found, _of_firmware(machine.gcode_flavour).refused)
+            entries[code] = _allowed(code, text, outside=code in entries and entries[code].outside)
+    return Commands(entries, _of_firmware(machine.gcode_flavour).refused)
 
 
 @cache
@@ -96,15 +96,15 @@ def _allowed(code: str, text: str, *, outside: bool) -> Allowed:
     """
     words = {}
     for word in text.replace(ANY, "").split():
-        found = _WORD.fullmatch(word)
-        if found is None:
+        match = _WORD.fullmatch(word)
+        if match is None:
             raise BadInput(f"control.commands.{code}: {word!r}; expected a letter with a number or a range, as S0..255")
-        letter, low, high = found.groups()
+        letter, low, high = match.groups()
         words[letter] = (float(low), float(high or low)) if low else (-inf, inf)
     return Allowed(text, None if ANY in text else words, outside)
 
 
-def check(events: Iterable[Event], machine: Printer, printed: tuple[int, int], found: Findings) -> None:
+def check(events: Iterable[Event], machine: Printer, printed: tuple[int, int], findings: Findings) -> None:
     """Refuse commands, words and values that are not on a printer's list, each with its line.
 
     Parameters
@@ -115,7 +115,7 @@ def check(events: Iterable[Event], machine: Printer, printed: tuple[int, int], f
         Who is to print.
     printed : (int, int)
         Moves before the first printed line, and before the last [-].
-    found : Findings
+    findings : Findings
         Grows.
     """
     known, name = commands(machine), machine.name
@@ -127,10 +127,10 @@ def check(events: Iterable[Event], machine: Printer, printed: tuple[int, int], f
             why = known.refused.get(code)
             message = f"{code} {why}" if why else f"{name} has no {code} in its list of commands"
             advice = "leave it out, or add it to the printer's file (control: commands)"
-            found.error("command", event.number, message, advice)
+            findings.error("command", event.number, message, advice)
             continue
         if entry.outside and first < event.row <= last:
             message = f"{str(event.command)[:60]} stands between printed lines"
-            found.error("command", event.number, message, "move it before the first printed line or after the last")
+            findings.error("command", event.number, message, "move it before the first printed line or after the last")
         for message, advice in entry.faults(event.command, code, name):
-            found.error("command", event.number, message, advice)
+            findings.error("command", event.number, message, advice)

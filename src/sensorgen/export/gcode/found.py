@@ -45,15 +45,15 @@ class Findings(list[GcodeFinding]):
     error, warning, info = partialmethod(add, "error"), partialmethod(add, "warning"), partialmethod(add, "info")
 
 
-def merged(found: Iterable[GcodeFinding]) -> tuple[GcodeFinding, ...]:
+def merged(findings: Iterable[GcodeFinding]) -> tuple[GcodeFinding, ...]:
     """Findings of the same words as one, which has the first line; the severe first, and then by line.
 
     Bytes of the file that are no UTF-8 are written out, so that any text can hold them.
     """
-    kept: dict[tuple[str, str, str], GcodeFinding] = {}
-    for given in found:
+    by_words: dict[tuple[str, str, str], GcodeFinding] = {}
+    for given in findings:
         f = replace(given, message=given.message.encode("utf-8", "backslashreplace").decode())
         key = (f.rule, f.severity, f.message)
-        old = kept.get(key)
-        kept[key] = f if old is None else replace(old, count=old.count + f.count)
-    return tuple(sorted(kept.values(), key=lambda f: (SEVERITIES.index(f.severity), f.line, f.rule)))
+        old = by_words.get(key)
+        by_words[key] = f if old is None else replace(old, count=old.count + f.count)
+    return tuple(sorted(by_words.values(), key=lambda f: (SEVERITIES.index(f.severity), f.line, f.rule)))

@@ -36,9 +36,9 @@ class Heat:
 class Heaters:
     """All heaters of a printer, cold at first, while its file is followed."""
 
-    def __init__(self, machine: Printer, loaded: Mapping[int, Material], found: Findings) -> None:
+    def __init__(self, machine: Printer, loaded: Mapping[int, Material], findings: Findings) -> None:
         """Take the material of each tool, as far as it is known, and the list that findings go to."""
-        self.machine, self.found = machine, found
+        self.machine, self.findings = machine, findings
         self.materials = dict(loaded)
         self.tools = {tool: Heat() for tool in machine.tool_numbers}
         self.bed = Heat()
@@ -57,7 +57,7 @@ class Heaters:
         if control.standby_c is not None and heat.rests_c is not None and not low_c <= heat.rests_c <= high_c:
             message = f"tool {tool} has waited at {heat.rests_c:g} C between its lines"
             advice = f"keep it at {low_c:g} to {high_c:g} C (G10 P{tool} R..)"
-            self.found.error("standby", number, message, advice)
+            self.findings.error("standby", number, message, advice)
 
     def take(self, tool: int, number: int, *, waits: bool) -> None:
         """A tool is taken, by a macro that ``waits`` for its heat or not; it goes on, also where it was off before."""
@@ -78,7 +78,7 @@ class Heaters:
         given_c = heat.active_c if heat and heat.on else 0.0
         if heat and given_c < coldest_c:
             message = f"tool {tool} moves filament at {given_c:g} C; below {coldest_c:g} C it is cold"
-            self.found.error("cold", number, message, f"heat it before (G10 P{tool} S..)")
+            self.findings.error("cold", number, message, f"heat it before (G10 P{tool} S..)")
 
     def check_printing(self, tool: int, number: int) -> None:
         """Check that the tool that prints a line, and the bed, suit its material and have been waited for."""
@@ -86,16 +86,16 @@ class Heaters:
         heat, advice = self.tools.get(tool), f"wait for it before (M116 P{tool})"
         if heat and heat.active_c > heat.awaited_c + WITHIN_C:
             message = f"tool {tool} prints without waiting for its {heat.active_c:g} C"
-            self.found.error("wait", number, message, advice)
+            self.findings.error("wait", number, message, advice)
         elif heat and heat.rested:
             message = f"tool {tool} prints at {heat.active_c:g} C straight from standby ({heat.standby_c:g} C)"
             known = tool in self.materials and self.machine.macro("tpost") is not None  # which has no wait
             low_c = self.materials[tool].print_range("nozzle_temperature_c", WITHIN_C)[0] if known else 0.0
             severity = "error" if heat.standby_c < low_c else "warning"
-            self.found.add(severity, "wait", number, message, advice)
+            self.findings.add(severity, "wait", number, message, advice)
         if self.bed.active_c > self.bed.awaited_c + WITHIN_C:
             message = f"lines are printed without waiting for the bed's {self.bed.active_c:g} C"
-            self.found.error("wait", number, message, "wait for it before (M190)")
+            self.findings.error("wait", number, message, "wait for it before (M190)")
 
     def _check_material(self, tool: int, number: int) -> None:
         material, heat = self.materials.get(tool), self.tools.get(tool)
@@ -108,7 +108,7 @@ class Heaters:
             low_c, high_c = material.print_range(quantity, BED_WITHIN_C if what == "the bed" else WITHIN_C)
             if not low_c <= given_c <= high_c:
                 message = f"{what} is at {given_c:g} C for {material.name}; its sources give {low_c:g} to {high_c:g} C"
-                self.found.error("material", number, message, f"set it in this range ({command}..)")
+                self.findings.error("material", number, message, f"set it in this range ({command}..)")
 
     def obey(self, event: Event, in_hand: int) -> None:
         """Follow a command that sets a temperature or names a tool by P; G10 with L does neither."""
@@ -159,7 +159,7 @@ class Heaters:
             self.check_tool(event.number, tool, "gets a temperature")
         elif self.machine.control.names_tools:
             message, advice = f"{command.code} sets a temperature and names no tool", f"G10 P{max(in_hand, 1)} S.. R.."
-            self.found.error("temperature", event.number, message, f"name it: {advice}")
+            self.findings.error("temperature", event.number, message, f"name it: {advice}")
         self._check_hot(event, "a tool", self.machine.max_nozzle_c)
         if tool in self.tools:
             heat = self.tools[int(tool)]
@@ -175,13 +175,13 @@ class Heaters:
         if tool not in self.machine.tool_numbers:
             known = ", ".join(map(str, self.machine.tool_numbers))
             message = f"tool {tool:g} {what}; {self.machine.name} has {known}"
-            self.found.error("tool", number, message, "give the printer's own number; slicers count from 0")
+            self.findings.error("tool", number, message, "give the printer's own number; slicers count from 0")
 
     def _check_hot(self, event: Event, what: str, most_c: float) -> None:
         for value_c in (event.command.number("S"), event.command.number("R")):
             if value_c is not None and not value_c <= most_c:
                 message = f"{what} is set to {value_c:g} C; the limit is {most_c:g} C"
-                self.found.error("temperature", event.number, message, "print cooler")
+                self.findings.error("temperature", event.number, message, "print cooler")
 
 
 def _given(command: Command, letter: str, before_c: float) -> float:

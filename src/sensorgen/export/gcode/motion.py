@@ -52,19 +52,19 @@ def executed(source: Source, machine: Printer) -> Motion:
 class _Steps:
     """All moves of a file, and between them the places that it names anew, as G92 does."""
 
-    def __init__(self, said: GcodeFile) -> None:
-        self.said = said
-        self.place, table = said.table()
+    def __init__(self, file: GcodeFile) -> None:
+        self.file = file
+        self.place, table = file.table()
         self.code = table[:, 0]
         self.moves = self.code < PLACE
         numbers = table[:, 1:]
-        numbers *= self._held(said.scale, 1.0)[:, None]
+        numbers *= self._held(file.scale, 1.0)[:, None]
         self.words = dict(zip(WORDS, np.clip(numbers, -MOST_MM, MOST_MM, out=numbers).T, strict=True))
-        self.sets = ((self._held(said.relative, 0.0) == 0) | ~self.moves) & (self.code != OFFSET)
+        self.sets = ((self._held(file.relative, 0.0) == 0) | ~self.moves) & (self.code != OFFSET)
 
     def motion(self) -> Motion:
         """The file as moves in columns."""
-        said = self.said
+        file = self.file
         rows = np.empty((np.count_nonzero(self.moves), 10))
         for k, column in enumerate(self._columns()):
             rows[:, k] = column if len(column) == len(rows) else column[self.moves]
@@ -79,16 +79,16 @@ class _Steps:
             given = straight & np.any([~np.isnan(self.words[letter]) for letter in letters], axis=0)
             faults += [FileFault(n >> SHIFT, what) for n in self.place[given].tolist()]
         arcs, wrong = self._arcs(rows)
-        told = [*said.events, *said.odd]
-        before = iter(self._rows([*(place for place, _ in told), *(place for place, _, _ in said.changes)]))
+        told = [*file.events, *file.odd]
+        before = iter(self._rows([*(place for place, _ in told), *(place for place, _, _ in file.changes)]))
         events = [Event(next(before), place >> SHIFT, command) for place, command in told]
-        changes = [ToolChange(next(before), place >> SHIFT, tool, macro) for place, tool, macro in said.changes]
+        changes = [ToolChange(next(before), place >> SHIFT, tool, macro) for place, tool, macro in file.changes]
         return Motion(
-            rows, arcs, events[: len(said.events)], events[len(said.events) :], changes, self._track(said.tools),
-            tuple(said.kinds), self._track(said.kind),
-            self._track(said.width_mm), self._track(said.height_mm), self._track(said.layer),
-            self._track(said.absolute_e), sorted([*said.faults, *faults, *wrong], key=lambda fault: fault.number),
-            said.lines, said.maker, self._z_stated(),
+            rows, arcs, events[: len(file.events)], events[len(file.events) :], changes, self._track(file.tools),
+            tuple(file.kinds), self._track(file.kind),
+            self._track(file.width_mm), self._track(file.height_mm), self._track(file.layer),
+            self._track(file.absolute_e), sorted([*file.faults, *faults, *wrong], key=lambda fault: fault.number),
+            file.lines, file.maker, self._z_stated(),
         )  # fmt: skip
 
     def _columns(self) -> Iterator[Real]:
@@ -97,10 +97,10 @@ class _Steps:
             yield _before(_state(self.words[axis], self.sets))
         for axis in "XYZ":
             yield _state(self.words[axis], self.sets)
-        given, absolute = self.words["E"], self._held(self.said.absolute_e, 1.0) > 0
+        given, absolute = self.words["E"], self._held(self.file.absolute_e, 1.0) > 0
         at = _state(given, absolute | ~self.moves)
         filament = np.where(self.moves & ~np.isnan(given), np.where(absolute, at - _before(at), given), 0.0)
-        yield _extruded(filament, self._held(self.said.tools, NO_TOOL))
+        yield _extruded(filament, self._held(self.file.tools, NO_TOOL))
         yield filament
         last = _last(~np.isnan(self.words["F"]))
         yield np.where(last < 0, DEFAULT_FEED_MM_MIN, self.words["F"][last])
@@ -109,7 +109,7 @@ class _Steps:
     def _z_stated(self) -> Mask:
         """Z has been stated since the last change of tool, for each move."""
         turned = np.zeros(len(self.place) + 1, bool)
-        turned[np.searchsorted(self.place, np.array(self.said.turns, np.int64))] = True
+        turned[np.searchsorted(self.place, np.array(self.file.turns, np.int64))] = True
         stated = _last(self.sets & ~np.isnan(self.words["Z"]))
         return np.asarray(stated >= _last(turned[:-1]))[self.moves]
 
@@ -131,7 +131,7 @@ class _Steps:
             _fitting(start[:, :2] + offset, start, end),
             centres_of_radius(start[:, :2], end[:, :2], radius, clockwise),
         )
-        centre[self._held(self.said.level, 1.0)[step] == 0] = np.nan
+        centre[self._held(self.file.level, 1.0)[step] == 0] = np.nan
         fits = ~np.isnan(centre).any(axis=1)
         faults = [
             FileFault(int(rows[k, 9]), f"G{int(code[k])} without a centre that fits; taken as a straight line")
@@ -141,8 +141,8 @@ class _Steps:
 
     def _rows(self, places: Sequence[int]) -> list[int]:
         """Number of moves before each of some places."""
-        found: list[int] = np.searchsorted(self.place[self.moves], np.array(places, np.int64)).tolist()
-        return found
+        counts: list[int] = np.searchsorted(self.place[self.moves], np.array(places, np.int64)).tolist()
+        return counts
 
     def _track(self, holding: Holding) -> ModalValues:
         return ModalValues(self._rows(holding.places), holding.values.tolist())

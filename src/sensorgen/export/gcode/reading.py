@@ -111,18 +111,18 @@ class GcodeFile:
         return places[order], rows[order]
 
     def _read(self, piece: bytes) -> None:
-        found = columns.read(piece)
+        table = columns.read(piece)
         first = self.lines + 1
-        self._places.append((found.plain + first) << SHIFT)
-        self._rows.append(np.column_stack([found.code, found.words]))
-        for row in found.rest.tolist():
-            line = piece[found.start[row] : found.end[row]]
+        self._places.append((table.plain + first) << SHIFT)
+        self._rows.append(np.column_stack([table.code, table.words]))
+        for row in table.rest.tolist():
+            line = piece[table.start[row] : table.end[row]]
             text = line.decode("utf-8", "surrogateescape")
             if text[0] == ";" and line.isascii():
                 self._remark(text[1:], (first + row) << SHIFT)
             elif not text.isspace():
                 self._other(text, first + row)
-        self.lines += len(found.start)
+        self.lines += len(table.start)
 
     def _remark(self, text: str, place: int) -> None:
         for quantity, value in _note(text):
@@ -139,16 +139,16 @@ class GcodeFile:
                 self.layer.put(place, last + 1 if quantity == remarks.NEXT_LAYER else value)
 
     def _other(self, text: str, number: int) -> None:
-        said = words.parse(text)
+        parsed = words.parse(text)
         place = number << SHIFT
-        if said.remark:
-            self._remark(said.remark, place)
+        if parsed.remark:
+            self._remark(parsed.remark, place)
         if not text.isascii():
             foreign = not text.partition(";")[0].isascii()
             self._fault(place, "characters that are not ASCII" + ("" if foreign else " in a comment"), severe=foreign)
-        for what in said.faults:
+        for what in parsed.faults:
             self._fault(place, what, severe=not words.is_meta(text))
-        for here, command in enumerate(said.commands, place):
+        for here, command in enumerate(parsed.commands, place):
             if command.code[0] == "T":
                 self._select(command.code[1:], here)
             elif command.code in self._sets:
