@@ -10,9 +10,9 @@ FORKS = """
 import gc, json, os, resource, selectors, sys
 import h5py, numpy, scipy.signal
 from sensorgen.checks import review
-from sensorgen.cli import bench_command, bench_show, build_command, check_command, log_command, log_write, main
+from sensorgen.cli import bench_command, log_command, main, printing
 from sensorgen.measure.log import Log, importing, notes, verify
-from sensorgen.measure.signal import hysteresis
+from sensorgen.measure.signal import run
 from sensorgen.workflows import api, batch, build
 
 

@@ -14,8 +14,8 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.identifiability.fisher import bounds, relative
 from sensorgen.prediction.identifiability.results import GUESS
-from sensorgen.prediction.losses import LOWEST_HZ
 from sensorgen.prediction.query import NOISE, Load
+from sensorgen.prediction.rest_state import LOWEST_HZ
 from sensorgen.prediction.results import Changes, Term
 
 SOURCES = "sources"
