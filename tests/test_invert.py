@@ -128,12 +128,14 @@ def test_it_is_the_least_squares_solution():
 
         start, border = (force[k], position[k] * 100), ([0.0, 0.0], [13.0, 10.0])
         peer = least_squares(residual, start, bounds=border, x_scale=(0.2, 0.2), xtol=1e-12, ftol=1e-14)
-        deviation = np.sqrt(np.diag(np.linalg.inv(peer.jac.T @ peer.jac)))
+        covariance = np.linalg.inv(peer.jac.T @ peer.jac)
+        deviation = np.sqrt(np.diag(covariance))
         assert abs(found.force_n[k] - peer.x[0]) < 0.02 * deviation[0]
         assert abs(found.position_m[k] * 100 - peer.x[1]) < 0.02 * deviation[1]
         assert found.chi2[k] == pytest.approx(2 * peer.cost, rel=1e-3)
         # 0.9 % at 1 N, the first solved stress of the cell, where the law's slope bends; elsewhere 0.3 %
         assert np.sqrt(found.covariance[k, 0, 0]) == pytest.approx(deviation[0], rel=1e-2)
+        assert found.covariance[k, 0, 1] * 100 == pytest.approx(covariance[0, 1], abs=0.02 * deviation.prod())
 
 
 @pytest.mark.parametrize(
