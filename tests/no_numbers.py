@@ -30,7 +30,7 @@ def unpredicted():
 def at_rest(folder="at-rest"):
     """Capacitance and resistance as ever, nothing under a load."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(quantities, "_at_load", lambda found, *_: found)
+        patch.setattr(quantities, "_model", lambda *_: (None, None, ""))  # without a sensor to load
         patch.setenv("SENSORGEN_CACHE", str(Path(os.environ["SENSORGEN_CACHE"]) / folder))
         yield
 
