@@ -90,10 +90,10 @@ def _leg(on: Point, centre: Point, other: float) -> float:
 @lru_cache(maxsize=64)
 def _edges(outline: Outline, bulges: tuple[float, ...]) -> tuple[_Edge, ...]:
     """Edges of a profile, arcs cut where they are level or upright."""
-    found = []
+    edges = []
     for a, b, bulge in zip(outline, outline[1:] + outline[:1], bulges, strict=True):
         if bulge == 0:
-            found.append(_Edge(a, b))
+            edges.append(_Edge(a, b))
             continue
         du, dv, lift = b[0] - a[0], b[1] - a[1], (1 - bulge * bulge) / (4 * bulge)
         centre = ((a[0] + b[0]) / 2 - dv * lift, (a[1] + b[1]) / 2 + du * lift)
@@ -104,8 +104,8 @@ def _edges(outline: Outline, bulges: tuple[float, ...]) -> tuple[_Edge, ...]:
         way = {0: (1.0, 0.0), 1: (0.0, 1.0), 2: (-1.0, 0.0), 3: (0.0, -1.0)}
         stops = [tuple(c + radius * w for c, w in zip(centre, way[k % 4], strict=True)) for k in quarters]
         places = [a, *((u, v) for u, v in (stops if turn > 0 else stops[::-1])), b]
-        found += [_Edge(start, end, centre) for start, end in pairwise(places)]
-    return tuple(found)
+        edges += [_Edge(start, end, centre) for start, end in pairwise(places)]
+    return tuple(edges)
 
 
 @dataclass(frozen=True)
@@ -164,15 +164,15 @@ class Revolved:
 
     def volume_mm3(self, low_mm: float = -inf, high_mm: float = inf) -> float:
         """Exact volume, of all of it or between two heights [mm3]."""
-        found = []
+        volumes = []
         for edge in self._edges():
             (_, za), (_, zb) = edge.start, edge.end
             ends = [min(max(z, low_mm), high_mm) for z in (za, zb)]
             if ends[0] != ends[1]:
                 a, b = ((edge.at_height(z), z) if z != given[1] else given
                         for z, given in zip(ends, (edge.start, edge.end), strict=True))  # fmt: skip
-                found.append(_Edge(a, b, edge.centre).volume_mm3())
-        return sum(found)
+                volumes.append(_Edge(a, b, edge.centre).volume_mm3())
+        return sum(volumes)
 
     def is_box(self) -> bool:
         """False: no box has curved faces."""
@@ -209,13 +209,13 @@ class Revolved:
 
     def profile(self, chord_mm: float) -> list[Point]:
         """Corners of the profile, with those of chords at most ``chord_mm`` from its arcs [mm]."""
-        found = []
+        corners = []
         for edge in self._edges():
             short = [edge]
             while edge.centre and _off_chord(short[0].middle(), short[0].start, short[0].end) > chord_mm:
                 short = [half for whole in short for half in whole.halves()]
-            found += [part.start for part in short]
-        return found
+            corners += [part.start for part in short]
+        return corners
 
     def moved(self, move: Move) -> "Revolved":
         """It at another place, scaled or turned."""

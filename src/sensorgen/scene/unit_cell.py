@@ -173,14 +173,14 @@ def _slice(column: SectionColumn, height_mm: float, layered: bool) -> Slice:
         at = layer.top_mm
     bands.append(Band("air", "", at, (height_mm, height_mm)))
     # Bands without those of no height, and neighbours of one material as one
-    found: list[Band] = []
+    joined: list[Band] = []
     for band in bands:
         if max(t - b for b, t in zip(band.bottom_mm, band.top_mm, strict=True)) <= ROUNDING_MM:
             continue
-        if found and found[-1].is_same(band) and not layered:
-            band = Band(band.material, band.terminal, found.pop().bottom_mm, band.top_mm)
-        found.append(band)
-    return Slice(column.left_mm, column.right_mm, tuple(found))
+        if joined and joined[-1].is_same(band) and not layered:
+            band = Band(band.material, band.terminal, joined.pop().bottom_mm, band.top_mm)
+        joined.append(band)
+    return Slice(column.left_mm, column.right_mm, tuple(joined))
 
 
 def _bridged(last: Slice, here: Slice) -> tuple[Band, ...]:
