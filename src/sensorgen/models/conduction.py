@@ -98,7 +98,7 @@ def electrode_resistance(
     return _per_resistivity(alone, axis, width).times(resistivity_ohm_m / M_PER_MM)
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=256)
 def _per_resistivity(alone: Scene, axis: str, width: float) -> Interval:
     """Resistance of all bodies over their resistivity [1/mm]."""
     square = square_to(alone, axis)

@@ -140,15 +140,15 @@ def _with_fields(
 
     Where no gap ends in an apex, the mesh as drawn is carried along until a gap closes: its errors cancel in the rise.
     """
-    from sensorgen.solvers.contact import deformed, plane_field
+    from sensorgen.solvers.contact import closing, plane_field
     from sensorgen.solvers.contact.carried import Carried
 
     mesh, sharp = run.mesh, bool(pressed.apex_m)
     share, rings = _SHARP_FIELD if sharp else _BLUNT_FIELD
 
     def meshed(u_m: Real) -> TriangleMesh | None:
-        outline = deformed.deformed(cell, mesh, run.problem.faces, u_m)
-        if deformed.misfit(outline, mesh, u_m) > _MISFIT:
+        outline = closing.deformed(cell, mesh, run.problem.faces, u_m)
+        if closing.misfit(outline, mesh, u_m) > _MISFIT:
             return None
         try:
             return plane_field.meshed(outline.without_block(), cell.width_mm() / 4, share * fineness.growth, rings)

@@ -21,10 +21,9 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import Region, parts
-from sensorgen.scene.raster import raster
-from sensorgen.scene.repetition import Repeat, halved, repeat, widened
-from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene, seen_from_above
-from sensorgen.scene.slabs import is_open, slabs
+from sensorgen.scene.repetition import Repeat, halved, raster, repeat, widened
+from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene
+from sensorgen.scene.slabs import Slab, is_open, slabs
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, LayerCell, PrismMesh, plan, solved
 
@@ -228,27 +227,20 @@ def _cell(scene: Scene) -> _Cell:
         return _enclosed(scene)
     if slanted:
         raise ValueError(f"{slanted.name} is slanted or curved in elevation: its layers are no prisms")
-    levels = np.unique(np.array([z for b in scene.bodies for p in b.pieces for z in p.span("z")]).round(9))
-    levels = levels[np.append(True, np.diff(levels) > SLIVER_MM)]
-    layers = [(low, high, _outlines(scene, (low + high) / 2)) for low, high in pairwise(levels.tolist())]
-    patterned = [region for *_, own in layers for region in own.values()]
+    layers = slabs(scene)
+    patterned = [region for slab in layers for region in slab.inner.values()]
     x, y = _sides(scene, patterned)
     whole = shapely.box(x.low_mm, y.low_mm, x.high_mm, y.high_mm)
     half = halved((x, y), [shapely.intersection(r, whole) for r in dict.fromkeys(patterned)])
     try:
-        return _numbered(levels.tolist(), _within(layers, *half), *half)
+        return _numbered(_levels(layers), _within(layers, *half), *half)
     except _Uncovered as error:
-        return _surrounded(scene, levels.tolist(), layers, x, y, error.gap_mm)
+        return _surrounded(scene, layers, x, y, error.gap_mm)
 
 
-def _outlines(scene: Scene, z_mm: float) -> dict[Body, Region]:
-    """Region of each body at a height, of upright pieces."""
-    outlines: dict[Body, list[shapely.Polygon]] = defaultdict(list)
-    for body in scene.bodies:
-        for p in body.pieces:
-            if p.span("z")[0] < z_mm < p.span("z")[1]:
-                outlines[body].append(shapely.Polygon(seen_from_above(p)))
-    return {body: shapely.union_all(own) for body, own in outlines.items()}
+def _levels(layers: Sequence[Slab]) -> list[float]:
+    """Planes between slabs [mm]."""
+    return [layers[0].low_mm, *(slab.high_mm for slab in layers)]
 
 
 def _sides(scene: Scene, patterned: Sequence[Region]) -> tuple[Repeat, Repeat]:
@@ -275,15 +267,12 @@ class _Uncovered(ValueError):
         self.gap_mm = gap_mm
 
 
-_Slab = tuple[float, float, dict[Body, Region]]
-
-
-def _within(slabs: Sequence[_Slab], x: Repeat, y: Repeat) -> list[dict[Body, Region]]:
+def _within(layers: Sequence[Slab], x: Repeat, y: Repeat) -> list[dict[Body, Region]]:
     """Regions of slabs inside a cell, from its corner; raises ValueError where they overlap."""
     window = (x.low_mm, y.low_mm, x.high_mm, y.high_mm)
     inside = [
-        {body: translate(shapely.clip_by_rect(r, *window), -x.low_mm, -y.low_mm) for body, r in own.items()}
-        for *_, own in slabs
+        {body: translate(shapely.clip_by_rect(r, *window), -x.low_mm, -y.low_mm) for body, r in slab.inner.items()}
+        for slab in layers
     ]
     if any(
         sum(r.area for r in own.values()) > shapely.union_all(list(own.values())).area + _OVERLAP_MM2 for own in inside
@@ -292,16 +281,14 @@ def _within(slabs: Sequence[_Slab], x: Repeat, y: Repeat) -> list[dict[Body, Reg
     return inside
 
 
-def _surrounded(
-    scene: Scene, levels_mm: list[float], slabs: Sequence[_Slab], x: Repeat, y: Repeat, gap_mm: float
-) -> _Cell:
+def _surrounded(scene: Scene, layers: Sequence[Slab], x: Repeat, y: Repeat, gap_mm: float) -> _Cell:
     """A scene whose electrodes do not cover it, whole or by half, with air around, as its ends are not those of a cell.
 
     Above and below, that air ends in a layer more, which the flux may use and the potential may not.
     """
     if gap_mm <= SLIVER_MM:
         raise ValueError("the electrodes touch: the capacitance grows without bound")
-    air, regions = _AIR * gap_mm, [region for *_, own in slabs for region in own.values()]
+    air, regions = _AIR * gap_mm, [region for slab in layers for region in slab.inner.values()]
     sides, ends = [], []
     for axis, side in enumerate((x, y)):
         if scene.repeats[axis]:
@@ -311,8 +298,9 @@ def _surrounded(
             sides.append(widened(regions, scene.size_mm, axis, air))
             ends.append((sides[-1].low_mm < 0, True))
     thick = _SHELL * air
+    levels_mm = _levels(layers)
     low, high = levels_mm[0] - air, levels_mm[-1] + air
-    inside = _within(slabs, sides[0], sides[1])
+    inside = _within(layers, sides[0], sides[1])
     heights = [low - thick, low, *levels_mm, high, high + thick]
     cell = _numbered(heights, [{}, {}, *inside, {}, {}], sides[0], sides[1], air)
     return replace(cell, open_sides=(ends[0], ends[1]))
@@ -338,7 +326,7 @@ def _enclosed(scene: Scene) -> _Cell:
         return {k: shapely.union_all(regions) for k, regions in by_kind.items()}
 
     every = [region for slab in layers for own in (slab.inner, slab.outer) for region in own.values()]
-    heights = [layers[0].low_mm, *(slab.high_mm for slab in layers)]
+    heights = _levels(layers)
     x = y = Repeat.of(0.0, 1.0, False, 1.0)
     gap_mm = _gap_mm([numbered(slab.outer) for slab in layers], heights, conductors)
     if not SLIVER_MM < gap_mm < np.inf:

@@ -17,9 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.solvers.network import links as links
-from sensorgen.solvers.network.band import product
-from sensorgen.solvers.network.nodes import Nodes, StraightLines
+from sensorgen.solvers import network as links
+from sensorgen.solvers.network import Nodes, StraightLines, product
 
 SOURCE = "Lines as in Dijkshoorn et al., Sensors 2021, 21, 3710 (traxel model); network derived anew"
 COST = 2

@@ -310,17 +310,19 @@ def export_design(design: Design, path: str | Path, gcode: str | Path | None = N
 
     design = _named(design)
     content = None if gcode is None else Path(gcode).read_bytes()
-    made = asprinted.body(design, paths.read(content, design.machine)) if content else reviewed(design).printed(design)
-    return exports.export(made, Path(path))
+    printed = (
+        asprinted.body(design, paths.read(content, design.machine)) if content else reviewed(design).printed(design)
+    )
+    return exports.export(printed, Path(path))
 
 
 def show(design: Design, path: str | Path = "") -> Path:
     """Write a design as one offline page, as ``sensorgen show`` does, and give its name: ``NAME.html`` if not given."""
-    from sensorgen.workflows import preview
+    from sensorgen.workflows import decision
 
     design = _named(design)
     file = Path(path or f"{design.name}.html")
-    files.replace(file, preview.page_of(design).encode())
+    files.replace(file, decision.page_of(design).encode())
     return file
 
 
@@ -356,10 +358,10 @@ def report(log: Log, iteration: int | None = None, *specimens: str, path: str | 
     from sensorgen.analysis.report import contents, pieces
 
     file = Path(path)
-    made = contents.report(log, iteration, specimens=specimens)
+    compared = contents.report(log, iteration, specimens=specimens)
     with files.replacing(file) as target:
-        target.writelines(piece.encode() for piece in pieces(made, file.suffix.lstrip(".") or "html"))
-    return made
+        target.writelines(piece.encode() for piece in pieces(compared, file.suffix.lstrip(".") or "html"))
+    return compared
 
 
 def invert(what: Design | Body, frequency_hz: Sequence[float], impedance_ohm: ArrayLike, *, noise: float) -> Estimates:
@@ -405,7 +407,7 @@ def calibrate(log: Log, *specimens: str, bench: Bench | None = None) -> list[Cal
     ``Calibration.inverter()`` then finds force and position. Parameters and errors as of
     :func:`sensorgen.analysis.calibration.calibrate`.
     """
-    return [made.calibration for made in calibrations.calibrate(log, specimens, bench)]
+    return [work.calibration for work in calibrations.calibrate(log, specimens, bench)]
 
 
 def compare(log: Log, iteration: int) -> Comparison:
@@ -427,10 +429,10 @@ def _named(design: Design) -> Design:
 
 def _numbers(name: str, values: ArrayLike) -> tuple[float, ...]:
     """Rising numbers from 0 on."""
-    found = np.atleast_1d(np.asarray(values, float))
-    if found.ndim > 1 or not (np.isfinite(found).all() and (found >= 0).all() and (np.diff(found) > 0).all()):
+    numbers = np.atleast_1d(np.asarray(values, float))
+    if numbers.ndim > 1 or not (np.isfinite(numbers).all() and (numbers >= 0).all() and (np.diff(numbers) > 0).all()):
         raise BadInput(f"{name}={values!r:.60}; expected a number, or rising numbers, from 0 on")
-    return tuple(found.tolist())
+    return tuple(numbers.tolist())
 
 
 def _several(what: object) -> Sequence[Any]:

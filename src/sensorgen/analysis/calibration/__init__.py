@@ -15,7 +15,7 @@ from sensorgen.core.errors import BadInput, MissingValue, within
 from sensorgen.core.version import __version__
 from sensorgen.design.body import BodyOf
 from sensorgen.design.design import Design
-from sensorgen.measure.log import BenchRun, Log, Reading, batches, notes
+from sensorgen.measure.log import BenchRun, Log, Reading, notes, prints
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log.entries import Specimen
 from sensorgen.prediction import bodies
@@ -98,15 +98,15 @@ def design_of(log: Log, specimen: str) -> tuple[str, Design]:
     if bound is None:
         with suppress(BadInput):
             name = notes.specimen(specimen).specimen
-    found = batches.designs(log).get(bound.design_id) if bound else None
-    if found is None:
+    design = prints.designs(log).get(bound.design_id) if bound else None
+    if design is None:
         with suppress(BadInput):
-            found = notes.design_of(specimen)
-    if found is None:
+            design = notes.design_of(specimen)
+    if design is None:
         raise MissingValue(
             f"no design is known of {specimen!r:.80}: sensorgen log specimen {specimen!r:.80} --design FILE binds it"
         )
-    return name, found
+    return name, design
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,16 +188,18 @@ def stored(log: Log, specimen: str) -> Calibration | None:
     row = next(iter(log.entries(Row, last=1, specimen=specimen)), None)
     if row is None:
         return None
-    found = from_json(row.data)
+    calibration = from_json(row.data)
     again = f"calibrate it again: sensorgen calibrate {specimen!r}"
-    if design_of(log, specimen)[1].id() != found.design_id:
-        raise BadInput(f"{specimen} was calibrated as {found.design} ({found.design_id}), but is no longer; {again}")
+    if design_of(log, specimen)[1].id() != calibration.design_id:
+        raise BadInput(
+            f"{specimen} was calibrated as {calibration.design} ({calibration.design_id}), but is no longer; {again}"
+        )
     current = {row.uid for row in (*log.recordings(specimen=specimen), *log.entries(Reading, specimen=specimen))}
-    if lost := set(found.rows) - current:
+    if lost := set(calibration.rows) - current:
         raise BadInput(
             f"{specimen}: {len(lost)} recordings or readings of its calibration were withdrawn or corrected; {again}"
         )
-    return found
+    return calibration
 
 
 def calibrate(
@@ -231,28 +233,29 @@ def calibrate(
     if len(set(specimens)) < len(specimens):
         raise BadInput(f"a specimen stands twice in {', '.join(specimens)}; expected each once")
     _check_numbers(log, [design_of(log, specimen)[0] for specimen in specimens], recordings)
-    found = []
+    entries = []
     for specimen in specimens:
         step(specimen)
-        found.append(known(log, specimen, bench, recordings, body_of))
-    posteriors = [calibrated(one.model, one.data) for one in found]
+        entries.append(known(log, specimen, bench, recordings, body_of))
+    posteriors = [calibrated(one.model, one.data) for one in entries]
     if len(posteriors) > 1:
-        posteriors = shared([one.model for one in found], posteriors, _INSTRUMENT)
-    made = []
-    for one, posterior in zip(found, posteriors, strict=True):
+        posteriors = shared([one.model for one in entries], posteriors, _INSTRUMENT)
+    works = []
+    for one, posterior in zip(entries, posteriors, strict=True):
         most = float(one.data.presses.force_n.max(initial=0.0)) or 6.0
-        held = held_out(one.model, one.data, BEYOND * most, step)
-        others = ", ".join(other.specimen for other in found if other is not one)
+        left_out = held_out(one.model, one.data, BEYOND * most, step)
+        others = ", ".join(other.specimen for other in entries if other is not one)
         notes = (*one.notes, *_off(one, posterior.at))
         notes += (f"lead, stray and offsets shared with {others}",) if others else ()
         calibration = Calibration(
-            one.specimen, one.design.name, one.design.id(), one.model, posterior, most, held[0] if held else None,
-            one.rows, tuple(gain(one.model, one.data, posterior.at).tolist()) if one.recorded else (), notes,
+            one.specimen, one.design.name, one.design.id(), one.model, posterior, most,
+            left_out[0] if left_out else None, one.rows,
+            tuple(gain(one.model, one.data, posterior.at).tolist()) if one.recorded else (), notes,
             links(one.predicted),
         )  # fmt: skip
         calibration = replace(calibration, notes=(*notes, *calibration.departures()))
-        made.append(CalibrationWork(calibration, one.data, held[1] if held else None))
-    return made
+        works.append(CalibrationWork(calibration, one.data, left_out[1] if left_out else None))
+    return works
 
 
 def _chosen(log: Log, name: str, numbers: Sequence[int]) -> list[BenchRun]:
@@ -316,9 +319,9 @@ class Recheck:
 
     def document(self) -> Iterator[Part]:
         """Paragraphs and tables of the presses."""
-        said = "ALARM: the calibration no longer held" if self.alarm else "the calibration still held"
+        verdict = "ALARM: the calibration no longer held" if self.alarm else "the calibration still held"
         yield (
-            f"{said}: {self.inside} of {self.presses} known forces in their 90 % intervals, their mean off by "
+            f"{verdict}: {self.inside} of {self.presses} known forces in their 90 % intervals, their mean off by "
             f"{self.z:+.1f} standard errors"
         )
         if self.change:
@@ -388,11 +391,11 @@ def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
 
 def rows(log: Log, calibrations: Sequence[Calibration]) -> list[Row]:
     """Rows of the log for calibrations."""
-    found = []
-    for made in calibrations:
-        of = next((s for s in log.specimens() if s.specimen == made.specimen), Specimen(specimen=made.specimen))
-        found.append(Row(
-            **vars(of), uid=uuid.uuid4().hex, written=made.specimen, design_id=made.design_id, design=made.design,
-            source="sensorgen calibrate", version=__version__, data=made.to_json(),
+    known, logged = {one.specimen: one for one in reversed(log.specimens())}, []
+    for one in calibrations:
+        of = known.get(one.specimen, Specimen(specimen=one.specimen))
+        logged.append(Row(
+            **vars(of), uid=uuid.uuid4().hex, written=one.specimen, design_id=one.design_id, design=one.design,
+            source="sensorgen calibrate", version=__version__, data=one.to_json(),
         ))  # fmt: skip
-    return found
+    return logged

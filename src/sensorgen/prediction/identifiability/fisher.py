@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import OutOfRange
-from sensorgen.models.sensor import Sensor
+from sensorgen.models.sensor import Response, Sensor
 from sensorgen.prediction.identifiability.results import (
     FORCE_SHARE,
     GUESS,
@@ -97,10 +97,17 @@ def slopes(sensor: Sensor, frequency_hz: ArrayLike, force_n: ArrayLike, position
         As :meth:`sensorgen.models.sensor.Sensor.response`; also where Z is 0.
     """
     force, position = (np.asarray(value, float)[..., None] for value in (force_n, position_m))
-    z, by_force, by_position = sensor.response(np.asarray(frequency_hz, float), force, position)
+    return relative(sensor.response(np.asarray(frequency_hz, float), force, position), force)
+
+
+def relative(response: Response, force_n: ArrayLike) -> Slopes:
+    """Derivatives of ln Z, of those of Z under a force [N]; errors as :func:`slopes`."""
+    z, by_force, by_position = response
     if not z.all():
         raise OutOfRange("Z is 0: a relative change needs a resistance or a capacitance to change")
-    return Slopes(by_force / z, np.where(force == 0, 0.0, by_position / z))  # at the ends rounding would leave residues
+    return Slopes(
+        by_force / z, np.where(np.equal(force_n, 0), 0.0, by_position / z)
+    )  # at the ends rounding would leave residues
 
 
 def bounds(of: Slopes, noise: float) -> LeastErrors:

@@ -391,8 +391,7 @@ class Estimator:
         ambiguous = np.zeros(len(z), bool)
         ambiguous[pair.rows] = True
         status = statuses(pair.best, own[:, _DIAGONAL, _DIAGONAL], tones, ambiguous)
-        known = self._known(target, pair.best)
-        return self._in_si(pair, known, status, tones)
+        return self._in_si(pair, self._known(target, pair.best), status, tones)
 
     def _known(self, target: FitGoal, fit: LocalFit) -> PressPosterior:
         """Means, covariances and intervals of scaled presses."""

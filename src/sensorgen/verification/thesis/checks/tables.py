@@ -13,15 +13,14 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design import materials, printer
 from sensorgen.design.shapes import reference
-from sensorgen.measure.log import tables as readings
+from sensorgen.measure.log import importing as readings
 from sensorgen.measure.log.entries import Reading
 from sensorgen.measure.signal.verdicts import Evidence, verdict
 from sensorgen.prediction import rest_state
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.query import TIP_M, TONES_HZ
 from sensorgen.verification.thesis.checks._columns import FILM_MM
-from sensorgen.verification.thesis.checks._text import table
-from sensorgen.verification.thesis.items import chapter
+from sensorgen.verification.thesis.items import chapter, table
 from sensorgen.verification.thesis.verdicts import ItemPart
 
 _UNITS = {"_pa": "Pa", "_kg_m3": "kg/m3", "_c": "°C", "_percent": "%"}  # by the ending of a quantity
@@ -36,7 +35,7 @@ Printed = dict[str, float]
 @cache
 def _prints() -> list[Reading]:
     """Table D.1."""
-    return readings.thesis()
+    return readings.thesis_readings()
 
 
 def _named(material: str, quantity: str) -> tuple[str, str]:
