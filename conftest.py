@@ -178,15 +178,17 @@ def pytest_terminal_summary(terminalreporter):
             terminalreporter.write_line(row)
 
 
-FIRST = (  # ten seconds and more of work or waiting: a worker that began one of them last would be left alone with it
-    "test_one_answer", "test_docs", "thesis/test_faults", "asprinted/test_pressed", "lab/test_faults",
-    "report/test_browser", "lab/test_kills", "lab/test_live", "lab/test_run", "lab/test_truths",
-    "lab/test_handyscope", "asprinted/test_real", "asprinted/test_compensation", "slicers/test_batch_real",
-    "cli/test_writing", "cli/test_import_command", "cli/test_calibrate_command", "cli/test_characterise_command",
-    "cli/test_optimise_command", "cli/test_invert_command", "cli/test_compress_command", "models/test_press2d",
-    "models/test_press3d", "models/test_press_round", "attacks/test_inputs_fuzz", "test_build", "test_chart",
-    "test_design_chart", "test_calibration", "lab/test_day", "test_fit", "test_new_user", "test_invert",
-    "test_drawing",
+FIRST = (  # longest first, down to ten seconds of work or waiting: a worker that began one last would be left alone
+    "report/test_browser", "test_fit", "lab/test_kills", "cli/test_import_command", "cli/test_predict_command",
+    "asprinted/test_compensation", "lab/test_faults", "lab/test_run", "cli/test_calibrate_command",
+    "cli/test_characterise_command", "asprinted/test_real", "thesis/test_faults", "cli/test_compress_command",
+    "test_invert", "test_compression_error", "cli/test_as_printed", "cli/test_writing", "test_one_answer",
+    "slicers/test_batch_real", "lab/test_live", "report/test_preview", "models/test_press3d",
+    "cli/test_optimise_command", "lab/test_truths", "test_changed_sensor", "cli/test_packs", "models/test_press2d",
+    "test_shape_files", "test_one_verdict", "models/test_press_normal", "test_design_chart", "test_calibration",
+    "report/test_contents", "slicers/test_slicing_real", "test_predict", "slicers/test_windows_real", "test_build",
+    "cli/test_invert_command", "models/test_porous", "test_chart", "asprinted/test_volume", "test_plots",
+    "lab/test_day", "asprinted/test_pressed", "slicers/test_best_tri_real", "test_planned",
 )  # fmt: skip
 
 
@@ -199,3 +201,4 @@ def pytest_collection_modifyitems(items):
 def pytest_collection_finish():
     """Ten thousand tests stay: the garbage collector need not look at them again and again."""
     gc.freeze()
+    gc.set_threshold(10_000, 20, 20)

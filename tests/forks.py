@@ -77,11 +77,11 @@ class Done:
 class Forks:
     """The process that forks; it ends with :meth:`close`."""
 
-    def __init__(self):
+    def __init__(self, env=None):
         own = {"OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "2", "PYTHONDONTWRITEBYTECODE": "1"}
         self.process = subprocess.Popen(
             [sys.executable, "-c", FORKS], stdin=subprocess.PIPE, stdout=subprocess.PIPE, encoding="utf-8",
-            env=os.environ | own,
+            env=os.environ | own | (env or {}),
         )  # fmt: skip
 
     def __call__(self, *words, cwd, before="pass", env=None, **limits):

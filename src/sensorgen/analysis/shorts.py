@@ -80,7 +80,7 @@ class FilmRisk(Pinholes):
     def document(self) -> Iterator[Part]:
         """Table of holes, and the probability with its assumptions."""
         yield from super().document()
-        said = (
+        counted = (
             f"{self.shorted} of {self.prints} prints of this shape and film in the log are shorted or leaking"
             if self.prints else f"no print of this shape and film: from holes and series {SERIES}"
         )  # fmt: skip
@@ -99,7 +99,7 @@ class FilmRisk(Pinholes):
             f"more than {max(every)}"
         )
         yield Facts((
-            ("P(short)", f"{_words(self.posterior)}; {said}"), ("before", _words(self.prior)),
+            ("P(short)", f"{_words(self.posterior)}; {counted}"), ("before", _words(self.prior)),
             (f"series {SERIES}", known), ("assumed", assumed),
         ))  # fmt: skip
 
@@ -126,7 +126,7 @@ def risk(design: Design, source: Source, log: Log | None = None) -> tuple[FilmRi
         The file prints something else, or the design has no film between electrodes.
     """
     here = placed(design, source)
-    found = pinholes(design, here.paths, here.centre_mm)
+    holes = pinholes(design, here.paths, here.centre_mm)
     thin = films(design, beads(design, here.paths, here.centre_mm))
     if not thin:
         raise BadInput(f"{design.name} has no film between electrodes; expected a dielectric from edge to edge")
@@ -134,7 +134,7 @@ def risk(design: Design, source: Source, log: Log | None = None) -> tuple[FilmRi
     shorted, prints = verdicts(log, design) if log else (0, 0)
     other = elsewhere(design.shape, [len(film.lines) for film in thin])
     whole = FilmRisk(
-        **vars(found), holes_low=float(np.min(counts)), holes_high=float(np.max(counts)), shorted=shorted,
+        **vars(holes), holes_low=float(np.min(counts)), holes_high=float(np.max(counts)), shorted=shorted,
         prints=prints, prior=chance(counts, other, 0, 0), posterior=chance(counts, other, shorted, prints),
     )  # fmt: skip
     return whole, picture(design.name, thin)

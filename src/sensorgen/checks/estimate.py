@@ -200,9 +200,9 @@ def _printed(
             aside = scene.size_mm if wide in (cura, cura_gaps) else None
             swollen = _widened(layer, body.name, length * width, made, aside)
             inside = shapely.clip_by_rect(swollen, 0.0, 0.0, length, width)
-            found, others = united(inside), shapely.get_parts(list(regions.values()))
+            region, others = united(inside), shapely.get_parts(list(regions.values()))
             met = np.unique(shapely.STRtree(others).query(inside, predicate="intersects")[1])
-            free = shapely.difference(found, shapely.union_all(others[met])) if met.size else found
+            free = shapely.difference(region, shapely.union_all(others[met])) if met.size else region
             regions[body.name] = cleaned(free)
     return regions
 
@@ -211,12 +211,12 @@ def _widened(
     layer: LayerRegions, body: str, plan_mm2: float, wide: Callable[[float], float], lopsided: Sequence[float] | None
 ) -> Sequence[Region]:
     """The parts of a body in a layer as their walls print them; strips that are ``lopsided``, in a sensor of a size."""
-    found = parts(layer.region(body))
-    if not found or found[0].area > plan_mm2 * (1 - SLIVER_MM):
-        return found
-    bounds = shapely.bounds(found)
+    plan = parts(layer.region(body))
+    if not plan or plan[0].area > plan_mm2 * (1 - SLIVER_MM):
+        return plan
+    bounds = shapely.bounds(plan)
     across = {"y": bounds[:, 2] - bounds[:, 0], "x": bounds[:, 3] - bounds[:, 1]}
-    width = across[layer.along] if layer.along else narrow_mm(found)
+    width = across[layer.along] if layer.along else narrow_mm(plan)
     printed = np.array([wide(w) for w in width.tolist()])
     more = (printed - width)[:, None] / 2
     if layer.along:
@@ -224,9 +224,9 @@ def _widened(
         swollen = bounds + more * sides
         if lopsided:
             # What is lost is lost on the far side of the bed's middle, along y on the front
-            off = bounds[:, ::2].mean(axis=1) - lopsided[0] / 2 if layer.along == "y" else -np.ones(len(found))
+            off = bounds[:, ::2].mean(axis=1) - lopsided[0] / 2 if layer.along == "y" else -np.ones(len(plan))
             swollen += np.minimum(more, 0.0) * np.sign(off)[:, None] * abs(sides)
         swollen = shapely.box(*swollen.T)
     else:
-        swollen = shapely.buffer(found, more[:, 0], join_style="mitre")
+        swollen = shapely.buffer(plan, more[:, 0], join_style="mitre")
     return list(swollen[printed > 0])

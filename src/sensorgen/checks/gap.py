@@ -96,10 +96,10 @@ def _printed(
         by_gap.setdefault(gap, []).append(walls)
     if all(gap is not None and abs(gap - gap_mm) <= TOUCH_MM for gap in by_gap):
         return
-    said = (f"{'nothing' if gap is None else f'{gap:g} mm'} ({', '.join(walls)})" for gap, walls in by_gap.items())
+    gaps = (f"{'nothing' if gap is None else f'{gap:g} mm'} ({', '.join(walls)})" for gap, walls in by_gap.items())
     yield Finding(
         "2-printed-gap", "warning", f"{pair[0].name} / {pair[1].name}",
-        f"electrode gap: {gap_mm:g} mm drawn, as printed {', '.join(said)}",
+        f"electrode gap: {gap_mm:g} mm drawn, as printed {', '.join(gaps)}",
         "widen narrow parts to a line, use thinner layers, or put the faces on layer boundaries",
         max((gap for gap in by_gap if gap is not None), default=None), round(gap_mm, 9), place_mm=place,
     )  # fmt: skip

@@ -47,7 +47,7 @@ def findings(
     slices = Slices(scene, quality)
     layers = estimate.layers(scene, printer, quality, walls, laid)
     printed = volumes.findings(volumes.rows(scene, layers), scene)
-    found = [
+    every = [
         *gap.check(slices, printer, quality, gap_mm),
         *grid.check(scene, slices.layers),
         *widths.check(slices, printer),
@@ -56,13 +56,13 @@ def findings(
         *support.findings(layers, printer.line_mm()),
         *(f for f in printed if f.severity == "error"),  # rules 4 and 5 have its warnings
     ]
-    return sorted(_over_layers(found), key=lambda f: (SEVERITIES.index(f.severity), int(f.rule.partition("-")[0])))
+    return sorted(_over_layers(every), key=lambda f: (SEVERITIES.index(f.severity), int(f.rule.partition("-")[0])))
 
 
-def _over_layers(found: Iterable[Finding]) -> Iterator[Finding]:
+def _over_layers(every: Iterable[Finding]) -> Iterator[Finding]:
     """One finding in layer after layer as one, from the first layer to the last."""
     merged: dict[tuple[str, str, str, str], list[Finding]] = {}
-    for finding in found:
+    for finding in every:
         alike = merged.setdefault((finding.rule, finding.severity, finding.body, finding.message), [])
         before = alike[-1] if alike else None
         if before and before.layer and finding.layer == (before.last_layer or before.layer) + 1:

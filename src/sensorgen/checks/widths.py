@@ -101,12 +101,12 @@ def check(slices: Slices, printer: Printer) -> Iterator[Finding]:
 
 
 def _by_band(
-    bands: Sequence[_Band], body: Body, layer: int, found: Sequence[Stretch], slices: Slices
+    bands: Sequence[_Band], body: Body, layer: int, across: Sequence[Stretch], slices: Slices
 ) -> Iterator[tuple[_Band, list[Stretch]]]:
     """Stretches by band. What vanishes is no error at tips, which taper out within their layer, and in support."""
     limits = pairwise((-inf, *(band.upto_mm + TOUCH_MM for band in bands)))
     for band, (least, most) in zip(bands, limits, strict=True):
-        here = [s for s in found if least < s.width_mm <= most]
+        here = [s for s in across if least < s.width_mm <= most]
         if band.severity == "error" and here:
             tapers = _tapers(here, body, layer, slices)
             if tips := [s for s, ends in zip(here, tapers, strict=True) if ends]:
@@ -132,10 +132,10 @@ def _tapers(here: Sequence[Stretch], body: Body, layer: int, slices: Slices) -> 
     return tips
 
 
-def _findings(rule: str, body: Body, found: Sequence[_Narrow]) -> Iterator[Finding]:
+def _findings(rule: str, body: Body, narrow: Sequence[_Narrow]) -> Iterator[Finding]:
     """One finding for a band in neighbouring layers."""
-    for band in dict.fromkeys(each.band for each in found):
-        numbered = list(enumerate(each for each in found if each.band == band))
+    for band in dict.fromkeys(each.band for each in narrow):
+        numbered = list(enumerate(each for each in narrow if each.band == band))
         for _, group in groupby(numbered, key=lambda pair: pair[1].layer - pair[0]):
             run = [each for _, each in group]
             worst = min(run, key=lambda each: each.stretches[0].width_mm)
@@ -179,10 +179,10 @@ def stretches(region: Region, limit_mm: float, *, gaps: bool = False) -> list[St
     way = (ends - starts)[:, ::-1] * [1.0, -1.0]
     way /= np.hypot(*way.T)[:, None] * (-1.0 if gaps else 1.0)
     tree = shapely.STRtree(shapely.linestrings(np.stack([starts, ends], axis=1)))
-    found: dict[tuple[float, ...], Stretch] = {}
+    by_place: dict[tuple[float, ...], Stretch] = {}
     has_corners = not boxes.all() and is_rectilinear(region)
     for share in (0.5, 1e-6, 1 - 1e-6) if has_corners else (0.5,):
-        known = {stretch.width_mm for stretch in found.values()}
+        known = {stretch.width_mm for stretch in by_place.values()}
         widths = _across(tree, starts + share * (ends - starts), way, limit_mm)
         met = np.flatnonzero(np.isfinite(widths))
         middles = (starts[met] + share * (ends - starts)[met] + way[met] * widths[met, None] / 2).round(9)
@@ -190,8 +190,8 @@ def stretches(region: Region, limit_mm: float, *, gaps: bool = False) -> list[St
             widths[met].tolist(), way[met].tolist(), middles.tolist(), middles.round(6).tolist(), strict=True
         ):
             if share == 0.5 or width not in known:
-                found.setdefault((width, *at), Stretch(width, (x, y), tuple(out)))
-    return sorted(found.values(), key=lambda s: (s.width_mm, abs(s.way[1]), s.middle_mm))
+                by_place.setdefault((width, *at), Stretch(width, (x, y), tuple(out)))
+    return sorted(by_place.values(), key=lambda s: (s.width_mm, abs(s.way[1]), s.middle_mm))
 
 
 def _across(

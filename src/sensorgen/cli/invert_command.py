@@ -195,8 +195,8 @@ def _of_design(
         return task.run((_REST,), lambda source: _Perfect(task, printed, query, source))
 
     def inverter(rest: Any, tones_hz: Any, noise: Any) -> _Made:
-        from sensorgen.analysis.calibration import Bench, spread_of
         from sensorgen.prediction.calibration import fitting
+        from sensorgen.prediction.calibration.bench import Bench, spread_of
         from sensorgen.prediction.calibration.inversion import Inverter
         from sensorgen.prediction.calibration.specimen import SpecimenModel
         from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N

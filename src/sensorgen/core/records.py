@@ -55,6 +55,11 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
+def stated(default: Any, about: str, **more: Any) -> Any:
+    """Field of a record with a default and a description."""
+    return Field(default=default, description=about, **more)
+
+
 _Record = TypeVar("_Record", bound=Strict)
 
 

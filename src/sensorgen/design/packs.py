@@ -350,13 +350,13 @@ def with_files(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     if not isinstance(given, dict) or not all(isinstance(texts, dict) for texts in given.values()):
         return data
     texts: dict[Kind, dict[str, Any]] = {kind: dict(given.get(kind, {})) for kind in SINGULAR}
-    made = dict(data)
-    made.update(_shape_and_machine(data, texts, folder))
-    made.update(_cell(data, texts, folder))
+    complete = dict(data)
+    complete.update(_shape_and_machine(data, texts, folder))
+    complete.update(_cell(data, texts, folder))
     if isinstance(data.get("materials"), dict):
-        made["materials"] = {part: _slot(word, texts, folder) for part, word in slots(data["materials"]).items()}
+        complete["materials"] = {part: _slot(word, texts, folder) for part, word in slots(data["materials"]).items()}
     if isinstance(data.get("bodies"), dict):
-        made["bodies"] = {
+        complete["bodies"] = {
             name: body | {"material": _slot(body.get("material"), texts, folder)} if isinstance(body, dict) else body
             for name, body in data["bodies"].items()
         }
@@ -364,7 +364,7 @@ def with_files(data: dict[str, Any], folder: Path) -> dict[str, Any]:
         if isinstance(name, str) and is_name("materials", name) and name not in shipped_names("materials"):
             _add(texts, "materials", name, folder)
     used = {kind: dict(sorted(content.items())) for kind, content in texts.items() if content}
-    return made | ({"own": given | used} if used or "own" in data else {})
+    return complete | ({"own": given | used} if used or "own" in data else {})
 
 
 def slots(materials: Mapping[str, Any]) -> dict[str, Any]:

@@ -97,18 +97,18 @@ def varies(name: str, text: str, fill: Mapping[str, str]) -> bool:
     BadInput
         The file is no shape.
     """
-    made = []
+    replies = []
     for _ in range(2):
         process = _ShapeProcess(name, text)
         try:
             defaults = {str(field["name"]): field["default"] for field in process.about["fields"]}
             question = {"parameters": defaults, "fill": fill}
-            made += [process.ask(question), process.ask(question)]
+            replies += [process.ask(question), process.ask(question)]
         except (KeyError, TypeError):
             return False  # no parameters: what reads the file says so
         finally:
             process.close()
-    return any(each != made[0] for each in made)
+    return any(each != replies[0] for each in replies)
 
 
 def is_trusted(text: str) -> bool:
@@ -121,14 +121,14 @@ def is_trusted(text: str) -> bool:
 
 def trust(name: str, text: str) -> Path:
     """Let a shape's file with this content run, confined; path of the list of such files."""
-    path, kept = packs.place() / TRUSTED, ""
+    path, trusted = packs.place() / TRUSTED, ""
     if is_trusted(text):
         return path
     with suppress(OSError, UnicodeDecodeError):
-        kept = path.read_text("utf-8")
+        trusted = path.read_text("utf-8")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        files.replace(path, f"{kept}{digest(text)} {name}\n".encode())
+        files.replace(path, f"{trusted}{digest(text)} {name}\n".encode())
     except OSError as error:
         raise Unwritable(f"cannot write {str(path)!r}: {error.strerror or error}") from None
     return path
@@ -211,11 +211,11 @@ def _adapter() -> "TypeAdapter[_ReadScene]":
 
 def _decoded(data: object) -> Scene:
     """A scene of plain data; raises ValidationError."""
-    found = _adapter().validate_python(data)
+    scene = _adapter().validate_python(data)
     bodies = (
-        Body(**{field.name: getattr(body, field.name) for field in dataclasses.fields(Body)}) for body in found.bodies
+        Body(**{field.name: getattr(body, field.name) for field in dataclasses.fields(Body)}) for body in scene.bodies
     )
-    return Scene(tuple(bodies), found.size_mm, found.repeats)
+    return Scene(tuple(bodies), scene.size_mm, scene.repeats)
 
 
 def _fields(name: str, reply: Mapping[str, Any]) -> list[tuple[str, type, Any]]:
@@ -365,8 +365,8 @@ def _process(name: str, text: str) -> _ShapeProcess:
             import atexit
 
             atexit.register(close)
-        made = _ShapeProcess(name, text)
-        _RUNNING[key] = made
+        process = _ShapeProcess(name, text)
+        _RUNNING[key] = process
     return _RUNNING[key]
 
 

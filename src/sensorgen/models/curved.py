@@ -78,10 +78,10 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     )
     reached = False
     try:
-        for level, elements, found in bounds(plan, width):
-            interval = fem.whole(found, shares.ravel().tolist())
+        for level, elements, energies in bounds(plan, width):
+            interval = fem.whole(energies, shares.ravel().tolist())
             reached = True
-            yield fem.FieldStep(level.order, elements, found.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
+            yield fem.FieldStep(level.order, elements, energies.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
             if interval.width() <= width:
                 return
     except fem.Unsolved:

@@ -117,11 +117,11 @@ def narrowed(
         pair = Pair.of(fine, values, mesh.order, mesh.flux_order)
         if mesh != MESHES[0] and pair.unknowns() > _MOST_UNKNOWNS:
             return
-        found = bounds(pair)
-        yield mesh, pair, found
-        if found.width() <= width:
+        bound = bounds(pair)
+        yield mesh, pair, bound
+        if bound.width() <= width:
             return
-        enough = [finer for finer in left if found.width() * finer.width <= width * mesh.width]
+        enough = [finer for finer in left if bound.width() * finer.width <= width * mesh.width]
         left = enough or left[-1:]
 
 
@@ -176,5 +176,5 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
         fields = Fields(lower, upper, part, size, pair.apart(u, level, rho), pair.unknowns())
         return disc(fields, turn, pair.flux.shares.tolist())
 
-    found = min((cell for *_, cell in narrowed(bounds, coarse, values, width)), key=Disc.width)
-    return found.times(EPS0_F_PER_M * M_PER_MM)
+    best = min((cell for *_, cell in narrowed(bounds, coarse, values, width)), key=Disc.width)
+    return best.times(EPS0_F_PER_M * M_PER_MM)

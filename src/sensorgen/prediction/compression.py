@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
 from math import inf, isfinite, nan
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +40,7 @@ from sensorgen.prediction.mesh_ladder import (
 )
 from sensorgen.prediction.plan import Level, Plan, PlanCandidate, cheapest, run_until_within
 from sensorgen.prediction.sensor_model import piece as piece_of
-from sensorgen.prediction.sweep import Sweep
-from sensorgen.prediction.sweep import sweep as swept
+from sensorgen.prediction.sweep import Sweeper
 
 
 @dataclass(frozen=True)
@@ -73,13 +71,13 @@ def _springs(design: Design, piece: PressedPiece, stress_pa: Sequence[float]) ->
     solids = elastic(design, scene)
     moduli = {n: s.youngs_modulus_pa / (1.0 if why else 1 - s.poisson_ratio**2) for n, s in solids.items()}
     boxes = all(p.is_box() for body in scene.bodies for p in body.pieces)
-    said = (
+    meaning = (
         "at most this, at small strain under a stiff plate"
         if boxes
         else "an estimate: columns without their neighbours"
     )
     doubts = (
-        f"displacement: {said}", "no capacitance under stress: springs have no outlines", *([why] if why else [])
+        f"displacement: {meaning}", "no capacitance under stress: springs have no outlines", *([why] if why else [])
     )  # fmt: skip
     return ClosedForm(springs.displacement_m(scene, moduli, stress_pa), {"top": "rigid"}, doubts)
 
@@ -278,8 +276,8 @@ class CompressionResult(Displayed):
             self.stress_kpa, self.displacement_um, self.displacement_error_um, self.rise_f_per_m2,
             self.rise_error_f_per_m2, self.lower_f_per_m2, self.upper_f_per_m2, *under.values(), strict=True,
         )  # fmt: skip
-        said = self.reason or "; ".join(self.faults)
-        more = self.converged_kpa, self.largest_rise_error, self.model, self.reached, said
+        reason = self.reason or "; ".join(self.faults)
+        more = self.converged_kpa, self.largest_rise_error, self.model, self.reached, reason
         rows = curve if self.model else [(None,) * 9]
         return Table("compression", "", (*COLUMNS, *columns, *HIDDEN), tuple((*row, *more) for row in rows))
 
@@ -348,36 +346,22 @@ def answer(body: Body, asked: PressQuestion, *, step: Step | None = None) -> Com
         if model in CLOSED_FORMS:
             return _closed_form(body, asked, model)
         case = _case(body, asked)
-        found = _estimated(case, asked, USUAL, step)
+        estimate = _estimated(case, asked, USUAL, step)
         if asked.check_mesh:
             finer = _estimated(case, asked, USUAL + 1, step)
-            found = replace(finer, found=press2d.compared(found.found, finer.found))
-        return _result(body, case, found, asked)
+            estimate = replace(finer, found=press2d.compared(estimate.found, finer.found))
+        return _result(body, case, estimate, asked)
     except NotInstalled as error:
         if asked.model:
             raise
         return _unsolved(body, asked, str(error))
 
 
-def sweep(
-    key: str | tuple[str, ...],
-    points: Sequence[tuple[Any, Body]],
-    asked: PressQuestion,
-    jobs: int,
-    done: Callable[[], None],
-    cluster: str = "",
-) -> Sweep[CompressionResult]:
-    """Answers along a sweep; a reason stands in place of a point that has no answer.
-
-    Parameters and errors as of :func:`answer` and :func:`sensorgen.prediction.sweep.sweep`.
-    """
-    alone = (BadInput, MissingValue, OutOfRange, Unpredictable)
-    work = partial(answer, asked=asked)
-    return swept(key, points, work, _failed, refused=alone, keep=asked.keep, jobs=jobs, cluster=cluster, done=done)
-
-
 def _failed(body: Body, reason: str) -> CompressionResult:
     return CompressionResult(design=body.design.name, body=body.provenance, reason=reason)
+
+
+sweep = Sweeper(answer, _failed, refused=(BadInput, MissingValue, OutOfRange, Unpredictable))
 
 
 def planned(body: Body, asked: PressQuestion) -> Plan:
@@ -394,17 +378,22 @@ def planned(body: Body, asked: PressQuestion) -> Plan:
     if model in CLOSED_FORMS:
         why = f"--model {model}" if asked.model else why_not_applicable(piece, MODELS[0])
         raise BadInput(f"an accuracy of C, and {why}: {model} tells {_NO_C}; leave out --accuracy")
-    candidates = []
-    for name in ALL:
-        if name != model:
-            without_c = _NO_C if name in CLOSED_FORMS else ""
-            unfit = without_c or why_not_applicable(piece, name) or "the model before it applies to the cell"
-            candidates.append(PlanCandidate(name, passed_over=f"--model {model}" if asked.model else unfit))
+    passed_over = [
+        PlanCandidate(name, passed_over=f"--model {model}" if asked.model else _unfit(piece, name))
+        for name in ALL if name != model
+    ]  # fmt: skip
     meshes = _mesh_levels(piece, model, asked)
-    candidates += [PlanCandidate(mesh.name, max(mesh.rise_error, VERIFIED), mesh.seconds) for mesh in meshes]
-    chosen = cheapest(tuple(candidates), asked.accuracy)
-    level = Level("compression", _MEASURE, asked.accuracy, tuple(candidates), chosen)
+    reach = [PlanCandidate(mesh.name, max(mesh.rise_error, VERIFIED), mesh.seconds) for mesh in meshes]
+    candidates = (*passed_over, *reach)
+    level = Level("compression", _MEASURE, asked.accuracy, candidates, cheapest(candidates, asked.accuracy))
     return Plan(asked.accuracy, f"the rise of C up to {asked.stress_kpa[-1]:g} kPa", (level,))
+
+
+def _unfit(piece: PressedPiece, name: str) -> str:
+    """Why a model is not the one of a piece whose capacitance is to reach an accuracy."""
+    if name in CLOSED_FORMS:
+        return _NO_C
+    return why_not_applicable(piece, name) or "the model before it applies to the cell"
 
 
 def _model(body: Body, asked: PressQuestion) -> str:
@@ -425,18 +414,18 @@ def _within(body: Body, asked: PressQuestion, step: Step | None) -> CompressionR
         mesh.name: partial(_estimated, case, asked, mesh.level, step)
         for mesh in _mesh_levels(case.piece, case.model, asked)
     }
-    found, level = run_until_within(plan.levels[0], find, _rise_error)
+    estimate, level = run_until_within(plan.levels[0], find, _rise_error)
     return replace(
-        _result(body, case, found, asked),
+        _result(body, case, estimate, asked),
         accuracy=asked.accuracy,
-        reached=_rise_error(found) <= asked.accuracy,
+        reached=_rise_error(estimate) <= asked.accuracy,
         plan=replace(plan, levels=(level,)),
     )
 
 
-def _rise_error(found: Estimate) -> float:
+def _rise_error(estimate: Estimate) -> float:
     """Largest relative error of the rise; infinite where the solution is not to be trusted [-]."""
-    return inf if found.found.faults else found.relative()[1]
+    return inf if estimate.found.faults else estimate.relative()[1]
 
 
 def _case(body: Body, asked: PressQuestion) -> Case:
@@ -465,32 +454,38 @@ def _result(body: Body, case: Case, estimate: Estimate, asked: PressQuestion) ->
     """
     from sensorgen.solvers.contact.cell import BLOCK
 
-    found, first, tip = estimate.found, estimate.found.capacitance_f_per_m2[0], asked.tip or body.design.tip.tip()
-    try:
-        rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
-    except Unpredictable:
-        rest = None
-    known, factor = first, 1.0
-    if first and rest and rest.lower_f_per_m2 is not None and rest.upper_f_per_m2 is not None:
-        known = Interval(rest.lower_f_per_m2, rest.upper_f_per_m2)
-        apart = known.upper < first.lower or first.upper < known.lower
-        factor = known.middle() / first.middle() if apart else 1.0
+    solution, tip = estimate.found, asked.tip or body.design.tip.tip()
+    rest, factor = _known_at_rest(body, asked, solution.capacitance_f_per_m2[0])
     rise, off = factor * estimate.rise_f_per_m2, factor * estimate.rise_error_f_per_m2
-    lower, upper = (rise - off + known.lower, rise + off + known.upper) if known else (nan + rise, nan + rise)
-    down, up = estimate.relative() if not found.faults else (inf, inf)
+    lower, upper = (rise - off + rest.lower, rise + off + rest.upper) if rest else (nan + rise, nan + rise)
+    errors = (inf, inf) if solution.faults else estimate.relative()
+    displacement_error, rise_error = (error if error < inf else None for error in errors)
     return CompressionResult(
         design=body.design.name, body=body.provenance, model=case.model,
         held=vars(case.boundary) | ({"top": tip.material} if BLOCK in case.solids else {}),
-        stress_kpa=tuple(p / _PA_PER_KPA for p in found.stress_pa.tolist()),
-        displacement_um=tuple(d * _UM_PER_M for d in found.displacement_m.tolist()),
+        stress_kpa=tuple(p / _PA_PER_KPA for p in solution.stress_pa.tolist()),
+        displacement_um=tuple(d * _UM_PER_M for d in solution.displacement_m.tolist()),
         displacement_error_um=_known(_UM_PER_M * estimate.displacement_error_m),
         rise_f_per_m2=_known(rise), rise_error_f_per_m2=_known(off),
         lower_f_per_m2=_known(lower), upper_f_per_m2=_known(upper),
-        converged_kpa=found.converged_pa / _PA_PER_KPA, faults=found.faults, bounds=_OF_BOTH,
-        doubts=(*found.doubts, *_assumed(body.design)),
-        largest_rise_error=up if up < inf else None, largest_displacement_error=down if down < inf else None,
+        converged_kpa=solution.converged_pa / _PA_PER_KPA, faults=solution.faults, bounds=_OF_BOTH,
+        doubts=(*solution.doubts, *_assumed(body.design)),
+        largest_rise_error=rise_error, largest_displacement_error=displacement_error,
         tops=dict(_under_tops(body, case, estimate, tip)),
     )  # fmt: skip
+
+
+def _known_at_rest(body: Body, asked: PressQuestion, first: Interval | None) -> tuple[Interval | None, float]:
+    """Capacitance at rest per area, and its ratio to the ``first`` of a pressed period: 1 where both may be equal."""
+    try:
+        rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
+    except Unpredictable:
+        return first, 1.0
+    if not first or rest.lower_f_per_m2 is None or rest.upper_f_per_m2 is None:
+        return first, 1.0
+    known = Interval(rest.lower_f_per_m2, rest.upper_f_per_m2)
+    apart = known.upper < first.lower or first.upper < known.lower
+    return known, known.middle() / first.middle() if apart else 1.0
 
 
 def _under_tops(
@@ -499,12 +494,12 @@ def _under_tops(
     """Rise of C under an even pressure and a stiff plate, where it differs by more than the error."""
     try:
         own = curve_of(estimate.found)
-        found = under_tops(body.design, piece_of(body), case.model, tip, own, case.boundary)
+        laws = under_tops(body.design, piece_of(body), case.model, tip, own, case.boundary)
     except SensorgenError:
         return
     stress, at_rest = estimate.found.stress_pa, estimate.found.capacitance_f_per_m2[0]
     at_rest_f_per_m2 = at_rest.middle() if at_rest else nan
-    for name, law in found.items():
+    for name, law in laws.items():
         strain = law.capacitive_strain(stress)[0]
         rise = np.where(stress <= law.stress_pa[-1], at_rest_f_per_m2 * strain / (1 - strain), nan)
         if name != tip.block and (abs(rise - estimate.rise_f_per_m2) > estimate.rise_error_f_per_m2).any():
@@ -524,51 +519,51 @@ def _known(values: Real) -> tuple[float | None, ...]:
 
 def _closed_form(body: Body, asked: PressQuestion, model: str) -> CompressionResult:
     """Displacement, and of a plate or infill the capacitance, by a law that solves no field."""
-    found = CLOSED_FORMS[model](body.design, piece_of(body), [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
+    estimate = CLOSED_FORMS[model](body.design, piece_of(body), [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
     unknown = np.full(len(asked.stress_kpa), nan)
     rise = off = lower = upper = unknown
-    if found.rises:
+    if estimate.rises:
         rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
         ends = rest.lower_f_per_m2 or nan, rest.upper_f_per_m2 or nan
-        rises = np.array(found.rises)
+        rises = np.array(estimate.rises)
         rise, off = sum(ends) / 2 * rises[0], sum(ends) / 2 * abs(rises - rises[0]).max(0)
         lower, upper = ends[0] * (1 + rises.min(0)), ends[1] * (1 + rises.max(0))
     return CompressionResult(
-        design=body.design.name, body=body.provenance, model=model, held=found.boundary, stress_kpa=asked.stress_kpa,
-        displacement_um=tuple((found.displacement_m * _UM_PER_M).tolist()), displacement_error_um=_known(unknown),
+        design=body.design.name, body=body.provenance, model=model, held=estimate.boundary, stress_kpa=asked.stress_kpa,
+        displacement_um=tuple((estimate.displacement_m * _UM_PER_M).tolist()), displacement_error_um=_known(unknown),
         rise_f_per_m2=_known(rise), rise_error_f_per_m2=_known(off), lower_f_per_m2=_known(lower),
         upper_f_per_m2=_known(upper), converged_kpa=asked.stress_kpa[-1],
-        doubts=(*found.doubts, *_assumed(body.design)),
-        bounds="of the capacitance, by the law between its bounds" if found.rises else "none",
+        doubts=(*estimate.doubts, *_assumed(body.design)),
+        bounds="of the capacitance, by the law between its bounds" if estimate.rises else "none",
     )  # fmt: skip
 
 
 def _unsolved(body: Body, asked: PressQuestion, why: str) -> CompressionResult:
     """Without the library for fields: a closed-form estimate, the capacitance at rest, and no accuracy."""
-    found = _closed_form(body, asked, FIRST)
+    result = _closed_form(body, asked, FIRST)
     rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
     unknown = (None,) * (len(asked.stress_kpa) - 1)
-    found = replace(
-        found, doubts=(*found.doubts, f"not solved: {why}"), lower_f_per_m2=(rest.lower_f_per_m2, *unknown),
+    result = replace(
+        result, doubts=(*result.doubts, f"not solved: {why}"), lower_f_per_m2=(rest.lower_f_per_m2, *unknown),
         upper_f_per_m2=(rest.upper_f_per_m2, *unknown),
         bounds=f"of the capacitance at rest, by {rest.model}; none under stress",
     )  # fmt: skip
     if asked.accuracy == inf:
-        return found
+        return result
     plan = planned(body, asked)
     (level,) = plan.levels
     candidates = tuple(replace(c, passed_over=c.passed_over or why) for c in level.candidates)
     plan = replace(plan, levels=(replace(level, chosen="", candidates=candidates),))
-    return replace(found, accuracy=asked.accuracy, reached=False, plan=plan)
+    return replace(result, accuracy=asked.accuracy, reached=False, plan=plan)
 
 
-def stresses_kpa(found: Sequence[float]) -> tuple[float, ...]:
+def stresses_kpa(given_kpa: Sequence[float]) -> tuple[float, ...]:
     """Stresses with 0 before them where it is not the first [kPa].
 
     >>> stresses_kpa((50.0, 100.0)), stresses_kpa((0.0, 10.0))
     ((0.0, 50.0, 100.0), (0.0, 10.0))
     """
-    whole = tuple(found) if found[0] == 0 else (0.0, *found)
+    whole = tuple(given_kpa) if given_kpa[0] == 0 else (0.0, *given_kpa)
     if len(whole) < 2:
         raise OutOfRange("--stress 0: expected a stress above 0, as in 0:100:10")
     return whole

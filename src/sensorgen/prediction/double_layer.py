@@ -66,16 +66,16 @@ def stacked(
     SensorgenError
         As :func:`sensorgen.prediction.planning.sensor_model`.
     """
-    found = [sensor_model(body(half), Query(tip=Tip(tip_m), law=law))[0] for half in halves(design)]
-    lower, upper = found[0], found[-1]
+    models = [sensor_model(body(half), Query(tip=Tip(tip_m), law=law))[0] for half in halves(design)]
+    lower, upper = models[0], models[-1]
     double = stack_of([lower.sensor, upper.sensor])
-    own = double if len(found) > 1 else stack_of([lower.sensor])
+    own = double if len(models) > 1 else stack_of([lower.sensor])
     material, source = design.slot("isolation")
-    taken = {value for half in found for value in half.values}
+    taken = {value for half in models for value in half.values}
     return Stacked(
         own, double, tip_m, material_value(material, source, "relative_permittivity").value,
         tuple(sorted(taken, key=lambda value: tuple(vars(value).values()))),
-        tuple(dict.fromkeys(doubt for half in found for doubt in half.doubts)),
+        tuple(dict.fromkeys(doubt for half in models for doubt in half.doubts)),
     )  # fmt: skip
 
 
@@ -124,16 +124,16 @@ def stack_of(sensors: Sequence[Sensor]) -> Stack:
     return Stack(first.length_m, first.width_m, tracks, tuple(films))
 
 
-def press_at(found: Stacked, force_n: float, position_m: float | None) -> Press:
+def press_at(stacks: Stacked, force_n: float, position_m: float | None) -> Press:
     """The tip centred at a position, or in the middle; raises OutOfRange where it overhangs the sensor's end."""
-    centre = found.own.length_m / 2 if position_m is None else position_m
-    left = centre - found.tip_m / 2
-    if not -1e-12 <= left <= found.own.length_m - found.tip_m + 1e-12:
+    centre = stacks.own.length_m / 2 if position_m is None else position_m
+    left = centre - stacks.tip_m / 2
+    if not -1e-12 <= left <= stacks.own.length_m - stacks.tip_m + 1e-12:
         raise OutOfRange(
-            f"a tip of {found.tip_m / M_PER_MM:g} mm at {centre / M_PER_MM:g} mm overhangs the sensor of "
-            f"{found.own.length_m / M_PER_MM:g} mm: move it inwards"
+            f"a tip of {stacks.tip_m / M_PER_MM:g} mm at {centre / M_PER_MM:g} mm overhangs the sensor of "
+            f"{stacks.own.length_m / M_PER_MM:g} mm: move it inwards"
         )
-    return Press(force_n, max(left, 0.0), found.tip_m)
+    return Press(force_n, max(left, 0.0), stacks.tip_m)
 
 
 _ROUNDING = 1e-12  # relative difference of two slopes below which it is rounding
@@ -172,10 +172,10 @@ def bounds(stack: Stack, frequency_hz: Real, press: Press, noise: float, drift: 
     drift : float
         Standard deviation of the drift of permittivity, the same in both films, relative [-].
     """
-    found = stack.response(frequency_hz, press)
+    response = stack.response(frequency_hz, press)
     upper, lower = port(2, 1, 2), port(1, 0, 2)
-    size_upper, size_lower = (noise * np.abs(found.impedance_ohm @ p @ p) for p in (upper, lower))
-    slopes = _slopes(found)
+    size_upper, size_lower = (noise * np.abs(response.impedance_ohm @ p @ p) for p in (upper, lower))
+    slopes = _slopes(response)
     by_upper, by_lower = slopes @ upper @ upper, slopes @ lower @ lower
     apart = by_upper - by_lower
     apart[np.abs(apart) < _ROUNDING * (np.abs(by_upper) + np.abs(by_lower))] = 0.0
@@ -193,8 +193,8 @@ def bounds(stack: Stack, frequency_hz: Real, press: Press, noise: float, drift: 
 def _alone(stack: Stack, which: int, frequency_hz: Real, press: Press, noise: float) -> tuple[Complex, Real]:
     """Slopes and noise of one film between its two tracks, without the other film."""
     tracks, films = stack.tracks[which : which + 2], stack.films[which : which + 1]
-    found = Stack(stack.length_m, stack.width_m, tracks, films).response(frequency_hz, press)
-    return _slopes(found)[..., 0, 0], noise * np.abs(found.impedance_ohm[..., 0, 0])
+    response = Stack(stack.length_m, stack.width_m, tracks, films).response(frequency_hz, press)
+    return _slopes(response)[..., 0, 0], noise * np.abs(response.impedance_ohm[..., 0, 0])
 
 
 def _slopes(response: StackResponse) -> Complex:
@@ -480,17 +480,17 @@ def study(
     SensorgenError
         As :func:`stacked` and :func:`press_at`.
     """
-    found = stacked(design, law, tip_m)
-    press, frequency = press_at(found, force_n, position_m), np.asarray(frequency_hz, float)
-    z = found.double.impedance(frequency, press)
-    touching = Touching(found.own, found.isolation_eps_r, frequency, press, noise, GroundTie())
+    stacks = stacked(design, law, tip_m)
+    press, frequency = press_at(stacks, force_n, position_m), np.asarray(frequency_hz, float)
+    z = stacks.double.impedance(frequency, press)
+    touching = Touching(stacks.own, stacks.isolation_eps_r, frequency, press, noise, GroundTie())
     return StackStudy(
         force_n, float(np.asarray(press.left_m)) + tip_m / 2, noise, drift, within_n,
         tuple(
             FilmReadings(float(f), *(float(part) for k in (0, 1) for part in (m[k, k].real, m[k, k].imag)))
             for f, m in zip(frequency, z, strict=True)
         ),
-        bounds(found.double, frequency, press, noise, drift), touching.press_shift(),
+        bounds(stacks.double, frequency, press, noise, drift), touching.press_shift(),
         tuple(touching.result(wiring, within_n, design.params.isolation_mm) for wiring in WIRINGS),
-        found.taken, found.doubts,
+        stacks.taken, stacks.doubts,
     )  # fmt: skip

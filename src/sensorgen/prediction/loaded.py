@@ -3,9 +3,9 @@
 import json
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -25,8 +25,7 @@ from sensorgen.prediction.planning import rough_sensor, sensor_model
 from sensorgen.prediction.query import Load, Query
 from sensorgen.prediction.results import Prediction, timeless
 from sensorgen.prediction.sensor_model import SensorModel
-from sensorgen.prediction.sweep import Sweep
-from sensorgen.prediction.sweep import sweep as swept
+from sensorgen.prediction.sweep import Sweeper
 
 LARGEST = 2_000_000  # impedances that are kept in memory at once
 ROWS = 4096  # of CSV at a time
@@ -66,17 +65,17 @@ class ImpedanceGrid:
             Per frequency: over force at the middle position, over position at the largest force [-]; None along an
             axis of one value.
         """
-        found = []
+        changes = []
         for z in self.impedance_ohm:
             deviation, middle = noise * np.abs(z).max(), z.shape[1] // 2
-            found.append(
+            changes.append(
                 {
                     f"{name}_by_{axis}": float(np.ptp(part) / deviation) if len(part) > 1 else None
                     for name, values in (("re", z.real), ("im", z.imag))
                     for axis, part in (("force", values[:, middle]), ("position", values[-1]))
                 }
             )
-        return found
+        return changes
 
 
 def impedance_grid(
@@ -130,8 +129,8 @@ def grid(sensor: Sensor, frequency_hz: ArrayLike, force_n: ArrayLike, position_m
     check_presses(sensor, force, at)
     ends = [0, *(np.flatnonzero(np.diff(sensor.whole(at))) + 1).tolist(), at.size]
     runs = [at[start:end] for start, end in pairwise(ends)]  # tips that lie whole on the sensor all press alike
-    found = [sensor.impedance(f[:, None, None], force[:, None], run) for run in runs]
-    return found[0] if len(found) == 1 else np.concatenate(found, axis=-1)
+    blocks = [sensor.impedance(f[:, None, None], force[:, None], run) for run in runs]
+    return blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=-1)
 
 
 def check_presses(sensor: Sensor, force_n: ArrayLike, position_m: ArrayLike) -> None:
@@ -255,18 +254,18 @@ class PredictedPoint:
         return Table("predictions", "", (*columns, Column("status"), Column("source")), (tuple(self._cells()),))
 
     def _cells(self) -> Iterator[Cell]:
-        found = self.prediction
-        if found is None:
+        prediction = self.prediction
+        if prediction is None:
             yield from (*[None] * 3 * len(_SHOWN), "not predicted", "")
             return
-        values = (found.capacitance, found.sensitivity, *found.bench())
-        for (_, _, size), bounds, words in zip(_SHOWN, values, ("", "", *found.resolved()), strict=True):
+        values = (prediction.capacitance, prediction.sensitivity, *prediction.bench())
+        for (_, _, size), bounds, words in zip(_SHOWN, values, ("", "", *prediction.resolved()), strict=True):
             if bounds is None:
                 yield from (None, None, None)
                 continue
             yield words if words in (CANNOT_SENSE, CANNOT_LOCATE) else bounds.value / size
             yield from (bounds.lower / size, bounds.upper / size)
-        yield from (found.status, self.source)
+        yield from (prediction.status, self.source)
 
     def remarks(self) -> Sequence[str]:
         """Source, and what is doubtful."""
@@ -279,26 +278,20 @@ class PredictedPoint:
         return [self.reason] if self.reason else self.prediction.problems(self.accuracy) if self.prediction else ()
 
 
-def sweep(
-    key: str | tuple[str, ...],
-    points: Sequence[tuple[Any, Body]],
-    query: Query,
-    jobs: int,
-    done: Callable[[], None],
-    cluster: str = "",
-) -> Sweep[PredictedPoint]:
-    """A prediction for each body; parameters and errors as of :func:`sensorgen.prediction.sweep.sweep`."""
-    work = partial(_point, query=query)
-    return swept(
-        key, points, work, lambda body, reason: PredictedPoint(body.design.name, reason), refused=(SensorgenError,),
-        jobs=jobs, cluster=cluster, done=done,
-    )  # fmt: skip
+def _point(body: Body, asked: Query) -> PredictedPoint:
+    prediction = timeless(evaluate(body, asked))
+    reason = prediction.reason if prediction.capacitance is None else ""
+    return PredictedPoint(prediction.design, reason, prediction, asked.accuracy)
 
 
-def _point(body: Body, query: Query) -> PredictedPoint:
-    found = timeless(evaluate(body, query))
-    return PredictedPoint(found.design, found.reason if found.capacitance is None else "", found, query.accuracy)
+def _unpredicted(body: Body, reason: str) -> PredictedPoint:
+    return PredictedPoint(body.design.name, reason)
 
+
+sweep = Sweeper(_point, _unpredicted, refused=(SensorgenError,))
+
+
+_FREQUENCY = Column("frequency", "Hz", si=True)
 
 Axes = tuple[Sequence[float], Sequence[float], Sequence[float]]  # frequency [Hz], force [N], position [mm]
 
@@ -342,7 +335,7 @@ class Loaded(Displayed):
 
     def document(self) -> Iterator[Part]:
         """Ranges of R and X, how much they change, corners at the last frequency, and the judgement of a reading."""
-        (frequency_hz, force, at), sensor = self.axes, self.model.sensor
+        (_, force, at), sensor = self.axes, self.model.sensor
         touches = float(sensor.contact_m(force[-1])[0])
         grown = f", contact {touches / M_PER_MM:.3g} mm at {force[-1]:g} N" if touches < sensor.tip_m else ""
         spread = "" if sensor.profile == "uniform" else f" ({sensor.profile}{grown})"
@@ -351,35 +344,46 @@ class Loaded(Displayed):
         yield f"tip {sensor.tip_m / M_PER_MM:g} mm{spread}, compression {sensor.compression.name}"
         yield from (f"doubtful: {doubt}" for doubt in self.doubts)
         yield ""
-        z, frequency = self.impedance, Column("frequency", "Hz", si=True)
-        heads = ("R, least", "R, most", "X, least", "X, most")
-        ends = (
-            (f, row.real.min(), row.real.max(), row.imag.min(), row.imag.max())
-            for f, row in zip(frequency_hz, z.impedance_ohm, strict=True)
-        )
-        yield Table("ends", "R and X [ohm]", (frequency, *(Column(h, digits=6) for h in heads)), tuple(ends))
+        yield self._ends()
         if len(force) > 1 or len(at) > 1:
             yield ""
-            caption = (
-                f"change of R and X in standard deviations of one reading, {self.noise:.2g} of |Z|: over force at "
-                f"{at[len(at) // 2]:g} mm, over position at {force[-1]:g} N"
-            )
-            names = ("R by force", "R by position", "X by force", "X by position")
-            changes = tuple(
-                (f, *change.values()) for f, change in zip(frequency_hz, z.changes(self.noise), strict=True)
-            )
-            yield Table("changes", caption, (frequency, *(Column(n, digits=3) for n in names)), changes)
+            yield self._changes()
         yield ""
-        places = _ends_and_middle(at)
-        columns = [Column(f"{part}, {at[k]:g} mm", digits=7) for k in places for part in "RX"]
-        corners = (
-            (force[j], *(part for k in places for part in (last[j][k].real, last[j][k].imag)))
-            for last in z.impedance_ohm[-1:] for j in _ends_and_middle(force)
-        )  # fmt: skip
-        caption = f"R and X [ohm] at {si(frequency_hz[-1], 'Hz')}"
-        yield Table("corners", caption, (Column("force", "N", si=True), *columns), tuple(corners))
+        yield self._corners()
         yield ""
         yield from self.prediction.judgement()
+
+    def _ends(self) -> Table:
+        """Least and largest R and X of each frequency."""
+        columns = (_FREQUENCY, *(Column(head, digits=6) for head in ("R, least", "R, most", "X, least", "X, most")))
+        rows = (
+            (f, z.real.min(), z.real.max(), z.imag.min(), z.imag.max())
+            for f, z in zip(self.axes[0], self.impedance.impedance_ohm, strict=True)
+        )
+        return Table("ends", "R and X [ohm]", columns, tuple(rows))
+
+    def _changes(self) -> Table:
+        """Changes of R and X over force and over position."""
+        frequency_hz, force, at = self.axes
+        caption = (
+            f"change of R and X in standard deviations of one reading, {self.noise:.2g} of |Z|: over force at "
+            f"{at[len(at) // 2]:g} mm, over position at {force[-1]:g} N"
+        )
+        names = ("R by force", "R by position", "X by force", "X by position")
+        changes = zip(frequency_hz, self.impedance.changes(self.noise), strict=True)
+        columns = (_FREQUENCY, *(Column(name, digits=3) for name in names))
+        return Table("changes", caption, columns, tuple((f, *change.values()) for f, change in changes))
+
+    def _corners(self) -> Table:
+        """R and X at the last frequency, at the ends and in the middle of both axes."""
+        frequency_hz, force, at = self.axes
+        places, last = _ends_and_middle(at), self.impedance.impedance_ohm[-1]
+        columns = [Column(f"{part}, {at[k]:g} mm", digits=7) for k in places for part in "RX"]
+        rows = (
+            (force[j], *(part for z in last[j][places] for part in (z.real, z.imag))) for j in _ends_and_middle(force)
+        )
+        caption = f"R and X [ohm] at {si(frequency_hz[-1], 'Hz')}"
+        return Table("corners", caption, (Column("force", "N", si=True), *columns), tuple(rows))
 
     def to_json(self) -> str:
         """Prediction and impedances, a line per key: for long lists of numbers."""

@@ -102,8 +102,8 @@ def at_hand(
     SensorgenError
         A slicer that is given is missing, or fails.
     """
-    if not slicer and (found := in_folder(design, folder)):
-        return found, ""
+    if not slicer and (file := in_folder(design, folder)):
+        return file, ""
     decides = slicer or deciding()
     if decides == NONE:
         return None, "no slicer installed" if not slicer and not os.environ.get(VARIABLE) else ""
@@ -134,8 +134,8 @@ def _sliced(design: Design, slicer: str, program: str, question: dict[str, Any],
     def work() -> dict[str, Any]:
         from sensorgen.prediction.new_slice import slice_now
 
-        made = slice_now(design, slicer, program=program, time_limit_s=_LIMIT_S, step=step)
-        return {"report": made.record(), "gcode": b64encode(zlib.compress(made.content, 1)).decode()}
+        sliced = slice_now(design, slicer, program=program, time_limit_s=_LIMIT_S, step=step)
+        return {"report": sliced.record(), "gcode": b64encode(zlib.compress(sliced.content, 1)).decode()}
 
     entry = stored.answer(question, work)
     return PrintFile(entry["report"] | {"name": design.name}, zlib.decompress(b64decode(entry["gcode"])))

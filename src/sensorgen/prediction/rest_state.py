@@ -45,7 +45,7 @@ def electrode_resistance(body: Body, ends: Sequence[str] = ENDS) -> dict[str, Bo
     OutOfRange
         An electrode that does not reach from end to end.
     """
-    design, found = body.design, {}
+    design, resistance = body.design, {}
     for end, rho in ((end, rho) for end, rho in resistivities(design).items() if end in ends):
         scene, *others = dict.fromkeys(body.cells.scenes.values())
         solid = _of_cell(body, scene, end, rho.value)
@@ -57,11 +57,11 @@ def electrode_resistance(body: Body, ends: Sequence[str] = ENDS) -> dict[str, Bo
                 printed.append(float("inf"))
         value, (low, high) = solid.middle(), spread(design, rho)
         relative = Interval(low / rho.value, high / rho.value) if rho.value else Interval(1.0, 1.0)
-        found[end] = Bounds.of(
+        resistance[end] = Bounds.of(
             value, "ohm", model=solid, print=Interval(min(printed), max(printed)), certified=True,
             material=relative.times(value),
         )  # fmt: skip
-    return found
+    return resistance
 
 
 def _of_cell(body: Body, scene: Scene, end: str, resistivity_ohm_m: float) -> Interval:
@@ -115,25 +115,25 @@ def permittivity(design: Design, frequency_hz: float | None = None) -> tuple[dic
         A dielectric without a permittivity.
     """
     taken = permittivities(design)
-    found = _with(taken, set_losses(design), frequency_hz)
-    return found, [*taken, *set_losses(design)]
+    eps = _with(taken, set_losses(design), frequency_hz)
+    return eps, [*taken, *set_losses(design)]
 
 
 def _with(
     taken: Sequence[MaterialValue], lost: Sequence[MaterialValue], frequency_hz: float | None
 ) -> dict[str, complex]:
-    found: dict[str, complex] = {t.material: t.value for t in taken}
+    eps: dict[str, complex] = {t.material: t.value for t in taken}
     for loss in lost:
         if loss.quantity == "loss_tangent":
-            found[loss.material] -= 1j * found[loss.material].real * loss.value
+            eps[loss.material] -= 1j * eps[loss.material].real * loss.value
         elif frequency_hz is None:
             raise BadInput(
                 f"{loss.material} leaks ({loss.value:g} ohm m), and its share depends on the frequency; "
                 "expected one: --frequency 1.1kHz"
             )
         else:
-            found[loss.material] -= 1j * _conduction(loss.value, frequency_hz)
-    return found
+            eps[loss.material] -= 1j * _conduction(loss.value, frequency_hz)
+    return eps
 
 
 def _conduction(resistivity_ohm_m: float, frequency_hz: float) -> float:
@@ -217,11 +217,11 @@ def _tangent(design: Design, taken: Sequence[MaterialValue], some: Sequence[Mate
     """C''/C' [-] and C'' [F] of the sensor with some of its losses."""
     if not some:
         return 0.0, 0.0
-    found = capacitance(design.in_use, _with(taken, some, LOWEST_HZ), _ACCURACY)
-    if found.loss_f is None:
+    answer = capacitance(design.in_use, _with(taken, some, LOWEST_HZ), _ACCURACY)
+    if answer.loss_f is None:
         return 0.0, 0.0
-    loss = (found.loss_f.lower + found.loss_f.upper) / 2
-    return loss / found.capacitance_f.middle(), loss
+    loss = (answer.loss_f.lower + answer.loss_f.upper) / 2
+    return loss / answer.capacitance_f.middle(), loss
 
 
 def _strong(taken: Sequence[MaterialValue], leaks: Sequence[MaterialValue]) -> Iterator[str]:
@@ -294,25 +294,17 @@ def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -
     values, rho = permittivities(body.design), resistivities(body.design)
     eps = {v.material: v.value for v in values}
     cells = body.cells
-    scene, *others = dict.fromkeys(cells.scenes.values())
+    scene = cells.first()
     ranges = ranges and width != inf
     wanted = inf if width == inf else min(width or inf, default_width(scene))
-    said = cells.remarks.get(next(iter(cells.scenes)), ())
+    remarks = cells.remarks.get(next(iter(cells.scenes)), ())
     try:
         answer = of_sensor(cells, eps, wanted)
     except Unpredictable as error:
-        raise Unpredictable("; ".join((*said, str(error)))) from None
+        raise Unpredictable("; ".join((*remarks, str(error)))) from None
     c = answer.capacitance_f
-    found, doubts, unbounded = [c.middle()], list(said), False
-    coarse = 2 * wanted if is_open(scene) else wanted  # whole sensors take long
-    for other in others if ranges else ():
-        try:
-            found.append(capacitance(other, eps, coarse).capacitance_f.middle() * cells.count)
-        except Unpredictable as error:
-            unbounded = unbounded or cells.gap_mm.get(_rule(cells, other)) == 0
-            rule = _rule(cells, other)
-            doubts.append(f"printed by the rule {rule!r} it has no capacitance: {error}")
-    by_width = Interval(min(found), max(found))
+    others, unknown, unbounded = _other_prints(cells, eps, wanted) if ranges else ([], [], False)
+    by_width = Interval(min([c.middle(), *others]), max([c.middle(), *others]))
     thick, thin = _film_ratios(cells, eps) if ranges else (1.0, 1.0)
     by_film = Interval(c.middle() * thick, c.middle() * (thin or 1.0))
     by_print = Interval(by_width.lower * thick, by_width.upper * (thin or 1.0))
@@ -322,24 +314,35 @@ def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -
         material=_permittivity_range(body.design, scene, c.middle()) if ranges else Interval(c.middle(), c.middle()),
     )  # fmt: skip
     ends = (rho["top"].value, rho["bottom"].value)
-    resistance, unknown = _resistance(body)
-    doubts += unknown
-    return RestState(answer, bounds, resistance, ends, (*values, *rho.values()), by_width, by_film, tuple(doubts))
+    resistance, missing = _resistance(body)
+    doubts = (*remarks, *unknown, *missing)
+    return RestState(answer, bounds, resistance, ends, (*values, *rho.values()), by_width, by_film, doubts)
+
+
+def _other_prints(cells: Cells, eps: Mapping[str, float], width: float) -> tuple[list[float], list[str], bool]:
+    """Capacitances of other ways to print it [F], why some have none, and True where one of these is a short."""
+    first, *others = dict.fromkeys(cells.scenes.values())
+    coarse = 2 * width if is_open(first) else width  # whole sensors take long
+    values, doubts, unbounded = [], [], False
+    for scene in others:
+        rule = next(name for name, cell in cells.scenes.items() if cell == scene)
+        try:
+            values.append(capacitance(scene, eps, coarse).capacitance_f.middle() * cells.count)
+        except Unpredictable as error:
+            unbounded |= cells.gap_mm.get(rule) == 0
+            doubts.append(f"printed by the rule {rule!r} it has no capacitance: {error}")
+    return values, doubts, unbounded
 
 
 def _resistance(body: Body) -> tuple[dict[str, Bounds], list[str]]:
     """Of the electrodes that reach from end to end, and why another has none."""
-    found, said = dict[str, Bounds](), list[str]()
+    resistance, reasons = dict[str, Bounds](), list[str]()
     for end in ENDS:
         try:
-            found |= electrode_resistance(body, (end,))
+            resistance |= electrode_resistance(body, (end,))
         except OutOfRange as error:
-            said.append(f"no resistance: {error}")
-    return found, said
-
-
-def _rule(cells: Cells, scene: Scene) -> str:
-    return next(name for name, cell in cells.scenes.items() if cell == scene)
+            reasons.append(f"no resistance: {error}")
+    return resistance, reasons
 
 
 def _film_ratios(cells: Cells, eps: Mapping[str, float]) -> tuple[float, float | None]:
@@ -375,15 +378,15 @@ def permittivity_ratios(design: Design, scene: Scene) -> dict[str, tuple[float, 
     values = permittivities(design)
     eps = {v.material: v.value for v in values}
     usual = capacitance(scene, eps).capacitance_f.middle()
-    found = {}
+    ratios = {}
     for value in values:
         low, high = spread(design, value)
         if high > _TOLD_APART * low:
             ends = (
                 capacitance(scene, eps | {value.material: end}).capacitance_f.middle() / usual for end in (low, high)
             )
-            found[value.material] = (next(ends), next(ends))
-    return found
+            ratios[value.material] = (next(ends), next(ends))
+    return ratios
 
 
 class Added(NamedTuple):

@@ -181,9 +181,9 @@ def _field(design: Design, asked: CapacitanceQuestion, press_mm: float) -> Found
     sizes = asdict(replace(now, length_mm=side_mm, width_mm=side_mm))
     pressed = designs.make(design.model_dump(exclude={"parameters"}) | {"parameters": sizes})
     taken = permittivities(pressed)
-    found = planner.capacitance(
+    solved = planner.capacitance(
         pressed.in_use, {t.material: t.value for t in taken}, asked.width or PLANE, keep=asked.keep
     )
-    value = found.capacitance_f.middle() / (side_mm * M_PER_MM) ** 2 * thesis_cells.stretch(rest, now)
-    by = f"their field by {found.model} within {found.width():.2g}; solved compression: compress"
+    value = solved.capacitance_f.middle() / (side_mm * M_PER_MM) ** 2 * thesis_cells.stretch(rest, now)
+    by = f"their field by {solved.model} within {solved.width():.2g}; solved compression: compress"
     return value, f"{thesis_cells.GEOMETRY_SOURCE}: sizes changed by hand, {by}", taken

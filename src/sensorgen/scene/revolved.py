@@ -34,19 +34,20 @@ class _Edge(NamedTuple):
 
     def at_height(self, z_mm: float) -> float:
         """Radius at a height between its ends."""
-        (ra, za), (rb, zb) = self.start, self.end
-        if self.centre is None:
-            return ra if za == zb else ra + (z_mm - za) / (zb - za) * (rb - ra)
-        rc, zc = self.centre
-        return rc + _leg(self.start, self.centre, z_mm - zc) * (1.0 if ra + rb > 2 * rc else -1.0)
+        return self._at(1, z_mm)
 
     def at_radius(self, r_mm: float) -> float:
         """Height at a radius between its ends."""
-        (ra, za), (rb, zb) = self.start, self.end
+        return self._at(0, r_mm)
+
+    def _at(self, k: int, value_mm: float) -> float:
+        """The other coordinate where the one of a number, 0 or 1, has a value between those of its ends."""
+        a, b = self.start[1 - k], self.end[1 - k]
         if self.centre is None:
-            return za if ra == rb else za + (r_mm - ra) / (rb - ra) * (zb - za)
-        rc, zc = self.centre
-        return zc + _leg(self.start, self.centre, r_mm - rc) * (1.0 if za + zb > 2 * zc else -1.0)
+            along = self.end[k] - self.start[k]
+            return a if not along else a + (value_mm - self.start[k]) / along * (b - a)
+        middle = self.centre[1 - k]
+        return middle + _leg(self.start, self.centre, value_mm - self.centre[k]) * (1.0 if a + b > 2 * middle else -1.0)
 
     def middle(self) -> Point:
         """Point half-way along it."""

@@ -36,7 +36,7 @@ _SHARES = (log(0.5), log(5.0))  # of its own value, that a width or a period may
 _LEAST_STEP, _LONGEST_STEP = 0.05, 0.3  # to a width that a capacitance leads to, in logarithms
 _STEEPEST = 5.0  # power of a width or period that a capacitance may follow; steeper, lines come or go [-]
 _ACCURACY = 1e-2  # of a capacitance, relative
-_MOST_TRIED, _MOST_SOLVED = 800, 40  # designs whose gap, and whose capacitance is found, before it gives up
+_MOST_TRIED, _MOST_SOLVED = 800, 60  # designs whose gap, and whose capacitance is found, before it gives up
 _MOST_PRESSED = 12  # designs whose stiffness is found
 _PERIODS = 4  # of a sensor by which prints are estimated
 
@@ -237,7 +237,6 @@ class CompensationSearch(Nearest):
         self.aim = dict(wanted)  # of estimates
         self.margin = _MARGIN  # factor by which the width or period may shrink without another gap
         self.widths = _widths(design, walls)
-        self.powers: dict[Key, float] = {}  # of a width that the capacitance follows
         self.estimates: dict[Candidate, Quantities] = {}
         self.prints: dict[Candidate, Quantities] = {}
         self.best: Candidate | None = None
@@ -340,17 +339,13 @@ class CompensationSearch(Nearest):
     def _neighbours(self, one: Candidate) -> Iterator[Candidate]:
         """Heights by a layer and the first steps of each width; of a changed width the next steps."""
         width = self._width(one)
-        if width is not None:
-            shares = [(width, share) for share in self._further(one, width)]
-        elif GAP in self.estimates[one]:
-            shares = [(key, share) for key in self.widths for share in self._first(one, key)]
+        if width is None and GAP in self.estimates[one]:
             yield from self._heights(one)
-        else:
-            return
-        for key, share in shares:
-            if _SHARES[0] <= share <= _SHARES[1]:
-                value = round(_own(self.base, key) * exp(share), 3)
-                yield from self.changed({**one.values, key: value}, one)
+        for key in [width] if width else self.widths * (GAP in self.estimates[one]):
+            for share in self._shares(one, key):
+                if _SHARES[0] <= share <= _SHARES[1]:
+                    value = round(_own(self.base, key) * exp(share), 3)
+                    yield from self.changed({**one.values, key: value}, one)
 
     def _width(self, one: Candidate) -> Key | None:
         """The width or period that is changed, if any."""
@@ -373,30 +368,19 @@ class CompensationSearch(Nearest):
 
     def _share(self, one: Candidate, key: Key) -> float:
         """Ln of a width over that of the design as it was."""
-        return log(float(one.values.get(key, 1.0)) / _own(self.base, key)) if key in one.values else 0.0
+        return log(float(one.values[key]) / _own(self.base, key)) if key in one.values else 0.0
 
-    def _first(self, one: Candidate, key: Key) -> tuple[float, ...]:
-        """Shares of a width to try first: wider where the gap is too large, else by the power, once it is known."""
-        off, power = self._capacitance_off(one), self.powers.get(key)
+    def _shares(self, one: Candidate, key: Key) -> Iterator[float]:
+        """Shares to try next: wider where the gap is too large, and onwards; where it is right, by the secant."""
+        share, off = self._share(one, key), self._capacitance_off(one)
+        before = one.before if one.before and self._width(one) else one
+        start, was = self._share(before, key), self._capacitance_off(before)
         if off is None:
-            return (copysign(_STEP, self.quantities(one)[GAP] - self.wanted[GAP]),)
-        return (-off / power, off / power) if power else (max(abs(off), _LEAST_STEP),)
-
-    def _further(self, one: Candidate, key: Key) -> tuple[float, ...]:
-        """Shares to try next: by the secant through the design before; onwards where the gap is wrong."""
-        share, start = (0.0 if each is None else self._share(each, key) for each in (one, one.before))
-        off, before = (None if each is None else self._capacitance_off(each) for each in (one, one.before))
-        if off is None:
-            onwards = share + copysign(_STEP, share - start)
-            return (onwards,) if before is None else (onwards, 2 * start - share)
-        if before is None:
-            power = self.powers.get(key)
-            return (share - off / power,) if power else (share + abs(off), share - abs(off))
-        power = (off - before) / (share - start)
-        if not 0 < abs(power) <= _STEEPEST:
-            return ()
-        self.powers[key] = power
-        return (share + max(-_LONGEST_STEP, min(-off / power, _LONGEST_STEP)),)
+            yield share + copysign(_STEP, share - start or self.quantities(one)[GAP] - self.wanted[GAP])
+        elif was is None or before is one:
+            yield from (share + step for step in (max(abs(off), _LEAST_STEP), -max(abs(off), _LEAST_STEP)))
+        elif 0 < abs(power := (off - was) / (share - start)) <= _STEEPEST:
+            yield share + max(-_LONGEST_STEP, min(-off / power, _LONGEST_STEP))
 
 
 def _widths(design: Design, walls: str) -> list[Key]:

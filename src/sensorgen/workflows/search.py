@@ -177,5 +177,5 @@ class Nearest(Search):
             yield Candidate(values, distance=far, before=before, origin=origin)
 
     def order(self, one: Candidate) -> tuple[float, ...]:
-        """Its distance; where the search begins, and what is looked at already, goes first."""
+        """Distance of a candidate; where the search begins, and what is looked at already, goes first."""
         return (one.distance if one.before else 0.0, -one.stage)

@@ -156,7 +156,7 @@ def stored_or_made(
     """
     for first in sorted(stored, key=lambda p: p.number):
         try:
-            found = from_json(first.data)
+            prediction = from_json(first.data)
             why = next((row.reason for row in log.superseding(first) if isinstance(row, Withdrawal)), "")
         except BadInput as error:
             why = str(error)
@@ -175,7 +175,7 @@ def stored_or_made(
             place += f"; anchored {anchor.logged_at} in {anchor.file}"
             place += f", {later} record{'s' * (later > 1)} later" if later else ""
         return Predicted(
-            body.design.name, body.design.id(), found, first.logged_at, first.version, before, place, _losses(body)
+            body.design.name, body.design.id(), prediction, first.logged_at, first.version, before, place, _losses(body)
         )  # fmt: skip
     return predicted(body)
 

@@ -115,29 +115,29 @@ def escaped(text: str) -> str:
     return html.escape(text, quote=False).replace('"', "&quot;")
 
 
-def parts_of(design: Design, made: Mapping[str, Mesh]) -> list[Part]:
+def parts_of(design: Design, meshes: Mapping[str, Mesh]) -> list[Part]:
     """Bodies of a design, in the sensor's coordinates.
 
     Parameters
     ----------
     design : Design
         The design.
-    made : mapping of str to Mesh
+    meshes : mapping of str to Mesh
         Mesh of each body, by its name [mm].
     """
-    return [part_of(design, body.name, body.material, made[body.name]) for body in design.printed.bodies]
+    return [part_of(design, body.name, body.material, meshes[body.name]) for body in design.printed.bodies]
 
 
 def part_of(design: Design, name: str, material: str, mesh: Mesh) -> Part:
     """One body, with the tool that the design gives its material."""
-    tool, found = design.tool(material), design.material(material)
+    tool, stuff = design.tool(material), design.material(material)
     settings = volume_settings(design.machine, design.layers, tool, load(design, material))
     if material not in {design.slot(end)[0].name for end in ("top_electrode", "bottom_electrode")}:
         settings["infill_overlap"] = FILM_OVERLAP
     return Part(
         name=name,
-        material=found.title,
-        colour=found.colour,
+        material=stuff.title,
+        colour=stuff.colour,
         extruder=design.machine.slicer_index(tool),
         mesh=mesh,
         settings=settings,

@@ -52,21 +52,21 @@ class Coverage:
     position_error_m: float
 
 
-def inside(found: InvertedPresses, presses: Presses) -> tuple[Mask, Mask]:
+def inside(inverted: InvertedPresses, presses: Presses) -> tuple[Mask, Mask]:
     """Masks of the forces and of the positions that lie in their intervals."""
     return tuple(  # type: ignore[return-value]
         (ends[:, 0] <= truth) & (truth <= ends[:, 1])
-        for ends, truth in ((found.force_90_n, presses.force_n), (found.position_90_m, presses.position_m))
+        for ends, truth in ((inverted.force_90_n, presses.force_n), (inverted.position_90_m, presses.position_m))
     )
 
 
-def coverage_of(found: InvertedPresses, presses: Presses) -> Coverage:
+def coverage_of(inverted: InvertedPresses, presses: Presses) -> Coverage:
     """Of presses that are known."""
-    force, position = inside(found, presses)
+    force, position = inside(inverted, presses)
     return Coverage(
-        len(force), int(force.sum()), int(position.sum()), float(np.median(np.ptp(found.force_90_n, axis=1))),
-        float(np.median(np.ptp(found.position_90_m, axis=1))), _rms(found.force_n - presses.force_n),
-        _rms(found.position_m - presses.position_m),
+        len(force), int(force.sum()), int(position.sum()), float(np.median(np.ptp(inverted.force_90_n, axis=1))),
+        float(np.median(np.ptp(inverted.position_90_m, axis=1))), _rms(inverted.force_n - presses.force_n),
+        _rms(inverted.position_m - presses.position_m),
     )  # fmt: skip
 
 
@@ -99,8 +99,8 @@ def held_out(
         known = replace(known, noise=np.median(data.noise, axis=0))
         parts.append(Inverter(model, known, force_limit_n=limit_n).batch(data.ratio[fold == k]))
     order = np.argsort(np.concatenate([np.flatnonzero(fold == k) for k in range(FOLDS)]), kind="stable")
-    found = InvertedPresses.joined(parts).rows(order)
-    return coverage_of(found, data.presses), found
+    inverted = InvertedPresses.joined(parts).rows(order)
+    return coverage_of(inverted, data.presses), inverted
 
 
 SCHEMA = 2
@@ -170,14 +170,14 @@ class Calibration:
 
     def departures(self) -> tuple[str, ...]:
         """Remarks on values that no longer lie where they were expected."""
-        found: dict[str, CalibratedValue | MaterialEstimate] = {
+        estimates: dict[str, CalibratedValue | MaterialEstimate] = {
             (f"{one.name} [{one.unit}]" if one.unit else one.name): one for one in self.values()
         }
-        found |= {f"{one.material} {one.quantity}": one for one in self.materials()}
+        estimates |= {f"{one.material} {one.quantity}": one for one in self.materials()}
         return tuple(
             f"{name}: {one.value:.3g} ({one.lower:.3g} to {one.upper:.3g}) has left what was expected, "
             f"{one.before_lower:.3g} to {one.before_upper:.3g}: doubt the design, film (a hole leaks), tip or bench"
-            for name, one in found.items()
+            for name, one in estimates.items()
             if one.lower > one.before_upper or one.upper < one.before_lower
         )
 
@@ -248,16 +248,16 @@ class Calibration:
 
     def document(self) -> Iterator[Part]:
         """Quality of the calibration, its values, and what it could not determine."""
-        p, held = self.posterior, self.held_out
+        p, tested = self.posterior, self.held_out
         by = f"{p.presses} known press{'es' * (p.presses != 1)} up to {self.force_n:.3g} N under a tip of "
         by += f"{self.model.sensor.tip_m * 1e3:g} mm and its readings at rest"
         by = by if p.presses else "its readings at rest alone"
         yield f"{self.specimen}, design {self.design}: calibrated by {by}"
-        if held:
+        if tested:
             yield (
-                f"presses held back in turn, each a mean over a second: {held.force} of {held.presses} forces and "
-                f"{held.position} of {held.presses} positions lie in their 90 % intervals, whose median widths are "
-                f"{held.force_width_n:.3g} N and {held.position_width_m * 1e3:.3g} mm"
+                f"presses held back in turn, each a mean over a second: {tested.force} of {tested.presses} forces and "
+                f"{tested.position} of {tested.presses} positions lie in their 90 % intervals, whose median widths are "
+                f"{tested.force_width_n:.3g} N and {tested.position_width_m * 1e3:.3g} mm"
             )
         elif p.presses:
             yield f"not checked on presses held back: that takes {FEWEST} known presses in one calibration"

@@ -374,8 +374,8 @@ def shared(models: Sequence[SpecimenModel], posteriors: Sequence[Posterior], nam
 
 def widened(model: SpecimenModel, posterior: Posterior) -> Posterior:
     """A posterior that no longer knows how the film yields under the tip, nor where that is: another tip, or day."""
-    kept = [k for k, name in enumerate(model.names) if not name.startswith(("rise", "force", "position"))]
-    loose = np.setdiff1d(np.arange(len(model.names)), kept)
+    fixed = [k for k, name in enumerate(model.names) if not name.startswith(("rise", "force", "position"))]
+    loose = np.setdiff1d(np.arange(len(model.names)), fixed)
     covariance = posterior.covariance.copy()
     covariance[loose] = covariance[:, loose] = 0.0
     usual = min(_SHAPE / model.spread.law_shape, 1.0)  # a print's laws differ by more than those of two tips

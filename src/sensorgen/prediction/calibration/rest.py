@@ -100,20 +100,20 @@ class Baseline:
         noise : (m,) array or float
             Standard deviation of its parts, relative [-].
         """
-        kept = np.flatnonzero(np.tile(np.isfinite(z_ohm), 2))
-        off = parts(np.log(z_ohm) - self._ln_z)[kept]
+        columns = np.flatnonzero(np.tile(np.isfinite(z_ohm), 2))
+        off = parts(np.log(z_ohm) - self._ln_z)[columns]
         covariance = self._covariance + np.diag(
             np.broadcast_to(np.tile(noise, 2 if np.ndim(noise) else 1), len(self._covariance)) ** 2
         )
-        weights, inverse = self._weights[kept], np.linalg.inv(covariance[np.ix_(kept, kept)])
+        weights, inverse = self._weights[columns], np.linalg.inv(covariance[np.ix_(columns, columns)])
         variance = np.linalg.pinv(weights.T @ inverse @ weights)
-        found = variance @ weights.T @ inverse @ off
-        left = off - weights @ found
+        ln_cr = variance @ weights.T @ inverse @ off
+        left = off - weights @ ln_cr
         usual_c, usual_r = (
             _SURE * hypot(session, float(variance[k, k]) ** 0.5) for k, session in enumerate((SESSION_C, SESSION_R))
         )
-        other = float(left @ inverse @ left) > float(chi2_limit(np.array(max(len(kept) - 2, 0))))
-        return RestChange(float(found[0]), float(found[1]), usual_c, usual_r, other)
+        other = float(left @ inverse @ left) > float(chi2_limit(np.array(max(len(columns) - 2, 0))))
+        return RestChange(float(ln_cr[0]), float(ln_cr[1]), usual_c, usual_r, other)
 
 
 LATEST = 64  # readings at rest that count, of those since the last press
@@ -230,8 +230,8 @@ class Rest:
         """Standard deviation of the parts of a reading at each tone (m,), by the scatter at rest; else ``NOISE``."""
         if not self.tells_noise:
             return NOISE
-        found: Real = np.sqrt(np.mean(self._squares, axis=0))
-        return found
+        deviation: Real = np.sqrt(np.mean(self._squares, axis=0))
+        return deviation
 
 
 def _scatter(z: Complex) -> Real:
@@ -250,6 +250,6 @@ def checked(tones_hz: Real, calibrated_hz: Real) -> NDArray[np.intp]:
     """
     same = np.isclose(np.asarray(tones_hz)[:, None], np.asarray(calibrated_hz), rtol=1e-6)
     if same.shape[0] != same.shape[1] or not (same.sum(0) == 1).all():
-        said, expected = (", ".join(f"{f / 1e3:g}" for f in hz) for hz in (tones_hz, calibrated_hz))
-        raise BadInput(f"readings at {said} kHz; expected {expected} kHz")
+        given, expected = (", ".join(f"{f / 1e3:g}" for f in hz) for hz in (tones_hz, calibrated_hz))
+        raise BadInput(f"readings at {given} kHz; expected {expected} kHz")
     return np.asarray(same.argmax(0))

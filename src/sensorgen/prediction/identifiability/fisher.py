@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import OutOfRange
-from sensorgen.models.sensor import Sensor
+from sensorgen.models.sensor import Response, Sensor
 from sensorgen.prediction.identifiability.results import (
     FORCE_SHARE,
     GUESS,
@@ -97,20 +97,27 @@ def slopes(sensor: Sensor, frequency_hz: ArrayLike, force_n: ArrayLike, position
         As :meth:`sensorgen.models.sensor.Sensor.response`; also where Z is 0.
     """
     force, position = (np.asarray(value, float)[..., None] for value in (force_n, position_m))
-    z, by_force, by_position = sensor.response(np.asarray(frequency_hz, float), force, position)
+    return relative(sensor.response(np.asarray(frequency_hz, float), force, position), force)
+
+
+def relative(response: Response, force_n: ArrayLike) -> Slopes:
+    """Derivatives of ln Z, of those of Z under a force [N]; errors as :func:`slopes`."""
+    z, by_force, by_position = response
     if not z.all():
         raise OutOfRange("Z is 0: a relative change needs a resistance or a capacitance to change")
-    return Slopes(by_force / z, np.where(force == 0, 0.0, by_position / z))  # at the ends rounding would leave residues
+    return Slopes(
+        by_force / z, np.where(np.equal(force_n, 0), 0.0, by_position / z)
+    )  # at the ends rounding would leave residues
 
 
-def bounds(found: Slopes, noise: float) -> LeastErrors:
+def bounds(of: Slopes, noise: float) -> LeastErrors:
     """Cramer-Rao bounds of force and position, both unknown: see :func:`sensorgen.prediction.inference.cramer_rao`.
 
     Slopes are those of ln Z; real and imaginary parts of all frequencies count alike.
 
     Parameters
     ----------
-    found : Slopes
+    of : Slopes
         Frequencies on the last axis.
     noise : float
         Of each part of Z, relative to abs(Z) [-].
@@ -129,28 +136,28 @@ def bounds(found: Slopes, noise: float) -> LeastErrors:
     >>> float(b.force_n), float(b.position_m)
     (0.005, 0.002)
     """
-    force, position, correlation = cramer_rao(*found)
+    force, position, correlation = cramer_rao(*of)
     return LeastErrors(noise * force, noise * position, correlation)
 
 
-def shares(found: Slopes) -> tuple[Real, Real]:
+def shares(of: Slopes) -> tuple[Real, Real]:
     """Share of each frequency in the information on force, and on position, the other being unknown too [-].
 
     The information on one of them, 1/sigma^2, is a sum over frequencies; nan where it is undefined.
     """
-    a, b = found
+    a, b = of
     with np.errstate(all="ignore"):
         force, position = (np.abs(orthogonal(u, v)) ** 2 for u, v in ((a, b), (b, a)))
         return force / force.sum(-1, keepdims=True), position / position.sum(-1, keepdims=True)
 
 
-def undefined(setup: Setup, found: Slopes) -> str:
+def undefined(setup: Setup, of: Slopes) -> str:
     """Why the position of a press is undefined, or ""."""
     if setup.force_n == 0:
         return "without a force there is no press to locate"
-    if not found.by_position_per_m.any():
+    if not of.by_position_per_m.any():
         return "Z does not depend on position"
-    if np.isnan(bounds(found, setup.noise).position_m):
+    if np.isnan(bounds(of, setup.noise).position_m):
         return "these frequencies cannot separate it from force: both change Z in the same direction"
     return ""
 
@@ -270,21 +277,21 @@ PER_DECADE = 20  # of the grid of advised frequencies
 BELOW, ABOVE = 100.0, 10.0  # how far the grid reaches from the corner, as factors
 
 
-def best(setup: Setup, found: Slopes, required: Required) -> tuple[FrequencyChoice, ...]:
+def best(setup: Setup, of: Slopes, required: Required) -> tuple[FrequencyChoice, ...]:
     """The best one, two and three of the given frequencies, all combinations tried.
 
     Parameters
     ----------
     setup : Setup
         The press and the frequencies. Of more than ``SEARCHED``, as many are taken evenly from the list.
-    found : Slopes
+    of : Slopes
         At the frequencies, and the press.
     required : Required
         Errors that serve; the best choice has the smallest shortfall.
     """
     count = len(setup.frequency_hz)
     taken = np.unique(np.linspace(0, count - 1, min(count, SEARCHED)).astype(int))
-    frequency, among = np.asarray(setup.frequency_hz)[taken], Slopes(*(slope[taken] for slope in found))
+    frequency, among = np.asarray(setup.frequency_hz)[taken], Slopes(*(slope[taken] for slope in of))
     sizes = range(1, min(3, len(taken)) + 1)
     return tuple(_best(frequency, among, size, setup.noise, required) for size in sizes)
 
@@ -294,8 +301,8 @@ def advised(setup: Setup, required: Required) -> AdvisedFrequencies:
     corner = _corner_hz(setup)
     low, high = corner / BELOW, min(corner * ABOVE, setup.highest_hz)
     grid = np.geomspace(low, high, round(PER_DECADE * float(np.log10(high / low))) + 1)
-    found = slopes(setup.sensor, grid, setup.force_n, setup.position_m)
-    single, pair = (_best(grid, found, size, setup.noise, required) for size in (1, 2))
+    on_grid = slopes(setup.sensor, grid, setup.force_n, setup.position_m)
+    single, pair = (_best(grid, on_grid, size, setup.noise, required) for size in (1, 2))
     return AdvisedFrequencies(float(grid[0]), float(grid[-1]), single, pair)
 
 
@@ -311,10 +318,10 @@ def _corner_hz(setup: Setup) -> float:
     return min(setup.sensor.corner_frequency_hz(), setup.highest_hz)
 
 
-def _best(frequency: Real, found: Slopes, size: int, noise: float, required: Required) -> FrequencyChoice:
+def _best(frequency: Real, of: Slopes, size: int, noise: float, required: Required) -> FrequencyChoice:
     """The combination of ``size`` frequencies with the smallest shortfall."""
     chosen = np.array(list(combinations(range(len(frequency)), size)))
-    limits = bounds(Slopes(*(slope[chosen] for slope in found)), noise)
+    limits = bounds(Slopes(*(slope[chosen] for slope in of)), noise)
     short = required.shortfall(limits)
     k = int(np.argmin(short))
     if np.isinf(short[k]):

@@ -111,10 +111,10 @@ def _tried(setup: Setup, need: Required) -> Iterator[Tried]:
     for change in CHANGES:
         changed = change.apply(setup)
         try:
-            found = changed.bounds()
+            limits = changed.bounds()
         except OutOfRange:
             continue
-        yield Tried(change, changed, found, float(need.shortfall(found)))
+        yield Tried(change, changed, limits, float(need.shortfall(limits)))
 
 
 def worse_filament(setup: Setup) -> Setup:

@@ -348,9 +348,9 @@ class Estimator:
 
     def one(self, impedance_ohm: ArrayLike) -> PressEstimate:
         """The press behind one reading (n_tones,) [ohm]; errors as :meth:`batch`."""
-        found = self._block(self._readings(np.asarray(impedance_ohm)[None]))
-        force, position, status = found.force_n[0], found.position_m[0], Status(int(found.status[0]))  # type: ignore[call-arg]
-        return PressEstimate(float(force), float(position), found.covariance[0], status)
+        estimates = self._block(self._readings(np.asarray(impedance_ohm)[None]))
+        force, position, status = estimates.force_n[0], estimates.position_m[0], Status(int(estimates.status[0]))  # type: ignore[call-arg]
+        return PressEstimate(float(force), float(position), estimates.covariance[0], status)
 
     def batch(self, impedance_ohm: ArrayLike) -> Estimates:
         """The presses behind readings (n, n_tones) [ohm].
@@ -385,14 +385,13 @@ class Estimator:
         response = parts(np.log(np.where(measured, z, 1.0)))
         weight = np.tile(measured, 2) / self._sigma
         target = FitGoal(response, weight, self._expected, self._information)
-        found = self._least_squares(target)
-        own = covariance(found.best.information - self._information)
+        pair = self._least_squares(target)
+        own = covariance(pair.best.information - self._information)
         tones = measured.sum(1)
         ambiguous = np.zeros(len(z), bool)
-        ambiguous[found.rows] = True
-        status = statuses(found.best, own[:, _DIAGONAL, _DIAGONAL], tones, ambiguous)
-        known = self._known(target, found.best)
-        return self._in_si(found, known, status, tones)
+        ambiguous[pair.rows] = True
+        status = statuses(pair.best, own[:, _DIAGONAL, _DIAGONAL], tones, ambiguous)
+        return self._in_si(pair, self._known(target, pair.best), status, tones)
 
     def _known(self, target: FitGoal, fit: LocalFit) -> PressPosterior:
         """Means, covariances and intervals of scaled presses."""
@@ -427,11 +426,11 @@ class Estimator:
         return Local(exact, self._table.at(press).slope)
 
     def _in_si(
-        self, found: _Pair, known: PressPosterior, status: NDArray[np.uint8], tones: NDArray[np.intp]
+        self, pair: _Pair, known: PressPosterior, status: NDArray[np.uint8], tones: NDArray[np.intp]
     ) -> Estimates:
         empty = status == Status.MISSING
         others = np.full((len(tones), 2), np.nan)
-        others[found.rows] = found.others
+        others[pair.rows] = pair.others
         mean, low, high = (
             np.where(empty[:, None], np.nan, a) * self.scale for a in (known.mean, known.low, known.high)
         )
@@ -442,7 +441,7 @@ class Estimator:
             force_90_n=np.stack([low[:, 0], high[:, 0]], -1),
             position_90_m=np.stack([low[:, 1], high[:, 1]], -1),
             status=status,
-            chi2=found.best.chi2,
+            chi2=pair.best.chi2,
             tones=tones,
             other_force_n=others[:, 0] * self.scale[0],
             other_position_m=others[:, 1] * self.scale[1],

@@ -96,17 +96,17 @@ def tones(frequency_hz: ArrayLike) -> Real:
         No list of numbers; none at all, one that is not above 0 and finite, or two that are equal.
     """
     try:
-        found = np.atleast_1d(np.asarray(frequency_hz, np.float64))
+        hz = np.atleast_1d(np.asarray(frequency_hz, np.float64))
     except (TypeError, ValueError):
         raise BadInput(f"frequencies are numbers in Hz, not {str(frequency_hz)[:60]!r}") from None
-    if found.ndim != 1 or not found.size:
-        raise BadInput(f"expected a list of frequencies in Hz, not an array of shape {found.shape}")
-    bad = ~((found > 0) & (found < np.inf))
+    if hz.ndim != 1 or not hz.size:
+        raise BadInput(f"expected a list of frequencies in Hz, not an array of shape {hz.shape}")
+    bad = ~((hz > 0) & (hz < np.inf))
     if bad.any():
-        raise OutOfRange(f"a frequency of {found[bad][0]:g} Hz; expected a number above 0")
-    if len(np.unique(found)) < len(found):
+        raise OutOfRange(f"a frequency of {hz[bad][0]:g} Hz; expected a number above 0")
+    if len(np.unique(hz)) < len(hz):
         raise OutOfRange("the same frequency twice: give each once")
-    return found
+    return hz
 
 
 FORCE_CELLS = 24
@@ -191,11 +191,11 @@ class ResponseTable:
         """
         filters = self._filters
         size = max(1, _SMALL_PRODUCT // filters.response.size)
-        found = [
+        seeds = [
             filters.nearest(response[start : start + size], weight[start : start + size])
             for start in range(0, max(len(response), 1), size)
         ]
-        seed, shift = (np.concatenate(column) for column in zip(*found, strict=True))
+        seed, shift = (np.concatenate(column) for column in zip(*seeds, strict=True))
         press = filters.seeds[seed]
         least = self.edges[0][1] / 2  # at no force nothing depends on the position: a search that starts there stays
         press[:, 0] = np.minimum(np.maximum(press[:, 0] + shift, least), 1.0)
@@ -310,10 +310,10 @@ def _minima(distance: Real) -> Mask:
     """Cells that are below all their neighbours, those at the border among the ones that they have."""
     around = np.pad(distance, 1, constant_values=np.inf)
     rows, columns = distance.shape
-    found = np.ones(distance.shape, bool)
+    lowest = np.ones(distance.shape, bool)
     for i, j in [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]:
-        found &= distance < around[i : i + rows, j : j + columns]
-    return found
+        lowest &= distance < around[i : i + rows, j : j + columns]
+    return lowest
 
 
 def _around(shape: tuple[int, int], seed: int) -> tuple[Mask, Mask]:

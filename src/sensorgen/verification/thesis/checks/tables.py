@@ -20,8 +20,7 @@ from sensorgen.prediction import rest_state
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.query import TIP_M, TONES_HZ
 from sensorgen.verification.thesis.checks._columns import FILM_MM
-from sensorgen.verification.thesis.checks._text import table
-from sensorgen.verification.thesis.items import chapter
+from sensorgen.verification.thesis.items import chapter, table
 from sensorgen.verification.thesis.verdicts import ItemPart
 
 _UNITS = {"_pa": "Pa", "_kg_m3": "kg/m3", "_c": "°C", "_percent": "%"}  # by the ending of a quantity
