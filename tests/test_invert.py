@@ -15,9 +15,8 @@ from sensorgen.design.design import make
 from sensorgen.models.compression import unconfined
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.inverse import answers
-from sensorgen.prediction.inverse.estimator import Estimator, estimate
+from sensorgen.prediction.inverse.estimator import Estimator, Prior, estimate
 from sensorgen.prediction.inverse.forward import Forward
-from sensorgen.prediction.inverse.prior import Prior
 from sensorgen.prediction.inverse.verdict import Status, chi2_limit
 from sensorgen.prediction.query import TONES_HZ
 

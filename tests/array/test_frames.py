@@ -87,6 +87,16 @@ def test_capacitances_alone_do(model):
     assert np.abs(maps(model, readout, frames).pressure_kpa - PRESSURE / 1e3).max() < 0.1
 
 
+def test_capacitances_alone_are_refused_where_two_give_one_reading(model):
+    """Of R and C in series the imaginary part of 1 / (R + 1 / jwC) is largest at wRC = 1, a phase of 45 degrees."""
+    readout = ArrayReadout(frequency_hz=(3e6,), noise=1e-4)
+    frames = frames_of(model, readout)
+    assert np.isfinite(maps(model, readout, frames).pressure_kpa).any()
+    frames.real = np.nan
+    with pytest.raises(BadInput, match=r"capacitances alone at 3 MHz: .* two of them give one reading"):
+        maps(model, readout, frames)
+
+
 @pytest.mark.parametrize("kind", ["guarded", "two-terminal"])
 def test_intervals_hold_and_the_foot_is_found(model, kind):
     """Scatter of 5 % at rest and in gain, noise of 0.1 %: 95 % of the pressures in their intervals."""

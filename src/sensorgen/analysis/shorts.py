@@ -30,7 +30,7 @@ from sensorgen.design.specimen_name import QUALITIES
 from sensorgen.export.gcode.files import Source
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.entries import Reading
-from sensorgen.measure.log.tables import thesis
+from sensorgen.measure.log.importing import thesis_readings
 from sensorgen.measure.signal.verdicts import ORDER
 
 CREDIBLE = 0.9  # share of the posterior inside the interval
@@ -146,7 +146,7 @@ def verdicts(log: Log, design: Design) -> tuple[int, int]:
     Rows of Table D.1's series 23 are left out: the prior has them.
     """
     film = design.parameters.get("dielectric_mm", getattr(design.params, "dielectric_mm", None))
-    counted = {r.uid for r in thesis() if r.iteration == SERIES}
+    counted = {r.uid for r in thesis_readings() if r.iteration == SERIES}
     last = {
         r.specimen: _low(r) for r in log.readings()
         if r.shape == design.shape and r.film_mm == film and r.y_ohm and r.z_ohm and r.uid not in counted
@@ -168,7 +168,7 @@ def series() -> Counts:
     51
     """
     shorted, every = Counter[tuple[str, int]](), Counter[tuple[str, int]]()
-    for r in thesis():
+    for r in thesis_readings():
         if r.iteration == SERIES and r.film_mm is not None and r.y_ohm and r.z_ohm:
             key = r.shape, round(r.film_mm / load_quality(QUALITIES[r.slicing] or "fine").layer_mm)
             shorted[key] += _low(r)

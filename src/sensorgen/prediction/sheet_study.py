@@ -163,10 +163,10 @@ class SheetStudy:
             Column("best frequencies", key="best_frequencies"),
         )  # fmt: skip
         rows: list[tuple[Cell, ...]] = []
-        for name, found in self.bounds.items():
-            errors = (float(np.median(found.sigma()[..., k])) for k in range(3))
-            best = ", ".join(si(float(found.frequency_hz[k]), "Hz") for k in found.best_tones()[:2])
-            located = round(100 * found.located())
+        for name, errors_of in self.bounds.items():
+            errors = (float(np.median(errors_of.sigma()[..., k])) for k in range(3))
+            best = ", ".join(si(float(errors_of.frequency_hz[k]), "Hz") for k in errors_of.best_tones()[:2])
+            located = round(100 * errors_of.located())
             rows.append((name, *(e if e < BOUNDLESS else inf for e in errors), located, best))
         yield Table("contacts", "", columns, tuple(rows))
         yield ""
@@ -174,7 +174,7 @@ class SheetStudy:
             "Medians over the sheet of the smallest standard errors; located: twice as well as a uniform distribution, "
             "in x and in y."
         )
-        yield Facts(tuple((name, found.verdict()) for name, found in self.bounds.items()))
+        yield Facts(tuple((name, errors_of.verdict()) for name, errors_of in self.bounds.items()))
 
     def record(self) -> SheetRecord:
         """All of it with maps of the errors and impedances of the unloaded sheet."""
@@ -182,17 +182,17 @@ class SheetStudy:
             self.force_n, self.press.length_m / M_PER_MM, self.noise, self.doubts, self.sheet.length_m,
             self.sheet.width_m, dict(zip(("top", "bottom"), self.sheet.sheet_resistance_ohm, strict=True)),
             float(self.sheet.capacitances().mean()), self.press.capacitance_factor,
-            {name: self._contact(name, found) for name, found in self.bounds.items()},
+            {name: self._contact(name, errors) for name, errors in self.bounds.items()},
         )  # fmt: skip
 
-    def _contact(self, name: str, found: PressErrors) -> ContactRecord:
-        z = impedance(self.sheet, self.ports[name], found.frequency_hz, cells=found.cells)
-        force, x, y = np.moveaxis(found.sigma(), -1, 0)
+    def _contact(self, name: str, errors: PressErrors) -> ContactRecord:
+        z = impedance(self.sheet, self.ports[name], errors.frequency_hz, cells=errors.cells)
+        force, x, y = np.moveaxis(errors.sigma(), -1, 0)
         return ContactRecord(
-            found.verdict(), found.located(), tuple(found.frequency_hz.tolist()),
-            tuple(float(found.frequency_hz[k]) for k in found.best_tones()), found.cells,
-            Parts(tuple(map(_map, z.real)), tuple(map(_map, z.imag))), tuple(found.x_m.tolist()),
-            tuple(found.y_m.tolist()), _map(force), _map(x), _map(y),
+            errors.verdict(), errors.located(), tuple(errors.frequency_hz.tolist()),
+            tuple(float(errors.frequency_hz[k]) for k in errors.best_tones()), errors.cells,
+            Parts(tuple(map(_map, z.real)), tuple(map(_map, z.imag))), tuple(errors.x_m.tolist()),
+            tuple(errors.y_m.tolist()), _map(force), _map(x), _map(y),
         )  # fmt: skip
 
     def to_json(self) -> str:

@@ -1,6 +1,6 @@
 """Bodies of revolution about an upright axis, of straight edges and arcs: exact volume, cuts as polygons."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -11,8 +11,8 @@ from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import (
     AXES,
     SLIVER_MM,
+    Move,
     Outline,
-    Place,
     Point,
     area_mm2,
     described,
@@ -34,19 +34,20 @@ class _Edge(NamedTuple):
 
     def at_height(self, z_mm: float) -> float:
         """Radius at a height between its ends."""
-        (ra, za), (rb, zb) = self.start, self.end
-        if self.centre is None:
-            return ra if za == zb else ra + (z_mm - za) / (zb - za) * (rb - ra)
-        rc, zc = self.centre
-        return rc + _leg(self.start, self.centre, z_mm - zc) * (1.0 if ra + rb > 2 * rc else -1.0)
+        return self._at(1, z_mm)
 
     def at_radius(self, r_mm: float) -> float:
         """Height at a radius between its ends."""
-        (ra, za), (rb, zb) = self.start, self.end
+        return self._at(0, r_mm)
+
+    def _at(self, k: int, value_mm: float) -> float:
+        """The other coordinate where the one of a number, 0 or 1, has a value between those of its ends."""
+        a, b = self.start[1 - k], self.end[1 - k]
         if self.centre is None:
-            return za if ra == rb else za + (r_mm - ra) / (rb - ra) * (zb - za)
-        rc, zc = self.centre
-        return zc + _leg(self.start, self.centre, r_mm - rc) * (1.0 if za + zb > 2 * zc else -1.0)
+            along = self.end[k] - self.start[k]
+            return a if not along else a + (value_mm - self.start[k]) / along * (b - a)
+        middle = self.centre[1 - k]
+        return middle + _leg(self.start, self.centre, value_mm - self.centre[k]) * (1.0 if a + b > 2 * middle else -1.0)
 
     def middle(self) -> Point:
         """Point half-way along it."""
@@ -216,24 +217,26 @@ class Revolved:
             found += [part.start for part in short]
         return found
 
-    def turned_over(self, size_mm: Place) -> "Revolved":
-        """It in a box of some size that is turned by half a turn about x."""
-        outline = tuple((r, rounded(size_mm[2] - z)) for r, z in self.outline)
-        return Revolved(self.x_mm, rounded(size_mm[1] - self.y_mm), outline, tuple(-bulge for bulge in self.bulges))
+    def moved(self, move: Move) -> "Revolved":
+        """It at another place, scaled or turned."""
+        factor, turn = abs(move.scale[0]), -1 if move.scale[2] < 0 else 1
+        corners = list(zip(self.outline, self.bulges, strict=True)) if factor == 1 else list(self._stretched(factor))
+        ((x, y),) = move.outline("z", ((self.x_mm, self.y_mm),))
+        outline = tuple((r, move.at("z", z)) for (r, z), _ in corners)
+        return Revolved(x, y, outline, tuple(turn * bulge for _, bulge in corners))
 
-    def stretched(self, factor: float) -> "Revolved":
-        """It scaled in x and y; arcs become short ones through the ellipse's points, exact to 1e-5 of the stretch."""
-        outline, bulges = [], []
-        for edge, straight in ((e, e.centre is None) for e in self._edges()):
+    def _stretched(self, factor: float) -> Iterator[tuple[Point, float]]:
+        """Corners and bulges of the profile scaled along the radius.
+
+        Arcs become short ones through the ellipse's points, exact to 1e-5 of the stretch.
+        """
+        for edge in self._edges():
             short = [edge]
-            while not straight and len(short) < pi / 2 / _ARC:
+            while edge.centre and len(short) < pi / 2 / _ARC:
                 short = [half for whole in short for half in whole.halves()]
             for part in short:
-                a, b = ((r * factor, z) for r, z in (part.start, part.end))
-                middle = part.middle()
-                outline.append((rounded(a[0]), rounded(a[1])))
-                bulges.append(0.0 if straight else _bulge(a, (middle[0] * factor, middle[1]), b))
-        return Revolved(rounded(self.x_mm * factor), rounded(self.y_mm * factor), tuple(outline), tuple(bulges))
+                a, middle, b = ((r * factor, z) for r, z in (part.start, part.middle(), part.end))
+                yield (rounded(a[0]), rounded(a[1])), _bulge(a, middle, b) if edge.centre else 0.0
 
     def _edges(self) -> tuple[_Edge, ...]:
         return _edges(self.outline, self.bulges)

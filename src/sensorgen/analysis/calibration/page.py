@@ -9,8 +9,7 @@ from sensorgen.analysis.plots import pages
 from sensorgen.analysis.plots.figure import BLUE, COLOURS, GREY, ORANGE, Axis, Curve, Figure, Panel
 from sensorgen.core import document
 from sensorgen.core.units import M_PER_MM
-from sensorgen.prediction.calibration.calibration import Calibration
-from sensorgen.prediction.calibration.coverage import inside
+from sensorgen.prediction.calibration.calibration import Calibration, inside
 from sensorgen.prediction.calibration.inversion import LEVEL
 from sensorgen.prediction.inverse.verdict import NORMAL_90
 

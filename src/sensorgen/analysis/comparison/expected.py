@@ -14,8 +14,8 @@ from sensorgen.measure.log import Entry, Log, Withdrawal
 from sensorgen.measure.log import Prediction as Stored
 from sensorgen.measure.signal.leakage import along_ohm, leak_s
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.losses import NOTHING_LOST, Lost, lost
 from sensorgen.prediction.quantities import impedance_at
+from sensorgen.prediction.rest_state import NOTHING_LOST, Lost, lost
 from sensorgen.prediction.results import Prediction, from_json
 
 _MOST_FILMS = 1 << 14  # readings across films, of one design, that are kept with what they predict

@@ -17,8 +17,8 @@ from sensorgen.design.design import Design
 from sensorgen.design.specimen_name import SpecimenName, design_of, parse
 from sensorgen.measure import accuracy
 from sensorgen.measure.log import BenchRun, Entry, Log, Prediction, Print, Reading, Withdrawal
-from sensorgen.measure.log.batches import designs as on_beds
 from sensorgen.measure.log.logbook import conflict
+from sensorgen.measure.log.prints import designs as on_beds
 from sensorgen.measure.signal.verdicts import (
     INTACT_OHM,
     Evidence,

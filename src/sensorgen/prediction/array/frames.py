@@ -1,8 +1,8 @@
 """Frames of an array to pressure maps: by C/C0 where that suffices, else with the network of the tracks."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from io import BytesIO
 from math import nan
 from typing import Any
@@ -25,8 +25,9 @@ SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration 
 _STEPS = 25  # of Gauss-Newton with the slopes at rest
 _DONE = 0.02  # of a standard error: a smaller step ends it
 _HEAVIER = 1.1  # times the heaviest frame so far: a later one is compared with the network too
-_SUFFICES = 1.0  # standard error by which C/C0 may differ from the network
+_SUFFICES = 0.5  # standard error by which C/C0 may differ from the network
 _ALIVE = 3.0  # factor of a reading at rest to the predicted one; prints differ by less
+_LEAST_PHASE = 50.0  # degrees that capacitances alone need
 _SHORTED = 10.0  # real part at rest over the predicted magnitude
 _LEAKS = 6  # steps to the conductance of shorts
 _SHOWN = 6  # crossings that are named
@@ -70,21 +71,13 @@ class PressureMaps:
 
         Standard errors of more crossings than one matrix takes grow as those of an array without ends.
         """
-        from scipy.sparse import csc_array, diags_array
-        from scipy.sparse.linalg import splu
-
-        spread, shape = self.model.spread, self.pressure_kpa.shape
+        shape = self.pressure_kpa.shape
         pressure, sigma = (each.reshape(shape[0], -1).copy() for each in (self.pressure_kpa, self.sigma_kpa))
         masks, which = np.unique(np.isfinite(pressure), axis=0, return_inverse=True)
         for k, known in enumerate(masks):
-            own = csc_array(spread[known][:, known])
-            back = splu(csc_array(diags_array(spread[known].sum(1) / own.sum(1)) @ own))
-            at = np.ix_(which.ravel() == k, known)
-            pressure[at] = back.solve(pressure[at].T).T
-            if known.sum() > MOST_DENSE:
-                sigma[at] *= self.model.undone
-            else:
-                sigma[at] = np.sqrt(sigma[at] ** 2 @ (back.solve(np.eye(own.shape[0])) ** 2).T)
+            at, (back, squares) = np.ix_(which.ravel() == k, known), _back(self.model, known.tobytes())
+            pressure[at] = back(pressure[at].T).T
+            sigma[at] = sigma[at] * self.model.undone if squares is None else np.sqrt(sigma[at] ** 2 @ squares)
         lost = ~_known(sigma * PA_PER_KPA)
         pressure[lost] = sigma[lost] = nan
         return replace(self, pressure_kpa=pressure.reshape(shape), sigma_kpa=sigma.reshape(shape))
@@ -349,14 +342,26 @@ class MapInverter:
             return np.asarray(siemens.imag * self.nominal.siemens.imag > 0)
 
     def refuse_dead(self) -> None:
-        """BadInput where no crossing is alive."""
+        """BadInput where no crossing is alive, or where two capacitances give one reading."""
         if self.alive.any():
+            self._refuse_ambiguous()
             return
         read, predicted = (self._median(each[self.model.here]) for each in (self.rest_s, self.nominal.siemens))
         raise BadInput(
             f"no crossing reads at rest within a factor of {_ALIVE:g} of what is predicted: the median imaginary part "
             f"is {read}, predicted {predicted}; expected siemens, or capacitance_f in farad, of this array"
         )
+
+    def _refuse_ambiguous(self) -> None:
+        """Refuse capacitances alone near 45 degrees: there the imaginary part is largest, and on both sides alike."""
+        nominal = self.nominal.siemens[self.alive]
+        phase = float(np.degrees(np.arctan2(np.abs(nominal.imag), np.abs(nominal.real)).min()))
+        if not self.parts[0].any() and phase < _LEAST_PHASE:
+            raise BadInput(
+                f"capacitances alone at {si(self.readout.frequency_hz[0], 'Hz')}: resistance of the tracks turns the "
+                f"phase to {phase:.0f} degrees, where two of them give one reading; "
+                "expected siemens, or a lower frequency"
+            )
 
     def _median(self, siemens: Complex) -> str:
         """Median of the imaginary parts, and the capacitance that it is, in words."""
@@ -453,19 +458,20 @@ class MapInverter:
     def planned(self, siemens: Complex, plan: "MapPlan | None" = None) -> tuple[Real, Real, str]:
         """Capacitance over that at rest (k, m, n), its error by noise (m, n), and by which model, and why.
 
-        C/C0 where it agrees with the network in the heaviest frame, else the network. Of a plan that goes on, frames
-        are compared that are heavier by a tenth than all before.
+        C/C0 up to the first frame in which it differs from the network, from there on the network. Frames are compared
+        that are heavier by a tenth than all before, so that a frame has one answer, alone, in a lot or in a recording.
         """
         ratio, error, plan = self.by_ratio(siemens), self.error, plan or MapPlan()
-        loads = np.nansum(np.where(self.alive, ratio - 1, 0), (1, 2))
-        heaviest = int(loads.argmax())
-        if not plan.network and loads[heaviest] > _HEAVIER * plan.load:
-            plan.worst = max(plan.worst, self._compared(siemens[heaviest], ratio[heaviest]))
-            plan.load = max(float(loads[heaviest]), 0.0)
-        by = plan.words()
-        if not plan.network:
+        loads, light = np.nansum(np.where(self.alive, ratio - 1, 0), (1, 2)), 0
+        while light < len(loads) and not plan.network:
+            if loads[light] > _HEAVIER * plan.load:
+                plan.worst = max(plan.worst, self._compared(siemens[light], ratio[light]))
+                plan.load = max(float(loads[light]), 0.0)
+            light += not plan.network
+        by, solved = plan.words(), siemens[light:]
+        if not len(solved):
             return ratio, error, by
-        ratio = np.where(np.isfinite(siemens.imag), self.by_network(siemens), np.nan)
+        ratio[light:] = np.where(np.isfinite(solved.imag), self.by_network(solved), np.nan)
         if lost := int((np.isnan(ratio) & np.isfinite(siemens.imag) & self.alive).sum()):
             by += f"; {lost} values left out that {_STEPS} steps of Gauss-Newton did not settle"
         return ratio, error, by
@@ -486,6 +492,21 @@ class MapInverter:
             pressure, sigma = PA_PER_KPA * mean, PA_PER_KPA / NORMAL_90 * half
         shown, error_kpa = (np.where(given, each / PA_PER_KPA, np.nan) for each in (pressure, sigma))
         return PressureMaps(self.model, by, time_s, shown, error_kpa, calibration)
+
+
+@lru_cache(maxsize=4)
+def _back(model: ArrayModel, known: bytes) -> tuple[Callable[[Real], Real], "Real | None"]:
+    """Pressures on the surface by those that some crossings carry, and squares of that matrix, transposed, if small."""
+    from scipy.sparse import csc_array, diags_array
+    from scipy.sparse.linalg import splu
+
+    here = np.frombuffer(known, bool)
+    own = csc_array(model.spread[here][:, here])
+    back = splu(csc_array(diags_array(model.spread[here].sum(1) / own.sum(1)) @ own)).solve
+    if own.shape[0] > MOST_DENSE:
+        return back, None
+    inverse = back(np.eye(own.shape[0]))
+    return lambda pressure: inverse @ pressure, (inverse**2).T
 
 
 def _cell(value: float) -> float | None:

@@ -1,10 +1,10 @@
-"""Merge contacting boundaries so that the deformed cell can be meshed without slivers of air.
+"""Outlines of a deformed cell, contacting boundaries merged so that it can be meshed without slivers of air.
 
 Each of two faces in contact runs over the points of the other, so that both become one line. Mirrors at the cell's ends
 are faces as well; points that touch one are put onto it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -13,8 +13,9 @@ from shapely import STRtree, box
 
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.units import M_PER_MM
-from sensorgen.solvers.contact.cell import OUTSIDE
+from sensorgen.solvers.contact.cell import OUTSIDE, ContactCell
 from sensorgen.solvers.contact.contact import Faces
+from sensorgen.solvers.contact.mesh import TriangleMesh, at_border
 
 Run = tuple[int, int]
 Sides = dict[Run, tuple[int, int]]
@@ -25,6 +26,7 @@ _ONE = 0.25  # points that touch and are nearer than this share of a side become
 _PAST = 0.1  # how far past its ends a side is still touched [-]
 _CORNER = 0.1  # sine of the angle by which a face turns at a corner, at least [-]
 _AGAINST = -0.3  # faces whose normals' product is above this do not look at each other [-]
+_ROUND = [0, 3, 1, 4, 2, 5]  # the nodes of a triangle, in turn
 
 
 @dataclass(frozen=True)
@@ -209,3 +211,56 @@ def _ways(border: _Air, instead: Whole, touched: Mask) -> list[list[int]]:
             border.places[over, 0] = border.places[a, 0]
         found.append([a, *(p for p in over.tolist() if p not in (a, b)), b])
     return found
+
+
+def deformed(cell: ContactCell, mesh: TriangleMesh, faces: Faces, u_m: Real) -> ContactCell:
+    """The cell at given displacements (2n) [m]; the sides of gaps become two straight pieces each."""
+    places = (mesh.points_m + u_m.reshape(-1, 2)) / M_PER_MM
+    found = _edges(cell, mesh)
+    if u_m.any():
+        found = closed(found, cell.air, places, faces)
+    edges = {}
+    for (a, b), sides in found.items():
+        p, q = (tuple(np.round(places[k], 9).tolist()) for k in (a, b))
+        if sides[0] != sides[1] and p != q:
+            edges[(p, q) if p < q else (q, p)] = sides if p < q else sides[::-1]
+    return replace(cell, edges=edges, right_mm=float(np.round(places[mesh.points_m[:, 0].argmax(), 0], 9)))
+
+
+def misfit(cell: ContactCell, mesh: TriangleMesh, u_m: Real) -> float:
+    """Largest change of a solid's area by what was closed, over that area [-]; ``cell`` has the closed outlines."""
+    places = (mesh.points_m + u_m.reshape(-1, 2)) / M_PER_MM
+    x, y = places[mesh.outer[:, _ROUND]].transpose(2, 0, 1)
+    areas = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) / 2
+    kept = np.bincount(mesh.region, areas, len(cell.regions) + 1)
+    found = np.zeros(len(kept))
+    for (a, b), sides in cell.edges.items():
+        half = (a[0] * b[1] - a[1] * b[0]) / 2
+        found[sides[0]] += half
+        found[sides[1]] -= half
+    solid = kept > 0
+    return float(np.abs(found[solid] / kept[solid] - 1).max())
+
+
+def _edges(cell: ContactCell, mesh: TriangleMesh) -> Sides:
+    """Sides between different regions: (node, node) to the regions on their left and right; halved but at walls."""
+    found: Sides = {}
+    air, x, middles = cell.air, mesh.points_m[:, 0], mesh.rim[:, 2]
+    walls = set(middles[np.isin(x[middles], (x.min(), x.max()))].tolist())  # middles of sides at the cell's ends
+    for k in range(3):
+        for (a, m, b), region in zip(
+            mesh.outer[:, [k, k + 3, (k + 1) % 3]].tolist(), mesh.region.tolist(), strict=True
+        ):
+            for p, q in ((a, b),) if m in walls else ((a, m), (m, b)):
+                if (q, p) in found:
+                    found[q, p] = (found[q, p][0], region)
+                else:
+                    found[p, q] = (region, OUTSIDE)
+    for a, b, m in mesh.rim[~at_border(mesh)].tolist():
+        for run in ((a, m), (m, b)):
+            found[run] = (found[run][0], air)
+    nodes = {tuple(np.round(p / M_PER_MM, 9).tolist()): k for k, p in enumerate(mesh.points_m)}
+    for (p, q), sides in cell.edges.items():
+        if air != OUTSIDE and set(sides) == {air, OUTSIDE}:
+            found[nodes[p], nodes[q]] = sides
+    return {run: sides for run, sides in found.items() if sides[0] != sides[1]}

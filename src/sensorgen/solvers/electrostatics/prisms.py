@@ -446,29 +446,42 @@ def _lower(mesh: PrismMesh, order: int) -> tuple[float, int]:
     """Thomson's functional of the best flux, and its unknowns."""
     import ngsolve as ng
 
-    space, cell = mesh.netgen, mesh.cell
     eps, names = _coefficients(mesh)
-    normal = ng.specialcf.normal(3)
-    plain = ng.FacetFESpace(space, order=order - 1, dirichlet="|".join(names))
-    facet = ng.Periodic(plain) if any(cell.periodic) else plain
-    below = ng.HDiv(space, order=order - 1, discontinuous=True, hodivfree=True) * ng.L2(space, order=0) * facet
-    (d, q, w), (e, r, z) = below.TnT()
-    form = ng.BilinearForm(below, symmetric=True, condense=True)
-    form += -(d * e / eps - q * ng.div(e) - r * ng.div(d)) * ng.dx
-    form += -(w * (e * normal) + z * (d * normal)) * ng.dx(element_boundary=True)
-    lower, found = balanced(form, lambda f: f.components[2], names)
-    field = found.components[0]
-    energy = ng.Integrate(field * field / eps, space, order=2 * order)
-    charges = [
-        -ng.Integrate(one.components[2] * (field * normal) * ng.dx(element_boundary=True), space)
-        for one in indicators(below, lambda f: f.components[2], names)
-    ]
+    field, lower, charges, unknowns = fluxes(mesh.netgen, eps, names, order - 1, periodic=any(mesh.cell.periodic))
+    energy = ng.Integrate(field * field / eps, mesh.netgen, order=2 * order)
     wrong = max(
         abs(energy - lower), abs(charges[TOP] - lower), abs(charges[BOTTOM] + lower), *map(abs, charges[2:]), 0.0
     )
     if not wrong < _BALANCE * lower:
         raise Unsolved(f"energy and charges differ by {wrong / lower:.1g}: triangles too slender for doubles")
-    return lower, facet.ndof
+    return lower, unknowns
+
+
+def fluxes(
+    space: Any, eps: Any, metal: Sequence[str], order: int, *, periodic: bool = False
+) -> tuple[Any, float, list[float], int]:
+    """The best flux of an order, its energy, the charge that it brings to each conductor, and the unknowns.
+
+    Its normal component is continuous in every moment of that order, which is all that it has: reference elements hold
+    the product of flux and face unchanged, however they are curved.
+    """
+    import ngsolve as ng
+
+    normal = ng.specialcf.normal(3)
+    plain = ng.FacetFESpace(space, order=order, dirichlet="|".join(metal))
+    facet = ng.Periodic(plain) if periodic else plain
+    below = ng.HDiv(space, order=order, discontinuous=True, hodivfree=True) * ng.L2(space, order=0) * facet
+    (d, q, w), (e, r, z) = below.TnT()
+    form = ng.BilinearForm(below, symmetric=True, condense=True)
+    form += -(d * e / eps - q * ng.div(e) - r * ng.div(d)) * ng.dx
+    form += -(w * (e * normal) + z * (d * normal)) * ng.dx(element_boundary=True)
+    energy, best = balanced(form, lambda f: f.components[2], metal)
+    field = best.components[0]
+    charges = [
+        -float(ng.Integrate(one.components[2] * (field * normal) * ng.dx(element_boundary=True), space))
+        for one in indicators(below, lambda f: f.components[2], metal)
+    ]
+    return field, energy, charges, facet.ndof
 
 
 def _coefficients(mesh: PrismMesh) -> tuple[Any, list[str]]:

@@ -11,8 +11,8 @@ from math import atan2, hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.scene.sections import ROUNDING_MM
-from sensorgen.scene.unit_cell import SectionCell
+from sensorgen.scene.sections import ROUNDING_MM, Section
+from sensorgen.scene.unit_cell import SectionCell, cell
 
 Edge = tuple[int, int]
 Triangle = tuple[int, int, int]
@@ -324,3 +324,29 @@ def fans(triangles: Sequence[Triangle]) -> dict[int, list[Fan]]:
                 fan.spokes.append(spoke)
             found[corner].append(fan)
     return found
+
+
+def energy(section: Section, height_mm: float, permittivity: Mapping[str, float]) -> float:
+    """Least energy of such potentials at 1 V, per depth and over eps0 [-], the same in each repeating cell.
+
+    Raises
+    ------
+    ValueError
+        The electrodes touch, none lies opposite the other, or the field between them would leave the sensor.
+    """
+    mesh = triangles(cell(section, height_mm))
+    used, corners = np.unique(np.array(mesh.triangles), return_inverse=True)
+    corners = corners.reshape(-1, 3)
+    points = mesh.points[used][corners]
+    sides = np.roll(points, -1, axis=1) - np.roll(points, -2, axis=1)
+    twice = np.abs(np.linalg.det(sides[:, :2]))
+    eps = np.array([permittivity[material] * share for material, share in mesh.regions])
+    stiffness = np.zeros((len(used),) * 2)
+    parts = (eps / (2 * twice))[:, None, None] * (sides @ sides.transpose(0, 2, 1))
+    np.add.at(stiffness, (corners[:, :, None], corners[:, None, :]), parts)
+    held = np.full(len(used), np.nan)
+    for edge, name in mesh.terminals.items():
+        held[np.searchsorted(used, edge)] = float(name == "top")
+    free = np.isnan(held)
+    held[free] = np.linalg.solve(stiffness[free][:, free], -stiffness[free][:, ~free] @ held[~free])
+    return float(held @ stiffness @ held)

@@ -9,9 +9,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
-from sensorgen.solvers.sheet.grid import axes, fold, folds
 from sensorgen.solvers.sheet.network import BY, links, network
-from sensorgen.solvers.sheet.parts import SIDES, Contact, Port, Sheet, SheetPatch, check, check_patch, contacts_of
+from sensorgen.solvers.sheet.parts import (
+    SIDES,
+    Contact,
+    Port,
+    Sheet,
+    SheetPatch,
+    axes,
+    check,
+    check_patch,
+    contacts_of,
+    fold,
+    folds,
+)
 
 COARSEST, FINEST = 10, 320  # cells between which a resolution is looked for
 _HIGHEST_HZ = 1e100

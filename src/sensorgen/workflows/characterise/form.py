@@ -234,17 +234,17 @@ def observations(form: Form, known: Sequence[Coupon], expected: Mapping[str, Seq
         A value that is no number, negative, or so far from the expected one that its unit is wrong; no reading at all.
     """
     coupons = {coupon.name: coupon for coupon in known}
-    found = []
+    observed = []
     for name, fields in form.coupons.items():
         if name == LINES:
             continue
         base = re.sub(r"-[b-d]$", "", name)
         if base not in coupons:
             raise UnknownName("coupon", name, [*coupons, LINES])
-        found.append(_observation(name, coupons[base], fields, form.meters, expected[base]))
-    if not any(o.read.any() for o in found):
+        observed.append(_observation(name, coupons[base], fields, form.meters, expected[base]))
+    if not any(o.read.any() for o in observed):
         raise BadInput("no reading in the form: fill in the numbers in place of ~")
-    return found
+    return observed
 
 
 def _observation(

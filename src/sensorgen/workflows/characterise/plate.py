@@ -34,8 +34,7 @@ from sensorgen.export.threemf.part import part_of
 from sensorgen.scene.drawing import paper
 from sensorgen.scene.geometry import meshes
 from sensorgen.scene.scene import Body, Prism, box
-from sensorgen.workflows.batch.layout import Plate, packed, room
-from sensorgen.workflows.batch.picture import bed_of, bed_svg, middle
+from sensorgen.workflows.batch.layout import Plate, bed_of, bed_svg, middle, packed, room
 
 if TYPE_CHECKING:
     from shapely import Polygon
@@ -203,8 +202,8 @@ def threemfs(
             made.append(threemf.Part(**{**vars(part), "settings": {**part.settings, **aligned}}))
         parts += threemf.placed(made, place.centre_mm, coupons[number].name if own else "lines")
     (x, y), (wide, deep) = design.machine.bed_centre_mm(), design.machine.bed_mm
-    found = loads(design)
-    primed, profile = tower(design.machine, design.layers, 2), prusa.profile(design.machine, design.layers, found)
+    by_tool = loads(design)
+    primed, profile = tower(design.machine, design.layers, 2), prusa.profile(design.machine, design.layers, by_tool)
     for family in threemf.FAMILIES:
         content = threemf.plate(family, name, parts, (x - wide / 2, y - deep / 2), primed, profile)
         yield f"{name}.{family}.3mf", content

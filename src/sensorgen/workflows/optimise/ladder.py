@@ -1,7 +1,7 @@
 """Knowledge of one design, the least expensive first: design rules, bounds at rest, a coarse mesh, everything."""
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from functools import cache as once
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,7 @@ from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.prediction.sensor_model import build_sensor, piece, pressure_pa
 from sensorgen.workflows.moves import short
 from sensorgen.workflows.optimise.target import NUMBERS
+from sensorgen.workflows.search import EarlyNumber
 from sensorgen.workflows.trial import Numbers, Trial, trial
 
 if TYPE_CHECKING:
@@ -34,23 +35,6 @@ AT_REST = frozenset({"gap_mm", "capacitance_pf", "top_electrode_ohm", "bottom_el
 COARSE = AT_REST | {"force_resolution_n", "position_resolution_mm", "sensitivity_per_kpa"}
 _PA_PER_KPA = 1e3
 _TRIAL = 5  # version of the stored trials
-
-
-@dataclass(frozen=True)
-class EarlyNumber:
-    """A number of one design before it is evaluated.
-
-    Attributes
-    ----------
-    lower, upper : float
-        Bounds where they are certified; else both are a value of unknown error [unit of its name].
-    certified : bool
-        Whether they are proven.
-    """
-
-    lower: float
-    upper: float
-    certified: bool
 
 
 def rules(design: Design) -> list[tuple[str, str]]:

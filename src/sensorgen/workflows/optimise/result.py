@@ -10,9 +10,11 @@ from sensorgen.core.display import Displayed
 from sensorgen.core.document import Cell, Column, Part, Table, comma_separated, shown
 from sensorgen.core.findings import Verdict
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
-from sensorgen.workflows.optimise.search import Row, Searched
+from sensorgen.workflows.optimise.front import Searched, value_of
 from sensorgen.workflows.optimise.target import NUMBERS, Target
 from sensorgen.workflows.optimise.ties import RULE, tied
+from sensorgen.workflows.optimise.ties import worth as worth_of
+from sensorgen.workflows.search import Candidate
 
 _LISTED = 8  # designs, of those that are tied
 _SAME = 1e-9  # relative difference of numbers that are equal but for rounding
@@ -358,36 +360,26 @@ def _remarks(found: Searched) -> Iterator[str]:
             )
 
 
-def chosen(target: Target, row: Row, *, leads: bool = False, ties: tuple[int, ...] = ()) -> Chosen:
+def chosen(target: Target, row: Candidate, *, leads: bool = False, ties: tuple[int, ...] = ()) -> Chosen:
     """A design of the space as plain data."""
-    trial, design = row.trial, row.candidate.design
+    trial, design = row.trial, row.made
     wanted = dict.fromkeys((*target.objectives, *target.limits, "capacitance_pf"))
-    values = {k: NUMBERS[k].of(trial.printed, trial.toolpath) for k in wanted} if trial else {}
+    values = {k: value_of(k, row) for k in wanted}
     uninformed = {k: limit for k in values if trial and (limit := NUMBERS[k].uninformed(trial)) < inf}
     return Chosen(
-        row.number, row.candidate.values, design.name if design else "", design.id() if design else "",
+        row.number, dict(row.values), design.name if design else "", design.id() if design else "",
         row.discarded, tuple(row.violated), trial.verdict if trial else "",
         {key: value for key, value in values.items() if value}, leads, ties, uninformed,
     )  # fmt: skip
 
 
-def leads(found: Searched) -> list[Row]:
+def leads(found: Searched) -> list[Candidate]:
     """Of the front, the designs that no other's best values are better than."""
-    worth = {}
-    for row in found.front:
-        if row.trial:
-            numbers = {k: NUMBERS[k].of(row.trial.printed, row.trial.toolpath) for k in found.target.objectives}
-            worth[row.number] = [found.target.worth(k, b.value) for k, b in numbers.items() if b]
+    keys = found.target.objectives
+    worth = {row.number: {key: worth_of(found.target, key, row) for key in keys} for row in found.front}
 
-    def is_beaten(row: Row) -> bool:
-        mine = worth[row.number]
-        others = (other for number, other in worth.items() if number != row.number)
-        steps = ([a - b for a, b in zip(o, mine, strict=True)] for o in others)
-        slack = [_SAME * abs(a) for a in mine]
-        return any(
-            all(s <= t for s, t in zip(step, slack, strict=True))
-            and any(s < -t for s, t in zip(step, slack, strict=True))
-            for step in steps
-        )
+    def is_better(one: dict[str, float], other: dict[str, float]) -> bool:
+        slack = {key: _SAME * abs(other[key]) for key in keys}
+        return all(one[k] <= other[k] + slack[k] for k in keys) and any(one[k] < other[k] - slack[k] for k in keys)
 
-    return [row for row in found.front if not is_beaten(row)]
+    return [row for row in found.front if not any(is_better(one, worth[row.number]) for one in worth.values())]
