@@ -100,8 +100,8 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
 
 
 def _is_one_section(scene: Scene) -> bool:
-    found = parts(scene)
-    return len(found) == 1 and not found[0].in_plan
+    sections_of = parts(scene)
+    return len(sections_of) == 1 and not sections_of[0].in_plan
 
 
 def _level(rows: Sequence["_Row"]) -> float:

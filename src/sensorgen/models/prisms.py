@@ -25,7 +25,6 @@ from sensorgen.scene.repetition import Repeat, halved, raster, repeat, widened
 from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene
 from sensorgen.scene.slabs import Slab, is_open, slabs
 from sensorgen.solvers.electrostatics import bounds as fem
-from sensorgen.solvers.electrostatics.enclosed import enclosing
 from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, LayerCell, PrismMesh, plan, solved
 
 SOURCE = "Dirichlet's and Thomson's principles; prisms of triangles, H1 and hybrid H(div) by NGSolve"
@@ -102,16 +101,16 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
             most = _OPEN_MB if cell.air_mm else _MOST_MB
             if outer.memory_mb(order) > most:
                 raise fem.Unsolved(f"{outer.memory_mb(order):.0f} MB; meshes of up to {most:g} MB are solved")
-            found = solved(inner, outer, order, cell.shares(outer), enclosed=enclosed)
+            energies = solved(inner, outer, order, cell.shares(outer), enclosed=enclosed)
         except fem.Unsolved as error:
             failed = error
             continue
         except shapely.errors.GEOSException as error:  # outlines that rounding makes invalid
             failed = fem.Unsolved(str(error))
             continue
-        interval = fem.whole(found, np.outer(cell.x.shares, cell.y.shares).ravel().tolist())
+        interval = fem.whole(energies, np.outer(cell.x.shares, cell.y.shares).ravel().tolist())
         reached = True
-        yield fem.FieldStep(order, int(outer.free.sum()), found.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
+        yield fem.FieldStep(order, int(outer.free.sum()), energies.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
         if interval.width() <= width:
             return
     if failed and not reached:
@@ -123,6 +122,8 @@ def _meshes(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> tup
 
     With air around it, the flux stays in that air, and the potential is constant beyond: a conductor that floats.
     """
+    from sensorgen.solvers.electrostatics.enclosed import enclosing
+
     far_mm, loose_mm = np.inf if cell.air_mm else _FAR * cell.gap_mm, _LOOSE * cell.gap_mm
     is_sound = False
     with suppress(fem.Unsolved):  # the grid is too fine, as coarser ones below may not be
@@ -134,7 +135,7 @@ def _meshes(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> tup
             if exact.plan.slenderness_mm() > _SLENDER_MM:
                 other = PrismMesh.of(cell.inside_shell(layers), beside, _GRID_MM, far_mm) if cell.air_mm else exact
                 return exact, other, False
-    found = []
+    meshes = []
     for outwards, least_mm in ((False, _SLENDER_MM), (True, _SLENDER_MM / 10)):  # a potential bears more than a flux
         for grid_mm in _COARSER_MM:
             some = replace(layers, regions=cell.outer) if outwards and cell.outer else layers
@@ -144,8 +145,8 @@ def _meshes(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> tup
             mesh = PrismMesh.of(near, beside_mm, grid_mm, far_mm)
             if mesh.plan.slenderness_mm() > least_mm:
                 break
-        found.append(mesh)
-    return found[0], found[1], True
+        meshes.append(mesh)
+    return meshes[0], meshes[1], True
 
 
 @dataclass(frozen=True)
@@ -212,10 +213,10 @@ class _Cell:
     def shares(self, mesh: PrismMesh) -> np.ndarray:
         """Number of times that each triangle of a mesh occurs in the sensor, beyond the least (t,)."""
         middle = mesh.plan.points_mm[mesh.plan.triangles].mean(1)
-        found = np.ones(len(middle))
+        shares = np.ones(len(middle))
         for at, side in zip(middle.T, (self.x, self.y), strict=True):
-            found *= side.shares[np.searchsorted(side.places_mm[1:-1] - side.low_mm, at)]
-        return np.asarray(found - self.x.shares.min() * self.y.shares.min())
+            shares *= side.shares[np.searchsorted(side.places_mm[1:-1] - side.low_mm, at)]
+        return np.asarray(shares - self.x.shares.min() * self.y.shares.min())
 
 
 @lru_cache(maxsize=8)
@@ -301,8 +302,8 @@ def _surrounded(scene: Scene, layers: Sequence[Slab], x: Repeat, y: Repeat, gap_
     low, high = levels_mm[0] - air, levels_mm[-1] + air
     inside = _within(layers, sides[0], sides[1])
     heights = [low - thick, low, *levels_mm, high, high + thick]
-    found = _numbered(heights, [{}, {}, *inside, {}, {}], sides[0], sides[1], air)
-    return replace(found, open_sides=(ends[0], ends[1]))
+    cell = _numbered(heights, [{}, {}, *inside, {}, {}], sides[0], sides[1], air)
+    return replace(cell, open_sides=(ends[0], ends[1]))
 
 
 def _enclosed(scene: Scene) -> _Cell:
@@ -318,11 +319,11 @@ def _enclosed(scene: Scene) -> _Cell:
         return ends[body.terminal] if body.terminal else conductors + names.index(body.material)
 
     def numbered(own: dict[Body, Region]) -> dict[int, Region]:
-        found: dict[int, list[Region]] = defaultdict(list)
+        by_kind: dict[int, list[Region]] = defaultdict(list)
         for body, region in own.items():
             if body.material != "air" and not region.is_empty:
-                found[kind(body)].append(translate(region, -x.low_mm, -y.low_mm))
-        return {k: shapely.union_all(regions) for k, regions in found.items()}
+                by_kind[kind(body)].append(translate(region, -x.low_mm, -y.low_mm))
+        return {k: shapely.union_all(regions) for k, regions in by_kind.items()}
 
     every = [region for slab in layers for own in (slab.inner, slab.outer) for region in own.values()]
     heights = _levels(layers)
@@ -391,12 +392,12 @@ def _numbered(
 
 def _dielectrics(own: Mapping[Body, Region], first: int, names: Sequence[str]) -> dict[int, Region]:
     """Region of each dielectric of a layer, numbered by its material; air is left out."""
-    found: dict[int, Region] = {}
+    by_kind: dict[int, Region] = {}
     for body, region in own.items():
         if not body.terminal and body.material != "air" and not region.is_empty:
             kind = first + names.index(body.material)
-            found[kind] = shapely.union_all([found.get(kind, region), region])
-    return found
+            by_kind[kind] = shapely.union_all([by_kind.get(kind, region), region])
+    return by_kind
 
 
 def _conductors(connected: Sequence[int], terminals: Sequence[str]) -> Whole:
@@ -423,10 +424,10 @@ def _uncovered(plans: np.ndarray, kinds: np.ndarray, sizes_mm: tuple[float, floa
 def _gap_mm(regions: Sequence[dict[int, Region]], heights_mm: Sequence[float], conductors: int) -> float:
     """Smallest distance of an electrode from another conductor [mm]."""
     spans = list(pairwise(heights_mm))
-    found = np.inf
+    least = np.inf
     for (i, one), (j, other) in product(enumerate(regions), repeat=2):
         apart = max(spans[i][0] - spans[j][1], spans[j][0] - spans[i][1], 0.0)
-        for end in {BOTTOM, TOP} & one.keys() if apart < found else ():
+        for end in {BOTTOM, TOP} & one.keys() if apart < least else ():
             for kind in (k for k in other if k < conductors and k != end):
-                found = min(found, float(np.hypot(shapely.distance(one[end], other[kind]), apart)))
-    return found
+                least = min(least, float(np.hypot(shapely.distance(one[end], other[kind]), apart)))
+    return least

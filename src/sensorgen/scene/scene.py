@@ -270,6 +270,16 @@ class Fill:
     support: str = ""
 
 
+def parameter(default: float, about: str, low: float, high: float, **more: Any) -> Any:
+    """Field of a shape's parameter, with its help and its range."""
+    return field(default=default, metadata={"help": about, "range": (low, high), **more})
+
+
+def choice(default: str, about: str, *choices: str) -> Any:
+    """Field of a shape's parameter that is one of several words."""
+    return field(default=default, metadata={"help": about, "choices": choices})
+
+
 @dataclass(frozen=True)
 class Envelope:
     """Parameters that every shape has.
@@ -277,12 +287,10 @@ class Envelope:
     The ranges in the metadata are those of sense for a printed sensor, far wider than any printer's.
     """
 
-    length_mm: float = field(default=100.0, metadata={"help": "Length of the sensor, along x.", "range": (1.0, 1000.0)})
-    width_mm: float = field(default=10.0, metadata={"help": "Width of the sensor, along y.", "range": (1.0, 1000.0)})
-    electrode_mm: float = field(default=0.3, metadata={"help": "Thickness of each electrode.", "range": (0.01, 10.0)})
-    isolation_mm: float = field(
-        default=0.0, metadata={"help": "Isolation layer over the top electrode; 0 leaves it out.", "range": (0.0, 10.0)}
-    )
+    length_mm: float = parameter(100.0, "Length of the sensor, along x.", 1.0, 1000.0)
+    width_mm: float = parameter(10.0, "Width of the sensor, along y.", 1.0, 1000.0)
+    electrode_mm: float = parameter(0.3, "Thickness of each electrode.", 0.01, 10.0)
+    isolation_mm: float = parameter(0.0, "Isolation layer over the top electrode; 0 leaves it out.", 0.0, 10.0)
 
     def cells(self) -> float:
         """Number of cells of a repeating pattern in the sensor; 1 without a pattern [-]."""
@@ -292,6 +300,19 @@ class Envelope:
         """All of the plan between two heights; nothing where they are one [mm]."""
         plates = (box(0.0, self.length_mm, 0.0, self.width_mm, low_mm, high_mm),)
         return plates if high_mm - low_mm > SLIVER_MM else ()
+
+    def between_electrodes(
+        self, fill: Fill, bodies: Sequence[Body], roof_mm: float, cogs: tuple[Piece, ...] | None = None
+    ) -> Scene:
+        """Scene of bodies between two plain electrodes, the upper one from a height on, perhaps with cogs [mm]."""
+        name, top = "top_electrode" if cogs is None else "top_electrode_with_cogs", roof_mm + self.electrode_mm
+        every = (
+            Body("bottom_electrode", fill.bottom_electrode, self.plate(0.0, self.electrode_mm), "bottom"),
+            *bodies,
+            Body(name, fill.top_electrode, (cogs or ()) + self.plate(roof_mm, top), "top"),
+            Body("isolation", fill.isolation, self.plate(top, top + self.isolation_mm)),
+        )
+        return Scene(every, (self.length_mm, self.width_mm, rounded(top + self.isolation_mm)))
 
 
 def seen_from_above(piece: Piece) -> Outline:

@@ -18,8 +18,8 @@ from importlib import resources
 
 from sensorgen.core.findings import Finding
 from sensorgen.scene.drawing import dimensions, layers, markers, panels, titleblock
-from sensorgen.scene.drawing.panels import Colours, ViewPanel
-from sensorgen.scene.drawing.paper import ARROWS, box, element, escaped, line
+from sensorgen.scene.drawing.panels import Colours
+from sensorgen.scene.drawing.paper import ARROWS, ViewPanel, box, element, escaped, line
 from sensorgen.scene.drawing.view import Measure, heights, nearest, views, widths
 from sensorgen.scene.scene import Point, Scene
 

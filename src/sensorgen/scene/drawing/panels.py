@@ -1,11 +1,11 @@
 """Views on the page: their scale, their room, and the materials in them."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import floor, log10
 
 from sensorgen.scene.drawing import dimensions
-from sensorgen.scene.drawing.paper import ViewFrame, box, element, fitted, number, text
+from sensorgen.scene.drawing.paper import ViewFrame, ViewPanel, box, element, fitted, number, text
 from sensorgen.scene.drawing.view import Measure, View
 from sensorgen.scene.scene import AXES, Body, Point, Scene, clipped
 
@@ -23,18 +23,6 @@ STRIP_LEFT, STRIP_RIGHT = 14.0, 4.0  # room beside a strip [mm]
 
 Colours = Mapping[str, tuple[str, str]]
 MISSING_COLOUR = "#c8c8c8"
-
-
-@dataclass(frozen=True)
-class ViewPanel:
-    """A view and where it stands on the page."""
-
-    view: View
-    frame: ViewFrame
-
-    def place(self, at_mm: Point) -> Point:
-        """Place on the page of a point (along, z) of the section [mm]."""
-        return self.frame.x(at_mm[0]), self.frame.y(at_mm[1])
 
 
 Room = tuple[float, float, float, float]  # left, top, right, bottom on the page [mm]

@@ -15,9 +15,8 @@ from sensorgen.models import capacitance_models, thesis_cells
 from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import mesh_ladder, planning
-from sensorgen.prediction.capacitance import is_plate
+from sensorgen.prediction.capacitance import expected, is_plate
 from sensorgen.prediction.compression_law import CLOSED_FORM, elastic, law_of
-from sensorgen.prediction.cost_model import expected
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import piece
