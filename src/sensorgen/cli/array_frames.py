@@ -60,6 +60,10 @@ def _refuse(task: "Task", *, perfect: bool, law: str) -> None:
     """Refuse options of lines."""
     given = {"--perfect": perfect, "--compression": law, "--prior": task.prior, "--force-limit": task.force_limit_n,
              "--newest": task.newest}  # fmt: skip
+    if task.output not in ("", "-") and Path(task.output).suffix not in (".npz", ".csv"):
+        raise BadInput(
+            f"--output {task.output}: expected a name that ends in .npz (maps) or .csv (a row for each frame)"
+        )
     if refused := next((option for option, value in given.items() if value), None):
         raise BadInput(f"{refused} is for lines; an array is inverted with --readout, --input, --noise and --scatter")
 

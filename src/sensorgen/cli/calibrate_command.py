@@ -20,6 +20,9 @@ _OF_SPECIMENS = {
     "page": "--page",
     "source": "--source",
     "dry_run": "--dry-run",
+    "tip": "--tip",
+    "force_offset": "--force-offset",
+    "file": "--log",
 }
 _OF_ARRAYS = {"array": "--array", "calibration": "--calibration", "by_first": "--by-first",
               "frequency_hz": "--frequency"}  # fmt: skip
