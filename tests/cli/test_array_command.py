@@ -88,7 +88,7 @@ def test_the_shape_has_options_like_others(run):
         (("invert", "a.yaml", "f.csv", "--perfect"), "--perfect is for lines"),
         (("invert", "a.yaml", "f.csv"), "no frequency of the readings"),
         (("invert", "a.yaml", "g.csv"), "frequency_hz is 1 kHz to 10 kHz; expected one frequency in all frames"),
-        (("invert", "a.yaml", "f.csv", "-o", "f.h5"), "--output f.h5: expected a name that ends in .npz"),
+        (("invert", "a.yaml", "f.csv", "-o", "f.h5"), "--output f.h5: expected a name in .npz"),
         (("array", "a.yaml", "--simulate", "f.csv"), "--simulate f.csv: expected a name that ends in .npz"),
         (("invert", "a.yaml", "f.csv", "--frequency", "10kHz"), "taken for rest; not read: Rest"),
     ],

@@ -145,8 +145,8 @@ def _noise_after(change: _Change) -> float:
     from sensorgen.prediction.array.readout import ArrayReadout
     from sensorgen.prediction.array.study import study
 
-    found = study(array_model(make(_with(change))), ArrayReadout())
-    return float(np.median(found.sigma_kpa[found.determined]))
+    resolution = study(array_model(make(_with(change))), ArrayReadout())
+    return float(np.median(resolution.sigma_kpa[resolution.determined]))
 
 
 def _run(

@@ -43,7 +43,7 @@ def by_lu(matrix: csr_matrix, right: Real) -> Real | None:
 
 
 @dataclass(frozen=True)
-class Front:
+class FrontalMatrix:
     """Unknowns that are eliminated together.
 
     Attributes
@@ -72,7 +72,7 @@ class Order:
     """In what order unknowns are eliminated, and in which fronts."""
 
     turn: Whole
-    fronts: list[Front]
+    fronts: list[FrontalMatrix]
 
 
 def order_of(matrix: csr_matrix, places: Whole) -> Order:
@@ -92,12 +92,12 @@ def order_of(matrix: csr_matrix, places: Whole) -> Order:
     turn = np.concatenate([own for own, _ in pieces])
     ends = np.cumsum([len(own) for own, _ in pieces])
     turned = matrix[turn][:, turn]
-    fronts: list[Front] = []
+    fronts: list[FrontalMatrix] = []
     for (own, children), stop in zip(pieces, ends.tolist(), strict=True):
         start = stop - len(own)
         near = [turned.indices[turned.indptr[start] : turned.indptr[stop]], *(fronts[c].outer for c in children)]
         outer = np.unique(np.concatenate(near))
-        fronts.append(Front(start, stop, outer[outer >= stop].astype(np.int64), children))
+        fronts.append(FrontalMatrix(start, stop, outer[outer >= stop].astype(np.int64), children))
     return Order(turn, fronts)
 
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from sensorgen.core.arrays import Mask, Real, Whole
-from sensorgen.scene.raster import raster
+from sensorgen.scene.repetition import raster
 from sensorgen.scene.scene import Body, Scene
 from sensorgen.solvers.electrostatics.corners import exponent
 

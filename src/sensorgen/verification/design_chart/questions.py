@@ -15,14 +15,13 @@ from sensorgen.models import capacitance_models, thesis_cells
 from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import mesh_ladder, planning
-from sensorgen.prediction.capacitance import is_plate
+from sensorgen.prediction.capacitance import expected, is_plate
 from sensorgen.prediction.compression_law import CLOSED_FORM, elastic, law_of
-from sensorgen.prediction.cost_model import expected
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import piece
 from sensorgen.solvers.line.inputs import PressedLine, read
-from sensorgen.verification import line_models, many_digits, peers
+from sensorgen.verification import line_models, peers
 from sensorgen.verification.apart import Work
 from sensorgen.verification.design_chart import works
 
@@ -227,7 +226,7 @@ def exact(line: PressedLine) -> tuple[complex, ...]:
     """Impedance of a line at every frequency, in many digits [ohm]."""
     r, y, length = read(line).sections()
     return tuple(
-        many_digits.impedance(
+        line_models.exact_impedance(
             [float(np.ravel(a)[0]) for a in r], [complex(np.ravel(a)[min(k, np.size(a) - 1)]) for a in y],
             [float(a) for a in length],
         )

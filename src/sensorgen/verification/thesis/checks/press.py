@@ -14,7 +14,7 @@ from sensorgen.prediction import compression as compressed
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor
-from sensorgen.verification.thesis.checks._text import table
+from sensorgen.verification.thesis.items import table
 from sensorgen.verification.thesis.verdicts import ItemPart
 
 _KPA = 100.0
