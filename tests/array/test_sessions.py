@@ -341,3 +341,5 @@ def test_commands_calibrate_and_invert_any_array(tmp_path):
     assert run(tmp_path, "calibrate", "0.csv", "S1")[0] == 2
     assert run(tmp_path, "calibrate", *files, "--frequency", "10kHz")[0] == 2
     assert run(tmp_path, "invert", "later.npz", "later.npz")[0] == 2
+    for ignored in (("--tip", "8"), ("--force-offset", "1"), ("--log", "l.db")):
+        assert run(tmp_path, "calibrate", *files, *ignored)[0] == 2

@@ -358,11 +358,13 @@ class CalibrationStudy:
         gains = law.at[law.alive, 0]
         scatter = 100 * gains.std() / abs(gains.mean())
         yield "law", f"{law.form.words()}{drift}; gain differs between elements by {scatter:.2g} %"
-        yield (
-            "error",
+        own = (
             f"{known.floor_kpa:.3g} kPa and {100 * known.share:.2g} % of the pressure, interval of {LEVEL:.0%}: "
-            f"{known.reach:.3g} times that; all at once {100 * known.common:.2g} %",
+            f"{known.reach:.3g} times that"
+            if known.floor_kpa
+            else "of one element not known, by total forces alone; expected a bladder or presses too"
         )
+        yield "error", f"{own}; all at once {100 * known.common:.2g} %"
         if (dead := np.flatnonzero(~law.alive) + 1).size:
             more = ", ..." if dead.size > _SHOWN else ""
             yield "dead", f"{dead.size} elements, from 1: {', '.join(map(str, dead[:_SHOWN].tolist()))}{more}"
