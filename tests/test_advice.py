@@ -139,8 +139,7 @@ def test_a_change_that_is_not_needed_is_dropped(plate):
     design, made, _ = plate
     search = AdviceSearch(design, made, 1e9, lambda _: None, time.process_time())
     idle = {("parameters", "length_mm"): 27.0, ("parameters", "width_mm"): 9.0}
-    search.push(search.changed(idle | {("parameters", "dielectric_mm"): 0.6}))
-    search.run()
+    search.run(search.changed(idle | {("parameters", "dielectric_mm"): 0.6}))
     assert [one.values for one in search.nearest] == [{("parameters", "dielectric_mm"): 0.6}]
 
 

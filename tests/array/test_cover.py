@@ -17,6 +17,7 @@ from skfem import (
 from skfem.helpers import ddot, sym_grad, trace
 from skfem.models.elasticity import lame_parameters
 
+from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
 from sensorgen.measure.virtual.array import nodal, printed
 from sensorgen.prediction.array.frames import PressureMaps, inverted
@@ -114,6 +115,15 @@ def test_a_press_under_a_sheet_comes_back(model):
     assert found == pytest.approx(load[2], abs=0.8)
     assert under.force_n[0][0] == pytest.approx(under.on_surface().force_n[0][0], rel=0.05)
     assert (under.on_surface().sigma_kpa >= under.sigma_kpa).all()
+
+
+def test_a_sheet_that_spreads_beyond_the_array_is_named(model):
+    data = model.design.model_dump(exclude_defaults=True)
+    plate = array_model(make({**data, "parameters": data["parameters"] | {"cover_mm": 30, "cover_mpa": 1e5}}))
+    with pytest.raises(
+        BadInput, match="cover_mm 30 of cover_mpa 100000: it spreads a press over more than 16 crossings"
+    ):
+        study(plate, ArrayReadout())
 
 
 def test_resolution_on_the_surface_is_worse(model):

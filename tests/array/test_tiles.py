@@ -103,6 +103,17 @@ def test_a_tile_reaches_under_the_next():
     assert edge[2] == edge[3]
 
 
+INSOLE_5 = {
+    "border": "foot 42 left",
+    "parameters": {"pitch_x_mm": 5, "pitch_y_mm": 5, "column_mm": 4, "row_mm": 4},
+}
+
+
+def test_an_outline_fits_with_the_leads_that_the_refusal_advises():
+    narrow = INSOLE_5["parameters"] | {"connector_mm": 2.4}
+    assert not tiles(make({"shape": "array", "cell": {}, **INSOLE_5, "parameters": narrow}))
+
+
 @pytest.mark.parametrize(
     ("data", "words"),
     [
@@ -110,7 +121,8 @@ def test_a_tile_reaches_under_the_next():
         ({"parameters": {"hole_mm": 6}}, "hole_mm 6: no room beside the leads"),
         ({"parameters": {"seams": "columns", "seam_mm": 5, "base_mm": 0}}, "nothing reaches under the next tile"),
         ({"parameters": {"length_mm": 990, "width_mm": 447}}, "tiles in two columns are too large"),
-        ({"border": "POLYGON ((0 0, 488 0, 488 447, 0 447, 0 0))"}, "only rectangles are printed as tiles"),
+        ({"border": "POLYGON ((0 0, 488 0, 488 447, 0 447, 0 0))"}, "rectangles .*: expected a smaller outline"),
+        (INSOLE_5, r"315\.76 x 172\.04 mm with its leads, the bed 390 x 170 mm.*: expected connector_mm 2\.4"),
     ],
 )  # fmt: skip
 def test_what_has_no_room_is_an_error(data, words):

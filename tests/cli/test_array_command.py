@@ -87,11 +87,15 @@ def test_the_shape_has_options_like_others(run):
         (("invert", "a.yaml", "none.npz"), "none.npz"),
         (("invert", "a.yaml", "f.csv", "--perfect"), "--perfect is for lines"),
         (("invert", "a.yaml", "f.csv"), "no frequency of the readings"),
+        (("invert", "a.yaml", "g.csv"), "frequency_hz is 1 kHz to 10 kHz; expected one frequency in all frames"),
+        (("invert", "a.yaml", "f.csv", "-o", "f.h5"), "--output f.h5: expected a name in .npz"),
+        (("array", "a.yaml", "--simulate", "f.csv"), "--simulate f.csv: expected a name that ends in .npz"),
         (("invert", "a.yaml", "f.csv", "--frequency", "10kHz"), "taken for rest; not read: Rest"),
     ],
 )
 def test_wrong_words_are_one_line(run, file, tmp_path, words, answer):
     (tmp_path / "f.csv").write_text("time_s,Rest,r1c1\n0,1,1e-12\n")
+    (tmp_path / "g.csv").write_text("time_s,frequency_hz,r1c1\n0,1000,1e-12\n1,10000,1e-12\n")
     said = run(*words)
     assert said.code == 2
     assert answer in said.line

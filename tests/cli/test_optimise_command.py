@@ -21,7 +21,7 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import Query
 from sensorgen.workflows.optimise import ladder, recommend, result
-from sensorgen.workflows.optimise.front import Searched, search
+from sensorgen.workflows.optimise.front import Front, search
 from sensorgen.workflows.optimise.result import ObjectiveSpread, Recommended
 from sensorgen.workflows.optimise.sample import _objectives, sample
 from sensorgen.workflows.optimise.space import MOST, candidates, space
@@ -266,7 +266,10 @@ def planted(plate, numbers, objectives):
         warning = tuple(Finding(f"{k}-x", "warning", "a", f"finding {k}", "b") for k in range(warnings))
         trial = replace(tried, printed=replace(tried.printed, **value), findings=warning)
         rows.append(Candidate({"a": float(number)}, design, number, trial=trial))
-    return Searched(target(objectives=objectives), tuple(rows), tuple(rows), 1.5, None)
+    search_ = Front(target(objectives=objectives))
+    search_.rows = rows
+    search_.front = tuple(rows)
+    return search_
 
 
 FORCE = {"force_resolution_n": "minimise"}

@@ -346,7 +346,7 @@ def test_help_does_not_load_numpy(real):
 
 
 def test_options_are_what_the_planner_knows():
-    from sensorgen.cli.predictions import command
+    from sensorgen.cli.predictions import predict_command as command
     from sensorgen.models.pressure import PROFILES
     from sensorgen.prediction.query import LAWS
 

@@ -67,7 +67,8 @@ def test_a_device_that_begins_anew_goes_on():
     [
         (checked("7,0.1,1,2,3,4,5"), "'7' has 5 values; expected 6, a frame of 2 x 3"),
         (checked("7,0.1,1,2,3,4,5,x"), "frame '7': could not convert"),
-        (FrameForm(3, 2).header(), "'sensorgen-frames 1 rows=3.* expected 6"),
+        (checked("7,nan,1,2,3,4,5,6"), "frame '7': its time is 'nan'; expected seconds"),
+        (FrameForm(3, 2).header(), "the array is now rows=3 columns=2 .* expected rows=2 columns=3 .*: begin anew"),
     ],
 )
 def test_a_whole_frame_that_is_wrong_ends_it(sent, words):

@@ -226,7 +226,7 @@ def test_the_conductance_of_a_plate_is_its_shape():
     assert conductance(plate(), 1) == pytest.approx(0.3, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", ["blank", "bricks", "cell", "section", "specimen", "mechanics", "faults"])
+@pytest.mark.parametrize("name", ["blank", "cell", "section", "specimen", "mechanics", "faults"])
 def test_it_is_written_apart_from_what_analyses_it(name):
     import ast
 

@@ -30,7 +30,7 @@ def cell_of(high, left, right, *outlines):
         Body("shape", "x60", tuple(Prism("y", tuple(o), 0.0, 10.0) for o in outlines)),
         Body("top_electrode", "etpu", (Prism("y", rectangle(0, wide, top, top + 0.3), 0.0, 10.0),), "top"),
     )
-    whole = slices(sections(Scene(bodies, (wide, 10.0, top + 0.3)))[0], 0.0, metal=True)
+    whole = slices(sections(Scene(bodies, (wide, 10.0, top + 0.3)))[0], 0.0, layered=True)
     return cells.between(whole, left, right, mirrored=True)
 
 

@@ -105,13 +105,9 @@ RULES: dict[str, Rule] = {
 
 
 def layers(
-    scene: Scene,
-    printer: Printer,
-    quality: Quality,
-    walls: str = "arachne",
-    laid: Mapping[str, LineLayout] | None = None,
-    shift: Shift | None = None,
-) -> list[LayerRegions]:
+    scene: Scene, printer: Printer, quality: Quality, walls: str = "arachne",
+    laid: Mapping[str, LineLayout] | None = None, shift: Shift | None = None,
+) -> list[LayerRegions]:  # fmt: skip
     """Printed part of every layer.
 
     Parameters

@@ -22,13 +22,9 @@ RULES = (
 
 
 def findings(
-    scene: Scene,
-    printer: Printer,
-    quality: Quality,
-    gap_mm: float,
-    walls: str = "arachne",
+    scene: Scene, printer: Printer, quality: Quality, gap_mm: float, walls: str = "arachne",
     laid: Mapping[str, estimate.LineLayout] | None = None,
-) -> list[Finding]:
+) -> list[Finding]:  # fmt: skip
     """All findings about a scene, the most severe first.
 
     Parameters

@@ -13,7 +13,7 @@ from sensorgen.cli.options import BenchTip, LogFile
 from sensorgen.core.errors import BadInput
 from sensorgen.core.options import Option
 
-_OF_SPECIMENS = ("recordings", "again", "page", "source", "dry_run")
+_OF_SPECIMENS = ("recordings", "again", "page", "source", "dry_run", "tip", "force_offset", "file")
 _OF_ARRAYS = ("array", "calibration", "by_first", "frequency_hz")
 Recordings = Annotated[tuple[int, ...], Option(kind=click.IntRange(1))]
 

@@ -129,6 +129,8 @@ def invert(design: "Design", task: Task, frames: ArrayFrames) -> int:
     from sensorgen.prediction.array.readout import ArrayReadout
     from sensorgen.prediction.query import NOISE
 
+    if task.output not in ("", "-") and Path(task.output).suffix not in (".npz", ".csv"):
+        raise BadInput(f"--output {task.output}: expected a name in .npz (maps) or .csv (a row for each frame)")
     refuse_typed(_OF_LINES, "is for lines; an array is inverted with --readout, --input, --noise and --scatter")
     refuse_input(frames.readout)
     model = array_model(design)

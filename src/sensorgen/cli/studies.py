@@ -9,6 +9,7 @@ from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.designs import of_design
 from sensorgen.cli.options import Force, InputResistance, Law, Readout, refuse_input
 from sensorgen.core import units
+from sensorgen.core.errors import BadInput
 from sensorgen.core.options import Option
 from sensorgen.core.units import FREQUENCY_HZ
 from sensorgen.prediction.query import TONES_HZ, Frequencies, Noise, Query
@@ -134,6 +135,8 @@ def array_command(
     from sensorgen.prediction.array.study import study
 
     refuse_input(readout)
+    if simulate is not None and simulate.suffix != ".npz":
+        raise BadInput(f"--simulate {simulate}: expected a name that ends in .npz")
     how = ArrayReadout(readout, input_ohm, frequency_hz, noise, noise_s or 0.0)  # type: ignore[arg-type]
     model = array_model(design)
     resolution = study(model, how, pressure_kpa, faults, short or 0.0)

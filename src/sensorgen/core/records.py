@@ -2,10 +2,11 @@
 
 import reprlib
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from itertools import zip_longest
 from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from sensorgen.core.errors import BadInput, UnknownName
 
@@ -195,3 +196,9 @@ def _example(kind: type[Strict], place: tuple[Any, ...]) -> str:
     place = tuple(part for part in place if isinstance(part, str))  # without positions in lists
     field = _record_at(kind, place[:-1]).model_fields.get(place[-1]) if place else None
     return " or ".join(map(str, field.examples)) if field and field.examples else "others of its kind"
+
+
+@cache
+def adapter(kind: type) -> TypeAdapter[Any]:
+    """Reader and writer of a dataclass as JSON."""
+    return TypeAdapter(kind)

@@ -406,16 +406,13 @@ class Design(Strict):
 
     def idle_waivers(self, findings: list[Finding]) -> list[Finding]:
         """A finding for each waiver that covers none of ``findings``: misspelt, or no longer needed."""
+        idle = (w for w in self.waivers if not any(_covers(w, f) for f in findings))
+        advice = "remove it, or correct its rule and body"
         return [
             Finding(
-                "10-waiver",
-                "warning",
-                w.body or "sensor",
-                f"the waiver of rule {w.rule} covers no finding",
-                "remove it, or correct its rule and body",
+                "10-waiver", "warning", w.body or "sensor", f"the waiver of rule {w.rule} covers no finding", advice
             )
-            for w in self.waivers
-            if not any(_covers(w, f) for f in findings)
+            for w in idle
         ]
 
 
@@ -702,17 +699,15 @@ def name_of(design: Design) -> str:
     >>> name_of(Design(shape="rect", parameters={"along": "yx", "length_mm": 50}, quality="extrafine"))
     'sqyx-d0.2-length50-extrafine'
     """
-    params, known = design.params, {f.name: f for f in dataclasses.fields(design.form.Params)}
-    start = getattr(design.form, "SHORT", design.shape) + str(getattr(params, "along", ""))
-    parts = [start]
+    params, default = design.params, Design(shape=design.shape)
+    parts, named = [getattr(design.form, "SHORT", design.shape) + str(getattr(params, "along", ""))], {"along"}
     if hasattr(params, "along"):
         parts.append(f"d{params.dielectric_mm:.10g}")  # type: ignore[attr-defined]
-    named = {"along"} | ({"dielectric_mm"} if hasattr(params, "along") else set())
-    for key, field in known.items():
-        value = getattr(params, key)
-        if key not in named and value != field.default:
-            parts.append(key.removesuffix("_mm").replace("_", "-") + _said(value))
-    default = Design(shape=design.shape)
+        named |= {"dielectric_mm"}
+    for field in dataclasses.fields(design.form.Params):
+        value = getattr(params, field.name)
+        if field.name not in named and value != field.default:
+            parts.append(field.name.removesuffix("_mm").replace("_", "-") + _in_name(value))
     for given, usual in ((design.quality, default.quality), (design.printer, default.printer)):
         parts.append("" if given == usual else _plain(Path(given).stem))
     if design.orientation != default.orientation:
@@ -726,7 +721,7 @@ def name_of(design: Design) -> str:
     return whole if len(whole) <= 100 else f"{whole[:90].rstrip('.-_')}-{_digest(whole)}"
 
 
-def _said(value: float | str) -> str:
+def _in_name(value: float | str) -> str:
     """A parameter's value as a part of a name."""
     return f"-{_plain(value)}" if isinstance(value, str) else f"{value:.10g}"
 

@@ -27,6 +27,9 @@ from sensorgen.scene.sections import sections
 SHAPE = "imported"
 MOST_BYTES = 200_000_000  # of a file of bodies
 _START = "data:application/zlib;base64,"
+_DAMAGED = (  # errors of reading what is no geometry
+    binascii.Error, zlib.error, ValueError, KeyError, TypeError, AttributeError, IndexError, RecursionError, BadInput,
+)  # fmt: skip
 HASHED = r"-([0-9a-f]{8})\.bodies\.json"  # end of a file's name
 
 
@@ -143,17 +146,7 @@ def bodies(geometry: str) -> Bodies:
         size = tuple(float(value) for value in data["size_mm"])
         pieces = {str(name): tuple(map(_piece, own)) for name, own in data["bodies"].items()}
         return Bodies(pieces, (size[0], size[1], size[2]), float(data["chord_mm"]), str(data["source"]))
-    except (
-        binascii.Error,
-        zlib.error,
-        ValueError,
-        KeyError,
-        TypeError,
-        AttributeError,
-        IndexError,
-        RecursionError,
-        BadInput,
-    ) as error:
+    except _DAMAGED as error:
         raise BadInput(
             f"geometry: no bodies in it ({error or type(error).__name__}); expected a file that sensorgen import wrote"
         ) from None

@@ -69,9 +69,7 @@ def with_own(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     own, inline = profile.get("own", {}), profile.get("settings", {})
     if not (isinstance(own, Mapping) and isinstance(inline, Mapping)):
         return data
-    if any(not isinstance(name, str) for name in own.values()) or any(
-        not isinstance(each, Mapping) for each in inline.values()
-    ):
+    if not all(isinstance(n, str) for n in own.values()) or not all(isinstance(s, Mapping) for s in inline.values()):
         return data
     read = {slicer: settings_of(folder / name) for slicer, name in own.items()}
     both = {slicer: {**read.get(slicer, {}), **inline.get(slicer, {})} for slicer in {**read, **inline}}
@@ -88,16 +86,20 @@ def settings_of(path: Path) -> dict[str, Setting]:
     """
     text = yamlfile.text(path)
     if path.suffix == ".json":
-        try:
-            data = json.loads(text)
-        except ValueError as error:
-            raise BadInput(f"{path}: no JSON: {error}") from None
-        if not isinstance(data, dict) or any(isinstance(v, bool | list | dict | None) for v in data.values()):
-            raise BadInput(f"{path}: expected names of settings, each with one text or number")
-        return data
+        return _of_json(path, text)
     lines = [line for line in text.splitlines() if line.strip() and line.lstrip()[0] not in "#;["]
     settings = {m[1]: m[2] for line in lines if (m := _LINE.fullmatch(line))}
     if len(settings) < len(lines) or not settings:
         wrong = next((line for line in lines if not _LINE.fullmatch(line)), "nothing, or a name twice")
         raise BadInput(f"{path}: expected lines 'name = value', each name once; it has {wrong[:60]!r}")
     return dict(settings)
+
+
+def _of_json(path: Path, text: str) -> dict[str, Setting]:
+    try:
+        data = json.loads(text)
+    except ValueError as error:
+        raise BadInput(f"{path}: no JSON: {error}") from None
+    if not isinstance(data, dict) or any(isinstance(v, bool | list | dict | None) for v in data.values()):
+        raise BadInput(f"{path}: expected names of settings, each with one text or number")
+    return data

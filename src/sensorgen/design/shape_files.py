@@ -134,11 +134,6 @@ def trust(name: str, text: str) -> Path:
     return path
 
 
-def _short(name: str, reply: Mapping[str, Any]) -> str:
-    """Beginning of the names of a shape's designs, which are those of files."""
-    return str(reply["short"]) if _NAME.fullmatch(str(reply["short"])) else name
-
-
 class _Foreign:
     """A shape whose file runs elsewhere: its parameters here, each scene from there."""
 
@@ -147,7 +142,8 @@ class _Foreign:
         reply = self._ask({})
         try:
             self.__doc__ = harmless(str(reply["about"])[:4000])
-            self.SHORT = _short(name, reply)
+            short = str(reply["short"])  # of the names of designs, which are those of files
+            self.SHORT = short if _NAME.fullmatch(short) else name
             parameters = _fields(name, reply)
         except (AttributeError, KeyError, TypeError, ValueError):
             raise BadInput(
@@ -232,21 +228,27 @@ def _fields(name: str, reply: Mapping[str, Any]) -> list[tuple[str, type, Any]]:
             raise BadInput(f"{where}: expected a name of small letters, digits and '_'")
         if not about["help"]:
             raise BadInput(f"{where} has no help; write metadata={{'help': ..., 'range': (low, high)}}")
-        if choices := about.get("choices"):
+        choices = about.get("choices")
+        if choices:
             if default not in choices or not all(isinstance(each, str) and each.isprintable() for each in choices):
                 raise BadInput(f"{where}: default {default!r:.40} is not among its choices, or one cannot be printed")
             about["choices"] = tuple(choices)
         else:
-            try:
-                low, high = (float(end) for end in about["range"])
-                sound = math.isfinite(high - low) and low <= float(default) <= high
-            except (KeyError, TypeError, ValueError, OverflowError):
-                raise BadInput(f"{where} has no range; write metadata={{'help': ..., 'range': (low, high)}}") from None
-            if not sound:
-                raise BadInput(f"{where}: default {default!r:.40} is outside its range {low:g} to {high:g}")
-            default, about["range"] = float(default), (low, high)
+            default, about["range"] = _in_range(where, default, about)
         parameters.append((key, str if choices else float, dataclasses.field(default=default, metadata=about)))
     return parameters
+
+
+def _in_range(where: str, default: Any, about: Mapping[str, Any]) -> tuple[float, tuple[float, float]]:
+    """Default and range of a parameter; raises BadInput."""
+    try:
+        low, high = (float(end) for end in about["range"])
+        sound = math.isfinite(high - low) and low <= float(default) <= high
+    except (KeyError, TypeError, ValueError, OverflowError):
+        raise BadInput(f"{where} has no range; write metadata={{'help': ..., 'range': (low, high)}}") from None
+    if not sound:
+        raise BadInput(f"{where}: default {default!r:.40} is outside its range {low:g} to {high:g}")
+    return float(default), (low, high)
 
 
 def _checked(name: str, scene: Scene, fill: Fill) -> Scene:
@@ -294,9 +296,7 @@ class _ShapeProcess:
             stderr=subprocess.DEVNULL, env={},
         )  # fmt: skip
         self._lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-        self._wanted = threading.Semaphore(
-            0
-        )  # lines: one for each question, or an endless answer would fill the memory
+        self._wanted = threading.Semaphore(0)  # lines, one for each question: an endless answer would fill the memory
         threading.Thread(target=_read, args=(self._process.stdout, self._wanted, self._lines), daemon=True).start()
         with ExitStack() as ended:
             ended.callback(self.close)

@@ -151,6 +151,9 @@ def parse(text: str) -> SpecimenName:
     film_mm, size_mm, more = _thickness(text, words.get("film"))
     slicing, read = _slicing(words.get("slicing"))
     place = words["place"]["letter"] if "place" in words else ""
+    nowhere = f"'{place}' taken for a place on the plate (right, left or middle): not explained" if place else ""
+    started = "" if head["iteration"] else "no iteration in the name"
+    assumed = (started, *doubts, *_case(text, head["shape"]), *more, read, nowhere)
     return SpecimenName(
         iteration=int(head["iteration"]) if head["iteration"] else None,
         shape=shape,
@@ -161,19 +164,7 @@ def parse(text: str) -> SpecimenName:
         place=place,
         size_mm=size_mm,
         raw=text,
-        assumed=tuple(
-            filter(
-                None,
-                (
-                    "" if head["iteration"] else "no iteration in the name",
-                    *doubts,
-                    *_case(text, head["shape"]),
-                    *more,
-                    read,
-                    f"'{place}' taken for a place on the plate (right, left or middle): not explained" if place else "",
-                ),
-            )
-        ),
+        assumed=tuple(filter(None, assumed)),
     )
 
 

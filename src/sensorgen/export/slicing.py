@@ -97,15 +97,9 @@ def alone(design: Design) -> Placed:
 
 
 def sliced(
-    pieces: Sequence[Placed],
-    slicer: str,
-    folder: Path,
-    *,
-    title: str = "",
-    program: str = "",
-    time_limit_s: float = TIME_LIMIT_S,
-    step: Step = lambda _: None,
-) -> Sliced:
+    pieces: Sequence[Placed], slicer: str, folder: Path, *, title: str = "", program: str = "",
+    time_limit_s: float = TIME_LIMIT_S, step: Step = lambda _: None,
+) -> Sliced:  # fmt: skip
     """Slice a plate and write ``raw.gcode`` and ``ready.gcode``.
 
     Parameters

@@ -135,6 +135,9 @@ def _refuse_times(unused: Sequence[str]) -> None:
 def _frequency(found: dict[str, np.ndarray], given: float | None) -> float:
     own = np.ravel(found.get("frequency_hz", np.zeros(1)))
     own = np.unique(own[np.isfinite(own)])
+    if own.size > 1:
+        first, last = (si(float(own[k]), "Hz") for k in (0, -1))
+        raise BadInput(f"frequency_hz is {first} to {last}; expected one frequency in all frames: one file of each")
     hertz = (float(own[0]) if own.size == 1 else 0.0) or given or 0.0
     if given and not math.isclose(hertz, given, rel_tol=1e-6):
         raise BadInput(f"frequency_hz is {si(hertz, 'Hz')}; expected {si(given, 'Hz')}, as given or of the readings")

@@ -312,16 +312,16 @@ def _of_loft(loft: Loft) -> Polyhedron:
     n, numbers = len(loft.lower), dict[Place, int]()
     ends = [(o, z) for o, z in ((loft.lower, loft.bottom_mm), (loft.upper, loft.top_mm))]
     ring = [numbers.setdefault((x, y, z), len(numbers)) for o, z in ends for x, y in o]
-    found = []
+    triangles = []
     for k in range(n):
         before = (k - 1) % n
         a, b, c, d = ring[before], ring[k], ring[n + k], ring[n + before]
-        found += [(a, b, c), (a, c, d)]
+        triangles += [(a, b, c), (a, c, d)]
     for (outline, _), first in zip(ends, (0, n), strict=True):
         if abs(area_mm2(outline)) > SLIVER_MM**2:
             cap = [tuple(ring[first + k] for k in triangle) for triangle in triangulated(outline)]
-            found += [(c, b, a) for a, b, c in cap] if first == 0 else [(a, b, c) for a, b, c in cap]
-    return Polyhedron(tuple(numbers), tuple(t for t in found if len(set(t)) == 3))
+            triangles += [(c, b, a) for a, b, c in cap] if first == 0 else [(a, b, c) for a, b, c in cap]
+    return Polyhedron(tuple(numbers), tuple(t for t in triangles if len(set(t)) == 3))
 
 
 def triangulated(outline: Outline) -> list[tuple[int, int, int]]:

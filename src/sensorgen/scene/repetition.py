@@ -112,7 +112,7 @@ def _is_plain(region: Region, size_mm: Sequence[float], axis: int) -> bool:
 
 def _crossings(looks: Sequence[Region], axis: int, whole: float, wide: float) -> list[tuple[Real, Real]]:
     """Where lines along the axis cross outlines, in order, and a number for which, and whether it is entered."""
-    found = []
+    lines_of = []
     for share in _CUTS:
         ends = np.array([[-1.0, share * wide], [whole + 1.0, share * wide]])
         line = shapely.linestrings(ends if axis == 0 else ends[:, ::-1])
@@ -126,8 +126,8 @@ def _crossings(looks: Sequence[Region], axis: int, whole: float, wide: float) ->
         every = np.concatenate(at)
         inside = (every > _SAME_MM) & (every < whole - _SAME_MM)
         order = np.argsort(every[inside], kind="stable")
-        found.append((every[inside][order], np.concatenate(kind)[inside][order]))
-    return found
+        lines_of.append((every[inside][order], np.concatenate(kind)[inside][order]))
+    return lines_of
 
 
 def _shifts(at: Real, kind: Real, period: float, whole: float) -> bool:
@@ -159,12 +159,12 @@ def halved(sides: tuple[Repeat, Repeat], regions: Sequence[Region]) -> tuple[Rep
     regions : sequence of Region
         All that lies in it.
     """
-    found = list(sides)
+    halves = list(sides)
     for axis, side in enumerate(sides):
         middle = (side.low_mm + side.high_mm) / 2
         if len(side.shares) == 1 and not side.shifts and are_mirrored(regions, axis, middle):
-            found[axis] = Repeat(side.low_mm, middle, False, np.array([side.low_mm, middle]), 2 * side.shares)
-    return found[0], found[1]
+            halves[axis] = Repeat(side.low_mm, middle, False, np.array([side.low_mm, middle]), 2 * side.shares)
+    return halves[0], halves[1]
 
 
 def are_mirrored(regions: Sequence[Region], axis: int, at_mm: float) -> bool:

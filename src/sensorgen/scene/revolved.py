@@ -1,6 +1,6 @@
 """Bodies of revolution about an upright axis, of straight edges and arcs: exact volume, cuts as polygons."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -90,10 +90,10 @@ def _leg(on: Point, centre: Point, other: float) -> float:
 @lru_cache(maxsize=64)
 def _edges(outline: Outline, bulges: tuple[float, ...]) -> tuple[_Edge, ...]:
     """Edges of a profile, arcs cut where they are level or upright."""
-    found = []
+    edges = []
     for a, b, bulge in zip(outline, outline[1:] + outline[:1], bulges, strict=True):
         if bulge == 0:
-            found.append(_Edge(a, b))
+            edges.append(_Edge(a, b))
             continue
         du, dv, lift = b[0] - a[0], b[1] - a[1], (1 - bulge * bulge) / (4 * bulge)
         centre = ((a[0] + b[0]) / 2 - dv * lift, (a[1] + b[1]) / 2 + du * lift)
@@ -104,8 +104,8 @@ def _edges(outline: Outline, bulges: tuple[float, ...]) -> tuple[_Edge, ...]:
         way = {0: (1.0, 0.0), 1: (0.0, 1.0), 2: (-1.0, 0.0), 3: (0.0, -1.0)}
         stops = [tuple(c + radius * w for c, w in zip(centre, way[k % 4], strict=True)) for k in quarters]
         places = [a, *((u, v) for u, v in (stops if turn > 0 else stops[::-1])), b]
-        found += [_Edge(start, end, centre) for start, end in pairwise(places)]
-    return tuple(found)
+        edges += [_Edge(start, end, centre) for start, end in pairwise(places)]
+    return tuple(edges)
 
 
 @dataclass(frozen=True)
@@ -164,15 +164,15 @@ class Revolved:
 
     def volume_mm3(self, low_mm: float = -inf, high_mm: float = inf) -> float:
         """Exact volume, of all of it or between two heights [mm3]."""
-        found = []
+        volumes = []
         for edge in self._edges():
             (_, za), (_, zb) = edge.start, edge.end
             ends = [min(max(z, low_mm), high_mm) for z in (za, zb)]
             if ends[0] != ends[1]:
                 a, b = ((edge.at_height(z), z) if z != given[1] else given
                         for z, given in zip(ends, (edge.start, edge.end), strict=True))  # fmt: skip
-                found.append(_Edge(a, b, edge.centre).volume_mm3())
-        return sum(found)
+                volumes.append(_Edge(a, b, edge.centre).volume_mm3())
+        return sum(volumes)
 
     def is_box(self) -> bool:
         """False: no box has curved faces."""
@@ -209,13 +209,13 @@ class Revolved:
 
     def profile(self, chord_mm: float) -> list[Point]:
         """Corners of the profile, with those of chords at most ``chord_mm`` from its arcs [mm]."""
-        found = []
+        corners = []
         for edge in self._edges():
             short = [edge]
             while edge.centre and _off_chord(short[0].middle(), short[0].start, short[0].end) > chord_mm:
                 short = [half for whole in short for half in whole.halves()]
-            found += [part.start for part in short]
-        return found
+            corners += [part.start for part in short]
+        return corners
 
     def moved(self, move: Move) -> "Revolved":
         """It at another place, scaled or turned."""
@@ -290,62 +290,43 @@ def _arc(radius_mm: float, quarters: int) -> Outline:
 
 @lru_cache(maxsize=64)
 def _beside_axis(outline: Outline, bulges: tuple[float, ...], away_mm: float) -> tuple[Outline, ...]:
-    """Outlines of the upright cut at some distance from the axis, in (along, z), the axis at 0 [mm]."""
-    chains = _chains(_edges(outline, bulges), away_mm)
-    if len(chains) == 1 and chains[0][0][0] > 0:  # all of the profile lies further out
-        loop = chains[0]
-        return tuple(loop[:-1]), tuple((-u, z) for u, z in reversed(loop[:-1]))
-    ends = sorted((z, k, last) for k, chain in enumerate(chains) for last, (_, z) in enumerate((chain[0], chain[-1])))
-    partner = {
-        a[1:]: b[1:] for one, two in zip(ends[::2], ends[1::2], strict=True) for a, b in ((one, two), (two, one))
-    }
-    found, left = [], set(range(len(chains)))
-    while left:
-        k = first = min(left)
-        loop, passes = [], 0
-        while passes == 0 or k != first:
-            left.discard(k)
-            loop += chains[k]
-            passes += 1
-            k = partner[k, 1][0]
-        if passes == 1 and abs(loop[0][1] - loop[-1][1]) > SLIVER_MM:  # both halves share one edge: they are one
-            found.append((*loop, *((-u, z) for u, z in reversed(loop[1:-1]))))
-        else:
-            found += [tuple(loop), tuple((-u, z) for u, z in reversed(loop))]
-    smooth = map(without_straight, found)
+    """Outlines of the upright cut at some distance from the axis, in (along, z), the axis at 0 [mm].
+
+    The half on one side is the profile, its radii seen at that distance and those within it at the axis; it and its
+    mirror image are one where they share an edge, but for a hole, which outlines do not have.
+    """
+    import shapely
+
+    half = shapely.make_valid(shapely.Polygon(_seen(outline, bulges, away_mm)))
+    halves = half, shapely.transform(half, lambda places: places * [-1.0, 1.0])
+    whole = shapely.get_parts(shapely.union_all(halves))
+    if any(shapely.get_num_interior_rings(part) > 0 for part in whole):
+        whole = shapely.get_parts(halves)
+    rings = (shapely.get_coordinates(shapely.orient_polygons(part))[:-1].tolist() for part in whole if part.area > 0)
+    smooth = (without_straight([(u, z) for u, z in ring]) for ring in rings)
     return tuple(o for o in smooth if len(o) > 2 and area_mm2(o) > SLIVER_MM**2)
 
 
-def _chains(edges: Sequence[_Edge], away_mm: float) -> list[list[Point]]:
-    """Runs of a profile's edges beyond some radius, as the upright cut at that distance shows them, to ``CHORD_MM``."""
-    runs: list[list[_Edge]] = []
-    inside = False
-    start = next((k for k, e in enumerate(edges) if e.start[0] <= away_mm), 0)
-    for edge in (*edges[start:], *edges[:start]):
+def _seen(outline: Outline, bulges: tuple[float, ...], away_mm: float) -> list[Point]:
+    """Corners of a profile as the upright cut at some distance from the axis shows them, to ``CHORD_MM``."""
+    ring: list[Point] = []
+    for edge in _edges(outline, bulges):
         a, b, centre = edge
-        if a[0] > away_mm or b[0] > away_mm:
-            low = (away_mm, edge.at_radius(away_mm)) if min(a[0], b[0]) <= away_mm else None
-            part = _Edge(low if low and a[0] <= away_mm else a, low if low and b[0] <= away_mm else b, centre)
-            if inside:
-                runs[-1].append(part)
+        todo = [edge]
+        if min(a[0], b[0]) < away_mm < max(a[0], b[0]):
+            at = (away_mm, edge.at_radius(away_mm))
+            todo = [_Edge(a, at, centre), _Edge(at, b, centre)]
+        if centre:
+            todo = [quarter for part in todo for half in part.halves() for quarter in half.halves()]
+        todo.reverse()
+        while todo:
+            part = todo.pop()
+            start, middle, end = (_shown(p, away_mm) for p in (part.start, part.middle(), part.end))
+            if _off_chord(middle, start, end) > 0.7 * CHORD_MM:  # the middle is not where a chord is furthest off
+                todo += part.halves()[::-1]
             else:
-                runs.append([part])
-        inside = b[0] > away_mm
-    found = []
-    for run in runs:
-        points = [_shown(run[0].start, away_mm)]
-        for edge in run:
-            todo = [edge] if edge.centre is None else [h for half in edge.halves() for h in half.halves()]
-            todo.reverse()
-            while todo:
-                part = todo.pop()
-                a, middle, b = (_shown(p, away_mm) for p in (part.start, part.middle(), part.end))
-                if _off_chord(middle, a, b) > 0.7 * CHORD_MM:  # the middle is not where a chord is furthest off
-                    todo += part.halves()[::-1]
-                else:
-                    points.append(b)
-        found.append(points)
-    return found
+                ring.append(end)
+    return ring
 
 
 def _shown(point: Point, away_mm: float) -> Point:

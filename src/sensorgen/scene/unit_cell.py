@@ -112,9 +112,9 @@ def cell(section: Section, height_mm: float, evenly: bool = True) -> SectionCell
     return mirrored(tuple(slices(section, height_mm)), evenly)
 
 
-def slices(section: Section, height_mm: float, *, metal: bool = False) -> list[Slice]:
-    """Columns of a section with the air between their layers; ``metal`` keeps the materials of conductors."""
-    return [_slice(column, height_mm, metal) for column in columns(section)]
+def slices(section: Section, height_mm: float, *, layered: bool = False) -> list[Slice]:
+    """Columns of a section with the air between them; ``layered`` keeps each layer, a conductor with its material."""
+    return [_slice(column, height_mm, layered) for column in columns(section)]
 
 
 @lru_cache(maxsize=16)
@@ -158,7 +158,7 @@ def affordable(slices: tuple[Slice, ...], evenly: bool = True) -> SectionCell:
     return even if len(even.slices) <= LARGER * len(smallest.slices) else smallest
 
 
-def _slice(column: SectionColumn, height_mm: float, metal: bool) -> Slice:
+def _slice(column: SectionColumn, height_mm: float, layered: bool) -> Slice:
     """A column with the air between its layers; layers of one material that touch are one."""
     bands: list[Band] = []
     at = (0.0, 0.0)
@@ -168,19 +168,19 @@ def _slice(column: SectionColumn, height_mm: float, metal: bool) -> Slice:
         terminal = layer.body.terminal
         bands.append(Band("air", "", at, layer.bottom_mm))
         bands.append(
-            Band("" if terminal and not metal else layer.body.material, terminal, layer.bottom_mm, layer.top_mm)
+            Band("" if terminal and not layered else layer.body.material, terminal, layer.bottom_mm, layer.top_mm)
         )
         at = layer.top_mm
     bands.append(Band("air", "", at, (height_mm, height_mm)))
     # Bands without those of no height, and neighbours of one material as one
-    found: list[Band] = []
+    joined: list[Band] = []
     for band in bands:
         if max(t - b for b, t in zip(band.bottom_mm, band.top_mm, strict=True)) <= ROUNDING_MM:
             continue
-        if found and found[-1].is_same(band):
-            band = Band(band.material, band.terminal, found.pop().bottom_mm, band.top_mm)
-        found.append(band)
-    return Slice(column.left_mm, column.right_mm, tuple(found))
+        if joined and joined[-1].is_same(band) and not layered:
+            band = Band(band.material, band.terminal, joined.pop().bottom_mm, band.top_mm)
+        joined.append(band)
+    return Slice(column.left_mm, column.right_mm, tuple(joined))
 
 
 def _bridged(last: Slice, here: Slice) -> tuple[Band, ...]:

@@ -233,11 +233,11 @@ def near(lines: StraightLines) -> tuple[Whole, Whole]:
     wide, high = cell.max(axis=0) + 2
     layer = lines.layer[piece] - lines.layer.min()
     key = (layer * wide + cell[:, 0]) * high + cell[:, 1]
-    held = _distinct(key * len(lines) + piece)  # sorted by square
-    within, inside = held // len(lines), held % len(lines)
+    passing = _distinct(key * len(lines) + piece)  # sorted by square
+    within, inside = passing // len(lines), passing % len(lines)
     begin = np.flatnonzero(np.append(True, np.diff(within) != 0))
-    square, begin, fill = within[begin], np.append(begin, len(held)), np.diff(begin, append=len(held))
-    found = []
+    square, begin, fill = within[begin], np.append(begin, len(passing)), np.diff(begin, append=len(passing))
+    pair_numbers = []
     # Squares in a column follow each other: of one layer the next half of those around, of the layer above all of them.
     for first, last in [(0, 1), *((n * high - 1, n * high + 1) for n in (1, wide - 1, wide, wide + 1))]:
         low, top = np.searchsorted(square, square + first), np.searchsorted(square, square + last, "right")
@@ -245,8 +245,8 @@ def near(lines: StraightLines) -> tuple[Whole, Whole]:
         a = np.repeat(inside, n)
         b = inside[np.arange(n.sum()) - np.repeat(np.cumsum(n) - n - low, n)]
         apart = a != b
-        found.append(_distinct(np.minimum(a, b)[apart] * len(lines) + np.maximum(a, b)[apart]))
-    pairs = _distinct(np.concatenate(found))
+        pair_numbers.append(_distinct(np.minimum(a, b)[apart] * len(lines) + np.maximum(a, b)[apart]))
+    pairs = _distinct(np.concatenate(pair_numbers))
     return pairs // len(lines), pairs % len(lines)
 
 
@@ -371,8 +371,8 @@ def _distributed(
     query = np.concatenate([every, every, qi, qj])
     at = np.concatenate([low, high, si * length[i][qi], start[qj] + sj * length[j][qj] * towards[qj]])
     query, at, share = interleaved(query, np.clip(at, low[query], high[query]))
-    kept = share > 0
-    query, at, share = query[kept], at[kept], share[kept]
+    used = share > 0
+    query, at, share = query[used], at[used], share[used]
     on_i = at / length[i][query]
     on_j = (at - start[query]) / towards[query] / length[j][query]
     return Links.between(nodes, (i[query], on_i), (j[query], on_j), share * breadth[query], path[query])
@@ -392,15 +392,15 @@ class _Ends:
         steep = np.abs(_dot(way[a], way[b])) < _PARALLEL
         a, b = a[steep], b[steep]
         mean, sine = (lines.width_m[a] + lines.width_m[b]) / 2, np.abs(_cross(way[a], way[b]))
-        found = []
+        sides_of = []
         for i, j in ((a, b), (b, a)):
             for side, at in ((0, lines.start_m), (1, lines.end_m)):
                 gap = at[i] - lines.start_m[j]
                 foot, away = _dot(gap, way[j]), np.abs(_cross(way[j], gap))
                 touch = (foot >= 0) & (foot <= length[j]) & (away < 1.1 * mean) & (away > _STACKED * mean)
                 columns = i, np.full(len(i), side), j, foot / length[j], away, sine
-                found.append(np.stack([column[touch] for column in columns]))
-        every = np.concatenate(found, axis=1)
+                sides_of.append(np.stack([column[touch] for column in columns]))
+        every = np.concatenate(sides_of, axis=1)
         every = every[:, np.lexsort((every[4], every[1], every[0]))]
         first = np.append(True, (np.diff(every[0]) != 0) | (np.diff(every[1]) != 0))[: every.shape[1]]
         self.piece, self.side, self.wall = every[:3, first].astype(np.int64)
@@ -478,8 +478,8 @@ def product(matrix: "csr_array[np.float64]", one: Real, other: Real) -> float:
     1.0
     """
     try:
-        found = _by_multigrid(matrix, other) if len(one) > _MOST else None
-        return float(one @ (_by_factor(matrix, other) if found is None else found))
+        solution = _by_multigrid(matrix, other) if len(one) > _MOST else None
+        return float(one @ (_by_factor(matrix, other) if solution is None else solution))
     except RuntimeError as error:  # exactly singular
         raise OutOfRange(_HARDLY) from error
 
@@ -496,8 +496,8 @@ def _by_multigrid(matrix: "csr_array[np.float64]", right: Real) -> Real | None:
         max_coarse=_COARSEST,
         coarse_solver="splu",
     )
-    found, failed = levels.solve(right, tol=_RESIDUAL, maxiter=_ITERATIONS, accel="cg", return_info=True)
-    return None if failed else found
+    solution, failed = levels.solve(right, tol=_RESIDUAL, maxiter=_ITERATIONS, accel="cg", return_info=True)
+    return None if failed else solution
 
 
 def _by_factor(matrix: "csr_array[np.float64]", right: Real) -> Real:

@@ -3,13 +3,14 @@
 import json
 import time
 from collections.abc import Callable, Iterable, Iterator
-from functools import cache, cached_property
+from functools import cached_property
 from hashlib import sha256
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sensorgen.checks.review import review
 from sensorgen.core import cache as answers
 from sensorgen.core.findings import Finding, verdict
+from sensorgen.core.records import adapter
 from sensorgen.design import best
 from sensorgen.design.design import Design
 from sensorgen.prediction.results import UNPREDICTED
@@ -17,9 +18,6 @@ from sensorgen.workflows import moves
 from sensorgen.workflows.changes import Advice, Change, TriedChange, effects, finding_counts
 from sensorgen.workflows.search import Candidate, Nearest
 from sensorgen.workflows.trial import Trial, grade, trial, words_of
-
-if TYPE_CHECKING:
-    from pydantic import TypeAdapter
 
 BUDGET_S = 60.0
 SHOWN = 3
@@ -39,25 +37,18 @@ def advised(
     """
     if verdict([f for f in now.findings if f.rule != UNPREDICTED]) == "PRINT":
         return None
-    digest = sha256(_adapter(Trial).dump_json(now)).hexdigest()
+    digest = sha256(adapter(Trial).dump_json(now)).hexdigest()
     question = {"advice": _VERSION, "design": design.id(), "trial": digest}
     stored = answers.known(question)
-    known: Advice | None = _adapter(Advice).validate_json(json.dumps(stored)) if stored else None
+    known: Advice | None = adapter(Advice).validate_json(json.dumps(stored)) if stored else None
     if known and (known.complete or known.budget_s >= budget_s):
         return known
     if budget_s <= 0:
         return None
     advice = advise(design, now, budget_s, step, spent_s)
     if advice.checked:
-        answers.keep(question, json.loads(_adapter(Advice).dump_json(advice)))
+        answers.keep(question, json.loads(adapter(Advice).dump_json(advice)))
     return advice
-
-
-@cache
-def _adapter(kind: type) -> "TypeAdapter[Any]":
-    from pydantic import TypeAdapter
-
-    return TypeAdapter(kind)
 
 
 def advise(
@@ -174,8 +165,7 @@ class AdviceSearch(Nearest):
         if one.origin:
             self.kept.append(one)
             return
-        whole = [kept for kept in self.nearest if one.values.items() < kept.values.items()]
-        self.nearest = [kept for kept in self.nearest if kept not in whole or kept.counts() < one.counts()]
+        self.nearest = [kept for kept in self.nearest if not _has_idle(kept, one)]
         # the last one leaves the fewest warnings, and takes the place of the farthest
         self.nearest = [*self.nearest[: SHOWN - 1], one]
         for key in one.values if len(one.values) > 1 else ():
@@ -208,3 +198,8 @@ class AdviceSearch(Nearest):
         better, words = effects(self.now, made)
         about = one.origin.about if one.origin else ""
         return TriedChange(changes, one.distance, made, about, better, words)
+
+
+def _has_idle(whole: Candidate, part: Candidate) -> bool:
+    """True if some of its changes do nothing: a part of them leaves no more findings."""
+    return part.values.items() < whole.values.items() and part.counts() <= whole.counts()

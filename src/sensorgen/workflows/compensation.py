@@ -118,21 +118,19 @@ def compensated(
     is_near = abs(_off(wanted, asked, GAP)) <= WITHIN[GAP]
     search = CompensationSearch(now, wanted, walls, sliced if is_near else None, step)
     search.run(search.changed({}))
-    before, after = search.first, search.best or search.nearest()
-    printed = search.quantities(after)
-    if not (search.best and is_near):
+    after = search.best or search.nearest()
+    made, printed = moves.changed(now, after.values), search.quantities(after)
+    if not is_near:  # the nearest alone is sliced
+        printed = quantities(made, sliced, stiffness=stiffness) if sliced else printed
         layers = f"{FILM_LAYERS} layers at least, {wanted[GAP]:g} mm at layers of {now.layers.layer_mm:g} mm"
-        why = f" of {design.name} by {walls} walls" if is_near else f": a film has {layers}"
-        made = moves.changed(now, after.values)
-        if sliced and not is_near:  # of what cannot be, the nearest alone is sliced
-            printed = quantities(made, sliced, stiffness=stiffness)
-        raise OutOfRange(f"{words(asked)} cannot be printed{why}; nearest: {_nearest(design, made, printed, asked)}")
-    if after is before:
+        raise _refused(f": a film has {layers}", design, made, printed, asked)
+    if search.best is None:
+        raise _refused(f" of {design.name} by {walls} walls", design, made, printed, asked)
+    if not after.values:
         return now, changes
     why = "gap, capacitance and stiffness" if stiffness else "gap and capacitance"
     changes += [Adjustment(key[-1], _own(now, key), float(value), why) for key, value in after.values.items()]
-    changes += _comes_out(search.quantities(before), printed, asked)
-    return _named(moves.changed(now, after.values), design), changes
+    return _named(made, design), [*changes, *_comes_out(search.quantities(search.first), printed, asked)]
 
 
 def _comes_out(before: Quantities, after: Quantities, asked: Quantities) -> Iterator[Adjustment]:
@@ -158,8 +156,8 @@ def words(quantities: Quantities) -> str:
     return " and ".join([", ".join(most), last]) if most else last
 
 
-def _nearest(design: Design, nearest: Design, printed: Quantities, asked: Quantities) -> str:
-    """The nearest print, what makes it and what it costs."""
+def _refused(why: str, design: Design, nearest: Design, printed: Quantities, asked: Quantities) -> OutOfRange:
+    """The refusal, with the nearest print, what makes it and what it costs."""
     old, new = (asdict(each.params) | {"quality": each.quality} for each in (design, nearest))
     values = ", ".join(f"{k} {v if isinstance(v, str) else f'{v:.4g}'}" for k, v in new.items() if v != old[k])
     errors = [
@@ -168,7 +166,8 @@ def _nearest(design: Design, nearest: Design, printed: Quantities, asked: Quanti
     ]  # fmt: skip
     layers = [len(one.layers.boundaries_mm(one.printed.size_mm[2])) - 1 for one in (design, nearest)]
     by = values or "the design as it is"
-    return f"{words(printed)} by {by}{''.join(errors)}; {layers[1]} layers for {layers[0]}"
+    best = f"{words(printed)} by {by}{''.join(errors)}; {layers[1]} layers for {layers[0]}"
+    return OutOfRange(f"{words(asked)} cannot be printed{why}; nearest: {best}")
 
 
 def _off(quantities: Quantities, asked: Quantities, key: str) -> float:

@@ -37,7 +37,7 @@ class EarlyNumber:
 
 @dataclass(eq=False)
 class Candidate:
-    """A design on the printable grid, and what is known of it.
+    """A design on the printable grid, and its results so far.
 
     Attributes
     ----------
@@ -169,7 +169,7 @@ class Nearest(Search):
     def changed(
         self, changes: moves.Changes, before: Candidate | None = None, origin: KnownDesign | None = None
     ) -> Iterator[Candidate]:
-        """The candidate with these changes, if it is new, and near enough or known to be good."""
+        """The candidate with these changes, if it is new, and not too far away, or a known design."""
         values = {key: value for key, value in changes.items() if value != moves.own(self.base, key)}
         mark, far = frozenset(values.items()), moves.distance(self.base, values)
         if mark not in self.seen and (origin or far <= self.farthest):

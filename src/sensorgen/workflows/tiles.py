@@ -10,7 +10,7 @@ Leads of each tile lie under the next one, as shingles; seen from above (pads #,
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from math import prod
 from typing import Annotated, Any, cast
@@ -24,6 +24,7 @@ from sensorgen.scene.scene import rounded
 
 SEAM_MM = 5.0
 _MOST_UP = 20
+_NARROWEST_MM = 1.0  # pitch of a connector, half of it for a lead
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,11 @@ def tiles(design: Design) -> tuple[tuple[Tile, Design], ...]:
     if not design.layout or p.tile or _fits(design.layout, design):
         return ()
     if design.border:
-        raise BadInput(f"{design.name}: the outline is larger than the bed; only rectangles are printed as tiles")
+        length, width = design.layout.size_mm
+        raise BadInput(
+            f"{design.name}: {length:g} x {width:g} mm with its leads, the bed {bed_x:g} x {bed_y:g} mm; only "
+            f"rectangles are printed as tiles: expected {_narrower(design)}"
+        )
     splits = product(range(1, min(p.counts[1], 2) + 1), range(1, min(p.counts[0], _MOST_UP) + 1))
     for across, up in sorted(splits, key=prod):
         places = tuple(_places(design, across, up))
@@ -89,6 +94,16 @@ def _fits(of: ArrayLayout, design: Design) -> bool:
     size = of.size_mm[0] * grown, (of.size_mm[1] + p.ledge_mm) * grown
     sizes = zip(size if p.pads == "bottom" else size[::-1], design.machine.bed_mm, strict=True)
     return all(side <= bed + TOUCH_MM for side, bed in sizes)
+
+
+def _narrower(design: Design) -> str:
+    """Advice for an outline that the bed does not hold: leads so near to each other that it does, or a smaller one."""
+    p = cast(Params, design.params)
+    for tenths in range(round(10 * p.connector_mm) - 1, round(10 * _NARROWEST_MM) - 1, -1):
+        near = replace(p, connector_mm=tenths / 10, lead_mm=min(p.lead_mm, tenths / 10 - _NARROWEST_MM / 2))
+        if _fits(layout(near, design.border), design):
+            return f"connector_mm {near.connector_mm:g} or less, lead_mm {near.lead_mm:.3g}"
+    return "a smaller outline, or a longer pitch, which has fewer leads"
 
 
 def _places(design: Design, across: int, up: int) -> Iterator[tuple[Tile, dict[str, Any]]]:

@@ -127,15 +127,8 @@ def select(candidates: Candidates, count: int, fits: Fits) -> tuple[int, ...]:
     chosen: tuple[int, ...] = ()
     while True:
         least = candidates.worth(chosen) + _GAIN if chosen else -np.inf
-        better = next(
-            (
-                s
-                for step in (_one_step, _two_steps)
-                for s in _ranked(candidates, step(candidates, chosen, count), least)
-                if fits(s)
-            ),
-            None,
-        )
+        steps = (_ranked(candidates, step(candidates, chosen, count), least) for step in (_one_step, _two_steps))
+        better = next((each for ranked in steps for each in ranked if fits(each)), None)
         if better is None:
             break
         chosen = better

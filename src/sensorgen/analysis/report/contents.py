@@ -124,21 +124,17 @@ def report(
     own = {one.specimen for one in calibrated}  # a calibration explains more than one parameter can
     explanations = explained.explanations(comparison, [run for run in recorded if run.entry.specimen not in own])
     impedances = recordings.impedances(recorded, comparison) if recorded else None
-    verdicts = (*yields.headline(comparison),) if comparison.direct else ()
-    shorts = (*yields.findings(comparison), *direction.findings(comparison)) if comparison.direct else ()
     ac = alternating.rows(comparison)
     changes = history.rows(comparison, ac)
-    headline = (*electrodes.headline(comparison), *verdicts, *alternating.headline(ac), *_untrusted(left_out))
-    by_frequency = (
-        *alternating.findings(ac),
-        *alternating.behind_leak(comparison),
-        *electrodes.beyond_meter(comparison),
-        *recordings.findings(recorded, impedances),
-    )
+    headline = (
+        *electrodes.headline(comparison), *yields.headline(comparison), *alternating.headline(ac),
+        *_untrusted(left_out),
+    )  # fmt: skip
     findings = (
-        *calibrations.findings(calibrated), *shorts, *history.findings(changes), *by_frequency,
-        *explained.sentences(explanations),
-        *electrodes.findings(comparison),
+        *calibrations.findings(calibrated), *yields.findings(comparison), *direction.findings(comparison),
+        *history.findings(changes), *alternating.findings(ac), *alternating.behind_leak(comparison),
+        *electrodes.beyond_meter(comparison), *recordings.findings(recorded, impedances),
+        *explained.sentences(explanations), *electrodes.findings(comparison),
     )  # fmt: skip
     step("variants")
     sections = list(_sections(log, comparison, recorded, explanations, impedances, ac, changes, calibrated, left_out))

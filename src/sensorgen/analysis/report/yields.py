@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from typing import Annotated
 
-from sensorgen.analysis.comparison import Comparison
+from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.plots.figure import BLUE, BROWN, GREY, MOST_POINTS, PURPLE, Axis, Curve, Figure, Panel
 from sensorgen.analysis.report.alternating import BAKED
 from sensorgen.analysis.report.electrodes import VERDICT_COLOURS
@@ -82,6 +82,8 @@ def everything(comparison: Comparison) -> Group:
 
 def headline(comparison: Comparison) -> Iterator[str]:
     """The yield, in one sentence."""
+    if not comparison.last:
+        return
     whole = everything(comparison).intact
     if len(comparison.last) == 1:
         row = comparison.last[0]
@@ -217,13 +219,16 @@ def _ratios(comparison: Comparison) -> Iterator[Figure]:
     if not known:
         return
     every, rows = len(known), list(known[:: -(-len(known) // MOST_POINTS)])
-    ends = [min(r.verdict.ry_ohm for r in rows) / 1.5, max(r.verdict.ry_ohm for r in rows) * 1.5]
+    ohms = [r.verdict.ry_ohm for r in rows]
+    ends = [min(ohms) / 1.5, max(ohms) * 1.5]
     curves = [
         Curve("line", f"film = {factor:g} x electrode", ends, [factor * x for x in ends], colour=GREY, dash=dash)
         for factor, dash in ((2.0, "solid"), (ORDER, "dash"))
     ]
-    for shape in sorted({r.reading.shape for r in rows}):
-        here = [r for r in rows if r.reading.shape == shape]
+    by_shape: dict[str, list[Compared]] = {}
+    for row in rows:
+        by_shape.setdefault(row.reading.shape, []).append(row)
+    for shape, here in sorted(by_shape.items()):
         curves.append(
             Curve("points", shape, [r.verdict.ry_ohm for r in here], [r.verdict.rz_ohm for r in here],
                   text=[f"{r.reading.specimen}: {r.verdict.word}" for r in here],

@@ -67,11 +67,7 @@ class CheckedFile(Checked):
 
 
 def check(
-    source: Source,
-    machine: Printer,
-    loaded: Mapping[int, str] | None = None,
-    *,
-    others_empty: bool = False,
+    source: Source, machine: Printer, loaded: Mapping[int, str] | None = None, *, others_empty: bool = False
 ) -> Checked:
     """Check a file, whoever has sliced it.
 
@@ -102,13 +98,9 @@ def check(
 
 
 def check_motion(
-    motion: Motion,
-    machine: Printer,
-    loaded: Mapping[int, str] | None = None,
-    *,
-    others_empty: bool = False,
+    motion: Motion, machine: Printer, loaded: Mapping[int, str] | None = None, *, others_empty: bool = False,
     texts: materials.Texts = materials.NO_TEXTS,
-) -> Checked:
+) -> Checked:  # fmt: skip
     """Check a file that was followed; see :func:`check`, and for ``texts`` :func:`sensorgen.design.materials.load`."""
     known = {*materials.names(), *texts.get("materials", ())}
     loads = {tool: materials.load(name, texts=texts) for tool, name in (loaded or {}).items() if name in known}

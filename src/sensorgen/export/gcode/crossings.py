@@ -199,14 +199,8 @@ def printed_lines(motion: Motion, machine: Printer, numbering: Numbering) -> Pri
         np.isfinite(paths.height_mm) & (paths.height_mm > 0), paths.height_mm, np.maximum(rise, _LEVEL_MM)
     )
     width = paths.volume_mm3(machine.filament_mm) / (paths.length_mm() * height)
-    return PrintedLines(
-        paths.start_mm[:, :2],
-        paths.end_mm[:, :2],
-        np.asarray(level * _LEVEL_MM, float),
-        width,
-        paths.tool,
-        paths.number,
-    )
+    top, ends = np.asarray(level * _LEVEL_MM, float), (paths.start_mm[:, :2], paths.end_mm[:, :2])
+    return PrintedLines(*ends, top, width, paths.tool, paths.number)
 
 
 def _cut(motion: Motion, tool: Whole, rows: Whole) -> MovePieces:
@@ -250,15 +244,9 @@ def _over(blocks: Iterator[MovePieces], lines: PrintedLines, within_mm: float, g
 
 
 def _points(
-    pieces: MovePieces,
-    lines: PrintedLines,
-    within_mm: float,
-    pitch_mm: float,
-    piece: Whole,
-    line: Whole,
-    low: Real,
+    pieces: MovePieces, lines: PrintedLines, within_mm: float, pitch_mm: float, piece: Whole, line: Whole, low: Real,
     high: Real,
-) -> Points:
+) -> Points:  # fmt: skip
     """Points of pieces at which the highest of the lines met is of another tool."""
     foreign = lines.tool[line] != pieces.tool[piece]
     mine = np.unique(piece[foreign])  # pieces that need points

@@ -116,11 +116,8 @@ def recipe(printer: Printer, quality: Quality, tool: int, load: ToolLoad) -> Rec
         raise OutOfRange(f"{where}: walls [lines] is {walls:g}; expected a whole number")
     line_mm = load.profile.line_mm.get(load.material.name, printer.line_mm())
     flow_percent = value("flow_percent", "flow [%]", 10, 200)
-    most_mm2_s = (
-        MELTED
-        * load.material.print_range("max_flow_mm3_s", 0.0)[1]
-        / (max(quality.layer_mm, quality.first_layer_mm) * flow_percent / 100)
-    )
+    melted_mm3_s = MELTED * load.material.print_range("max_flow_mm3_s", 0.0)[1]
+    most_mm2_s = melted_mm3_s / (max(quality.layer_mm, quality.first_layer_mm) * flow_percent / 100)
     return Recipe(
         material=load.material,
         source=load.source,

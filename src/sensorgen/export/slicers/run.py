@@ -85,11 +85,8 @@ def run(
         if code == NOT_RUN:
             raise SlicerFailed(f"cannot run {command[0]}: {_last_words(output)}")
         if code != 0:
-            how = (
-                f"failed with exit code {code}"
-                if code > 0
-                else f"was ended by {_SIGNALS.get(-code, f'signal {-code}')}"
-            )
+            signalled = f"was ended by {_SIGNALS.get(-code, f'signal {-code}')}"
+            how = f"failed with exit code {code}" if code > 0 else signalled
             raise SlicerFailed(f"{name} {how}: {_last_words(output)}")
         if not gcode.is_file() or gcode.stat().st_size == 0:
             raise SlicerFailed(f"{name} ended well but wrote no {gcode}: {_last_words(output)}")
@@ -99,13 +96,9 @@ def _wait(command: Sequence[str], output: BinaryIO, environment: Mapping[str, st
     """Exit code of a process, which always ends here, together with whatever it started itself."""
     end = time.monotonic() + runner.time_limit_s
     process = subprocess.Popen(  # noqa: S603 - a slicer found by name, with our own arguments
-        on_leash(list(command)),
-        stdin=subprocess.PIPE,
-        stdout=output,
-        stderr=output,
-        env=environment,
+        on_leash(list(command)), stdin=subprocess.PIPE, stdout=output, stderr=output, env=environment,
         start_new_session=True,
-    )
+    )  # fmt: skip
     try:
         while True:
             runner.tick()

@@ -132,11 +132,7 @@ def unknown(title: str, keys: Iterable[str]) -> tuple[Finding, ...]:
         return ()
     return (
         Finding(
-            "11-profile",
-            "warning",
-            "sensor",
-            f"{title} does not know {', '.join(names)}: ignored",
-            "correct the name, or slice with a version that knows the setting",
-            count=len(names),
+            "11-profile", "warning", "sensor", f"{title} does not know {', '.join(names)}: ignored",
+            "correct the name, or slice with a version that knows the setting", count=len(names),
         ),
-    )
+    )  # fmt: skip

@@ -18,7 +18,7 @@ import zlib
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from math import inf, nan
+from math import inf, isfinite, nan
 
 import numpy as np
 
@@ -193,7 +193,8 @@ class FrameStream:
                     damaged += 1
                     continue
                 self._heard_s = self._clock.now()
-                if FrameForm.of(text) == self._form:
+                if form := FrameForm.of(text):
+                    self._refuse_change(form)
                     continue
                 missing, siemens, clipped = self._frame(text.split(","))
                 lost, saturated = lost + missing, saturated + clipped
@@ -203,6 +204,12 @@ class FrameStream:
             heard = f"{damaged} damaged lines" if damaged else "nothing"
             raise DeviceFault(f"{self._port.address}: {heard} for {_SILENT_S:g} s; check cable, power and baud")
         return FrameLot(np.array(times), np.array(frames).reshape(-1, *self.shape), lost, damaged, saturated)
+
+    def _refuse_change(self, form: FrameForm) -> None:
+        """Refuse another header than the first."""
+        if form != self._form:
+            new, old = (of.header().decode().partition("*")[0].partition(" 1 ")[2] for of in (form, self._form))
+            raise DeviceFault(f"{self._port.address}: the array is now {new}; expected {old}: begin anew")
 
     def _frame(self, words: list[str]) -> tuple[int, Complex, int]:
         """Number of frames missing before one, its readings, and how many are saturated."""
@@ -215,6 +222,8 @@ class FrameStream:
         try:
             counter, time_s = int(words[0]), float(words[1]) + self._offset_s
             siemens = form.siemens(words[2:])
+            if not isfinite(time_s):
+                raise ValueError(f"its time is {words[1]!r:.20}; expected seconds")
         except ValueError as error:
             raise DeviceFault(f"{self._port.address}: frame {words[0]!r:.20}: {error}") from None
         missing = counter - self._counter - 1 if self._counter >= 0 else 0

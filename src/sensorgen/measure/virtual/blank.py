@@ -112,7 +112,7 @@ def _stored(design: Design) -> Blank:
 def _source() -> str:
     """Of the code that decides: a new version solves anew."""
     here = Path(__file__)
-    files = (here, *(here.with_name(f"{name}.py") for name in ("bricks", "cell", "section")))
+    files = (here, *(here.with_name(f"{name}.py") for name in ("cell", "section")))
     return sha256(b"".join(f.read_bytes() for f in files)).hexdigest()
 
 

@@ -33,6 +33,7 @@ USUAL_KPA = 90.0  # of 6 N on 8 x 8 mm
 _N_PER_KPA_MM2 = 1e-3
 _NEWTON = 12  # steps: the law is smooth and nearly straight
 _FELT = 1e-4  # of a pressure: less is not spread
+_FAR = 0.02  # of the pressed square's own pressure, eight squares away: what lies beside an array would carry some
 _RUBBER = 0.48  # Poisson's ratio of a sheet
 _FILM = 0.9  # of the reduced gap: a film that is more of it is the cell
 SHORT_OHM = 1e3  # of a shorted crossing: one bead of the electrodes' material across the film
@@ -209,9 +210,16 @@ class ArrayModel:
         alone[0, 0] = 1.0
         try:
             cell, wall = self._springs
-            return kernel(self.cover, self._share * cell + (1 - self._share) * wall, (py * M_PER_MM, px * M_PER_MM))
+            of = kernel(self.cover, self._share * cell + (1 - self._share) * wall, (py * M_PER_MM, px * M_PER_MM))
         except MissingValue:
             return alone
+        if np.abs(of[len(of) // 2]).max() > _FAR * of[0, 0]:
+            p = self.layout.params
+            raise BadInput(
+                f"cover_mm {p.cover_mm:g} of cover_mpa {p.cover_mpa:g}: it spreads a press over more than {len(of)} "
+                "crossings, beyond the array; expected a thinner or softer sheet"
+            )
+        return of
 
     @cached_property
     def spread(self) -> "csr_array":

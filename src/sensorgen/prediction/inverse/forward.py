@@ -14,6 +14,7 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models import line
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.inference import Index, parts
+from sensorgen.solvers.line.inputs import far_load
 
 FORCE_LIMIT_N = 13.0  # the rig's largest force, thesis chapter 6
 _HALVINGS = 40
@@ -47,7 +48,9 @@ class Forward:
         self.sensor, self.frequency_hz = sensor, tones(frequency_hz)
         self.susceptance: Real = 2 * np.pi * self.frequency_hz * sensor.capacitance_f_per_m
         self.loose = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * self.susceptance
-        self.track, self.track_per_pascal = sensor.track_ohm_per_m()
+        track, self.track_per_pascal = sensor.track_ohm_per_m()
+        self.track: Real = np.asarray(track)
+        self._load = far_load(sensor.far_end)
 
     def log_impedance(self, force_n: Real, position_m: Real) -> Complex:
         """Natural logarithm of Z/ohm, (n, n_tones); parameters and errors as :meth:`Sensor.impedance`.
@@ -61,9 +64,9 @@ class Forward:
         pressed = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * (self.susceptance / (1 - thinning))
         under = self.track + stress * self.track_per_pascal
         right = np.maximum(sensor.length_m - patch.left_m - patch.length_m, 0.0)
-        z = line.cascade(
-            [self.track, under, self.track], [self.loose, pressed, self.loose],
-            [patch.left_m, patch.length_m, right], sensor.far_end,
+        z = line.through(
+            [self.track, under, self.track], [self.loose, pressed, self.loose], [patch.left_m, patch.length_m, right],
+            self._load,
         )  # fmt: skip
         return np.log(sensor.at_leads(z, self.frequency_hz))
 

@@ -93,7 +93,7 @@ def cell_of(scene: Scene, period_mm: float | None) -> ContactCell:
     """
     try:
         found = sections(scene)
-        whole = straightened(slices(found[0], 0.0, metal=True))
+        whole = straightened(slices(found[0], 0.0, layered=True))
     except ValueError as error:
         raise BadInput(f"compression needs a prismatic scene: {error}") from None
     if len(found) > 1:

@@ -179,13 +179,13 @@ def triangulated(
     ``coarser_mm`` is the largest triangle of regions that may have larger ones than ``coarse_mm``.
     ``quick`` makes Delaunay triangles with one optimisation step; for potentials they are as good as a front.
     """
-    made = mesher.mesh([*edges.items()], coarse_mm, growth, coarser_mm or {}, quick=quick)
+    output = mesher.mesh([*edges.items()], coarse_mm, growth, coarser_mm or {}, quick=quick)
     behind = [min(pair) for pair in edges.values()]
     marked: dict[int, list[Run]] = {}
-    for (a, b), number in zip(made.sides.tolist(), made.edge.tolist(), strict=True):
+    for (a, b), number in zip(output.sides.tolist(), output.edge.tolist(), strict=True):
         if behind[number - 1] < 0:
             marked.setdefault(behind[number - 1], []).append((a, b))
-    return Net(made.points * M_PER_MM, made.corners, made.region, marked)
+    return Net(output.points * M_PER_MM, output.corners, output.region, marked)
 
 
 def nearest(points_m: Real, place_mm: Point) -> int:
@@ -201,8 +201,8 @@ def cuts(length_mm: float, first_mm: float, last_mm: float, fineness: Fineness) 
     """
     half = length_mm / 2
     ahead, behind = (grown(half, size, fineness) / length_mm for size in (first_mm, last_mm))
-    found = [*ahead[:-1], 0.5, *(1 - behind[-2::-1])] if len(ahead) + len(behind) > 2 else []
-    return [float(t) for t in found]
+    places = [*ahead[:-1], 0.5, *(1 - behind[-2::-1])] if len(ahead) + len(behind) > 2 else []
+    return [float(t) for t in places]
 
 
 def grown(reach: float, size: float, fineness: Fineness) -> Real:
@@ -227,7 +227,7 @@ def sharp_corners(edges: Mapping[Edge, tuple[int, int]], left_mm: float, right_m
                 ways.setdefault(place, []).append(out)
                 if place[0] in (left_mm, right_mm) and out[0]:
                     ways[place].append(out * (-1, 1))
-    return [place for place, found in ways.items() if len(found) != 2 or found[0] @ found[1] >= -np.cos(_SHARP)]
+    return [place for place, out_of in ways.items() if len(out_of) != 2 or out_of[0] @ out_of[1] >= -np.cos(_SHARP)]
 
 
 def notches(cell: ContactCell) -> list[Point]:
@@ -238,9 +238,9 @@ def notches(cell: ContactCell) -> list[Point]:
         if left != right:
             for (p, q), solid in ((edge, left), (edge[::-1], right)):
                 ways.setdefault(p, []).append((atan2(q[1] - p[1], q[0] - p[0]), solid))
-    alone = {place: found for place, found in ways.items() if len(found) == 2}
+    alone = {place: out_of for place, out_of in ways.items() if len(out_of) == 2}
     halves = {place: pi / 2 if place[0] in (cell.left_mm, cell.right_mm) else pi for place in alone}
-    angles = {place: _filled(found) for place, found in alone.items()}
+    angles = {place: _filled(out_of) for place, out_of in alone.items()}
     return [place for place, half in halves.items() if angles[place] > half and abs(angles[place] - pi) > _SHARP]
 
 
@@ -255,23 +255,23 @@ def ringed(points: Real, triangles: Whole, region: Whole, tips: list[int], count
     is_tip = np.zeros(len(points) + 1, bool)
     is_tip[tips] = True
     at: dict[int, dict[int, list[int]]] = {tip: {} for tip in tips}  # triangles there: corners and region, by number
-    made, gone, total = [], set[int](), 0
+    triangle_sets, gone, total = [], set[int](), 0
 
     def add(new: Whole, regions: Whole) -> None:
         beside = is_tip[np.minimum(new, len(is_tip) - 1)]
         for k in np.flatnonzero(beside.any(axis=1)).tolist():
             for corner in new[k, beside[k]].tolist():
                 at[corner][total + k] = [*new[k].tolist(), int(regions[k])]
-        made.append(np.column_stack([new, regions]))
+        triangle_sets.append(np.column_stack([new, regions]))
 
     add(triangles, region)
     for tip in tips:
         # Cut all sides that start at a point at the same shares, and so each triangle there into a small one and pairs
-        total = sum(map(len, made))
+        total = sum(map(len, triangle_sets))
         whole = {k: own for k, own in at[tip].items() if k not in gone}
         gone.update(whole)
-        found = np.array(list(whole.values()))
-        here, fill = found[:, :3], found[:, 3]
+        rows = np.array(list(whole.values()))
+        here, fill = rows[:, :3], rows[:, 3]
         first = (here == tip).argmax(axis=1)
         _, *ends = np.take_along_axis(here, (first[:, None] + np.arange(3)) % 3, axis=1).T
         beside = np.unique(ends)
@@ -282,5 +282,5 @@ def ringed(points: Real, triangles: Whole, region: Whole, tips: list[int], count
         near = points[tip] + _RATIO ** np.arange(1, count + 1)[:, None, None] * (points[beside] - points[tip])
         points = np.concatenate([points, near.reshape(-1, 2)])
         add(new, np.tile(fill, 2 * count + 1))
-    kept = np.concatenate(made)[~np.isin(np.arange(sum(map(len, made))), list(gone))]
-    return points, kept[:, :3], kept[:, 3]
+    left = np.concatenate(triangle_sets)[~np.isin(np.arange(sum(map(len, triangle_sets))), list(gone))]
+    return points, left[:, :3], left[:, 3]

@@ -56,10 +56,10 @@ class Sheet:
 
     def capacitances(self) -> Real:
         """Capacitance per area on a grid of equal rectangles, one where it is uniform [F/m2]."""
-        found = np.asarray(self.capacitance_f_per_m2)
-        if found.dtype.kind not in "iuf" or found.ndim not in (0, 2) or not found.size:
+        grid = np.asarray(self.capacitance_f_per_m2)
+        if grid.dtype.kind not in "iuf" or grid.ndim not in (0, 2) or not grid.size:
             raise BadInput("capacitance_f_per_m2 takes a number, or an array with one row per step along x")
-        return np.atleast_2d(found).astype(float)
+        return np.atleast_2d(grid).astype(float)
 
     def edge(self, side: str, name: str, start_m: float = 0.0, stop_m: float | None = None) -> "Contact":
         """Contact along an edge, or along a stretch of it.
@@ -171,13 +171,13 @@ def contacts_of(sheet: Sheet, ports: Sequence[Port]) -> tuple[Contact, ...]:
     for plus, minus in ports:
         if plus == minus:
             raise OutOfRange(f"a port between the {plus} and itself reads nothing: give two contacts")
-    found = tuple(dict.fromkeys(contact for port in ports for contact in port))
-    for contact in found:
+    contacts = tuple(dict.fromkeys(contact for port in ports for contact in port))
+    for contact in contacts:
         _check_inside(f"the {contact}", sheet, contact.x_m, contact.y_m)
-    for one, other in combinations(found, 2):
+    for one, other in combinations(contacts, 2):
         if one.touches(other):
             raise OutOfRange(f"the {one} and the {other} are shorted: keep them apart, or use one for both")
-    return found
+    return contacts
 
 
 def check_patch(sheet: Sheet, patch: SheetPatch) -> None:
@@ -217,19 +217,19 @@ class GridLines:
     def below(self, at_m: Real) -> Real:
         """Integral of each node's hat function up to a place, one row per place [m]."""
         t = np.clip((at_m[:, None] - self.lines_m[:-1]) / self.steps_m, 0.0, 1.0)
-        found = np.zeros((len(at_m), len(self.lines_m)))
-        found[:, 1:] += self.steps_m * t**2 / 2
-        found[:, :-1] += self.steps_m * t * (1 - t / 2)
-        return found
+        integrals = np.zeros((len(at_m), len(self.lines_m)))
+        integrals[:, 1:] += self.steps_m * t**2 / 2
+        integrals[:, :-1] += self.steps_m * t * (1 - t / 2)
+        return integrals
 
     def hats(self, at_m: Real) -> Real:
         """Each node's hat function at a place, one row per place [-]."""
         k = np.clip(np.searchsorted(self.lines_m, at_m, side="right") - 1, 0, len(self.steps_m) - 1)
         t = (at_m - self.lines_m[k]) / self.steps_m[k]
-        found = np.zeros((len(at_m), len(self.lines_m)))
+        values = np.zeros((len(at_m), len(self.lines_m)))
         rows = np.arange(len(at_m))
-        found[rows, k], found[rows, k + 1] = 1 - t, t
-        return found
+        values[rows, k], values[rows, k + 1] = 1 - t, t
+        return values
 
 
 def axes(sheet: Sheet, contacts: Sequence[Contact], cells: int) -> tuple[GridLines, GridLines]:
@@ -298,11 +298,11 @@ def _lines(size: float, borders: list[float], corners: set[float], cells: int) -
 
 def _crowding(at: Real, size: float, corners: set[float]) -> Real:
     """Number of lines before a place, up to a factor."""
-    found = at / size
+    lines = at / size
     for corner in sorted(corners):
         away = (at - corner) / size
-        found = found + np.sign(away) * np.abs(away) ** (1 / GRADING)
-    return np.asarray(found)
+        lines = lines + np.sign(away) * np.abs(away) ** (1 / GRADING)
+    return np.asarray(lines)
 
 
 def folds(ports: Sequence[Port], patch: SheetPatch | None) -> bool:

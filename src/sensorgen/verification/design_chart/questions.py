@@ -135,16 +135,16 @@ def _capacitance(body: Body) -> Question:
             series.append(Series(f"thesis_cells: {name.removeprefix('thesis-')}", OWN, (("", work, 0.0),)))
     for name in peers.FIELD:
         try:
-            found = [] if peers.missing(name) else peers.levels(name, scene, eps)
+            runs = [] if peers.missing(name) else peers.levels(name, scene, eps)
             why = peers.missing(name)
         except ValueError as error:
-            found, why = [], str(error)
+            runs, why = [], str(error)
         if why:
             silent.append((name, why))
             continue
         levels = tuple(
             (said.rstrip(", "), partial(works.peer, name, scene, eps, k, count), 0.0)
-            for k, (said, _) in enumerate(found)
+            for k, (said, _) in enumerate(runs)
         )
         series.append(Series(name, name, levels))
     return Question("capacitance", "capacitance at rest", "C at rest", tuple(series), tuple(silent), (), largest)
@@ -156,11 +156,11 @@ def _compression(body: Body, stress_pa: float) -> Question:
     series, silent = [], [("springs", "it has a displacement and no capacitance")]
     for law in (*CLOSED_FORM, ""):
         try:
-            found = law_of(body.design, rest.answer, law, printed=None if body.is_drawn else pressed)
+            law_here = law_of(body.design, rest.answer, law, printed=None if body.is_drawn else pressed)
         except SensorgenError as error:
             silent.append((f"compression: {law}", str(error)))
             continue
-        if law or not (plate or not found.bounded):
+        if law or not (plate or not law_here.bounded):
             name = f"compression: {law or 'stored curve'}"
             series.append(Series(name, OWN, (("", partial(works.rise_by_law, body, law, stress_pa), 0.0),)))
     references: tuple[Reference, ...] = ()
@@ -277,17 +277,17 @@ def _seconds(body: Body, query: Query) -> float:
     return sum(c.expected_seconds or 0.0 for c in chosen)
 
 
-def largest(found: tuple[complex, ...], known: tuple[complex, ...]) -> float:
+def largest(answer: tuple[complex, ...], known: tuple[complex, ...]) -> float:
     """Largest relative distance [-]."""
-    return max(abs(a / b - 1) for a, b in zip(found, known, strict=True))
+    return max(abs(a / b - 1) for a, b in zip(answer, known, strict=True))
 
 
-def of_line(found: tuple[complex, ...], known: tuple[complex, ...]) -> float:
+def of_line(answer: tuple[complex, ...], known: tuple[complex, ...]) -> float:
     """The larger one of abs(Z) and of Re Z by itself, at the worst frequency [-]."""
-    real = (abs(a.real / b.real - 1) for a, b in zip(found, known, strict=True))
-    return max(largest(found, known), *real)
+    real = (abs(a.real / b.real - 1) for a, b in zip(answer, known, strict=True))
+    return max(largest(answer, known), *real)
 
 
-def of_modulus(found: tuple[complex, ...], known: tuple[complex, ...]) -> float:
+def of_modulus(answer: tuple[complex, ...], known: tuple[complex, ...]) -> float:
     """Of abs(Z), at the worst frequency [-]."""
-    return max(abs(abs(a) / abs(b) - 1) for a, b in zip(found, known, strict=True))
+    return max(abs(abs(a) / abs(b) - 1) for a, b in zip(answer, known, strict=True))

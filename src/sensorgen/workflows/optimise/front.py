@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from math import inf, log
 from typing import Any
 
@@ -56,71 +56,6 @@ class Workers:
 HERE = Workers()
 
 
-@dataclass(frozen=True)
-class Searched:
-    """The whole space after a search.
-
-    Attributes
-    ----------
-    target : Target
-        That was searched for.
-    rows : tuple of Candidate
-        Every design.
-    front : tuple of Candidate
-        Designs that no other is certain to be better than, the best compromise first.
-    margin : float
-        Between a number on the coarse mesh and its best value, that was allowed for [-].
-    largest : float or None
-        The largest factor between both among the evaluated designs [-]; None where no coarse mesh was used.
-    size : int
-        Designs of the whole space where only a sample was tried, else 0 [-].
-    """
-
-    target: Target
-    rows: tuple[Candidate, ...]
-    front: tuple[Candidate, ...]
-    margin: float
-    largest: float | None
-    size: int = 0
-
-    @property
-    def evaluated(self) -> tuple[Candidate, ...]:
-        """Designs that were evaluated."""
-        return tuple(row for row in self.rows if row.trial)
-
-    def reasons(self) -> list[tuple[str, bool, int]]:
-        """Why designs are out, whether that is proven, and how many; of reasons that differ in numbers the first."""
-        found: Counter[tuple[str, bool]] = Counter()
-        words: dict[str, str] = {}
-        front = {row.number for row in self.front}
-        for row in self.rows:
-            why = row.discarded or (f"violates {min(row.violated)}" if row.violated else "")
-            if not why and row.number not in front:
-                why = "evaluated; another is better in every objective"
-            if why:
-                alike = _NUMBER.sub("#", why)
-                words.setdefault(alike, why)
-                found[alike, row.certified and bool(row.discarded)] += 1
-        return [(words[alike], certified, count) for (alike, certified), count in found.most_common()]
-
-    def nearest(self) -> Candidate | None:
-        """Where nothing meets the target: the design that violates the fewest constraints, and these the least."""
-        tried = [row for row in self.rows if row.violated]
-        return min(
-            tried, key=lambda row: (row.trial is None, len(row.violated), sum(row.violated.values())), default=None
-        )
-
-    def binding(self) -> list[tuple[str, int, int]]:
-        """Constraints, how many designs violate each, and how many violate nothing else."""
-        every, alone = Counter[str](), Counter[str]()
-        for row in self.rows:
-            every.update(list(row.violated))
-            alone.update(list(row.violated) if len(row.violated) == 1 else ())
-        return [
-            (name, count, alone[name]) for name, count in sorted(every.items(), key=lambda i: (-alone[i[0]], -i[1]))
-        ]
-
-
 class Front(Search):
     """Every design of a space: discarded for a reason, or evaluated as printed, against all that were before.
 
@@ -134,6 +69,10 @@ class Front(Search):
         Read the cache and store new answers, so that a search that was stopped goes on where it was.
     progress : callable
         Called with the step, how many designs are done, and how many there are.
+    margin, largest : float
+        Between a number on the coarse mesh and its best value: allowed for, and seen; 0 where none was used [-].
+    whole : int
+        Designs of the whole space where only a sample was tried, else 0 [-].
     """
 
     def __init__(
@@ -146,8 +85,8 @@ class Front(Search):
         keys = {*target.objectives, *target.limits}
         self.is_bounded, self.is_pressed = bool(keys & AT_REST), bool(keys & (COARSE - AT_REST))
         self.best: list[dict[str, Interval]] = []  # objectives of those that were evaluated and violate nothing
-        self.margin, self.largest = MARGIN, 0.0
-        self.together = max(2, workers.jobs, len(workers.lanes))
+        self.margin, self.largest, self.whole = MARGIN, 0.0, 0
+        self.together = max(1, workers.jobs, len(workers.lanes))
         self.identities: set[str] = set()
 
     def made(self, some: Sequence[Candidate]) -> list[Candidate]:
@@ -202,18 +141,22 @@ class Front(Search):
 
     def take(self, one: Candidate, answer: Any) -> Iterable[Candidate]:
         """Discard for a finding or a proven limit; after an evaluation, perhaps take discards back."""
-        if one.stage == _EVALUATION + 1:
+        if one.stage > _EVALUATION:
             return self._evaluated(one, answer)
-        if one.stage == _BOUNDS + 1:
+        if one.stage > _BOUNDS:
             one.known = {} if isinstance(answer, str) else answer
             self._limit(one)
         else:
-            refused = [answer] if isinstance(answer, str) else [r for r, s in answer if self.target.refuses(s, r)]
-            if refused:
-                one.violated = {f"check {rule}": 1.0 for rule in refused}
-                one.discard(f"checks: {refused[0]}")
-            one.stage += not (self.is_bounded or self.solve)
+            self._check(one, [(answer, "error")] if isinstance(answer, str) else answer)
         return () if one.discarded else (one,)
+
+    def _check(self, one: Candidate, findings: Sequence[tuple[str, str]]) -> None:
+        """Discard a design with a finding that is refused; without an objective at rest, leave out its bounds."""
+        refused = [rule for rule, severity in findings if self.target.refuses(severity, rule)]
+        if refused:
+            one.violated = {f"check {rule}": 1.0 for rule in refused}
+            one.discard(f"checks: {refused[0]}")
+        one.stage += not (self.is_bounded or self.solve)
 
     def _limit(self, one: Candidate) -> None:
         """Discard a design whose certified bounds lie beyond a limit."""
@@ -259,19 +202,56 @@ class Front(Search):
         ends = {key: Interval(one.known[key].lower / s, one.known[key].upper * s) for key, s in shares.items()}
         return {key: self.target.badness(key, interval) for key, interval in ends.items()}
 
-    def searched(self, size: int = 0) -> Searched:
-        """The front of designs that are all discarded or evaluated."""
+    @cached_property
+    def front(self) -> tuple[Candidate, ...]:
+        """Designs that no other is certain to be better than, the best compromise first."""
         feasible = [row for row in self.rows if row.trial and not row.violated]
         worth = {row.number: badness(self.target, row) for row in feasible}
         front = [row for row in feasible if not any(_beats(other, worth[row.number]) for other in worth.values())]
-        ordered = sorted(front, key=_compromise(self.target, front))
-        return Searched(self.target, tuple(self.rows), tuple(ordered), self.margin, self.largest or None, size)
+        return tuple(sorted(front, key=_compromise(self.target, front)))
+
+    @property
+    def evaluated(self) -> tuple[Candidate, ...]:
+        """Designs that were evaluated."""
+        return tuple(row for row in self.rows if row.trial)
+
+    def reasons(self) -> list[tuple[str, bool, int]]:
+        """Why designs are out, whether that is proven, and how many; of reasons that differ in numbers the first."""
+        found: Counter[tuple[str, bool]] = Counter()
+        words: dict[str, str] = {}
+        front = {row.number for row in self.front}
+        for row in self.rows:
+            why = row.discarded or (f"violates {min(row.violated)}" if row.violated else "")
+            if not why and row.number not in front:
+                why = "evaluated; another is better in every objective"
+            if why:
+                alike = _NUMBER.sub("#", why)
+                words.setdefault(alike, why)
+                found[alike, row.certified and bool(row.discarded)] += 1
+        return [(words[alike], certified, count) for (alike, certified), count in found.most_common()]
+
+    def nearest(self) -> Candidate | None:
+        """Where nothing meets the target: the design that violates the fewest constraints, and these the least."""
+        tried = [row for row in self.rows if row.violated]
+        return min(
+            tried, key=lambda row: (row.trial is None, len(row.violated), sum(row.violated.values())), default=None
+        )
+
+    def binding(self) -> list[tuple[str, int, int]]:
+        """Constraints, how many designs violate each, and how many violate nothing else."""
+        every, alone = Counter[str](), Counter[str]()
+        for row in self.rows:
+            every.update(list(row.violated))
+            alone.update(list(row.violated) if len(row.violated) == 1 else ())
+        return [
+            (name, count, alone[name]) for name, count in sorted(every.items(), key=lambda i: (-alone[i[0]], -i[1]))
+        ]
 
 
 def search(
     target: Target, space: Sequence[Candidate], workers: Workers = HERE, *, keep: bool = True,
     progress: Progress = lambda *_: None,
-) -> Searched:  # fmt: skip
+) -> Front:  # fmt: skip
     """Every design of a space: discarded for a reason, or evaluated as printed; arguments as of :class:`Front`.
 
     Raises
@@ -282,7 +262,7 @@ def search(
     with workers.opened() as opened:
         front = Front(target, opened, keep=keep, progress=progress)
         front.run(front.made(space))
-    return front.searched()
+    return front
 
 
 def value_of(key: str, row: Candidate) -> Bounds | None:

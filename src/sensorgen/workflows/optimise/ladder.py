@@ -2,8 +2,7 @@
 
 import json
 from dataclasses import asdict, replace
-from functools import cache as once
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from sensorgen.checks.review import review
 from sensorgen.core import cache
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import SensorgenError
+from sensorgen.core.records import adapter
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
@@ -27,9 +27,6 @@ from sensorgen.workflows.moves import short
 from sensorgen.workflows.optimise.target import NUMBERS
 from sensorgen.workflows.search import EarlyNumber
 from sensorgen.workflows.trial import Numbers, Trial, trial
-
-if TYPE_CHECKING:
-    from pydantic import TypeAdapter
 
 AT_REST = frozenset({"gap_mm", "capacitance_pf", "top_electrode_ohm", "bottom_electrode_ohm"})
 COARSE = AT_REST | {"force_resolution_n", "position_resolution_mm", "sensitivity_per_kpa"}
@@ -127,9 +124,10 @@ def everything(design: Design, query: Query, slicer: str) -> Trial:
         found = trial(design, query, slicer=slicer or NONE, drawn=False)
         if design.layout and found.status == "predicted":
             found = replace(found, printed=_of_array(design, query, slicer, found.printed))
-        return json.loads(_adapter().dump_json(found))
+        return json.loads(adapter(Trial).dump_json(found))
 
-    return _adapter().validate_json(json.dumps(cache.answer(question, work)))
+    tried: Trial = adapter(Trial).validate_json(json.dumps(cache.answer(question, work)))
+    return tried
 
 
 def _of_array(design: Design, query: Query, slicer: str, numbers: Numbers) -> Numbers:
@@ -144,10 +142,3 @@ def _of_array(design: Design, query: Query, slicer: str, numbers: Numbers) -> Nu
     sigma = found.sigma_kpa[found.model.here & found.determined]
     resolution = float(np.median(sigma)) if sigma.size else float("inf")
     return replace(numbers, pressure_resolution=resolution, wires=float(len(found.model.wires())))
-
-
-@once
-def _adapter() -> "TypeAdapter[Trial]":
-    from pydantic import TypeAdapter
-
-    return TypeAdapter(Trial)

@@ -18,7 +18,7 @@ from sensorgen.export.slicers import PROGRAMS
 from sensorgen.export.slicers.run import find
 from sensorgen.workflows.build import build
 from sensorgen.workflows.optimise import ladder
-from sensorgen.workflows.optimise.front import HERE, Searched, Workers, value_of
+from sensorgen.workflows.optimise.front import HERE, Front, Workers, value_of
 from sensorgen.workflows.optimise.result import ObjectiveSpread, Recommended, chosen, leads
 from sensorgen.workflows.optimise.space import grid_mm
 from sensorgen.workflows.optimise.target import NUMBERS, Target
@@ -31,7 +31,7 @@ Step = Callable[[str], None]
 
 
 def recommended(
-    name: str, found: Searched, out: Path, workers: Workers = HERE, *, keep: bool = True, sliced: bool = True,
+    name: str, found: Front, out: Path, workers: Workers = HERE, *, keep: bool = True, sliced: bool = True,
     step: Step = lambda _: None,
 ) -> tuple[Recommended, ...]:  # fmt: skip
     """Write the files of the designs to print into ``out``.

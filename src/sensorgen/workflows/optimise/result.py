@@ -10,7 +10,7 @@ from sensorgen.core.display import Displayed
 from sensorgen.core.document import Cell, Column, Part, Table, comma_separated, shown
 from sensorgen.core.findings import Verdict
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
-from sensorgen.workflows.optimise.front import Searched, value_of
+from sensorgen.workflows.optimise.front import Front, value_of
 from sensorgen.workflows.optimise.target import NUMBERS, Target
 from sensorgen.workflows.optimise.ties import RULE, tied
 from sensorgen.workflows.optimise.ties import worth as worth_of
@@ -324,7 +324,7 @@ def _numbers(one: Recommended) -> Table:
     return Table(f"design-{one.design.number}", "", columns, tuple(tuple(cells(key)) for key in one.design.numbers))
 
 
-def result(name: str, found: Searched, recommended: tuple[Recommended, ...] = ()) -> Optimised:
+def result(name: str, found: Front, recommended: tuple[Recommended, ...] = ()) -> Optimised:
     """A search as its answer."""
     front = {row.number for row in found.front}
     ahead, keys = leads(found), list(found.target.objectives)
@@ -342,13 +342,13 @@ def result(name: str, found: Searched, recommended: tuple[Recommended, ...] = ()
         name, len(found.rows), len(found.evaluated),
         {k: goal if isinstance(goal, str) else f"near {goal.near:g}" for k, goal in found.target.objectives.items()},
         tuple(Reason(*reason) for reason in found.reasons()), tuple(designs[row.number - 1] for row in found.front),
-        designs, found.margin, found.largest, recommended, designs[nearest.number - 1] if nearest else None,
+        designs, found.margin, found.largest or None, recommended, designs[nearest.number - 1] if nearest else None,
         () if front else tuple(Binding(*each) for each in found.binding()), tuple(_remarks(found)),
-        found.size,
+        found.whole,
     )  # fmt: skip
 
 
-def _remarks(found: Searched) -> Iterator[str]:
+def _remarks(found: Front) -> Iterator[str]:
     """Accepted doubts that no evaluated design has."""
     doubts = list(dict.fromkeys(doubt for row in found.evaluated if row.trial for doubt in row.trial.doubts))
     for part in found.target.accept_doubts if found.evaluated else ():
@@ -373,7 +373,7 @@ def chosen(target: Target, row: Candidate, *, leads: bool = False, ties: tuple[i
     )  # fmt: skip
 
 
-def leads(found: Searched) -> list[Candidate]:
+def leads(found: Front) -> list[Candidate]:
     """Of the front, the designs that no other's best values are better than."""
     keys = found.target.objectives
     worth = {row.number: {key: worth_of(found.target, key, row) for key in keys} for row in found.front}

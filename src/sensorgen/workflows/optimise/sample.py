@@ -4,7 +4,7 @@ import importlib.util
 from collections.abc import Sequence
 
 from sensorgen.core.errors import NotInstalled
-from sensorgen.workflows.optimise.front import HERE, Front, Progress, Searched, Workers
+from sensorgen.workflows.optimise.front import HERE, Front, Progress, Workers
 from sensorgen.workflows.optimise.space import Space
 from sensorgen.workflows.optimise.target import Target
 from sensorgen.workflows.optimise.ties import worth
@@ -20,7 +20,7 @@ _WORST = 1e30  # objective of a design that has none
 def sample(
     target: Target, space: Space, count: int, workers: Workers = HERE, *, keep: bool = True,
     progress: Progress = lambda *_: None,
-) -> Searched:  # fmt: skip
+) -> Front:  # fmt: skip
     """The front of so many designs, which NSGA-II chooses by the results of those before.
 
     Each generation is checked, bounded and evaluated as by :func:`sensorgen.workflows.optimise.front.search`, against
@@ -71,7 +71,8 @@ def sample(
                 trial.set_constraint("violated", sum(row.violated.values()))
                 study.tell(trial, _objectives(target, row))
             idle = idle + 1 if len(rows) == before else 0
-    return front.searched(space.size)
+    front.whole = space.size
+    return front
 
 
 def _objectives(target: Target, row: Candidate) -> Sequence[float]:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from functools import partial
 
-from sensorgen.workflows.optimise.front import Searched, value_of
+from sensorgen.workflows.optimise.front import Front, value_of
 from sensorgen.workflows.optimise.target import Target
 from sensorgen.workflows.search import Candidate
 
@@ -22,7 +22,7 @@ def tied(one: Candidate, other: Candidate, keys: Sequence[str]) -> bool:
     return True
 
 
-def settled(found: Searched, best: Candidate, key: str = "") -> tuple[Candidate, tuple[Candidate, ...]]:
+def settled(found: Front, best: Candidate, key: str = "") -> tuple[Candidate, tuple[Candidate, ...]]:
     """The design to print among those of the front that equal the best within what the models leave open.
 
     Parameters
