@@ -220,6 +220,6 @@ def test_a_stiffness_that_was_asked_for_comes_out_with_gap_and_capacitance(monke
 def test_a_stiffness_that_cannot_be_had_is_refused_with_the_nearest(monkeypatch):
     monkeypatch.setattr(compensation.moves, "steps", few)
     monkeypatch.setattr(compensation, "of_body", stiff(lambda height: 10 * height))
-    monkeypatch.setattr(compensation, "_MOST_SOLVED", 8)
+    monkeypatch.setattr(compensation, "_MOST_SOLVED", 20)
     with pytest.raises(OutOfRange, match=r"and 240 kPa/mm cannot be printed.*nearest: a gap of 0\.2 mm, .* kPa/mm by"):
         compensated(small(parameters={"dielectric_mm": 0.2}), stiffness=True)

@@ -27,6 +27,7 @@ FILM_LAYERS = 2  # of a film at least: through one layer leads every slit betwee
 GAP, CAPACITANCE, STIFFNESS = "gap_mm", "capacitance_pf", "stiffness_kpa_per_mm"
 UNITS = {GAP: "mm", CAPACITANCE: "pF", STIFFNESS: "kPa/mm"}
 WITHIN = {GAP: 0.03, CAPACITANCE: 0.02, STIFFNESS: 0.1}  # relative errors; whole layers leave few stiffnesses
+ESTIMATE_WITHIN = WITHIN | {CAPACITANCE: 0.01}  # of a changed design before it is sliced
 PRESSURE_PA = 80e3  # 8 N on 10 x 10 mm: under which a stiffness is meant
 FARTHEST = 2.0  # distance of a change, as of moves.distance [-]
 MOST_SLICES = 6  # with that of the design as it was
@@ -286,9 +287,9 @@ class CompensationSearch(Nearest):
             self._correct(one)
         else:
             self.estimates[one] = answer
-        aim = self.wanted if is_print or not one.values else self.aim
+        aim, within = (self.wanted, WITHIN) if is_print or not one.values else (self.aim, ESTIMATE_WITHIN)
         keys = list(aim) if one.stage > 1 else [GAP, CAPACITANCE]
-        is_reached = all(abs(_off(answer, aim, key)) <= WITHIN[key] for key in keys)
+        is_reached = all(abs(_off(answer, aim, key)) <= within[key] for key in keys)
         if one.stage < len(self.works) and (is_reached or not one.values):
             return [one]
         if is_reached:
@@ -376,8 +377,11 @@ class CompensationSearch(Nearest):
         start, was = self._share(before, key), self._capacitance_off(before)
         if off is None:
             yield share + copysign(_STEP, share - start or self.quantities(one)[GAP] - self.wanted[GAP])
-        elif was is None or before is one:
-            yield from (share + step for step in (max(abs(off), _LEAST_STEP), -max(abs(off), _LEAST_STEP)))
+            yield from () if was is None else (2 * start - share,)
+        elif before is one:
+            yield share + max(abs(off), _LEAST_STEP)
+        elif was is None:
+            yield from (share + off, share - off)
         elif 0 < abs(power := (off - was) / (share - start)) <= _STEEPEST:
             yield share + max(-_LONGEST_STEP, min(-off / power, _LONGEST_STEP))
 
