@@ -203,14 +203,18 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
             stiffest=stiffest, assumed=_unknown(model),
         )  # fmt: skip
         others: Otherwise = ([None], [None])
+        layer: list[Sensor | None] = []
         if law.bounded:
-            others = list(_printed_otherwise(model, load, query)), list(_other_films(model, load, query))
+            (*films,) = _other_films(model, load, query)
+            others, layer = (list(_printed_otherwise(model, load, query)), films[:2]), films[2:]
         beyond = law.compression.doubt(float(model.sensor.stress_pa(load.force_n, load.position_m)))
         pressed = (beyond, _few_periods(model.body, query), _free_sides(model.body))
         found = replace(
             found, identifiability=made, sensitivity=_sensitivity(model, load, query, others),
             doubts=(*found.doubts, *filter(None, pressed)),
-            budget=error_budget(model, query.load(model.body.design), query.accuracy, *others, query.noise),
+            budget=error_budget(
+                model, query.load(model.body.design), query.accuracy, *others, layer, query.noise, made.bench_ratio()
+            ),
         )  # fmt: skip
         return _with_tops(_resolution(found, model, load, query, others), model, load, query)
     except SensorgenError as error:
@@ -265,11 +269,13 @@ def _printed_otherwise(model: SensorModel, load: Load, query: Query) -> Iterator
 
 
 def _other_films(model: SensorModel, load: Load, query: Query) -> Iterator[Sensor | None]:
-    """Sensors with the thickest and the thinnest film; None where one is not known under pressure."""
+    """Sensors with the thickest and the thinnest film, and one a layer thinner; None where it is not known so."""
     body, rest, tip = model.body, model.rest, query.tip_of(model.body.design)
     film = body.cells.film
     pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
-    for scene, farad in ((film.thicker, rest.by_film.lower), (film.thinner, rest.by_film.upper)) if film else ():
+    films = ((film.thicker, rest.by_film.lower), (film.thinner, rest.by_film.upper),
+             (film.layer_thinner, rest.layer_thinner_f)) if film else ()  # fmt: skip
+    for scene, farad in films:
         if scene is None:
             yield None
             continue
