@@ -121,7 +121,8 @@ def _print(
     rest, film, design = model.rest, model.body.cells.film, model.body.design
     turns = "" if model.body.is_drawn else by_walls(design)
     if turns or rest.by_width.lower < rest.by_width.upper:
-        what, values_f = f"of {', '.join(model.body.cells.scenes)}", (rest.by_width.lower, rest.by_width.upper)
+        what = f"line shapes or walls: {', '.join(model.body.cells.scenes)}"
+        values_f = rest.by_width.lower, rest.by_width.upper
         yield reference.term(
             "slicer's walls", what, "print", _ends(model, values_f, otherwise), at_least=None in otherwise,
             source="slicers", turns=turns,
@@ -247,4 +248,4 @@ def _least_modulus(sensor: Sensor, softest: float, reference: ReferenceLoad) -> 
 
 def _range_text(ranges: Sequence[tuple[float, float]]) -> str:
     low, high = min(a for a, _ in ranges), max(b for _, b in ranges)
-    return f"{low:.3g} to {high:.3g}"
+    return " to ".join(f"{float(f'{end:.3g}'):g}" for end in (low, high))

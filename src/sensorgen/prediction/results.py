@@ -571,8 +571,8 @@ def resolved(error: Bounds | None, most: float, cannot: str, *, conditional: boo
         return "–"
     if not (error.lower if conditional else error.value) < GUESS * most:
         return cannot
-    if error.value >= most:
-        return f"{cannot}, at best {si(error.lower, error.unit)}"
+    if not error.value < GUESS * most:
+        return f"{cannot}, at best {si(error.lower, error.unit, 2)}"
     if error.upper > most:
         error = replace(error, upper=most, open="upper")
     return error.words()
