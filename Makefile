@@ -31,8 +31,8 @@ nightly: $(READY_DEV) ## the tests that guard more of the same, kills and attack
 	$(MAKE) attack sbom audit
 
 lint: $(READY_DEV) ## style, types, which module may import which, and the lines of budget.tsv
-	$(BIN)/ruff format --check src tests bench docs scripts
-	$(BIN)/ruff check src tests bench docs scripts
+	$(BIN)/ruff format --check conftest.py src tests bench docs scripts
+	$(BIN)/ruff check conftest.py src tests bench docs scripts
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/python scripts/size.py --check

@@ -15,7 +15,7 @@ from sensorgen.design.design import make
 from sensorgen.design.walls import rule
 from sensorgen.export import slicing
 from sensorgen.prediction import bodies
-from sensorgen.workflows.compensation import compensated, found
+from sensorgen.workflows.compensation import CAPACITANCE, GAP, compensated, of_body
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "asprinted"))
 import voxels
@@ -48,7 +48,7 @@ def main() -> None:
 def row(shape: str, film: float, quality: str, slicer: str) -> str:
     """One design by one slicer; what is refused with its reason."""
     design = make({"shape": shape, "quality": quality, "parameters": {"dielectric_mm": film}})
-    asked, count, files = found(bodies.drawn(design)), [0], {}
+    asked, count, files = of_body(bodies.drawn(design)), [0], {}
 
     def sliced(one):
         with TemporaryDirectory() as folder:
@@ -60,7 +60,7 @@ def row(shape: str, film: float, quality: str, slicer: str) -> str:
         return printed
 
     def words(one):
-        return f"{one.gap_mm:g} mm, {one.capacitance_pf / asked.capacitance_pf - 1:+.1%}"
+        return f"{one[GAP]:g} mm, {one[CAPACITANCE] / asked[CAPACITANCE] - 1:+.1%}"
 
     def shorter(one):
         """A cone's sensor of a fifth of its cells: real slices of all take half a minute."""
@@ -68,22 +68,22 @@ def row(shape: str, film: float, quality: str, slicer: str) -> str:
         return make(data | {"parameters": dict(one.parameters) | {"length_mm": 20.0}}) if shape == "cone" else one
 
     larger = 5.0 if shape == "cone" else 1.0
-    before = found(sliced(shorter(design)))
+    before = of_body(sliced(shorter(design)))
     start, count[0] = seconds(), 0
-    head = f"| {shape} {film:g} {quality} | {slicer} | {asked.gap_mm:g} mm, {asked.capacitance_pf:.4g} pF | "
-    head += f"{before.gap_mm:g} mm, {larger * before.capacitance_pf / asked.capacitance_pf - 1:+.1%} | "
+    head = f"| {shape} {film:g} {quality} | {slicer} | {asked[GAP]:g} mm, {asked[CAPACITANCE]:.4g} pF | "
+    head += f"{before[GAP]:g} mm, {larger * before[CAPACITANCE] / asked[CAPACITANCE] - 1:+.1%} | "
     try:
         made, changes = compensated(design, rule(slicer, design.walls), sliced=sliced)
     except SensorgenError as error:
         return head + f"refused | | {error} | {count[0]}, {seconds() - start:.1f} |"
     effort = f"{count[0]}, {seconds() - start:.1f}"
     made = shorter(made)
-    after = found(sliced(made))
-    error = larger * after.capacitance_pf / asked.capacitance_pf - 1
+    after = of_body(sliced(made))
+    error = larger * after[CAPACITANCE] / asked[CAPACITANCE] - 1
     gap, value = by_voxels(made, files[made.id()])
     said = ", ".join(f"{c.what} {c.after:.4g}" for c in changes if "printed" not in c.what) or "none"
     return (
-        f"{head}{after.gap_mm:g} mm, {error:+.1%} | {gap:g} mm, {larger * value / asked.capacitance_pf - 1:+.1%} | "
+        f"{head}{after[GAP]:g} mm, {error:+.1%} | {gap:g} mm, {larger * value / asked[CAPACITANCE] - 1:+.1%} | "
         f"{said} | {effort} |"
     )
 

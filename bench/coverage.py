@@ -20,10 +20,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import independent_sensor
 from independent_data import data_of, model_of, none_of
-from sensorgen.prediction.calibration.baseline import Baseline
-from sensorgen.prediction.calibration.coverage import inside
+from sensorgen.prediction.calibration.calibration import inside
 from sensorgen.prediction.calibration.fitting import by_rest, calibrated, gain, prior
 from sensorgen.prediction.calibration.inversion import OTHERWISE, Inverter, Verdict, doubt_rest
+from sensorgen.prediction.calibration.rest import Baseline
 from sensorgen.prediction.inverse.estimator import Estimator
 from virtual_specimen import TONES_HZ
 from virtual_specimen.adapter import ERRORS, LIMIT_N, data, specimen_model, split

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from sensorgen.core.errors import SensorgenError
 from sensorgen.design.design import Design, make
 from sensorgen.models import compression, press2d, press_round
+from sensorgen.prediction import capacitance as expectations
 from sensorgen.prediction import compression_law as celllaw
-from sensorgen.prediction import cost_model as expectations
 from sensorgen.prediction import mesh_ladder as pressing
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.verification.chart import cells

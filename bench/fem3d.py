@@ -30,7 +30,7 @@ def solved(layers: int, order: int) -> dict[str, float]:
 
 def cut(length_mm: float, accuracy: float, largest: float) -> dict[str, float]:
     """A sensor of period 2.2 mm, its cell at most so many times the smallest one."""
-    from sensorgen.scene import raster
+    from sensorgen.scene import repetition as raster
 
     raster.LARGER = largest
     return asked(length_mm, 10.0, accuracy, x60_width_mm=0.9)

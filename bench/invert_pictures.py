@@ -11,8 +11,7 @@ import numpy as np
 
 from sensorgen.design.design import make
 from sensorgen.prediction.bodies import drawn
-from sensorgen.prediction.inverse.estimator import Estimator
-from sensorgen.prediction.inverse.prior import Prior
+from sensorgen.prediction.inverse.estimator import Estimator, Prior
 from sensorgen.prediction.inverse.verdict import Status
 from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor

@@ -22,7 +22,7 @@ from sensorgen.core.errors import NotInstalled
 from sensorgen.measure.lab.clock import RealClock, SimulatedClock
 from sensorgen.measure.lab.handyscope import Handyscope, load
 from sensorgen.measure.lab.live import LiveView, Sample
-from sensorgen.measure.signal.multisine import TONES_HZ
+from sensorgen.measure.signal.waveform import TONES_HZ
 from sensorgen.measure.virtual.handyscope import SERIAL, PhasorMeter
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "lab"))

@@ -18,7 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from sensorgen.analysis import calibration
-from sensorgen.measure.log import Log, binding
+from sensorgen.measure.log import Log, prints
 from sensorgen.measure.log.bench import log_recording
 from sensorgen.prediction.bodies import drawn as drawn_body
 from virtual_specimen import TONES_HZ, drawn, recorded, session, write_csv
@@ -85,7 +85,7 @@ def main():
         (folder / "mine.yaml").write_text("shape: tri\nname: mine\nparameters:\n  dielectric_mm: 0.2\n")
         recorded(truth, folder, 30, 1)
         with Log(folder / "log.db", create=True) as log:
-            binding.bind(log, ["S1"], str(folder / "mine.yaml"))
+            prints.bind(log, ["S1"], str(folder / "mine.yaml"))
             log_recording(log, "S1", folder / "run-lcr.csv", folder / "run-rig.csv")
             made = calibration.calibrate(log, ["S1"], calibration.Bench(tip_m=5e-3), body_of=drawn_body)
             log.add(calibration.rows(log, [made[0].calibration]))

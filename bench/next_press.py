@@ -13,7 +13,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from sensorgen.prediction.calibration.coverage import coverage_of
+from sensorgen.prediction.calibration.calibration import coverage_of
 from sensorgen.prediction.calibration.fitting import Data, calibrated
 from sensorgen.prediction.calibration.inversion import Inverter
 from sensorgen.prediction.calibration.next_press import AIMS, VALUES, NextPress, PossiblePresses

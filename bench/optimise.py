@@ -19,7 +19,7 @@ from statistics import mean, median
 from sensorgen.core import cache
 from sensorgen.core.parallel import in_parallel, open_lanes
 from sensorgen.workflows.optimise import ladder
-from sensorgen.workflows.optimise.search import Workers, search
+from sensorgen.workflows.optimise.front import Workers, search
 from sensorgen.workflows.optimise.space import candidates
 from sensorgen.workflows.optimise.target import load
 

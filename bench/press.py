@@ -22,7 +22,7 @@ from sensorgen.prediction import mesh_ladder
 from sensorgen.scene.scene import Body, Prism, Scene, box, rectangle
 from sensorgen.scene.sections import columns, sections
 from sensorgen.solvers.contact import cell as cells
-from sensorgen.solvers.contact import deformed, pressed
+from sensorgen.solvers.contact import closing, pressed
 
 HERE = Path(__file__).parent
 PICTURES = HERE.parent / "docs" / "pictures"
@@ -425,7 +425,7 @@ def shapes_picture():
     """Outlines of the pressed cell, and the gap's tip that closes."""
     cell = tri(0.1)[1]
     found, run = press2d._solved(cell, solids(), [0.0, 5e4, 1e5], BoundaryConditions(), Fineness(), lambda _: None)
-    outlines = [deformed.deformed(cell, run.mesh, run.problem.faces, state.u_m) for state in run.states]
+    outlines = [closing.deformed(cell, run.mesh, run.problem.faces, state.u_m) for state in run.states]
     figure, axes = plt.subplots(1, 3, figsize=(9, 3.9), layout="constrained", sharey=True)
     for ax, outline, stress in zip(axes, outlines, found.stress_pa, strict=True):
         for (p, q), sides in outline.edges.items():

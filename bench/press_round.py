@@ -22,6 +22,7 @@ from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design.design import make
 from sensorgen.models import curved, press3d, press_round
 from sensorgen.models.press_round import Elastic
+from sensorgen.prediction.mesh_ladder import limit as two_meshes
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.electrostatics.round_mesh import solid
 
@@ -159,7 +160,7 @@ def main() -> None:
     fine, coarse = (
         press3d.press(press3d.cell(scene), SOLIDS, stress, EPS, fineness=press3d.BrickCounts(n)) for n in (3, 2)
     )
-    boxes = press3d.limit(fine, coarse, 3)
+    boxes = two_meshes(fine, coarse, 3)
     rows.append(("pillar", float(boxes.found.displacement_m[2]), float(boxes.rise_f_per_m2[2]), *rings(scene, 5e4)))
     lines = [
         f"| {name} | {down * 1e9:.4g} | {rise * 1e9:.4g} | {own / down - 1:+.1%} | {more / rise - 1:+.1%} |\n"

@@ -23,8 +23,8 @@ import made  # noqa: E402 - the truth is made as for the tests
 from sensorgen.analysis.plots import recordings as plots  # noqa: E402
 from sensorgen.analysis.plots import static  # noqa: E402
 from sensorgen.measure.recording import joined, read, rig  # noqa: E402
-from sensorgen.measure.signal import drift, hysteresis, lowpass, presses, waveform  # noqa: E402
-from sensorgen.measure.signal.run import processed  # noqa: E402
+from sensorgen.measure.signal import drift, lowpass, presses, waveform  # noqa: E402
+from sensorgen.measure.signal.run import of_presses, processed  # noqa: E402
 from sensorgen.models.sensor import Sensor  # noqa: E402
 from sensorgen.prediction.identifiability.fisher import bounds, slopes  # noqa: E402
 from sensorgen.prediction.inverse.estimator import Estimator  # noqa: E402
@@ -323,7 +323,7 @@ def ways_picture():
     plan = made.presses(5, seed=3, dwell_s=12, rest_s=6, least_n=2.0)
     with tempfile.TemporaryDirectory() as folder:
         run, _ = joined_run(Path(folder), plan, 7.25, 0.0, law=made.answering(0.01, 3.0), ramp_s=6.0)
-    found = hysteresis.of_presses(processed(run.recording, run, law="smooth"))
+    found = of_presses(processed(run.recording, run, law="smooth"))
     name = "synthetic film that answers within 3 s"
     (PICTURES / "recordings-ways.png").write_bytes(static.png(plots.hysteresis(found.ways, made.TONES_HZ, name)))
 

@@ -17,8 +17,7 @@ from sensorgen.export import slicing
 from sensorgen.models.sheet import Sheet, SheetPatch, contact_sets, localise
 from sensorgen.models.stack import GroundTie
 from sensorgen.prediction.bodies import drawn
-from sensorgen.prediction.double_layer.designs import press_at, stacked
-from sensorgen.prediction.double_layer.touching import WIRINGS, Touching
+from sensorgen.prediction.double_layer import WIRINGS, Touching, press_at, stacked
 from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor
 from sensorgen.scene.geometry.layered import closed

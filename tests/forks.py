@@ -10,9 +10,9 @@ FORKS = """
 import gc, json, os, resource, selectors, sys
 import h5py, numpy, scipy.signal
 from sensorgen.checks import review
-from sensorgen.cli import bench_command, bench_show, build_command, check_command, log_command, log_write, main
+from sensorgen.cli import bench_command, log_command, main, printing
 from sensorgen.measure.log import Log, importing, notes, verify
-from sensorgen.measure.signal import hysteresis
+from sensorgen.measure.signal import run
 from sensorgen.workflows import api, batch, build
 
 
@@ -77,11 +77,11 @@ class Done:
 class Forks:
     """The process that forks; it ends with :meth:`close`."""
 
-    def __init__(self):
+    def __init__(self, env=None):
         own = {"OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "2", "PYTHONDONTWRITEBYTECODE": "1"}
         self.process = subprocess.Popen(
             [sys.executable, "-c", FORKS], stdin=subprocess.PIPE, stdout=subprocess.PIPE, encoding="utf-8",
-            env=os.environ | own,
+            env=os.environ | own | (env or {}),
         )  # fmt: skip
 
     def __call__(self, *words, cwd, before="pass", env=None, **limits):

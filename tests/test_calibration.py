@@ -8,13 +8,12 @@ import pytest
 from sensorgen.core.errors import BadInput
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.calibration import calibration as records
-from sensorgen.prediction.calibration.coverage import coverage_of, held_out, inside
+from sensorgen.prediction.calibration.calibration import coverage_of, held_out, inside
 from sensorgen.prediction.calibration.fitting import by_rest, calibrated, gain, prior, shared, widened
 from sensorgen.prediction.calibration.inversion import Inverter, Verdict
 from sensorgen.prediction.calibration.rest import Rest, checked
 from sensorgen.prediction.calibration.specimen import Spread, unknown
-from sensorgen.prediction.inverse.estimator import Estimator
-from sensorgen.prediction.inverse.prior import Prior
+from sensorgen.prediction.inverse.estimator import Estimator, Prior
 from virtual_specimen import TONES_HZ, drawn, session
 from virtual_specimen.adapter import ERRORS, LIMIT_N, data, specimen_model, split
 

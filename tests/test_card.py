@@ -16,12 +16,24 @@ from scipy.optimize import least_squares
 from sensorgen.core.errors import SensorgenError
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.identifiability import frequencies
-from sensorgen.prediction.identifiability.fisher import Setup, Slopes, bearable, bounds, shares, slopes
-from sensorgen.prediction.identifiability.frequencies import spread
+from sensorgen.prediction.identifiability import fisher
+from sensorgen.prediction.identifiability.fisher import (
+    Required,
+    Setup,
+    Slopes,
+    bearable,
+    bounds,
+    bracket,
+    metres,
+    newtons,
+    required,
+    shares,
+    slopes,
+    spread,
+    verdict,
+)
 from sensorgen.prediction.identifiability.identify import identify, surface
 from sensorgen.prediction.identifiability.results import Identifiability, of_schema_1
-from sensorgen.prediction.identifiability.verdict import Required, bracket, metres, newtons, required, verdict
 from sensorgen.prediction.query import TONES_HZ
 
 EPS0 = 8.8541878128e-12
@@ -406,7 +418,7 @@ def test_the_instruments_limit_bounds_the_advice_but_not_the_tones():
 
 
 def test_many_tones_are_searched_evenly(monkeypatch):
-    monkeypatch.setattr(frequencies, "SEARCHED", 24)
+    monkeypatch.setattr(fisher, "SEARCHED", 24)
     tones = np.geomspace(1e3, 1e6, 300)
     best = identify(tri(), tones).best_frequencies
     assert [len(row.frequency_hz) for row in best] == [1, 2, 3]

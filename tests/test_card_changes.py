@@ -11,11 +11,9 @@ from sensorgen.design.design import make
 from sensorgen.design.tip import EVEN, STIFF
 from sensorgen.models import compression
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.identifiability import changes
-from sensorgen.prediction.identifiability.changes import CHANGES, most_helpful, together
-from sensorgen.prediction.identifiability.fisher import Setup
-from sensorgen.prediction.identifiability.identify import identify
-from sensorgen.prediction.identifiability.verdict import required
+from sensorgen.prediction.identifiability import identify as changes
+from sensorgen.prediction.identifiability.fisher import Setup, required
+from sensorgen.prediction.identifiability.identify import CHANGES, identify, most_helpful, together
 from sensorgen.prediction.query import FLAT, TONES_HZ
 
 EPS0 = 8.8541878128e-12

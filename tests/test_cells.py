@@ -7,7 +7,7 @@ import pytest
 from sensorgen.design.shapes import reference, tri
 from sensorgen.scene import unit_cell as cells
 from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
-from sensorgen.scene.sections import ROUNDING_MM, columns, sections
+from sensorgen.scene.sections import ROUNDING_MM, sections
 from sensorgen.scene.unit_cell import SectionCell, cell
 
 HEIGHT_MM = 1.4
@@ -155,10 +155,10 @@ def test_a_row_without_mirrors_is_solved_as_a_whole():
 def test_a_row_without_mirrors_is_looked_at_once_for_each_place(monkeypatch):
     """Not once for each pair of places: 50 periods took 14 s."""
     looked = []
-    repeats = cells._repeats
-    monkeypatch.setattr(cells, "_repeats", lambda *given: looked.append(given[1:]) or repeats(*given))
+    repeats = cells.repeats
+    monkeypatch.setattr(cells, "repeats", lambda *given: looked.append(given[1:]) or repeats(*given))
     section = sections(steps(12))[0]
-    found_here = cells.mirrored(tuple(cells._slice(column, HEIGHT_MM) for column in columns(section)))
+    found_here = cells.mirrored(tuple(cells.slices(section, HEIGHT_MM)))
     edges = {x for s in found_here.slices for x in (s.left_mm, s.right_mm)}
     places = edges | {(s.left_mm + s.right_mm) / 2 for s in found_here.slices if s.is_flat()}
     assert len(found_here.slices) == 12 * 4

@@ -8,11 +8,10 @@ import pytest
 from independent_data import data_of, model_of, none_of
 from independent_sensor import CHANGES, LENGTH_M, TONES_HZ, WIDTH_M, Strip, drawn_at_random, next_day, run
 from sensorgen.prediction.calibration import calibration as records
-from sensorgen.prediction.calibration.baseline import Baseline
-from sensorgen.prediction.calibration.coverage import inside
+from sensorgen.prediction.calibration.calibration import inside
 from sensorgen.prediction.calibration.fitting import by_rest, calibrated, gain, loosened, widened
 from sensorgen.prediction.calibration.inversion import OTHERWISE, Inverter, Verdict, doubt_rest
-from sensorgen.prediction.calibration.rest import Rest
+from sensorgen.prediction.calibration.rest import Baseline, Rest
 
 NOISE, LIMIT_N, ANSWERED = 1e-3, 7.5, (Verdict.OK, Verdict.FORCE_ONLY)
 OMEGA = 2 * np.pi * TONES_HZ

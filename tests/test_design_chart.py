@@ -19,7 +19,7 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.query import Query
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.line.inputs import read
-from sensorgen.verification import many_digits, peers
+from sensorgen.verification import line_models, peers
 from sensorgen.verification.apart import apart, here
 from sensorgen.verification.chart import cells, lines
 from sensorgen.verification.chart_command import command
@@ -91,11 +91,13 @@ def test_many_digits(name):
     r, y, length = read(standard.line()).sections()
     for k, known in enumerate(standard.known.values()):
         own = [complex(np.ravel(each)[k]) for each in y]
-        found = many_digits.impedance([float(np.ravel(each)[0]) for each in r], own, [float(each) for each in length])
+        found = line_models.exact_impedance(
+            [float(np.ravel(each)[0]) for each in r], own, [float(each) for each in length]
+        )
         assert found == pytest.approx(known, rel=3e-16, abs=0)
         assert found.real == pytest.approx(known.real, rel=3e-16, abs=0)
     with pytest.raises(OutOfRange, match="long"):
-        many_digits.impedance([1e9], [1j], [1.0])
+        line_models.exact_impedance([1e9], [1j], [1.0])
 
 
 def small(**parameters):

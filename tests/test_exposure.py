@@ -131,8 +131,8 @@ def test_uneven_pressure_by_integrals():
 
 def test_dispersion_by_kramers_and_kronig():
     """A permittivity as (j omega)^-n is in phase with its loss: tan(n pi / 2) at every frequency."""
-    from sensorgen.prediction.losses import LOWEST_HZ
     from sensorgen.prediction.reference_load import Dispersed
+    from sensorgen.prediction.rest_state import LOWEST_HZ
 
     sensor = sensor_of(make({"shape": "reference"})).sensor
     there = Dispersed(**vars(sensor), permittivity_power=0.04, resistivity_power=0.0).at(10 * LOWEST_HZ)

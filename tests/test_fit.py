@@ -26,15 +26,14 @@ from sensorgen.design import materials
 from sensorgen.design.design import make
 from sensorgen.design.materials import own
 from sensorgen.design.specimen_name import design_of, parse
-from sensorgen.measure.log import Log, bench, binding, notes
+from sensorgen.measure.log import Log, bench, notes, prints
 from sensorgen.measure.signal.leakage import across_ohm, along_ohm
 from sensorgen.models import columns
 from sensorgen.prediction import capacitance as prediction_of_c
 from sensorgen.prediction.bodies import default_body, drawn
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.losses import lost
 from sensorgen.prediction.query import Query
-from sensorgen.prediction.rest_state import rest_state
+from sensorgen.prediction.rest_state import lost, rest_state
 
 
 @pytest.fixture(autouse=True)
@@ -344,7 +343,7 @@ def test_a_cell_at_the_end_of_the_models_bounds_is_fitted_from_the_log(end, boun
     (tmp_path / "pillars.yaml").write_text(PILLARS)
     names, rng = [f"P{k}" for k in range(3)], np.random.default_rng(3)
     with Log(tmp_path / "log.db", create=True) as log:
-        binding.bind(log, names, str(tmp_path / "pillars.yaml"))
+        prints.bind(log, names, str(tmp_path / "pillars.yaml"))
         for name in names:
             pf = 1e12 * pillars_f(EPS_TRUE, end) * math.exp(rng.normal(0, 0.02))
             log.add([notes.with_ac(notes.reading(name, log=log), {"Cp": [f"{pf:.6g}pF@1kHz"]})])

@@ -12,9 +12,8 @@ from sensorgen.design.design import make
 from sensorgen.design.values import permittivities
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.compression_law import elastic
-from sensorgen.prediction.double_layer.designs import stacked
-from sensorgen.prediction.electrodes import electrode_resistance
-from sensorgen.prediction.rest_state import rest_state
+from sensorgen.prediction.double_layer import stacked
+from sensorgen.prediction.rest_state import electrode_resistance, rest_state
 
 
 def design(values, shape="reference", **rest):

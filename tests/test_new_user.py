@@ -1,6 +1,5 @@
 """From an empty folder with a wheel: own material, printer, shape and CAD, to G-code and page, each by its command."""
 
-import os
 import re
 import subprocess
 import sys
@@ -9,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from forks import Forks
+
 UNPRESSED = (  # by the package of the wheel, not by that of the repository
-    "import os, runpy, sys; sys.modules['netgen'] = None; import sensorgen; "
-    "assert sensorgen.__file__.startswith(os.environ['PYTHONPATH']), sensorgen.__file__; "
-    "runpy.run_module('sensorgen', run_name='__main__')"
+    "import os, sys; sys.modules['netgen'] = None; import sensorgen; "
+    "assert sensorgen.__file__.startswith(os.environ['PYTHONPATH']), sensorgen.__file__"
 )
 ROOT = Path(__file__).parents[1]
 HERE = Path(__file__).parent
@@ -43,17 +43,16 @@ def sensorgen(site, tmp_path):
     home = {"HOME": str(tmp_path / "home"), "PYTHONPATH": str(site), "XDG_CONFIG_HOME": str(tmp_path / "home/config"),
             "SENSORGEN_CACHE": str(tmp_path / "cache")}  # fmt: skip
     (tmp_path / "work").mkdir()
+    forks = Forks(home)
 
     def run(*words, code=0):
-        command = [sys.executable, "-c", UNPRESSED, *map(str, words)]
-        done = subprocess.run(
-            command, cwd=tmp_path / "work", env=os.environ | home, capture_output=True, encoding="utf-8", check=False
-        )
-        assert done.returncode == code, f"{words}: {done.stdout}{done.stderr}"
-        assert "Traceback" not in done.stderr
-        return done.stdout
+        done = forks(*words, cwd=tmp_path / "work", before=UNPRESSED, env=home)
+        assert done.code == code, f"{words}: {done.out}{done.err}"
+        assert "Traceback" not in done.err
+        return done.out
 
-    return run
+    yield run
+    forks.close()
 
 
 def test_own_material_printer_and_shape_to_gcode_and_page(sensorgen, tmp_path, program):

@@ -15,7 +15,7 @@ from in_process import run
 from no_numbers import nothing
 from sensorgen.analysis.report import report
 from sensorgen.core.findings import counts, verdict
-from sensorgen.measure.log import Log, binding, notes
+from sensorgen.measure.log import Log, notes, prints
 from sensorgen.prediction import quantities
 
 DESIGNS = {
@@ -71,7 +71,7 @@ def _counted(findings):
 def _drawn_in_report(folder):
     """The drawing in the report of one reading of a specimen."""
     with Log(folder / "log.db", create=True) as log:
-        binding.bind(log, ["S1"], str(folder / "d.yaml"))
+        prints.bind(log, ["S1"], str(folder / "d.yaml"))
         log.add([notes.reading("S1", "700", "OL", log=log)])
         made = report(log, None, specimens=["S1"])
     ((drawing,),) = [section.drawings for section in made.sections if section.drawings]

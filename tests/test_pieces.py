@@ -12,7 +12,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.scene.geometry import meshes, validity
 from sensorgen.scene.polyhedra import Loft, Polyhedron
 from sensorgen.scene.revolved import CHORD_MM, Revolved
-from sensorgen.scene.scene import Body, Prism, Scene, area_mm2, box, content, rectangle
+from sensorgen.scene.scene import Body, Move, Prism, Scene, area_mm2, box, content, rectangle
 
 QUARTER = tan(pi / 8)  # bulge of a quarter of a circle
 HEMISPHERE = Revolved(1.0, 2.0, ((0, 0), (0.5, 0), (0, 0.5)), (0, QUARTER, 0))
@@ -139,18 +139,20 @@ def test_its_spans_hold_its_cuts(piece):
 @pytest.mark.parametrize("piece", EVERY.values(), ids=EVERY)
 def test_turned_over_and_stretched(piece):
     size = (7.0, 5.0, 4.0)
-    turned = piece.turned_over(size)
+    turned = piece.moved(Move((1, -1, -1), (0, *size[1:])))
     assert turned.volume_mm3() == pytest.approx(piece.volume_mm3(), rel=1e-12)
     for axis, whole in (("y", 5.0), ("z", 4.0)):
         assert turned.span(axis) == pytest.approx([whole - v for v in piece.span(axis)[::-1]], abs=1e-12)
     assert area(turned.cut("z", 3.8)) == pytest.approx(area(piece.cut("z", 0.2)), rel=1e-6)
     for factor in (0.98, 1.02):
-        assert piece.stretched(factor).volume_mm3() == pytest.approx(factor**2 * piece.volume_mm3(), rel=1e-6)
+        assert piece.moved(Move((factor, factor, 1))).volume_mm3() == pytest.approx(
+            factor**2 * piece.volume_mm3(), rel=1e-6
+        )
     assert pickle.loads(pickle.dumps(piece)) == piece
 
 
 def test_every_piece_has_another_content():
-    contents = [repr(content(p)) for p in (*EVERY.values(), *(p.stretched(1.01) for p in EVERY.values()))]
+    contents = [repr(content(p)) for p in (*EVERY.values(), *(p.moved(Move((1.01, 1.01, 1))) for p in EVERY.values()))]
     assert len(set(contents)) == len(contents)
 
 

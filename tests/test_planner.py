@@ -10,8 +10,8 @@ from sensorgen.core import cache
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange, UnknownName
 from sensorgen.design.design import make
+from sensorgen.prediction import capacitance as expectations
 from sensorgen.prediction import capacitance as planner
-from sensorgen.prediction import cost_model as expectations
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.capacitance import Contradiction, Unpredictable, capacitance
 from sensorgen.prediction.rest_state import rest_state

@@ -25,7 +25,7 @@ from sensorgen.prediction import quantities
 from sensorgen.prediction.bodies import drawn, estimated
 from sensorgen.prediction.capacitance import Unpredictable, capacitance
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.grid import (
+from sensorgen.prediction.loaded import (
     FORCES_N,
     LARGEST,
     ROWS,
@@ -35,10 +35,9 @@ from sensorgen.prediction.grid import (
     impedance_grid,
     positions_mm,
 )
-from sensorgen.prediction.losses import Lost
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import NOISE, TONES_HZ, Query
-from sensorgen.prediction.rest_state import rest_state
+from sensorgen.prediction.rest_state import Lost, rest_state
 from sensorgen.prediction.results import from_json, to_json
 
 EPS = {"x60": 4.68, "air": 1.00059}

@@ -17,8 +17,8 @@ from sensorgen.design.values import lead_ranges, material_value, spread
 from sensorgen.models.overlap import edge_fringe_f
 from sensorgen.prediction import bodies, compression_law
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.inverse.forward import Forward, Scalar
-from sensorgen.prediction.narrowing import MULTIMETER, WEIGHT, WIDE
+from sensorgen.prediction.inverse.forward import Forward
+from sensorgen.prediction.quantities import MULTIMETER, WEIGHT, WIDE
 from sensorgen.prediction.results import _change
 
 pytestmark = pytest.mark.usefixtures("shared_cache")
@@ -136,7 +136,6 @@ def test_leads_are_a_two_port_in_front_of_the_line():
     forward = Forward(led, tones)
     at = np.log(led.impedance(tones, force, place))
     assert forward.log_impedance(np.array([force]), np.array([place]))[0] == pytest.approx(at, rel=1e-12)
-    assert Scalar(forward).log_impedance(force, place) == pytest.approx(at.tolist(), rel=1e-12)
 
 
 def test_leads_that_are_stated_are_known_to_a_tenth():

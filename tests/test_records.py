@@ -12,7 +12,7 @@ from sensorgen.core.records import checked
 from sensorgen.design import materials, packs, printer
 from sensorgen.design.design import make
 from sensorgen.measure import accuracy
-from sensorgen.measure.log import facts
+from sensorgen.measure.log import bench
 from sensorgen.workflows.batch.plan import BatchPlan
 from sensorgen.workflows.optimise.target import Target
 
@@ -107,7 +107,7 @@ def test_damaged_facts_of_a_recording():
         ('{"lockins": 5}', "lockins is 5"),
     ):
         with pytest.raises(BadInput, match="the facts of a recording are damaged: ") as caught:
-            facts.from_json(text)
+            bench.from_json(text)
         assert message in str(caught.value)
         assert not OF_PYDANTIC.search(str(caught.value))
 

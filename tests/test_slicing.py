@@ -22,7 +22,7 @@ from sensorgen.export.gcode import paths
 from sensorgen.export.gcode.check import check
 from sensorgen.export.slicers import run, stl
 from sensorgen.export.slicing import Placed, alone, sliced
-from sensorgen.export.threemf.plate import box_mm
+from sensorgen.export.threemf.part import box_mm
 from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.scene import Body, box
 from sensorgen.workflows.slice import slice_design

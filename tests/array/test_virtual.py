@@ -99,3 +99,4 @@ def test_the_whole_demonstration(tmp_path):
         assert run.force < 2
         assert run.verdict == "PRINT"
     assert found.runs[1].error_kpa < found.runs[0].error_kpa
+    assert found.runs[1].centre_mm < 1

@@ -1,7 +1,5 @@
 """What is changed so that what was asked for comes out: by the estimate, and by a real slicer."""
 
-from dataclasses import replace
-
 import pytest
 
 from sensorgen.asprinted.printed import body, gap_mm, nominal
@@ -10,7 +8,7 @@ from sensorgen.design import design
 from sensorgen.prediction.bodies import drawn, estimated, sliced
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.workflows import compensation
-from sensorgen.workflows.compensation import BAKE, compensated, found, printable
+from sensorgen.workflows.compensation import BAKE, CAPACITANCE, GAP, STIFFNESS, compensated, of_body, printable
 
 from .conftest import small
 
@@ -60,8 +58,8 @@ def test_a_film_of_one_layer_is_refused_with_the_nearest(monkeypatch):
 def test_a_film_of_one_layer_that_prints_as_two_is_refused_all_the_same(monkeypatch):
     """A print with the nearest gap that can be had, and the capacitance asked for, is not what was asked for."""
     asked = small(parameters={"dielectric_mm": 0.1})
-    two = replace(found(drawn(asked)), gap_mm=0.12)
-    monkeypatch.setattr(compensation, "_estimate", lambda design, walls, **_: replace(two, design=design))
+    two = of_body(drawn(asked)) | {GAP: 0.12}
+    monkeypatch.setattr(compensation.CompensationSearch, "_at_rest", lambda *_: two)
     with pytest.raises(OutOfRange, match=r"2 layers at least.*nearest: a gap of 0\.12 mm and"):
         compensated(asked)
 
@@ -118,7 +116,7 @@ def test_an_array_keeps_its_period():
     assert names == ["root_mm", "tip_mm"]
     cones = design.make({"shape": "cone", "parameters": {"length_mm": 10.0, "width_mm": 10.0, "period_mm": 1.5}})
     larger = design.make({"shape": "cone", "parameters": {"length_mm": 9.0, "width_mm": 9.0, "period_mm": 1.5}})
-    one, other = (compensation._print(each, drawn).capacitance_pf for each in (cones, larger))
+    one, other = (compensation.quantities(each, drawn)[CAPACITANCE] for each in (cones, larger))
     assert one == pytest.approx(other, rel=1e-6)  # both have 36 cells
 
 
@@ -178,11 +176,11 @@ def test_a_real_slicer_prints_gap_and_capacitance(printed, real):
 def test_the_stiffness_is_that_of_the_solved_cell():
     """The stored cell came down by 36.44 um under 100 kPa, on another mesh."""
     asked = design.make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}})
-    assert found(drawn(asked), stiffness=True).stiffness_kpa_per_mm == pytest.approx(100 / 36.44e-3, rel=0.03)
-    plate = found(drawn(design.make({"shape": "reference"})), stiffness=True)
+    assert of_body(drawn(asked), stiffness=True)[STIFFNESS] == pytest.approx(100 / 36.44e-3, rel=0.03)
+    plate = of_body(drawn(design.make({"shape": "reference"})), stiffness=True)
     # 6 MPa over 0.6 mm, times 11.77 of finite elements where it is bonded (reference/bonded_plates.json), which the
     # closed form of such plates holds to 4 %
-    assert plate.stiffness_kpa_per_mm == pytest.approx(11.7667 * 6e3 / 0.6, rel=0.04)
+    assert plate[STIFFNESS] == pytest.approx(11.7667 * 6e3 / 0.6, rel=0.04)
 
 
 def test_a_stiffness_of_a_cell_in_3d_is_refused():
@@ -196,11 +194,12 @@ def few(design, kinds):
 
 
 def stiff(of_print):
-    """``found`` with a stiffness of 1000 kPa/mm per mm of the lower prisms' height; of a print, of another height."""
+    """``of_body`` with a stiffness of 1000 kPa/mm per mm of the lower prisms' height; of a print, of another height."""
 
     def with_stiffness(body, *, stiffness=False):
         height = body.design.params.lower_height_mm
-        return replace(found(body), stiffness_kpa_per_mm=1e3 * (height if body.is_drawn else of_print(height)))
+        stiff = {STIFFNESS: 1e3 * (height if body.is_drawn else of_print(height))} if stiffness else {}
+        return of_body(body) | stiff
 
     return with_stiffness
 
@@ -209,7 +208,7 @@ def test_a_stiffness_that_was_asked_for_comes_out_with_gap_and_capacitance(monke
     """0.24 mm as drawn are 0.2 mm in whole layers; it is 0.3 mm that print as stiff."""
     asked = small(parameters={"dielectric_mm": 0.2})
     monkeypatch.setattr(compensation.moves, "steps", few)
-    monkeypatch.setattr(compensation, "found", stiff(lambda height: height - 0.06))
+    monkeypatch.setattr(compensation, "of_body", stiff(lambda height: height - 0.06))
     made, changes = compensated(asked, stiffness=True)
     assert made.params.lower_height_mm == pytest.approx(0.3)
     assert changed(changes)["stiffness as printed [kPa/mm]"][1] == pytest.approx(240.0)
@@ -220,7 +219,7 @@ def test_a_stiffness_that_was_asked_for_comes_out_with_gap_and_capacitance(monke
 
 def test_a_stiffness_that_cannot_be_had_is_refused_with_the_nearest(monkeypatch):
     monkeypatch.setattr(compensation.moves, "steps", few)
-    monkeypatch.setattr(compensation, "found", stiff(lambda height: 10 * height))
+    monkeypatch.setattr(compensation, "of_body", stiff(lambda height: 10 * height))
     monkeypatch.setattr(compensation, "_MOST_SOLVED", 8)
     with pytest.raises(OutOfRange, match=r"and 240 kPa/mm cannot be printed.*nearest: a gap of 0\.2 mm, .* kPa/mm by"):
         compensated(small(parameters={"dielectric_mm": 0.2}), stiffness=True)

@@ -17,7 +17,7 @@ from sensorgen.prediction.bodies import sliced
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.scene.layers import drawn
 from sensorgen.scene.scene import area_mm2
-from sensorgen.solvers.network.nodes import StraightLines
+from sensorgen.solvers.network import StraightLines
 
 from .conftest import small
 

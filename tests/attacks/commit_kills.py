@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 from sensorgen.measure.log import BenchRun, Log, Reading, files, sync, verify
-from sensorgen.measure.log.tables import thesis
+from sensorgen.measure.log.importing import thesis_readings
 
 FAULT = ctypes.CDLL(None)
 OLD = Path(__file__).parents[1] / "reference" / "0645a80"
@@ -53,7 +53,7 @@ def begin(folder, work):
     elif work is not add:
         (folder / "run.mat").write_bytes(b"raw" * 5000)
         with Log(path, create=True) as log:
-            log.add(thesis()[:9])
+            log.add(thesis_readings()[:9])
     if work is merge:
         with Log(folder / "other.db", create=True) as other:
             add(folder / "other.db")

@@ -14,8 +14,8 @@ import pytest
 
 from sensorgen.core.errors import SensorgenError
 from sensorgen.measure.log import Log, verify
-from sensorgen.measure.log.batches import prediction
-from sensorgen.measure.log.tables import thesis
+from sensorgen.measure.log.importing import thesis_readings
+from sensorgen.measure.log.prints import prediction
 
 HERE = Path(__file__).parent
 LONG = bool(os.environ.get("SENSORGEN_ATTACK"))
@@ -51,7 +51,7 @@ def test_flipped_bits_change_nothing_unseen(tmp_path):
     """A flip is found by opening or by ``verify``, or it lies where nothing of the content does."""
     path, other = tmp_path / "log.db", tmp_path / "other.db"
     with Log(path, create=True) as log:
-        log.add([*thesis(), prediction("d", "trix", {"capacitance_f": {"lower": 1e-11, "upper": 2e-11}})])
+        log.add([*thesis_readings(), prediction("d", "trix", {"capacitance_f": {"lower": 1e-11, "upper": 2e-11}})])
         log.pragma("wal_checkpoint(TRUNCATE)")
     whole, before, rng = path.read_bytes(), content(path), random.Random(11)
     told = 0

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen.workflows.batch import arranged, picture
+from sensorgen.workflows.batch import arranged, layout
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "film-study.yaml"
 SVG = "{http://www.w3.org/2000/svg}"
 
 
 def text_of(found):
-    return picture.svg(found.plan.name, found.pieces[0].design.machine, found.room, found.plate, found.pieces)
+    return layout.svg(found.plan.name, found.pieces[0].design.machine, found.room, found.plate, found.pieces)
 
 
 def drawn(found):
@@ -73,6 +73,6 @@ def test_more_designs_than_colours_share_them():
             self.design, self.name = self, f"{key:03}"
             self.design_id = self.name
 
-    found = picture.colours([Known(k) for k in range(20)])
+    found = layout.colours([Known(k) for k in range(20)])
     assert list(found) == [f"{k:03}" for k in range(20)]
     assert len({found[key] for key in list(found)[:8]}) == 8

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from sensorgen.core.errors import BadInput, OutOfRange, SensorgenError, UnknownName
 from sensorgen.design import design
 from sensorgen.workflows.batch import arranged
-from sensorgen.workflows.batch.pieces import pieces, shuffled, tools
-from sensorgen.workflows.batch.plan import BatchPlan, Item, load
+from sensorgen.workflows.batch.plan import BatchPlan, Item, load, pieces, shuffled, tools
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "docs" / "examples" / "film-study.yaml"
@@ -170,7 +169,7 @@ def test_places_in_the_order_are_as_good_as_evenly_spread():
 
 def test_the_order_does_not_hang_on_pythons_own_hashes():
     code = (
-        "from pathlib import Path\nfrom sensorgen.workflows.batch.pieces import pieces, shuffled\n"
+        "from pathlib import Path\nfrom sensorgen.workflows.batch.plan import pieces, shuffled\n"
         "from sensorgen.workflows.batch.plan import load\n"
         f"path = Path({str(EXAMPLE)!r})\nprint([p.name for p in shuffled(pieces(load(path), path.parent), 1)])"
     )

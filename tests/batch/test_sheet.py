@@ -11,9 +11,8 @@ import pytest
 from sensorgen.core.errors import MissingValue
 from sensorgen.design.design import make
 from sensorgen.design.specimen_name import named, parse
-from sensorgen.workflows.batch import sheet
-from sensorgen.workflows.batch.pieces import PrintPiece, pieces
-from sensorgen.workflows.batch.plan import load
+from sensorgen.workflows.batch import labelling
+from sensorgen.workflows.batch.plan import PrintPiece, load, pieces
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "film-study.yaml"
 DOTS = 4  # of the picture, per square of a code
@@ -44,12 +43,12 @@ def codes(page):
 
 
 def labels():
-    return [sheet.Label.of(p, "film-study", k) for k, p in enumerate(pieces(load(EXAMPLE), EXAMPLE.parent), 1)]
+    return [labelling.Label.of(p, "film-study", k) for k, p in enumerate(pieces(load(EXAMPLE), EXAMPLE.parent), 1)]
 
 
 def test_every_code_reads_as_its_label_says():
     made = labels()
-    read = list(codes(sheet.page(made, "film-study")))
+    read = list(codes(labelling.page(made, "film-study")))
     assert len(read) == 20
     for label, text in zip(made, read, strict=True):
         name, batch, design_id = text.split("\n")
@@ -59,11 +58,12 @@ def test_every_code_reads_as_its_label_says():
 
 def test_the_page_needs_nothing_else_and_holds_text_as_text():
     design = make({"shape": "tri"}).model_copy(update={"name": "<b>&"})
-    page = sheet.page(
-        [sheet.Label.of(PrintPiece(named(design, 26, 1), design, design.id()), "a", 1)], '<script>alert("x")</script>'
+    page = labelling.page(
+        [labelling.Label.of(PrintPiece(named(design, 26, 1), design, design.id()), "a", 1)],
+        '<script>alert("x")</script>',
     )
     assert "<script" not in page
-    assert "<i>" not in sheet.page([sheet.Label("<i>26", "<i>b", "<i>c", "<i>d", 1)], "a")
+    assert "<i>" not in labelling.page([labelling.Label("<i>26", "<i>b", "<i>c", "<i>d", 1)], "a")
     assert "&lt;b&gt;&amp;" in page
     assert not re.findall(r"(?:src|href)\s*=", page)
     assert set(re.findall(r"https?://[^\"' ]+", page)) <= {"http://www.w3.org/2000/svg"}
@@ -72,8 +72,8 @@ def test_the_page_needs_nothing_else_and_holds_text_as_text():
 def test_without_the_library_of_codes_it_is_said_what_to_do(monkeypatch):
     monkeypatch.setitem(sys.modules, "segno", None)
     with pytest.raises(MissingValue, match=r"pip install segno, or set 'labels: \{sheet: false\}'"):
-        sheet.page(labels(), "a")
+        labelling.page(labels(), "a")
 
 
 def test_the_same_batch_gives_the_same_page():
-    assert sheet.page(labels(), "a") == sheet.page(labels(), "a")
+    assert labelling.page(labels(), "a") == labelling.page(labels(), "a")

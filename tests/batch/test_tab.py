@@ -8,7 +8,7 @@ from sensorgen.design import design
 from sensorgen.design.specimen_name import SpecimenName, parse
 from sensorgen.scene import lettering
 from sensorgen.scene.geometry import meshes
-from sensorgen.workflows.batch import arranged, tab
+from sensorgen.workflows.batch import arranged, labelling
 
 SENSOR = design.make({"shape": "tri"})
 NAME = "26 triX .2mm 12 x fine"
@@ -16,9 +16,9 @@ NAME = "26 triX .2mm 12 x fine"
 
 def raised(sensor, name):
     """The raised squares of a tab as a picture of dots, the top row first."""
-    (body,) = tab.bodies(sensor, name)
-    dot = tab.dot_mm(sensor)
-    length, _ = tab.size_mm(sensor, name)
+    (body,) = labelling.bodies(sensor, name)
+    dot = labelling.dot_mm(sensor)
+    length, _ = labelling.size_mm(sensor, name)
     x0 = sensor.printed.size_mm[0]
     letters = body.pieces[1:]
     top = max(p.span("y")[1] for p in letters)
@@ -56,7 +56,7 @@ def test_what_is_written_can_be_read():
 @pytest.mark.parametrize(("nozzle", "line"), [(0.4, 0.44), (0.25, 0.275), (0.6, 0.66)])
 def test_strokes_are_wider_than_a_line(nozzle, line):
     sensor = design.make({"shape": "tri", "nozzle_mm": nozzle, "parameters": {"width_mm": 20}})
-    letters = tab.bodies(sensor, NAME)[0].pieces[1:]
+    letters = labelling.bodies(sensor, NAME)[0].pieces[1:]
     for p in letters:
         assert min(p.span("x")[1] - p.span("x")[0], p.span("y")[1] - p.span("y")[0]) >= 1.05 * line
 
@@ -65,8 +65,8 @@ def test_strokes_are_wider_than_a_line(nozzle, line):
 @pytest.mark.parametrize("shape", ["tri", "rect", "reference"])
 def test_the_tab_touches_the_far_end_and_lies_on_the_bed(shape, orientation):
     sensor = design.make({"shape": shape, "orientation": orientation, "shrinkage": 0.2})
-    (body,) = tab.bodies(sensor, NAME)
-    length, width = tab.size_mm(sensor, NAME)
+    (body,) = labelling.bodies(sensor, NAME)
+    length, width = labelling.size_mm(sensor, NAME)
     x0, deep, _ = sensor.printed.size_mm
     spans = {axis: [p.span(axis) for p in body.pieces] for axis in "xyz"}
     assert min(a for a, _ in spans["x"]) == x0
@@ -78,7 +78,7 @@ def test_the_tab_touches_the_far_end_and_lies_on_the_bed(shape, orientation):
 
 
 def test_the_mesh_is_closed_and_of_the_volume_of_its_boxes():
-    (body,) = tab.bodies(SENSOR, NAME)
+    (body,) = labelling.bodies(SENSOR, NAME)
     mesh = meshes.mesh(body)
     assert mesh.volume_mm3() == pytest.approx(body.volume_mm3(), rel=1e-9)
     edges = np.sort(mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
@@ -93,7 +93,7 @@ def test_a_piece_has_room_for_its_tab_on_the_plate(plan, wanted):
     found = arranged(path)
     for number, rect in found.plate.items():
         piece = found.pieces[number]
-        more = tab.bodies(piece.design, piece.name) if wanted == "true" else ()
+        more = labelling.bodies(piece.design, piece.name) if wanted == "true" else ()
         boxes = [p for body in (*piece.design.printed.bodies, *more) for p in body.pieces]
         length, width = (max(p.span(axis)[1] for p in boxes) - min(p.span(axis)[0] for p in boxes) for axis in "xy")
         assert (rect.x1 - rect.x0, rect.y1 - rect.y0) == pytest.approx((length, width))
@@ -105,7 +105,7 @@ def test_every_name_of_the_grammar_can_be_written():
         for slicing in ("", "fine", "x fine", "xtrafine"):
             axes = {"tri": "Y", "rect": "XY"}.get(shape, "")
             name = SpecimenName(1234567890 % 9999, shape, axes, 0.123457, 9876, slicing, "m").name
-            assert tab.bodies(sensor, parse(name).name)
+            assert labelling.bodies(sensor, parse(name).name)
 
 
 def test_letters_that_look_alike_never_change_a_name():
@@ -125,6 +125,6 @@ def test_no_dot_of_a_letter_hangs_on_its_corners_alone(letter):
 def test_narrow_sensors_are_told():
     thin = design.make({"shape": "tri", "parameters": {"width_mm": 2}})
     with pytest.raises(BadInput, match="2 mm wide, too little"):
-        tab.bodies(thin, NAME)
+        labelling.bodies(thin, NAME)
     with pytest.raises(BadInput, match="no letter '!'"):
-        tab.bodies(SENSOR, "26 triX!")
+        labelling.bodies(SENSOR, "26 triX!")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import in_process
-from sensorgen.measure.log import Log, binding
+from sensorgen.measure.log import Log, prints
 from sensorgen.measure.log.bench import log_recording
 from virtual_specimen import TONES_HZ, drawn, recorded, session, write_csv
 
@@ -24,7 +24,7 @@ def made(tmp_path_factory):
     (folder / "mine.yaml").write_text(DESIGN)
     recorded(TRUTH, folder, 24, 1)
     with Log(folder / "log.db", create=True) as log:
-        binding.bind(log, ["S1"], str(folder / "mine.yaml"))
+        prints.bind(log, ["S1"], str(folder / "mine.yaml"))
         log_recording(log, "S1", folder / "run-lcr.csv", folder / "run-rig.csv")
     shutil.copytree(folder, folder / "calibrated")
     with pytest.MonkeyPatch.context() as patch:

@@ -240,12 +240,12 @@ def test_what_is_not_to_be_trusted_is_said_with_exit_code_1(run, monkeypatch):
 
 
 def test_the_bar_goes_on_where_a_cell_is_pressed_again_on_another_mesh(monkeypatch):
-    from sensorgen.cli import show
+    from sensorgen.cli import render
 
     shown = []
     bar = click.progressbar(length=4, file=io.StringIO())
     monkeypatch.setattr(click, "progressbar", lambda **_: bar)
-    with show.pressing((0.0, 10.0, 20.0, 30.0)) as step:
+    with render.pressing((0.0, 10.0, 20.0, 30.0)) as step:
         for reached_pa in (0.0, 1e4, 0.0, 1e4, 2e4, 3e4):
             step(reached_pa)
             shown.append(bar.pos)

@@ -6,9 +6,9 @@ from pathlib import Path
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.document import text
 from sensorgen.design.design import make
+from sensorgen.prediction.loaded import PredictedPoint
 from sensorgen.prediction.results import SCHEMA, Prediction
 from sensorgen.prediction.sweep import Sweep
-from sensorgen.prediction.swept_prediction import PredictedPoint
 from sensorgen.workflows.build import build
 
 

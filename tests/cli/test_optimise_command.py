@@ -21,12 +21,13 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import Query
 from sensorgen.workflows.optimise import ladder, recommend, result
+from sensorgen.workflows.optimise.front import Front, search
 from sensorgen.workflows.optimise.result import ObjectiveSpread, Recommended
 from sensorgen.workflows.optimise.sample import _objectives, sample
-from sensorgen.workflows.optimise.search import Row, Searched, search
-from sensorgen.workflows.optimise.space import MOST, Candidate, candidates, space
+from sensorgen.workflows.optimise.space import MOST, candidates, space
 from sensorgen.workflows.optimise.target import Target, load
 from sensorgen.workflows.optimise.ties import settled
+from sensorgen.workflows.search import Candidate, EarlyNumber
 from sensorgen.workflows.templates import new
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -64,7 +65,7 @@ def test_the_front_is_that_of_a_plain_loop():
         if not any(c2 >= c and r2 >= r and (c2 > c * (1 + 1e-9) or r2 > r * (1 + 1e-9)) for c2, r2 in values.values())
     }  # fmt: skip
     search_ = found(parameters={"dielectric_mm": {"from": 0.1, "to": 0.3}, "electrode_mm": {"from": 0.2, "to": 0.3}})
-    leads = {tuple(row.candidate.values.values()) for row in result.leads(search_)}
+    leads = {tuple(row.values.values()) for row in result.leads(search_)}
     assert leads == best == {(0.1, 0.2)}
     assert len(search_.rows) == 6
     assert len(search_.evaluated) + sum(bool(row.discarded) for row in search_.rows) == 6
@@ -79,7 +80,7 @@ def test_a_planted_optimum_is_found():
     search_ = found(
         parameters={"dielectric_mm": {"from": 0.1, "to": 1.2}}, objectives={"capacitance_pf": {"near": wanted}}
     )
-    assert search_.front[0].candidate.values == {"dielectric_mm": nearest} == {"dielectric_mm": 0.7}
+    assert search_.front[0].values == {"dielectric_mm": nearest} == {"dielectric_mm": 0.7}
     out = [row for row in search_.rows if row.discarded]
     assert out
     assert all(row.certified and row.discarded == "dominated" for row in out)
@@ -113,7 +114,7 @@ def test_sensitivity_on_the_coarse_mesh_is_that_of_a_bonded_plate():
 @pytest.mark.usefixtures("at_rest")
 def test_limits_are_proven_before_anything_is_evaluated():
     search_ = found(limits={"capacitance_pf": {"most": 150}})
-    assert {row.candidate.values["dielectric_mm"] for row in search_.evaluated} <= {0.3, 0.4}
+    assert {row.values["dielectric_mm"] for row in search_.evaluated} <= {0.3, 0.4}
     assert [r for r in search_.reasons() if r[0] == "limit capacitance_pf"] == [("limit capacitance_pf", True, 6)]
 
 
@@ -161,15 +162,13 @@ def test_discards_on_a_coarse_mesh_hold_or_are_taken_back(monkeypatch):
 
     def lying(design, query, solve):
         film = design.params.dielectric_mm
-        return {
-            "force_resolution_n": ladder.EarlyNumber(film if film != 0.4 else 9.0, film if film != 0.4 else 9.0, False)
-        }
+        return {"force_resolution_n": EarlyNumber(film if film != 0.4 else 9.0, film if film != 0.4 else 9.0, False)}
 
     monkeypatch.setattr(ladder, "known", lying)
     search_ = found(objectives={"force_resolution_n": "minimise"})
     assert search_.largest > 1.5
     assert search_.margin > search_.largest
-    assert not any(row.discarded == "dominated" for row in search_.rows if row.candidate.values["dielectric_mm"] == 0.4)
+    assert not any(row.discarded == "dominated" for row in search_.rows if row.values["dielectric_mm"] == 0.4)
 
 
 @pytest.mark.parametrize(
@@ -222,9 +221,9 @@ def test_a_length_in_the_plane_is_varied_in_half_lines():
         design={"shape": "reference", "parameters": {"dielectric_mm": 0.3}},
         parameters={"length_mm": {"from": 40, "to": 41}}, objectives={"capacitance_pf": {"near": wanted}},
     )  # fmt: skip
-    assert [row.candidate.values["length_mm"] for row in search_.rows] == pytest.approx(lengths)
+    assert [row.values["length_mm"] for row in search_.rows] == pytest.approx(lengths)
     row = search_.front[0]
-    assert row.candidate.values["length_mm"] == pytest.approx(lengths[2])
+    assert row.values["length_mm"] == pytest.approx(lengths[2])
     wider = [design.params.length_mm for design in recommend.within_tolerance(search_.target, row.design)]
     assert wider == pytest.approx([lengths[2] - 0.05, lengths[2] + 0.05])
 
@@ -266,8 +265,11 @@ def planted(plate, numbers, objectives):
         }
         warning = tuple(Finding(f"{k}-x", "warning", "a", f"finding {k}", "b") for k in range(warnings))
         trial = replace(tried, printed=replace(tried.printed, **value), findings=warning)
-        rows.append(Row(number, Candidate({"a": float(number)}, design), trial=trial))
-    return Searched(target(objectives=objectives), tuple(rows), tuple(rows), 1.5, None)
+        rows.append(Candidate({"a": float(number)}, design, number, trial=trial))
+    search_ = Front(target(objectives=objectives))
+    search_.rows = rows
+    search_.front = tuple(rows)
+    return search_
 
 
 FORCE = {"force_resolution_n": "minimise"}
@@ -332,10 +334,10 @@ def test_a_sample_of_a_huge_space_proves_nothing(counts):
     whole = space(wanted)
     assert whole.size > 4e6
     first, again = (sample(wanted, whole, count) for count in counts)
-    assert [row.candidate.values for row in first.rows[: counts[1]]] == [row.candidate.values for row in again.rows]
+    assert [row.values for row in first.rows[: counts[1]]] == [row.values for row in again.rows]
 
     def plate_pf(row):
-        v = row.candidate.values
+        v = row.values
         return 1e12 * EPS0 * EPS_X60 * v["length_mm"] * v["width_mm"] * 1e-3 / v["dielectric_mm"]
 
     best = max(first.rows, key=plate_pf)
@@ -350,7 +352,7 @@ def test_a_sample_of_a_small_space_is_the_space():
     pytest.importorskip("optuna")
     wanted = target()
     search_ = sample(wanted, space(wanted), 12)
-    assert {tuple(row.candidate.values.values()) for row in result.leads(search_)} == {(0.1, 0.2)}
+    assert {tuple(row.values.values()) for row in result.leads(search_)} == {(0.1, 0.2)}
     assert len(search_.rows) == 12
     (lead,) = result.leads(search_)  # what is bred from is the lower the better, of C and R alike
     best, others = (np.array([_objectives(wanted, row) for row in some]) for some in ([lead], search_.evaluated))
@@ -392,13 +394,13 @@ def test_a_shape_is_a_target(shape):
     wanted = load(shape)
     some = candidates(wanted)
     base = make(wanted.design)
-    near = [one for one in some if one.design and len(set(one.values.items()) - set(some[0].values.items())) == 1]
+    near = [one for one in some if one.made and len(set(one.values.items()) - set(some[0].values.items())) == 1]
     assert 3 <= len(some) <= 16  # minutes: the design, and those that differ in one length
     assert len(near) >= 2
-    assert base.id() in {one.design.id() for one in some if one.design}
+    assert base.id() in {one.design.id() for one in some if one.made}
     if shape == "tri":
         known = [load_design(DOCS / f"{name}-tri.yaml") for name in ("best", "locates")]
-        made = [(one.design.params, one.design.quality) for one in some if one.design]
+        made = [(one.design.params, one.design.quality) for one in some if one.made]
         assert all((each.params, each.quality) in made for each in known)
 
 

@@ -54,11 +54,11 @@ OTHER = {
 @pytest.fixture
 def taken(monkeypatch, run):
     """The design that a command line stands for."""
-    from sensorgen.cli import check_command
+    from sensorgen.cli import printing
 
     def design(*words):
         got = []
-        monkeypatch.setattr(check_command.command, "work", lambda design, **_: got.append(design) or 0)
+        monkeypatch.setattr(printing.command, "work", lambda design, **_: got.append(design) or 0)
         said = run("check", *words)
         assert (said.code, said.err) == (0, "")
         return got[0]

@@ -214,7 +214,7 @@ def test_a_file_holds_what_the_terminal_would_show(run, tmp_path, form, press):
 
 
 def test_a_file_that_fails_leaves_the_old_one(run, tmp_path, monkeypatch):
-    from sensorgen.prediction import grid as predict
+    from sensorgen.prediction import loaded as predict
 
     def half(*_):
         yield "half"
@@ -346,7 +346,7 @@ def test_help_does_not_load_numpy(real):
 
 
 def test_options_are_what_the_planner_knows():
-    from sensorgen.cli.predict_command import command
+    from sensorgen.cli.predictions import command
     from sensorgen.models.pressure import PROFILES
     from sensorgen.prediction.query import LAWS
 

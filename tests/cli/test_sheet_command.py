@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sensorgen.cli import show
+from sensorgen.cli import render
 from sensorgen.core.document import text
 from sensorgen.models.sheet import Sheet, SheetPatch
 from sensorgen.prediction.sheet_study import SheetStudy
@@ -87,7 +87,7 @@ def test_a_bar_moves_with_the_places(run, monkeypatch):
     def progress(names):
         yield lambda name: steps.append(names.index(name))
 
-    monkeypatch.setattr(show, "progress", progress)
+    monkeypatch.setattr(render, "progress", progress)
     assert run(*WORDS, "--contacts", "opposite").code == 0
     assert steps == list(range(49))
 

@@ -8,7 +8,7 @@ from sensorgen.design import materials
 from sensorgen.design.printer import load_printer
 from sensorgen.export.gcode.check import check
 from sensorgen.export.gcode.motion import follow
-from sensorgen.export.gcode.timing import seconds
+from sensorgen.export.gcode.moves import seconds
 
 from .good import OWN  # isort: skip
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from sensorgen.core import plugins as registry
+from sensorgen.core import worker as core_worker
 from sensorgen.core.errors import CadFailed, Unwritable
 from sensorgen.design import shapes
 from sensorgen.scene.geometry import cad
@@ -177,8 +178,8 @@ def test_a_hang_is_ended(pretend: Callable[[str], None], tmp_path: Path) -> None
 def test_a_job_that_cannot_be_read(pretend: Callable[[str], None], tmp_path: Path) -> None:
     pretend("")
     with CadProcess() as process:
-        assert process._process.stdin is not None
-        process._process.stdin.write(b"nonsense\n")
+        assert process._worker.process.stdin is not None
+        process._worker.process.stdin.write(b"nonsense\n")
         with pytest.raises(CadFailed, match=r"ended with exit code 1: .*UnpicklingError"):
             process.write_step(SCENE, COLOURS, "t", tmp_path / "a.step")
 
@@ -186,7 +187,7 @@ def test_a_job_that_cannot_be_read(pretend: Callable[[str], None], tmp_path: Pat
 def test_an_answer_that_cannot_be_read(
     pretend: Callable[[str], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cad, "GRACE_S", 0.2)
+    monkeypatch.setattr(core_worker, "GRACE_S", 0.2)
     monkeypatch.setattr(cad, "WORKER", ("-c", "import time; print('nonsense', flush=True); time.sleep(60)"))
     with CadProcess() as process, pytest.raises(CadFailed, match="answer that cannot be read"):
         process.write_step(SCENE, COLOURS, "t", tmp_path / "a.step")

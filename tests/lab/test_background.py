@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from sensorgen.measure.lab import background
+from sensorgen.measure.lab import sessions
 from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings
 
 
@@ -47,7 +47,7 @@ def _until(condition):
 
 def test_a_read_never_waits_and_loses_nothing():
     meter = Slow()
-    beside = background.Background(meter)
+    beside = sessions.Background(meter)
     beside.start(np.array([1e3, 1e4]), 1.0)
     assert beside.read().impedance_ohm.shape == (0, 2)
     for _ in range(3):
@@ -65,7 +65,7 @@ def test_a_read_never_waits_and_loses_nothing():
 def test_a_failure_of_the_meter_is_raised_in_the_loop():
     meter = Slow()
     meter.fault = DeviceFault("cable")
-    beside = background.Background(meter)
+    beside = sessions.Background(meter)
     beside.start(np.array([1e3]), 1.0)
     meter.go.release()
     _until(lambda: beside._fault)
@@ -75,9 +75,9 @@ def test_a_failure_of_the_meter_is_raised_in_the_loop():
 
 
 def test_a_meter_that_hangs_does_not_hold_up_the_end(monkeypatch):
-    monkeypatch.setattr(background, "_LONGEST_S", 0.1)
+    monkeypatch.setattr(sessions, "_LONGEST_S", 0.1)
     meter = Slow()
-    beside = background.Background(meter)
+    beside = sessions.Background(meter)
     beside.start(np.array([1e3]), 1.0)
     _until(lambda: meter.asked)
     with pytest.raises(DeviceFault, match="no answer"):

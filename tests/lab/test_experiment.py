@@ -7,7 +7,7 @@ import pytest
 
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import SensorgenError
-from sensorgen.measure.lab import experiment, plans, run
+from sensorgen.measure.lab import experiment, run
 from sensorgen.measure.signal.presses import GUARD_S, WINDOW_S
 
 RANDOM = {"random": {"presses": 40, "seed": 3}}
@@ -77,7 +77,7 @@ def test_a_file_that_is_wrong_is_named(tmp_path):
 
 
 def test_random_presses_are_seeded_inside_the_sensor_and_half_from_above():
-    steps, again = (plans.steps(made(), 100.0) for _ in range(2))
+    steps, again = (experiment.steps(made(), 100.0) for _ in range(2))
     assert steps == again
     assert sum(step.peak_n > step.force_n for step in steps) == 20
     assert all(2.5 <= step.place_mm <= 97.5 and 0.4 <= step.force_n <= step.peak_n <= 6 for step in steps)
@@ -86,7 +86,7 @@ def test_random_presses_are_seeded_inside_the_sensor_and_half_from_above():
 
 
 def test_the_course_of_a_press_rises_over_its_peak_and_is_held_for_the_average():
-    step = next(s for s in plans.steps(made(), 100.0) if s.peak_n > s.force_n)
+    step = next(s for s in experiment.steps(made(), 100.0) if s.peak_n > s.force_n)
     course = [step.force_at(0.01 * k) for k in range(round(step.seconds * 100) + 1)]
     assert max(course) == pytest.approx(step.peak_n)
     assert course[-1] == step.force_n
@@ -101,7 +101,7 @@ def test_ramp_sine_and_sweep_have_the_forces_and_places_that_were_asked_for():
         {"sine": {"position_mm": 50, "mean_n": 3.0, "amplitude_n": 1.0, "frequency_hz": 0.5, "cycles": 4}},
         {"sweep": {"force_n": 2.0, "position_mm": [80, 20], "places": 4}},
     ]
-    ramp, _, sine, *sweep = plans.steps(made(plan=plan), 100.0)
+    ramp, _, sine, *sweep = experiment.steps(made(plan=plan), 100.0)
     assert ramp.force_at(ramp.seconds / 2) == pytest.approx(4.0)
     assert ramp.seconds == pytest.approx(2 * 3.7 / 2)
     rise = (3.0 - 0.3) / 20

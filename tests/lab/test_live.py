@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from sensorgen.measure.lab.live import LiveText, LiveView, Sample, line
-from sensorgen.measure.signal.multisine import TONES_HZ
+from sensorgen.measure.signal.waveform import TONES_HZ
 
 OUT = Path(__file__).parents[2] / "out" / "live"  # CI keeps it
 TONES = np.array(TONES_HZ)

@@ -9,14 +9,14 @@ from serving import tcp_server
 
 from lab.spring_plant import SpringPlant
 from sensorgen.core.errors import OutOfRange
-from sensorgen.measure.lab import lcr_meter, multimeter
+from sensorgen.measure.lab import meters
 from sensorgen.measure.lab.clock import RealClock, SimulatedClock
 from sensorgen.measure.lab.devices import DeviceFault, WrongDevice
 from sensorgen.measure.lab.port import SimulatedPort, VisaPort
 from sensorgen.measure.virtual import scpi
 
 TONES = np.array([1000.0, 1e5])
-MODELS = {"hp-4284a": lcr_meter.HP_4284A, "keysight-e4980a": lcr_meter.E4980A}
+MODELS = {"hp-4284a": meters.HP_4284A, "keysight-e4980a": meters.E4980A}
 
 
 class Lab:
@@ -26,7 +26,7 @@ class Lab:
         self.clock, self.plant = SimulatedClock(), SpringPlant()
         self.instrument = scpi.SimulatedLcrMeter(self.plant, model)
         port = SimulatedPort(self.instrument, self.clock)
-        self.meter = lcr_meter.LcrMeter(port, self.clock, MODELS[model], lcr_meter.Settings(aperture=aperture))
+        self.meter = meters.LcrMeter(port, self.clock, MODELS[model], meters.LcrSettings(aperture=aperture))
 
     def run(self, seconds):
         """Read at 100 Hz; everything that came."""
@@ -125,7 +125,7 @@ def test_readings_that_a_program_which_has_died_did_not_fetch_are_passed_over():
     port = SimulatedPort(lab.instrument, lab.clock)
     for command in (b"FETC?\n", b"FREQ?\n", b"SYST:ERR?\n"):
         port.write(command)
-    other = lcr_meter.LcrMeter(port, lab.clock, lcr_meter.HP_4284A)
+    other = meters.LcrMeter(port, lab.clock, meters.HP_4284A)
     assert other.identify().serial == "2940J01234"
     other.start(TONES, 1.0)
     lab.clock.wait_until(2.0)
@@ -162,16 +162,14 @@ def _sim(monkeypatch):
 @pytest.mark.usefixtures("_sim")
 def test_an_analyser_of_pyvisa_sim():
     clock = SimulatedClock()
-    meter = lcr_meter.LcrMeter(
-        VisaPort("GPIB0::17::INSTR"), clock, lcr_meter.HP_4284A, lcr_meter.Settings(aperture="SHOR")
-    )
+    meter = meters.LcrMeter(VisaPort("GPIB0::17::INSTR"), clock, meters.HP_4284A, meters.LcrSettings(aperture="SHOR"))
     assert meter.identify().serial == "2940J01234"
     meter.start(TONES, 1.0)
     clock.wait_until(0.1)
     assert meter.read().impedance_ohm[0, 0] == 1000 - 159155j
     meter.stop()
     meter.close()
-    wrong = lcr_meter.LcrMeter(VisaPort("GPIB0::18::INSTR"), clock, lcr_meter.HP_4284A)
+    wrong = meters.LcrMeter(VisaPort("GPIB0::18::INSTR"), clock, meters.HP_4284A)
     with pytest.raises(WrongDevice, match="Keysight Technologies,E4980A"):
         wrong.start(TONES, 1.0)
     wrong.close()
@@ -185,7 +183,7 @@ def test_an_analyser_on_a_tcp_socket(monkeypatch):
     plant.time_s = clock.now()
     instrument = scpi.SimulatedLcrMeter(plant)
     with tcp_server(instrument, clock) as address:
-        meter = lcr_meter.LcrMeter(VisaPort(address), clock, lcr_meter.HP_4284A, lcr_meter.Settings(aperture="SHOR"))
+        meter = meters.LcrMeter(VisaPort(address), clock, meters.HP_4284A, meters.LcrSettings(aperture="SHOR"))
         meter.start(TONES, 1.0)
         rows = []
         while len(rows) < 4:
@@ -202,7 +200,7 @@ def test_an_analyser_on_a_tcp_socket(monkeypatch):
 def test_a_simulated_multimeter(model, name):
     clock, plant = SimulatedClock(), SpringPlant()
     instrument = scpi.SimulatedMultimeter(plant, model)
-    meter = multimeter.Multimeter(SimulatedPort(instrument, clock))
+    meter = meters.Multimeter(SimulatedPort(instrument, clock))
     assert meter.identify().model == name
     assert float(meter.resistance(wires=4)) == 650
     assert float(meter.resistance(wires=2)) == 651
@@ -214,7 +212,7 @@ def test_a_simulated_multimeter(model, name):
 @pytest.mark.parametrize("fault", ["silent", "hung", "garbage", "identity", "truncated", "cut", "error"])
 def test_a_planted_fault_of_a_multimeter_is_seen(fault):
     instrument = scpi.SimulatedMultimeter(SpringPlant())
-    meter = multimeter.Multimeter(SimulatedPort(instrument, SimulatedClock()))
+    meter = meters.Multimeter(SimulatedPort(instrument, SimulatedClock()))
     if fault not in ("identity", "cut"):
         meter.identify()
     instrument.fault = fault

@@ -9,7 +9,7 @@ from sensorgen.analysis.calibration import Bench, spread_of
 from sensorgen.design.design import make
 from sensorgen.measure.virtual.specimen import PressedSpecimen, decades, drawn
 from sensorgen.prediction import bodies
-from sensorgen.prediction.calibration.coverage import inside
+from sensorgen.prediction.calibration.calibration import inside
 from sensorgen.prediction.calibration.fitting import Data, calibrated
 from sensorgen.prediction.calibration.inversion import Inverter
 from sensorgen.prediction.calibration.materials import estimate, links

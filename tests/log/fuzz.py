@@ -13,7 +13,7 @@ from pathlib import Path
 from sensorgen.core.errors import SensorgenError
 from sensorgen.measure.log import Log, exchange, importing, verify
 from sensorgen.measure.log.entries import ROWS
-from sensorgen.measure.log.tables import thesis
+from sensorgen.measure.log.importing import thesis_readings
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "attacks"))
 import damage
@@ -29,7 +29,7 @@ BATCH = {
 
 def samples(folder):
     """Sound files of every kind, by name."""
-    rows = thesis()[:12]
+    rows = thesis_readings()[:12]
     with Log(folder / "sound.db", create=True) as log:
         log.add(rows)
         for name in ("table.csv", "table.parquet"):
@@ -61,7 +61,7 @@ def main(folder, count, seed):
     folder, rng, seen, faults = Path(folder), random.Random(seed), Counter(), []
     sound = samples(folder)
     with Log(folder / "log.db", create=True) as log:
-        log.add(thesis()[:3])
+        log.add(thesis_readings()[:3])
         before = state(log)
         for _ in range(count):
             name = rng.choice(sorted(sound))

@@ -163,19 +163,19 @@ def test_a_huge_file_is_refused_before_it_is_read(log, tmp_path, run_files, monk
 
 
 def test_a_recording_that_grows_while_it_is_read_is_refused(log, tmp_path, monkeypatch):
-    from sensorgen.measure.log import facts
+    from sensorgen.measure.log import bench
 
     path = tmp_path / "run.csv"
     rows = "".join(f"{k},-{k},{k}\n" for k in range(1, 99))
     path.write_text(f"re_ohm_1kHz,im_ohm_1kHz,time_s\n{rows}")
 
-    def growing(*paths, summarised=facts.summarised):
+    def growing(*paths, summarised=bench.summarised):
         found = summarised(*paths)
         with path.open("a") as file:
             file.write("99,-99,99\n")
         return found
 
-    monkeypatch.setattr(facts, "summarised", growing)
+    monkeypatch.setattr(bench, "summarised", growing)
     with pytest.raises(SensorgenError, match="changed while it was read: log it when it is complete"):
         log_recording(log, "26 triX", path)
     assert log.recordings() == ()

@@ -11,18 +11,18 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.log import Log, anchors, chain, logbook, verify
-from sensorgen.measure.log.batches import prediction
+from sensorgen.measure.log import Log, chain, logbook, verify
+from sensorgen.measure.log.importing import thesis_readings
+from sensorgen.measure.log.logbook import withdraw
 from sensorgen.measure.log.notes import reading
-from sensorgen.measure.log.tables import thesis
-from sensorgen.measure.log.withdrawing import withdraw
+from sensorgen.measure.log.prints import prediction
 
 PREDICTED = {"capacitance_f": {"lower": 1e-11, "upper": 2e-11}}
 
 
 @pytest.fixture
 def full(log):
-    log.add([prediction("d", "trix", PREDICTED), *thesis()[:12]])
+    log.add([prediction("d", "trix", PREDICTED), *thesis_readings()[:12]])
     log.add([reading("23 triX", "650", remark="the last")])
     return log
 
@@ -81,7 +81,7 @@ def test_every_edit_by_sql_is_found(full, path, statements):
 
 
 def test_whoever_rewrites_the_whole_chain_is_found_by_an_anchor(full, path, tmp_path):
-    anchors.anchor(full, tmp_path / "notes.txt")
+    verify.anchor(full, tmp_path / "notes.txt")
     assert verify.verified(full, tmp_path / "notes.txt").faults == ()
     head, rows = "", []
     for record in full.records():

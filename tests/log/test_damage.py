@@ -9,14 +9,14 @@ import pytest
 
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.measure.log import Log, files, verify
-from sensorgen.measure.log.tables import thesis
+from sensorgen.measure.log.importing import thesis_readings
 
 
 @pytest.fixture
 def sound(path):
     """A log with Table D.1."""
     with Log(path, create=True) as log:
-        log.add(thesis())
+        log.add(thesis_readings())
     return path
 
 
@@ -137,7 +137,7 @@ def test_raw_files_are_checked(log, tmp_path):
 
 
 def test_a_prediction_that_was_tuned_is_found(log, path):
-    from sensorgen.measure.log.batches import prediction
+    from sensorgen.measure.log.prints import prediction
 
     log.add([prediction("d", "trix", {"capacitance_f": {"lower": 1e-11, "upper": 2e-11}})])
     assert list(verify.faults(log)) == []

@@ -11,7 +11,7 @@ import scipy.io
 
 from sensorgen.cli import cli
 from sensorgen.measure.log import Log
-from sensorgen.measure.log.resistances import parse
+from sensorgen.measure.log.notes import parse
 
 pytest.importorskip("pyvisa_sim")
 ROOT = Path(__file__).parents[2]

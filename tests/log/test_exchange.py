@@ -18,15 +18,15 @@ from sensorgen.measure.log import (
     Print,
     RawFile,
     Reading,
+    entries,
     exchange,
-    fields,
     files,
     importing,
     verify,
 )
-from sensorgen.measure.log.batches import prediction
 from sensorgen.measure.log.entries import ROWS, DesignRow, Withdrawal
 from sensorgen.measure.log.notes import reading
+from sensorgen.measure.log.prints import prediction
 
 REMARKS = [
     "=1+1",
@@ -172,7 +172,7 @@ def test_a_terminal_obeys_no_cell_and_the_text_comes_back():
 )
 def test_any_numbers_come_back(ohm, baked, number):
     for annotation, value in ((tuple[float, ...], ohm), (bool | None, baked), (int | None, number)):
-        assert fields.from_cell(annotation, fields.to_cell(value)) == value
+        assert entries.from_cell(annotation, entries.to_cell(value)) == value
 
 
 @pytest.mark.parametrize(

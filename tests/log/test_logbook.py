@@ -12,18 +12,7 @@ import pytest
 
 from sensorgen.core.errors import BadInput, UnknownName, Unwritable
 from sensorgen.core.files import part_of
-from sensorgen.measure.log import (
-    Batch,
-    BenchRun,
-    Log,
-    Prediction,
-    Print,
-    RawFile,
-    Reading,
-    database,
-    schema,
-    verify,
-)
+from sensorgen.measure.log import Batch, BenchRun, Log, Prediction, Print, RawFile, Reading, database, verify
 from sensorgen.measure.log.entries import ROWS, DesignRow, Withdrawal
 from sensorgen.measure.log.notes import reading
 
@@ -190,7 +179,7 @@ def test_settings_that_keep_what_is_promised(log):
     assert log.pragma("synchronous") == ("2",)
     assert log.pragma("foreign_keys") == ("1",)
     assert log.pragma("trusted_schema") == ("0",)
-    assert log.pragma("user_version") == (str(schema.VERSION),)
+    assert log.pragma("user_version") == (str(database.VERSION),)
 
 
 @pytest.fixture
@@ -230,7 +219,7 @@ def test_a_log_is_the_same_new_or_taken_along(version1, tmp_path):
 
 
 def test_a_migration_that_fails_leaves_version_1(version1, monkeypatch):
-    monkeypatch.setattr(database, "STEPS", (*schema.STEPS[:2], (*schema.STEPS[2], "CREATE TABLE reading (x)")))
+    monkeypatch.setattr(database, "STEPS", (*database.STEPS[:2], (*database.STEPS[2], "CREATE TABLE reading (x)")))
     with pytest.raises(BadInput, match="damaged"):
         Log(version1)
     tables = "SELECT count(*) FROM sqlite_schema WHERE name = 'bench_run'"
@@ -241,7 +230,7 @@ def test_a_migration_that_fails_leaves_version_1(version1, monkeypatch):
 
 
 def test_a_log_of_a_newer_sensorgen_is_refused(log, path):
-    sql(path, f"PRAGMA user_version = {schema.VERSION + 1}")
+    sql(path, f"PRAGMA user_version = {database.VERSION + 1}")
     with pytest.raises(BadInput, match=r"of version 4; expected up to 3: take a newer sensorgen"):
         Log(path)
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from sensorgen.core.errors import NotInstalled
-from sensorgen.measure.lab import multimeter
+from sensorgen.measure.lab import meters
 from sensorgen.measure.lab.devices import DeviceFault
 from sensorgen.measure.lab.port import VisaPort
 from sensorgen.measure.log import Log
@@ -30,12 +30,12 @@ FAILS = {
 @pytest.fixture(autouse=True)
 def _simulated(monkeypatch):
     monkeypatch.setenv("PYVISA_LIBRARY", f"{Path(__file__).with_name('meters.yaml')}@sim")
-    monkeypatch.setattr(multimeter, "TIMEOUT_S", 0.2)
+    monkeypatch.setattr(meters, "TIMEOUT_S", 0.2)
 
 
 def opened(address):
     """A meter, to be closed."""
-    return closing(multimeter.Multimeter(VisaPort(address)))
+    return closing(meters.Multimeter(VisaPort(address)))
 
 
 @pytest.mark.parametrize(

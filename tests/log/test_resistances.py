@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.log.resistances import MOST_OHM, OVERLOAD, parse
+from sensorgen.measure.log.notes import MOST_OHM, OVERLOAD, parse
 
 PLAIN = {
     "650": 650.0,

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from sensorgen.analysis.comparison import of_iteration
-from sensorgen.cli.log_write import DEFECTS as CHOICES
+from sensorgen.cli.log_command import DEFECTS as CHOICES
 from sensorgen.core.errors import BadInput
 from sensorgen.design.design import load, make
-from sensorgen.measure.log import Batch, Log, Print, RawFile, Reading, binding, importing, notes, sync, withdrawing
+from sensorgen.measure.log import Batch, Log, Print, RawFile, Reading, importing, logbook, notes, prints, sync
 from sensorgen.measure.log.entries import DEFECTS
 from sensorgen.prediction import bodies
 
@@ -91,7 +91,7 @@ def test_two_machines_with_two_designs_under_one_name_are_told_and_left_out(tmp_
     other.write_text(OWN.replace("120", "110"))
     for machine, design in (("a", own), ("b", other)):
         with Log(tmp_path / f"{machine}.db", create=True) as log:
-            binding.bind(log, ["S1"], str(design))
+            prints.bind(log, ["S1"], str(design))
             log.add([notes.reading("S1", "4k", log=log)])
             sync.sync(log, tmp_path / "shared")
     with Log(tmp_path / "a.db") as log:
@@ -106,7 +106,7 @@ def test_two_machines_with_two_designs_under_one_name_are_told_and_left_out(tmp_
 @pytest.mark.usefixtures("at_rest")
 def test_an_own_design_is_never_compared_with_the_thesis_design_of_a_similar_name(log, own):
     """As a newcomer's sensor was: predicted as trix-d0.3, for its shape and film."""
-    binding.bind(log, ["1 triX .3mm 1 fine"], str(own), iteration=1)
+    prints.bind(log, ["1 triX .3mm 1 fine"], str(own), iteration=1)
     log.add([notes.reading("1 triX .3mm 1 fine", "4.5k", log=log)])
     found = of_iteration(log, 1, body_of=bodies.drawn)
     assert {of.design_id for of in found.predictions.values()} == {load(own).id()}
@@ -131,7 +131,7 @@ def test_two_designs_of_one_name_stay_apart(log, own, tmp_path):
     (tmp_path / "b").mkdir()
     (tmp_path / "b" / "mysensor.yaml").write_text(OWN.replace("120", "60"))
     for name, file in (("S1", own), ("S2", tmp_path / "b" / "mysensor.yaml")):
-        binding.bind(log, [name], str(file))
+        prints.bind(log, [name], str(file))
         log.add([notes.reading(name, "4.5k", log=log)])
     found = of_iteration(log, None, body_of=bodies.drawn)
     long, short = (row.predicted.ry_ohm.value for row in found.rows)
@@ -140,14 +140,14 @@ def test_two_designs_of_one_name_stay_apart(log, own, tmp_path):
 
 def test_a_name_on_a_bed_is_bound_to_the_place_on_it(log):
     design = make({"shape": "tri", "parameters": {"length_mm": 50.0}, "name": "short"})
-    from sensorgen.measure.log.batches import design_row
+    from sensorgen.measure.log.prints import design_row
 
     log.add([
         RawFile(uid="f" * 64, name="batch.json", size=1), Batch(uid="b", batch="bed 7", file="f" * 64),
         design_row(design.id(), design.name, design.resolved()),
         Print(uid="p", specimen="26 triX .2mm 2", iteration=26, batch_uid="b", design_id=design.id(), design="short"),
     ])  # fmt: skip
-    binding.bind(log, ["S1"], printed="26 triX .2mm 2")
+    prints.bind(log, ["S1"], printed="26 triX .2mm 2")
     log.add([notes.reading("S1", "4.5k", log=log)])
     (reading,) = log.readings()
     assert (reading.batch, reading.design, reading.iteration) == ("bed 7", "short", 26)
@@ -180,8 +180,8 @@ def test_a_reading_whose_parts_do_not_match_is_no_reading():
 
 
 def test_a_withdrawn_print_binds_no_more(log, own):
-    binding.bind(log, ["S1"], str(own))
-    withdrawing.withdraw(log, "print", 1, "wrong")
+    prints.bind(log, ["S1"], str(own))
+    logbook.withdraw(log, "print", 1, "wrong")
     assert log.bound("S1") is None
     with pytest.raises(BadInput, match="log specimen NAME"):
         notes.specimen("S1", log)

@@ -11,11 +11,11 @@ import pytest
 
 from sensorgen.core import document
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.log import BenchRun, Log, Prediction, Reading, chain, file_system, files, listing, sync, verify
-from sensorgen.measure.log.batches import prediction
+from sensorgen.measure.log import BenchRun, Log, Prediction, Reading, chain, database, files, listing, sync, verify
+from sensorgen.measure.log.importing import thesis_readings
+from sensorgen.measure.log.logbook import withdraw
 from sensorgen.measure.log.notes import reading
-from sensorgen.measure.log.tables import thesis
-from sensorgen.measure.log.withdrawing import withdraw
+from sensorgen.measure.log.prints import prediction
 
 PREDICTED = {"capacitance_f": {"lower": 1e-11, "upper": 2e-11}}
 
@@ -98,7 +98,7 @@ def test_the_same_table_imported_twice_is_one_table(machines, tmp_path):
     a, b, _ = machines
     a.add([reading("23 triX", "650")])
     for log in (a, b):
-        log.add(thesis())
+        log.add(thesis_readings())
     for log in (a, b, a):
         sync.sync(log, tmp_path / "share")
     assert [len(log.readings()) for log in (a, b)] == [70, 70]
@@ -166,7 +166,7 @@ def test_withdrawing_the_correction_that_counts_lets_the_other_one_count(machine
 def test_a_log_that_was_copied_and_used_twice(machines, tmp_path):
     """Both copies go on from the same record: a fork, which a sync joins."""
     a, *_ = machines
-    a.add(thesis()[:5])
+    a.add(thesis_readings()[:5])
     a.pragma("wal_checkpoint(TRUNCATE)")
     shutil.copy(a.path, tmp_path / "copy.db")
     with Log(tmp_path / "copy.db") as copy:
@@ -194,7 +194,7 @@ def test_backup_and_restore(machines, tmp_path, name):
     a, b, _ = machines
     (tmp_path / "run.mat").write_bytes(b"raw" * 99)
     kept = files.keep(a.files, tmp_path / "run.mat")
-    a.add([kept, BenchRun(uid="run", specimen="23 triX", written="23 triX", file=kept.uid), *thesis()])
+    a.add([kept, BenchRun(uid="run", specimen="23 triX", written="23 triX", file=kept.uid), *thesis_readings()])
     sync.backup(a, tmp_path / name)
     with pytest.raises(BadInput, match="is there; expected a new folder"):
         sync.backup(a, tmp_path / name)
@@ -352,6 +352,6 @@ def test_shares_are_told_from_disks(monkeypatch, path, shared):
     monkeypatch.setattr(
         Path, "read_text", lambda self, *how: MOUNTS if str(self) == "/proc/self/mountinfo" else real(self, *how)
     )
-    found = file_system.without_locks(Path(path))
+    found = database.without_locks(Path(path))
     assert found.startswith(shared)
     assert bool(found) == bool(shared)

@@ -8,8 +8,8 @@ import pytest
 from sensorgen.core.errors import BadInput, SensorgenError
 from sensorgen.design import specimen_name
 from sensorgen.design.design import Design
-from sensorgen.measure.log import Log, importing, notes, tables
-from sensorgen.measure.log.withdrawing import withdraw
+from sensorgen.measure.log import Log, importing, notes
+from sensorgen.measure.log.logbook import withdraw
 
 HEAD = "specimen,y,z,remark\n"
 
@@ -122,7 +122,7 @@ def test_columns_that_are_not_there(take):
 
 def test_a_huge_table_is_refused_unread(log, tmp_path, monkeypatch):
     with (tmp_path / "big.csv").open("wb") as file:
-        file.truncate(tables.MOST_BYTES + 1)
+        file.truncate(importing.MOST_BYTES + 1)
     with pytest.raises(SensorgenError, match="64000001 bytes; expected at most 64000000: split it"):
         importing.import_file(log, tmp_path / "big.csv", {})
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sensorgen.measure.log.tables import thesis
+from sensorgen.measure.log.importing import thesis_readings
 
 TABLE = list(csv.DictReader((Path(__file__).parents[1] / "reference" / "table_d1.csv").read_text("utf-8").splitlines()))
 OURS = {  # what the notes say, and the word of ours that says it
@@ -39,7 +39,7 @@ def numbers(cell):
 
 @pytest.fixture(scope="module")
 def rows():
-    return thesis()
+    return thesis_readings()
 
 
 def test_every_row_means_what_it_says(rows):

@@ -22,7 +22,7 @@ from sensorgen.models.columns import _mean_min, capacitance, why_not_applicable
 from sensorgen.scene.scene import Body, Fill, Prism, Scene, box
 from sensorgen.scene.sections import sections
 from sensorgen.scene.unit_cell import cell
-from sensorgen.solvers.electrostatics.linear import energy as straight
+from sensorgen.solvers.electrostatics.triangles import energy as straight
 from sensorgen.solvers.electrostatics.triangles import triangles
 
 EPS = {"x60": 4.68, "air": 1.00059}

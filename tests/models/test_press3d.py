@@ -15,6 +15,7 @@ from sensorgen.design.design import make
 from sensorgen.models import fem2d, fem3d, press2d, press3d, springs
 from sensorgen.models.compression import curve_of
 from sensorgen.models.press3d import BoundaryConditions, BrickCounts, Elastic
+from sensorgen.prediction.mesh_ladder import limit
 from sensorgen.scene.scene import Body, Scene, box
 from sensorgen.solvers.contact import (
     air,
@@ -483,7 +484,7 @@ def mesh_of_order_two(pieces, stress, rise=2e-9, moved=1e-6, error=0.3):
 def test_two_meshes_lead_to_their_limit():
     every, some = [0.0, 2e4, 5e4, 1e5, 1.2e5], [0.0, 5e4, 1e5]
     fine = mesh_of_order_two(3, every)
-    found = press3d.limit(fine, mesh_of_order_two(2, some), 3)
+    found = limit(fine, mesh_of_order_two(2, some), 3)
     assert found.rise_f_per_m2 == pytest.approx(2e-9 * np.array(every) / 1e5, rel=1e-6)
     assert found.found.displacement_m - 1e-7 == pytest.approx(1e-6 * np.array(every) / 1e5, rel=1e-9)
     beyond = 0.3 / 9 * found.rise_f_per_m2[:4]
@@ -493,7 +494,7 @@ def test_two_meshes_lead_to_their_limit():
     assert [c.upper - c.lower for c in found.found.capacitance_f_per_m2] == pytest.approx(
         [c.upper - c.lower for c in fine.capacitance_f_per_m2], rel=1e-6
     )
-    one = press3d.limit(fine, mesh_of_order_two(3, some), 3)  # too many boxes to be cut further
+    one = limit(fine, mesh_of_order_two(3, some), 3)  # too many boxes to be cut further
     assert np.isinf(one.rise_error_f_per_m2[1:]).all()
     assert (one.rise_error_f_per_m2[0], one.displacement_error_m[0]) == (0.0, 0.0)
 
@@ -509,7 +510,7 @@ def test_the_stated_rise_holds_that_of_a_second_program():
     fine, coarse = (
         press3d.press(bricks, solids(), [0.0, reference["pressure_pa"]], EPS, None, BrickCounts(n)) for n in (3, 2)
     )
-    found = press3d.limit(fine, coarse, 3)
+    found = limit(fine, coarse, 3)
     rest, apart = found.found.capacitance_f_per_m2[0], abs(exact["rise"] - case["meshes"][0]["rise"])
     assert rest.lower * 4e-6 * 1.21 < exact["capacitance_f"] < rest.upper * 4e-6 * 1.21
     rise, error = found.rise_f_per_m2[1] / rest.middle(), found.rise_error_f_per_m2[1] / rest.middle()

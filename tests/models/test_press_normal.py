@@ -7,13 +7,14 @@ import pytest
 
 from sensorgen.design.design import make
 from sensorgen.scene.scene import Body, Prism, Scene, rectangle
-from sensorgen.scene.sections import columns, sections
+from sensorgen.scene.sections import sections
+from sensorgen.scene.unit_cell import slices
 
 pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import press2d
 from sensorgen.models.press2d import BoundaryConditions, Elastic, Fineness
 from sensorgen.solvers.contact import cell as cells
-from sensorgen.solvers.contact import contact, deformed, plane_field
+from sensorgen.solvers.contact import closing, contact, plane_field
 
 EPS = {"x60": 4.68, "etpu": 5.0, "air": 1.00059}
 EPS0 = 8.8541878e-12
@@ -29,7 +30,8 @@ def cell_of(high, left, right, *outlines):
         Body("shape", "x60", tuple(Prism("y", tuple(o), 0.0, 10.0) for o in outlines)),
         Body("top_electrode", "etpu", (Prism("y", rectangle(0, wide, top, top + 0.3), 0.0, 10.0),), "top"),
     )
-    return cells._cell(columns(sections(Scene(bodies, (wide, 10.0, top + 0.3)))[0]), left, right, mirrored=True)
+    whole = slices(sections(Scene(bodies, (wide, 10.0, top + 0.3)))[0], 0.0, layered=True)
+    return cells.between(whole, left, right, mirrored=True)
 
 
 def box(left, right, low, high):
@@ -160,7 +162,7 @@ def test_a_sloping_joint_hands_an_even_pressure_on(drop):
     found, run = solved(cell, stresses)
     assert found.faults == ()
     assert found.fall_m == pytest.approx(1e-6, rel=1e-6)  # straight down, on a slope too
-    outline = deformed.deformed(cell, run.mesh, run.problem.faces, run.states[-1].u_m)
+    outline = closing.deformed(cell, run.mesh, run.problem.faces, run.states[-1].u_m)
     filled = plane_field.capacitance(cell, plane_field.meshed(outline, cell.width_mm() / 4, 0.2), EPS)
     assert filled.middle() == pytest.approx(EPS["x60"] * EPS0 / (0.6e-3 - found.displacement_m[-1]), rel=1e-4, abs=0)
     off = np.abs(-run.states[-1].inner.pressure[:, 0] / 1e5 - 1)

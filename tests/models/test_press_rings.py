@@ -8,7 +8,7 @@ pytest.importorskip("netgen", reason="pip install 'sensorgen[fem]'")
 from sensorgen.models import fem2d, press2d
 from sensorgen.models.press2d import Fineness
 from sensorgen.scene.scene import Body, Scene, box
-from sensorgen.solvers.contact import mesh, plane_field, rings, wedge
+from sensorgen.solvers.contact import mesh, plane_field
 from sensorgen.solvers.contact.cell import OUTSIDE, ContactCell, Region
 
 EPS = {"x60": 4.68, "air": 1.00059}
@@ -30,7 +30,7 @@ def stairs():
 def test_rings_fill_the_same_place_and_share_all_sides():
     points = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.4, 0.5]], float)
     triangles = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
-    found, cut, region = rings.ringed(points, triangles, np.array([1, 2, 3, 4]), [4, 0], 6)
+    found, cut, region = mesh.ringed(points, triangles, np.array([1, 2, 3, 4]), [4, 0], 6)
     u, v = (found[cut[:, k]] - found[cut[:, 0]] for k in (1, 2))
     area = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
     assert area.min() > 0
@@ -43,7 +43,7 @@ def test_rings_fill_the_same_place_and_share_all_sides():
 
 def test_corners_are_where_solid_and_air_or_plates_turn_and_where_three_meet():
     cell = press2d.cell(stairs(), 2.0)
-    found = {(round(x, 6), round(y, 6)) for x, y in rings.corners(cell.edges, cell.left_mm, cell.right_mm)}
+    found = {(round(x, 6), round(y, 6)) for x, y in mesh.sharp_corners(cell.edges, cell.left_mm, cell.right_mm)}
     if cell.left_mm == 0.0:  # half a period from the gap's middle to the foot's
         expected = {(0.7, 0.4), (0.7, 0.5), (0.4, 0.5), (0.4, 0.6)}
     else:
@@ -64,7 +64,7 @@ def test_the_bounds_of_stairs_hold_those_of_other_elements_and_are_narrow():
 
 def test_notches_are_where_solids_fill_more_than_half_a_turn_mirrors_included():
     cell = press2d.cell(stairs(), 2.0)
-    found = {(round(x, 6), round(y, 6)) for x, y in rings.notches(cell)}
+    found = {(round(x, 6), round(y, 6)) for x, y in mesh.notches(cell)}
     assert found == {(0.7, 0.4), (0.7, 0.5), (0.4, 0.6)}  # and not (0.4, 0.5), where the air does
 
 
@@ -80,7 +80,7 @@ def test_a_blunt_corner_at_a_mirror_is_a_notch_and_where_two_solids_meet_there_i
         ((0.0, 0.6), (0.0, 0.8)): (OUTSIDE, 2),
     }
     solids = (Region("x60", ""), Region("etpu", "top"))
-    assert rings.notches(ContactCell(edges, solids, 0.0, 1.0, mirrored=True)) == [(0.0, 0.3)]
+    assert mesh.notches(ContactCell(edges, solids, 0.0, 1.0, mirrored=True)) == [(0.0, 0.3)]
 
 
 def test_stairs_are_near_their_limit_on_the_mesh_that_is_used():
@@ -99,7 +99,7 @@ def test_finer_levels_are_finer_at_the_apex_too():
 
 def test_a_wedge_is_filled_though_its_corners_lie_on_a_line():
     places = [(0.0, 0.0), (1.0, 0.02), (2.0, 0.04), (3.0, 0.06), (3.1, 0.5), (2.0, 0.3), (1.0, 0.15)]
-    found = wedge.filled(range(len(places)), places)
+    found = plane_field.filled(range(len(places)), places)
     u, v = (np.array([np.subtract(places[t[k]], places[t[0]]) for t in found]) for k in (1, 2))
     area = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
     x, y = np.array(places).T
@@ -113,7 +113,7 @@ def test_a_wedge_ends_before_the_way_across_would_cut_its_side():
     tip, slope, head, foot = (85.3, 13.4), (42.3, 18.4), (32.6, 15.2), (32.55, 0.0)
     outline = [tip, slope, (0.5, 25.3), (0.0, -15.0), (32.5, -15.0), foot, head]
     edges = dict.fromkeys(zip(outline, [*outline[1:], tip], strict=True), (1, 2))
-    assert wedge.Wedge((tip, slope), (tip, head)) in wedge.wedges(edges, 1)
+    assert plane_field.Wedge((tip, slope), (tip, head)) in plane_field.wedges(edges, 1)
 
 
 def test_a_wedge_ends_before_another_body_stands_in_it():
@@ -123,4 +123,4 @@ def test_a_wedge_ends_before_another_body_stands_in_it():
     body = [(1.32, 2.87), (3.6, 4.46), (1.5, 2.05)]
     rings_ = [(outline, (1, 2)), (body, (3, 1))]
     edges = {(p, q): sides for ring, sides in rings_ for p, q in zip(ring, [*ring[1:], ring[0]], strict=True)}
-    assert wedge.Wedge((tip, out), (tip, into)) in wedge.wedges(edges, 1)
+    assert plane_field.Wedge((tip, out), (tip, into)) in plane_field.wedges(edges, 1)

@@ -13,6 +13,7 @@ from sensorgen.core.errors import BadInput
 from sensorgen.design.design import make
 from sensorgen.models import curved, press2d, press3d, press_round
 from sensorgen.models.press_round import BoundaryConditions, Elastic, Fineness
+from sensorgen.prediction.mesh_ladder import limit
 from sensorgen.scene.polyhedra import Loft
 from sensorgen.scene.revolved import Revolved
 from sensorgen.scene.scene import Body, Scene, box, rectangle
@@ -109,7 +110,7 @@ def test_a_pyramid_with_upright_walls_is_the_box_of_the_model_in_3d():
     fine, coarse = (
         press3d.press(press3d.cell(boxes), SOLIDS, stress, EPS, fineness=press3d.BrickCounts(n)) for n in (3, 2)
     )
-    deep = press3d.limit(fine, coarse, 3)
+    deep = limit(fine, coarse, 3)
     rise = np.diff([c.middle() for c in round_one.capacitance_f_per_m2])[0]
     assert round_one.displacement_m[1:] == pytest.approx(deep.found.displacement_m[1:], rel=0.03)
     assert rise == pytest.approx(deep.rise_f_per_m2[1], rel=0.05)

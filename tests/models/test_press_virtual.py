@@ -13,7 +13,7 @@ from test_press_feet import EPS, QUICK, SOLIDS, stacked
 from sensorgen.core.units import EPS0_F_PER_M
 from sensorgen.models import press2d
 from sensorgen.models.press2d import BoundaryConditions
-from sensorgen.solvers.contact import deformed
+from sensorgen.solvers.contact import closing
 
 LOADS_PA = [0.0, 1.9e4, 2e4, 2.1e4]
 
@@ -93,7 +93,7 @@ def test_growth_of_the_capacitance_is_the_fields_virtual_work():
     cell, on_base = stacked(0.2, 0.3), BoundaryConditions()
     found = press2d.press(cell, SOLIDS, LOADS_PA, EPS, fineness=QUICK)
     _, run = press2d._solved(cell, SOLIDS, LOADS_PA, on_base, QUICK, lambda _: None)
-    outlines = [deformed.deformed(cell, run.mesh, run.problem.faces, state.u_m) for state in run.states]
+    outlines = [closing.deformed(cell, run.mesh, run.problem.faces, state.u_m) for state in run.states]
     capacitance, slope = growth(outlines[1:], LOADS_PA[1:])
     before, here, after = (c.middle() for c in found.capacitance_f_per_m2[1:])
     assert capacitance == pytest.approx(here, rel=1e-3)

@@ -10,10 +10,7 @@ from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.models.compression import unconfined
 from sensorgen.models.stack import Film, GroundTie, Press, Stack, Track
-from sensorgen.prediction.double_layer import study
-from sensorgen.prediction.double_layer.designs import halves, press_at, stack_of, stacked
-from sensorgen.prediction.double_layer.differencing import bounds
-from sensorgen.prediction.double_layer.touching import WIRINGS, Touching
+from sensorgen.prediction.double_layer import WIRINGS, Touching, bounds, halves, press_at, stack_of, stacked, study
 from sensorgen.prediction.query import TONES_HZ
 
 TONES = np.array(TONES_HZ)

@@ -6,7 +6,7 @@ import scipy.sparse.linalg
 from scipy.sparse import csr_array, diags_array
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.solvers.network import band as _traxel_band
+from sensorgen.solvers import network as _traxel_band
 
 
 def network(n, reach, seed=1):

@@ -5,9 +5,9 @@ import pytest
 
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models import traxels
-from sensorgen.solvers.network import band
-from sensorgen.solvers.network import links as links
-from sensorgen.solvers.network.nodes import Nodes, StraightLines
+from sensorgen.solvers import network as band
+from sensorgen.solvers import network as links
+from sensorgen.solvers.network import Nodes, StraightLines
 from sensorgen.verification.chart.rectilinear import plate
 
 RHO, W, H = 0.2, 0.42e-3, 0.1e-3

@@ -18,7 +18,7 @@ from scipy.sparse.linalg import spsolve
 from sensorgen.analysis.characterise import catalogue
 from sensorgen.analysis.characterise.posterior import Observation
 from sensorgen.models import traxels
-from sensorgen.solvers.network.nodes import StraightLines
+from sensorgen.solvers.network import StraightLines
 from sensorgen.verification.chart.rectilinear import plate as lines_of
 
 EPS0 = 8.8541878128e-12

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from sensorgen.core.errors import BadInput, UnknownName
-from sensorgen.measure.signal import drift, laws, presses
-from sensorgen.measure.signal.hysteresis import hysteresis
-from sensorgen.measure.signal.surfaces import normalised, surface
+from sensorgen.measure.signal import drift, presses
+from sensorgen.measure.signal.presses import normalised, surface
+from sensorgen.measure.signal.run import hysteresis
 
 MADE = made.presses(12)
 RUN = made.run(MADE, rate_hz=70, creep=0.004)
@@ -140,7 +140,7 @@ def test_drift_is_fitted_to_the_rest_and_taken_out():
     valid = np.ones(len(run.time_s), bool)
     found = drift.fitted(run.time_s, run.impedance_ohm, valid, run.force_n)
     check_drift(found, run)
-    left = found.fit.left * (70 * laws.BIN_S) ** 0.5  # means of so many readings
+    left = found.fit.left * (70 * drift.BIN_S) ** 0.5  # means of so many readings
     np.testing.assert_allclose(left.real.std(axis=0), 1e-3, rtol=0.15)
     np.testing.assert_allclose(left.imag.std(axis=0), 1e-3, rtol=0.15)
     with pytest.raises(BadInput, match="0 readings at rest"):
@@ -174,7 +174,7 @@ def test_time_constants_of_a_film_come_back():
     force = run.force_n.copy()
     force[500:600] = np.nan  # the rig was silent
     found = drift.fitted(run.time_s, run.impedance_ohm, valid, force)
-    taus = sorted(term.tau_s for term in found.fit.terms if isinstance(term, laws.Relaxation))
+    taus = sorted(term.tau_s for term in found.fit.terms if isinstance(term, drift.Relaxation))
     assert taus[:2] == pytest.approx([2, 30], rel=0.05)
     off = (found.at(run.time_s) - run.drift)[force > 0.4]
     assert np.quantile(np.abs(off - off.mean(axis=0)), 0.95) < 5e-4 < 0.03 < np.abs(run.drift).max()

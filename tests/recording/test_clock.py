@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from sensorgen.core.errors import BadInput
-from sensorgen.measure.recording.clock import rebuilt
+from sensorgen.measure.recording.samples import rebuilt
 
 TIME = np.arange(140 * 60) / 140
 

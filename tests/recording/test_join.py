@@ -9,8 +9,7 @@ from scipy.signal import lfilter
 
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.recording import Recording, RecordingClock, Source, joined, joined_all, offset, rig
-from sensorgen.measure.recording.clock import rebuilt
-from sensorgen.measure.recording.samples import blank, sifted
+from sensorgen.measure.recording.samples import blank, rebuilt, sifted
 
 MADE = made.presses(12)
 END = MADE[-1][1] + 4

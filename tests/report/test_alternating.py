@@ -10,7 +10,7 @@ import pytest
 from sensorgen.analysis.comparison import of_iteration, predicted
 from sensorgen.analysis.report import FORMATS, alternating, report, written
 from sensorgen.design.design import load
-from sensorgen.measure.log import Log, binding, notes
+from sensorgen.measure.log import Log, notes, prints
 from sensorgen.prediction import bodies
 from sensorgen.workflows.stored_prediction import predicted_rows
 
@@ -30,7 +30,7 @@ def logged(tmp_path, design):
 
     def call(**readings):
         with Log(tmp_path / "log.db", create=True) as log:
-            binding.bind(log, list(readings), str(design))
+            prints.bind(log, list(readings), str(design))
             log.add(predicted_rows(load(design)))
             for name, (instrument, typed) in readings.items():
                 log.add([notes.with_ac(notes.reading(name, instrument=instrument, log=log), typed)])
@@ -95,7 +95,7 @@ def test_verdicts_go_by_frequency_and_flags_name_what_is_impossible(logged):
 def test_before_and_after_the_bake_stay_apart(tmp_path, design):
     defects = {"S1": ("hole", "zits"), "S2": ()}
     with Log(tmp_path / "log.db", create=True) as log:
-        binding.bind(log, ["S1", "S2"], str(design))
+        prints.bind(log, ["S1", "S2"], str(design))
         for name, baked in itertools.product(defects, (False, True)):
             one = notes.reading(name, "2k", "OL" if baked else "10", baked=baked, log=log)
             log.add([replace(one, defects=defects[name])])
@@ -108,7 +108,7 @@ def test_before_and_after_the_bake_stay_apart(tmp_path, design):
 
 def test_dc_resistances_have_the_meters_uncertainty_and_its_ranges(tmp_path, design):
     with Log(tmp_path / "log.db", create=True) as log:
-        binding.bind(log, ["S1"], str(design))
+        prints.bind(log, ["S1"], str(design))
         log.add([replace(notes.reading("S1", "600 / 602", "500M", instrument="HP 34401A", log=log), wires=4)])
         made = report(log, None)
     (row,) = next(t for t in made.tables if t.key == "readings").rows
@@ -131,7 +131,7 @@ def test_a_reading_at_any_frequency_is_compared_with_the_prediction_at_it(design
 
 def test_the_leak_of_a_capacitor_is_judged_by_its_reactance(tmp_path, design):
     with Log(tmp_path / "log.db", create=True) as log:
-        binding.bind(log, ["S1", "S2"], str(design))
+        prints.bind(log, ["S1", "S2"], str(design))
         log.add([notes.reading(name, "2k", word, log=log) for name, word in (("S1", "45M"), ("S2", "10M"))])
         made, found = report(log, None), of_iteration(log, None)
     assert [row.verdict.word for row in found.rows] == ["intact", "leak"]
@@ -145,7 +145,7 @@ def test_bake_shrinkage_and_defects_stand_beside_their_change(tmp_path, design):
     shrunk = tmp_path / "shrunk.yaml"
     shrunk.write_text(design.read_text() + "shrinkage: 0.2\n")
     with Log(tmp_path / "log.db", create=True) as log:
-        binding.bind(log, ["S1"], str(shrunk))
+        prints.bind(log, ["S1"], str(shrunk))
         for baked, ohm, farad, defects in ((False, "2k", "100pF", ()), (True, "1.5k", "62pF", ("hole",))):
             one = notes.reading("S1", ohm, "50M", baked=baked, log=log)
             typed = {"Cp": [f"{farad}@100kHz"], "D": ["0.02@100kHz"]}

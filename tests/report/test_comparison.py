@@ -17,8 +17,8 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import OutOfRange
 from sensorgen.design.design import make
 from sensorgen.design.specimen_name import design_of, parse
-from sensorgen.measure.log import Log, anchors, notes
-from sensorgen.measure.log.batches import prediction
+from sensorgen.measure.log import Log, notes, verify
+from sensorgen.measure.log.prints import prediction
 from sensorgen.measure.signal.leakage import across_ohm, along_ohm, electrode_and_leak, leak_s
 from sensorgen.models import line
 from sensorgen.models.compression import unconfined
@@ -107,8 +107,8 @@ def test_an_anchor_after_a_prediction_is_shown_with_it(tmp_path):
     data = {"electrode_resistance_ohm": {"top": 1000.0, "bottom": 3000.0}}
     with Log(tmp_path / "log.db", create=True) as book:
         book.add([prediction(design.id(), design.name, data), prediction("x" * 16, "another", data)])
-        anchors.anchor(book, tmp_path / "heads.txt")
-        anchors.anchor(book, tmp_path / "later.txt")
+        verify.anchor(book, tmp_path / "heads.txt")
+        verify.anchor(book, tmp_path / "later.txt")
         book.add([prediction(other.id(), other.name, data)])
         book.add([notes.reading("40 triX .1mm", "0.65k", "40"), notes.reading("40 triY .1mm", "0.65k", "40")])
         found = of_iteration(book, 40)

@@ -10,7 +10,7 @@ from sensorgen.analysis.plots import pages, shades
 from sensorgen.analysis.preview import geometry
 from sensorgen.design.design import make
 from sensorgen.scene.geometry.meshes import mesh
-from sensorgen.workflows.preview import page_of
+from sensorgen.workflows.decision import page_of
 
 HOSTILE = "</script><img src=x onerror=alert(1)> & 'quoted'"
 TRI = {"shape": "tri", "parameters": {"dielectric_mm": 0.2, "length_mm": 12.0}}

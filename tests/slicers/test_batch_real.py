@@ -18,10 +18,10 @@ from sensorgen.design.printer import load_printer
 from sensorgen.design.tower import tower
 from sensorgen.export.gcode import paths
 from sensorgen.export.slicers import run
-from sensorgen.measure.log import batches
+from sensorgen.measure.log import prints
 from sensorgen.measure.log.entries import Prediction, RawFile
 from sensorgen.prediction import quantities
-from sensorgen.workflows.batch import make, tab
+from sensorgen.workflows.batch import labelling, make
 from sensorgen.workflows.batch.record import RECORD
 from sensorgen.workflows.sealed import batch_differences
 
@@ -147,15 +147,15 @@ def test_every_specimen_is_printed_whole_with_both_tools_and_its_tab(small, slic
     for name, rows in inside.items():
         length_mm = read(small.folder)["specimens"][name]["size_mm"][0]
         sensor = design.make({"shape": "tri", "parameters": {"length_mm": 12.0, "width_mm": 10.0}})
-        (label,) = tab.bodies(sensor, name)
-        assert length_mm == pytest.approx(12 + tab.size_mm(sensor, name)[0])
+        (label,) = labelling.bodies(sensor, name)
+        assert length_mm == pytest.approx(12 + labelling.size_mm(sensor, name)[0])
         printed, exact = volumes(lines, rows), solid(name, label.volume_mm3())
         for tool, volume in exact.items():
             assert printed[tool] == pytest.approx(volume, rel=0.12), (name, tool)
         # Raised letters: X60 above the tab's plate and beyond the sensor's end.
         centre = read(small.folder)["specimens"][name]["centre_mm"][0]
         end = centre - length_mm / 2 + 12
-        above = rows & (lines.start_mm[:, 0] > end + LINE_MM) & (lines.end_mm[:, 2] > tab.PLATE_MM + 0.05)
+        above = rows & (lines.start_mm[:, 0] > end + LINE_MM) & (lines.end_mm[:, 2] > labelling.PLATE_MM + 0.05)
         assert (lines.tool[above] == 4).all()
         letters = sum(p.volume_mm3() for p in label.pieces[1:])
         assert volumes(lines, above)[4] == pytest.approx(letters, rel=0.35), name
@@ -232,7 +232,7 @@ def test_each_designs_prediction_is_that_of_the_first_slicers_print(small):
 def test_the_log_keeps_the_predictions(small):
     path = small.folder / RECORD
     file = RawFile(uid="0" * 64, name=RECORD, size=path.stat().st_size)
-    kept = [json.loads(row.data) for row in batches.rows(path, file) if isinstance(row, Prediction)]
+    kept = [json.loads(row.data) for row in prints.rows(path, file) if isinstance(row, Prediction)]
     assert len(kept) == 2  # copies share one
     assert all(data in read(small.folder)["predictions"].values() for data in kept)
 

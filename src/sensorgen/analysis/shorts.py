@@ -30,7 +30,7 @@ from sensorgen.design.specimen_name import QUALITIES
 from sensorgen.export.gcode.files import Source
 from sensorgen.measure.log import Log
 from sensorgen.measure.log.entries import Reading
-from sensorgen.measure.log.tables import thesis
+from sensorgen.measure.log.importing import thesis_readings
 from sensorgen.measure.signal.verdicts import ORDER
 
 CREDIBLE = 0.9  # share of the posterior inside the interval
@@ -80,7 +80,7 @@ class FilmRisk(Pinholes):
     def document(self) -> Iterator[Part]:
         """Table of holes, and the probability with its assumptions."""
         yield from super().document()
-        said = (
+        counted = (
             f"{self.shorted} of {self.prints} prints of this shape and film in the log are shorted or leaking"
             if self.prints else f"no print of this shape and film: from holes and series {SERIES}"
         )  # fmt: skip
@@ -99,7 +99,7 @@ class FilmRisk(Pinholes):
             f"more than {max(every)}"
         )
         yield Facts((
-            ("P(short)", f"{_words(self.posterior)}; {said}"), ("before", _words(self.prior)),
+            ("P(short)", f"{_words(self.posterior)}; {counted}"), ("before", _words(self.prior)),
             (f"series {SERIES}", known), ("assumed", assumed),
         ))  # fmt: skip
 
@@ -126,7 +126,7 @@ def risk(design: Design, source: Source, log: Log | None = None) -> tuple[FilmRi
         The file prints something else, or the design has no film between electrodes.
     """
     here = placed(design, source)
-    found = pinholes(design, here.paths, here.centre_mm)
+    holes = pinholes(design, here.paths, here.centre_mm)
     thin = films(design, beads(design, here.paths, here.centre_mm))
     if not thin:
         raise BadInput(f"{design.name} has no film between electrodes; expected a dielectric from edge to edge")
@@ -134,7 +134,7 @@ def risk(design: Design, source: Source, log: Log | None = None) -> tuple[FilmRi
     shorted, prints = verdicts(log, design) if log else (0, 0)
     other = elsewhere(design.shape, [len(film.lines) for film in thin])
     whole = FilmRisk(
-        **vars(found), holes_low=float(np.min(counts)), holes_high=float(np.max(counts)), shorted=shorted,
+        **vars(holes), holes_low=float(np.min(counts)), holes_high=float(np.max(counts)), shorted=shorted,
         prints=prints, prior=chance(counts, other, 0, 0), posterior=chance(counts, other, shorted, prints),
     )  # fmt: skip
     return whole, picture(design.name, thin)
@@ -146,7 +146,7 @@ def verdicts(log: Log, design: Design) -> tuple[int, int]:
     Rows of Table D.1's series 23 are left out: the prior has them.
     """
     film = design.parameters.get("dielectric_mm", getattr(design.params, "dielectric_mm", None))
-    counted = {r.uid for r in thesis() if r.iteration == SERIES}
+    counted = {r.uid for r in thesis_readings() if r.iteration == SERIES}
     last = {
         r.specimen: _low(r) for r in log.readings()
         if r.shape == design.shape and r.film_mm == film and r.y_ohm and r.z_ohm and r.uid not in counted
@@ -168,7 +168,7 @@ def series() -> Counts:
     51
     """
     shorted, every = Counter[tuple[str, int]](), Counter[tuple[str, int]]()
-    for r in thesis():
+    for r in thesis_readings():
         if r.iteration == SERIES and r.film_mm is not None and r.y_ohm and r.z_ohm:
             key = r.shape, round(r.film_mm / load_quality(QUALITIES[r.slicing] or "fine").layer_mm)
             shorted[key] += _low(r)

@@ -89,25 +89,25 @@ def beads(design: Design, paths: "Paths", centre_mm: Point | None = None, *, cut
     """
     scene, machine = design.printed, design.machine
     corner = np.array(centre_mm or machine.bed_centre_mm()) - np.array(scene.size_mm[:2]) / 2
-    found = paths.model()
-    ends = [p[:, :2] - corner for p in (found.start_mm, found.end_mm)]
-    share = np.ones(len(found.tool))
+    model = paths.model()
+    ends = [p[:, :2] - corner for p in (model.start_mm, model.end_mm)]
+    share = np.ones(len(model.tool))
     if cut:
         ends, share = _inside(ends[0], ends[1], np.array(scene.size_mm[:2]))
     tools = {design.tool(body.material) for body in scene.bodies}
     heights = np.array(design.layers.boundaries_mm(scene.size_mm[2]))
-    layer = np.abs(found.end_mm[:, 2, None] - heights[1:]).argmin(1)
-    here = np.abs(found.end_mm[:, 2] - heights[1:][layer]) < _LEVEL_MM
+    layer = np.abs(model.end_mm[:, 2, None] - heights[1:]).argmin(1)
+    here = np.abs(model.end_mm[:, 2] - heights[1:][layer]) < _LEVEL_MM
     # Lines run half a line inside their body: what touches the piece from outside, as a tab, is half a line away.
     middle, margin = (ends[0] + ends[1]) / 2, machine.line_mm() / 4
     here &= ((middle > -margin) & (middle < np.array(scene.size_mm[:2]) + margin)).all(1)
-    here &= np.isin(found.tool, sorted(tools))
+    here &= np.isin(model.tool, sorted(tools))
     height = np.diff(heights)[layer]
-    volume = found.volume_mm3(machine.filament_mm) * share
+    volume = model.volume_mm3(machine.filament_mm) * share
     here &= share > 0
-    width = found.volume_mm3(machine.filament_mm) / (found.length_mm() * height)
-    body = _owners(design, found.tool, layer, middle)
-    columns = (*ends, width, height, volume, layer, body, found.tool, found.number)
+    width = model.volume_mm3(machine.filament_mm) / (model.length_mm() * height)
+    body = _owners(design, model.tool, layer, middle)
+    columns = (*ends, width, height, volume, layer, body, model.tool, model.number)
     return Beads(*(c[here] for c in columns))
 
 
@@ -173,7 +173,7 @@ def layers(
     """
     if convention not in CONVENTIONS:
         raise UnknownName("convention for a line's width", convention, CONVENTIONS)
-    scene, found = design.printed, []
+    scene, printed = design.printed, []
     for number, layer in enumerate(drawn(scene, design.layers.boundaries_mm(scene.size_mm[2]))):
         here, cover = lines.of(lines.layer == number), _strips if layer.along else _union
         bodies, regions = np.unique(here.body).tolist(), dict[str, Region]()
@@ -187,8 +187,8 @@ def layers(
                 most = max(filled.area, float((mine.volume_mm3 / mine.height_mm).sum()))
                 filled = plan[0] if most > FULL * scene.size_mm[0] * scene.size_mm[1] else filled
             regions[name] = cleaned(shapely.difference(filled, shapely.union_all(list(regions.values()))))
-        found.append(layer.mapped(regions))
-    return found
+        printed.append(layer.mapped(regions))
+    return printed
 
 
 def _strips(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], convention: str) -> Region:
@@ -252,16 +252,16 @@ def _closed(plans: NDArray[np.object_], slit_mm: float) -> Region:
     region = CrossSection([ring[:-1] for ring in rings if len(ring)], FillRule.NonZero)
     for way in (slit_mm, -slit_mm):
         region = region.offset(way, JoinType.Miter, _MITRE)
-    found = (part.to_polygons() for part in region.decompose())
-    return shapely.multipolygons([shapely.Polygon(outer, holes) for outer, *holes in found])
+    outlines = (part.to_polygons() for part in region.decompose())
+    return shapely.multipolygons([shapely.Polygon(outer, holes) for outer, *holes in outlines])
 
 
 def _offset(pieces: NDArray[np.object_], area_mm2: Real, more_mm: float) -> NDArray[np.object_]:
     """Polygons with their outlines moved until they have some areas, then outwards by a length [mm]."""
-    offset, made = np.zeros(len(pieces)), pieces.copy()
+    offset, moved = np.zeros(len(pieces)), pieces.copy()
     for _ in range(_STEPS):  # of Newton's method: the length of the outline is the slope of the area
-        away = np.abs(shapely.area(made) - area_mm2) > _OF_AREA * area_mm2
-        step = (area_mm2 - shapely.area(made)) / np.maximum(shapely.length(made), SLIVER_MM)
+        away = np.abs(shapely.area(moved) - area_mm2) > _OF_AREA * area_mm2
+        step = (area_mm2 - shapely.area(moved)) / np.maximum(shapely.length(moved), SLIVER_MM)
         offset[away] += step[away]
-        made[away] = shapely.buffer(pieces[away], offset[away], join_style="mitre")
-    return shapely.buffer(made, more_mm, join_style="mitre") if more_mm else made
+        moved[away] = shapely.buffer(pieces[away], offset[away], join_style="mitre")
+    return shapely.buffer(moved, more_mm, join_style="mitre") if more_mm else moved

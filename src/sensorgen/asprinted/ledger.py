@@ -167,12 +167,12 @@ def deposit(lines: Beads, shape: tuple[int, ...]) -> Real:
     rest = place - cell
     inside = ((cell >= 0) & (cell < np.array(shape) - 1)).all(1)
     cell, rest, share = cell[inside], rest[inside], share[inside]
-    found = np.zeros(shape[0] * shape[1])
+    filled = np.zeros(shape[0] * shape[1])
     for i in (0, 1):
         for j in (0, 1):
             weight = share * np.abs(1 - i - rest[:, 0]) * np.abs(1 - j - rest[:, 1])
-            found += np.bincount((cell[:, 0] + i) * shape[1] + cell[:, 1] + j, weight, len(found))
-    return found.reshape(shape).astype(np.float32)
+            filled += np.bincount((cell[:, 0] + i) * shape[1] + cell[:, 1] + j, weight, len(filled))
+    return filled.reshape(shape).astype(np.float32)
 
 
 def _cover(regions: Sequence[Region], shape: tuple[int, ...]) -> Real:
@@ -320,13 +320,13 @@ def _volumes(
     """Each body takes in each layer about the volume that some walls make of it."""
     bodies, line = design.printed.bodies, design.machine.line_mm()
     laid = estimate.lines(design)
-    made = [estimate.layers(design.printed, design.machine, design.layers, walls, laid) for walls in estimate.RULES]
+    by_walls = [estimate.layers(design.printed, design.machine, design.layers, walls, laid) for walls in estimate.RULES]
     printed = np.zeros((len(around[0]), len(bodies)))
     np.add.at(printed, (lines.layer, lines.body), lines.volume_mm3)
     for n, body in enumerate(bodies):
         for k, layer in enumerate(around[0]):
             areas = np.array([each[k].region(body.name).area for each in around])
-            walls = np.array([each[k].region(body.name).area for each in made])
+            walls = np.array([each[k].region(body.name).area for each in by_walls])
             given, spare = printed[k, n], 2 * line * line * layer.height_mm  # ends of a line or two
             low, high = _expected(areas, walls, laid[body.material].infill, _limits(design, layer, body.name))
             low, high = low * layer.height_mm, high * layer.height_mm

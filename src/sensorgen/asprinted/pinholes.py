@@ -103,7 +103,7 @@ def films(design: Design, lines: Beads) -> list[CoveredFilm]:
     plates = drawn(scene, design.layers.boundaries_mm(scene.size_mm[2]))
     plan = scene.size_mm[0] * scene.size_mm[1]
     whole = [sum(layer.region(name).area for name in names) > _WHOLE * plan for layer in plates]
-    found = []
+    runs = []
     for run in np.split(np.arange(len(plates)), np.flatnonzero(np.diff(whole)) + 1):
         layers = [int(k) for k in run]
         below = set(terminal[lines.body[lines.layer < layers[0]]].tolist()) - {""}
@@ -114,19 +114,19 @@ def films(design: Design, lines: Beads) -> list[CoveredFilm]:
         margin = design.machine.line_mm() / 2
         inside = shapely.box(margin, margin, scene.size_mm[0] - margin, scene.size_mm[1] - margin)
         span = plates[layers[0]].bottom_mm, plates[layers[-1]].top_mm
-        found.append(CoveredFilm(inside, tuple(k + 1 for k in layers), span, tuple(own)))
-    return found
+        runs.append(CoveredFilm(inside, tuple(k + 1 for k in layers), span, tuple(own)))
+    return runs
 
 
 def opened(film: CoveredFilm, widths: Sequence[float], shifts_mm: Sequence[Point] = ()) -> list[Region]:
     """Openings of each layer of a film, its lines as wide as a share of what the file says, and shifted [mm]."""
-    found = []
+    openings = []
     for k, (lines, width) in enumerate(zip(film.lines, widths, strict=True)):
         shift = np.array(shifts_mm[k] if shifts_mm else (0.0, 0.0))
         ways = shapely.linestrings(np.stack([lines.start_mm + shift, lines.end_mm + shift], axis=1))
         filled = shapely.union_all(shapely.buffer(ways, lines.widths_mm("stadium") * width / 2, quad_segs=4))
-        found.append(shapely.difference(film.plan, filled))
-    return found
+        openings.append(shapely.difference(film.plan, filled))
+    return openings
 
 
 def through(layers: Sequence[Region]) -> list[Polygon]:
@@ -148,11 +148,11 @@ def through(layers: Sequence[Region]) -> list[Polygon]:
         throats.append((over[wide], np.stack([here[wide] + first[k], there[wide] + first[k + 1]])))
     edges = np.concatenate([ends for _, ends in throats], axis=1)
     of = groups(int(first[-1]), *edges)
-    found = []
+    holes = []
     for one in set(of[: first[1]].tolist()) & set(of[first[-2] :].tolist()):
         between = [over[of[ends[0]] == one] for over, ends in throats]
-        found += [p for place in min(between, key=lambda over: shapely.area(over).sum()) for p in parts(place)]
-    return [hole for hole in found if hole.area > HOLE_MM2]
+        holes += [p for place in min(between, key=lambda over: shapely.area(over).sum()) for p in parts(place)]
+    return [hole for hole in holes if hole.area > HOLE_MM2]
 
 
 def pinholes(
@@ -179,8 +179,8 @@ def pinholes(
 
 def of_lines(design: Design, lines: Beads, *, widths: Sequence[float], most_layers: int) -> Pinholes:
     """Pinholes by the lines of the piece."""
-    found = [film for film in films(design, lines) if len(film.lines) <= most_layers]
-    return Pinholes(design.name, tuple(_row(film, width) for film in found for width in widths))
+    thin = [film for film in films(design, lines) if len(film.lines) <= most_layers]
+    return Pinholes(design.name, tuple(_row(film, width) for film in thin for width in widths))
 
 
 def _row(film: CoveredFilm, width: float) -> OpenPlaces:
@@ -197,9 +197,9 @@ def _row(film: CoveredFilm, width: float) -> OpenPlaces:
     )  # fmt: skip
 
 
-def findings(found: Pinholes) -> Iterator[Finding]:
+def findings(pinholes: Pinholes) -> Iterator[Finding]:
     """Rule 10: a film of one layer, and a film that its lines leave open, with place and figures."""
-    for row in found.rows:
+    for row in pinholes.rows:
         if row.width < 1 or not (row.layers == 1 or row.holes):
             continue
         edge = f", {row.edge_percent:.0f} % of them within {_EDGE_MM:g} mm of the edge" if row.holes else ""
@@ -217,9 +217,9 @@ def findings(found: Pinholes) -> Iterator[Finding]:
 def draws(film: CoveredFilm, count: int, seed: int = 23) -> Real:
     """Through-holes in prints whose layers differ in width by up to 5 % and are shifted by ``SHIFT_MM``, (count,)."""
     rng = np.random.default_rng(seed)
-    found = []
+    counts = []
     for _ in range(count):
         widths = rng.uniform(0.95, 1.05, len(film.lines)).tolist()
         shifts = [(float(x), float(y)) for x, y in rng.uniform(-SHIFT_MM, SHIFT_MM, (len(film.lines), 2))]
-        found.append(len(through(opened(film, widths, shifts))))
-    return np.array(found, float)
+        counts.append(len(through(opened(film, widths, shifts))))
+    return np.array(counts, float)

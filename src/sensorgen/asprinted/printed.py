@@ -86,7 +86,7 @@ class Printed:
         plan = Window((0.0, whole.size_mm[0]), (0.0, whole.size_mm[1])) if fringe else window(whole, boundaries)
         if self.design.border:
             plan = inside(plan, whole, drawn(self.design.printed, boundaries))
-        return {name: cell(self.design, found.layers, found.bodies, plan) for name, found in self._connected.items()}
+        return {name: cell(self.design, own.layers, own.bodies, plan) for name, own in self._connected.items()}
 
     @cached_property
     def _connected(self) -> "dict[str, Connected]":
@@ -98,7 +98,7 @@ class Printed:
 
     def remarks(self) -> dict[str, tuple[str, ...]]:
         """By every convention, where electrodes touch, and how many pieces of conductor float."""
-        return {name: found.remarks() for name, found in self._connected.items()}
+        return {name: connected.remarks() for name, connected in self._connected.items()}
 
     @property
     def cell(self) -> PrintCell:
@@ -181,8 +181,8 @@ def body(
             f"no line of {design.name} in this G-code: expected tools {tools} in layers of "
             f"{design.layers.layer_mm:g} mm at its place on the bed; was it sliced from this design?"
         )
-    found = {name: printed_layers(design, lines, name) for name in CONVENTIONS}
-    return Printed(design, f"printed, {slicer or 'from G-code'}", found, lines)
+    by_convention = {name: printed_layers(design, lines, name) for name in CONVENTIONS}
+    return Printed(design, f"printed, {slicer or 'from G-code'}", by_convention, lines)
 
 
 def nominal(design: Design, paths: "Paths", slicer: str = "", centre_mm: Point | None = None) -> Printed:
@@ -223,11 +223,11 @@ def cell(design: Design, layers: Sequence[LayerRegions], bodies: Sequence[Body],
     if not any(plan.repeats):
         inside = evened(inside, plan) if crossed else evened(inside, plan, ROUNDED_MM)
     like = replace(scene, bodies=tuple(bodies), size_mm=(*plan.sides_mm(), scene.size_mm[2]), repeats=plan.repeats)
-    found = scene_of(inside, like)
+    scene_here = scene_of(inside, like)
     if design.orientation == "upside-down":
-        found = found.turned_over()
-    kept = replace(found, bodies=tuple(b for b in found.bodies if not b.is_support()))
-    smaller = kept.stretched(1.0 - design.shrinkage) if design.shrinkage else kept
+        scene_here = scene_here.turned_over()
+    in_use = replace(scene_here, bodies=tuple(b for b in scene_here.bodies if not b.is_support()))
+    smaller = in_use.stretched(1.0 - design.shrinkage) if design.shrinkage else in_use
     return PrintCell(smaller, scene.size_mm[0] * scene.size_mm[1] / plan.area_mm2())
 
 

@@ -90,13 +90,13 @@ def inside(plan: Window, whole: Scene, layers: Sequence[LayerRegions]) -> Window
     for axis, (low, high) in zip("xy", (plan.x_mm, plan.y_mm), strict=True):
         uniform = len(square_to(whole, axis)) == 1
         sides.append((0.4 * high + 0.6 * low, 0.6 * high + 0.4 * low) if uniform else (low, high))
-    found = Window(sides[0], sides[1], plan.repeats)
+    period_window = Window(sides[0], sides[1], plan.repeats)
     box = shapely.box(sides[0][0], sides[1][0], sides[0][1], sides[1][1])
     if not any(
         shapely.covers(shapely.union_all(list(layer.regions.values())).buffer(SLIVER_MM), box) for layer in layers
     ):
         raise BadInput("the border cuts the period in the middle of the sensor; expected one that leaves it whole")
-    return found
+    return period_window
 
 
 def _period(
@@ -111,9 +111,9 @@ def _period(
         )
         width, shifts = high - low, False
     else:
-        found = repeat([region for layer in patterned for region in layer.regions.values()], size_mm, axis)
-        low, shifts = found.low_mm, found.shifts
-        width = (found.high_mm - low) / (2 if shifts else 1)
+        repeated = repeat([region for layer in patterned for region in layer.regions.values()], size_mm, axis)
+        low, shifts = repeated.low_mm, repeated.shifts
+        width = (repeated.high_mm - low) / (2 if shifts else 1)
     middle = int((end / 2 - low) // width)
     starts = [low + k * width for k in range(middle - 3, middle + 3)]
     inside = [s for s in starts if s > -SLIVER_MM and s + 2 * width < end + SLIVER_MM]
@@ -150,18 +150,18 @@ def _of_strips(regions: Sequence[Region], size_mm: Sequence[float], axis: int) -
 def cut(layers: Sequence[LayerRegions], to: Window) -> list[LayerRegions]:
     """The part of some layers within a window, moved to the origin, with edges that rounding parted made one [mm]."""
     (x0, x1), (y0, y1) = to.x_mm, to.y_mm
-    found = []
+    moved = []
     for layer in layers:
         inside = {n: translate(shapely.clip_by_rect(r, x0, y0, x1, y1), -x0, -y0) for n, r in layer.regions.items()}
-        found.append(layer.mapped(inside))
-    drawn = shapely.get_coordinates([region for layer in found if layer.along for region in layer.regions.values()])
+        moved.append(layer.mapped(inside))
+    drawn = shapely.get_coordinates([region for layer in moved if layer.along for region in layer.regions.values()])
     places = []  # edges, rising, and where each goes: to the middle of those that rounding parted, or to the side
     for axis, side in enumerate(to.sides_mm()):
         edges = np.unique(np.append(drawn[:, axis], [0.0, side]))
         groups = np.split(edges, np.flatnonzero(np.diff(edges) >= ROUNDED_MM) + 1)
         middles = [np.full(len(g), round(float(g.mean()), 6)) for g in groups[1:-1]]
         places.append((edges, np.concatenate([0.0 * groups[0], *middles, 0.0 * groups[-1] + side])))
-    return [layer.mapped({n: _moved(r, places, layer.along) for n, r in layer.regions.items()}) for layer in found]
+    return [layer.mapped({n: _moved(r, places, layer.along) for n, r in layer.regions.items()}) for layer in moved]
 
 
 def _moved(region: Region, places: list[tuple[Real, Real]], along: str) -> Region:
@@ -186,7 +186,7 @@ def evened(layers: Sequence[LayerRegions], to: Window, within_mm: float = np.inf
     lopsided: as they are where a strip would move by ``within_mm`` or more. Widths stay; a strip that is printed a
     little aside moves to its place, which changes the field in second order.
     """
-    sides, found = np.array([*to.sides_mm(), *to.sides_mm()]), []
+    sides, even = np.array([*to.sides_mm(), *to.sides_mm()]), []
     for layer in layers:
         regions = dict(layer.regions)
         for name, region in regions.items() if layer.along else ():
@@ -196,5 +196,5 @@ def evened(layers: Sequence[LayerRegions], to: Window, within_mm: float = np.inf
                 return list(layers)
             middle = ((bounds + mirrored - sides) / 2).round(9).round(6) + sides / 2  # alike to both sides
             regions[name] = shapely.union_all(shapely.box(*middle.round(9).T))
-        found.append(layer.mapped(regions))
-    return found
+        even.append(layer.mapped(regions))
+    return even

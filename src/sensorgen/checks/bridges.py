@@ -86,14 +86,14 @@ def _spans(shape: Region, ground: Sequence[Region], least_mm: float) -> dict[str
     Every unsupported place is held along x or along y; the better way counts. Places that are held neither way,
     as the corners of a roof that juts out on two sides, hold on to those that are.
     """
-    found = dict.fromkeys(("bridge", "overhang", "island"), _Span())
+    spans = dict.fromkeys(("bridge", "overhang", "island"), _Span())
     if shape.is_empty or any(shape is region for region in ground):
-        return found
+        return spans
     if shapely.covers(ground, shapely.box(*shape.bounds)).any():
-        return found
+        return spans
     rectilinear = is_rectilinear(shapely.multipolygons(shapely.get_parts([shape, *ground])))
     if not rectilinear and cleaned(shapely.difference(shape, shapely.union_all(ground))).is_empty:
-        return found
+        return spans
     lines, filled, below = _grid(shape, ground, least_mm / 2, rectilinear)
     air = filled & ~below
 
@@ -113,9 +113,9 @@ def _spans(shape: Region, ground: Sequence[Region], least_mm: float) -> dict[str
     def note(kind: str, lengths: Real, where: Mask) -> None:
         lengths = lengths.clip(max=most[kind])
         i, j = np.unravel_index(np.argmax(np.where(where, lengths, 0.0)), where.shape)
-        if where[i, j] and lengths[i, j] > found[kind].mm:
+        if where[i, j] and lengths[i, j] > spans[kind].mm:
             x, y = (float(line[k] + line[k + 1]) / 2 for line, k in zip(lines, (i, j), strict=True))
-            found[kind] = _Span(float(lengths[i, j]), round(x, 9), round(y, 9))
+            spans[kind] = _Span(float(lengths[i, j]), round(x, 9), round(y, 9))
 
     while air.any():
         ends, lengths, narrow = _best(filled, lines, air)
@@ -125,7 +125,7 @@ def _spans(shape: Region, ground: Sequence[Region], least_mm: float) -> dict[str
             note("island", narrow, air & (narrow > least_mm + TOUCH_MM))
             break
         air &= ends == 0
-    return found
+    return spans
 
 
 def _best(filled: Mask, lines: tuple[Real, Real], air: Mask) -> tuple[Whole, Real, Real]:

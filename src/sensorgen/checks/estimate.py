@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from sensorgen.checks.widths import SWELLS, VANISHES
-from sensorgen.core.errors import MissingValue, UnknownName
+from sensorgen.core.errors import UnknownName
 from sensorgen.design.design import Design, Infill
 from sensorgen.design.printer import Printer, Quality
 from sensorgen.scene.layers import LayerRegions, Region, cleaned, drawn, narrow_mm, parts, united
@@ -50,24 +50,16 @@ class LineLayout:
 
 def lines(design: Design) -> dict[str, LineLayout]:
     """Layout of the lines of each material of a design, as far as its print settings are known."""
-    found = {}
+    layouts = {}
     for name, source in design.used().items():
-
-        def value(quantity: str, otherwise: float, name: str = name, source: str = source) -> float:
-            try:
-                return design.material(name).value(quantity, source).value
-            except MissingValue:
-                return otherwise
-
+        material, infill = design.material(name), design.infill.get(name, Infill())
         line = design.profile.line_mm.get(name, design.machine.line_mm())
-        walls = design.profile.wall_lines.get(name) or value("wall_lines", 1.0)
-        infill = design.infill.get(name, Infill())
-        percent, pattern = (
-            infill.percent or value("infill_percent", 100.0),
-            infill.pattern or design.layers.infill_pattern,
-        )
-        found[name] = LineLayout(line, walls * line, percent / 100.0, pattern)
-    return found
+        walls = design.profile.wall_lines.get(name) or material.chosen("wall_lines", source)
+        percent = infill.percent or material.chosen("infill_percent", source)
+        pattern = infill.pattern or design.layers.infill_pattern
+        shares = (1.0 if walls is None else walls) * line, (100.0 if percent is None else percent) / 100.0
+        layouts[name] = LineLayout(line, *shares, pattern)
+    return layouts
 
 
 def arachne(width_mm: float, layer_mm: float, line_mm: float, nozzle_mm: float) -> float:  # noqa: ARG001
@@ -113,13 +105,9 @@ RULES: dict[str, Rule] = {
 
 
 def layers(
-    scene: Scene,
-    printer: Printer,
-    quality: Quality,
-    walls: str = "arachne",
-    laid: Mapping[str, LineLayout] | None = None,
-    shift: Shift | None = None,
-) -> list[LayerRegions]:
+    scene: Scene, printer: Printer, quality: Quality, walls: str = "arachne",
+    laid: Mapping[str, LineLayout] | None = None, shift: Shift | None = None,
+) -> list[LayerRegions]:  # fmt: skip
     """Printed part of every layer.
 
     Parameters
@@ -151,26 +139,25 @@ def layers(
     """
     if walls not in RULES:
         raise UnknownName("walls", walls, RULES)
-    laid = laid or {}
-    found: list[LayerRegions] = []
+    printed: list[LayerRegions] = []
     known: dict[object, Mapping[str, Region]] = {}  # of equal layers, which share their regions
     given = drawn(scene, quality.boundaries_mm(scene.size_mm[2]))
     way = "x" if any(layer.along == "x" for layer in given) else "y"
+    sparse = {b.name: laid[b.material] for b in scene.bodies if laid and b.material in laid}
     for number, layer in enumerate(given):
         key = round(layer.height_mm, 12), *((name, id(region)) for name, region in layer.regions.items())
         if key not in known:
-            known[key] = _printed(layer, scene, printer, RULES[walls], laid)
+            known[key] = _printed(layer, scene, printer, RULES[walls], laid or {})
         regions = dict(known[key])
-        for body in scene.bodies:
-            mine = laid.get(body.material)
-            if mine and mine.infill < 1 and body.name in regions:
-                whole = regions[body.name].area > scene.size_mm[0] * scene.size_mm[1] * (1 - SLIVER_MM)
+        for name, mine in sparse.items():
+            if mine.infill < 1 and name in regions:
+                whole = regions[name].area > scene.size_mm[0] * scene.size_mm[1] * (1 - SLIVER_MM)
                 line_mm = RULES[walls](mine.line_mm, layer.height_mm, mine.line_mm, printer.nozzle_mm)
-                along = way if whole else layer.along or way
                 aside = (shift or (0.0, mine.infill * (1 - mine.infill)))[number % 2]
-                regions[body.name] = _sparse(regions[body.name], mine, line_mm, along, aside)
-        found.append(layer.mapped(regions))
-    return found
+                along = way if whole else layer.along or way
+                regions[name] = _sparse(regions[name], mine, line_mm, along, aside)
+        printed.append(layer.mapped(regions))
+    return printed
 
 
 def _sparse(region: Region, lines: LineLayout, line_mm: float, way: str, shift: float) -> Region:
@@ -209,9 +196,9 @@ def _printed(
             aside = scene.size_mm if wide in (cura, cura_gaps) else None
             swollen = _widened(layer, body.name, length * width, made, aside)
             inside = shapely.clip_by_rect(swollen, 0.0, 0.0, length, width)
-            found, others = united(inside), shapely.get_parts(list(regions.values()))
+            region, others = united(inside), shapely.get_parts(list(regions.values()))
             met = np.unique(shapely.STRtree(others).query(inside, predicate="intersects")[1])
-            free = shapely.difference(found, shapely.union_all(others[met])) if met.size else found
+            free = shapely.difference(region, shapely.union_all(others[met])) if met.size else region
             regions[body.name] = cleaned(free)
     return regions
 
@@ -220,12 +207,12 @@ def _widened(
     layer: LayerRegions, body: str, plan_mm2: float, wide: Callable[[float], float], lopsided: Sequence[float] | None
 ) -> Sequence[Region]:
     """The parts of a body in a layer as their walls print them; strips that are ``lopsided``, in a sensor of a size."""
-    found = parts(layer.region(body))
-    if not found or found[0].area > plan_mm2 * (1 - SLIVER_MM):
-        return found
-    bounds = shapely.bounds(found)
+    plan = parts(layer.region(body))
+    if not plan or plan[0].area > plan_mm2 * (1 - SLIVER_MM):
+        return plan
+    bounds = shapely.bounds(plan)
     across = {"y": bounds[:, 2] - bounds[:, 0], "x": bounds[:, 3] - bounds[:, 1]}
-    width = across[layer.along] if layer.along else narrow_mm(found)
+    width = across[layer.along] if layer.along else narrow_mm(plan)
     printed = np.array([wide(w) for w in width.tolist()])
     more = (printed - width)[:, None] / 2
     if layer.along:
@@ -233,9 +220,9 @@ def _widened(
         swollen = bounds + more * sides
         if lopsided:
             # What is lost is lost on the far side of the bed's middle, along y on the front
-            off = bounds[:, ::2].mean(axis=1) - lopsided[0] / 2 if layer.along == "y" else -np.ones(len(found))
+            off = bounds[:, ::2].mean(axis=1) - lopsided[0] / 2 if layer.along == "y" else -np.ones(len(plan))
             swollen += np.minimum(more, 0.0) * np.sign(off)[:, None] * abs(sides)
         swollen = shapely.box(*swollen.T)
     else:
-        swollen = shapely.buffer(found, more[:, 0], join_style="mitre")
+        swollen = shapely.buffer(plan, more[:, 0], join_style="mitre")
     return list(swollen[printed > 0])

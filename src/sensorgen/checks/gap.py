@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
+from operator import itemgetter
 
 import shapely
 
@@ -19,11 +20,10 @@ def check(slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> 
 
     Of three electrodes or more, plates separate neighbours: there the distance is that of their faces.
     """
-    bodies = sorted((b for b in slices.scene.bodies if b.terminal), key=lambda b: min(p.span("z")[0] for p in b.pieces))
-    pairs = [pair for pair in pairwise(bodies) if pair[0].terminal != pair[1].terminal]
-    for low, high in pairs:
-        top = max(p.span("z")[1] for p in low.pieces)
-        apart = gap_mm if len(pairs) == 1 else round(min(p.span("z")[0] for p in high.pieces) - top, 9)
+    ends = [(*_ends(body), body) for body in slices.scene.bodies if body.terminal]
+    pairs = [(a, b) for a, b in pairwise(sorted(ends, key=itemgetter(0))) if a[2].terminal != b[2].terminal]
+    for (_, top, low), (bottom, _, high) in pairs:
+        apart = gap_mm if len(pairs) == 1 else round(bottom - top, 9)
         place = (0.0, 0.0, top)
         if apart <= TOUCH_MM:
             yield Finding(
@@ -35,6 +35,12 @@ def check(slices: Slices, printer: Printer, quality: Quality, gap_mm: float) -> 
             yield from film
             if not any(f.severity == "error" for f in film):
                 yield from _printed((low, high), place, slices, printer, apart)
+
+
+def _ends(body: Body) -> tuple[float, float]:
+    """Lowest and highest place of a body [mm]."""
+    lows, highs = zip(*(piece.span("z") for piece in body.pieces), strict=True)
+    return min(lows), max(highs)
 
 
 def _on_edge(pair: Pair, slices: Slices, gap_mm: float) -> bool:
@@ -90,10 +96,10 @@ def _printed(
         by_gap.setdefault(gap, []).append(walls)
     if all(gap is not None and abs(gap - gap_mm) <= TOUCH_MM for gap in by_gap):
         return
-    said = (f"{'nothing' if gap is None else f'{gap:g} mm'} ({', '.join(walls)})" for gap, walls in by_gap.items())
+    gaps = (f"{'nothing' if gap is None else f'{gap:g} mm'} ({', '.join(walls)})" for gap, walls in by_gap.items())
     yield Finding(
         "2-printed-gap", "warning", f"{pair[0].name} / {pair[1].name}",
-        f"electrode gap: {gap_mm:g} mm drawn, as printed {', '.join(said)}",
+        f"electrode gap: {gap_mm:g} mm drawn, as printed {', '.join(gaps)}",
         "widen narrow parts to a line, use thinner layers, or put the faces on layer boundaries",
         max((gap for gap in by_gap if gap is not None), default=None), round(gap_mm, 9), place_mm=place,
     )  # fmt: skip

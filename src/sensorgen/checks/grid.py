@@ -1,12 +1,12 @@
 """Rules 3 and 4: faces on layer boundaries, and bodies between the sampling planes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from sensorgen.checks.slices import TOUCH_MM, Layers
 from sensorgen.core.findings import Finding
 from sensorgen.scene.layers import faces_mm
-from sensorgen.scene.scene import Body, Scene
+from sensorgen.scene.scene import Body, Point, Scene
 
 
 def check(scene: Scene, layers: Layers) -> Iterator[Finding]:
@@ -36,7 +36,7 @@ def _faces(body: Body, layers: Layers) -> Iterator[Finding]:
 
 
 def _samples(body: Body, layers: Layers) -> Iterator[Finding]:
-    spans = {p.span("z"): p for p in body.pieces}
+    spans = list(dict.fromkeys(p.span("z") for p in body.pieces))
     lost = [span for span in spans if not any(_within(mid, span) for mid in layers.mids_mm)]
     for low, high in lost:
         yield Finding(
@@ -46,16 +46,22 @@ def _samples(body: Body, layers: Layers) -> Iterator[Finding]:
             round(high - low, 9), layers.boundaries_mm[1] / 2, place_mm=_place(body, (low + high) / 2),
             count=sum(p.span("z") == (low, high) for p in body.pieces),
         )  # fmt: skip
+    yield from _cut_off(body, [span for span in spans if span not in lost], layers)
+
+
+def _cut_off(body: Body, spans: Sequence[Point], layers: Layers) -> Iterator[Finding]:
+    """Ends of a body in layers whose sample hits none of it."""
     for number, ((low, high), mid) in enumerate(zip(pairwise(layers.boundaries_mm), layers.mids_mm, strict=True)):
-        here = [s for s in spans if s not in lost and min(s[1], high) - max(s[0], low) > TOUCH_MM]
+        here = [(a, b) for a, b in ((max(s[0], low), min(s[1], high)) for s in spans) if b - a > TOUCH_MM]
         if here and not any(_within(mid, span) for span in here):
-            height = max(min(s[1], high) - max(s[0], low) for s in here)
-            end, side = ("top", "below") if min(s[1] for s in here) < high else ("lowest", "above")
+            bottoms, tops = zip(*here, strict=True)
+            height = max(b - a for a, b in here)
+            end, side = ("top", "below") if min(tops) < high else ("lowest", "above")
             yield Finding(
                 "4-unsampled", "warning", body.name,
                 f"the {end} {height:.3g} mm lies {side} the slicer's sampling plane and is not printed",
                 "move the face to a layer boundary", round(height, 9), round((high - low) / 2, 9), number + 1,
-                _place(body, (max(low, min(s[0] for s in here)) + min(high, max(s[1] for s in here))) / 2),
+                _place(body, (min(bottoms) + max(tops)) / 2),
             )  # fmt: skip
 
 

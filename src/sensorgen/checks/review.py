@@ -87,18 +87,19 @@ def review(design: Design, step: Step = lambda _: None, walls: str = "") -> Revi
         return Review({}, misfit)
     scene = design.printed
     step("meshes")
-    made = _meshes(design)
+    meshed = _meshes(design)
     step("checks")
-    gap_mm = validity.electrode_gap_mm(scene, made)
-    found = rules.findings(
+    gap_mm = validity.electrode_gap_mm(scene, meshed)
+    findings = rules.findings(
         scene, design.machine, design.layers, gap_mm, walls or rule("prusa", design.walls), estimate.lines(design)
     ) + _crowding(design)
-    found = [advised(f, [p.name for p in fields(design.params)]) for f in found]
-    if not any(f.severity == "error" and f.rule != LOST for f in found):
+    findings = [advised(f, [p.name for p in fields(design.params)]) for f in findings]
+    if not any(f.severity == "error" and f.rule != LOST for f in findings):
         step("validity")
         advice = "change the parameters; if they make sense, this is a fault of sensorgen: report it"
-        found = [Finding("0-body", "error", body, what, advice) for body, what in validity.faults(scene, made)] + found
-    return Review(made, design.waived(found) + design.idle_waivers(found))
+        faults = validity.faults(scene, meshed)
+        findings = [*(Finding("0-body", "error", body, what, advice) for body, what in faults), *findings]
+    return Review(meshed, design.waived(findings) + design.idle_waivers(findings))
 
 
 def advised(finding: Finding, parameters: list[str]) -> Finding:
@@ -172,26 +173,26 @@ class CheckReport:
         yield comma_separated(table(self.findings))
 
 
-def report(design: Design, held: Review) -> CheckReport:
+def report(design: Design, reviewed: Review) -> CheckReport:
     """The findings as data."""
     return CheckReport(
-        design.name, design.id(), design.machine.name, design.layers.name, held.verdict, held.source, held.counts(),
-        tuple(held.findings),
+        design.name, design.id(), design.machine.name, design.layers.name, reviewed.verdict, reviewed.source,
+        reviewed.counts(), tuple(reviewed.findings),
     )  # fmt: skip
 
 
-def draw(design: Design, held: Review, printed: Scene | None = None, source: str = "") -> str:
+def draw(design: Design, reviewed: Review, printed: Scene | None = None, source: str = "") -> str:
     """The drawing of the cross-section, as SVG, with what is printed outlined over it if that is given."""
     from sensorgen.scene import drawing
 
     scene = design.printed
     names = {body.material for body in scene.bodies}
     notes = [
-        f"{held.verdict}; {held.source}",
+        f"{reviewed.verdict}; {reviewed.source}",
         f"{design.machine.name}, {design.layers.name}, printed {design.orientation}",
         *([f"green outlines: {source}"] if source else []),
     ]
     known = {name: (design.material(name).title, design.material(name).colour) for name in sorted(names)}
     return drawing.svg(
-        scene, design.name, design.layers.boundaries_mm(scene.size_mm[2]), held.findings, known, notes, printed
+        scene, design.name, design.layers.boundaries_mm(scene.size_mm[2]), reviewed.findings, known, notes, printed
     )

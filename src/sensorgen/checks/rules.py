@@ -3,8 +3,9 @@
 Rule 7, printed against drawn volume, is estimated here; after slicing it is taken from the G-code.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from itertools import chain
 
 from sensorgen.checks import bed, bridges, estimate, gap, grid, support, volumes, widths
 from sensorgen.checks.slices import Slices
@@ -21,13 +22,9 @@ RULES = (
 
 
 def findings(
-    scene: Scene,
-    printer: Printer,
-    quality: Quality,
-    gap_mm: float,
-    walls: str = "arachne",
+    scene: Scene, printer: Printer, quality: Quality, gap_mm: float, walls: str = "arachne",
     laid: Mapping[str, estimate.LineLayout] | None = None,
-) -> list[Finding]:
+) -> list[Finding]:  # fmt: skip
     """All findings about a scene, the most severe first.
 
     Parameters
@@ -46,7 +43,7 @@ def findings(
     slices = Slices(scene, quality)
     layers = estimate.layers(scene, printer, quality, walls, laid)
     printed = volumes.findings(volumes.rows(scene, layers), scene)
-    found = [
+    every = [
         *gap.check(slices, printer, quality, gap_mm),
         *grid.check(scene, slices.layers),
         *widths.check(slices, printer),
@@ -55,16 +52,17 @@ def findings(
         *support.findings(layers, printer.line_mm()),
         *(f for f in printed if f.severity == "error"),  # rules 4 and 5 have its warnings
     ]
-    # The same finding in layer after layer becomes one, from the first layer to the last
+    return sorted(_over_layers(every), key=lambda f: (SEVERITIES.index(f.severity), int(f.rule.partition("-")[0])))
+
+
+def _over_layers(every: Iterable[Finding]) -> Iterator[Finding]:
+    """One finding in layer after layer as one, from the first layer to the last."""
     merged: dict[tuple[str, str, str, str], list[Finding]] = {}
-    for finding in found:
+    for finding in every:
         alike = merged.setdefault((finding.rule, finding.severity, finding.body, finding.message), [])
         before = alike[-1] if alike else None
         if before and before.layer and finding.layer == (before.last_layer or before.layer) + 1:
             alike[-1] = replace(before, last_layer=finding.layer)
         else:
             alike.append(finding)
-    return sorted(
-        (finding for alike in merged.values() for finding in alike),
-        key=lambda f: (SEVERITIES.index(f.severity), int(f.rule.partition("-")[0])),
-    )
+    return chain.from_iterable(merged.values())

@@ -61,8 +61,8 @@ class Slices:
         region = self.body(body, layer)
         key = id(region), least_mm
         if key not in self._wider:
-            found = shapely.get_parts(region)
-            self._wider[key] = shapely.multipolygons(found[narrow_mm(found) > least_mm + TOUCH_MM])
+            pieces = shapely.get_parts(region)
+            self._wider[key] = shapely.multipolygons(pieces[narrow_mm(pieces) > least_mm + TOUCH_MM])
         return self._wider[key]
 
     def printed_layers(self, body: Body, least_mm: float) -> list[int]:

@@ -97,23 +97,23 @@ def rows(
     """
     boundaries = (printed[0].bottom_mm, *(layer.top_mm for layer in printed))
     exact_mm3 = {body.name: _drawn_mm3(body, boundaries) for body in scene.bodies}
-    found = []
-    for number, (meant, made) in enumerate(zip(drawn(scene, boundaries), printed, strict=True)):
+    volumes = []
+    for number, (meant, laid) in enumerate(zip(drawn(scene, boundaries), printed, strict=True)):
         least = _LEAST * scene.size_mm[0] * scene.size_mm[1] * meant.height_mm
         for body in scene.bodies:
             exact = exact_mm3[body.name][number]
-            area = made.region(body.name).area * made.height_mm
+            area = laid.region(body.name).area * laid.height_mm
             volume = area if volumes_mm3 is None else volumes_mm3.get((number, body.name), 0.0)
             if max(exact, volume) > least:
                 plan = parts(meant.region(body.name))
-                lost, merged = _lost(plan, parts(made.region(body.name)))
+                lost, merged = _lost(plan, parts(laid.region(body.name)))
                 x0, y0, x1, y1 = plan[lost[0] if lost else 0].bounds if plan else (0.0, 0.0, 0.0, 0.0)
                 place = (x0, (y0 + y1) / 2) if meant.along == "x" else ((x0 + x1) / 2, y0)
                 counts = len(plan), len(lost), merged
-                found.append(
+                volumes.append(
                     LayerVolume(body.name, number + 1, meant.bottom_mm, meant.top_mm, exact, volume, *counts, place)
                 )
-    return found
+    return volumes
 
 
 def _drawn_mm3(body: Body, boundaries_mm: Sequence[float]) -> list[float]:
@@ -121,36 +121,38 @@ def _drawn_mm3(body: Body, boundaries_mm: Sequence[float]) -> list[float]:
     bottom, top = np.array([p.span("z") for p in body.pieces]).T
     volume = np.array([p.volume_mm3() for p in body.pieces])
     upright = np.array([p.is_constant("z") for p in body.pieces])
-    found = []
+    volumes = []
     for low, high in pairwise(boundaries_mm):
         share = (np.minimum(top, high) - np.maximum(bottom, low)).clip(0) / (top - bottom)
         cut = ~upright & (share > 0) & (share < 1)
         parts_mm3 = (body.pieces[k].volume_mm3(low, high) for k in np.flatnonzero(cut).tolist())
-        found.append(float((volume * share)[~cut].sum()) + sum(parts_mm3))
-    return found
+        volumes.append(float((volume * share)[~cut].sum()) + sum(parts_mm3))
+    return volumes
 
 
-def _lost(plan: Sequence[Region], made: Sequence[Region]) -> tuple[list[int], int]:
+def _lost(plan: Sequence[Region], printed: Sequence[Region]) -> tuple[list[int], int]:
     """Numbers of the parts that are lost, and how many merge with their neighbours."""
-    pairs = shapely.STRtree(made).query(plan) if plan and made else np.empty((2, 0), np.intp)
-    shared = shapely.area(shapely.intersection(np.take(plan, pairs[0]), np.take(made, pairs[1]))) if pairs.size else []
-    kept = np.bincount(pairs[0], weights=shared, minlength=len(plan))
-    lost = np.flatnonzero(kept < VANISHED * shapely.area(plan)).tolist() if plan else []
+    pairs = shapely.STRtree(printed).query(plan) if plan and printed else np.empty((2, 0), np.intp)
+    shared = (
+        shapely.area(shapely.intersection(np.take(plan, pairs[0]), np.take(printed, pairs[1]))) if pairs.size else []
+    )
+    areas = np.bincount(pairs[0], weights=shared, minlength=len(plan))
+    lost = np.flatnonzero(areas < VANISHED * shapely.area(plan)).tolist() if plan else []
     met = np.bincount(pairs[1][np.asarray(shared) > SLIVER_MM], minlength=1)
     return lost, int((met - 1).clip(0).sum())
 
 
-def findings(found: Iterable[LayerVolume], scene: Scene) -> list[Finding]:
+def findings(volumes: Iterable[LayerVolume], scene: Scene) -> list[Finding]:
     """Rule 7: an error where a sampled body is not printed at all, else a warning outside ``LOW`` to ``HIGH``.
 
     Parameters
     ----------
-    found : iterable of LayerVolume
+    volumes : iterable of LayerVolume
         Of one print.
     scene : Scene
         The sensor on its bed.
     """
-    outside = [row for row in found if row.ratio is not None and not LOW <= row.ratio <= HIGH]
+    outside = [row for row in volumes if row.ratio is not None and not LOW <= row.ratio <= HIGH]
     return [finding for body in scene.bodies for finding in _of_body(body, [r for r in outside if r.body == body.name])]
 
 
@@ -164,8 +166,9 @@ def _of_body(body: Body, outside: Sequence[LayerVolume]) -> Iterator[Finding]:
         ratios = sorted({f"{row.ratio:.2f}" for row in here})
         what = fault or f"prints {' to '.join(ratios[:: max(len(ratios) - 1, 1)])} times its volume"
         vanished = max(here, key=lambda row: row.vanished)
+        fused = max(row.fused for row in here)
         more = [f"{vanished.vanished} of {vanished.strips} strips vanish"] if vanished.vanished and not fault else []
-        more += [f"{max(row.fused for row in here)} fuse"] if any(row.fused for row in here) else []
+        more += [f"{fused} fuse"] if fused else []
         yield Finding(
             "7-printed", "error" if severe else "warning", body.name,
             f"from {first.bottom_mm:g} to {last.top_mm:g} mm it {', '.join([what, *more])}",

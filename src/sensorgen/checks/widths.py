@@ -7,7 +7,8 @@ the edge across.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, pairwise
+from math import inf
 
 import numpy as np
 import shapely
@@ -100,37 +101,41 @@ def check(slices: Slices, printer: Printer) -> Iterator[Finding]:
 
 
 def _by_band(
-    bands: Sequence[_Band], body: Body, layer: int, found: Sequence[Stretch], slices: Slices
+    bands: Sequence[_Band], body: Body, layer: int, across: Sequence[Stretch], slices: Slices
 ) -> Iterator[tuple[_Band, list[Stretch]]]:
     """Stretches by band. What vanishes is no error at tips, which taper out within their layer, and in support."""
-    for below, band in zip((None, *bands), bands, strict=False):
-        here = [s for s in found if s.width_mm <= band.upto_mm + TOUCH_MM]
-        here = [s for s in here if below is None or s.width_mm > below.upto_mm + TOUCH_MM]
+    limits = pairwise((-inf, *(band.upto_mm + TOUCH_MM for band in bands)))
+    for band, (least, most) in zip(bands, limits, strict=True):
+        here = [s for s in across if least < s.width_mm <= most]
         if band.severity == "error" and here:
-            half = slices.layers.mids_mm[layer] - slices.layers.boundaries_mm[layer]
-            # Tips lose half of their width up to the layer's boundary, and so all of it up to the next sample.
-            width, middle, way = (np.array([getattr(s, k) for s in here]) for k in ("width_mm", "middle_mm", "way"))
-            reach = 0.75 * width[:, None] * way
-            lines = shapely.linestrings(np.stack([middle - reach, middle + reach], axis=1))
-            lengths = []
-            for sign in (-1, 1):
-                polygons = shapely.get_parts(slices.near(body, layer, sign * _NEAR * half))
-                line, part = shapely.STRtree(polygons).query(lines)
-                inside = shapely.length(shapely.intersection(lines[line], polygons[part]))
-                lengths.append(np.bincount(line, inside, len(lines)))
-            tapers: list[bool] = (abs(lengths[1] - lengths[0]) / 2 / _NEAR > 0.49 * width).tolist()
-            tips = [s for s, ends in zip(here, tapers, strict=True) if ends]
-            here = [s for s, ends in zip(here, tapers, strict=True) if not ends]
-            if tips:
+            tapers = _tapers(here, body, layer, slices)
+            if tips := [s for s, ends in zip(here, tapers, strict=True) if ends]:
                 yield replace(band, severity="warning", noun="tip"), tips
+            here = [s for s, ends in zip(here, tapers, strict=True) if not ends]
         if here:
             yield replace(band, severity="warning") if band.severity == "error" and body.is_support() else band, here
 
 
-def _findings(rule: str, body: Body, found: Sequence[_Narrow]) -> Iterator[Finding]:
+def _tapers(here: Sequence[Stretch], body: Body, layer: int, slices: Slices) -> list[bool]:
+    """Mark tips, which lose half of their width up to the layer's boundary, and so all of it up to the next sample."""
+    half = slices.layers.mids_mm[layer] - slices.layers.boundaries_mm[layer]
+    width, middle, way = (np.array([getattr(s, k) for s in here]) for k in ("width_mm", "middle_mm", "way"))
+    reach = 0.75 * width[:, None] * way
+    lines = shapely.linestrings(np.stack([middle - reach, middle + reach], axis=1))
+    lengths = []
+    for sign in (-1, 1):
+        polygons = shapely.get_parts(slices.near(body, layer, sign * _NEAR * half))
+        line, part = shapely.STRtree(polygons).query(lines)
+        inside = shapely.length(shapely.intersection(lines[line], polygons[part]))
+        lengths.append(np.bincount(line, inside, len(lines)))
+    tips: list[bool] = (abs(lengths[1] - lengths[0]) / 2 / _NEAR > 0.49 * width).tolist()
+    return tips
+
+
+def _findings(rule: str, body: Body, narrow: Sequence[_Narrow]) -> Iterator[Finding]:
     """One finding for a band in neighbouring layers."""
-    for band in dict.fromkeys(each.band for each in found):
-        numbered = list(enumerate(each for each in found if each.band == band))
+    for band in dict.fromkeys(each.band for each in narrow):
+        numbered = list(enumerate(each for each in narrow if each.band == band))
         for _, group in groupby(numbered, key=lambda pair: pair[1].layer - pair[0]):
             run = [each for _, each in group]
             worst = min(run, key=lambda each: each.stretches[0].width_mm)
@@ -174,10 +179,10 @@ def stretches(region: Region, limit_mm: float, *, gaps: bool = False) -> list[St
     way = (ends - starts)[:, ::-1] * [1.0, -1.0]
     way /= np.hypot(*way.T)[:, None] * (-1.0 if gaps else 1.0)
     tree = shapely.STRtree(shapely.linestrings(np.stack([starts, ends], axis=1)))
-    found: dict[tuple[float, ...], Stretch] = {}
+    by_place: dict[tuple[float, ...], Stretch] = {}
     has_corners = not boxes.all() and is_rectilinear(region)
     for share in (0.5, 1e-6, 1 - 1e-6) if has_corners else (0.5,):
-        known = {stretch.width_mm for stretch in found.values()}
+        known = {stretch.width_mm for stretch in by_place.values()}
         widths = _across(tree, starts + share * (ends - starts), way, limit_mm)
         met = np.flatnonzero(np.isfinite(widths))
         middles = (starts[met] + share * (ends - starts)[met] + way[met] * widths[met, None] / 2).round(9)
@@ -185,8 +190,8 @@ def stretches(region: Region, limit_mm: float, *, gaps: bool = False) -> list[St
             widths[met].tolist(), way[met].tolist(), middles.tolist(), middles.round(6).tolist(), strict=True
         ):
             if share == 0.5 or width not in known:
-                found.setdefault((width, *at), Stretch(width, (x, y), tuple(out)))
-    return sorted(found.values(), key=lambda s: (s.width_mm, abs(s.way[1]), s.middle_mm))
+                by_place.setdefault((width, *at), Stretch(width, (x, y), tuple(out)))
+    return sorted(by_place.values(), key=lambda s: (s.width_mm, abs(s.way[1]), s.middle_mm))
 
 
 def _across(

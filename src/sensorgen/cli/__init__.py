@@ -60,7 +60,15 @@ SECTIONS = {  # what each command is for, here so that --help imports none of th
     },
 }
 COMMANDS = tuple(name for commands in SECTIONS.values() for name in commands)
-_PACKAGE = {"chart": "verification", "thesis": "verification"}  # of a command's module, where it is not ``cli``
+_MODULES = {  # of commands, where it is not ``cli/NAME_command.py``
+    "chart": "verification.chart_command",
+    "thesis": "verification.thesis_command",
+    **dict.fromkeys(("check", "build", "slice"), "cli.printing"),
+    **dict.fromkeys(("predict", "cell", "compress"), "cli.predictions"),
+    **dict.fromkeys(("show", "draw", "export"), "cli.views"),
+    **dict.fromkeys(("array", "sheet", "stack"), "cli.studies"),
+    **dict.fromkeys(("new", "pack", "list", "schema", "completion"), "cli.reference"),
+}
 WRONG_INPUT = 2
 FOUND_ERRORS = 1
 
@@ -72,7 +80,7 @@ _ELSEWHERE = {  # options of other programs, and where the quantity is here
 
 
 class _Lazy(click.Group):
-    """Commands that are imported when they are asked for: ``cli/NAME_command.py`` holds ``command``."""
+    """Commands, imported when used: ``command`` of a module, or ``NAME_command`` where it has several."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         return list(COMMANDS)
@@ -86,9 +94,8 @@ class _Lazy(click.Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:  # noqa: ARG002
         if name not in COMMANDS:
             return None
-        command: click.Command = importlib.import_module(
-            f"sensorgen.{_PACKAGE.get(name, 'cli')}.{name}_command"
-        ).command
+        module = importlib.import_module(f"sensorgen.{_MODULES.get(name, f'cli.{name}_command')}")
+        command: click.Command = getattr(module, f"{name}_command", None) or module.command
         command.short_help = next(commands[name] for commands in SECTIONS.values() if name in commands)
         return command
 

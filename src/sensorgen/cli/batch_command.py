@@ -5,11 +5,10 @@ from typing import Annotated
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, render, show
+from sensorgen.cli import FOUND_ERRORS, render
 from sensorgen.cli.commands import FirstWord
 from sensorgen.cli.commands import command as of_function
-from sensorgen.cli.log_words import LogFile
-from sensorgen.cli.options import Cluster, Strict, TimeLimit
+from sensorgen.cli.options import Cluster, LogFile, Strict, TimeLimit
 from sensorgen.core.options import Option
 from sensorgen.export.slicers import TIME_LIMIT_S
 
@@ -46,7 +45,7 @@ class _PlanGroup(FirstWord):
 
             with LogFile().existing() as log:
                 head = log.head()[1] if log else ""
-            with render.refused(Path(name).stem), show.progress(STEPS) as step:
+            with render.refused(Path(name).stem), render.progress(STEPS) as step:
                 batch = make(
                     Path(name), out, gcode=not no_gcode, time_limit_s=time_limit_s, force=force, strict=strict,
                     log_head=head, jobs=jobs, cluster=cluster, step=step,

@@ -7,7 +7,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Annotated
 
 from sensorgen.cli import render
-from sensorgen.cli.bench_opened import bench
+from sensorgen.cli.bench_recordings import bench
 from sensorgen.cli.designs import of_design
 from sensorgen.cli.options import InputResistance, Readout, refuse_input
 from sensorgen.core.errors import BadInput
@@ -65,7 +65,7 @@ def _array(
     page, --page/--no-page
         Show it in the browser.
     """
-    from sensorgen.cli.array_frames import known
+    from sensorgen.cli.inversion import known
     from sensorgen.measure.lab.clock import RealClock
     from sensorgen.measure.lab.frame_live import FrameFeed, MapView, follow
     from sensorgen.measure.lab.frame_recorder import recorder
@@ -86,7 +86,7 @@ def _array(
         render.say(meter.identify().model, err=True)
         _refuse_shape(meter, model)
         how = ArrayReadout(readout, input_ohm, (meter.frequency_hz,), noise)  # type: ignore[arg-type]
-        live = LiveMaps(model, how, scatter, known(calibration), day, newest=True)
+        live = LiveMaps(model, how, scatter, known(calibration), day)
         file = recorder(record, meter.shape, meter.frequency_hz) if record else None
         if file:
             stack.callback(file.close)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from sensorgen.cli import render, show
+from sensorgen.cli import render
 from sensorgen.core.errors import BadInput
 from sensorgen.core.options import Option
 from sensorgen.design.walls import WALLS
@@ -71,7 +71,7 @@ class BodyChoice:
         from sensorgen.checks.review import STEPS, review
         from sensorgen.prediction import bodies, slices
 
-        with show.progress((*STEPS, "slicing")) as step:
+        with render.progress((*STEPS, "slicing")) as step:
             if self.gcode:
                 printed = bodies.registered(design, Path(self.gcode))
                 return printed, slices.combined(design, review(design, step), printed.provenance, printed.findings())
@@ -97,7 +97,7 @@ def compensated(
         return design, []
     from sensorgen.workflows.compensation import compensated as changed
 
-    with show.progress(("designs",)) as step:
+    with render.progress(("designs",)) as step:
         printable, changes = changed(
             design, walls, bake=word == "bake", stiffness=word == "stiffness",
             sliced=partial(sliced, slicer, program=program) if slicer else None, step=step,
@@ -112,5 +112,5 @@ def sliced(slicer: str, design: "Design", program: str = "") -> "Body":
     from sensorgen.export import slicing
     from sensorgen.prediction import bodies, print_files
 
-    with show.progress(slicing.STEPS) as step:
+    with render.progress(slicing.STEPS) as step:
         return bodies.of_file(design, print_files.at_hand(design, None, slicer, step, program)[0])

@@ -5,24 +5,16 @@ from typing import Annotated
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, array_calibrate, options, render, show
-from sensorgen.cli.array_calibrate import ArrayOptions
+from sensorgen.cli import FOUND_ERRORS, inversion, options, render
 from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import command as of_function
-from sensorgen.cli.log_words import LogFile
-from sensorgen.cli.options import BenchTip
+from sensorgen.cli.inversion import ArrayOptions
+from sensorgen.cli.options import BenchTip, LogFile
 from sensorgen.core.errors import BadInput
 from sensorgen.core.options import Option
 
-_OF_SPECIMENS = {
-    "recordings": "--recording",
-    "again": "--recheck",
-    "page": "--page",
-    "source": "--source",
-    "dry_run": "--dry-run",
-}
-_OF_ARRAYS = {"array": "--array", "calibration": "--calibration", "by_first": "--by-first",
-              "frequency_hz": "--frequency"}  # fmt: skip
+_OF_SPECIMENS = ("recordings", "again", "page", "source", "dry_run")
+_OF_ARRAYS = ("array", "calibration", "by_first", "frequency_hz")
 Recordings = Annotated[tuple[int, ...], Option(kind=click.IntRange(1))]
 
 
@@ -55,23 +47,19 @@ def command(
     dry_run
         Log nothing.
     """
-    files = array_calibrate.are_files(specimens)
-    wrong = _OF_SPECIMENS if files else _OF_ARRAYS
-    if refused := next((flag for name, flag in wrong.items() if options.typed(name)), None):
-        raise BadInput(f"{refused} is for {'specimens' if files else 'files of an array'}, not for what is given")
-    if files:
-        return array_calibrate.calibrate(specimens, of_array)
+    if inversion.are_files(specimens):
+        options.refuse_typed(_OF_SPECIMENS, "is for specimens, not for what is given")
+        return inversion.calibrate(specimens, of_array)
+    options.refuse_typed(_OF_ARRAYS, "is for files of an array, not for what is given")
     from sensorgen.analysis import calibration
 
     pressed = bench.bench()
     _refuse(len(specimens), again=again, source=bool(source))
-    with log.opened() as rows, show.progress(["calibrating"]) as step:
-        if again:
-            results = calibration.Together((calibration.recheck(rows, specimens[0], recordings),))
-        else:
-            results = calibration.Together(
-                tuple(calibration.calibrate(rows, specimens, pressed, recordings, body_of=body, step=step))
-            )
+    with log.opened() as rows, render.progress(["calibrating"]) as step:
+        results = calibration.Together(
+            (calibration.recheck(rows, specimens[0], recordings),) if again
+            else tuple(calibration.calibrate(rows, specimens, pressed, recordings, body_of=body, step=step))
+        )  # fmt: skip
         if not dry_run:
             rows.add(calibration.rows(rows, [one.calibration for one in results.results]))
     render.deliver(results)

@@ -61,13 +61,13 @@ def _of_packs(kind: Kind, entry: Callable[[packs.File], ListEntry]) -> Catalogue
     entries: dict[str, ListEntry] = {}
     for file in packs.files(kind):
         try:
-            made = entry(file)
+            listed = entry(file)
         except SensorgenError as error:
-            made = ListEntry(f"cannot be used: {error}")
+            listed = ListEntry(f"cannot be used: {error}")
         version = ""
         with suppress(SensorgenError):
             version = file.pack.version
-        origin = ListEntry(made.about, made.values, file.pack.name, version, file.pack.where, str(file.path))
+        origin = ListEntry(listed.about, listed.values, file.pack.name, version, file.pack.where, str(file.path))
         entries.setdefault(file.name, origin)
     return Catalogue(dict(sorted(entries.items())))
 
@@ -152,8 +152,8 @@ def instruments() -> Catalogue:
     from sensorgen.measure import accuracy
 
     def entry(file: packs.File) -> ListEntry:
-        made = accuracy.parse(file.text(), f"{file.name}.yaml")
-        return ListEntry(made.name, (f"source: {made.source}",))
+        instrument = accuracy.parse(file.text(), f"{file.name}.yaml")
+        return ListEntry(instrument.name, (f"source: {instrument.source}",))
 
     return _of_packs("instruments", entry)
 
@@ -205,20 +205,20 @@ def _first_line(doc: str | None) -> str:
 
 def schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of the design file; the parameters depend on the shape."""
-    made = design.Design.model_json_schema()
+    schema = design.Design.model_json_schema()
     shapes = dict[str, type[Envelope]]()
     for file in packs.files("shapes"):
         with suppress(SensorgenError):  # not trusted, or damaged: the list of shapes says so
             shapes[file.name] = _form(file).Params
-    made["properties"]["shape"] |= {"anyOf": [{"enum": list(shapes)}, {"pattern": r"\.py$"}]}
-    slots = made["$defs"]["Slots"]["properties"]
+    schema["properties"]["shape"] |= {"anyOf": [{"enum": list(shapes)}, {"pattern": r"\.py$"}]}
+    slots = schema["$defs"]["Slots"]["properties"]
     slots["electrode"] = slots["top_electrode"] | {"description": "Both electrodes.", "default": None}
-    made["properties"]["parameters"] = {"type": "object"}
-    made["allOf"] = [
+    schema["properties"]["parameters"] = {"type": "object"}
+    schema["allOf"] = [
         {"if": {"properties": {"shape": {"const": n}}}, "then": {"properties": {"parameters": _parameters(p)}}}
         for n, p in shapes.items()
     ]
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made, "title": "sensorgen design"}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "sensorgen design"}
 
 
 def _parameters(params: type[Envelope]) -> dict[str, Any]:

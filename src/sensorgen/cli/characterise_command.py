@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import render, show
+from sensorgen.cli import render
 from sensorgen.cli.commands import FirstWord
 from sensorgen.cli.commands import command as of_function
 from sensorgen.cli.options import DryRun
@@ -53,7 +53,7 @@ class _PrinterGroup(FirstWord):
                 raise BadInput(f"--tool {wrong!r}; expected MATERIAL=NUMBER, as in etpu=3")
             names = [material for word in materials for material in word.split(",")]
             numbers = {key: int(number) for key, _, number in pairs.values()}
-            with show.progress(STEPS) as step:
+            with render.progress(STEPS) as step:
                 study = Study.of(name, names, quality=quality, tools=numbers)
                 return plan(study, out, name=plate, count=count, hours=hours, step=step)
 

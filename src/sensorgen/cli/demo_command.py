@@ -6,7 +6,7 @@ from typing import Annotated
 
 import click
 
-from sensorgen.cli import render, show
+from sensorgen.cli import render
 from sensorgen.cli.commands import command as of_function
 from sensorgen.core.options import Option
 
@@ -37,7 +37,7 @@ def _lab(*, out: Path = Path("out/demo-lab"), count: Prints = 5, seed: Seed = 1,
     """
     from sensorgen.workflows.demo import demo
 
-    with show.progress(["demo"]) as step:
+    with render.progress(["demo"]) as step:
         loop = demo(out, count=count, seed=seed, step=step)
     render.deliver(loop)
     if show_it:
@@ -64,7 +64,7 @@ def _insole(*, out: Path = Path("out/demo-insole"), seed: Seed = 1, show_it: boo
     """
     from sensorgen.workflows.insole import demo
 
-    with show.progress(["demo"]) as step:
+    with render.progress(["demo"]) as step:
         steps = demo(out, seed=seed, step=step)
     render.deliver(steps)
     if show_it:

@@ -122,8 +122,8 @@ def _of_packs(base: Data, folder: Path) -> Data:
         return base
     from sensorgen.design import packs
 
-    found = packs.with_files({key: base[key] for key in ("shape", "own") if key in base}, folder)
-    return base | found
+    with_files = packs.with_files({key: base[key] for key in ("shape", "own") if key in base}, folder)
+    return base | with_files
 
 
 def _shape_of(base: Data) -> "Shape | ModuleType | None":

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from sensorgen.cli import render, show
+from sensorgen.cli import render
 from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import command as of_function
-from sensorgen.cli.log_words import LogFile
-from sensorgen.cli.options import BenchTip, DryRun
+from sensorgen.cli.options import BenchTip, DryRun, LogFile
 from sensorgen.core.errors import BadInput
 from sensorgen.core.options import Option
 
@@ -58,7 +57,7 @@ def command(
         raise BadInput("expected either specimens, as in 'sensorgen fit S1 S2', --iteration or --thesis")
     which, share = (SERIES, 0.0) if thesis else (iteration, HELD_BACK)
     pressed = bench.bench()
-    with _thesis() if thesis else log.opened() as rows, show.progress(STEPS) as step:
+    with _thesis() if thesis else log.opened() as rows, render.progress(STEPS) as step:
         values = fit(rows, which, seed, body, step, pressed, specimens=specimens, held_share=share)
     if values.values and not dry_run:
         path = output or own.path(values.source)

@@ -8,8 +8,7 @@ import click
 
 from sensorgen.cli import render
 from sensorgen.cli.commands import command as of_function
-from sensorgen.cli.log_words import LogFile
-from sensorgen.cli.options import Strict
+from sensorgen.cli.options import LogFile, Strict
 from sensorgen.cli.words import completed, pairs
 from sensorgen.core.errors import BadInput, within
 from sensorgen.core.options import Argument, Option

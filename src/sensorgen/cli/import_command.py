@@ -65,9 +65,9 @@ def command(
 def _listed(assembly: Any, folder: Path, drawing: Path | None) -> int:
     """List bodies that are not imported, and raise the reason unless a list is all that was asked for."""
     from sensorgen.core import files
-    from sensorgen.workflows.importing import listing, reading
+    from sensorgen.workflows.importing import assigning, reading
 
-    listed = listing.BodyListing.of(assembly, folder)
+    listed = assigning.BodyListing.of(assembly, folder)
     render.deliver(listed)
     if assembly.errors:
         first, where = assembly.errors[0], "nothing is imported"

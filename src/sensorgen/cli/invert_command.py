@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 import numpy as np
 
-from sensorgen.cli import array_calibrate, render
+from sensorgen.cli import inversion, render
 from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import command as of_function
 from sensorgen.cli.designs import DesignGroup
-from sensorgen.cli.inversion_task import Task
-from sensorgen.cli.log_words import LogFile
-from sensorgen.cli.options import ArrayFrames, Law
+from sensorgen.cli.inversion import Task
+from sensorgen.cli.options import ArrayFrames, Law, LogFile
 from sensorgen.core import plugins as registry
 from sensorgen.core.errors import BadInput, MissingValue, UnknownName, within
 from sensorgen.design import shapes
@@ -22,8 +21,8 @@ if TYPE_CHECKING:
     from sensorgen.core.document import Documented
     from sensorgen.design.design import Design
     from sensorgen.measure.readings import FileRows, Readings
-    from sensorgen.prediction.calibration.baseline import Baseline
     from sensorgen.prediction.calibration.inversion import Inverter
+    from sensorgen.prediction.calibration.rest import Baseline
     from sensorgen.prediction.query import Query
 
 _REST, _TIME = "rest", "time_s"
@@ -182,9 +181,9 @@ def _of_design(
         As if the sensor were exactly as predicted, and no reading at rest were needed: what noise alone leaves.
     """
     if design.layout:
-        from sensorgen.cli import array_frames
+        from sensorgen.cli import inversion
 
-        return array_frames.invert(design, task, frames, perfect=perfect, law=law)
+        return inversion.invert(design, task, frames)
     if frames.calibration:
         raise BadInput(f"--calibration is of an array; {design.name} is {design.shape}: invert its specimen by name")
     from sensorgen.prediction.query import Query
@@ -196,8 +195,8 @@ def _of_design(
         return task.run((_REST,), lambda source: _Perfect(task, printed, query, source))
 
     def inverter(rest: Any, tones_hz: Any, noise: Any) -> _Made:
-        from sensorgen.analysis.calibration import Bench, spread_of
         from sensorgen.prediction.calibration import fitting
+        from sensorgen.prediction.calibration.bench import Bench, spread_of
         from sensorgen.prediction.calibration.inversion import Inverter
         from sensorgen.prediction.calibration.specimen import SpecimenModel
         from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
@@ -252,9 +251,9 @@ class _Specimens(DesignGroup):
         """The command for a shape, a design file, a calibration of an array, or a specimen."""
         if name.endswith(".npz"):
 
-            @of_function(name, about=array_calibrate.invert.__doc__ or "")
+            @of_function(name, about=inversion.invert_calibrated.__doc__ or "")
             def calibrated(task: Task) -> int:
-                return array_calibrate.invert(name, task)
+                return inversion.invert_calibrated(name, task)
 
             return calibrated
         try:

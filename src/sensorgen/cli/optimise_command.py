@@ -5,7 +5,7 @@ from typing import Annotated
 
 import click
 
-from sensorgen.cli import render, show
+from sensorgen.cli import render
 from sensorgen.cli.commands import command as of_function
 from sensorgen.cli.options import Cluster, DesignTip, Jobs, NoCache
 from sensorgen.core.options import Option
@@ -36,12 +36,12 @@ def command(
     no_gcode
         Do not slice them.
     """
-    from sensorgen.workflows.optimise import search
+    from sensorgen.workflows.optimise.front import Workers
     from sensorgen.workflows.optimise.run import optimise
 
-    with show.counted() as step:
+    with render.counted() as step:
         designs = optimise(
-            target, out, search.Workers(show.at_once(jobs), cluster), count=sample or 0,
+            target, out, Workers(render.at_once(jobs), cluster), count=sample or 0,
             keep=not no_cache, built=not no_build, sliced=not no_gcode, tip=tip, progress=step,
         )  # fmt: skip
     render.deliver(designs)

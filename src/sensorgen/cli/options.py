@@ -1,5 +1,7 @@
 """Options that several commands have: each a type, to annotate a parameter with, or a record of several."""
 
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -7,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import click
 from click.core import ParameterSource
 
-from sensorgen.cli import render, show
+from sensorgen.cli import render
 from sensorgen.cli.words import NumberRange, pairs
 from sensorgen.core import units
 from sensorgen.core.errors import BadInput
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from sensorgen.analysis.calibration import Bench
     from sensorgen.design.body import BodyOf
     from sensorgen.design.design import Design
+    from sensorgen.measure.log import Log
     from sensorgen.workflows.changes import Advice, Change
 
 Strict = Annotated[bool, Option("Treat warnings as errors.")]
@@ -131,8 +134,8 @@ class Sweeping:
         """Answers of a solver for each value, with a progress bar."""
         key, designs = self.designs(design)
         points = [(value, body_of(one)) for value, one in designs]
-        with show.bar(len(points)) as done:
-            return solve(key, points, question, show.at_once(self.jobs), done, self.cluster)
+        with render.bar(len(points)) as done:
+            return solve(key, points, question, render.at_once(self.jobs), done, self.cluster)
 
 
 @dataclass(frozen=True)
@@ -218,6 +221,13 @@ def typed(name: str) -> bool:
     return click.get_current_context().get_parameter_source(name) is ParameterSource.COMMANDLINE
 
 
+def refuse_typed(names: Collection[str], why: str) -> None:
+    """Raise BadInput for the first option that was given, by the names of their parameters."""
+    for option in click.get_current_context().command.params:
+        if option.name in names and typed(option.name):
+            raise BadInput(f"{option.opts[0]} {why}")
+
+
 def refuse_explain(given: bool, *, many: bool) -> None:
     """Raise BadInput for ``--explain`` with a form for programs, or of many designs."""
     if given and (many or render.form() in ("json", "csv")):
@@ -228,3 +238,62 @@ def refuse_input(readout: str) -> None:
     """Refuse ``--input`` of a readout by two terminals."""
     if readout != "guarded" and typed("input_ohm"):
         raise BadInput("--input is of the guarded readout; expected no --input with --readout two-terminal")
+
+
+@dataclass(frozen=True)
+class LogFile:
+    """The log that ``--log`` names, or the usual one.
+
+    Attributes
+    ----------
+    file, --log : FILE
+        The log; what SENSORGEN_LOG says, or the one of this user, if not given.
+    """
+
+    file: Path | None = None
+
+    def opened(self, *, create: bool = False) -> "Log":
+        """Open the log."""
+        from sensorgen.measure.log import Log, place
+
+        return Log(self.file or place(), create=create)
+
+    def of_command(self, *, create: bool = False) -> "Log":
+        """The log, open until the command has ended."""
+        log: Log = click.get_current_context().with_resource(self.opened(create=create))
+        return log
+
+    @contextmanager
+    def existing(self) -> Iterator["Log | None"]:
+        """The log, or None where ``--log`` names none and there is none yet."""
+        from sensorgen.measure.log import place
+
+        if self.file is None and not place().exists():
+            yield None
+            return
+        with self.opened() as log:
+            yield log
+
+
+@dataclass(frozen=True)
+class ColumnNames:
+    """Names of columns in an instrument's CSV, and in a rig's log.
+
+    Attributes
+    ----------
+    columns, --column : OURS=THEIRS
+        Column of the readings' file, if it is CSV and calls it otherwise: time_s, stamp_s, re_ohm_1.1kHz ...
+    rig_columns, --rig-column : OURS=THEIRS
+        Column of the rig's log: time_s, set_force_n, set_position_mm, force_n, error.
+    """
+
+    columns: tuple[str, ...] = ()  # fmt: skip
+    rig_columns: tuple[str, ...] = ()  # fmt: skip
+
+    def of_readings(self) -> dict[str, str]:
+        """Names in the readings' file to ours."""
+        return {theirs: ours for ours, theirs in pairs(self.columns, "--column")}
+
+    def of_rig(self) -> dict[str, str]:
+        """Names in the rig's log to ours."""
+        return {theirs: ours for ours, theirs in pairs(self.rig_columns, "--rig-column")}

@@ -1,19 +1,93 @@
-"""Results as text, JSON, CSV or Markdown, to the terminal or a file: the one way out of every command."""
+"""Results as text, JSON, CSV or Markdown, to the terminal or a file, and progress: the one way out of every command."""
 
+import os
 import sys
-from collections.abc import Iterable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from sensorgen.cli import FOUND_ERRORS, show
+from sensorgen.cli import FOUND_ERRORS
 from sensorgen.core.errors import BadInput
 from sensorgen.core.terminal import escaped, harmless
+from sensorgen.core.units import si
 
 if TYPE_CHECKING:
     from sensorgen.core.document import Documented, Part
+
+
+@contextmanager
+def progress(steps: Sequence[str]) -> Iterator[Callable[[str], None]]:
+    """A bar that moves with the named steps and is gone afterwards; only for a person."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    started, done = time.monotonic(), 0
+
+    def step(name: str) -> None:
+        nonlocal done
+        done = steps.index(name) if name in steps else done  # a part of a step moves the clock alone
+        bar = "#" * (20 * done // max(1, len(steps) - 1))
+        seconds = time.monotonic() - started
+        click.echo(f"\r[{bar:20}] {seconds:4.1f} s  {harmless(name):24.24}", nl=False, err=True)
+
+    try:
+        yield step
+    finally:
+        clear()
+
+
+def clear() -> None:
+    """Clear the bar, for what is printed in its place."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        click.echo("\r" + " " * 60 + "\r", nl=False, err=True)
+
+
+def at_once(jobs: int | None) -> int:
+    """Default number of processes."""
+    return jobs or os.cpu_count() or 1
+
+
+@contextmanager
+def bar(length: int, label: str = "solving") -> Iterator[Callable[..., None]]:
+    """A progress bar on the terminal, only for a person; each call moves it by one, or up to the number given."""
+    with click.progressbar(length=length, file=sys.stderr, hidden=not sys.stderr.isatty(), label=label) as shown:
+        shown.render_progress()
+        yield lambda upto=None: shown.update(1 if upto is None else max(upto - shown.pos, 0))
+
+
+@contextmanager
+def pressing(stress_kpa: Sequence[float]) -> Iterator[Callable[[float], None]]:
+    """A progress bar that stands at the highest stress reached so far, only for a person."""
+    with bar(len(stress_kpa), "pressing") as step:
+        yield lambda reached_pa: step(sum(1e3 * kpa <= reached_pa for kpa in stress_kpa))
+
+
+@contextmanager
+def counted() -> Iterator[Callable[[str, int, int], None]]:
+    """A line with the step, how far it is, and the time left; only for a person."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        yield lambda *_: None
+        return
+    begun: dict[str, tuple[float, int]] = {}
+
+    def step(name: str, done: int, count: int) -> None:
+        now = time.monotonic()
+        if done <= 1:  # of each round anew
+            begun[name] = now, done
+        start, first = begun.get(name, (now, done))
+        left = (now - start) / (done - first) * (count - done) if done > first else 0.0
+        words = f"{name} {done} of {count}" + (f", {si(left, 's', 2)} left" if left else "")
+        click.echo(f"\r{words:50.50}", nl=False, err=True)
+
+    try:
+        yield step
+    finally:
+        clear()
+
 
 _ABOUT = {"json": "Print as JSON.", "csv": "Print the table as CSV, all digits.", "markdown": "Print as Markdown."}
 _COLOURS = {"error": "red", "warning": "yellow", "info": "blue", "CHANGE": "red", "PRINT": "green"}
@@ -158,7 +232,7 @@ def write(text: Iterable[str]) -> None:
         return
     from sensorgen.core import files
 
-    with show.progress(()) as step, files.replacing(Path(output)) as file:
+    with progress(()) as step, files.replacing(Path(output)) as file:
         for k, piece in enumerate(text):
             step(f"{k} pieces")
             file.write(piece.encode())

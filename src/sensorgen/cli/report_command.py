@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from sensorgen.cli import render, show
+from sensorgen.cli import render
 from sensorgen.cli.commands import command as of_function
-from sensorgen.cli.log_words import LogFile
+from sensorgen.cli.options import LogFile
 from sensorgen.core.errors import BadInput
 from sensorgen.core.options import Option
 
@@ -50,7 +50,7 @@ def command(
         raise BadInput("--open shows an HTML file; expected --format html and a file")
     if specimens and iteration is not None:
         raise BadInput(f"--iteration {iteration} beside specimens; expected one of the two")
-    with log.opened() as rows, show.progress(STEPS) as step:
+    with log.opened() as rows, render.progress(STEPS) as step:
         compared = report(rows, iteration, step, specimens=specimens)
     if pictures:
         _draw(compared, pictures)
@@ -84,7 +84,7 @@ def _draw(compared: "Report", folder: Path) -> None:
     from sensorgen.analysis.plots.static import files
     from sensorgen.core import files as store
 
-    with show.progress([figure.key for figure in compared.figures]) as step:
+    with render.progress([figure.key for figure in compared.figures]) as step:
         for figure in compared.figures:
             step(figure.key)
             for name, content in files(figure):

@@ -62,13 +62,13 @@ def answer(question: Mapping[str, JSON], work: Callable[[], JSON]) -> JSON:
     -----
     Where the folder cannot be written to, nothing is kept and nothing said: the answer is as good.
     """
-    found = known(question)
-    if found is None:
+    result = known(question)
+    if result is None:
         if _ONLY_KNOWN.get():
             raise Unknown
-        found = work()
-        keep(question, found)
-    return found
+        result = work()
+        keep(question, result)
+    return result
 
 
 @contextmanager
@@ -104,9 +104,9 @@ def nothing_kept() -> Iterator[None]:
 
 def known(question: Mapping[str, JSON]) -> JSON | None:
     """The answer that a question got before, or None; an entry that is damaged counts as none."""
-    for one, found in _HELD_BACK.get() or ():
+    for one, answer in _HELD_BACK.get() or ():
         if one == question:
-            return found
+            return answer
     try:
         entry = json.loads(_file(question).read_text("utf-8"))
         sound = entry["question"] == json.loads(_text(question)) and entry["sha256"] == _digest(entry["answer"])
@@ -115,14 +115,14 @@ def known(question: Mapping[str, JSON]) -> JSON | None:
     return entry["answer"] if sound else None
 
 
-def keep(question: Mapping[str, JSON], found: JSON) -> None:
+def keep(question: Mapping[str, JSON], answer: JSON) -> None:
     """Store the answer to a question, in place of what was there."""
-    held = _HELD_BACK.get()
-    if held is not None:
-        held.append((question, found))
+    entries = _HELD_BACK.get()
+    if entries is not None:
+        entries.append((question, answer))
         return
     file = _file(question)
-    entry = {"question": question, "answer": found, "sha256": _digest(found)}
+    entry = {"question": question, "answer": answer, "sha256": _digest(answer)}
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         store.replace(file, json.dumps(entry).encode())

@@ -97,14 +97,16 @@ class Table:
     def of(cls, key: str, caption: str, rows: Sequence[Any]) -> Self:
         """A table of dataclasses of one type, at least one; fields annotated with a ``Column`` are its columns."""
         hints = get_type_hints(type(rows[0]), include_extras=True)
-        found = {f.name: c for f in fields(rows[0]) for c in getattr(hints[f.name], "__metadata__", ())[:1]}
+        columns = {f.name: c for f in fields(rows[0]) for c in getattr(hints[f.name], "__metadata__", ())[:1]}
 
         def cells(row: Any) -> tuple[Cell, ...]:
-            values = (getattr(row, name) for name in found)
+            values = (getattr(row, name) for name in columns)
             return tuple(None if isinstance(v, float) and isnan(v) else v for v in values)
 
-        kept = rows if isinstance(rows, Lazy) else tuple(rows)
-        return cls(key, caption, tuple(replace(c, key=name) for name, c in found.items()), _each(kept, cells), kept)
+        members = rows if isinstance(rows, Lazy) else tuple(rows)
+        return cls(
+            key, caption, tuple(replace(c, key=name) for name, c in columns.items()), _each(members, cells), members
+        )
 
     def beside(self, column: Column, values: Sequence[Cell]) -> "Table":
         """The table with one more column before the first."""
@@ -113,12 +115,12 @@ class Table:
 
     def filled(self) -> "Table":
         """The table for people: without hidden columns, and those that are empty in every row."""
-        kept = [
+        shown_columns = [
             k for k, column in enumerate(self.columns)
             if not column.hidden and any(row[k] not in (None, "") for row in self.cells)
         ]  # fmt: skip
-        cells = _each(self.cells, lambda row: tuple(row[k] for k in kept))
-        return replace(self, columns=tuple(self.columns[k] for k in kept), cells=cells)
+        cells = _each(self.cells, lambda row: tuple(row[k] for k in shown_columns))
+        return replace(self, columns=tuple(self.columns[k] for k in shown_columns), cells=cells)
 
 
 def _each(rows: Sequence[Any], change: Callable[[Any], tuple[Cell, ...]]) -> Sequence[tuple[Cell, ...]]:
@@ -183,6 +185,15 @@ def visible(words: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
 
 
+def some(words: Sequence[str], most: int) -> str:
+    """The first of many words, and the number of the others.
+
+    >>> some(["a", "b", "c"], 2), some(["a"], 2)
+    ('a, b and 1 more', 'a')
+    """
+    return ", ".join(words[:most]) + (f" and {len(words) - most} more" if len(words) > most else "")
+
+
 def exact(cell: Cell) -> str:
     """A cell for programs, all digits; "" for nothing.
 
@@ -216,17 +227,16 @@ def text(parts: Iterable[Part]) -> Iterator[str]:
 def _facts(part: Facts) -> Iterator[str]:
     wide = max(len(name) for name, _ in part.rows) + 2
     hanging = " " * (wide + part.hang)
-    for name, said in part.rows:
-        yield from _wrapped(visible(said), initial_indent=f"{name:{wide}}", subsequent_indent=hanging)
+    for name, words in part.rows:
+        yield from _wrapped(visible(words), initial_indent=f"{name:{wide}}", subsequent_indent=hanging)
 
 
 def _aligned(table: Table) -> Iterator[str]:
     """Numbers to the right, words to the left; words of the last column are wrapped."""
-    rows = [[visible(c.words(v)) for v, c in zip(row, table.columns, strict=True)] for row in table.cells]
-    worded = _worded(table)
-    lines = [[c.head for c in table.columns], *rows]
-    wide = [max(len(line[k]) for line in lines) for k in range(len(table.columns))]
-    before = sum(wide[:-1]) + 2 * len(wide[:-1])
+    rows = ([visible(c.words(v)) for v, c in zip(row, table.columns, strict=True)] for row in table.cells)
+    worded, lines = _worded(table), [[c.head for c in table.columns], *rows]
+    wide = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    before = sum(width + 2 for width in wide[:-1])
     for line in lines:
         cells = [f"{v:<{w}}" if words else f"{v:>{w}}" for v, w, words in zip(line, wide, worded, strict=True)]
         if not worded[-1]:
@@ -249,7 +259,7 @@ def markdown(parts: Iterable[Part]) -> Iterator[str]:
         if isinstance(part, str):
             yield from ("", safe(part)) if part else ()
         elif isinstance(part, Facts):
-            yield from ("", *(f"- {safe(f'{name}: {said}' if name else said)}" for name, said in part.rows))
+            yield from ("", *(f"- {safe(f'{name}: {words}' if name else words)}" for name, words in part.rows))
         else:
             yield from _markdown_table(part.filled())
 

@@ -12,9 +12,9 @@ class SensorgenError(Exception):
 
     def within(self, where: str) -> Self:
         """Lead the message by the file or key that it is about, unless it names that already."""
-        said = str(self)
-        if where and not (said.startswith((f"{where}:", f"{where},")) or f" {where!r}: " in said):
-            self.args = (f"{where}: {said}",)
+        message = str(self)
+        if where and not (message.startswith((f"{where}:", f"{where},")) or f" {where!r}: " in message):
+            self.args = (f"{where}: {message}",)
         return self
 
 

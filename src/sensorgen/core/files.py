@@ -261,11 +261,11 @@ def alone(path: Path, *, wait: bool) -> Iterator[bool]:
 @contextmanager
 def _undisturbed() -> Iterator[None]:
     """Hold back Ctrl-C and a request to end for a moment."""
-    held: list[int] = []
+    signals: list[int] = []
     before: dict[int, Any] = {}
 
     def hold(number: int, _: FrameType | None) -> None:
-        held.append(number)
+        signals.append(number)
 
     with suppress(ValueError):  # not in the main thread: nobody interrupts here
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -275,5 +275,5 @@ def _undisturbed() -> Iterator[None]:
     finally:
         for which, handler in before.items():
             signal.signal(which, handler)
-    for which in held[:1]:
+    for which in signals[:1]:
         signal.raise_signal(which)

@@ -111,42 +111,42 @@ class Refused:
             yield "all of them: sensorgen check"
 
 
-def listed(found: Iterable[Finding]) -> Iterator[Part]:
+def listed(findings: Iterable[Finding]) -> Iterator[Part]:
     """Findings as facts, each with what to change."""
-    heads = (("waived" if f.waiver else f.severity, f) for f in found)
+    heads = (("waived" if f.waiver else f.severity, f) for f in findings)
     if rows := tuple(row for head, f in heads for row in ((head, f.place), ("", f.text))):
         yield Facts(rows)
 
 
-def table(found: Iterable[Finding]) -> Table:
+def table(findings: Iterable[Finding]) -> Table:
     """Findings as a table."""
     heads = ("severity", "rule", "body", "places", "finding", "advice")
     columns = (*map(Column, heads), *(Column(name, hidden=True) for name in ("layer", "last_layer", "waiver")))
     rows = (
-        (f.severity, f.rule, f.body, f.count, f.message, f.advice, f.layer, f.last_layer, f.waiver) for f in found
+        (f.severity, f.rule, f.body, f.count, f.message, f.advice, f.layer, f.last_layer, f.waiver) for f in findings
     )  # fmt: skip
     return Table("findings", "", columns, tuple(rows))
 
 
-def counts(found: Sequence[Finding]) -> dict[str, int]:
+def counts(findings: Sequence[Finding]) -> dict[str, int]:
     """Number of findings of each severity, and of those that are waived [-]."""
-    heads = ["waived" if f.waiver else f.severity for f in found]
+    heads = ["waived" if f.waiver else f.severity for f in findings]
     return {head: heads.count(head) for head in (*SEVERITIES, "waived")}
 
 
-def verdict(found: Sequence[Finding]) -> Verdict:
+def verdict(findings: Sequence[Finding]) -> Verdict:
     """CHANGE where a finding is an error, PRINT WITH WARNINGS, or PRINT; waived findings do not count.
 
     >>> verdict([Finding("2-film", "warning", "film", "a single layer", "print two")])
     'PRINT WITH WARNINGS'
     """
-    number = counts(found)
+    number = counts(findings)
     return "CHANGE" if number["error"] else "PRINT WITH WARNINGS" if number["warning"] else "PRINT"
 
 
-def headline(name: str, found: Sequence[Finding], source: str = "") -> str:
+def headline(name: str, findings: Sequence[Finding], source: str = "") -> str:
     """Verdict, counts and source of all findings about a print."""
-    return f"{verdict(found)}  {name}: {counted(counts(found))}{source and f'; {source}'}"
+    return f"{verdict(findings)}  {name}: {counted(counts(findings))}{source and f'; {source}'}"
 
 
 def counted(counts: Mapping[str, int]) -> str:
@@ -159,7 +159,7 @@ def counted(counts: Mapping[str, int]) -> str:
     return ", ".join(words) or "no findings"
 
 
-def grouped(found: Sequence[Finding]) -> list[Finding]:
+def grouped(findings: Sequence[Finding]) -> list[Finding]:
     """Each sentence once, whatever its numbers: with all bodies and layers, and the worst place; the severe first.
 
     >>> wide = [Finding("5-width", "warning", "film", f"{w} mm wide", "widen it", w, 0.44, k, count=9)
@@ -167,17 +167,17 @@ def grouped(found: Sequence[Finding]) -> list[Finding]:
     >>> [(f.message, f.layer, f.last_layer, f.count) for f in grouped(wide)]
     [('0.2 mm wide', 5, 7, 27)]
     """
-    return [_joined(alike) for alike in _by_sentence(found)]
+    return [_joined(alike) for alike in _by_sentence(findings)]
 
 
-def numbered(found: Sequence[Finding]) -> dict[Finding, int]:
+def numbered(findings: Sequence[Finding]) -> dict[Finding, int]:
     """Number of each finding among the sentences of :func:`grouped`, from 1: its number on the drawing."""
-    return {f: number for number, alike in enumerate(_by_sentence(found), 1) for f in alike}
+    return {f: number for number, alike in enumerate(_by_sentence(findings), 1) for f in alike}
 
 
-def _by_sentence(found: Sequence[Finding]) -> Iterable[list[Finding]]:
+def _by_sentence(findings: Sequence[Finding]) -> Iterable[list[Finding]]:
     merged: dict[tuple[str, str, str, str], list[Finding]] = {}
-    for f in sorted(found, key=lambda f: (bool(f.waiver), SEVERITIES.index(f.severity))):
+    for f in sorted(findings, key=lambda f: (bool(f.waiver), SEVERITIES.index(f.severity))):
         merged.setdefault((f.severity, f.waiver, f.rule, _NUMBER.sub("0", f.message)), []).append(f)
     return merged.values()
 
@@ -193,6 +193,6 @@ def _joined(alike: Sequence[Finding]) -> Finding:
     )  # fmt: skip
 
 
-def most_severe(found: Sequence[Finding], count: int) -> list[Finding]:
+def most_severe(findings: Sequence[Finding], count: int) -> list[Finding]:
     """The first findings that matter of those that the design does not waive, each sentence once."""
-    return grouped([f for f in found if not f.waiver])[:count]
+    return grouped([f for f in findings if not f.waiver])[:count]

@@ -11,7 +11,7 @@ from functools import partial
 from itertools import starmap
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from sensorgen.core.errors import BadInput, NotInstalled, SensorgenError
 from sensorgen.core.leash import end_with_parent
@@ -73,52 +73,67 @@ def in_parallel(
     if min(jobs, len(inputs)) < 2 and not (cluster and inputs):
         yield from enumerate(starmap(work, inputs))
         return
+    with nullcontext(lanes) if lanes else open_lanes(min(jobs, len(inputs)), cluster) as opened:
+        yield from _in_lanes(work, inputs, opened, lost)
+
+
+def _in_lanes(
+    work: Work[Result], inputs: Sequence[tuple[Any, ...]], lanes: "Sequence[Lane]", lost: Lost[Result] | None
+) -> Iterator[tuple[int, Result]]:
     from concurrent.futures import FIRST_COMPLETED, wait
 
-    with nullcontext(lanes) if lanes else open_lanes(min(jobs, len(inputs)), cluster) as opened:
-        todo, again, free = deque(range(len(inputs))), deque[_Chunk](), list(opened)
-        running: dict[Future[tuple[float, list[Result]]], tuple[Lane, _Chunk]] = {}
-        spent, done, ready = 0.0, 0, list[tuple[int, Result]]()
-        while todo or again or running:
-            while free and (todo or again):
-                alone = opened[0].shared and (todo or running)  # a chunk that killed waits until others are safe
-                in_time = int(CHUNK_S * done / spent) if spent else 1
-                chunk = again.popleft() if again and not alone else _taken(todo, in_time, len(opened))
-                if not chunk.numbers:
-                    break
-                lane = free.pop()
-                running[lane.submit(work, [inputs[k] for k in chunk.numbers])] = lane, chunk
-            yield from ready  # after the lanes have got work: what is done with a result takes time
-            ready.clear()
-            finished = wait(running, _POLL_S, FIRST_COMPLETED).done
-            opened[0].check(idle=not finished)
-            for future in finished:
-                lane, chunk = running.pop(future)
-                free.append(lane)
-                try:
-                    seconds, results = future.result()
-                except lane.deadly:
-                    lane.renew()
-                    again.extend(chunk.after_death())
-                    ready.extend(_losses(chunk, lost))
-                    continue
-                spent, done = spent + seconds, done + len(results)
-                ready.extend(zip(chunk.numbers, results, strict=True))
-        yield from ready
+    queue, free, ready = _Queue(len(inputs), len(lanes), lanes[0].shared), list(lanes), list[tuple[int, Result]]()
+    running: dict[Future[tuple[float, list[Result]]], tuple[Lane, _Chunk]] = {}
+    while queue.left() or running:
+        while free and (chunk := queue.next(waits=bool(running))):
+            lane = free.pop()
+            running[lane.submit(work, [inputs[k] for k in chunk.numbers])] = lane, chunk
+        yield from ready  # after the lanes have got work: what is done with a result takes time
+        ready.clear()
+        finished = wait(running, _POLL_S, FIRST_COMPLETED).done
+        lanes[0].check(idle=not finished)
+        for future in finished:
+            lane, chunk = running.pop(future)
+            free.append(lane)
+            try:
+                seconds, results = future.result()
+            except lane.deadly:
+                lane.renew()
+                ready.extend(queue.died(chunk, lost))
+                continue
+            queue.spent_s, queue.done = queue.spent_s + seconds, queue.done + len(results)
+            ready.extend(zip(chunk.numbers, results, strict=True))
+    yield from ready
 
 
-def _losses(chunk: "_Chunk", lost: Lost[Result] | None) -> Iterator[tuple[int, Result]]:
-    """Number and result of a work that is not sent again; an error where no result stands for it."""
-    if not chunk.after_death():
+class _Queue:
+    """Works that are still to be sent, new ones and those of chunks that died."""
+
+    def __init__(self, count: int, lanes: int, shared: bool) -> None:
+        self.todo, self.again = deque(range(count)), deque[_Chunk]()
+        self.lanes, self.shared, self.spent_s, self.done = lanes, shared, 0.0, 0
+
+    def left(self) -> bool:
+        """Test whether there are any."""
+        return bool(self.todo or self.again)
+
+    def next(self, *, waits: bool) -> "_Chunk | None":
+        """The next chunk, so small that each lane gets two more; None where one that killed ``waits`` for others."""
+        if self.again and not (self.shared and (self.todo or waits)):
+            return self.again.popleft()
+        in_time = int(CHUNK_S * self.done / self.spent_s) if self.spent_s else 1
+        size = min(len(self.todo), max(1, min(in_time, len(self.todo) // (2 * self.lanes))))
+        return _Chunk(tuple(self.todo.popleft() for _ in range(size))) if size else None
+
+    def died(self, chunk: "_Chunk", lost: Lost[Result] | None) -> list[tuple[int, Result]]:
+        """Send a chunk again after a death; number and result of a work that is not, an error where it has none."""
+        again = chunk.after_death()
+        self.again.extend(again)
+        if again:
+            return []
         if lost is None:
             raise SensorgenError(_DIED) from None
-        yield chunk.numbers[0], lost(chunk.numbers[0], _DIED)
-
-
-def _taken(todo: deque[int], most: int, lanes: int) -> "_Chunk":
-    """The next works, few enough that each lane gets two more chunks; none where none is left."""
-    size = min(len(todo), max(1, min(most, len(todo) // (2 * lanes))))
-    return _Chunk(tuple(todo.popleft() for _ in range(size)))
+        return [(chunk.numbers[0], lost(chunk.numbers[0], _DIED))]
 
 
 def remembered(
@@ -235,56 +250,58 @@ def said(work: Work[Result], *given: Any, refused: tuple[type[SensorgenError], .
         return f"{type(error).__name__}: {error}; a fault of sensorgen, please report it"
 
 
-class Lane(Protocol):
-    """Takes one chunk at a time."""
+class Lane:
+    """Executor of one chunk at a time, whose process may die.
 
-    executor: "Executor"
-    deadly: tuple[type[BaseException], ...]  # what a future raises whose process has died
-    shared: bool  # whether its process also has other chunks, which die with it: what is sent again is sent alone
-
-    def submit(self, work: Work[Result], inputs: Sequence[tuple[Any, ...]]) -> "Future[tuple[float, list[Result]]]":
-        """Begin a chunk."""
-
-    def renew(self) -> None:
-        """Go on after a death."""
-
-    def check(self, *, idle: bool) -> None:
-        """Raise SensorgenError where no results will come any more."""
-
-
-class _Process:
-    """A fresh process, so that solver and CAD kernel never meet in one; alone in its pool, so that it dies alone."""
+    Attributes
+    ----------
+    executor : Executor
+        Of the chunks.
+    deadly : tuple of type
+        Errors of a future whose process has died.
+    shared : bool
+        True where its process also has other chunks, which die with it: what is sent again is sent alone.
+    """
 
     shared = False
 
+    def __init__(self, executor: "Executor", *deadly: type[BaseException]) -> None:
+        self.executor, self.deadly = executor, deadly
+
+    def submit(self, work: Work[Result], inputs: Sequence[tuple[Any, ...]]) -> "Future[tuple[float, list[Result]]]":
+        """Begin a chunk."""
+        return self.executor.submit(_chunk, work, inputs)
+
+    def renew(self) -> None:
+        """Go on after a death: of its own, or with a process that somebody else replaces."""
+
+    def check(self, *, idle: bool) -> None:
+        """Raise SensorgenError where no results will come any more; a process that has died says so itself."""
+
+
+class _Process(Lane):
+    """A fresh process, so that solver and CAD kernel never meet in one; alone in its pool, so that it dies alone."""
+
     def __init__(self) -> None:
-        from concurrent.futures.process import BrokenProcessPool
-
-        self.deadly: tuple[type[BaseException], ...] = (BrokenProcessPool,)
-        self.executor = self._made()
-
-    def _made(self) -> "Executor":
         import multiprocessing
         from concurrent.futures import ProcessPoolExecutor
+        from concurrent.futures.process import BrokenProcessPool
 
-        return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _begin)
+        super().__init__(ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _begin), BrokenProcessPool)
 
     def submit(self, work: Work[Result], inputs: Sequence[tuple[Any, ...]]) -> "Future[tuple[float, list[Result]]]":
         """Begin a chunk, in another process if this one has died at rest."""
         limited = partial(_within, _LIMIT_S, work)
         try:
-            return self.executor.submit(_chunk, limited, inputs)
+            return super().submit(limited, inputs)
         except self.deadly:
             self.renew()
-            return self.executor.submit(_chunk, limited, inputs)
+            return super().submit(limited, inputs)
 
     def renew(self) -> None:
         """Another process in place of the dead one."""
         self.executor.shutdown()
-        self.executor = self._made()
-
-    def check(self, *, idle: bool) -> None:
-        """A process that has died says so itself."""
+        self.executor = _Process().executor
 
 
 def open_lanes(jobs: int, cluster: str = "") -> "AbstractContextManager[Sequence[Lane]]":
@@ -326,25 +343,16 @@ def _begin() -> None:
     end_with_parent(parent.join if parent else None)
 
 
-class _Cluster:
-    """One of the places of a Dask cluster."""
+class _Cluster(Lane):
+    """One of the places of a Dask cluster, which replaces its workers itself."""
 
     shared = True
 
     def __init__(self, client: Any, address: str) -> None:
         from distributed.scheduler import KilledWorker
 
-        self.seen_s = perf_counter()
-        self.client, self.address, self.executor = client, address, client.get_executor(pure=False)
-        self.deadly: tuple[type[BaseException], ...] = (KilledWorker,)
-
-    def submit(self, work: Work[Result], inputs: Sequence[tuple[Any, ...]]) -> "Future[tuple[float, list[Result]]]":
-        """Begin a chunk."""
-        future: Future[tuple[float, list[Result]]] = self.executor.submit(_chunk, work, inputs)
-        return future
-
-    def renew(self) -> None:
-        """The cluster replaces its workers itself."""
+        super().__init__(client.get_executor(pure=False), KilledWorker)
+        self.client, self.address, self.seen_s = client, address, perf_counter()
 
     def check(self, *, idle: bool) -> None:
         """Raise SensorgenError where the scheduler, or for a while every worker, has gone."""
@@ -390,23 +398,11 @@ def _check_private(address: str) -> None:
 def _on_cluster(address: str) -> Iterator[Sequence[Lane]]:
     """Places of a Dask cluster: two chunks for each of its threads."""
     import importlib.util
-    import logging
     from concurrent.futures import CancelledError
 
     if importlib.util.find_spec("distributed") is None:
         raise NotInstalled("--cluster needs Dask distributed: pip install 'sensorgen[cluster]'")
-    from distributed import Client
-
-    loggers = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in ("distributed", "asyncio")]
-    for name in loggers:  # each has a level of its own
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what goes wrong is said once, by us
-    _check_private(address)
-    try:
-        client = Client(**{"scheduler_file" if Path(address).is_file() else "address": address}, timeout=_CONNECT_S)
-    except (OSError, ValueError, TimeoutError) as error:
-        raise SensorgenError(
-            f"no Dask scheduler at {address!r} ({str(error).splitlines()[0]:.80}); {_EXPECTED_CLUSTER}"
-        ) from None
+    client = _client(address)
     try:
         threads = sum(client.nthreads().values())
         if not threads:
@@ -420,3 +416,21 @@ def _on_cluster(address: str) -> Iterator[Sequence[Lane]]:
         raise gone(address) from None
     finally:
         client.close(timeout=_CONNECT_S)
+
+
+def _client(address: str) -> Any:
+    """Client of a cluster, whose own messages are muted: what goes wrong is said once, by us."""
+    import logging
+
+    from distributed import Client
+
+    for name in logging.root.manager.loggerDict:  # each has a level of its own
+        if name.partition(".")[0] in ("distributed", "asyncio"):
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    _check_private(address)
+    try:
+        return Client(**{"scheduler_file" if Path(address).is_file() else "address": address}, timeout=_CONNECT_S)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise SensorgenError(
+            f"no Dask scheduler at {address!r} ({str(error).splitlines()[0]:.80}); {_EXPECTED_CLUSTER}"
+        ) from None

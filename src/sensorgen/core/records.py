@@ -2,10 +2,11 @@
 
 import reprlib
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from itertools import zip_longest
 from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from sensorgen.core.errors import BadInput, UnknownName
 
@@ -53,6 +54,11 @@ class Strict(BaseModel):
     """A record: unknown keys are refused, true is not 1, and "5" is no number."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+def stated(default: Any, about: str, **more: Any) -> Any:
+    """Field of a record with a default and a description."""
+    return Field(default=default, description=about, **more)
 
 
 _Record = TypeVar("_Record", bound=Strict)
@@ -126,14 +132,17 @@ def _place(fault: Mapping[str, Any], data: object) -> list[str | int]:
 
 def _first(faults: Sequence[Mapping[str, Any]], data: object) -> tuple[Mapping[str, Any], list[Mapping[str, Any]]]:
     """The first fault, and all of its value: of the alternatives for one value, those of the one that fits farthest."""
-    misspelt = (f for f in faults if f["type"] == "extra_forbidden" and f["loc"][:-1] == faults[0]["loc"][:-1])
-    first = next(misspelt, faults[0])  # before a key that is missing
+    first = _unknown_key([f for f in faults if f["loc"][:-1] == faults[0]["loc"][:-1]])  # before a key that is missing
     alike = [fault for fault in faults if _branches(fault, first, data)]
-    deepest = max(len(_place(fault, data)) for fault in alike)
-    last = [fault for fault in alike if len(_place(fault, data)) == deepest]
-    best = next((fault for fault in last if fault["type"] == "extra_forbidden"), last[0])
-    place = _place(best, data)
-    return best, [fault for fault in alike if _place(fault, data) == place]
+    places = [_place(fault, data) for fault in alike]
+    deepest = max(map(len, places))
+    best = _unknown_key([fault for fault, place in zip(alike, places, strict=True) if len(place) == deepest])
+    return best, [fault for fault, place in zip(alike, places, strict=True) if place == _place(best, data)]
+
+
+def _unknown_key(faults: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
+    """The first fault of a key that is unknown, else the first of all."""
+    return next((fault for fault in faults if fault["type"] == "extra_forbidden"), faults[0])
 
 
 def _branches(fault: Mapping[str, Any], first: Mapping[str, Any], data: object) -> bool:
@@ -187,3 +196,9 @@ def _example(kind: type[Strict], place: tuple[Any, ...]) -> str:
     place = tuple(part for part in place if isinstance(part, str))  # without positions in lists
     field = _record_at(kind, place[:-1]).model_fields.get(place[-1]) if place else None
     return " or ".join(map(str, field.examples)) if field and field.examples else "others of its kind"
+
+
+@cache
+def adapter(kind: type) -> TypeAdapter[Any]:
+    """Reader and writer of a dataclass as JSON."""
+    return TypeAdapter(kind)

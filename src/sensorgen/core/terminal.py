@@ -20,4 +20,4 @@ def escaped(text: str) -> str:
     >>> escaped('"a\u202eb"' + "\n")
     '"a\\u202eb"\n'
     """
-    return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return _CONTROL.sub(lambda match: f"\\u{ord(match[0]):04x}", text)

@@ -69,10 +69,10 @@ class Quantity:
 
     def float(self, number: Decimal, text: str) -> float:
         """The nearest floating-point number, if it is finite."""
-        found = float(number)
-        if not math.isfinite(found):
+        value = float(number)
+        if not math.isfinite(value):
             raise self._no(text, "; it is too large")
-        return found
+        return value
 
     def _no(self, text: str, advice: str) -> BadInput:
         units = [name for name in self.units if name.isascii()]
@@ -186,15 +186,15 @@ def values(text: str, quantity: Quantity) -> tuple[float, ...]:
     """
     words = [part.split(":") for part in text.split(",")]
     numbers = iter(_numbers([word for part in words for word in part], text, quantity))
-    found: list[float] = []
+    rising: list[float] = []
     for part in words:
-        exact = _part([next(numbers) for _ in part], ":".join(part).strip(), MOST_VALUES - len(found))
-        found += [quantity.float(number, text) for number in exact]
-    for before, after in pairwise(found):
+        exact = _part([next(numbers) for _ in part], ":".join(part).strip(), MOST_VALUES - len(rising))
+        rising += [quantity.float(number, text) for number in exact]
+    for before, after in pairwise(rising):
         if not before < after:
             what = "stands twice" if before == after else f"stands after {before:g}"
             raise BadInput(f"{_short(text)}: {after:g} {what}; expected rising values, each once")
-    return tuple(found)
+    return tuple(rising)
 
 
 def _numbers(words: Sequence[str], text: str, quantity: Quantity) -> Iterator[Decimal]:
@@ -222,10 +222,10 @@ def _part(numbers: Sequence[Decimal], text: str, room: int) -> list[Decimal]:
     steps = int((stop - start) / step + _ROUNDING)
     if steps >= room:
         raise BadInput(f"{_short(text)}: more than {MOST_VALUES} values in all; expected fewer: use a larger step")
-    found = [start + k * step for k in range(steps + 1)]
-    if abs(found[-1] - stop) <= _ROUNDING * step:
-        found[-1] = stop
-    return found
+    grid = [start + k * step for k in range(steps + 1)]
+    if abs(grid[-1] - stop) <= _ROUNDING * step:
+        grid[-1] = stop
+    return grid
 
 
 def _short(text: str) -> str:

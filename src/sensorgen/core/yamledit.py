@@ -71,17 +71,20 @@ def _added(text: str, node: yaml.MappingNode, path: Sequence[str], value: Value)
         end = node.end_mark.index - 1
         last = node.value[-1][1].end_mark.index if node.value else end
         return text[:last] + (", " if node.value else "") + inside + text[last:]
-    newline = "\r\n" if "\r\n" in text else "\n"
-    indent, last = node.start_mark.column, node.value[-1][1]
-    while isinstance(last, yaml.CollectionNode) and not last.flow_style and last.value:
-        entry = last.value[-1]  # the marks of a block end after comments that follow it
-        last = entry[1] if isinstance(entry, tuple) else entry
-    end = last.end_mark.index
+    newline, indent, end = "\r\n" if "\r\n" in text else "\n", node.start_mark.column, _end(node)
     at = text.find("\n", end - 1 if text[:end].endswith("\n") else end)
     before, after = (text + newline, "") if at < 0 else (text[: at + 1], text[at + 1 :])
     lines = [f"{' ' * (indent + 2 * k)}{key}:" for k, key in enumerate(path)]
     lines[-1] += f" {_scalar(value)}"
     return before + "".join(line + newline for line in lines) + after
+
+
+def _end(node: yaml.Node) -> int:
+    """Place where the last value of a block ends: its own mark comes after comments that follow it."""
+    while isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
+        entry = node.value[-1]
+        node = entry[1] if isinstance(entry, tuple) else entry
+    return int(node.end_mark.index)
 
 
 def _scalar(value: Value) -> str:

@@ -47,11 +47,11 @@ def text(path: Path) -> str:
 def _content(path: Path) -> bytes:
     """Content of a regular file; a pipe or device, which may never end, is not waited for."""
     with open(path, "rb", opener=_unblocked) as file:
-        found = os.fstat(file.fileno())
-        if not stat.S_ISREG(found.st_mode):
+        status = os.fstat(file.fileno())
+        if not stat.S_ISREG(status.st_mode):
             raise BadInput(f"{path}: not a file; expected a YAML file")
-        if found.st_size > MAX_BYTES:
-            raise BadInput(f"{path}: {found.st_size} bytes; expected at most {MAX_BYTES}: is this the right file?")
+        if status.st_size > MAX_BYTES:
+            raise BadInput(f"{path}: {status.st_size} bytes; expected at most {MAX_BYTES}: is this the right file?")
         return file.read(MAX_BYTES)
 
 
@@ -141,8 +141,8 @@ class _Loader(_Fast):  # type: ignore[misc,valid-type]
         for key, _ in node.value:
             if key.tag != _TEXT:
                 shown = repr(key.value) if isinstance(key, yaml.ScalarNode) else "that is a list or a mapping"
-                said = f"key {shown}: expected text, a number in quotes"
-                raise yaml.constructor.ConstructorError(None, None, said, key.start_mark)
+                problem = f"key {shown}: expected text, a number in quotes"
+                raise yaml.constructor.ConstructorError(None, None, problem, key.start_mark)
             if key.value in seen:
                 raise yaml.constructor.ConstructorError(None, None, f"key {key.value!r} is given twice", key.start_mark)
             seen.add(key.value)

@@ -22,8 +22,7 @@ from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.design.effects import TipData
 from sensorgen.design.tip import EVEN
 from sensorgen.scene.lettering import LINE_DOTS, runs
-from sensorgen.scene.scene import SLIVER_MM, Body, Envelope, Fill, Piece, Point, Prism, Scene, box, rounded
-from sensorgen.scene.shifting import shifted, transposed
+from sensorgen.scene.scene import SLIVER_MM, Body, Envelope, Fill, Move, Piece, Point, Prism, Scene, box, rounded
 
 if TYPE_CHECKING:
     import shapely
@@ -603,7 +602,7 @@ def _laid(p: Params, bodies: tuple[Body, ...], size_mm: tuple[float, float, floa
     if p.pads == "bottom":
         return Scene(bodies, size_mm)
     length, width, height = size_mm
-    exchanged = (replace(body, pieces=tuple(map(transposed, body.pieces))) for body in bodies)
+    exchanged = (replace(body, pieces=tuple(q.moved(Move(exchanges=True)) for q in body.pieces)) for body in bodies)
     return Scene(tuple(exchanged), (width, length, height))
 
 
@@ -701,7 +700,7 @@ def _strip(
         if body.terminal not in ("", "top"):
             raise BadInput(f"cell: it has an electrode {body.terminal!r}; expected a shape with a top and a bottom one")
         key = (body.name, body.material, body.terminal)
-        found[key] = [shifted(piece, (x0, y0, p.base_mm)) for piece in body.pieces]
+        found[key] = [piece.moved(Move(shift_mm=(x0, y0, p.base_mm))) for piece in body.pieces]
     if all(terminal != "top" for *_, terminal in found):
         raise BadInput("cell: it has no top electrode; expected a shape with one, as tri or reference")
     return found

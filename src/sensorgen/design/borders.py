@@ -68,16 +68,18 @@ def region(text: str) -> "shapely.Polygon":
     import shapely
 
     try:
-        found = shapely.from_wkt(text)
+        polygon = shapely.from_wkt(text)
     except shapely.errors.GEOSException as error:
         raise BadInput(f"border: {error}") from None
-    if isinstance(found, shapely.Polygon) and not found.is_valid:
-        raise BadInput(f"border: the outline crosses itself: {shapely.is_valid_reason(found)} mm; draw it anew there")
-    if not (isinstance(found, shapely.Polygon) and found.area > 0):
+    if isinstance(polygon, shapely.Polygon) and not polygon.is_valid:
+        raise BadInput(f"border: the outline crosses itself: {shapely.is_valid_reason(polygon)} mm; draw it anew there")
+    if not (isinstance(polygon, shapely.Polygon) and polygon.area > 0):
         raise BadInput("border: expected an SVG or DXF file, a foot as 'foot 42 left', or one POLYGON around an area")
-    if found.bounds[:2] != (0.0, 0.0):
-        raise BadInput(f"border: it begins at {found.bounds[0]:g}, {found.bounds[1]:g} mm; expected its corner at 0, 0")
-    return found
+    if polygon.bounds[:2] != (0.0, 0.0):
+        raise BadInput(
+            f"border: it begins at {polygon.bounds[0]:g}, {polygon.bounds[1]:g} mm; expected its corner at 0, 0"
+        )
+    return polygon
 
 
 def cut(scene: "Scene", text: str) -> "Scene":

@@ -17,7 +17,7 @@ from sensorgen.core import display, yamlfile
 from sensorgen.core import plugins as registry
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.findings import Finding
-from sensorgen.core.records import Strict, checked, problem, shown
+from sensorgen.core.records import Strict, checked, problem, shown, stated
 from sensorgen.design import borders, imported, packs, shapes
 from sensorgen.design import materials as material_files
 from sensorgen.design.effects import Effects, TipData
@@ -57,19 +57,19 @@ class Slots(Strict):
     top_electrode: Slot = "etpu"
     bottom_electrode: Slot = "etpu"
     film: Slot = "x60"
-    dielectric: Slot = Field(default="x60", description="Of film and isolation too, unless they are given.")
+    dielectric: Slot = stated("x60", "Of film and isolation too, unless they are given.")
     isolation: Slot = "x60"
-    support: Slot | None = Field(default=None, description="Fills the air while printing; left empty when not given.")
+    support: Slot | None = stated(None, "Fills the air while printing; left empty when not given.")
 
 
 class Leads(Strict):
     """Leads between the sensor and the meter: in parallel, in series, and the state of their guard."""
 
-    capacitance_pf: Annotated[float, Field(ge=0)] | None = Field(
-        default=None, description="Of the leads; 0 to 5 pF when not given, to 0.1 with a driven guard [pF]."
+    capacitance_pf: Annotated[float, Field(ge=0)] | None = stated(
+        None, "Of the leads; 0 to 5 pF when not given, to 0.1 with a driven guard [pF]."
     )
-    resistance_ohm: Annotated[float, Field(ge=0)] | None = Field(
-        default=None, description="Of leads and both contacts; 0 with four wires. A range when not given [ohm]."
+    resistance_ohm: Annotated[float, Field(ge=0)] | None = stated(
+        None, "Of leads and both contacts; 0 with four wires. A range when not given [ohm]."
     )
     guard: Literal["driven", "none"] = "none"
 
@@ -85,7 +85,7 @@ class Waiver(Strict):
     """A finding that the designer accepts, and why."""
 
     rule: Annotated[str, Field(pattern=r"^[0-9]+(-[a-z-]+)?$", examples=["5-width", "5"])]
-    body: str = Field(default="", description="Name of the body; all bodies when not given.")
+    body: str = stated("", "Name of the body; all bodies when not given.")
     reason: Annotated[str, Field(min_length=5)]
 
 
@@ -93,7 +93,7 @@ class Cell(Strict):
     """Shape of the cell at each crossing of an array."""
 
     shape: str = "reference"
-    parameters: dict[str, float | str] = Field(default={}, description="Of that shape; its size is that of a crossing.")
+    parameters: dict[str, float | str] = stated({}, "Of that shape; its size is that of a crossing.")
 
 
 class Design(Strict):
@@ -117,53 +117,49 @@ class Design(Strict):
         """The dimensioned cross-section with layers and findings, as a notebook shows it; ``str()`` is the SVG."""
         return SVG(display.html(self))
 
-    name: str = Field(
-        default="",
-        description="Folder and file name; made from the parameters when not given.",
+    name: str = stated(
+        "",
+        "Folder and file name; made from the parameters when not given.",
         json_schema_extra={"pattern": f"^{_NAME.pattern}$"},
     )
     shape: str
     parameters: dict[str, float | str] = Field(default={})
     materials: Slots = Slots()
-    material_values: dict[str, dict[str, float]] = Field(
-        default={},
-        description="Material to quantity to a value, in its name's unit, that goes before every source's.",
+    material_values: dict[str, dict[str, float]] = stated(
+        {},
+        "Material to quantity to a value, in its name's unit, that goes before every source's.",
         examples=[{"x60": {"relative_permittivity": 3.0}}],
     )
     printer: str = "diabase-h5"
     quality: str = "fine"
-    nozzle_mm: Annotated[float, Field(ge=0.05, le=5.0)] | None = Field(
-        default=None, description="Nozzle diameter when it is not the printer's own [mm]."
+    nozzle_mm: Annotated[float, Field(ge=0.05, le=5.0)] | None = stated(
+        None, "Nozzle diameter when it is not the printer's own [mm]."
     )
-    tools: dict[str, Annotated[int, Field(ge=0, le=99)]] = Field(
-        default={}, description="Material to tool, in the printer's own numbers."
-    )
-    infill: dict[str, Infill] = Field(default={}, description="Material to infill.")
+    tools: dict[str, Annotated[int, Field(ge=0, le=99)]] = stated({}, "Material to tool, in the printer's own numbers.")
+    infill: dict[str, Infill] = stated({}, "Material to infill.")
     orientation: Literal["as-drawn", "upside-down"] = "as-drawn"
-    shrinkage: Annotated[float, Field(ge=0, lt=0.9)] = Field(
-        default=0.0, description="Share that the bake takes off in the plane; the print is made larger by it [-]."
+    shrinkage: Annotated[float, Field(ge=0, lt=0.9)] = stated(
+        0.0, "Share that the bake takes off in the plane; the print is made larger by it [-]."
     )
     profile: Profile = Profile()
-    tip: TipData = Field(default=TipData(), description="What presses it; no part of its identity.")
-    effects: Effects = Field(default=Effects(), description="What readings depend on beside the press.")
+    tip: TipData = stated(TipData(), "What presses it; no part of its identity.")
+    effects: Effects = stated(Effects(), "What readings depend on beside the press.")
     waivers: tuple[Waiver, ...] = Field(default=(), strict=False)  # YAML has lists only
     leads: Leads = Leads()
-    own: dict[Kind, dict[str, str]] = Field(
-        default={}, description="Text of each file that the design takes from packs that do not ship, by kind and name."
+    own: dict[Kind, dict[str, str]] = stated(
+        {}, "Text of each file that the design takes from packs that do not ship, by kind and name."
     )
-    geometry: str | None = Field(
-        default=None, description="File of the bodies of an imported sensor, relative to the design's own file."
-    )
-    bodies: dict[str, imported.Filled] = Field(default={}, description="Imported body to material and terminal.")
-    cell: Cell | None = Field(default=None, description="Of an array: what lies between crossing tracks.")
-    border: str | None = Field(
-        default=None,
-        description="SVG or DXF file of the sensor's outline in plan, relative to the design's own file; or a foot by "
+    geometry: str | None = stated(None, "File of the bodies of an imported sensor, relative to the design's own file.")
+    bodies: dict[str, imported.Filled] = stated({}, "Imported body to material and terminal.")
+    cell: Cell | None = stated(None, "Of an array: what lies between crossing tracks.")
+    border: str | None = stated(
+        None,
+        "SVG or DXF file of the sensor's outline in plan, relative to the design's own file; or a foot by "
         "its EU size, as: foot 42 left.",
     )
-    regions: dict[_Region, list[list[float]]] = Field(
-        default={},
-        description="Of an array: named regions, corners in mm from the outline's own, two of a rectangle; a foot has "
+    regions: dict[_Region, list[list[float]]] = stated(
+        {},
+        "Of an array: named regions, corners in mm from the outline's own, two of a rectangle; a foot has "
         "heel, midfoot, metatarsals, hallux and toes.",
     )
 
@@ -181,8 +177,8 @@ class Design(Strict):
     def __getstate__(self) -> dict[Any, Any]:
         """State without derived values: classes of shape files exist in this process only."""
         state = super().__getstate__()
-        kept = {key: value for key, value in state["__dict__"].items() if key in type(self).model_fields}
-        return state | {"__dict__": kept}
+        given = {key: value for key, value in state["__dict__"].items() if key in type(self).model_fields}
+        return state | {"__dict__": given}
 
     @cached_property
     def params(self) -> Envelope:
@@ -204,8 +200,8 @@ class Design(Strict):
     @cached_property
     def machine(self) -> Printer:
         """The printer, with this design's nozzle."""
-        found = load_printer(self.printer, self.own.get("printers", {}).get(self.printer))
-        return found.model_copy(update={"nozzle_mm": self.nozzle_mm}) if self.nozzle_mm else found
+        printer = load_printer(self.printer, self.own.get("printers", {}).get(self.printer))
+        return printer.model_copy(update={"nozzle_mm": self.nozzle_mm}) if self.nozzle_mm else printer
 
     @cached_property
     def layers(self) -> Quality:
@@ -234,11 +230,11 @@ class Design(Strict):
     def used(self) -> dict[str, str]:
         """Materials of the scene's bodies with their source; the first slot that names one decides."""
         here = {body.material for body in self.drawn.bodies}
-        found: dict[str, str] = {}
+        sources: dict[str, str] = {}
         for name, _, source in (slot.partition("@") for slot in self._filled()):
             if name in here:
-                found[name] = found.get(name) or source
-        return found
+                sources[name] = sources.get(name) or source
+        return sources
 
     @cached_property
     def drawn(self) -> Scene:
@@ -276,9 +272,11 @@ class Design(Strict):
         )  # fmt: skip
         others["tip"] = arrays.crossing_tip(params, self.tip)
         own = arrays.cell_parameters(params, cell.shape, cell.parameters, self.layers.layer_mm)
-        made = make({**others, "name": f"{self.name[:80] or 'array'}-crossing", "shape": cell.shape, "parameters": own})
-        arrays.check_cell(made.params, params)
-        return made
+        crossing = make(
+            {**others, "name": f"{self.name[:80] or 'array'}-crossing", "shape": cell.shape, "parameters": own}
+        )
+        arrays.check_cell(crossing.params, params)
+        return crossing
 
     @property
     def area_mm2(self) -> float:
@@ -408,16 +406,13 @@ class Design(Strict):
 
     def idle_waivers(self, findings: list[Finding]) -> list[Finding]:
         """A finding for each waiver that covers none of ``findings``: misspelt, or no longer needed."""
+        idle = (w for w in self.waivers if not any(_covers(w, f) for f in findings))
+        advice = "remove it, or correct its rule and body"
         return [
             Finding(
-                "10-waiver",
-                "warning",
-                w.body or "sensor",
-                f"the waiver of rule {w.rule} covers no finding",
-                "remove it, or correct its rule and body",
+                "10-waiver", "warning", w.body or "sensor", f"the waiver of rule {w.rule} covers no finding", advice
             )
-            for w in self.waivers
-            if not any(_covers(w, f) for f in findings)
+            for w in idle
         ]
 
 
@@ -612,13 +607,13 @@ def of_resolved(name: str, data: Mapping[str, Any]) -> Design:
         }
     except (AttributeError, KeyError, TypeError):
         raise BadInput(f"{name}: not a resolved design; expected one as batch.json has it") from None
-    found = make({"name": name, **{key: data[key] for key in Design.model_fields if key in data}, **names})
-    now = found.resolved()
-    forms = (data, now, found._lasting(now))
+    design = make({"name": name, **{key: data[key] for key in Design.model_fields if key in data}, **names})
+    now = design.resolved()
+    forms = (data, now, design._lasting(now))
     then, *here = ({k: v for k, v in d.items() if k not in ("sensorgen", "own")} for d in forms)
     if then not in json.loads(json.dumps(here)):
         raise BadInput(f"{name}: its materials, printer or quality have other values here than where it was recorded")
-    return found
+    return design
 
 
 def _check_names(design: Design) -> None:
@@ -704,17 +699,15 @@ def name_of(design: Design) -> str:
     >>> name_of(Design(shape="rect", parameters={"along": "yx", "length_mm": 50}, quality="extrafine"))
     'sqyx-d0.2-length50-extrafine'
     """
-    params, known = design.params, {f.name: f for f in dataclasses.fields(design.form.Params)}
-    start = getattr(design.form, "SHORT", design.shape) + str(getattr(params, "along", ""))
-    parts = [start]
+    params, default = design.params, Design(shape=design.shape)
+    parts, named = [getattr(design.form, "SHORT", design.shape) + str(getattr(params, "along", ""))], {"along"}
     if hasattr(params, "along"):
         parts.append(f"d{params.dielectric_mm:.10g}")  # type: ignore[attr-defined]
-    said = {"along"} | ({"dielectric_mm"} if hasattr(params, "along") else set())
-    for key, field in known.items():
-        value = getattr(params, key)
-        if key not in said and value != field.default:
-            parts.append(key.removesuffix("_mm").replace("_", "-") + _said(value))
-    default = Design(shape=design.shape)
+        named |= {"dielectric_mm"}
+    for field in dataclasses.fields(design.form.Params):
+        value = getattr(params, field.name)
+        if field.name not in named and value != field.default:
+            parts.append(field.name.removesuffix("_mm").replace("_", "-") + _in_name(value))
     for given, usual in ((design.quality, default.quality), (design.printer, default.printer)):
         parts.append("" if given == usual else _plain(Path(given).stem))
     if design.orientation != default.orientation:
@@ -728,7 +721,7 @@ def name_of(design: Design) -> str:
     return whole if len(whole) <= 100 else f"{whole[:90].rstrip('.-_')}-{_digest(whole)}"
 
 
-def _said(value: float | str) -> str:
+def _in_name(value: float | str) -> str:
     """A parameter's value as a part of a name."""
     return f"-{_plain(value)}" if isinstance(value, str) else f"{value:.10g}"
 

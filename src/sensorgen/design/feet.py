@@ -60,10 +60,10 @@ def outline(text: str) -> Real | None:
         raise BadInput(f"border {text!r}; expected an EU size and a side, as: foot 42 left")
     if not SIZES[0] <= size <= SIZES[1]:
         raise OutOfRange(f"border: EU size {size:g}; expected {SIZES[0]:g} to {SIZES[1]:g}")
-    found = _left() * length_mm(size)
+    corners = _left() * length_mm(size)
     if words[2] == "right":
-        found = found * [1, -1] + [0, found[:, 1].max()]
-    return found.round(4)
+        corners = corners * [1, -1] + [0, corners[:, 1].max()]
+    return corners.round(4)
 
 
 def regions(text: str) -> dict[str, list[list[float]]]:

@@ -27,6 +27,9 @@ from sensorgen.scene.sections import sections
 SHAPE = "imported"
 MOST_BYTES = 200_000_000  # of a file of bodies
 _START = "data:application/zlib;base64,"
+_DAMAGED = (  # errors of reading what is no geometry
+    binascii.Error, zlib.error, ValueError, KeyError, TypeError, AttributeError, IndexError, RecursionError, BadInput,
+)  # fmt: skip
 HASHED = r"-([0-9a-f]{8})\.bodies\.json"  # end of a file's name
 
 
@@ -143,17 +146,7 @@ def bodies(geometry: str) -> Bodies:
         size = tuple(float(value) for value in data["size_mm"])
         pieces = {str(name): tuple(map(_piece, own)) for name, own in data["bodies"].items()}
         return Bodies(pieces, (size[0], size[1], size[2]), float(data["chord_mm"]), str(data["source"]))
-    except (
-        binascii.Error,
-        zlib.error,
-        ValueError,
-        KeyError,
-        TypeError,
-        AttributeError,
-        IndexError,
-        RecursionError,
-        BadInput,
-    ) as error:
+    except _DAMAGED as error:
         raise BadInput(
             f"geometry: no bodies in it ({error or type(error).__name__}); expected a file that sensorgen import wrote"
         ) from None
@@ -172,11 +165,11 @@ def params(geometry: str) -> Params:
     """Size of an imported sensor, and the period of its pattern where one cross-section repeats."""
     from sensorgen.scene.unit_cell import cell
 
-    found = bodies(geometry)
-    length, width, height = found.size_mm
-    made = Scene(tuple(Body(name, name, own) for name, own in found.pieces.items()), found.size_mm)
+    content = bodies(geometry)
+    length, width, height = content.size_mm
+    drawn = Scene(tuple(Body(name, name, own) for name, own in content.pieces.items()), content.size_mm)
     try:
-        (section,) = sections(made)
+        (section,) = sections(drawn)
         piece = cell(section, height)
     except ValueError:  # several cross-sections, none that is constant, or bodies that overlap
         return Params(length, width)
@@ -187,12 +180,12 @@ def params(geometry: str) -> Params:
 
 def scene(geometry: str, filled: Mapping[str, Filled]) -> Scene:
     """Bodies of an imported sensor, with the materials and terminals of a map."""
-    found = bodies(geometry)
-    made = (
+    content = bodies(geometry)
+    drawn = (
         Body(name, filled[name].material.partition("@")[0], own, filled[name].terminal)
-        for name, own in found.pieces.items()
+        for name, own in content.pieces.items()
     )
-    return Scene(tuple(made), found.size_mm)
+    return Scene(tuple(drawn), content.size_mm)
 
 
 def check(geometry: str | None, filled: Mapping[str, Filled], given: Mapping[str, float | str]) -> None:
@@ -238,11 +231,11 @@ def slots(geometry: str, filled: Mapping[str, Filled], conducts: Iterable[str]) 
     conductors = set(conducts)
     volume = {name: sum(piece.volume_mm3() for piece in own) for name, own in bodies(geometry).pieces.items()}
     largest = sorted(filled, key=lambda name: volume[name])
-    found: dict[str, str] = {}
+    parts: dict[str, str] = {}
     for name in largest:
         one = filled[name]
         if one.material.partition("@")[0] not in conductors:
-            found |= {"film": one.material, "dielectric": one.material} if name != "support" else {}
+            parts |= {"film": one.material, "dielectric": one.material} if name != "support" else {}
         elif one.terminal in ("top", "bottom"):
-            found[f"{one.terminal}_electrode"] = one.material
-    return found
+            parts[f"{one.terminal}_electrode"] = one.material
+    return parts

@@ -8,7 +8,7 @@ given again, so that a design means the same everywhere.
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import resources
@@ -228,18 +228,22 @@ def _of_package(point: "EntryPoint") -> Pack:
     if not NAME.fullmatch(point.name) or not all(part.isidentifier() for part in parts):
         raise BadInput(f"{whose}: entry point {point.value!r:.80} names no folder, as in my_package.pack; uninstall it")
     folder = Path(str(dist.locate_file("/".join(parts)))) if dist else Path(*parts)
-    if not folder.is_dir():
-        from importlib.util import find_spec
-
-        try:  # of the first part alone: finding a part of a package would run the package
-            spec = find_spec(parts[0])
-        except (ImportError, ValueError, AttributeError):
-            spec = None
-        top = list(spec.submodule_search_locations or ()) if spec else []
-        folder = Path(top[0]).joinpath(*parts[1:]) if top else folder
+    folder = folder if folder.is_dir() else _importable(parts) or folder
     if not folder.is_dir():
         raise BadInput(f"{whose}: there is no folder {'/'.join(parts)!r} in it; repair or uninstall it")
     return Pack(point.name, "installed", folder, package)
+
+
+def _importable(parts: Sequence[str]) -> Path | None:
+    """Folder of a part of a package, which is not imported; None where there is no such package."""
+    from importlib.util import find_spec
+
+    try:  # of the first part alone: finding a part of a package would run the package
+        spec = find_spec(parts[0])
+    except (ImportError, ValueError, AttributeError):
+        return None
+    top = list(spec.submodule_search_locations or ()) if spec else []
+    return Path(top[0]).joinpath(*parts[1:]) if top else None
 
 
 def find(kind: Kind, name: str, folder: Path | None = None) -> File:
@@ -350,13 +354,13 @@ def with_files(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     if not isinstance(given, dict) or not all(isinstance(texts, dict) for texts in given.values()):
         return data
     texts: dict[Kind, dict[str, Any]] = {kind: dict(given.get(kind, {})) for kind in SINGULAR}
-    made = dict(data)
-    made.update(_shape_and_machine(data, texts, folder))
-    made.update(_cell(data, texts, folder))
+    complete = dict(data)
+    complete.update(_shape_and_machine(data, texts, folder))
+    complete.update(_cell(data, texts, folder))
     if isinstance(data.get("materials"), dict):
-        made["materials"] = {part: _slot(word, texts, folder) for part, word in slots(data["materials"]).items()}
+        complete["materials"] = {part: _slot(word, texts, folder) for part, word in slots(data["materials"]).items()}
     if isinstance(data.get("bodies"), dict):
-        made["bodies"] = {
+        complete["bodies"] = {
             name: body | {"material": _slot(body.get("material"), texts, folder)} if isinstance(body, dict) else body
             for name, body in data["bodies"].items()
         }
@@ -364,7 +368,7 @@ def with_files(data: dict[str, Any], folder: Path) -> dict[str, Any]:
         if isinstance(name, str) and is_name("materials", name) and name not in shipped_names("materials"):
             _add(texts, "materials", name, folder)
     used = {kind: dict(sorted(content.items())) for kind, content in texts.items() if content}
-    return made | ({"own": given | used} if used or "own" in data else {})
+    return complete | ({"own": given | used} if used or "own" in data else {})
 
 
 def slots(materials: Mapping[str, Any]) -> dict[str, Any]:
@@ -386,9 +390,8 @@ def _shape_and_machine(
     kinds: tuple[tuple[str, Kind], ...] = (("shape", "shapes"), ("printer", "printers"), ("quality", "qualities"))
     for key, kind in kinds:
         word = data.get(key)
-        if isinstance(word, str) and not (
-            key == "shape" and ("geometry" in data or word == "array")
-        ):  # those are no file
+        no_file = key == "shape" and ("geometry" in data or word == "array")
+        if isinstance(word, str) and not no_file:
             yield key, _add(texts, kind, word, folder)
 
 

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput
-from sensorgen.core.records import Strict
+from sensorgen.core.records import Strict, stated
 
 Slicer = Literal["prusa", "cura", "orca"]
 Setting = str | int | float
@@ -20,23 +20,23 @@ _LINE = re.compile(r"\s*([A-Za-z0-9_]+)\s*=\s*(.*?)\s*")
 class Profile(Strict):
     """Slicer settings of a design. What is not given is as in our profiles, from material, printer and quality."""
 
-    walls: Literal["arachne", "classic"] | None = Field(
-        default=None, description="Lines of variable width, or of one width; classic walls drop what no line fits."
+    walls: Literal["arachne", "classic"] | None = stated(
+        None, "Lines of variable width, or of one width; classic walls drop what no line fits."
     )
-    wall_lines: dict[str, Annotated[int, Field(ge=1, le=100)]] = Field(
-        default={}, description="Material to the number of its walls' lines."
+    wall_lines: dict[str, Annotated[int, Field(ge=1, le=100)]] = stated(
+        {}, "Material to the number of its walls' lines."
     )
-    line_mm: dict[str, Annotated[float, Field(ge=0.05, le=5.0)]] = Field(
-        default={}, description="Material to the width of its lines [mm]."
+    line_mm: dict[str, Annotated[float, Field(ge=0.05, le=5.0)]] = stated(
+        {}, "Material to the width of its lines [mm]."
     )
-    infill_angle_deg: dict[str, Annotated[float, Field(ge=0.0, lt=180.0)]] = Field(
-        default={}, description="Material to the direction of its infill, from x [degree]."
+    infill_angle_deg: dict[str, Annotated[float, Field(ge=0.0, lt=180.0)]] = stated(
+        {}, "Material to the direction of its infill, from x [degree]."
     )
-    own: dict[Slicer, str] = Field(
-        default={}, description="Slicer to a file of settings (.ini, .json), relative to the design's own file."
+    own: dict[Slicer, str] = stated(
+        {}, "Slicer to a file of settings (.ini, .json), relative to the design's own file."
     )
-    settings: dict[Slicer, dict[str, Setting]] = Field(
-        default={}, description="Slicer to its settings, which go before all others, those of the file too."
+    settings: dict[Slicer, dict[str, Setting]] = stated(
+        {}, "Slicer to its settings, which go before all others, those of the file too."
     )
 
     def materials(self) -> set[str]:
@@ -69,9 +69,7 @@ def with_own(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     own, inline = profile.get("own", {}), profile.get("settings", {})
     if not (isinstance(own, Mapping) and isinstance(inline, Mapping)):
         return data
-    if any(not isinstance(name, str) for name in own.values()) or any(
-        not isinstance(each, Mapping) for each in inline.values()
-    ):
+    if not all(isinstance(n, str) for n in own.values()) or not all(isinstance(s, Mapping) for s in inline.values()):
         return data
     read = {slicer: settings_of(folder / name) for slicer, name in own.items()}
     both = {slicer: {**read.get(slicer, {}), **inline.get(slicer, {})} for slicer in {**read, **inline}}
@@ -88,16 +86,20 @@ def settings_of(path: Path) -> dict[str, Setting]:
     """
     text = yamlfile.text(path)
     if path.suffix == ".json":
-        try:
-            data = json.loads(text)
-        except ValueError as error:
-            raise BadInput(f"{path}: no JSON: {error}") from None
-        if not isinstance(data, dict) or any(isinstance(v, bool | list | dict | None) for v in data.values()):
-            raise BadInput(f"{path}: expected names of settings, each with one text or number")
-        return data
+        return _of_json(path, text)
     lines = [line for line in text.splitlines() if line.strip() and line.lstrip()[0] not in "#;["]
-    found = {m[1]: m[2] for line in lines if (m := _LINE.fullmatch(line))}
-    if len(found) < len(lines) or not found:
+    settings = {m[1]: m[2] for line in lines if (m := _LINE.fullmatch(line))}
+    if len(settings) < len(lines) or not settings:
         wrong = next((line for line in lines if not _LINE.fullmatch(line)), "nothing, or a name twice")
         raise BadInput(f"{path}: expected lines 'name = value', each name once; it has {wrong[:60]!r}")
-    return dict(found)
+    return dict(settings)
+
+
+def _of_json(path: Path, text: str) -> dict[str, Setting]:
+    try:
+        data = json.loads(text)
+    except ValueError as error:
+        raise BadInput(f"{path}: no JSON: {error}") from None
+    if not isinstance(data, dict) or any(isinstance(v, bool | list | dict | None) for v in data.values()):
+        raise BadInput(f"{path}: expected names of settings, each with one text or number")
+    return data

@@ -97,18 +97,18 @@ def varies(name: str, text: str, fill: Mapping[str, str]) -> bool:
     BadInput
         The file is no shape.
     """
-    made = []
+    replies = []
     for _ in range(2):
         process = _ShapeProcess(name, text)
         try:
             defaults = {str(field["name"]): field["default"] for field in process.about["fields"]}
             question = {"parameters": defaults, "fill": fill}
-            made += [process.ask(question), process.ask(question)]
+            replies += [process.ask(question), process.ask(question)]
         except (KeyError, TypeError):
             return False  # no parameters: what reads the file says so
         finally:
             process.close()
-    return any(each != made[0] for each in made)
+    return any(each != replies[0] for each in replies)
 
 
 def is_trusted(text: str) -> bool:
@@ -121,22 +121,17 @@ def is_trusted(text: str) -> bool:
 
 def trust(name: str, text: str) -> Path:
     """Let a shape's file with this content run, confined; path of the list of such files."""
-    path, kept = packs.place() / TRUSTED, ""
+    path, trusted = packs.place() / TRUSTED, ""
     if is_trusted(text):
         return path
     with suppress(OSError, UnicodeDecodeError):
-        kept = path.read_text("utf-8")
+        trusted = path.read_text("utf-8")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        files.replace(path, f"{kept}{digest(text)} {name}\n".encode())
+        files.replace(path, f"{trusted}{digest(text)} {name}\n".encode())
     except OSError as error:
         raise Unwritable(f"cannot write {str(path)!r}: {error.strerror or error}") from None
     return path
-
-
-def _short(name: str, reply: Mapping[str, Any]) -> str:
-    """Beginning of the names of a shape's designs, which are those of files."""
-    return str(reply["short"]) if _NAME.fullmatch(str(reply["short"])) else name
 
 
 class _Foreign:
@@ -147,7 +142,8 @@ class _Foreign:
         reply = self._ask({})
         try:
             self.__doc__ = harmless(str(reply["about"])[:4000])
-            self.SHORT = _short(name, reply)
+            short = str(reply["short"])  # of the names of designs, which are those of files
+            self.SHORT = short if _NAME.fullmatch(short) else name
             parameters = _fields(name, reply)
         except (AttributeError, KeyError, TypeError, ValueError):
             raise BadInput(
@@ -211,11 +207,11 @@ def _adapter() -> "TypeAdapter[_ReadScene]":
 
 def _decoded(data: object) -> Scene:
     """A scene of plain data; raises ValidationError."""
-    found = _adapter().validate_python(data)
+    scene = _adapter().validate_python(data)
     bodies = (
-        Body(**{field.name: getattr(body, field.name) for field in dataclasses.fields(Body)}) for body in found.bodies
+        Body(**{field.name: getattr(body, field.name) for field in dataclasses.fields(Body)}) for body in scene.bodies
     )
-    return Scene(tuple(bodies), found.size_mm, found.repeats)
+    return Scene(tuple(bodies), scene.size_mm, scene.repeats)
 
 
 def _fields(name: str, reply: Mapping[str, Any]) -> list[tuple[str, type, Any]]:
@@ -232,21 +228,27 @@ def _fields(name: str, reply: Mapping[str, Any]) -> list[tuple[str, type, Any]]:
             raise BadInput(f"{where}: expected a name of small letters, digits and '_'")
         if not about["help"]:
             raise BadInput(f"{where} has no help; write metadata={{'help': ..., 'range': (low, high)}}")
-        if choices := about.get("choices"):
+        choices = about.get("choices")
+        if choices:
             if default not in choices or not all(isinstance(each, str) and each.isprintable() for each in choices):
                 raise BadInput(f"{where}: default {default!r:.40} is not among its choices, or one cannot be printed")
             about["choices"] = tuple(choices)
         else:
-            try:
-                low, high = (float(end) for end in about["range"])
-                sound = math.isfinite(high - low) and low <= float(default) <= high
-            except (KeyError, TypeError, ValueError, OverflowError):
-                raise BadInput(f"{where} has no range; write metadata={{'help': ..., 'range': (low, high)}}") from None
-            if not sound:
-                raise BadInput(f"{where}: default {default!r:.40} is outside its range {low:g} to {high:g}")
-            default, about["range"] = float(default), (low, high)
+            default, about["range"] = _in_range(where, default, about)
         parameters.append((key, str if choices else float, dataclasses.field(default=default, metadata=about)))
     return parameters
+
+
+def _in_range(where: str, default: Any, about: Mapping[str, Any]) -> tuple[float, tuple[float, float]]:
+    """Default and range of a parameter; raises BadInput."""
+    try:
+        low, high = (float(end) for end in about["range"])
+        sound = math.isfinite(high - low) and low <= float(default) <= high
+    except (KeyError, TypeError, ValueError, OverflowError):
+        raise BadInput(f"{where} has no range; write metadata={{'help': ..., 'range': (low, high)}}") from None
+    if not sound:
+        raise BadInput(f"{where}: default {default!r:.40} is outside its range {low:g} to {high:g}")
+    return float(default), (low, high)
 
 
 def _checked(name: str, scene: Scene, fill: Fill) -> Scene:
@@ -294,9 +296,7 @@ class _ShapeProcess:
             stderr=subprocess.DEVNULL, env={},
         )  # fmt: skip
         self._lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-        self._wanted = threading.Semaphore(
-            0
-        )  # lines: one for each question, or an endless answer would fill the memory
+        self._wanted = threading.Semaphore(0)  # lines, one for each question: an endless answer would fill the memory
         threading.Thread(target=_read, args=(self._process.stdout, self._wanted, self._lines), daemon=True).start()
         with ExitStack() as ended:
             ended.callback(self.close)
@@ -365,8 +365,8 @@ def _process(name: str, text: str) -> _ShapeProcess:
             import atexit
 
             atexit.register(close)
-        made = _ShapeProcess(name, text)
-        _RUNNING[key] = made
+        process = _ShapeProcess(name, text)
+        _RUNNING[key] = process
     return _RUNNING[key]
 
 

@@ -93,10 +93,10 @@ def _answer(module: ModuleType, question: Mapping[str, Any]) -> Any:
         return params.cells()
     from sensorgen.scene.scene import Fill
 
-    made = module.scene(params, Fill(**question["fill"]))
-    if not dataclasses.is_dataclass(made) or isinstance(made, type):
-        raise TypeError(f"scene() gives {type(made).__name__}; expected a Scene")
-    return dataclasses.asdict(made)
+    scene = module.scene(params, Fill(**question["fill"]))
+    if not dataclasses.is_dataclass(scene) or isinstance(scene, type):
+        raise TypeError(f"scene() gives {type(scene).__name__}; expected a Scene")
+    return dataclasses.asdict(scene)
 
 
 def _limit(memory_bytes: int) -> None:

@@ -147,33 +147,24 @@ def parse(text: str) -> SpecimenName:
         raise _unreadable(text, "no shape in it")
     shape = _SHAPES[head["shape"]]
     axes, doubts = _axes(text, shape, head["axes"], head["shape"])
-    found = _rest(text, plain[head.end() :])
-    film_mm, size_mm, more = _thickness(text, found.get("film"))
-    slicing, read = _slicing(found.get("slicing"))
-    place = found["place"]["letter"] if "place" in found else ""
+    words = _rest(text, plain[head.end() :])
+    film_mm, size_mm, more = _thickness(text, words.get("film"))
+    slicing, read = _slicing(words.get("slicing"))
+    place = words["place"]["letter"] if "place" in words else ""
+    nowhere = f"'{place}' taken for a place on the plate (right, left or middle): not explained" if place else ""
+    started = "" if head["iteration"] else "no iteration in the name"
+    assumed = (started, *doubts, *_case(text, head["shape"]), *more, read, nowhere)
     return SpecimenName(
         iteration=int(head["iteration"]) if head["iteration"] else None,
         shape=shape,
         axes=axes,
         film_mm=film_mm,
-        replicate=int(found["replicate"]["number"]) if "replicate" in found else None,
+        replicate=int(words["replicate"]["number"]) if "replicate" in words else None,
         slicing=slicing,
         place=place,
         size_mm=size_mm,
         raw=text,
-        assumed=tuple(
-            filter(
-                None,
-                (
-                    "" if head["iteration"] else "no iteration in the name",
-                    *doubts,
-                    *_case(text, head["shape"]),
-                    *more,
-                    read,
-                    f"'{place}' taken for a place on the plate (right, left or middle): not explained" if place else "",
-                ),
-            )
-        ),
+        assumed=tuple(filter(None, assumed)),
     )
 
 
@@ -207,7 +198,7 @@ def _case(text: str, word: str) -> list[str]:
 
 def _rest(text: str, rest: str) -> dict[str, re.Match[str]]:
     """Words after the shape, each kind at most once, in any order, with or without blanks between."""
-    found: dict[str, re.Match[str]] = {}
+    words: dict[str, re.Match[str]] = {}
     at = 0
     while at < len(rest):
         if rest[at] == " ":
@@ -216,23 +207,23 @@ def _rest(text: str, rest: str) -> dict[str, re.Match[str]]:
         kind, match = next(((k, m) for k, p in _REST.items() if (m := p.match(rest, at))), ("", None))
         if match is None:
             raise _unreadable(text, f"cannot read {shown(rest[at:])}")
-        if kind in found:
-            raise _unreadable(text, f"two words for its {kind}: {found[kind][0]!r} and {match[0]!r}")
-        found[kind], at = match, match.end()
-    return found
+        if kind in words:
+            raise _unreadable(text, f"two words for its {kind}: {words[kind][0]!r} and {match[0]!r}")
+        words[kind], at = match, match.end()
+    return words
 
 
-def _thickness(text: str, found: re.Match[str] | None) -> tuple[float | None, float | None, list[str]]:
+def _thickness(text: str, match: re.Match[str] | None) -> tuple[float | None, float | None, list[str]]:
     """Film, size that is no film, and what was assumed."""
-    if found is None:
+    if match is None:
         return 0.0, None, [NO_FILM]
-    written = found["number"] or found["bare"]
+    written = match["number"] or match["bare"]
     value = float(written)
     if value > THICKEST_MM:
         raise _unreadable(text, f"a film of {value:g} mm; expected at most {THICKEST_MM:g} mm")
-    if found["bare"] or "." in written:
-        said = [f"{written}mm written {_short(value)}mm"] if value and written != _short(value) else []
-        return value, None, said
+    if match["bare"] or "." in written:
+        doubts = [f"{written}mm written {_short(value)}mm"] if value and written != _short(value) else []
+        return value, None, doubts
     if value in (1.0, 2.0):
         return value / 10, None, [f"{written}mm read as .{written}mm: the point is lost"]
     if value < 1:
@@ -240,13 +231,13 @@ def _thickness(text: str, found: re.Match[str] | None) -> tuple[float | None, fl
     return None, value, [f"{written}mm is too thick for a film: taken for another size, the film is unknown"]
 
 
-def _slicing(found: re.Match[str] | None) -> tuple[str, str]:
-    if found is None:
+def _slicing(match: re.Match[str] | None) -> tuple[str, str]:
+    if match is None:
         return "", ""
-    prefix = found["word"] or ""
+    prefix = match["word"] or ""
     word = "xtrafine" if "tra" in prefix else prefix + "fine"  # blanks are single ones by now
-    said = f"'{found[0]}' read as {QUALITIES[word]}" if word in ("xfine", "xtrafine") else ""
-    return word, said
+    doubt = f"'{match[0]}' read as {QUALITIES[word]}" if word in ("xfine", "xtrafine") else ""
+    return word, doubt
 
 
 def design_of(specimen: SpecimenName) -> Design | None:

@@ -190,13 +190,13 @@ def piezoresistance(design: Design) -> dict[str, MaterialValue]:
 
     No source that ships gives one: without a value of the user's own, resistivity under the tip is as elsewhere.
     """
-    found = {}
+    by_end = {}
     for end in ENDS:
         try:
-            found[end] = material_value(*design.slot(f"{end}_electrode"), PIEZORESISTANCE)
+            by_end[end] = material_value(*design.slot(f"{end}_electrode"), PIEZORESISTANCE)
         except MissingValue:
             continue
-    return found
+    return by_end
 
 
 def film(design: Design) -> str:

@@ -21,8 +21,8 @@ def of_design(design: Design) -> list[Finding]:
         loaded = loads(design)
     except SensorgenError:  # a material without a tool or a value for printing: reported by what needs it
         loaded = {}
-    found = faults(design.machine, design.layers, loaded)
-    return [Finding(RULE, "error", design.machine.name, message, advice) for _, message, advice in found]
+    wrong = faults(design.machine, design.layers, loaded)
+    return [Finding(RULE, "error", design.machine.name, message, advice) for _, message, advice in wrong]
 
 
 def faults(machine: Printer, layers: Quality, loaded: Mapping[int, ToolLoad]) -> Iterator[tuple[str, str, str]]:

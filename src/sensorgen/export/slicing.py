@@ -50,12 +50,12 @@ class Placed:
 
     def sensor_mm(self) -> tuple[float, float]:
         """Middle of the sensor alone, without what is printed with it [mm]."""
-        found = []
+        middle = []
         for axis, size, place in zip("xy", self.design.printed.size_mm, self.centre_mm, strict=False):
             spans = [piece.span(axis) for body in self.extra for piece in body.pieces] or [(0.0, 0.0)]
             low, high = min(0.0, *(start for start, _ in spans)), max(size, *(end for _, end in spans))
-            found.append(place + size / 2 - (low + high) / 2)
-        return found[0], found[1]
+            middle.append(place + size / 2 - (low + high) / 2)
+        return middle[0], middle[1]
 
 
 @dataclass(frozen=True)
@@ -97,15 +97,9 @@ def alone(design: Design) -> Placed:
 
 
 def sliced(
-    pieces: Sequence[Placed],
-    slicer: str,
-    folder: Path,
-    *,
-    title: str = "",
-    program: str = "",
-    time_limit_s: float = TIME_LIMIT_S,
-    step: Step = lambda _: None,
-) -> Sliced:
+    pieces: Sequence[Placed], slicer: str, folder: Path, *, title: str = "", program: str = "",
+    time_limit_s: float = TIME_LIMIT_S, step: Step = lambda _: None,
+) -> Sliced:  # fmt: skip
     """Slice a plate and write ``raw.gcode`` and ``ready.gcode``.
 
     Parameters
@@ -142,7 +136,7 @@ def sliced(
     check(pieces)
     step("meshes")
     bodies, machine = plate_parts(pieces), pieces[0].design.machine
-    raw, made = folder / "raw.gcode", folder / "ready.gcode"
+    raw, printable = folder / "raw.gcode", folder / "ready.gcode"
     step("files")
     runner = Runner(program, time_limit_s, lambda: step("slicing"))
     try:
@@ -154,7 +148,7 @@ def sliced(
     step("G-code")
     motion = follow(text)
     lifted = lift(b"".join(ready(text, motion, machine)), machine)
-    with store.replacing(made) as file:
+    with store.replacing(printable) as file:
         file.write(lifted.text)
     end = machine.end_gcode.strip().rpartition("\n")[2].strip().encode()
     placeholder = set(b"{[") & set(end)  # that the slicer fills in
@@ -167,7 +161,7 @@ def sliced(
     step("done")
     own_seconds = time.perf_counter() - started - seconds
     findings = versions.unknown(f"{TITLES[slicer]} {version}", not_known)
-    return Sliced(raw, made, lifted, lines, slicer, version, seconds, own_seconds, findings)
+    return Sliced(raw, printable, lifted, lines, slicer, version, seconds, own_seconds, findings)
 
 
 def check(pieces: Sequence[Placed]) -> None:
@@ -203,36 +197,41 @@ def plate_loads(pieces: Sequence[Placed]) -> dict[int, ToolLoad]:
     BadInput
         Two pieces want different things of one tool.
     """
-    found: dict[int, ToolLoad] = {}
+    by_tool: dict[int, ToolLoad] = {}
     for piece in pieces:
         for tool, load in loads(piece.design).items():
-            if found.setdefault(tool, load) != load:
+            if by_tool.setdefault(tool, load) != load:
                 raise BadInput(
                     f"{piece.name} and another piece want tool {tool} differently ({load.material.name} with other "
-                    f"infill or source, or {found[tool].material.name}): one plate loads each tool once"
+                    f"infill or source, or {by_tool[tool].material.name}): one plate loads each tool once"
                 )
-    return found
+    return by_tool
 
 
 def plate_parts(pieces: Sequence[Placed]) -> list[threemf.Part]:
     """All bodies of a plate, where they stand on the bed; equal designs are meshed once."""
-    made: dict[str, list[threemf.Part]] = {}
-    found: list[threemf.Part] = []
+    by_design: dict[str, list[threemf.Part]] = {}
+    parts: list[threemf.Part] = []
     for piece in pieces:
         key = piece.design.id()
-        if key not in made:
-            made[key] = parts_of(piece.design, {body.name: meshes.mesh(body) for body in piece.design.printed.bodies})
+        if key not in by_design:
+            by_design[key] = parts_of(
+                piece.design, {body.name: meshes.mesh(body) for body in piece.design.printed.bodies}
+            )
         extra = [part_of(piece.design, body.name, body.material, meshes.mesh(body)) for body in piece.extra]
-        found += threemf.placed([*made[key], *extra], piece.centre_mm, piece.name)
-    return found
+        parts += threemf.placed([*by_design[key], *extra], piece.centre_mm, piece.name)
+    return parts
 
 
 def plate_3mf(pieces: Sequence[Placed], family: str, title: str) -> bytes:
     """The 3MF of a plate for one family of slicers; see :func:`sensorgen.export.threemf.plate`."""
     check(pieces)
     design = pieces[0].design
-    found = plate_loads(pieces)
-    primed, text = tower(design.machine, design.layers, len(found)), prusa.profile(design.machine, design.layers, found)
+    by_tool = plate_loads(pieces)
+    primed, text = (
+        tower(design.machine, design.layers, len(by_tool)),
+        prusa.profile(design.machine, design.layers, by_tool),
+    )
     return threemf.plate(family, title, plate_parts(pieces), _corner_mm(design), primed, text)
 
 
@@ -285,10 +284,10 @@ def _version(text: bytes, slicer: str) -> str:
     SlicerFailed
         It is older than the profiles.
     """
-    found = re.search(_NAMED[slicer], text[:_HEAD].decode("utf-8", "replace"))
-    if found is None:
+    match = re.search(_NAMED[slicer], text[:_HEAD].decode("utf-8", "replace"))
+    if match is None:
         return "unknown"
-    version = found[1].strip(".")
+    version = match[1].strip(".")
     if tuple(map(int, version.split(".")[:2])) < _OLDEST[slicer]:
         oldest = ".".join(map(str, _OLDEST[slicer]))
         raise SlicerFailed(f"the slicer is version {version}; the profiles need {oldest} or later")

@@ -193,19 +193,19 @@ class CsvTable:
     ) -> TableRows:
         simple = all(line.count(self._separator) == len(self.names) - 1 and '"' not in line for line in lines)
         values = self._converted_at_once(lines, numbers) if simple else None
-        if values is None:
-            cells = [self._counted(row, self._cells(row, line)) for row, line in zip(rows, lines, strict=True)]
-        else:  # no quotes: every separator separates, and splitting is faster
+        if values is not None:  # no quotes: every separator separates, and splitting is faster
             cells = [line.rstrip("\r\n").split(self._separator) if text else [] for line in lines]
-        if values is None:
-            values = np.empty((len(rows), len(numbers)))
-            for k, at in np.ndindex(values.shape):
-                comma, column = self._separator == ";", numbers[at]
-                try:
-                    values[k, at] = number(cells[k][column], decimal_comma=comma, date=column in dates)
-                except BadInput as error:
-                    raise error.within(f"{self.name}, row {rows[k]}, column {self.names[column]}") from None
+        else:
+            cells = [self._counted(row, self._cells(row, line)) for row, line in zip(rows, lines, strict=True)]
+            some = (self._number(row, line, at, dates) for row, line in zip(rows, cells, strict=True) for at in numbers)
+            values = np.fromiter(some, float, len(rows) * len(numbers)).reshape(len(rows), len(numbers))
         return TableRows(rows, values, [[line[at] for at in text] for line in cells])
+
+    def _number(self, row: int, cells: Sequence[str], at: int, dates: Collection[int]) -> float:
+        try:
+            return number(cells[at], decimal_comma=self._separator == ";", date=at in dates)
+        except BadInput as error:
+            raise error.within(f"{self.name}, row {row}, column {self.names[at]}") from None
 
     def _converted_at_once(self, lines: list[str], numbers: Sequence[int]) -> NDArray[np.float64] | None:
         """All numbers of a block, or None where a cell is empty, no number, or infinite."""
@@ -313,15 +313,21 @@ def number(text: str, *, decimal_comma: bool = False, date: bool = False) -> flo
         if "," in stripped and "." in stripped:
             raise BadInput(f"{text[:60]!r} has a point and a comma; write numbers as 1234.5 or 1234,5")
         stripped = stripped.replace(",", ".")
-    value = None
+    value: float | None
     try:
         value = float(stripped) if stripped else np.nan
     except ValueError:
-        with suppress(ValueError):
-            found = datetime.fromisoformat(stripped) if date else None
-            value = found.timestamp() if found and found.tzinfo else None
+        value = _seconds(stripped) if date else None
     if value is None or "_" in stripped or not stripped.isascii():  # Python reads 1_0 and other scripts' digits too
         raise BadInput(f"{text[:60]!r} is not a number; leave the cell empty where nothing was measured")
     if np.isinf(value):
         raise BadInput(f"{text[:60]!r} is not finite; leave the cell empty where nothing was measured")
     return value
+
+
+def _seconds(text: str) -> float | None:
+    """A date with its time zone, in seconds since 1970; None of any other text."""
+    with suppress(ValueError):
+        when = datetime.fromisoformat(text)
+        return when.timestamp() if when.tzinfo else None
+    return None

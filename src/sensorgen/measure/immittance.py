@@ -96,19 +96,19 @@ def parse(quantity: str, text: str) -> tuple[AcReading, ...]:
         frequency = frequency_hz(at)
         if not frequency > 0:
             raise BadInput("expected a frequency above 0 Hz; DC resistances go to --y and --z")
-        found = [_READING.fullmatch(part.strip()) for part in re.split("[/;|]", words.replace("+/-", "±"))]
-        matches = [match for match in found if match]
-        if len(matches) < len(found):
+        matches = [_READING.fullmatch(part.strip()) for part in re.split("[/;|]", words.replace("+/-", "±"))]
+        if None in matches:
             raise BadInput(f"no number; expected one as {_EXAMPLES.get(quantity, '650ohm@1kHz')}")
-        last = matches[-1]["unit"]
-        readings = []
-        for match in matches:
-            scale = factor(quantity, match["unit"] or last)
-            value, stated = (float(decimal(match[name] or "0") * scale) for name in ("value", "pm"))
-            if not math.isfinite(value) or not math.isfinite(stated):
-                raise BadInput("more than a number can hold; expected a value as it was read")
-            readings.append(AcReading(quantity, value, frequency, abs(stated)))
-    return tuple(readings)
+        return tuple(_reading(quantity, match, matches[-1], frequency) for match in matches)
+
+
+def _reading(quantity: str, match: Any, last: Any, frequency_hz: float) -> AcReading:
+    """A reading of the text; the last one has the unit of those without."""
+    scale = factor(quantity, match["unit"] or last["unit"])
+    value, stated = (float(decimal(match[name] or "0") * scale) for name in ("value", "pm"))
+    if not math.isfinite(value) or not math.isfinite(stated):
+        raise BadInput("more than a number can hold; expected a value as it was read")
+    return AcReading(quantity, value, frequency_hz, abs(stated))
 
 
 def decimal(text: str) -> Decimal:
@@ -196,12 +196,12 @@ def impedance(values: Mapping[str, float], frequency_hz: float) -> complex | Non
     >>> round(z.real), round(z.imag)
     (318183, -15909131)
     """
-    found = pair(values)
-    if found is None:
+    both = pair(values)
+    if both is None:
         return None
-    one, other = found
+    one, other = both
     try:
-        z = _PAIRS[found](values[one], values[other], 2 * math.pi * frequency_hz)
+        z = _PAIRS[both](values[one], values[other], 2 * math.pi * frequency_hz)
     except (ZeroDivisionError, OverflowError):
         return None
     return z if cmath.isfinite(z) else None

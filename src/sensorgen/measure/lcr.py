@@ -7,7 +7,7 @@ below it, units in the header or beside each number, UTF-8 with a byte order mar
 import csv
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -83,7 +83,7 @@ class _Column:
     head: str
 
 
-_Row = dict[_Column, tuple[float, bool] | None]
+_Row = dict[_Column, tuple[float, bool]]
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,11 @@ class _Header:
     separator: str
     columns: tuple[_Column, ...]
     heads: tuple[str, ...]
+
+    @property
+    def status(self) -> list[int]:
+        """Positions of the meter's marks of rows."""
+        return [k for k, head in enumerate(self.heads) if head.casefold() in _STATUS]
 
 
 def read(path: Path) -> LcrTable:
@@ -110,18 +115,17 @@ def read(path: Path) -> LcrTable:
     lines = _lines(path)
     header = _found(lines, path)
     columns, first_row = _with_units(lines, header)
-    status = [k for k, head in enumerate(header.heads) if head.casefold() in _STATUS]
     rows, faulty = list[_Row](), 0
     for number, cells in _rows(lines, header, first_row, path):
-        if any(cells[k].strip("+0. ") for k in status):
+        if any(cells[k].strip("+0. ") for k in header.status):
             faulty += 1
         else:
-            rows.append({column: _value(cells[column.at], column, path, number) for column in columns})
-    overloads = sum(value is None for row in rows for value in row.values())
-    readings = tuple(_readings([{c: v for c, v in row.items() if v is not None} for row in rows], columns, path))
+            rows.append(_values(cells, columns, path, number))
+    overloads = len(rows) * len(columns) - sum(map(len, rows))
+    readings = tuple(_readings(rows, columns, path))
     if not readings:
         raise BadInput(f"{path}: no readings below the header in row {header.line + 1}")
-    used = {column.at for column in columns} | set(status)
+    used = {column.at for column in columns} | set(header.status)
     left_out = tuple(head for k, head in enumerate(header.heads) if k not in used and head)
     return LcrTable(readings, len(rows), "\n".join(lines[: header.line]), _doubts(columns, overloads, faulty), left_out)
 
@@ -222,8 +226,8 @@ def _function(before: Sequence[str]) -> tuple[str, str] | None:
     """Primary and secondary quantity, where a line of settings names the meter's function, as Cp-D or CPD."""
     for line in before:
         for word in re.split(r"[\s,;:=\"]+", line.upper()):
-            if found := _FUNCTIONS.get(re.sub(r"[-–/_]", "", word)):
-                return found
+            if quantities := _FUNCTIONS.get(re.sub(r"[-–/_]", "", word)):
+                return quantities
     return None
 
 
@@ -254,6 +258,12 @@ def _with_units(lines: Sequence[str], header: _Header) -> tuple[tuple[_Column, .
     return tuple(columns), below + 1
 
 
+def _values(cells: Sequence[str], columns: Sequence[_Column], path: Path, number: int) -> _Row:
+    """Numbers of a row, without those that are missing."""
+    values = ((column, _value(cells[column.at], column, path, number)) for column in columns)
+    return {column: value for column, value in values if value}
+
+
 def _value(cell: str, column: _Column, path: Path, number: int) -> tuple[float, bool] | None:
     """Number in SI units, and whether its unit is known; None where there is none."""
     where = f"{path}, row {number + 1}, column {column.head}"
@@ -272,21 +282,19 @@ def _value(cell: str, column: _Column, path: Path, number: int) -> tuple[float, 
     return value * (1.0 if scale is None else scale), scale is not None
 
 
-def _readings(
-    rows: Sequence[Mapping[_Column, tuple[float, bool]]], columns: Sequence[_Column], path: Path
-) -> Iterator[AcReading]:
+def _readings(rows: Sequence[_Row], columns: Sequence[_Column], path: Path) -> Iterator[AcReading]:
     degrees = _degrees(rows, columns, path)
-    for row in rows:
-        frequency = next((value for column, (value, _) in row.items() if column.quantity == "frequency"), 0.0)
-        if frequency < 0 or (frequency == 0 and len(row) > 1 and any(c.quantity == "frequency" for c in row)):
+    at = next(column for column in columns if column.quantity == "frequency")
+    for row in (row for row in rows if at in row):
+        frequency, _ = row.pop(at)
+        if frequency < 0 or (frequency == 0 and row):
             raise BadInput(f"{path}: a frequency of {frequency:g} Hz; expected one above 0")
         for column, (value, known) in row.items():
-            if column.quantity != "frequency" and frequency:
-                in_rad = math.radians(value) if column.quantity == "phase" and degrees and not known else value
-                yield AcReading(column.quantity, in_rad, frequency)
+            bare = column.quantity == "phase" and not known
+            yield AcReading(column.quantity, math.radians(value) if bare and degrees else value, frequency)
 
 
-def _degrees(rows: Sequence[Mapping[_Column, tuple[float, bool]]], columns: Sequence[_Column], path: Path) -> bool:
+def _degrees(rows: Sequence[_Row], columns: Sequence[_Column], path: Path) -> bool:
     """Test whether angles without a unit are in degrees: only if one is too large for radians."""
     bare = [value for row in rows for column, (value, known) in row.items() if column.quantity == "phase" and not known]
     if bare and max(map(abs, bare)) <= math.pi:

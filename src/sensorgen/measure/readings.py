@@ -94,8 +94,8 @@ class Readings:
         for block in self._table.blocks(columns, self._others, size):
             impedance = np.empty((len(block.rows), m), np.complex128)
             impedance.real, impedance.imag = block.numbers[:, :m], block.numbers[:, m : 2 * m]
-            found = FileRows(block.rows, impedance, block.text, block.numbers[:, 2 * m :])
-            yield self._only_newest(found) if self._newest else found
+            rows = FileRows(block.rows, impedance, block.text, block.numbers[:, 2 * m :])
+            yield self._only_newest(rows) if self._newest else rows
 
     def _only_newest(self, block: FileRows) -> FileRows:
         at_rest = [np.nan_to_num(block.numbers[:, k]) != 0 for k, name in enumerate(self.numbers) if name == REST]

@@ -72,5 +72,5 @@ def names() -> tuple[str, ...]:
 
 def capacitance_models() -> dict[str, CapacitanceModel]:
     """The models of capacitance by name, loaded."""
-    found = plugins.stating(sys.modules[__name__], "def capacitance(")
-    return {name: cast(CapacitanceModel, import_module(f"{__name__}.{name}")) for name in found}
+    names_of_models = plugins.stating(sys.modules[__name__], "def capacitance(")
+    return {name: cast(CapacitanceModel, import_module(f"{__name__}.{name}")) for name in names_of_models}

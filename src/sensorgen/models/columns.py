@@ -21,7 +21,7 @@ from sensorgen.scene.overlay import OverlayPart, parts
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import ROUNDING_MM, Layer, SectionColumn, sections
 from sensorgen.solvers.electrostatics.bounds import third_conductor
-from sensorgen.solvers.electrostatics.linear import energy as straight
+from sensorgen.solvers.electrostatics.triangles import energy as straight
 
 SOURCE = "Thesis 3.2.1 and 3.2.2, Eqs. 3.10 to 3.49, corrected; Dirichlet's and Thomson's principles"
 COST = 1
@@ -100,8 +100,8 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
 
 
 def _is_one_section(scene: Scene) -> bool:
-    found = parts(scene)
-    return len(found) == 1 and not found[0].in_plan
+    sections_of = parts(scene)
+    return len(sections_of) == 1 and not sections_of[0].in_plan
 
 
 def _level(rows: Sequence["_Row"]) -> float:

@@ -376,9 +376,9 @@ def solved(
 
 def solved_print(content: str, youngs_modulus_pa: Mapping[str, float]) -> CapacitanceCurve | None:
     """The stored curve of a printed cell, by the identity of its cross-section, for the same moduli [Pa]; else None."""
-    found = _read("solved_prints.yaml")
-    cell = found["cells"].get(content)
-    return _curve(found | cell, 1.0) if cell and found["youngs_modulus_pa"] == dict(youngs_modulus_pa) else None
+    cells = _read("solved_prints.yaml")
+    cell = cells["cells"].get(content)
+    return _curve(cells | cell, 1.0) if cell and cells["youngs_modulus_pa"] == dict(youngs_modulus_pa) else None
 
 
 def prototype(shape: str) -> CapacitanceCurve:
@@ -389,10 +389,10 @@ def prototype(shape: str) -> CapacitanceCurve:
 def _curve(cell: Mapping[str, Any], scale: float) -> CapacitanceCurve:
     """A stored cell's curve, its moduli multiplied by a factor."""
     stress = [kpa * _PA_PER_KPA * scale for kpa in cell["stress_kpa"]]
-    found = curve("solved", cell["source"], stress, [1 + percent / 100 for percent in cell["rise_percent"]])
+    solved_curve = curve("solved", cell["source"], stress, [1 + percent / 100 for percent in cell["rise_percent"]])
     changes, block = dict(cell.get("held", {})), cell.get("block", ()) if abs(scale - 1) < _SAME else ()
     return replace(
-        found, within=cell["within"], stiff_change=cell["stiff"], block_changes=tuple(block),
+        solved_curve, within=cell["within"], stiff_change=cell["stiff"], block_changes=tuple(block),
         boundary_changes=tuple(changes.values()), displacement_m=cell["displacement_um"] / _UM_PER_M,
         doubts=tuple(cell.get("doubts", ())),
     )  # fmt: skip

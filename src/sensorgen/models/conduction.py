@@ -98,7 +98,7 @@ def electrode_resistance(
     return _per_resistivity(alone, axis, width).times(resistivity_ohm_m / M_PER_MM)
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=256)
 def _per_resistivity(alone: Scene, axis: str, width: float) -> Interval:
     """Resistance of all bodies over their resistivity [1/mm]."""
     square = square_to(alone, axis)
@@ -117,11 +117,11 @@ def _per_resistivity(alone: Scene, axis: str, width: float) -> Interval:
         look = [content(p) for b in alone.bodies for p in b.pieces]
         key = sha256(dumps([look, alone.size_mm]).encode()).hexdigest()
         question = {"what": "conduction", "scene": key, "axis": axis, "width": width}
-        found = cached.known(question)
-        if found is None:
-            found = [(step.lower, step.upper) for step in _in_space(alone, axis, width)]
-            cached.keep(question, found)
-        simple = _best((Interval(*ends) for ends in found), simple)
+        bounds = cached.known(question)
+        if bounds is None:
+            bounds = [(step.lower, step.upper) for step in _in_space(alone, axis, width)]
+            cached.keep(question, bounds)
+        simple = _best((Interval(*ends) for ends in bounds), simple)
     if simple.upper == np.inf:
         raise _interrupted(
             alone, axis, "no piece of it runs unchanged from end to end; expected a plate under the cogs"
@@ -135,8 +135,8 @@ def _interrupted(alone: Scene, axis: str, why: str) -> OutOfRange:
 
 def _best(steps: Iterator[Interval], simple: Interval) -> Interval:
     """Interval that all bounds of one number leave."""
-    for found in steps:
-        simple = Interval(max(simple.lower, found.lower), min(simple.upper, found.upper))
+    for step in steps:
+        simple = Interval(max(simple.lower, step.lower), min(simple.upper, step.upper))
     return simple
 
 
@@ -174,8 +174,8 @@ def _in_plane(alone: Scene, section: Section, width: float) -> Iterator[Interval
         raise _interrupted(alone, section.across, "no piece of it reaches from end to end") from None
     cells = length / (high - low)
 
-    def resistance(found: fem.Energies) -> Interval:
-        one = fem.whole(found, [1.0]).times(section.depth_mm)
+    def resistance(energies: fem.Energies) -> Interval:
+        one = fem.whole(energies, [1.0]).times(section.depth_mm)
         return Interval(cells / one.upper, cells / one.lower)
 
     return (step.interval for step in narrowed(mesh, {_METAL: 1.0}, resistance, width))

@@ -19,7 +19,6 @@ from sensorgen.scene.layers import Region
 from sensorgen.scene.repetition import Repeat, halved, repeat
 from sensorgen.scene.scene import SLIVER_MM, Piece, Scene
 from sensorgen.solvers.electrostatics import bounds as fem
-from sensorgen.solvers.electrostatics.round_bodies import RoundCell, bounds
 
 SOURCE = "Dirichlet's and Thomson's principles; curved tetrahedra, H1 and hybrid H(div) by NGSolve"
 COST = 3
@@ -63,6 +62,8 @@ def capacitance(scene: Scene, permittivity: Mapping[str, float], width: float = 
 
 def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH) -> Iterator[fem.FieldStep]:
     """The meshes that :func:`capacitance` goes through, until the interval is narrow enough."""
+    from sensorgen.solvers.electrostatics.round_bodies import RoundCell, bounds
+
     own, x, y = cell(scene)
     values = [float(permittivity[name]) for name in own.materials]
     shares = np.outer(x.shares, y.shares)
@@ -77,10 +78,10 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
     )
     reached = False
     try:
-        for level, elements, found in bounds(plan, width):
-            interval = fem.whole(found, shares.ravel().tolist())
+        for level, elements, energies in bounds(plan, width):
+            interval = fem.whole(energies, shares.ravel().tolist())
             reached = True
-            yield fem.FieldStep(level.order, elements, found.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
+            yield fem.FieldStep(level.order, elements, energies.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
             if interval.width() <= width:
                 return
     except fem.Unsolved:

@@ -99,13 +99,13 @@ def narrowed(
     last, order = np.inf, _first(width)
     while order <= _ORDERS[1]:
         try:
-            found = _solved(mesh, values, order)
-            here = interval(found)
+            energies = _solved(mesh, values, order)
+            here = interval(energies)
         except fem.Unsolved:
             if last == np.inf:
                 raise
             return  # doubles end here: what was solved before stands
-        yield fem.FieldStep(order, mesh.elements(), found.unknowns, here)
+        yield fem.FieldStep(order, mesh.elements(), energies.unknowns, here)
         if here.width() <= width or here.width() > _STALLED * last:
             return
         order, last = order + _more(here.width(), width), here.width()
@@ -155,11 +155,11 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
         if best.width() <= width:
             break
         try:
-            found = _disc(mesh, values, turn, order)
+            finer = _disc(mesh, values, turn, order)
         except fem.Unsolved:
             break  # doubles end here: what was solved before stands
-        gain = found.width() / best.width()
-        best = min(best, found, key=Disc.width)
+        gain = finer.width() / best.width()
+        best = min(best, finer, key=Disc.width)
         if gain > _STALLED:
             break
     return best.times(EPS0_F_PER_M * M_PER_MM * section.depth_mm)
@@ -174,7 +174,7 @@ def _disc(mesh: Cones, permittivity: Mapping[str, complex], turn: Turned, order:
     mixed = (eps * plane.crossings(u, psi.conj())).real
     apart = (abs(eps) ** 2 * square + plane.energies(psi, psi.conj()).real - 2 * mixed) / rho
     off = _rounding(plane, abs(eps), rho, u, psi)
-    found = Fields(
+    fields = Fields(
         lower=_thomson(plane, eps, u, psi),
         energy=energy.sum(),
         part=weight @ energy,
@@ -183,23 +183,23 @@ def _disc(mesh: Cones, permittivity: Mapping[str, complex], turn: Turned, order:
         unknowns=plane.unknowns,
         rounding=off / abs(energy.sum()),
     )
-    return disc(found, turn, [share for _, share in mesh.triangles.regions])
+    return disc(fields, turn, [share for _, share in mesh.triangles.regions])
 
 
 def _triangles(scene: Scene) -> tuple[Section, Triangles]:
     """The scene's only cross-section, and its repeating cell in few triangles."""
-    found = sections(scene)
-    if len(found) > 1:
-        raise ValueError(f"{len(found)} different cross-sections: the field runs in all three directions")
-    return found[0], triangles(cell(found[0], scene.size_mm[2]))
+    cross_sections = sections(scene)
+    if len(cross_sections) > 1:
+        raise ValueError(f"{len(cross_sections)} different cross-sections: the field runs in all three directions")
+    return cross_sections[0], triangles(cell(cross_sections[0], scene.size_mm[2]))
 
 
 def _graded(coarse: Triangles, permittivity: Mapping[str, float], width: float) -> Cones:
     """Finer at corners, with as many rings as leave a small share of a width unresolved there."""
-    found = exponents(coarse, permittivity)
-    rings = {corner: np.log(_CORNER_SHARE * width) / (2 * value * np.log(RATIO)) for corner, value in found.items()}
+    powers = exponents(coarse, permittivity)
+    rings = {corner: np.log(_CORNER_SHARE * width) / (2 * value * np.log(RATIO)) for corner, value in powers.items()}
     doublings = {c: int(np.clip(np.ceil(np.log2(max(n, 1.0))), 0, _MOST_DOUBLINGS)) for c, n in rings.items()}
-    mesh = Cones(graded(coarse, found), doublings)
+    mesh = Cones(graded(coarse, powers), doublings)
     if mesh.areas().min() <= 0:
         raise fem.Unsolved(
             "a piece of the scene is too thin for its length: double precision does not resolve such triangles"

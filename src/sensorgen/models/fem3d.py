@@ -6,7 +6,7 @@ docs/cells.md.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -15,8 +15,10 @@ from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.electrostatics import bounds as fem
 from sensorgen.solvers.electrostatics.bounds import Fields, disc, turned
-from sensorgen.solvers.electrostatics.boxes import Pair, whole
 from sensorgen.solvers.electrostatics.bricks import Grid, grid, layered
+
+if TYPE_CHECKING:
+    from sensorgen.solvers.electrostatics.boxes import Pair
 
 SOURCE = "Dirichlet's and Thomson's principles; graded boxes, H1 and hybrid H(div), nested dissection"
 COST = 3
@@ -86,8 +88,8 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
 
 
 def narrowed(
-    bounds: Callable[[Pair], Bounded], coarse: Grid, values: Sequence[complex], width: float
-) -> Iterator[tuple[BoxMeshLevel, Pair, Bounded]]:
+    bounds: "Callable[[Pair], Bounded]", coarse: Grid, values: Sequence[complex], width: float
+) -> "Iterator[tuple[BoxMeshLevel, Pair, Bounded]]":
     """Bounds on meshes of a grid from coarse to fine, until they are narrow enough.
 
     Parameters
@@ -106,6 +108,8 @@ def narrowed(
     Meshes are left out that miss the width if they narrow the bounds as they do on rect, and those too large for the
     memory.
     """
+    from sensorgen.solvers.electrostatics.boxes import Pair
+
     left = list(MESHES)
     while left:
         mesh = left.pop(0)
@@ -113,16 +117,18 @@ def narrowed(
         pair = Pair.of(fine, values, mesh.order, mesh.flux_order)
         if mesh != MESHES[0] and pair.unknowns() > _MOST_UNKNOWNS:
             return
-        found = bounds(pair)
-        yield mesh, pair, found
-        if found.width() <= width:
+        bound = bounds(pair)
+        yield mesh, pair, bound
+        if bound.width() <= width:
             return
-        enough = [finer for finer in left if found.width() * finer.width <= width * mesh.width]
+        enough = [finer for finer in left if bound.width() * finer.width <= width * mesh.width]
         left = enough or left[-1:]
 
 
-def total(pair: Pair) -> Interval:
+def total(pair: "Pair") -> Interval:
     """Energy at 1 V over eps0 of all that the sensor holds, cut cells among it [mm]."""
+    from sensorgen.solvers.electrostatics.boxes import whole
+
     shares, rho = pair.flux.shares, np.real(pair.flux.eps)
     upper, cut = pair.potential.least().energy, bool(np.ptp(shares))
     flux = pair.flux.least(keep=cut)
@@ -160,7 +166,7 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
     values = [0j, 0j, *(complex(permittivity[name]) for name in coarse.names[2:])]
     turn = turned(values[2:])
 
-    def bounds(pair: Pair) -> Disc:
+    def bounds(pair: "Pair") -> Disc:
         u, level = pair.potential.solved(), pair.flux.solved()
         rho = np.array([turn.weight[eps] for eps in pair.flux.eps.tolist()])
         upper, lower = ((x * boxes.answers(x)).sum() for x, boxes in ((u, pair.potential), (level, pair.flux)))
@@ -170,5 +176,5 @@ def lossy(scene: Scene, permittivity: Mapping[str, complex], width: float = WIDT
         fields = Fields(lower, upper, part, size, pair.apart(u, level, rho), pair.unknowns())
         return disc(fields, turn, pair.flux.shares.tolist())
 
-    found = min((cell for *_, cell in narrowed(bounds, coarse, values, width)), key=Disc.width)
-    return found.times(EPS0_F_PER_M * M_PER_MM)
+    best = min((cell for *_, cell in narrowed(bounds, coarse, values, width)), key=Disc.width)
+    return best.times(EPS0_F_PER_M * M_PER_MM)

@@ -67,7 +67,7 @@ def impedance(line: PressedLine) -> Complex:
     >>> round(float(z.real), 6), round(float(z.imag), 3)
     (2999.654163, -2094651.586)
     """
-    return read(line).evaluate(lambda block: [_through(*block.sections(), block.load_ohm)])[0]
+    return read(line).evaluate(lambda block: [through(*block.sections(), block.load_ohm)])[0]
 
 
 def cascade(
@@ -116,7 +116,7 @@ def cascade(
     n = len(r)
 
     def work(parts: list[NDArray[Any]]) -> list[Complex]:
-        return [_through(parts[:n], parts[n : 2 * n], parts[2 * n : 3 * n], None if load is None else parts[-1])]
+        return [through(parts[:n], parts[n : 2 * n], parts[2 * n : 3 * n], None if load is None else parts[-1])]
 
     return in_blocks(arrays, work)[0]
 
@@ -174,10 +174,13 @@ def corner_frequency_hz(resistance_ohm: float, capacitance_f: float) -> float:
     return float(1.0 / turned) if turned else float("inf")
 
 
-def _through(
+def through(
     r: Sequence[NDArray[Any]], y: Sequence[NDArray[Any]], lengths: Sequence[NDArray[Any]], load: NDArray[Any] | None
 ) -> Complex:
-    """March admittance from an open end, and impedance from any other: neither is then ever infinite on the way."""
+    """As :func:`cascade`, of values that are known to be in range; ``load`` is None at an open end [ohm].
+
+    March admittance from an open end, and impedance from any other: neither is then ever infinite on the way.
+    """
     with np.errstate(all="ignore"):
         if load is None:
             current, voltage = _march(np.asarray(0j), y, r, lengths)

@@ -186,26 +186,26 @@ def response(
         chain = Chain(*_sections(track, tip, pieces, frequency_hz), far_load(track.far_end))
         by_force = _along(chain, pieces, tip.by_force, [piece.by_force for piece in pieces])
         by_position = _along(chain, pieces, tip.by_position, [piece.by_position for piece in pieces])
-    found = np.broadcast_arrays(chain.z, by_force, by_position)
-    if not (abs(found[0].sum()) < HIGHEST_OHM and all(np.isfinite(value.sum()) for value in found)):
+    whole = np.broadcast_arrays(chain.z, by_force, by_position)
+    if not (abs(whole[0].sum()) < HIGHEST_OHM and all(np.isfinite(value.sum()) for value in whole)):
         raise OutOfRange("no derivative where Z is infinite or beyond double precision")
-    return found[0], found[1], found[2]
+    return whole[0], whole[1], whole[2]
 
 
 def _along(
     chain: Chain, pieces: list[_PatchPiece], motion: ContactSlopes, matter: list[tuple[Real, Complex]]
 ) -> Complex:
     """Derivative of Z as the pieces move, grow, and change their matter."""
-    found = np.zeros((), complex)
+    total = np.zeros((), complex)
     moves, grows = np.any(motion.left), np.any(motion.length)
     for k, (piece, change) in enumerate(zip(pieces, matter, strict=True), 1):
-        found = found + sum(chain.by_matter(k, *change))
+        total = total + sum(chain.by_matter(k, *change))
         if moves:
-            found = found + motion.left * chain.by_shift(k, piece.contrast)
+            total = total + motion.left * chain.by_shift(k, piece.contrast)
         if grows:
             longer = piece.length_share * (chain.by_length(k) - chain.by_length(len(pieces) + 1))
-            found = found + motion.length * longer
-    return found
+            total = total + motion.length * longer
+    return total
 
 
 def _unpressed(track: RestLine, frequency_hz: Real) -> Complex:
@@ -229,7 +229,7 @@ def _sections(
 def _pieces(track: RestLine, tip: LineContact, law: Compression, frequency_hz: Real) -> list[_PatchPiece]:
     mean = tip.mean_pa()
     film, away = _susceptance(track, frequency_hz), _unpressed(track, frequency_hz)
-    found = []
+    pieces = []
     for k, share in enumerate(tip.pieces.length):
         weight = tip.pieces.pressure[..., k]
         stress = np.asarray(weight * mean)
@@ -237,7 +237,7 @@ def _pieces(track: RestLine, tip: LineContact, law: Compression, frequency_hz: R
         rise = track.rise_ohm_per_m_per_pa * stress
         thinned = film * (thinning / (1 - thinning))
         by_stress = film * (slope / (1 - thinning) ** 2)
-        found.append(
+        pieces.append(
             _PatchPiece(
                 np.asarray(track.r_ohm_per_m + rise),
                 np.asarray(away + thinned),
@@ -247,7 +247,7 @@ def _pieces(track: RestLine, tip: LineContact, law: Compression, frequency_hz: R
                 _matter(track, tip, k, by_stress, tip.by_position, 0.0),
             )
         )
-    return found
+    return pieces
 
 
 def _matter(

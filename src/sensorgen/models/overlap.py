@@ -127,15 +127,15 @@ def _upright(
     look: Sequence[tuple[float, Body | None]], area_mm2: float, eps: Mapping[Body, float], air: float
 ) -> float:
     """Capacitance of straight flux in columns, over eps0 [mm]."""
-    found, last, reduced = 0.0, "", 0.0
+    total, last, reduced = 0.0, "", 0.0
     for thick, body in look:
         end = body.terminal if body else ""
         if end in ("bottom", "top"):
-            found += area_mm2 / reduced if last not in ("", end) and reduced > 0 else 0.0
+            total += area_mm2 / reduced if last not in ("", end) and reduced > 0 else 0.0
             last, reduced = end, 0.0
         elif end != FLOATING:
             reduced += thick / (eps[body] if body else air)
-    return found
+    return total
 
 
 def _energy(scene: Scene, eps: Mapping[Body, float], air: float, beside_mm: float, above_mm: float) -> float:
@@ -172,11 +172,11 @@ def _permittivity_areas(
     slab: Slab, rings: Sequence[Region], areas: Real, eps: Mapping[Body, float], air: float
 ) -> Real:
     """Integral of the permittivity over each ring [mm2]."""
-    found = air * areas
+    total = air * areas
     for body, region in slab.outer.items():
         if body in eps and eps[body] > air:
-            found = found + (eps[body] - air) * shapely.area(shapely.intersection(rings, region))
-    return np.asarray(found)
+            total = total + (eps[body] - air) * shapely.area(shapely.intersection(rings, region))
+    return np.asarray(total)
 
 
 @lru_cache(maxsize=16)

@@ -155,14 +155,14 @@ def filling(scene: Scene, modulus_pa: Mapping[str, float]) -> Filling | None:
         Young's modulus by material [Pa].
     """
     try:
-        found = [(part.depth_mm * (c.right_mm - c.left_mm), c) for part in parts(scene) for c in part.columns]
+        columns = [(part.depth_mm * (c.right_mm - c.left_mm), c) for part in parts(scene) for c in part.columns]
     except ValueError:
         return None
-    area = np.array([a for a, _ in found]) / sum(a for a, _ in found)
-    ends = {_gap(column) for _, column in found}
+    area = np.array([a for a, _ in columns]) / sum(a for a, _ in columns)
+    ends = {_gap(column) for _, column in columns}
     if len(ends) != 1 or (gap := ends.pop()) is None:
         return None
-    between = [[one for one in column.layers if not one.body.terminal and _inside(one, gap)] for _, column in found]
+    between = [[one for one in column.layers if not one.body.terminal and _inside(one, gap)] for _, column in columns]
     levels = sorted({*gap, *(round(z, 9) for of in between for one in of for z in (one.bottom_mm[0], one.top_mm[0]))})
     height = np.diff(levels)
     moduli = np.array([[_modulus(of, (a + b) / 2, modulus_pa) for a, b in pairwise(levels)] for of in between])

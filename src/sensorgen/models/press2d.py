@@ -122,15 +122,15 @@ def _solved(
     mesh = mesh_of(cell, fineness)
     materials = [cell.regions[k - 1].material for k in mesh.region.tolist()]
     longest = _STICKING_STEP if boundary.contact == "stick" else _STEP
-    found, run = solve(mesh, [solids[m] for m in materials], stress_pa, boundary, longest, SOURCE, step)
+    pressed, run = solve(mesh, [solids[m] for m in materials], stress_pa, boundary, longest, SOURCE, step)
     if not cell.mirrored:
-        said = "solved as if each period were followed by its mirror image: the cell is not symmetric"
-        found = replace(found, doubts=(said, *found.doubts))
-    return found, run
+        remark = "solved as if each period were followed by its mirror image: the cell is not symmetric"
+        pressed = replace(pressed, doubts=(remark, *pressed.doubts))
+    return pressed, run
 
 
 def _with_fields(
-    found: Pressed,
+    pressed: Pressed,
     cell: ContactCell,
     run: LoadSteps[TriangleMesh],
     permittivity: Mapping[str, float],
@@ -140,15 +140,15 @@ def _with_fields(
 
     Where no gap ends in an apex, the mesh as drawn is carried along until a gap closes: its errors cancel in the rise.
     """
-    from sensorgen.solvers.contact import deformed, plane_field
+    from sensorgen.solvers.contact import closing, plane_field
     from sensorgen.solvers.contact.carried import Carried
 
-    mesh, sharp = run.mesh, bool(found.apex_m)
+    mesh, sharp = run.mesh, bool(pressed.apex_m)
     share, rings = _SHARP_FIELD if sharp else _BLUNT_FIELD
 
     def meshed(u_m: Real) -> TriangleMesh | None:
-        outline = deformed.deformed(cell, mesh, run.problem.faces, u_m)
-        if deformed.misfit(outline, mesh, u_m) > _MISFIT:
+        outline = closing.deformed(cell, mesh, run.problem.faces, u_m)
+        if closing.misfit(outline, mesh, u_m) > _MISFIT:
             return None
         try:
             return plane_field.meshed(outline.without_block(), cell.width_mm() / 4, share * fineness.growth, rings)
@@ -161,12 +161,12 @@ def _with_fields(
         except Unmeshed:
             return None
 
-    displacements = [state.u_m for state in run.states[: len(found.stress_pa)]]
+    displacements = [state.u_m for state in run.states[: len(pressed.stress_pa)]]
     drawn = None if sharp else meshed(displacements[0])
     carried = Carried(drawn, mesh, cell) if drawn else None
     own = [carried.at(u_m) if carried else None for u_m in displacements]
     fields = [bounds(field or meshed(u_m)) for field, u_m in zip(own, displacements, strict=True)]
-    return replace(with_capacitances(found, fields), carried=tuple(field is not None for field in own))
+    return replace(with_capacitances(pressed, fields), carried=tuple(field is not None for field in own))
 
 
 def why_not_applicable(scene: Scene) -> str | None:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Scene
@@ -33,19 +32,15 @@ __all__ = [
     "BoundaryConditions",
     "BrickCounts",
     "Elastic",
-    "MeshLimit",
     "Pressed",
     "cell",
     "compared",
-    "limit",
     "press",
     "why_not_applicable",
 ]  # fmt: skip
 
 _STEP = 1 / 60  # longest load step over the least Young's modulus: 100 kPa for 6 MPa [-]
 _MOST = 4000  # solid bricks: more would take hours
-_ORDER = 2  # power of the number of pieces with which the mesh's error falls, as another program shows it [-]
-_DOUBT = 0.5  # error of where two meshes lead, over how far that is beyond the finer one; 0.25 was seen [-]
 _OPEN = (1e-4, 1e-3, 1e-2, 5e-2, 0.15)  # least height of a gap in the field over that as drawn, tried in turn [-]
 
 
@@ -56,64 +51,6 @@ class BrickCounts:
     pieces: int = 3
     shrink: float = 0.3
     orders: FieldOrders = field(default_factory=FieldOrders)
-
-
-@dataclass(frozen=True)
-class MeshLimit:
-    """Where two meshes lead (Richardson's extrapolation), and by how much that may be off: an estimate.
-
-    Attributes
-    ----------
-    found : Pressed
-        Displacement and rise of the capacitance for pieces without end; bounds of the field as on the finer mesh.
-    displacement_error_m : (n,) array
-        Of the displacement [m]; infinite above the coarser mesh's last pressure, and where both meshes are one.
-    rise_f_per_m2, rise_error_f_per_m2 : (n,) array
-        C(p) - C(0), NaN where unknown, and its error [F/m2].
-    """
-
-    found: Pressed
-    displacement_error_m: Real
-    rise_f_per_m2: Real
-    rise_error_f_per_m2: Real
-
-
-def limit(fine: Pressed, coarse: Pressed, pieces: int) -> MeshLimit:
-    """Extrapolate displacement and rise from two meshes.
-
-    Parameters
-    ----------
-    fine, coarse : Pressed
-        With ``pieces`` and with one piece less; the coarser one at some of the pressures, 0 among them.
-    pieces : int
-        2 or more.
-
-    Notes
-    -----
-    The rise is nearer than the capacitance: one mesh is deformed, so that its bounds err alike before and after. Half
-    of the difference of their rises counts as the field's error.
-    """
-    n, at = len(fine.stress_pa), np.searchsorted(fine.stress_pa, coarse.stress_pa)
-    following = np.searchsorted(at, np.arange(n))  # the next shared pressure
-    further = (pieces - 1) ** _ORDER / (pieces**_ORDER - (pieces - 1) ** _ORDER)
-    down = fine.displacement_m - fine.fall_m
-    bounds = [np.array([(c.lower, c.upper) if c else (np.nan,) * 2 for c in f.capacitance_f_per_m2])
-              for f in (fine, coarse)]  # fmt: skip
-    rises, others = (found - found[0] for found in bounds)
-    same = np.array_equal(fine.displacement_m[at], coarse.displacement_m)
-    ways, errors = [], []
-    for own, other in ((down, coarse.displacement_m - coarse.fall_m), (rises.mean(axis=1), others.mean(axis=1))):
-        shares = further * (1 - np.divide(other[1:], own[at][1:]))
-        ways.append(np.append(np.append(0.0, shares), shares[-1:])[following] * own if shares.size else 0.0 * own)
-        doubts = np.append(np.append(0.0, abs(shares)), np.inf)[following]
-        errors.append(np.where(np.arange(n), np.inf if same else _DOUBT * doubts * abs(own), 0.0))
-    shifted = tuple(
-        Interval(c.lower + way, c.upper + way) if c else None
-        for c, way in zip(fine.capacitance_f_per_m2, ways[1].tolist(), strict=True)
-    )
-    found = replace(fine, displacement_m=fine.displacement_m + ways[0], capacitance_f_per_m2=shifted)
-    field = abs(np.diff(rises)[:, 0]) / 2
-    return MeshLimit(found, errors[0], rises.mean(axis=1) + ways[1], errors[1] + field)
 
 
 def why_not_applicable(scene: Scene) -> str | None:
@@ -133,11 +70,11 @@ def cell(scene: Scene) -> Bricks:
     BadInput
         A prism is no box, bodies overlap, or the cell has too many boxes.
     """
-    found = bricks_of(scene)
-    boxes = int((found.fill > 0).sum())
+    bricks = bricks_of(scene)
+    boxes = int((bricks.fill > 0).sum())
     if boxes > _MOST:
         raise BadInput(f"its cell has {boxes} boxes; at most {_MOST} can be pressed in 3D")
-    return found
+    return bricks
 
 
 def press(
@@ -179,13 +116,13 @@ def press(
     check(stress_pa, boundary)
     most = int((_MOST / max((bricks.fill > 0).sum(), 1)) ** (1 / 3))
     fineness = replace(wanted, pieces=min(wanted.pieces, max(most, 1)))
-    found, run = _solved(
+    pressed, run = _solved(
         bricks.cut(fineness.pieces, fineness.shrink), solids, stress_pa, boundary, step or (lambda _: None)
     )
     if fineness != wanted:
-        said = f"every box cut into {fineness.pieces} pieces along each axis, not {wanted.pieces}: there are many"
-        found = replace(found, doubts=(*found.doubts, said))
-    return _with_fields(found, run, permittivity, fineness.orders) if permittivity else found
+        remark = f"every box cut into {fineness.pieces} pieces along each axis, not {wanted.pieces}: there are many"
+        pressed = replace(pressed, doubts=(*pressed.doubts, remark))
+    return _with_fields(pressed, run, permittivity, fineness.orders) if permittivity else pressed
 
 
 def _solved(
@@ -199,16 +136,16 @@ def _solved(
 
     mesh = mesh_of(cut, cut.fill > 0)
     materials = [cut.regions[k].material for k in mesh.region.tolist()]
-    found, run = solve(mesh, [solids[m] for m in materials], stress_pa, boundary, _STEP, SOURCE, step)
+    pressed, run = solve(mesh, [solids[m] for m in materials], stress_pa, boundary, _STEP, SOURCE, step)
     last = run.states[-1]
     if (run.problem.gaps(last.pairs, last.u_m) < 0).any():
         how = "and hold fast" if boundary.contact == "stick" else "without friction"
-        found = replace(found, doubts=(*found.doubts, f"faces of gaps touch, {how}"))
-    return found, run
+        pressed = replace(pressed, doubts=(*pressed.doubts, f"faces of gaps touch, {how}"))
+    return pressed, run
 
 
 def _with_fields(
-    found: Pressed, run: "LoadSteps[BrickMesh]", permittivity: Mapping[str, float], orders: FieldOrders
+    pressed: Pressed, run: "LoadSteps[BrickMesh]", permittivity: Mapping[str, float], orders: FieldOrders
 ) -> Pressed:
     """Add the capacitance of the deformed boxes; gaps that are shut are boundary open by a little."""
     from sensorgen.solvers.contact.air import AirMap
@@ -228,4 +165,4 @@ def _with_fields(
                 continue
         return None
 
-    return with_capacitances(found, [bounds(state) for state in run.states])
+    return with_capacitances(pressed, [bounds(state) for state in run.states])

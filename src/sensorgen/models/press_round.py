@@ -71,8 +71,8 @@ def press(
     BadInput
         The scene has no round cell.
     """
-    found = press2d.press(cell(scene, fineness), solids, stress_pa, permittivity, boundary, fineness, step)
-    return replace(found, source=SOURCE)
+    pressed = press2d.press(cell(scene, fineness), solids, stress_pa, permittivity, boundary, fineness, step)
+    return replace(pressed, source=SOURCE)
 
 
 def cell(scene: Scene, fineness: Fineness = USUAL) -> ContactCell:
@@ -123,7 +123,7 @@ class _Plan:
 
 def _outlines(pieces: Sequence[Piece], plan: _Plan, fineness: Fineness) -> list[list[Point]]:
     """Outlines of a body in radius and height [mm]."""
-    found: list[list[Point]] = []
+    outlines: list[list[Point]] = []
     flat: list[Piece] = []
     for piece in pieces:
         if not isinstance(piece, Revolved):
@@ -135,15 +135,15 @@ def _outlines(pieces: Sequence[Piece], plan: _Plan, fineness: Fineness) -> list[
         room = np.maximum(end - plan.axis, plan.axis - start).min()
         if axis.distance(shapely.Point(plan.axis)) > _SAME_MM or reach > room + _SAME_MM:
             raise BadInput("a body of revolution is not about the cell's axis, or reaches beyond it")
-        found.append(corners)
+        outlines.append(corners)
     for low, high in pairwise(sorted({z for piece in flat for z in piece.levels_mm()})):
         first, middle, last = (_radius(flat, plan, low + share * (high - low)) for share in (0.25, 0.5, 0.75))
         if abs(first + last - 2 * middle) > _BENT * middle:
             raise BadInput("a body's flanks are not straight")
         if middle:
             a, b = (middle + end * (last - first) for end in (-1, 1))
-            found.append([(0.0, low), (a, low), (b, high), (0.0, high)])
-    return found
+            outlines.append([(0.0, low), (a, low), (b, high), (0.0, high)])
+    return outlines
 
 
 def _radius(pieces: Sequence[Piece], plan: _Plan, z_mm: float) -> float:

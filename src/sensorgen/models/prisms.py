@@ -21,12 +21,10 @@ from sensorgen.core.bounds import Interval
 from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.scene.connections import groups
 from sensorgen.scene.layers import Region, parts
-from sensorgen.scene.raster import raster
-from sensorgen.scene.repetition import Repeat, halved, repeat, widened
-from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene, seen_from_above
-from sensorgen.scene.slabs import is_open, slabs
+from sensorgen.scene.repetition import Repeat, halved, raster, repeat, widened
+from sensorgen.scene.scene import FLOATING, SLIVER_MM, Body, Scene
+from sensorgen.scene.slabs import Slab, is_open, slabs
 from sensorgen.solvers.electrostatics import bounds as fem
-from sensorgen.solvers.electrostatics.enclosed import enclosing
 from sensorgen.solvers.electrostatics.prisms import BOTTOM, TOP, LayerCell, PrismMesh, plan, solved
 
 SOURCE = "Dirichlet's and Thomson's principles; prisms of triangles, H1 and hybrid H(div) by NGSolve"
@@ -103,16 +101,16 @@ def steps(scene: Scene, permittivity: Mapping[str, float], width: float = WIDTH)
             most = _OPEN_MB if cell.air_mm else _MOST_MB
             if outer.memory_mb(order) > most:
                 raise fem.Unsolved(f"{outer.memory_mb(order):.0f} MB; meshes of up to {most:g} MB are solved")
-            found = solved(inner, outer, order, cell.shares(outer), enclosed=enclosed)
+            energies = solved(inner, outer, order, cell.shares(outer), enclosed=enclosed)
         except fem.Unsolved as error:
             failed = error
             continue
         except shapely.errors.GEOSException as error:  # outlines that rounding makes invalid
             failed = fem.Unsolved(str(error))
             continue
-        interval = fem.whole(found, np.outer(cell.x.shares, cell.y.shares).ravel().tolist())
+        interval = fem.whole(energies, np.outer(cell.x.shares, cell.y.shares).ravel().tolist())
         reached = True
-        yield fem.FieldStep(order, int(outer.free.sum()), found.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
+        yield fem.FieldStep(order, int(outer.free.sum()), energies.unknowns, interval.times(EPS0_F_PER_M * M_PER_MM))
         if interval.width() <= width:
             return
     if failed and not reached:
@@ -124,6 +122,8 @@ def _meshes(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> tup
 
     With air around it, the flux stays in that air, and the potential is constant beyond: a conductor that floats.
     """
+    from sensorgen.solvers.electrostatics.enclosed import enclosing
+
     far_mm, loose_mm = np.inf if cell.air_mm else _FAR * cell.gap_mm, _LOOSE * cell.gap_mm
     is_sound = False
     with suppress(fem.Unsolved):  # the grid is too fine, as coarser ones below may not be
@@ -135,7 +135,7 @@ def _meshes(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> tup
             if exact.plan.slenderness_mm() > _SLENDER_MM:
                 other = PrismMesh.of(cell.inside_shell(layers), beside, _GRID_MM, far_mm) if cell.air_mm else exact
                 return exact, other, False
-    found = []
+    meshes = []
     for outwards, least_mm in ((False, _SLENDER_MM), (True, _SLENDER_MM / 10)):  # a potential bears more than a flux
         for grid_mm in _COARSER_MM:
             some = replace(layers, regions=cell.outer) if outwards and cell.outer else layers
@@ -145,8 +145,8 @@ def _meshes(cell: "_Cell", layers: LayerCell, beside_mm: Sequence[float]) -> tup
             mesh = PrismMesh.of(near, beside_mm, grid_mm, far_mm)
             if mesh.plan.slenderness_mm() > least_mm:
                 break
-        found.append(mesh)
-    return found[0], found[1], True
+        meshes.append(mesh)
+    return meshes[0], meshes[1], True
 
 
 @dataclass(frozen=True)
@@ -213,10 +213,10 @@ class _Cell:
     def shares(self, mesh: PrismMesh) -> np.ndarray:
         """Number of times that each triangle of a mesh occurs in the sensor, beyond the least (t,)."""
         middle = mesh.plan.points_mm[mesh.plan.triangles].mean(1)
-        found = np.ones(len(middle))
+        shares = np.ones(len(middle))
         for at, side in zip(middle.T, (self.x, self.y), strict=True):
-            found *= side.shares[np.searchsorted(side.places_mm[1:-1] - side.low_mm, at)]
-        return np.asarray(found - self.x.shares.min() * self.y.shares.min())
+            shares *= side.shares[np.searchsorted(side.places_mm[1:-1] - side.low_mm, at)]
+        return np.asarray(shares - self.x.shares.min() * self.y.shares.min())
 
 
 @lru_cache(maxsize=8)
@@ -227,27 +227,20 @@ def _cell(scene: Scene) -> _Cell:
         return _enclosed(scene)
     if slanted:
         raise ValueError(f"{slanted.name} is slanted or curved in elevation: its layers are no prisms")
-    levels = np.unique(np.array([z for b in scene.bodies for p in b.pieces for z in p.span("z")]).round(9))
-    levels = levels[np.append(True, np.diff(levels) > SLIVER_MM)]
-    layers = [(low, high, _outlines(scene, (low + high) / 2)) for low, high in pairwise(levels.tolist())]
-    patterned = [region for *_, own in layers for region in own.values()]
+    layers = slabs(scene)
+    patterned = [region for slab in layers for region in slab.inner.values()]
     x, y = _sides(scene, patterned)
     whole = shapely.box(x.low_mm, y.low_mm, x.high_mm, y.high_mm)
     half = halved((x, y), [shapely.intersection(r, whole) for r in dict.fromkeys(patterned)])
     try:
-        return _numbered(levels.tolist(), _within(layers, *half), *half)
+        return _numbered(_levels(layers), _within(layers, *half), *half)
     except _Uncovered as error:
-        return _surrounded(scene, levels.tolist(), layers, x, y, error.gap_mm)
+        return _surrounded(scene, layers, x, y, error.gap_mm)
 
 
-def _outlines(scene: Scene, z_mm: float) -> dict[Body, Region]:
-    """Region of each body at a height, of upright pieces."""
-    outlines: dict[Body, list[shapely.Polygon]] = defaultdict(list)
-    for body in scene.bodies:
-        for p in body.pieces:
-            if p.span("z")[0] < z_mm < p.span("z")[1]:
-                outlines[body].append(shapely.Polygon(seen_from_above(p)))
-    return {body: shapely.union_all(own) for body, own in outlines.items()}
+def _levels(layers: Sequence[Slab]) -> list[float]:
+    """Planes between slabs [mm]."""
+    return [layers[0].low_mm, *(slab.high_mm for slab in layers)]
 
 
 def _sides(scene: Scene, patterned: Sequence[Region]) -> tuple[Repeat, Repeat]:
@@ -274,15 +267,12 @@ class _Uncovered(ValueError):
         self.gap_mm = gap_mm
 
 
-_Slab = tuple[float, float, dict[Body, Region]]
-
-
-def _within(slabs: Sequence[_Slab], x: Repeat, y: Repeat) -> list[dict[Body, Region]]:
+def _within(layers: Sequence[Slab], x: Repeat, y: Repeat) -> list[dict[Body, Region]]:
     """Regions of slabs inside a cell, from its corner; raises ValueError where they overlap."""
     window = (x.low_mm, y.low_mm, x.high_mm, y.high_mm)
     inside = [
-        {body: translate(shapely.clip_by_rect(r, *window), -x.low_mm, -y.low_mm) for body, r in own.items()}
-        for *_, own in slabs
+        {body: translate(shapely.clip_by_rect(r, *window), -x.low_mm, -y.low_mm) for body, r in slab.inner.items()}
+        for slab in layers
     ]
     if any(
         sum(r.area for r in own.values()) > shapely.union_all(list(own.values())).area + _OVERLAP_MM2 for own in inside
@@ -291,16 +281,14 @@ def _within(slabs: Sequence[_Slab], x: Repeat, y: Repeat) -> list[dict[Body, Reg
     return inside
 
 
-def _surrounded(
-    scene: Scene, levels_mm: list[float], slabs: Sequence[_Slab], x: Repeat, y: Repeat, gap_mm: float
-) -> _Cell:
+def _surrounded(scene: Scene, layers: Sequence[Slab], x: Repeat, y: Repeat, gap_mm: float) -> _Cell:
     """A scene whose electrodes do not cover it, whole or by half, with air around, as its ends are not those of a cell.
 
     Above and below, that air ends in a layer more, which the flux may use and the potential may not.
     """
     if gap_mm <= SLIVER_MM:
         raise ValueError("the electrodes touch: the capacitance grows without bound")
-    air, regions = _AIR * gap_mm, [region for *_, own in slabs for region in own.values()]
+    air, regions = _AIR * gap_mm, [region for slab in layers for region in slab.inner.values()]
     sides, ends = [], []
     for axis, side in enumerate((x, y)):
         if scene.repeats[axis]:
@@ -310,11 +298,12 @@ def _surrounded(
             sides.append(widened(regions, scene.size_mm, axis, air))
             ends.append((sides[-1].low_mm < 0, True))
     thick = _SHELL * air
+    levels_mm = _levels(layers)
     low, high = levels_mm[0] - air, levels_mm[-1] + air
-    inside = _within(slabs, sides[0], sides[1])
+    inside = _within(layers, sides[0], sides[1])
     heights = [low - thick, low, *levels_mm, high, high + thick]
-    found = _numbered(heights, [{}, {}, *inside, {}, {}], sides[0], sides[1], air)
-    return replace(found, open_sides=(ends[0], ends[1]))
+    cell = _numbered(heights, [{}, {}, *inside, {}, {}], sides[0], sides[1], air)
+    return replace(cell, open_sides=(ends[0], ends[1]))
 
 
 def _enclosed(scene: Scene) -> _Cell:
@@ -330,14 +319,14 @@ def _enclosed(scene: Scene) -> _Cell:
         return ends[body.terminal] if body.terminal else conductors + names.index(body.material)
 
     def numbered(own: dict[Body, Region]) -> dict[int, Region]:
-        found: dict[int, list[Region]] = defaultdict(list)
+        by_kind: dict[int, list[Region]] = defaultdict(list)
         for body, region in own.items():
             if body.material != "air" and not region.is_empty:
-                found[kind(body)].append(translate(region, -x.low_mm, -y.low_mm))
-        return {k: shapely.union_all(regions) for k, regions in found.items()}
+                by_kind[kind(body)].append(translate(region, -x.low_mm, -y.low_mm))
+        return {k: shapely.union_all(regions) for k, regions in by_kind.items()}
 
     every = [region for slab in layers for own in (slab.inner, slab.outer) for region in own.values()]
-    heights = [layers[0].low_mm, *(slab.high_mm for slab in layers)]
+    heights = _levels(layers)
     x = y = Repeat.of(0.0, 1.0, False, 1.0)
     gap_mm = _gap_mm([numbered(slab.outer) for slab in layers], heights, conductors)
     if not SLIVER_MM < gap_mm < np.inf:
@@ -403,12 +392,12 @@ def _numbered(
 
 def _dielectrics(own: Mapping[Body, Region], first: int, names: Sequence[str]) -> dict[int, Region]:
     """Region of each dielectric of a layer, numbered by its material; air is left out."""
-    found: dict[int, Region] = {}
+    by_kind: dict[int, Region] = {}
     for body, region in own.items():
         if not body.terminal and body.material != "air" and not region.is_empty:
             kind = first + names.index(body.material)
-            found[kind] = shapely.union_all([found.get(kind, region), region])
-    return found
+            by_kind[kind] = shapely.union_all([by_kind.get(kind, region), region])
+    return by_kind
 
 
 def _conductors(connected: Sequence[int], terminals: Sequence[str]) -> Whole:
@@ -435,10 +424,10 @@ def _uncovered(plans: np.ndarray, kinds: np.ndarray, sizes_mm: tuple[float, floa
 def _gap_mm(regions: Sequence[dict[int, Region]], heights_mm: Sequence[float], conductors: int) -> float:
     """Smallest distance of an electrode from another conductor [mm]."""
     spans = list(pairwise(heights_mm))
-    found = np.inf
+    least = np.inf
     for (i, one), (j, other) in product(enumerate(regions), repeat=2):
         apart = max(spans[i][0] - spans[j][1], spans[j][0] - spans[i][1], 0.0)
-        for end in {BOTTOM, TOP} & one.keys() if apart < found else ():
+        for end in {BOTTOM, TOP} & one.keys() if apart < least else ():
             for kind in (k for k in other if k < conductors and k != end):
-                found = min(found, float(np.hypot(shapely.distance(one[end], other[kind]), apart)))
-    return found
+                least = min(least, float(np.hypot(shapely.distance(one[end], other[kind]), apart)))
+    return least

@@ -50,19 +50,19 @@ def modulus_pa(
     """
     if min(youngs_modulus_pa, width_m, thickness_m, bulk_pa, *electrode_pa, *electrode_m) <= 0:
         raise OutOfRange("a size or a modulus of a bonded plate is 0 or less; expected numbers above 0")
-    g, d, held = youngs_modulus_pa / 3, thickness_m, base == "bonded"
+    g, d, is_bonded = youngs_modulus_pa / 3, thickness_m, base == "bonded"
     (g_low, g_top), (t_low, t) = [e / 3 for e in electrode_pa], electrode_m
-    if not held:
+    if not is_bonded:
         g_top, t = (g_low * t_low + g_top * t) / (t_low + t), (t_low + t) / 2
     x = width_m / 2 * np.sin(np.linspace(0, np.pi / 2, _ELEMENTS + 1))
     length, one = np.diff(x)[:, None], np.ones((_ELEMENTS, 1))
     dp, du = (np.array(of) / length for of in ([-1, 1, 0, 0], [0, 0, -1, 1]))  # of p, p, u, u at both ends
     p, u = (one * np.array(of) / 2 for of in ([1, 1, 0, 0], [0, 0, 1, 1]))
     slip = t_low * g / (g_low * d)
-    below = (slip * u - t_low * (d + t_low) / (2 * g_low) * dp) / (1 + slip) if held else u
+    below = (slip * u - t_low * (d + t_low) / (2 * g_low) * dp) / (1 + slip) if is_bonded else u
     film = d * (u + below) / 2 - d**3 / (12 * g) * dp
     up, down = (g * (u - below) / d + sign * d / 2 * dp for sign in (1, -1))  # shear on the upper and lower face
-    lower = t_low**2 / (2 * g_low) * down - t_low**3 / (3 * g_low) * dp if held else t * u
+    lower = t_low**2 / (2 * g_low) * down - t_low**3 / (3 * g_low) * dp if is_bonded else t * u
     tension = 4 * max(g_top - g, _LEAST * g_top) * t * du - t * p
     turn, half = np.array([-1.0, 1.0]), length / 2
     rows = [
@@ -78,7 +78,7 @@ def modulus_pa(
     for fixed in (n - 1, n):  # p at the side, u in the middle
         matrix[fixed] = np.eye(2 * n)[fixed]
         load[fixed] = 0
-    found = np.linalg.solve(matrix, load)
-    pressure = float(np.trapezoid(found[:n], x))
-    squeezed = float(film[-1] @ found[at[-1]]) + d / bulk_pa * pressure
+    solution = np.linalg.solve(matrix, load)
+    pressure = float(np.trapezoid(solution[:n], x))
+    squeezed = float(film[-1] @ solution[at[-1]]) + d / bulk_pa * pressure
     return pressure / (squeezed / d) + 4 * g

@@ -55,10 +55,10 @@ def displacement_m(scene: Scene, modulus_pa: Mapping[str, float], stress_pa: Seq
     # Gap [mm], compliance t / M [mm/Pa], width [mm] and thickness [mm] at places in all columns
     share, rows = _PLACES, []
     try:
-        found = parts(scene)
+        sections_of = parts(scene)
     except ValueError as error:
         raise BadInput(f"no springs of columns: {error}") from None
-    for part in found:
+    for part in sections_of:
         for column in part.columns:
             bottoms, tops = (
                 np.array([getattr(layer, key) for layer in column.layers]) @ np.array([1 - share, share])

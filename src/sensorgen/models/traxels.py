@@ -17,9 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.solvers.network import links as links
-from sensorgen.solvers.network.band import product
-from sensorgen.solvers.network.nodes import Nodes, StraightLines
+from sensorgen.solvers import network as links
+from sensorgen.solvers.network import Nodes, StraightLines, product
 
 SOURCE = "Lines as in Dijkshoorn et al., Sensors 2021, 21, 3710 (traxel model); network derived anew"
 COST = 2
@@ -78,14 +77,14 @@ def resistance(
     pairs = links.near(lines)
     crossings = links.crossings(lines, pairs)
     nodes = Nodes.of(lines, crossings.places())
-    found = links.gathered(lines, nodes, pairs, crossings)
-    conductance = found.conductance_s(resistivity_ohm_m, contact_ohm_m2)
+    network = links.gathered(lines, nodes, pairs, crossings)
+    conductance = network.conductance_s(resistivity_ohm_m, contact_ohm_m2)
     # Current along x in a mean field of 1 V/m [A]
     x = nodes.place_m[:, 0]
     left, right = x <= ends_m[0], x >= ends_m[1]
     if not left.any() or not right.any():
         raise OutOfRange(f"no line reaches beyond {ends_m[0]:g} and {ends_m[1]:g} m: put the ends within the electrode")
-    matrix = found.matrix(conductance, len(x))
+    matrix = network.matrix(conductance, len(x))
     _, part = connected_components(matrix, directed=False)
     free = ~(left | right) & np.isin(part, part[left | right])
     leaving = matrix @ x  # were the field the same everywhere

@@ -38,8 +38,8 @@ def _drawn_cells(design: Design) -> Cells:
         scene, periods = _one_period(scene)
         count *= periods
     rims = tuple((_connected(design, part), number) for part, number in beside)
-    said = "its cells leave rims without structures: compression is that of the cells, as if there were no rims"
-    remarks: dict[str, tuple[str, ...]] = {DRAWN: (said,) if rims else ()}
+    rimless = "its cells leave rims without structures: compression is that of the cells, as if there were no rims"
+    remarks: dict[str, tuple[str, ...]] = {DRAWN: (rimless,) if rims else ()}
     return Cells({DRAWN: scene}, count, period, partial(_drawn_gap, design), remarks=remarks, beside=rims)
 
 
@@ -64,11 +64,11 @@ def _parts(design: Design) -> "list[tuple[Scene, float]]":
     if not isinstance(params, ArrayParams) or all(isinstance(p, Prism) for b in scene.bodies for p in b.pieces):
         return [(scene, 1.0)]
     given = design.model_dump(exclude_defaults=True, mode="json")
-    found = []
+    parts = []
     for length, width, count in params.parts():
         one = replace(params, length_mm=length, width_mm=width)
-        found.append((make(given | {"parameters": asdict(one)}).in_use, count))
-    return found
+        parts.append((make(given | {"parameters": asdict(one)}).in_use, count))
+    return parts
 
 
 def _one_period(scene: "Scene") -> "tuple[Scene, float]":
@@ -133,9 +133,9 @@ def estimated(design: Design, walls: str = "") -> Body:
     """
     design = _one(design)
     rules = (walls,) if walls else wall_rules(design.profile.walls)
-    said = f"printed, estimated ({WALLS.get(rules[0], rules[0])})"
+    provenance = f"printed, estimated ({WALLS.get(rules[0], rules[0])})"
     identity = _identity(design, "estimated", *rules, _height_error(design))
-    return Body(design, "estimated", said, identity, partial(_estimated_cells, design, rules))
+    return Body(design, "estimated", provenance, identity, partial(_estimated_cells, design, rules))
 
 
 def _estimated_cells(design: Design, rules: Sequence[str]) -> Cells:
@@ -199,8 +199,8 @@ def registered(design: Design, path: Path) -> "Printed":
     from sensorgen.asprinted import printed, registration
 
     try:
-        found = registration.placed(design, path)
-        return printed.body(design, found.paths, slicer=path.name, centre_mm=found.centre_mm)
+        placement = registration.placed(design, path)
+        return printed.body(design, placement.paths, slicer=path.name, centre_mm=placement.centre_mm)
     except BadInput as error:
         raise error.within(str(path)) from None
 
@@ -242,10 +242,10 @@ def _printed_cells(prints: "Mapping[str, Printed]") -> Cells:
 
     cells, remarks = {}, {}
     for rule, printed in prints.items():
-        said = printed.remarks()
+        words = printed.remarks()
         for name, cell in printed.cells.items():
             key = rule if len(printed.cells) == 1 else name
-            cells[key], remarks[key] = cell, said[name]
+            cells[key], remarks[key] = cell, words[name]
     first, (printed, *_) = next(iter(cells.values())), prints.values()
     period = None
     if getattr(printed.design.params, "period_mm", None) is not None:
@@ -258,8 +258,8 @@ def _printed_cells(prints: "Mapping[str, Printed]") -> Cells:
     thicker = film.thicker(first.scene, error_mm)
     less = map(partial(film.thicker, first.scene), (-error_mm, -printed.design.layers.layer_mm))
     films = FilmThickness(error_mm, next(less), thicker, next(less)) if error_mm and thicker else None
-    found = Cells(scenes, first.count, period, partial(_printed_gaps, scenes), printed.lines, remarks, films)
-    return _inside(printed.design, found) if printed.design.border else found
+    whole = Cells(scenes, first.count, period, partial(_printed_gaps, scenes), printed.lines, remarks, films)
+    return _inside(printed.design, whole) if printed.design.border else whole
 
 
 def _printed_gaps(scenes: "Mapping[str, Scene]") -> dict[str, float]:

@@ -1,27 +1,135 @@
 """Select the least expensive capacitance model that applies to a scene and meets a tolerance.
 
 Models that take milliseconds always run: their bounds show whether more is needed. The others are ranked by their
-expected time and error (:mod:`sensorgen.prediction.cost_model`), and run one after the other.
+expected time and error, and run one after the other. Both are scaled from measurements to the scene: all of
+``models/expected.yaml``, made by ``bench/expected.py``.
 """
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cache, lru_cache
 from hashlib import sha256
+from importlib import resources
 from json import dumps
 from math import hypot, inf
-from typing import Any
+from typing import Any, NamedTuple
 
+from sensorgen import models
 from sensorgen.core import cache as cached
+from sensorgen.core import yamlfile
 from sensorgen.core.bounds import Disc, Interval
 from sensorgen.core.errors import OutOfRange, SensorgenError, UnknownName
 from sensorgen.design.body import Cells
 from sensorgen.models import capacitance_models
-from sensorgen.prediction.cost_model import expected, measured
 from sensorgen.prediction.plan import PlanCandidate
 from sensorgen.scene.scene import FLOATING, Scene, content
 from sensorgen.scene.sections import overlap, sections
 from sensorgen.scene.slabs import is_open
+
+FILE = "expected.yaml"
+
+
+class MeasuredCost(NamedTuple):
+    """A model on one scene.
+
+    ``points`` are the widths of its bounds that it reached [-], each with its time [s]; the time grows with a power of
+    the number of ``parts``, of the kind ``counted``. ``loading`` what it needs takes once [s].
+    """
+
+    scene: str
+    counted: str
+    parts: int
+    power: float
+    points: list[tuple[float, float]]
+    loading: float = 0.0
+
+
+class Size(NamedTuple):
+    """Number of parts of the repeating cell of a scene, and whether the sensor's end cuts one."""
+
+    parts: int
+    is_cut: bool
+
+
+def expected(model: str, scene: Scene, width: float) -> tuple[float | None, float | None]:
+    """Width and seconds of the fastest measurement that did, or of the one that came nearest, scaled to a scene.
+
+    Parameters
+    ----------
+    model : str
+        Name of a model.
+    scene : Scene
+        Of any kind; where its parts cannot be counted, time is as measured.
+    width : float
+        That is wanted [-]; where any will do, nothing is scaled.
+
+    Returns
+    -------
+    (float, float) or (None, None)
+        Nothing where the model was never measured.
+
+    Notes
+    -----
+    In a cross-section that is cut amid a cell the energy of its own length counts; the relative width is the root of
+    the cell's.
+    """
+    if model not in measured():
+        return None, None
+    reachable = points(model, scene if width < inf else None)
+    enough = [point for point in reachable if point[0] <= width]
+    return min(enough, key=lambda p: p[1]) if enough else min(reachable)
+
+
+def points(model: str, scene: Scene | None) -> list[tuple[float, float]]:
+    """All widths that a model reached [-], each with its time [s], scaled to a scene if one is given."""
+    cost = measured()[model]
+    size = _size(scene, cost.counted) if scene else None
+    root = 0.5 if size and size.is_cut else 1.0
+    times = (size.parts / cost.parts) ** cost.power if size else 1.0
+    return [(reached**root, seconds * times) for reached, seconds in cost.points]
+
+
+@cache
+def measured() -> dict[str, MeasuredCost]:
+    """Each model on its scene."""
+    data = yamlfile.parse((resources.files(models) / FILE).read_text("utf-8"), FILE)
+    return {
+        name: MeasuredCost(**{**entry, "points": [(width, seconds) for width, seconds in entry["points"]]})
+        for name, entry in data.items()
+    }
+
+
+@lru_cache(maxsize=8)
+def _size(scene: Scene, counted: str) -> Size | None:
+    try:
+        return COUNTED[counted](scene)
+    except ValueError:  # a scene that the model does not apply to either
+        return None
+
+
+def _bands(scene: Scene) -> Size:
+    """Pieces of one material in vertical strips without corners."""
+    from sensorgen.scene.unit_cell import cell
+
+    period = cell(sections(scene)[0], scene.size_mm[2])
+    return Size(sum(len(s.bands) for s in period.slices), len(set(period.shares)) > 1)
+
+
+def _boxes(scene: Scene) -> Size:
+    """Boxes between the electrodes."""
+    from sensorgen.solvers.electrostatics.bricks import grid
+
+    return Size(int((grid(scene).fill > 1).sum()), is_cut=False)
+
+
+COUNTED: dict[str, Callable[[Scene], Size]] = {
+    "bands": _bands,
+    "pieces": lambda scene: _bands(scene)._replace(is_cut=False),  # of a cell that is pressed by itself
+    "boxes": _boxes,
+    "cells": lambda _: Size(1, is_cut=False),  # a round one
+}
+
 
 # Relative width of a capacitance's bounds where none is asked for: a cross-section, 3D, electrodes that do not cover
 PLANE, SPATIAL, OPEN = 1e-3, 1e-2, 2.5e-2
@@ -119,14 +227,14 @@ def of_sensor(
     cells: Cells, permittivity: Mapping[str, complex], width: float = inf, model: str = "", keep: bool = True
 ) -> Answer:
     """Capacitance of a whole sensor by its most likely cells; parameters and errors as of :func:`capacitance`."""
-    found = capacitance(cells.first(), permittivity, width, model, keep).times(cells.count, cells.count_error)
+    whole = capacitance(cells.first(), permittivity, width, model, keep).times(cells.count, cells.count_error)
     for scene, count in cells.beside:
         try:
             rims = capacitance(scene, permittivity, width, model, keep)
         except Unpredictable as error:
             raise Unpredictable(f"rims that its cells leave; a sensor of whole cells has none: {error}") from None
-        found = found.plus(rims.times(count, cells.count_error))
-    return found
+        whole = whole.plus(rims.times(count, cells.count_error))
+    return whole
 
 
 def capacitance(
@@ -177,8 +285,8 @@ def capacitance(
         return _asked(scene, permittivity, width, model)
     question = _question(scene, permittivity, width, model)
     known = cached.known(question)
-    found = known or cached.answer(question, lambda: _plain(_asked(scene, permittivity, width, model)))
-    return replace(_of_plain(found), known=known is not None)
+    data = known or cached.answer(question, lambda: _plain(_asked(scene, permittivity, width, model)))
+    return replace(_of_plain(data), known=known is not None)
 
 
 def weighed(scene: Scene, width: float = inf, model: str = "", lossy: bool = False) -> tuple[PlanCandidate, ...]:
@@ -200,11 +308,11 @@ def _ordered(scene: Scene, width: float, model: str) -> list[PlanCandidate]:
     loaded = capacitance_models()
     if model and model not in loaded:
         raise UnknownName("model of capacitance", model, loaded)
-    found = [
+    candidates = [
         PlanCandidate(name, *expected(name, scene, width), "" if model in ("", name) else f"--model {model}")
         for name in loaded
     ]
-    return sorted(found, key=lambda c: _rank(c, loaded[c.model].COST, width))
+    return sorted(candidates, key=lambda c: _rank(c, loaded[c.model].COST, width))
 
 
 def _unfit(candidate: PlanCandidate, scene: Scene, kind: str) -> str:
@@ -241,14 +349,14 @@ def _asked(scene: Scene, permittivity: Mapping[str, complex], width: float, mode
             plan.append(replace(candidate, passed_over=reason))
             continue
         try:
-            found, seconds = _timed(candidate.model, kind, scene, permittivity, width)
+            bound, seconds = _timed(candidate.model, kind, scene, permittivity, width)
         except Unsolved as error:  # the others answer as well as they can
             refused.append(f"{candidate.model}: {error}")
             plan.append(replace(candidate, passed_over=str(error)))
             continue
-        bounds[candidate.model] = found
+        bounds[candidate.model] = bound
         _refuse_contradiction(bounds)
-        plan.append(replace(candidate, width=found.width(), seconds=seconds))
+        plan.append(replace(candidate, width=bound.width(), seconds=seconds))
     if not bounds:
         raise Unpredictable(_together(refused))
     best = min(bounds, key=lambda name: bounds[name].width())
@@ -270,18 +378,18 @@ def _kind(permittivity: Mapping[str, complex]) -> str:
     return _LOSSY if any(isinstance(value, complex) for value in permittivity.values()) else _LOSSLESS
 
 
-def _parts(found: Interval | Disc) -> tuple[Interval, Interval | None]:
+def _parts(bound: Interval | Disc) -> tuple[Interval, Interval | None]:
     """Bounds of a capacitance, and those of what it loses."""
-    if isinstance(found, Interval):
-        return found, None
-    real, loss = found.centre.real, -found.centre.imag
-    return Interval(real - found.radius, real + found.radius), Interval(loss - found.radius, loss + found.radius)
+    if isinstance(bound, Interval):
+        return bound, None
+    real, loss = bound.centre.real, -bound.centre.imag
+    return Interval(real - bound.radius, real + bound.radius), Interval(loss - bound.radius, loss + bound.radius)
 
 
 def _refuse_contradiction(bounds: Mapping[str, Interval | Disc]) -> None:
     """All of them hold the truth: any two overlap."""
-    for part in zip(*(_parts(found) for found in bounds.values()), strict=True):
-        named = {name: found for name, found in zip(bounds, part, strict=True) if found}
+    for part in zip(*(_parts(bound) for bound in bounds.values()), strict=True):
+        named = {name: bound for name, bound in zip(bounds, part, strict=True) if bound}
         if named:
             _refuse_apart(named)
 
@@ -298,7 +406,7 @@ def _refuse_apart(bounds: Mapping[str, Interval]) -> None:
 
 def _idle(candidate: PlanCandidate, bounds: Mapping[str, Interval | Disc], width: float) -> str:
     """Why a model that applies is not needed."""
-    best = min((found.width() for found in bounds.values()), default=inf)
+    best = min((bound.width() for bound in bounds.values()), default=inf)
     if bounds and best <= width:
         return "not needed"
     return f"not expected to come nearer than {candidate.reach():.2g}" if candidate.reach() >= best else ""
@@ -311,8 +419,8 @@ def _timed(
     model = capacitance_models()[name]
     given = (model.WIDTH if width == inf else width,) if hasattr(model, "WIDTH") else ()
     start = time.perf_counter()
-    found: Interval | Disc = getattr(model, kind)(scene, permittivity, *given)
-    return found, time.perf_counter() - start
+    bound: Interval | Disc = getattr(model, kind)(scene, permittivity, *given)
+    return bound, time.perf_counter() - start
 
 
 def _question(scene: Scene, permittivity: Mapping[str, complex], width: float, model: str) -> dict[str, Any]:
@@ -348,5 +456,5 @@ def is_plate(answer: Answer, scene: Scene) -> bool:
         return False
     from sensorgen.models import porous
 
-    found = porous.filling(scene, dict.fromkeys((body.material for body in scene.bodies), 1.0))
-    return found is None or found.share > 1 - _SOLID
+    filling = porous.filling(scene, dict.fromkeys((body.material for body in scene.bodies), 1.0))
+    return filling is None or filling.share > 1 - _SOLID

@@ -1,21 +1,19 @@
 """Capacitance per area of a body between bounds, unloaded: the result of ``sensorgen cell``."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from math import inf
-from typing import Annotated, Any
+from typing import Annotated
 
 from sensorgen.core.display import Displayed
 from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.units import M_PER_MM, si
 from sensorgen.design.body import Body
 from sensorgen.design.values import MaterialValue
-from sensorgen.prediction import losses
+from sensorgen.prediction import rest_state
 from sensorgen.prediction.capacitance import Unpredictable, default_width, of_sensor
 from sensorgen.prediction.plan import PlanCandidate, candidates_table
-from sensorgen.prediction.sweep import Sweep
-from sensorgen.prediction.sweep import sweep as swept
+from sensorgen.prediction.sweep import Sweeper
 
 QUANTITIES = {
     "relative_permittivity": "relative permittivity",
@@ -132,11 +130,13 @@ class CellCapacitance(Displayed):
 
     def remarks(self) -> Sequence[str]:
         """Material values and their sources."""
-        found = [
+        by_quantity = [
             (QUANTITIES[quantity], [v for v in self.values if v.quantity == quantity])
             for quantity in dict.fromkeys(v.quantity for v in self.values)
         ]
-        return [f"{name} of {', '.join(f'{v.material} {v.value:g} ({v.source})' for v in of)}" for name, of in found]
+        return [
+            f"{name} of {', '.join(f'{v.material} {v.value:g} ({v.source})' for v in of)}" for name, of in by_quantity
+        ]
 
     def explained(self) -> Iterator[Part]:
         """The plan, with what came of it."""
@@ -172,41 +172,30 @@ def answer(body: Body, asked: CapacitanceQuestion) -> CellCapacitance:
     """
     design, cells = body.design, body.cells
     scene = cells.first()
-    permittivity, values = losses.permittivity(design, asked.frequency_hz)
+    permittivity, values = rest_state.permittivity(design, asked.frequency_hz)
     width = default_width(scene) if asked.width is None else asked.width
-    found = of_sensor(cells, permittivity, width, asked.model, asked.keep)
+    total = of_sensor(cells, permittivity, width, asked.model, asked.keep)
     area_m2 = design.area_mm2 * M_PER_MM**2
-    real, loss, per_area = found.capacitance_f, found.loss_f, found.capacitance_f.times(1 / area_m2)
+    real, loss, per_area = total.capacitance_f, total.loss_f, total.capacitance_f.times(1 / area_m2)
     tan_delta = None
     if loss and real.lower > 0:
         ends = (real.lower, real.upper)
         tan_delta = loss.lower / ends[loss.lower > 0], loss.upper / ends[loss.upper < 0]
     return CellCapacitance(
-        design=design.name, body=body.provenance, model=found.model,
+        design=design.name, body=body.provenance, model=total.model,
         lower_f_per_m2=per_area.lower, upper_f_per_m2=per_area.upper,
         loss_lower_f_per_m2=loss.lower / area_m2 if loss else None,
         loss_upper_f_per_m2=loss.upper / area_m2 if loss else None,
-        relative_width=found.width(), seconds=found.seconds(),
-        reached=found.width() <= found.wanted + 2 * cells.count_error * (1 + found.wanted),
-        accuracy=found.wanted if found.wanted < inf else None, known=found.known, area_m2=area_m2, tan_delta=tan_delta,
-        frequency_hz=asked.frequency_hz if loss else None, refused=found.refused, plan=found.plan, values=tuple(values),
+        relative_width=total.width(), seconds=total.seconds(),
+        reached=total.width() <= total.wanted + 2 * cells.count_error * (1 + total.wanted),
+        accuracy=total.wanted if total.wanted < inf else None, known=total.known, area_m2=area_m2, tan_delta=tan_delta,
+        frequency_hz=asked.frequency_hz if loss else None, refused=total.refused, plan=total.plan, values=tuple(values),
         doubts=cells.remarks.get(next(iter(cells.scenes)), ()),
     )  # fmt: skip
 
 
-def sweep(
-    key: str | tuple[str, ...], points: Sequence[tuple[Any, Body]], asked: CapacitanceQuestion, jobs: int,
-    done: Callable[[], None], cluster: str = "",
-) -> Sweep[CellCapacitance]:  # fmt: skip
-    """Answers along a sweep; a reason stands in place of what no model applies to, or at which one fails.
-
-    Parameters and errors as of :func:`answer` and :func:`sensorgen.prediction.sweep.sweep`.
-    """
-    work = partial(answer, asked=asked)
-    return swept(
-        key, points, work, _failed, refused=(Unpredictable,), keep=asked.keep, jobs=jobs, cluster=cluster, done=done
-    )
-
-
 def _failed(body: Body, reason: str) -> CellCapacitance:
     return CellCapacitance(design=body.design.name, body=body.provenance, reason=reason)
+
+
+sweep = Sweeper(answer, _failed, refused=(Unpredictable,))

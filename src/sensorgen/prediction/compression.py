@@ -1,13 +1,14 @@
 """Displacement and capacitance of a design's cell under pressure: results of ``sensorgen compress``."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
 from math import inf, isfinite, nan
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
@@ -17,14 +18,13 @@ from sensorgen.core.errors import BadInput, MissingValue, NotInstalled, OutOfRan
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.tip import TOPS, WORDS, Tip
-from sensorgen.design.values import assumed, of_all_materials, permittivities
-from sensorgen.models import press2d
+from sensorgen.design.values import assumed, film, of_all_materials, permittivities
+from sensorgen.models import press2d, springs
 from sensorgen.models.compression import curve_of
 from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.prediction import capacitance_answer as at_rest
-from sensorgen.prediction import closed_form_compression as closed_form
-from sensorgen.prediction.capacitance import Unpredictable
-from sensorgen.prediction.compression_law import case_of, under_tops
+from sensorgen.prediction.capacitance import Answer, Unpredictable, capacitance, is_plate
+from sensorgen.prediction.compression_law import case_of, elastic, gap_m, infill, law_of, under_tops
 from sensorgen.prediction.mesh_ladder import (
     MODELS,
     USUAL,
@@ -35,12 +35,101 @@ from sensorgen.prediction.mesh_ladder import (
     PressedPiece,
     estimated,
     mesh_levels,
+    refuse_crushing,
     why_not_applicable,
 )
 from sensorgen.prediction.plan import Level, Plan, PlanCandidate, cheapest, run_until_within
 from sensorgen.prediction.sensor_model import piece as piece_of
-from sensorgen.prediction.sweep import Sweep
-from sensorgen.prediction.sweep import sweep as swept
+from sensorgen.prediction.sweep import Sweeper
+
+
+@dataclass(frozen=True)
+class ClosedForm:
+    """A closed-form estimate of the displacement.
+
+    Attributes
+    ----------
+    displacement_m : (n,) array
+        Of the top, at every stress [m].
+    boundary : dict of str to str
+        Boundary conditions that the law assumes.
+    doubts : tuple of str
+        Limits of its validity.
+    rises : tuple of (n,) array
+        C'(p)/C'(0) - 1, by the law and by each within its error; none of springs [-].
+    """
+
+    displacement_m: NDArray[np.float64]
+    boundary: dict[str, str]
+    doubts: tuple[str, ...]
+    rises: tuple[NDArray[np.float64], ...] = ()
+
+
+def _springs(design: Design, piece: PressedPiece, stress_pa: Sequence[float]) -> ClosedForm:
+    """Samples as springs side by side, for any scene."""
+    scene, why = piece.scene, press2d.why_not_applicable(piece.scene)
+    solids = elastic(design, scene)
+    moduli = {n: s.youngs_modulus_pa / (1.0 if why else 1 - s.poisson_ratio**2) for n, s in solids.items()}
+    boxes = all(p.is_box() for body in scene.bodies for p in body.pieces)
+    meaning = (
+        "at most this, at small strain under a stiff plate"
+        if boxes
+        else "an estimate: columns without their neighbours"
+    )
+    doubts = (
+        f"displacement: {meaning}", "no capacitance under stress: springs have no outlines", *([why] if why else [])
+    )  # fmt: skip
+    return ClosedForm(springs.displacement_m(scene, moduli, stress_pa), {"top": "rigid"}, doubts)
+
+
+PLATES = {"unconfined": "free", "bonded": "bonded to both electrodes"}
+
+
+def law_name(design: Design, piece: PressedPiece) -> str:
+    """Law in closed form of a plate of one material, or of infill; "" of other cells, which are solved."""
+    try:
+        if piece.period_mm is not None or len({b.terminal for b in piece.scene.bodies} - {""}) != 2:
+            return ""
+        known = _at_rest(design, piece)
+        if is_plate(known, piece.scene):
+            return "bonded" if _between(piece) == {film(design)} else ""
+        return "infill" if infill(design, piece) else ""
+    except SensorgenError:
+        return ""
+
+
+def _at_rest(design: Design, piece: PressedPiece) -> Answer:
+    eps = {t.material: t.value for t in permittivities(design)}
+    return capacitance(piece.scene, eps, model="columns", keep=False)
+
+
+def _between(piece: PressedPiece) -> set[str]:
+    return {body.material for body in piece.scene.bodies if not body.terminal}
+
+
+def _law(name: str, design: Design, piece: PressedPiece, stress_pa: Sequence[float]) -> ClosedForm:
+    """A law of solid plates or of infill."""
+    known = _at_rest(design, piece)
+    if name in PLATES and (not is_plate(known, piece.scene) or _between(piece) != {film(design)}):
+        raise BadInput(f"--model {name} applies to a solid plate of one material, {design.shape} is none: try springs")
+    refuse_crushing(
+        stress_pa[-1], {n: taken.value for n, taken in of_all_materials(design, "youngs_modulus_pa").items()}
+    )
+    law, gap, stress = law_of(design, known, name, printed=piece), gap_m(piece.scene), np.asarray(stress_pa)
+    with suppress(OutOfRange):  # of the softest, whose electrodes would touch
+        strains = [each.capacitive_strain(stress)[0] for each in (law.compression, *law.others)]
+        rises = tuple(strain / (1 - strain) for strain in strains)
+        displacement_m = stress / law.compression.foundation_stiffness_pa_per_m(gap)
+        doubts = (f"displacement: of the film between its electrodes, {law.compression.source}", *law.doubts)
+        return ClosedForm(displacement_m, {"sides": PLATES.get(name, "as infill")}, doubts, rises)
+    raise OutOfRange(f"{stress_pa[-1] / 1e3:g} kPa: by the softest law the electrodes touch; expected less")
+
+
+CLOSED_FORMS: dict[str, Callable[[Design, PressedPiece, Sequence[float]], ClosedForm]] = {
+    "springs": _springs, **{name: partial(_law, name) for name in (*PLATES, "infill")},
+}  # fmt: skip
+FIRST = "springs"  # applies to any scene: the default where no field can be solved
+
 
 __all__ = [
     "ALL",
@@ -54,7 +143,7 @@ __all__ = [
 ]
 
 Step = Callable[[float], None]
-ALL = (*MODELS, *closed_form.MODELS)
+ALL = (*MODELS, *CLOSED_FORMS)
 
 COLUMNS = (
     Column("stress", "kPa", key="stress_kpa"), Column("displacement", "um", key="displacement_um"),
@@ -187,8 +276,8 @@ class CompressionResult(Displayed):
             self.stress_kpa, self.displacement_um, self.displacement_error_um, self.rise_f_per_m2,
             self.rise_error_f_per_m2, self.lower_f_per_m2, self.upper_f_per_m2, *under.values(), strict=True,
         )  # fmt: skip
-        said = self.reason or "; ".join(self.faults)
-        more = self.converged_kpa, self.largest_rise_error, self.model, self.reached, said
+        reason = self.reason or "; ".join(self.faults)
+        more = self.converged_kpa, self.largest_rise_error, self.model, self.reached, reason
         rows = curve if self.model else [(None,) * 9]
         return Table("compression", "", (*COLUMNS, *columns, *HIDDEN), tuple((*row, *more) for row in rows))
 
@@ -254,39 +343,25 @@ def answer(body: Body, asked: PressQuestion, *, step: Step | None = None) -> Com
         if asked.accuracy < inf:
             return _within(body, asked, step)
         model = _model(body, asked)
-        if model in closed_form.MODELS:
+        if model in CLOSED_FORMS:
             return _closed_form(body, asked, model)
         case = _case(body, asked)
-        found = _estimated(case, asked, USUAL, step)
+        estimate = _estimated(case, asked, USUAL, step)
         if asked.check_mesh:
             finer = _estimated(case, asked, USUAL + 1, step)
-            found = replace(finer, found=press2d.compared(found.found, finer.found))
-        return _result(body, case, found, asked)
+            estimate = replace(finer, found=press2d.compared(estimate.found, finer.found))
+        return _result(body, case, estimate, asked)
     except NotInstalled as error:
         if asked.model:
             raise
         return _unsolved(body, asked, str(error))
 
 
-def sweep(
-    key: str | tuple[str, ...],
-    points: Sequence[tuple[Any, Body]],
-    asked: PressQuestion,
-    jobs: int,
-    done: Callable[[], None],
-    cluster: str = "",
-) -> Sweep[CompressionResult]:
-    """Answers along a sweep; a reason stands in place of a point that has no answer.
-
-    Parameters and errors as of :func:`answer` and :func:`sensorgen.prediction.sweep.sweep`.
-    """
-    alone = (BadInput, MissingValue, OutOfRange, Unpredictable)
-    work = partial(answer, asked=asked)
-    return swept(key, points, work, _failed, refused=alone, keep=asked.keep, jobs=jobs, cluster=cluster, done=done)
-
-
 def _failed(body: Body, reason: str) -> CompressionResult:
     return CompressionResult(design=body.design.name, body=body.provenance, reason=reason)
+
+
+sweep = Sweeper(answer, _failed, refused=(BadInput, MissingValue, OutOfRange, Unpredictable))
 
 
 def planned(body: Body, asked: PressQuestion) -> Plan:
@@ -295,34 +370,37 @@ def planned(body: Body, asked: PressQuestion) -> Plan:
         raise OutOfRange(f"an accuracy of {asked.accuracy:g}; expected a number above 0, as 1e-2")
     piece = piece_of(body)
     model = _model(body, asked)
-    if model in (*closed_form.PLATES, "infill"):
+    if model in (*PLATES, "infill"):
         raise BadInput(
             f"an accuracy of C, which follows the law {model}, a closed form, between its bounds: leave out "
             "--accuracy, or solve one of unlimited cells with --sides symmetric"
         )
-    if model in closed_form.MODELS:
+    if model in CLOSED_FORMS:
         why = f"--model {model}" if asked.model else why_not_applicable(piece, MODELS[0])
         raise BadInput(f"an accuracy of C, and {why}: {model} tells {_NO_C}; leave out --accuracy")
-    candidates = []
-    for name in ALL:
-        if name != model:
-            without_c = _NO_C if name in closed_form.MODELS else ""
-            unfit = without_c or why_not_applicable(piece, name) or "the model before it applies to the cell"
-            candidates.append(PlanCandidate(name, passed_over=f"--model {model}" if asked.model else unfit))
+    passed_over = [
+        PlanCandidate(name, passed_over=f"--model {model}" if asked.model else _unfit(piece, name))
+        for name in ALL if name != model
+    ]  # fmt: skip
     meshes = _mesh_levels(piece, model, asked)
-    candidates += [PlanCandidate(mesh.name, max(mesh.rise_error, VERIFIED), mesh.seconds) for mesh in meshes]
-    chosen = cheapest(tuple(candidates), asked.accuracy)
-    level = Level("compression", _MEASURE, asked.accuracy, tuple(candidates), chosen)
+    reach = [PlanCandidate(mesh.name, max(mesh.rise_error, VERIFIED), mesh.seconds) for mesh in meshes]
+    candidates = (*passed_over, *reach)
+    level = Level("compression", _MEASURE, asked.accuracy, candidates, cheapest(candidates, asked.accuracy))
     return Plan(asked.accuracy, f"the rise of C up to {asked.stress_kpa[-1]:g} kPa", (level,))
+
+
+def _unfit(piece: PressedPiece, name: str) -> str:
+    """Why a model is not the one of a piece whose capacitance is to reach an accuracy."""
+    if name in CLOSED_FORMS:
+        return _NO_C
+    return why_not_applicable(piece, name) or "the model before it applies to the cell"
 
 
 def _model(body: Body, asked: PressQuestion) -> str:
     piece = piece_of(body)
     usual = asked.sides == "bonded" and asked.boundary.period == "fixed"
-    law = closed_form.law_name(body.design, piece) if usual and not asked.model and not asked.check_mesh else ""
-    return (
-        law or asked.model or next((name for name in MODELS if not why_not_applicable(piece, name)), closed_form.FIRST)
-    )
+    law = law_name(body.design, piece) if usual and not asked.model and not asked.check_mesh else ""
+    return law or asked.model or next((name for name in MODELS if not why_not_applicable(piece, name)), FIRST)
 
 
 def _mesh_levels(piece: PressedPiece, model: str, asked: PressQuestion) -> list[MeshLevel]:
@@ -336,18 +414,18 @@ def _within(body: Body, asked: PressQuestion, step: Step | None) -> CompressionR
         mesh.name: partial(_estimated, case, asked, mesh.level, step)
         for mesh in _mesh_levels(case.piece, case.model, asked)
     }
-    found, level = run_until_within(plan.levels[0], find, _rise_error)
+    estimate, level = run_until_within(plan.levels[0], find, _rise_error)
     return replace(
-        _result(body, case, found, asked),
+        _result(body, case, estimate, asked),
         accuracy=asked.accuracy,
-        reached=_rise_error(found) <= asked.accuracy,
+        reached=_rise_error(estimate) <= asked.accuracy,
         plan=replace(plan, levels=(level,)),
     )
 
 
-def _rise_error(found: Estimate) -> float:
+def _rise_error(estimate: Estimate) -> float:
     """Largest relative error of the rise; infinite where the solution is not to be trusted [-]."""
-    return inf if found.found.faults else found.relative()[1]
+    return inf if estimate.found.faults else estimate.relative()[1]
 
 
 def _case(body: Body, asked: PressQuestion) -> Case:
@@ -376,32 +454,38 @@ def _result(body: Body, case: Case, estimate: Estimate, asked: PressQuestion) ->
     """
     from sensorgen.solvers.contact.cell import BLOCK
 
-    found, first, tip = estimate.found, estimate.found.capacitance_f_per_m2[0], asked.tip or body.design.tip.tip()
-    try:
-        rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
-    except Unpredictable:
-        rest = None
-    known, factor = first, 1.0
-    if first and rest and rest.lower_f_per_m2 is not None and rest.upper_f_per_m2 is not None:
-        known = Interval(rest.lower_f_per_m2, rest.upper_f_per_m2)
-        apart = known.upper < first.lower or first.upper < known.lower
-        factor = known.middle() / first.middle() if apart else 1.0
+    solution, tip = estimate.found, asked.tip or body.design.tip.tip()
+    rest, factor = _known_at_rest(body, asked, solution.capacitance_f_per_m2[0])
     rise, off = factor * estimate.rise_f_per_m2, factor * estimate.rise_error_f_per_m2
-    lower, upper = (rise - off + known.lower, rise + off + known.upper) if known else (nan + rise, nan + rise)
-    down, up = estimate.relative() if not found.faults else (inf, inf)
+    lower, upper = (rise - off + rest.lower, rise + off + rest.upper) if rest else (nan + rise, nan + rise)
+    errors = (inf, inf) if solution.faults else estimate.relative()
+    displacement_error, rise_error = (error if error < inf else None for error in errors)
     return CompressionResult(
         design=body.design.name, body=body.provenance, model=case.model,
         held=vars(case.boundary) | ({"top": tip.material} if BLOCK in case.solids else {}),
-        stress_kpa=tuple(p / _PA_PER_KPA for p in found.stress_pa.tolist()),
-        displacement_um=tuple(d * _UM_PER_M for d in found.displacement_m.tolist()),
+        stress_kpa=tuple(p / _PA_PER_KPA for p in solution.stress_pa.tolist()),
+        displacement_um=tuple(d * _UM_PER_M for d in solution.displacement_m.tolist()),
         displacement_error_um=_known(_UM_PER_M * estimate.displacement_error_m),
         rise_f_per_m2=_known(rise), rise_error_f_per_m2=_known(off),
         lower_f_per_m2=_known(lower), upper_f_per_m2=_known(upper),
-        converged_kpa=found.converged_pa / _PA_PER_KPA, faults=found.faults, bounds=_OF_BOTH,
-        doubts=(*found.doubts, *_assumed(body.design)),
-        largest_rise_error=up if up < inf else None, largest_displacement_error=down if down < inf else None,
+        converged_kpa=solution.converged_pa / _PA_PER_KPA, faults=solution.faults, bounds=_OF_BOTH,
+        doubts=(*solution.doubts, *_assumed(body.design)),
+        largest_rise_error=rise_error, largest_displacement_error=displacement_error,
         tops=dict(_under_tops(body, case, estimate, tip)),
     )  # fmt: skip
+
+
+def _known_at_rest(body: Body, asked: PressQuestion, first: Interval | None) -> tuple[Interval | None, float]:
+    """Capacitance at rest per area, and its ratio to the ``first`` of a pressed period: 1 where both may be equal."""
+    try:
+        rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
+    except Unpredictable:
+        return first, 1.0
+    if not first or rest.lower_f_per_m2 is None or rest.upper_f_per_m2 is None:
+        return first, 1.0
+    known = Interval(rest.lower_f_per_m2, rest.upper_f_per_m2)
+    apart = known.upper < first.lower or first.upper < known.lower
+    return known, known.middle() / first.middle() if apart else 1.0
 
 
 def _under_tops(
@@ -410,12 +494,12 @@ def _under_tops(
     """Rise of C under an even pressure and a stiff plate, where it differs by more than the error."""
     try:
         own = curve_of(estimate.found)
-        found = under_tops(body.design, piece_of(body), case.model, tip, own, case.boundary)
+        laws = under_tops(body.design, piece_of(body), case.model, tip, own, case.boundary)
     except SensorgenError:
         return
     stress, at_rest = estimate.found.stress_pa, estimate.found.capacitance_f_per_m2[0]
     at_rest_f_per_m2 = at_rest.middle() if at_rest else nan
-    for name, law in found.items():
+    for name, law in laws.items():
         strain = law.capacitive_strain(stress)[0]
         rise = np.where(stress <= law.stress_pa[-1], at_rest_f_per_m2 * strain / (1 - strain), nan)
         if name != tip.block and (abs(rise - estimate.rise_f_per_m2) > estimate.rise_error_f_per_m2).any():
@@ -435,51 +519,51 @@ def _known(values: Real) -> tuple[float | None, ...]:
 
 def _closed_form(body: Body, asked: PressQuestion, model: str) -> CompressionResult:
     """Displacement, and of a plate or infill the capacitance, by a law that solves no field."""
-    found = closed_form.MODELS[model](body.design, piece_of(body), [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
+    estimate = CLOSED_FORMS[model](body.design, piece_of(body), [_PA_PER_KPA * kpa for kpa in asked.stress_kpa])
     unknown = np.full(len(asked.stress_kpa), nan)
     rise = off = lower = upper = unknown
-    if found.rises:
+    if estimate.rises:
         rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
         ends = rest.lower_f_per_m2 or nan, rest.upper_f_per_m2 or nan
-        rises = np.array(found.rises)
+        rises = np.array(estimate.rises)
         rise, off = sum(ends) / 2 * rises[0], sum(ends) / 2 * abs(rises - rises[0]).max(0)
         lower, upper = ends[0] * (1 + rises.min(0)), ends[1] * (1 + rises.max(0))
     return CompressionResult(
-        design=body.design.name, body=body.provenance, model=model, held=found.boundary, stress_kpa=asked.stress_kpa,
-        displacement_um=tuple((found.displacement_m * _UM_PER_M).tolist()), displacement_error_um=_known(unknown),
+        design=body.design.name, body=body.provenance, model=model, held=estimate.boundary, stress_kpa=asked.stress_kpa,
+        displacement_um=tuple((estimate.displacement_m * _UM_PER_M).tolist()), displacement_error_um=_known(unknown),
         rise_f_per_m2=_known(rise), rise_error_f_per_m2=_known(off), lower_f_per_m2=_known(lower),
         upper_f_per_m2=_known(upper), converged_kpa=asked.stress_kpa[-1],
-        doubts=(*found.doubts, *_assumed(body.design)),
-        bounds="of the capacitance, by the law between its bounds" if found.rises else "none",
+        doubts=(*estimate.doubts, *_assumed(body.design)),
+        bounds="of the capacitance, by the law between its bounds" if estimate.rises else "none",
     )  # fmt: skip
 
 
 def _unsolved(body: Body, asked: PressQuestion, why: str) -> CompressionResult:
     """Without the library for fields: a closed-form estimate, the capacitance at rest, and no accuracy."""
-    found = _closed_form(body, asked, closed_form.FIRST)
+    result = _closed_form(body, asked, FIRST)
     rest = at_rest.answer(body, at_rest.CapacitanceQuestion(keep=asked.keep))
     unknown = (None,) * (len(asked.stress_kpa) - 1)
-    found = replace(
-        found, doubts=(*found.doubts, f"not solved: {why}"), lower_f_per_m2=(rest.lower_f_per_m2, *unknown),
+    result = replace(
+        result, doubts=(*result.doubts, f"not solved: {why}"), lower_f_per_m2=(rest.lower_f_per_m2, *unknown),
         upper_f_per_m2=(rest.upper_f_per_m2, *unknown),
         bounds=f"of the capacitance at rest, by {rest.model}; none under stress",
     )  # fmt: skip
     if asked.accuracy == inf:
-        return found
+        return result
     plan = planned(body, asked)
     (level,) = plan.levels
     candidates = tuple(replace(c, passed_over=c.passed_over or why) for c in level.candidates)
     plan = replace(plan, levels=(replace(level, chosen="", candidates=candidates),))
-    return replace(found, accuracy=asked.accuracy, reached=False, plan=plan)
+    return replace(result, accuracy=asked.accuracy, reached=False, plan=plan)
 
 
-def stresses_kpa(found: Sequence[float]) -> tuple[float, ...]:
+def stresses_kpa(given_kpa: Sequence[float]) -> tuple[float, ...]:
     """Stresses with 0 before them where it is not the first [kPa].
 
     >>> stresses_kpa((50.0, 100.0)), stresses_kpa((0.0, 10.0))
     ((0.0, 50.0, 100.0), (0.0, 10.0))
     """
-    whole = tuple(found) if found[0] == 0 else (0.0, *found)
+    whole = tuple(given_kpa) if given_kpa[0] == 0 else (0.0, *given_kpa)
     if len(whole) < 2:
         raise OutOfRange("--stress 0: expected a stress above 0, as in 0:100:10")
     return whole

@@ -20,7 +20,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.tip import EVEN, STIFF, Tip
 from sensorgen.design.values import MaterialValue, film, material_value, of_all_materials, permittivities
-from sensorgen.models import compression, sandwich
+from sensorgen.models import compression
 from sensorgen.models.compression import CapacitanceCurve, Compression, curve_of
 from sensorgen.prediction.capacitance import Answer, is_plate
 from sensorgen.prediction.mesh_ladder import (
@@ -37,7 +37,7 @@ from sensorgen.prediction.mesh_ladder import (
     pressed,
 )
 from sensorgen.prediction.query import FLAT, LAWS
-from sensorgen.scene.scene import Body, Scene, box
+from sensorgen.scene.scene import Body, Point, Scene, box
 from sensorgen.scene.sections import sections
 
 if TYPE_CHECKING:
@@ -123,25 +123,29 @@ def law_of(
     if is_plate(answer, piece.scene):
         return _plate(design, moduli, name, piece)
     if name in ("bonded", "free"):
-        held = "the law 'bonded' applies to a solid plate" if name == "bonded" else "cells are held by their neighbours"
-        raise OutOfRange(f"{held}; {design.shape} has gaps: expected 'unconfined' or the sides symmetric")
-    if name == "symmetric":  # as the neighbours of a cell with gaps hold it anyway
-        name = ""
+        condition = (
+            "the law 'bonded' applies to a solid plate" if name == "bonded" else "cells are held by their neighbours"
+        )
+        raise OutOfRange(f"{condition}; {design.shape} has gaps: expected 'unconfined' or the sides symmetric")
+    stored = None if name in ("unconfined", "infill") else _stored(design, printed)
+    if stored and until_pa <= _PAST * stored.stress_pa[-1]:
+        return _stored_law(stored, moduli, tip, usual=_is_usual(design, tip))
+    if name == "solved":
+        return solved(design, printed, tip=tip, until_pa=until_pa)
+    return _unsolved(design, moduli[film(design)], name, piece)
+
+
+def _unsolved(design: Design, soft: MaterialValue, name: str, piece: PressedPiece) -> Law:
+    """A cell with gaps as infill where it is like that, else as a plate of its soft material, of unknown error."""
+    by_infill = (
+        infill(design, piece) if name == "infill" or (name != "unconfined" and piece.period_mm is None) else None
+    )
+    if by_infill:
+        return by_infill
     if name == "infill":
-        if found := infill(design, piece):
-            return found
         raise OutOfRange(
             f"the law 'infill' applies to solids that stand between flat electrodes; {design.shape} has none"
         )
-    values = {n: t.value for n, t in moduli.items()}
-    known = _stored_print(design, printed, values) if printed else _stored(design, values)
-    if known and name != "unconfined" and until_pa <= _PAST * known.stress_pa[-1]:
-        return _stored_law(known, moduli, tip, usual=_is_usual(design, tip))
-    if name == "solved":
-        return solved(design, printed, tip=tip, until_pa=until_pa)
-    if not name and piece.period_mm is None and (found := infill(design, piece)):
-        return found
-    soft = moduli[film(design)]
     doubt = (
         f"{design.shape} approximated by a free solid plate of {soft.material} (B.49): its cell was not solved; "
         "predict --compression solved does that, in seconds to a minute"
@@ -215,41 +219,40 @@ def infill(design: Design, piece: PressedPiece) -> Law | None:
     from sensorgen.models import porous
 
     moduli = of_all_materials(design, "youngs_modulus_pa")
-    found = porous.filling(piece.scene, {n: t.value for n, t in moduli.items()})
-    if not found:
+    filling = porous.filling(piece.scene, {n: t.value for n, t in moduli.items()})
+    if not filling:
         return None
     eps = {t.material: t.value for t in permittivities(design)}
-    modulus_pa, power = found.modulus_pa, found.rise_powers(eps[film(design)])
+    modulus_pa, power = filling.modulus_pa, filling.rise_powers(eps[film(design)])
 
     def law(modulus: float, power: float) -> CapacitanceCurve:
         ratio = (1 - _STRAIN) ** -power
         own = compression.curve("infill", porous.SOURCE, (modulus * _STRAIN).tolist(), ratio.tolist())
-        return replace(own, displacement_m=float(_STRAIN[-1]) * found.gap_mm * M_PER_MM)
+        return replace(own, displacement_m=float(_STRAIN[-1]) * filling.gap_mm * M_PER_MM)
 
     others = law(modulus_pa.lower, power.upper), law(modulus_pa.upper, power.lower)
     return Law(law(modulus_pa.middle(), power.middle()), tuple(moduli.values()), others=others)
 
 
-def _stored(design: Design, youngs_modulus_pa: Mapping[str, float]) -> CapacitanceCurve | None:
-    """The stored curve of this cell, for materials of the same Poisson's ratio; else None."""
-    known = compression.solved(design.shape, vars(design.params), youngs_modulus_pa)
-    return known if known and _incompressible(design) else None
+def _stored(design: Design, printed: PressedPiece | None) -> CapacitanceCurve | None:
+    """The stored curve of this cell as drawn, or as printed as those of the thesis's designs are; else None.
+
+    Those are of materials of one Poisson's ratio.
+    """
+    moduli_pa = {n: t.value for n, t in of_all_materials(design, "youngs_modulus_pa").items()}
+    if printed is None:
+        curve = compression.solved(design.shape, vars(design.params), moduli_pa)
+    else:
+        # Estimates; G-code, of which equal slices differ by 4 nm; both as mirror images, as other counts of periods are
+        keys = (content(printed, digits, turned=turned) for turned in (False, True) for digits in (6, 3))
+        curve = next(filter(None, (compression.solved_print(key, moduli_pa) for key in keys)), None)
+    return curve if curve and _incompressible(design) else None
 
 
 def _incompressible(design: Design) -> bool:
     """Test whether all materials have the Poisson's ratio of the stored cells."""
     ratios = (taken.value for taken in of_all_materials(design, "poisson_ratio").values())
     return all(abs(ratio - compression.SOLVED_RATIO) < _SAME_RATIO for ratio in ratios)
-
-
-def _stored_print(
-    design: Design, printed: PressedPiece, youngs_modulus_pa: Mapping[str, float]
-) -> CapacitanceCurve | None:
-    """The stored curve of a printed cell, as those of the thesis's designs are."""
-    # Estimates; G-code, of which equal slices differ by 4 nm; both as the mirror image, as other counts of periods are
-    keys = (content(printed, digits, turned=turned) for turned in (False, True) for digits in (6, 3))
-    found = next(filter(None, (compression.solved_print(key, youngs_modulus_pa) for key in keys)), None)
-    return found if found and _incompressible(design) else None
 
 
 def content(piece: PressedPiece, digits: int = 6, *, turned: bool = False) -> str:
@@ -262,15 +265,20 @@ def content(piece: PressedPiece, digits: int = 6, *, turned: bool = False) -> st
         return ""
     outlines = [outline for _, outline in section.regions]
     if turned:
-        middle = sum(f(x for outline in outlines for x, _ in outline) for f in (min, max))
-        outlines = [tuple((middle - x, z) for x, z in outline[::-1]) for outline in outlines]
-        starts = [outline.index(min(outline, key=lambda p: p[::-1])) for outline in outlines]  # the lowest, leftmost
-        outlines = [outline[k:] + outline[:k] for outline, k in zip(outlines, starts, strict=True)]
+        outlines = _mirrored(outlines)
     regions = sorted(
         (body.material, body.terminal, [[round(v, digits) for v in corner] for corner in outline])
         for (body, _), outline in zip(section.regions, outlines, strict=True)
     )
     return sha256(dumps([regions, piece.period_mm]).encode()).hexdigest()[:16]
+
+
+def _mirrored(outlines: Sequence[tuple[Point, ...]]) -> list[tuple[Point, ...]]:
+    """Outlines turned about their middle, each from its lowest corner on, the leftmost of these."""
+    middle = sum(f(x for outline in outlines for x, _ in outline) for f in (min, max))
+    turned = [tuple((middle - x, z) for x, z in outline[::-1]) for outline in outlines]
+    starts = [outline.index(min(outline, key=lambda p: p[::-1])) for outline in turned]
+    return [outline[k:] + outline[:k] for outline, k in zip(turned, starts, strict=True)]
 
 
 def _plate(design: Design, moduli: Mapping[str, MaterialValue], name: str, piece: PressedPiece) -> Law:
@@ -308,6 +316,8 @@ def _bonded(
 
 def _between(rubber: tuple[float, ...], ends: Sequence[tuple[float, float]], base: str) -> compression.Plate:
     """A film between its electrodes on a base."""
+    from sensorgen.models import sandwich
+
     (low_pa, low_m), (top_pa, top_m) = ends
     modulus = sandwich.modulus_pa(*rubber, electrode_pa=(low_pa, top_pa), electrode_m=(low_m, top_m), base=base)
     return compression.Plate("bonded", f"bonded to both electrodes: {modulus / rubber[0]:.4g} E", modulus)
@@ -329,12 +339,12 @@ def _electrode(moduli: Mapping[str, MaterialValue], scene: Scene, end: str) -> t
 
 
 def _cell(
-    found: CapacitanceCurve, moduli: Mapping[str, MaterialValue], tops: Mapping[str, CapacitanceCurve] | None = None
+    curve: CapacitanceCurve, moduli: Mapping[str, MaterialValue], tops: Mapping[str, CapacitanceCurve] | None = None
 ) -> Law:
     """Law of a solved cell, with the errors of its rise and onset, and under other boundary conditions."""
-    others = tuple(replace(found.scaled_rise(1 + sign * found.within), onset=1 + sign * _ONSET) for sign in (-1, 1))
-    other_boundaries = tuple(found.scaled_rise(1 + change) for change in found.boundary_changes)
-    return Law(found, tuple(moduli.values()), found.doubts, others, tops or {}, other_boundaries)
+    others = tuple(replace(curve.scaled_rise(1 + sign * curve.within), onset=1 + sign * _ONSET) for sign in (-1, 1))
+    other_boundaries = tuple(curve.scaled_rise(1 + change) for change in curve.boundary_changes)
+    return Law(curve, tuple(moduli.values()), curve.doubts, others, tops or {}, other_boundaries)
 
 
 def _stored_law(even: CapacitanceCurve, moduli: Mapping[str, MaterialValue], tip: Tip, *, usual: bool) -> Law:
@@ -395,18 +405,20 @@ def solved(
     loads = stresses_pa(until_pa)
     case = _case(design, piece, model, boundary) if boundary else case_of(design, piece, model, tip)
     estimate = estimated(case, loads, level, sound=True)
-    found = estimate.found
-    if found.converged_pa < _ENOUGH * max(until_pa, STRESS_PA[-1]):
-        found = pressed(case, loads, level)
-    curve = curve_of(found)
+    solution = estimate.found
+    if solution.converged_pa < _ENOUGH * max(until_pa, STRESS_PA[-1]):
+        solution = pressed(case, loads, level)
+    curve = curve_of(solution)
     shares = estimate.rise_error_f_per_m2[1:] / estimate.rise_f_per_m2[1:]
     known = shares[np.isfinite(shares)]
     if not known.size:
         raise OutOfRange("the error of the solved cell is unknown: the next coarser mesh did not converge")
-    curve = replace(curve, within=float(known.max()), displacement_m=float(found.displacement_m[-1]) - found.fall_m)
+    curve = replace(
+        curve, within=float(known.max()), displacement_m=float(solution.displacement_m[-1]) - solution.fall_m
+    )
     short = curve.stress_pa[-1] < loads[-1]
     ended = [f"the solution of the cell ended at {curve.stress_pa[-1] / 1e3:.3g} kPa"] if short else []
-    doubts = (*found.doubts, *([_LANDING] if found.fall_m else []), *ended)
+    doubts = (*solution.doubts, *([_LANDING] if solution.fall_m else []), *ended)
     tops = {} if boundary else under_tops(design, piece, model, tip, curve)
     return _cell(replace(curve, doubts=doubts), {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, tops)
 
@@ -428,10 +440,10 @@ def under_tops(
 
     def rise(block: str) -> Real:
         try:
-            found = pressed(case_of(design, piece, model, replace(tip, block=block), boundary), loads, level).sound()
+            solution = pressed(case_of(design, piece, model, replace(tip, block=block), boundary), loads, level).sound()
         except SensorgenError:
             return np.zeros(0)
-        values = np.array([c.middle() if c else np.nan for c in found.capacitance_f_per_m2])
+        values = np.array([c.middle() if c else np.nan for c in solution.capacitance_f_per_m2])
         rises: Real = values[1:] - values[0]
         return rises
 
@@ -477,16 +489,18 @@ def at_a_few_pressures(
     if name in ("bonded", "symmetric") and not is_plate(answer, printed.scene):
         name = ""
     known = law_of(design, answer, name, printed=printed, tip=tip, until_pa=stress_pa)
+    if known.bounded:
+        return known
     model = model_of(printed, quick=True)
-    if known.bounded or model == "press3d":
-        return known if known.bounded else infill(design, printed)
+    if model == "press3d":
+        return infill(design, printed)
     try:
         case = case_of(design, printed, model, tip)
-        found = pressed(case, [stress_pa * part for part in (0, 0.5, 1, 1.25)], COARSEST)
-        curve = curve_of(found)
+        solution = pressed(case, [stress_pa * part for part in (0, 0.5, 1, 1.25)], COARSEST)
+        curve = curve_of(solution)
     except SensorgenError:
         return None
-    fallen_m = float(found.displacement_m[-1]) - found.fall_m
+    fallen_m = float(solution.displacement_m[-1]) - solution.fall_m
     return replace(known, compression=replace(curve, displacement_m=fallen_m), doubts=())
 
 

@@ -34,16 +34,16 @@ def evaluate(body: Body, query: Query = DEFAULT, *, keep: bool = True, beside: b
         A query that no sensor can answer: an accuracy or a noise that is not above 0, a tip that does not fit.
     """
     query = query.of(body.design)
-    found = _stored(body, query) if keep else _computed(body, query)
+    prediction = _stored(body, query) if keep else _computed(body, query)
     if body.is_drawn or not beside:
-        return found
-    return replace(found, drawn=evaluate(bodies.drawn(body.design), query, keep=keep))
+        return prediction
+    return replace(prediction, drawn=evaluate(bodies.drawn(body.design), query, keep=keep))
 
 
 def _stored(body: Body, query: Query) -> Prediction:
     question = {"what": "prediction", "body": body.identity, "query": asdict(query), "schema": SCHEMA}
-    found = from_json(cache.answer(question, lambda: adapter().dump_json(_computed(body, query)).decode()))
-    return replace(found, design=body.design.name, body=body.provenance)
+    prediction = from_json(cache.answer(question, lambda: adapter().dump_json(_computed(body, query)).decode()))
+    return replace(prediction, design=body.design.name, body=body.provenance)
 
 
 def _computed(body: Body, query: Query) -> Prediction:

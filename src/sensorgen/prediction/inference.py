@@ -6,7 +6,7 @@ The one engine behind a press (`inverse`, many samples of two parameters), a spe
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -60,17 +60,17 @@ class Samples:
 
     def rows(self, which: Index | Mask) -> Self:
         """Some of the samples."""
-        return type(self)(*(getattr(self, one.name)[which] for one in fields(self)))  # type: ignore[arg-type]
+        return type(self)(*(column[which] for column in vars(self).values()))
 
     def put(self, which: Index | Mask, other: Self) -> None:
         """Take the other's samples at these rows."""
-        for one in fields(self):  # type: ignore[arg-type]
-            getattr(self, one.name)[which] = getattr(other, one.name)
+        for own, new in zip(vars(self).values(), vars(other).values(), strict=True):
+            own[which] = new
 
     @classmethod
     def joined(cls, several: Sequence[Self]) -> Self:
         """Records one after the other."""
-        return cls(*(np.concatenate([getattr(one, f.name) for one in several]) for f in fields(cls)))  # type: ignore[arg-type]
+        return cls(*map(np.concatenate, zip(*(vars(one).values() for one in several), strict=True)))
 
 
 @dataclass(frozen=True, eq=False)

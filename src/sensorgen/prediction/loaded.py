@@ -1,23 +1,297 @@
-"""A prediction with the impedance over frequency, force and position."""
+"""Predictions over force, position and frequency, and along values of one setting."""
 
 import json
+import math
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from itertools import pairwise
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.core.display import Displayed
-from sensorgen.core.document import Column, Part, Table
-from sensorgen.core.errors import MissingValue, OutOfRange
-from sensorgen.core.units import M_PER_MM, si
+from sensorgen.core.document import Cell, Column, Part, Table
+from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError
+from sensorgen.core.units import M_PER_MM, frequency_text, si
 from sensorgen.design.body import Body
+from sensorgen.design.design import Design
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction import grid
 from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
 from sensorgen.prediction.planning import rough_sensor, sensor_model
-from sensorgen.prediction.query import Query
-from sensorgen.prediction.results import Prediction
+from sensorgen.prediction.query import Load, Query
+from sensorgen.prediction.results import Prediction, timeless
 from sensorgen.prediction.sensor_model import SensorModel
+from sensorgen.prediction.sweep import Sweeper
+
+LARGEST = 2_000_000  # impedances that are kept in memory at once
+ROWS = 4096  # of CSV at a time
+FORCES_N = tuple(k / 10 for k in range(61))  # up to the thesis's 6 N
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class ImpedanceGrid:
+    """Impedance of a sensor over three axes.
+
+    Attributes
+    ----------
+    frequency_hz, force_n, position_mm : tuple of float
+        The axes [Hz], [N], [mm].
+    impedance_ohm : (n_frequency, n_force, n_position) complex array
+        Impedance [ohm].
+    """
+
+    frequency_hz: tuple[float, ...]
+    force_n: tuple[float, ...]
+    position_mm: tuple[float, ...]
+    impedance_ohm: Complex
+
+    def changes(self, noise: float) -> list[dict[str, float | None]]:
+        """Range of R and X of each frequency over force and over position, in standard deviations of a reading.
+
+        Parameters
+        ----------
+        noise : float
+            Standard deviation of Re Z and of Im Z of one reading, relative to abs(Z) [-].
+
+        Returns
+        -------
+        list of dict
+            Per frequency: over force at the middle position, over position at the largest force [-]; None along an
+            axis of one value.
+        """
+        changes = []
+        for z in self.impedance_ohm:
+            deviation, middle = noise * np.abs(z).max(), z.shape[1] // 2
+            changes.append(
+                {
+                    f"{name}_by_{axis}": float(np.ptp(part) / deviation) if len(part) > 1 else None
+                    for name, values in (("re", z.real), ("im", z.imag))
+                    for axis, part in (("force", values[:, middle]), ("position", values[-1]))
+                }
+            )
+        return changes
+
+
+def impedance_grid(
+    sensor: Sensor, frequency_hz: Sequence[float], force_n: Sequence[float], position_mm: Sequence[float]
+) -> ImpedanceGrid:
+    """Impedance for every frequency [Hz], force [N] and position [mm], each rising.
+
+    Raises
+    ------
+    OutOfRange
+        As :func:`grid`; also more than ``LARGEST`` impedances.
+    """
+    counts = [len(axis) for axis in (frequency_hz, force_n, position_mm)]
+    if math.prod(counts) > LARGEST:
+        raise OutOfRange(
+            f"{' x '.join(map(str, counts))} frequencies, forces and positions; expected at most {LARGEST} impedances "
+            "at once: use larger steps, or CSV"
+        )
+    z = grid(sensor, frequency_hz, force_n, np.asarray(position_mm) * M_PER_MM)
+    return ImpedanceGrid(tuple(frequency_hz), tuple(force_n), tuple(position_mm), z)
+
+
+def grid(sensor: Sensor, frequency_hz: ArrayLike, force_n: ArrayLike, position_m: ArrayLike) -> Complex:
+    """Impedance for every tone, force and position, in this order of axes [ohm].
+
+    Parameters
+    ----------
+    sensor : Sensor
+        That is pressed.
+    frequency_hz, force_n, position_m : (n,) array
+        Tones [Hz], forces [N] and centres of the tip [m].
+
+    Returns
+    -------
+    (n_frequency, n_force, n_position) complex array
+        Impedance [ohm]; memory is that of the answer.
+
+    Raises
+    ------
+    OutOfRange
+        A position outside the sensor, or a force that it cannot bear; the message names it.
+
+    Examples
+    --------
+    >>> from sensorgen.models.compression import unconfined
+    >>> plate = Sensor(0.1, 0.01, (3e-4, 3e-4), (0.07, 0.2), 69.06e-11, unconfined(6e6))
+    >>> grid(plate, [1.1e3, 99.7e3], [0.0, 3.0, 6.0], [0.02, 0.05]).shape
+    (2, 3, 2)
+    """
+    f, force, at = (np.asarray(values, float) for values in (frequency_hz, force_n, position_m))
+    check_presses(sensor, force, at)
+    ends = [0, *(np.flatnonzero(np.diff(sensor.whole(at))) + 1).tolist(), at.size]
+    runs = [at[start:end] for start, end in pairwise(ends)]  # tips that lie whole on the sensor all press alike
+    blocks = [sensor.impedance(f[:, None, None], force[:, None], run) for run in runs]
+    return blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=-1)
+
+
+def check_presses(sensor: Sensor, force_n: ArrayLike, position_m: ArrayLike) -> None:
+    """Refuse presses that the sensor has no answer for.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        That is pressed.
+    force_n, position_m : (n,) array
+        Forces, rising [N]; centres of the tip [m].
+
+    Raises
+    ------
+    OutOfRange
+        A position outside the sensor; a force that makes the electrodes touch or is beyond the law of compression:
+        the first one, where the tip rests on least.
+    """
+    force, at = np.asarray(force_n, float), np.asarray(position_m, float)
+    hardest = float(at[np.argmin(sensor.patch(at).length_m)])
+    first = bisect_left(force, True, key=lambda value: bool(_refusal(sensor, value, hardest)))
+    if first < len(force):
+        fine = f"up to {force[first - 1]:g} N there" if first else "less"
+        larger = "rounder" if sensor.contact else "longer"
+        where = f"force {force[first]:g} N at position {hardest / M_PER_MM:g} mm"
+        raise OutOfRange(f"{where}: {_refusal(sensor, force[first], hardest)}; expected {fine}, or a {larger} tip")
+
+
+def _refusal(sensor: Sensor, force_n: float, position_m: float) -> str:
+    """Why a press has no answer, "" if it has one."""
+    try:
+        stress = sensor.stress_pa(force_n, position_m)
+        sensor.compression.capacitive_strain(stress)
+        sensor.check_tracks(stress)
+    except OutOfRange as error:
+        return str(error).partition(": press less")[0]
+    return ""
+
+
+def positions_mm(design: Design) -> tuple[float, ...]:
+    """A hundred equal steps along a design's sensor [mm]."""
+    length = float(design.params.length_mm)
+    return (*(length * k / 100 for k in range(100)), length)
+
+
+def hardest(frequency_hz: Sequence[float], force_n: Sequence[float], position_mm: Sequence[float]) -> Load:
+    """The reference load of a grid: the largest force at the middle position."""
+    return Load(tuple(frequency_hz), force_n[-1], position_mm[len(position_mm) // 2] * M_PER_MM)
+
+
+def csv_blocks(
+    sensor: Sensor, frequency_hz: Sequence[float], force_n: Sequence[float], position_mm: Sequence[float]
+) -> Iterator[str]:
+    """Impedances as CSV, a row per force and position, ``ROWS`` rows at a time after the head.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        That is pressed.
+    frequency_hz, force_n, position_mm : sequence of float
+        Tones [Hz], forces [N] and centres of the tip [mm].
+
+    Raises
+    ------
+    OutOfRange
+        As :func:`grid`, before the first block.
+    """
+    tones, force, at = (np.asarray(values, float) for values in (frequency_hz, force_n, position_mm))
+    check_presses(sensor, force, at * M_PER_MM)
+    names = [f"{part}_ohm_{frequency_text(f)}" for f in frequency_hz for part in ("re", "im")]
+    yield ",".join(["force_n", "position_mm", *names]) + "\n"
+    for start in range(0, force.size * at.size, ROWS):
+        by_force, by_position = np.divmod(np.arange(start, min(start + ROWS, force.size * at.size)), at.size)
+        f, x = force[by_force], at[by_position]
+        z = sensor.impedance(tones[:, None], f, x * M_PER_MM)
+        rows = np.column_stack([f, x, *(part for row in z for part in (row.real, row.imag))]).tolist()
+        yield "".join(",".join(map(repr, row)) + "\n" for row in rows)
+
+
+_SHOWN = (
+    ("capacitance", "pF", 1e-12), ("sensitivity", "1/kPa", 1.0), ("force_resolution", "N", 1.0),
+    ("position_resolution", "mm", 1e-3),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PredictedPoint:
+    """A prediction at one value of a sweep.
+
+    Attributes
+    ----------
+    design : str
+        Name of the design.
+    reason : str
+        Why nothing is predicted, or "".
+    prediction : Prediction or None
+        Of the body; None where it cannot be predicted at all.
+    accuracy : float or None
+        Of abs(Z), that was asked for [-].
+    """
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
+
+    design: str
+    reason: str = ""
+    prediction: Prediction | None = None
+    accuracy: float | None = None
+
+    @property
+    def source(self) -> str:
+        """Slicer and version, "estimated", or "drawn"."""
+        body = self.prediction.body if self.prediction else ""
+        return body.removeprefix("printed, ").partition(" (")[0].partition(", ")[0]
+
+    def table(self) -> Table:
+        """One row: each number with its range."""
+        columns = [
+            Column(f"{name.replace('_', ' ')}{end}", unit, hidden=bool(end))
+            for name, unit, _ in _SHOWN for end in ("", ", least", ", most")
+        ]  # fmt: skip
+        return Table("predictions", "", (*columns, Column("status"), Column("source")), (tuple(self._cells()),))
+
+    def _cells(self) -> Iterator[Cell]:
+        prediction = self.prediction
+        if prediction is None:
+            yield from (*[None] * 3 * len(_SHOWN), "not predicted", "")
+            return
+        values = (prediction.capacitance, prediction.sensitivity, *prediction.bench())
+        for (_, _, size), bounds, words in zip(_SHOWN, values, ("", "", *prediction.resolved()), strict=True):
+            if bounds is None:
+                yield from (None, None, None)
+                continue
+            yield words if words in (CANNOT_SENSE, CANNOT_LOCATE) else bounds.value / size
+            yield from (bounds.lower / size, bounds.upper / size)
+        yield from (prediction.status, self.source)
+
+    def remarks(self) -> Sequence[str]:
+        """Source, and what is doubtful."""
+        return (
+            [f"source: {self.source}", *(f"doubtful: {d}" for d in self.prediction.doubts)] if self.prediction else []
+        )
+
+    def problems(self) -> Sequence[str]:
+        """Why it is not predicted, or not within the accuracy."""
+        return [self.reason] if self.reason else self.prediction.problems(self.accuracy) if self.prediction else ()
+
+
+def _point(body: Body, asked: Query) -> PredictedPoint:
+    prediction = timeless(evaluate(body, asked))
+    reason = prediction.reason if prediction.capacitance is None else ""
+    return PredictedPoint(prediction.design, reason, prediction, asked.accuracy)
+
+
+def _unpredicted(body: Body, reason: str) -> PredictedPoint:
+    return PredictedPoint(body.design.name, reason)
+
+
+sweep = Sweeper(_point, _unpredicted, refused=(SensorgenError,))
+
+
+_FREQUENCY = Column("frequency", "Hz", si=True)
 
 Axes = tuple[Sequence[float], Sequence[float], Sequence[float]]  # frequency [Hz], force [N], position [mm]
 
@@ -47,9 +321,9 @@ class Loaded(Displayed):
     left_out: str = ""
 
     @cached_property
-    def impedance(self) -> grid.ImpedanceGrid:
+    def impedance(self) -> ImpedanceGrid:
         """Over frequency, force and position [ohm]; raises OutOfRange where there are too many to keep."""
-        return grid.impedance_grid(self.model.sensor, *self.axes)
+        return impedance_grid(self.model.sensor, *self.axes)
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -61,7 +335,7 @@ class Loaded(Displayed):
 
     def document(self) -> Iterator[Part]:
         """Ranges of R and X, how much they change, corners at the last frequency, and the judgement of a reading."""
-        (frequency_hz, force, at), sensor = self.axes, self.model.sensor
+        (_, force, at), sensor = self.axes, self.model.sensor
         touches = float(sensor.contact_m(force[-1])[0])
         grown = f", contact {touches / M_PER_MM:.3g} mm at {force[-1]:g} N" if touches < sensor.tip_m else ""
         spread = "" if sensor.profile == "uniform" else f" ({sensor.profile}{grown})"
@@ -70,35 +344,46 @@ class Loaded(Displayed):
         yield f"tip {sensor.tip_m / M_PER_MM:g} mm{spread}, compression {sensor.compression.name}"
         yield from (f"doubtful: {doubt}" for doubt in self.doubts)
         yield ""
-        z, frequency = self.impedance, Column("frequency", "Hz", si=True)
-        heads = ("R, least", "R, most", "X, least", "X, most")
-        ends = (
-            (f, row.real.min(), row.real.max(), row.imag.min(), row.imag.max())
-            for f, row in zip(frequency_hz, z.impedance_ohm, strict=True)
-        )
-        yield Table("ends", "R and X [ohm]", (frequency, *(Column(h, digits=6) for h in heads)), tuple(ends))
+        yield self._ends()
         if len(force) > 1 or len(at) > 1:
             yield ""
-            caption = (
-                f"change of R and X in standard deviations of one reading, {self.noise:.2g} of |Z|: over force at "
-                f"{at[len(at) // 2]:g} mm, over position at {force[-1]:g} N"
-            )
-            names = ("R by force", "R by position", "X by force", "X by position")
-            changes = tuple(
-                (f, *change.values()) for f, change in zip(frequency_hz, z.changes(self.noise), strict=True)
-            )
-            yield Table("changes", caption, (frequency, *(Column(n, digits=3) for n in names)), changes)
+            yield self._changes()
         yield ""
-        places = _ends_and_middle(at)
-        columns = [Column(f"{part}, {at[k]:g} mm", digits=7) for k in places for part in "RX"]
-        corners = (
-            (force[j], *(part for k in places for part in (last[j][k].real, last[j][k].imag)))
-            for last in z.impedance_ohm[-1:] for j in _ends_and_middle(force)
-        )  # fmt: skip
-        caption = f"R and X [ohm] at {si(frequency_hz[-1], 'Hz')}"
-        yield Table("corners", caption, (Column("force", "N", si=True), *columns), tuple(corners))
+        yield self._corners()
         yield ""
         yield from self.prediction.judgement()
+
+    def _ends(self) -> Table:
+        """Least and largest R and X of each frequency."""
+        columns = (_FREQUENCY, *(Column(head, digits=6) for head in ("R, least", "R, most", "X, least", "X, most")))
+        rows = (
+            (f, z.real.min(), z.real.max(), z.imag.min(), z.imag.max())
+            for f, z in zip(self.axes[0], self.impedance.impedance_ohm, strict=True)
+        )
+        return Table("ends", "R and X [ohm]", columns, tuple(rows))
+
+    def _changes(self) -> Table:
+        """Changes of R and X over force and over position."""
+        frequency_hz, force, at = self.axes
+        caption = (
+            f"change of R and X in standard deviations of one reading, {self.noise:.2g} of |Z|: over force at "
+            f"{at[len(at) // 2]:g} mm, over position at {force[-1]:g} N"
+        )
+        names = ("R by force", "R by position", "X by force", "X by position")
+        changes = zip(frequency_hz, self.impedance.changes(self.noise), strict=True)
+        columns = (_FREQUENCY, *(Column(name, digits=3) for name in names))
+        return Table("changes", caption, columns, tuple((f, *change.values()) for f, change in changes))
+
+    def _corners(self) -> Table:
+        """R and X at the last frequency, at the ends and in the middle of both axes."""
+        frequency_hz, force, at = self.axes
+        places, last = _ends_and_middle(at), self.impedance.impedance_ohm[-1]
+        columns = [Column(f"{part}, {at[k]:g} mm", digits=7) for k in places for part in "RX"]
+        rows = (
+            (force[j], *(part for z in last[j][places] for part in (z.real, z.imag))) for j in _ends_and_middle(force)
+        )
+        caption = f"R and X [ohm] at {si(frequency_hz[-1], 'Hz')}"
+        return Table("corners", caption, (Column("force", "N", si=True), *columns), tuple(rows))
 
     def to_json(self) -> str:
         """Prediction and impedances, a line per key: for long lists of numbers."""
@@ -130,8 +415,8 @@ class Loaded(Displayed):
         return xr.DataArray(self.impedance.impedance_ohm, dict(axes), name="impedance_ohm")
 
     def csv(self) -> Iterator[str]:
-        """R and X, a row per force and position, as :func:`sensorgen.prediction.grid.csv_blocks`."""
-        return grid.csv_blocks(self.model.sensor, *self.axes)
+        """R and X, a row per force and position, as :func:`sensorgen.prediction.loaded.csv_blocks`."""
+        return csv_blocks(self.model.sensor, *self.axes)
 
 
 def loaded(body: Body, query: Query, force_n: Sequence[float] = (), position_mm: Sequence[float] = ()) -> Loaded:
@@ -152,13 +437,13 @@ def loaded(body: Body, query: Query, force_n: Sequence[float] = (), position_mm:
     SensorgenError
         As :func:`sensorgen.prediction.evaluate.sensor_model`; a load that the sensor cannot take.
     """
-    axes = query.frequency_hz, tuple(force_n) or grid.FORCES_N, tuple(position_mm) or grid.positions_mm(body.design)
-    reference = grid.hardest(*axes)
+    axes = query.frequency_hz, tuple(force_n) or FORCES_N, tuple(position_mm) or positions_mm(body.design)
+    reference = hardest(*axes)
     query = replace(query, force_n=reference.force_n, position_m=reference.position_m)
     rough = rough_sensor(body, query.law, query.tip_of(body.design), query.force_n)
     at_m = [x * M_PER_MM for x in axes[2]]
     whole = at_m if position_mm else [x for x in at_m if rough.sensor.whole(x)]
-    grid.check_presses(rough.sensor, axes[1], whole or at_m)
+    check_presses(rough.sensor, axes[1], whole or at_m)
     prediction, model = evaluate(body, query), sensor_model(body, query)[0]
     at, left_out = (axes[2], "") if position_mm else _pressable(model.sensor, *axes[1:])
     return Loaded(prediction, model, (*axes[:2], at), query.noise, left_out)
@@ -167,12 +452,12 @@ def loaded(body: Body, query: Query, force_n: Sequence[float] = (), position_mm:
 def _pressable(
     sensor: Sensor, force_n: Sequence[float], position_mm: Sequence[float]
 ) -> tuple[Sequence[float], str]:  # fmt: skip
-    """Positions that can be pressed, and why others cannot; errors as of :func:`grid.check_presses`."""
+    """Positions that can be pressed, and why others cannot; errors as of :func:`check_presses`."""
     try:
-        grid.check_presses(sensor, force_n, [x * M_PER_MM for x in position_mm])
+        check_presses(sensor, force_n, [x * M_PER_MM for x in position_mm])
     except OutOfRange as error:
         whole = tuple(x for x in position_mm if sensor.whole(x * M_PER_MM))
-        grid.check_presses(sensor, force_n, [x * M_PER_MM for x in whole])
+        check_presses(sensor, force_n, [x * M_PER_MM for x in whole])
         return whole, f"only from {whole[0]:g} to {whole[-1]:g} mm, where the tip lies on the sensor whole ({error})"
     return position_mm, ""
 

@@ -18,7 +18,7 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.design.design import Design
-from sensorgen.prediction import cost_model as expectations
+from sensorgen.prediction.capacitance import points
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.sections import overlap
 
@@ -40,6 +40,8 @@ _AT_APEX = 8.0  # added error where triangles at an apex are as large as the dis
 _AT_APEX_POWER = 2  # of their size over the displacement
 VERIFIED = 7.5e-3  # error of the rise below which nothing is stated: other programs agree with this one to 0.6 % [-]
 _OF_DISPLACEMENT = 0.6  # error of the displacement over that of the rise, as expected [-]
+_PIECES_ORDER = 2  # power of the number of pieces with which the mesh's error falls, as another program shows it [-]
+_DOUBT = 0.5  # error of where two meshes lead, over how far that is beyond the finer one; 0.25 was seen [-]
 _APART = 4  # loads of the fine mesh to one of the coarse mesh
 _ARRAYS = ("stress_pa", "displacement_m", "volume_ratio", "penetration", "imbalance")
 _TUPLES = ("faults", "doubts", "carried", "apex_m")
@@ -112,8 +114,8 @@ class MeshLevel:
 @lru_cache(maxsize=16)
 def why_not_applicable(piece: PressedPiece, model: str) -> str | None:
     """Why a model does not apply to a piece, or None."""
-    said: str | None = import_module(f"sensorgen.models.{model}").why_not_applicable(piece.scene)
-    return said
+    reason: str | None = import_module(f"sensorgen.models.{model}").why_not_applicable(piece.scene)
+    return reason
 
 
 def model_of(piece: PressedPiece, *, quick: bool = False) -> str:
@@ -134,11 +136,11 @@ def mesh_levels(piece: PressedPiece, model: str, loads: int) -> list[MeshLevel]:
     loads : int
         Pressures above 0 that are asked for.
     """
-    points, share = expectations.points(model, piece.scene), loads / _MEASURED_LOADS
+    reached, share = points(model, piece.scene), loads / _MEASURED_LOADS
     area = _area_error(model)
     return [
         MeshLevel(_name(model, level), model, level, SAFETY * rise + area, (seconds + before) * share)
-        for level, ((_, before), (rise, seconds)) in enumerate(pairwise(points), COARSEST + 1)
+        for level, ((_, before), (rise, seconds)) in enumerate(pairwise(reached), COARSEST + 1)
     ]
 
 
@@ -281,24 +283,63 @@ def estimated(
     MissingValue, BadInput, OutOfRange
         As :func:`pressed`.
     """
-    found = pressed(case, stress_pa, level, keep=keep, step=step)
-    found = found.sound() if sound else found
-    last = len(found.stress_pa) - 1
+    fine = pressed(case, stress_pa, level, keep=keep, step=step)
+    fine = fine.sound() if sound else fine
+    last = len(fine.stress_pa) - 1
     shared = sorted({0, min(1, last), *range(last, 0, -_APART)})
-    some = [float(found.stress_pa[k]) for k in shared]
+    some = [float(fine.stress_pa[k]) for k in shared]
     alone = last == 0 or _size(case.model, level - 1) == inf
-    coarse = found.first(1) if alone else pressed(case, some, level - 1, keep=keep).sound()
+    coarse = fine.first(1) if alone else pressed(case, some, level - 1, keep=keep).sound()
     if not alone and coarse.stress_pa[-1] < some[-1]:  # shorter steps
-        coarse = pressed(case, [float(p) for p in found.stress_pa], level - 1, keep=keep).sound()
-    coarse = coarse.some(np.flatnonzero(np.isin(coarse.stress_pa, found.stress_pa)).tolist())
-    return (_limit if case.model == "press3d" else _errors)(case, found, coarse, level)
+        coarse = pressed(case, [float(p) for p in fine.stress_pa], level - 1, keep=keep).sound()
+    coarse = coarse.some(np.flatnonzero(np.isin(coarse.stress_pa, fine.stress_pa)).tolist())
+    return (_limit if case.model == "press3d" else _errors)(case, fine, coarse, level)
+
+
+def limit(fine: "Pressed", coarse: "Pressed", pieces: int) -> Estimate:
+    """Extrapolate displacement and rise from two meshes of boxes (Richardson), to pieces without end.
+
+    Bounds of the field are as wide as on the finer mesh. An error is infinite above the coarser mesh's last pressure,
+    and where both meshes are one.
+
+    Parameters
+    ----------
+    fine, coarse : Pressed
+        With ``pieces`` and with one piece less; the coarser one at some of the pressures, 0 among them.
+    pieces : int
+        2 or more.
+
+    Notes
+    -----
+    The rise is nearer than the capacitance: one mesh is deformed, so that its bounds err alike before and after. Half
+    of the difference of their rises counts as the field's error.
+    """
+    n, at = len(fine.stress_pa), np.searchsorted(fine.stress_pa, coarse.stress_pa)
+    following = np.searchsorted(at, np.arange(n))  # the next shared pressure
+    further = (pieces - 1) ** _PIECES_ORDER / (pieces**_PIECES_ORDER - (pieces - 1) ** _PIECES_ORDER)
+    down = fine.displacement_m - fine.fall_m
+    rises, others = (ends - ends[0] for ends in map(_ends, (fine, coarse)))
+    same = np.array_equal(fine.displacement_m[at], coarse.displacement_m)
+    ways, errors = [], []
+    for own, other in ((down, coarse.displacement_m - coarse.fall_m), (rises.mean(axis=1), others.mean(axis=1))):
+        shares = further * (1 - np.divide(other[1:], own[at][1:]))
+        ways.append(np.append(np.append(0.0, shares), shares[-1:])[following] * own if shares.size else 0.0 * own)
+        doubts = np.append(np.append(0.0, abs(shares)), np.inf)[following]
+        errors.append(np.where(np.arange(n), np.inf if same else _DOUBT * doubts * abs(own), 0.0))
+    shifted = tuple(
+        Interval(c.lower + way, c.upper + way) if c else None
+        for c, way in zip(fine.capacitance_f_per_m2, ways[1].tolist(), strict=True)
+    )
+    extrapolated = replace(fine, displacement_m=fine.displacement_m + ways[0], capacitance_f_per_m2=shifted)
+    field = abs(np.diff(rises)[:, 0]) / 2
+    return Estimate(extrapolated, errors[0], rises.mean(axis=1) + ways[1], errors[1] + field)
 
 
 def _limit(case: Case, fine: "Pressed", coarse: "Pressed", level: int) -> Estimate:
     """Where two meshes of boxes lead, with at least the error that this has on other cells."""
     from sensorgen.models import press3d
 
-    ahead = press3d.limit(fine, coarse, press3d.BrickCounts().pieces + level)
+    ahead = limit(fine, coarse, press3d.BrickCounts().pieces + level)
     least = max(_expected(case, level), VERIFIED)
     down = ahead.found.displacement_m - fine.fall_m
     moved = np.maximum(ahead.displacement_error_m, _OF_DISPLACEMENT * least * down)
@@ -353,16 +394,21 @@ def _safety(case: Case, apex: bool, level: int) -> float:
     return _SHARP if apex else _BLUNT
 
 
-def _rise(found: "Pressed") -> tuple[Real, Real]:
+def _ends(solution: "Pressed") -> Real:
+    """Bounds of the capacitance at each pressure (n, 2) [F/m2]; NaN where unknown."""
+    bounds = [(c.lower, c.upper) if c else (np.nan, np.nan) for c in solution.capacitance_f_per_m2]
+    return np.array(bounds).reshape(-1, 2)
+
+
+def _rise(solution: "Pressed") -> tuple[Real, Real]:
     """Rise of the capacitance, and by how much its field's bounds leave it open [F/m2].
 
     Where the field is meshed anew, bounds are independent; on one mesh they err alike before and after.
     """
-    bounds = [(c.lower, c.upper) if c else (np.nan, np.nan) for c in found.capacitance_f_per_m2]
-    lower, upper = np.array(bounds).reshape(-1, 2).T
+    lower, upper = _ends(solution).T
     middle = (lower + upper) / 2
     width = upper - lower
-    alike = np.array(found.carried) if found.carried else np.zeros(len(middle), bool)
+    alike = np.array(solution.carried) if solution.carried else np.zeros(len(middle), bool)
     return middle - middle[:1], np.where(alike, abs(width - width[:1]), width + width[:1]) / 2
 
 
@@ -380,11 +426,11 @@ def _press(case: Case) -> "tuple[Callable[..., Pressed], str]":
     return partial(press2d.press, cell), repr(cell)
 
 
-def _plain(found: "Pressed") -> Data:
+def _plain(solution: "Pressed") -> Data:
     """As JSON holds it."""
-    data = vars(found)
-    bounds = [[c.lower, c.upper] if c else None for c in found.capacitance_f_per_m2]
-    lists = {name: getattr(found, name).tolist() for name in _ARRAYS}
+    data = vars(solution)
+    bounds = [[c.lower, c.upper] if c else None for c in solution.capacitance_f_per_m2]
+    lists = {name: getattr(solution, name).tolist() for name in _ARRAYS}
     return data | lists | {"capacitance_f_per_m2": bounds}
 
 

@@ -175,22 +175,21 @@ def run_until_within(
     """
     names = [c.model for c in level.candidates if not c.passed_over]
     start = names.index(level.chosen)
-    came = {c.model: c for c in level.candidates}
-    found: dict[str, tuple[float, Found]] = {}
-    said: SensorgenError | None = None
+    reached = {c.model: c for c in level.candidates}
+    results: dict[str, tuple[float, Found]] = {}
+    failure: SensorgenError | None = None
     for name in (*names[start:], *reversed(names[:start])):
-        if found and (name in names[:start] or min(w for w, _ in found.values()) <= level.allowed):
-            continue
+        if results and (name in names[:start] or min(w for w, _ in results.values()) <= level.allowed):
+            break
         begun = time.perf_counter()
         try:
             answer = find[name]()
         except SensorgenError as error:
-            said, came[name] = error, replace(came[name], passed_over=str(error))
+            failure, reached[name] = error, replace(reached[name], passed_over=str(error))
             continue
-        found[name] = width(answer), answer
-        seconds = time.perf_counter() - begun
-        came[name] = replace(came[name], width=found[name][0], seconds=seconds)
-    if not found:
-        raise said or SensorgenError(f"{level.name}: no model applies")
-    best = min(found, key=lambda name: found[name][0])
-    return found[best][1], replace(level, candidates=tuple(came.values()), chosen=best)
+        results[name] = width(answer), answer
+        reached[name] = replace(reached[name], width=results[name][0], seconds=time.perf_counter() - begun)
+    if not results:
+        raise failure or SensorgenError(f"{level.name}: no model applies")
+    best = min(results, key=lambda name: results[name][0])
+    return results[best][1], replace(level, candidates=tuple(reached.values()), chosen=best)

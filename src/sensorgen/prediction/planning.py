@@ -102,8 +102,8 @@ def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", t
     printed = None if body.is_drawn else piece(body)
 
     def laws(answer: Answer) -> list[LawOption]:
-        found = options(body.design, answer, law, printed=printed, tip=tip, until_pa=until_pa)
-        return found if thorough else _inexpensive(found, body)
+        available = options(body.design, answer, law, printed=printed, tip=tip, until_pa=until_pa)
+        return available if thorough else _inexpensive(available, body)
 
     width = min(wanted, 2 * share / by_capacitance, default_width(body.cells.first()))
     levels = (_cell(rough, width), _compression(laws(rough.rest.answer), sensor, load, share), line)
@@ -111,18 +111,18 @@ def plan(body: Body, load: Load, accuracy: float | None = None, law: str = "", t
     return PredictionPlan(body, load, tip, laws, rough, by_capacitance, Plan(wanted, at, levels))
 
 
-def _inexpensive(found: list[LawOption], body: Body) -> list[LawOption]:
+def _inexpensive(available: list[LawOption], body: Body) -> list[LawOption]:
     """Without cells in 3D: in their place infill's law, else the nearest prototype's, of unknown error."""
-    spatial = [option for option in found if option.name.startswith("press3d")]
+    spatial = [option for option in available if option.name.startswith("press3d")]
     if not spatial:
-        return found
-    name, said = "nearest prototype", "compression of the nearest cell that was solved"
+        return available
+    name, remark = "nearest prototype", "compression of the nearest cell that was solved"
     law = infill(body.design, piece(body))
     if law:
-        name, said = law.compression.name, "compression of infill, between standing columns and flat levels"
+        name, remark = law.compression.name, "compression of infill, between standing columns and flat levels"
     known = law or replace(spatial[0].expected, bounded=False)
-    said += f": solving this cell takes some {spatial[0].seconds:.0f} s (predict --compression solved)"
-    known = replace(known, doubts=(said,))
+    remark += f": solving this cell takes some {spatial[0].seconds:.0f} s (predict --compression solved)"
+    known = replace(known, doubts=(remark,))
     return [LawOption(name, 0.0, known, lambda: known)]
 
 
@@ -219,16 +219,16 @@ def _error(sensor: Sensor, load: Load, *others: Sensor, factor: float = 1.0) -> 
 def _line(sensor: Sensor, load: Load, allowed: float, expected: Level | None = None) -> Level:
     """Sections under the tip until there are enough: one where its pressure is uniform, which is exact."""
     before = {c.model: c for c in expected.candidates} if expected else {}
-    found: list[PlanCandidate] = []
+    candidates: list[PlanCandidate] = []
     for name, pieces in _NAMES.items():
-        enough = found and (found[-1].width or 0.0) <= allowed
+        enough = candidates and (candidates[-1].width or 0.0) <= allowed
         if (pieces == 1) is (sensor.profile == UNIFORM) and not enough:
             begun = time.perf_counter()
             cut = replace(sensor, pieces=pieces)
             error = 0.0 if pieces == 1 else _error(cut, load, replace(cut, pieces=2 * pieces), factor=_RICHARDSON)
             seconds = time.perf_counter() - begun
-            found.append(replace(before.get(name, PlanCandidate(name)), width=error, seconds=seconds))
-    return Level("line", _ERROR_OF_Z, allowed, tuple(found), found[-1].model)
+            candidates.append(replace(before.get(name, PlanCandidate(name)), width=error, seconds=seconds))
+    return Level("line", _ERROR_OF_Z, allowed, tuple(candidates), candidates[-1].model)
 
 
 def _expected(level: Level) -> Level:

@@ -19,8 +19,6 @@ from sensorgen.core.errors import SensorgenError, UnknownName
 from sensorgen.design.design import Design
 from sensorgen.design.printer import folder as profiles
 from sensorgen.export.slicers import PROGRAMS, SLICERS
-from sensorgen.export.slicers.loads import loads
-from sensorgen.export.slicers.run import find
 
 if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
@@ -104,11 +102,13 @@ def at_hand(
     SensorgenError
         A slicer that is given is missing, or fails.
     """
-    if not slicer and (found := in_folder(design, folder)):
-        return found, ""
+    if not slicer and (file := in_folder(design, folder)):
+        return file, ""
     decides = slicer or deciding()
     if decides == NONE:
         return None, "no slicer installed" if not slicer and not os.environ.get(VARIABLE) else ""
+    from sensorgen.export.slicers.run import find
+
     try:
         program = find(*PROGRAMS[decides], program)
         question = _question(design, decides, program)
@@ -134,8 +134,8 @@ def _sliced(design: Design, slicer: str, program: str, question: dict[str, Any],
     def work() -> dict[str, Any]:
         from sensorgen.prediction.new_slice import slice_now
 
-        made = slice_now(design, slicer, program=program, time_limit_s=_LIMIT_S, step=step)
-        return {"report": made.record(), "gcode": b64encode(zlib.compress(made.content, 1)).decode()}
+        sliced = slice_now(design, slicer, program=program, time_limit_s=_LIMIT_S, step=step)
+        return {"report": sliced.record(), "gcode": b64encode(zlib.compress(sliced.content, 1)).decode()}
 
     entry = stored.answer(question, work)
     return PrintFile(entry["report"] | {"name": design.name}, zlib.decompress(b64decode(entry["gcode"])))
@@ -144,6 +144,7 @@ def _sliced(design: Design, slicer: str, program: str, question: dict[str, Any],
 def _question(design: Design, slicer: str, program: str) -> dict[str, Any]:
     """All that decides a slice and its findings: files and values that a profile is written by, not its text."""
     from sensorgen.export.slicers import versions
+    from sensorgen.export.slicers.loads import loads
 
     changed = Path(program).stat().st_mtime_ns
     version = tuple(

@@ -5,7 +5,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from itertools import product
-from math import inf, isnan, nan, pi, prod, tan
+from math import inf, isfinite, isnan, nan, pi, prod, tan
 from typing import Any
 
 import numpy as np
@@ -23,20 +23,87 @@ from sensorgen.models.compression import Compression
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.capacitance import Unpredictable
 from sensorgen.prediction.compression_law import CLOSED_FORM, at_a_few_pressures
-from sensorgen.prediction.electrodes import electrode_resistance
 from sensorgen.prediction.error_budget import error_budget, material_ends, modulus_range
 from sensorgen.prediction.identifiability.fisher import Setup
 from sensorgen.prediction.identifiability.identify import identify
-from sensorgen.prediction.losses import LARGEST_TANGENT, LOWEST_HZ, Lost, lost
-from sensorgen.prediction.narrowing import narrowings
 from sensorgen.prediction.plan import Plan
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import FORCE_N, Load, Query
 from sensorgen.prediction.reference_load import ReferenceLoad
-from sensorgen.prediction.rest_state import Added, RestState, added, rest_state
-from sensorgen.prediction.results import SCHEMA, Impedance, Prediction, UnderTop
+from sensorgen.prediction.rest_state import (
+    LARGEST_TANGENT,
+    LOWEST_HZ,
+    Added,
+    Lost,
+    RestState,
+    added,
+    electrode_resistance,
+    lost,
+    rest_state,
+)
+from sensorgen.prediction.results import SCHEMA, Impedance, Narrowing, Prediction, UnderTop
 from sensorgen.prediction.sensor_model import SensorModel, build_sensor, piece
 from sensorgen.scene.slabs import is_open
+
+WIDE = 3.0  # upper over lower end, from which on a measurement is advised
+_METER, _PRESS = 1.02, 1.1  # upper over lower end of what a meter, and what a known weight, leave of what they measure
+MULTIMETER, LCR = "multimeter, four wires", "LCR meter at rest, open leads subtracted"
+WEIGHT, GCODE = "known weight on it", "G-code (sensorgen slice)"
+_REMOVES = {  # causes by what they no longer count after
+    MULTIMETER: ("resistivity", "contact resistance"),
+    LCR: ("permittivity", "lead capacitance"),
+    WEIGHT: ("law", "width", "film", "stiffness"),
+    GCODE: ("width",),
+}
+
+
+def narrowings(
+    prediction: Prediction, body: Body, of_force: Mapping[str, Interval], of_position: Mapping[str, Interval]
+) -> Iterator[Narrowing]:
+    """Measurements for all ranges that span more than ``WIDE``.
+
+    Parameters
+    ----------
+    prediction : Prediction
+        With its ranges.
+    body : Body
+        That is predicted: of G-code, there is none to narrow it.
+    of_force, of_position : mapping of str to Interval
+        Ends of the resolutions by each cause [N], [m].
+    """
+    for end, r in prediction.resistance.items():
+        yield from _narrowing(f"{end} electrode", r, {MULTIMETER: _METER, GCODE: _without_print(r)}, body)
+    if c := prediction.capacitance:
+        yield from _narrowing("capacitance", c, {LCR: _METER, GCODE: _without_print(c)}, body)
+    if s := prediction.sensitivity:
+        yield from _narrowing("sensitivity", s, {WEIGHT: _PRESS, GCODE: _without_print(s)}, body)
+    for name, resolution, causes in (
+        ("force resolution", prediction.force_resolution, of_force),
+        ("position resolution", prediction.position_resolution, of_position),
+    ):
+        if resolution:
+            left = {
+                by: prod(_factor(part) for cause, part in causes.items() if not cause.startswith(removed))
+                for by, removed in _REMOVES.items()
+            }
+            yield from _narrowing(name, resolution, left, body)
+
+
+def _narrowing(name: str, of: Bounds, left: Mapping[str, float], body: Body) -> Iterator[Narrowing]:
+    now = _factor(of)
+    possible = {by: factor for by, factor in left.items() if by != GCODE or body.kind == "estimated"}
+    if now > WIDE and possible:
+        best = min(possible, key=possible.__getitem__)
+        yield Narrowing(name, best, now, min(possible[best], now))
+
+
+def _factor(of: Bounds | Interval) -> float:
+    return of.upper / of.lower if of.lower > 0 and isfinite(of.upper) else inf
+
+
+def _without_print(of: Bounds) -> float:
+    return _factor(of) / _factor(of.print)
+
 
 Otherwise = tuple[Sequence[Sensor | None], Sequence[Sensor | None]]  # by other walls; with other films
 
@@ -50,22 +117,22 @@ _SAME = 0.05  # capacitances that differ by less are not told apart: solving tak
 def prediction(body: Body, query: Query) -> Prediction:
     """Prediction of a body, computed now; parameters and errors as of :mod:`sensorgen.prediction.evaluate`."""
     design, load = body.design, query.load(body.design)
-    found = Prediction(
+    result = Prediction(
         SCHEMA, design.name, design.id(), body.provenance, "not predicted", load.force_n, load.position_m
     )  # fmt: skip
     try:
-        found = replace(found, gap=_gap(body))
+        result = replace(result, gap=_gap(body))
         model, plan, reason = _model(body, query)
         rest = model.rest if model else rest_state(body)
-        found = _at_rest(replace(found, status="predicted", reason=reason), body, rest, query.frequency_hz)
+        result = _at_rest(replace(result, status="predicted", reason=reason), body, rest, query.frequency_hz)
     except SensorgenError as error:  # no model applies, a value is missing, an electrode or a tool path is interrupted
-        touches = found.gap is not None and found.gap.value == 0
+        touches = result.gap is not None and result.gap.value == 0
         with suppress(SensorgenError):  # as a resistivity that is missing
-            found = replace(found, resistance=electrode_resistance(body))
-        return replace(found, status="short" if touches else "not predicted", reason=str(error))
+            result = replace(result, resistance=electrode_resistance(body))
+        return replace(result, status="short" if touches else "not predicted", reason=str(error))
     values, doubts = (model.values, model.doubts) if model else (rest.values, rest.doubts)
-    found = replace(found, plan=plan, values=values, assumptions=tuple(_assumptions(body, model)), doubts=doubts)
-    return _at_load(found, model, load, query) if model else found
+    result = replace(result, plan=plan, values=values, assumptions=tuple(_assumptions(body, model)), doubts=doubts)
+    return _at_load(result, model, load, query) if model else result
 
 
 def _model(body: Body, query: Query) -> tuple[SensorModel | None, Plan | None, str]:
@@ -90,16 +157,16 @@ def _gap(body: Body) -> Bounds | None:
     return Bounds.of(gaps[0], "m", print=by_print, certified=True)
 
 
-def _at_rest(found: Prediction, body: Body, rest: RestState, frequency_hz: tuple[float, ...]) -> Prediction:
+def _at_rest(result: Prediction, body: Body, rest: RestState, frequency_hz: tuple[float, ...]) -> Prediction:
     """Capacitance, resistance, corner frequency and impedance without a load."""
     r_only, c_only, gone, (farad, ohm) = rest.resistance, rest.capacitance, lost(body.design), added(body)
     resistance, c = {end: r.plus(*ohm) for end, r in r_only.items()}, c_only.plus(*farad)
     if set(resistance) != set(ENDS):
-        return replace(found, capacitance=c, resistance=resistance)
+        return replace(result, capacitance=c, resistance=resistance)
     r = _in_series(r_only["top"], r_only["bottom"])
     corner = _of_line(r, c_only, lambda ohm, farad: line.corner_frequency_hz(ohm, farad), "Hz")
     return replace(
-        found, capacitance=c, resistance=resistance, corner_frequency=corner,
+        result, capacitance=c, resistance=resistance, corner_frequency=corner,
         impedance=tuple(
             _impedance(f, r, c_only, gone, (farad, ohm), body.design.effects.permittivity_dispersion)
             for f in frequency_hz
@@ -107,11 +174,11 @@ def _at_rest(found: Prediction, body: Body, rest: RestState, frequency_hz: tuple
     )  # fmt: skip
 
 
-def impedance_at(found: Prediction, frequency_hz: float, gone: Lost) -> Impedance | None:
+def impedance_at(prediction: Prediction, frequency_hz: float, gone: Lost) -> Impedance | None:
     """Impedance at rest of a predicted sensor at any frequency; None where it is no line of two electrodes."""
-    if found.capacitance is None or set(found.resistance) != set(ENDS):
+    if prediction.capacitance is None or set(prediction.resistance) != set(ENDS):
         return None
-    c, ends = found.capacitance, [found.resistance[end] for end in ENDS]
+    c, ends = prediction.capacitance, [prediction.resistance[end] for end in ENDS]
     leads = _beyond(c), _beyond(ends[0])
     whole = _in_series(ends[0].alone(), ends[1].alone())
     return _impedance(frequency_hz, whole, c.alone(), gone, leads, Effects().permittivity_dispersion)
@@ -119,8 +186,8 @@ def impedance_at(found: Prediction, frequency_hz: float, gone: Lost) -> Impedanc
 
 def _beyond(quantity: Bounds) -> Added:
     """Least and most that leads may add to the value of a quantity."""
-    found = quantity.leads or Interval(quantity.value, quantity.value)
-    return Added(0.0, found.lower - quantity.value, found.upper - quantity.value)
+    ends = quantity.leads or Interval(quantity.value, quantity.value)
+    return Added(0.0, ends.lower - quantity.value, ends.upper - quantity.value)
 
 
 def _in_series(one: Bounds, other: Bounds) -> Bounds:
@@ -188,7 +255,7 @@ def _impedance(
     return Impedance(frequency_hz, part("real"), part("imag"))
 
 
-def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) -> Prediction:
+def _at_load(result: Prediction, model: SensorModel, load: Load, query: Query) -> Prediction:
     """Sensitivity, resolution and error budget at the reference load; or why there are none."""
     law = model.law
     stiffest = (
@@ -198,7 +265,7 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
     )
     load = replace(load, force_n=load.force_n or FORCE_N)
     try:
-        made = identify(
+        known = identify(
             model.sensor, load.frequency_hz, query.noise, force_n=load.force_n, position_m=load.position_m,
             stiffest=stiffest, assumed=_unknown(model),
         )  # fmt: skip
@@ -209,16 +276,16 @@ def _at_load(found: Prediction, model: SensorModel, load: Load, query: Query) ->
             others, layer = (list(_printed_otherwise(model, load, query)), films[:2]), films[2:]
         beyond = law.compression.doubt(float(model.sensor.stress_pa(load.force_n, load.position_m)))
         pressed = (beyond, _few_periods(model.body, query), _free_sides(model.body))
-        found = replace(
-            found, identifiability=made, sensitivity=_sensitivity(model, load, query, others),
-            doubts=(*found.doubts, *filter(None, pressed)),
+        result = replace(
+            result, identifiability=known, sensitivity=_sensitivity(model, load, query, others),
+            doubts=(*result.doubts, *filter(None, pressed)),
             budget=error_budget(
-                model, query.load(model.body.design), query.accuracy, *others, layer, query.noise, made.bench_ratio()
+                model, query.load(model.body.design), query.accuracy, *others, layer, query.noise, known.bench_ratio()
             ),
         )  # fmt: skip
-        return _with_tops(_resolution(found, model, load, query, others), model, load, query)
+        return _with_tops(_resolution(result, model, load, query, others), model, load, query)
     except SensorgenError as error:
-        return replace(found, reason=str(error))
+        return replace(result, reason=str(error))
 
 
 def _unknown(model: SensorModel) -> str:
@@ -291,23 +358,23 @@ def _closed_form(model: SensorModel) -> str:
     return name if (name := model.law.compression.name) in CLOSED_FORM else ""
 
 
-def _end(found: list[tuple[float, Body, RestState]], *, least: bool) -> tuple[float, Body, RestState]:
+def _end(candidates: list[tuple[float, Body, RestState]], *, least: bool) -> tuple[float, Body, RestState]:
     """The first with the least or the largest capacitance, to 5 %."""
-    value = (min if least else max)(c for c, _, _ in found)
-    return next(pick for pick in found if abs(pick[0] / value - 1) < _SAME)
+    value = (min if least else max)(c for c, _, _ in candidates)
+    return next(pick for pick in candidates if abs(pick[0] / value - 1) < _SAME)
 
 
-def _with_tops(found: Prediction, model: SensorModel, load: Load, query: Query) -> Prediction:
+def _with_tops(result: Prediction, model: SensorModel, load: Load, query: Query) -> Prediction:
     """Widen ranges by an even pressure and a stiff plate, and list these where they differ by more than the error.
 
     Under another top the relative errors are those under the tip.
     """
     tip = query.tip_of(model.body.design)
-    own = {name: bounds for name in _UNITS if (bounds := getattr(found, name)) and bounds.value}
+    own = {name: bounds for name in _UNITS if (bounds := getattr(result, name)) and bounds.value}
     others = (
         _under_top(name, law, own, model, load, query) for name, law in model.law.tops.items() if name != tip.block
     )
-    known = found.identifiability
+    known = result.identifiability
     tops = [
         UnderTop(tip.material, **own, calibrated=known and known.calibrated, typical=known and known.map.typical()),
         *filter(None, others),
@@ -321,7 +388,7 @@ def _with_tops(found: Prediction, model: SensorModel, load: Load, query: Query) 
             bounds.value, bounds.unit, model=_compounded(bounds.value, [bounds.model, _range(under)]),
             print=bounds.print, material=bounds.material, certified=bounds.certified, open=bounds.open,
         )  # fmt: skip
-    return replace(found, **wider, tops=tuple(tops) if apart else ())
+    return replace(result, **wider, tops=tuple(tops) if apart else ())
 
 
 def _under_top(
@@ -377,7 +444,7 @@ def _is_beyond(of: Callable[[Compression], float], law: Compression) -> bool:
     return False
 
 
-def _resolution(found: Prediction, model: SensorModel, load: Load, query: Query, others: Otherwise) -> Prediction:
+def _resolution(result: Prediction, model: SensorModel, load: Load, query: Query, others: Otherwise) -> Prediction:
     """Standard errors of force and position from one reading, with what they are of sensors within the errors."""
     errors = partial(_errors, load=load, query=query)
     own, law = errors(model.sensor), model.law
@@ -408,8 +475,8 @@ def _resolution(found: Prediction, model: SensorModel, load: Load, query: Query,
         return whole, by_cause
 
     (force, of_force), (position, of_position) = of(0, "N"), of(1, "m")
-    found = replace(found, force_resolution=force, position_resolution=position)
-    return replace(found, narrowing=tuple(narrowings(found, model.body, of_force, of_position)))
+    result = replace(result, force_resolution=force, position_resolution=position)
+    return replace(result, narrowing=tuple(narrowings(result, model.body, of_force, of_position)))
 
 
 def _errors(sensor: Sensor | None, load: Load, query: Query) -> tuple[float, float]:
@@ -434,11 +501,11 @@ def _range(values: Sequence[float]) -> Interval:
 
 def _span(value: float, of: Callable[[Compression], float], laws: Iterable[Compression]) -> Interval:
     """Lowest and highest over other laws of compression, those left out that the pressure is beyond."""
-    found = [value]
+    values = [value]
     for law in laws:
         with suppress(OutOfRange):
-            found.append(of(law))
-    return Interval(min(found), max(found))
+            values.append(of(law))
+    return Interval(min(values), max(values))
 
 
 def _moduli(model: SensorModel) -> list[Compression]:

@@ -2,18 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import pi, tan
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.identifiability.fisher import bounds, slopes
+from sensorgen.prediction.identifiability.fisher import bounds, relative
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE, GUESS
-from sensorgen.prediction.losses import LOWEST_HZ
 from sensorgen.prediction.query import NOISE, Load
+from sensorgen.prediction.rest_state import LOWEST_HZ
 from sensorgen.prediction.results import Changes, Term
 
 SOURCES = "sources"
@@ -21,9 +23,6 @@ _STEPS = 4  # of Gauss and Newton, to a press that is misread
 _SETTLED = 1e-6  # relative step that is the last one, as the next would be about its square
 _PARALLEL = 1e-9  # of the larger direction, below which another one does not tell; of a press, what is rounding
 _MOST = 20.0  # force that a press is misread as, over its own [-]
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 class LoadedImpedance(NamedTuple):
@@ -74,14 +73,15 @@ class ReferenceLoad:
         self.sensor, self.force_n, self._noise, self._on_bench = sensor, load.force_n, noise, on_bench
         self.at = load.force_n, load.position_m
         self._frequency = np.asarray(load.frequency_hz, float)
+        self._response = lru_cache(lambda other: other.response(self._frequency, *self.at))
         self._own = self._read(sensor)
         self._told = self._grades(sensor)
 
     def _read(self, sensor: Sensor) -> LoadedImpedance:
         """Values of a sensor; of one whose values depend on the frequency, by that of each tone."""
-        tones = [(sensor, self._frequency)]
-        if isinstance(sensor, Dispersed):
-            tones = [(sensor.at(f), np.array([f])) for f in self._frequency.tolist()]
+        if not isinstance(sensor, Dispersed):
+            return LoadedImpedance(*(*self._response(sensor), sensor.impedance(self._frequency, 0.0, self.at[1])))
+        tones = [(sensor.at(f), np.array([f])) for f in self._frequency.tolist()]
         read = [(*s.response(f, *self.at), s.impedance(f, 0.0, self.at[1])) for s, f in tones]
         return LoadedImpedance(*(np.concatenate(parts) for parts in zip(*read, strict=True)))
 
@@ -121,13 +121,12 @@ class ReferenceLoad:
 
         Least squares of the logarithms, by Gauss-Newton steps that stay on the sensor and within its law.
         """
-        force = self.force_n
-        own, sought, scale = self._own, read.shift(), np.array([force, self.sensor.length_m])
-        at = np.array(self.at)
+        own, at, scale = self._own, np.array(self.at), np.array([self.force_n, self.sensor.length_m])
+        sought = read.shift()
         for _ in range(_STEPS):
             by = np.column_stack([_parts(own.by_force / own.pressed), _parts(own.by_position / own.pressed)])
             step = np.linalg.lstsq(by * scale, sought - own.shift(), rcond=_PARALLEL)[0]
-            after = np.clip(at + step * scale, 0.0, [_MOST * force, self.sensor.length_m])
+            after = np.clip(at + step * scale, 0.0, [_MOST * self.force_n, self.sensor.length_m])
             if np.abs(step).max() < _SETTLED:
                 at = after
                 break
@@ -142,7 +141,7 @@ class ReferenceLoad:
 
     def _grades(self, sensor: Sensor) -> tuple[float, float]:
         """Standard errors of force and position on a bench, over what a reading without information has."""
-        found = bounds(slopes(sensor, self._frequency, *self.at), self._noise)
+        found = bounds(relative(self._response(sensor), self.force_n), self._noise)
         guess = GUESS * self.force_n or 1.0, GUESS * sensor.length_m
         errors = np.nan_to_num((found.force_n, found.position_m), nan=np.inf) * self._on_bench / guess
         return float(errors[0]), float(errors[1])
@@ -152,10 +151,7 @@ class ReferenceLoad:
         if changes is None or not self.force_n:
             return ""
         wrong = changes.force_n / (GUESS * self.force_n), changes.position_m / (GUESS * self.sensor.length_m)
-        try:
-            ends = [wrong, *(self._grades(other) for other in others)]
-        except OutOfRange:
-            return ""
+        ends = [wrong, *map(self._grades, others)]
         words = zip((CANNOT_SENSE, CANNOT_LOCATE), self._told, zip(*ends, strict=True), strict=True)
         return ", ".join(cannot for cannot, own, of in words if own < 1 <= max(of))
 

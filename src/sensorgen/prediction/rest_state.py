@@ -1,21 +1,239 @@
-"""A body at rest: capacitance with what its range holds, and resistivities."""
+"""A body at rest: capacitance with what its range holds, losses of its dielectrics, resistance of its electrodes."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, prod
+from math import inf, pi, prod
 from typing import NamedTuple
 
 from sensorgen.core.bounds import Bounds, Interval
-from sensorgen.core.errors import OutOfRange
-from sensorgen.core.units import M_PER_MM
+from sensorgen.core.errors import BadInput, MissingValue, OutOfRange
+from sensorgen.core.units import EPS0_F_PER_M, M_PER_MM
 from sensorgen.design.body import Body, Cells
 from sensorgen.design.design import Design
-from sensorgen.design.values import ENDS, MaterialValue, lead_ranges, permittivities, resistivities, spread
+from sensorgen.design.materials import FILM_LEAK, SET
+from sensorgen.design.values import (
+    ASSUMED,
+    ENDS,
+    MaterialValue,
+    dielectrics,
+    lead_ranges,
+    permittivities,
+    resistivities,
+    spread,
+)
+from sensorgen.models import conduction
 from sensorgen.models.overlap import edge_fringe_f
 from sensorgen.prediction.capacitance import PLANE, Answer, Unpredictable, capacitance, default_width, of_sensor
-from sensorgen.prediction.electrodes import electrode_resistance
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.slabs import is_open
+
+
+def electrode_resistance(body: Body, ends: Sequence[str] = ENDS) -> dict[str, Bounds]:
+    """Resistance of the top and the bottom electrode from end to end [ohm].
+
+    Parameters
+    ----------
+    body : Body
+        Drawn or printed; a print is solid where it is printed, as contacts between lines cost nothing.
+    ends : sequence of str
+        Which electrodes.
+
+    Raises
+    ------
+    MissingValue
+        No source gives a resistivity.
+    OutOfRange
+        An electrode that does not reach from end to end.
+    """
+    design, resistance = body.design, {}
+    for end, rho in ((end, rho) for end, rho in resistivities(design).items() if end in ends):
+        scene, *others = dict.fromkeys(body.cells.scenes.values())
+        solid = _of_cell(body, scene, end, rho.value)
+        printed = [solid.middle()]
+        for other in others:
+            try:
+                printed.append(_of_cell(body, other, end, rho.value).middle())
+            except OutOfRange:  # by this rule the electrode is interrupted
+                printed.append(float("inf"))
+        value, (low, high) = solid.middle(), spread(design, rho)
+        relative = Interval(low / rho.value, high / rho.value) if rho.value else Interval(1.0, 1.0)
+        resistance[end] = Bounds.of(
+            value, "ohm", model=solid, print=Interval(min(printed), max(printed)), certified=True,
+            material=relative.times(value),
+        )  # fmt: skip
+    return resistance
+
+
+def _of_cell(body: Body, scene: Scene, end: str, resistivity_ohm_m: float) -> Interval:
+    """Of the whole sensor, from one unit cell: cells in series along it, in parallel across it [ohm]."""
+    p = body.design.params
+    in_series, in_parallel = p.length_mm / scene.size_mm[0], p.width_mm / scene.size_mm[1]
+    return conduction.electrode_resistance(scene, end, resistivity_ohm_m).times(in_series / in_parallel)
+
+
+LOSSES = ("loss_tangent", "resistivity_ohm_m")
+LARGEST_TANGENT = 0.05  # assumed of an elastomer of which nothing is stated, its conduction included
+LOWEST_HZ = 1.1e3  # of the bench's tones: a leak is strongest there
+
+_ACCURACY = 1e-5
+_WEAK = 0.1  # of what is stored: up to here a leak is a conductance within 1 %
+
+
+def set_losses(design: Design) -> list[MaterialValue]:
+    """Loss tangents and resistivities that a design sets for its dielectrics itself.
+
+    No source gives a loss tangent, and the one resistivity that a source prints is a slip: what the user does not set
+    is taken for lossless; only the range of an impedance holds up to ``LARGEST_TANGENT``.
+    """
+    names = dielectrics(design) | {"air"}
+    return [
+        MaterialValue(name, quantity, values[quantity], SET)
+        for name, values in sorted(design.material_values.items())
+        if name in names
+        for quantity in LOSSES
+        if quantity in values
+    ]
+
+
+def permittivity(design: Design, frequency_hz: float | None = None) -> tuple[dict[str, complex], list[MaterialValue]]:
+    r"""Relative permittivity of every dielectric and of air, complex where one loses or leaks; and what it rests on.
+
+    .. math:: \varepsilon = \varepsilon' (1 - j \tan\delta) - j / (\omega \varepsilon_0 \varrho)
+
+    Parameters
+    ----------
+    design : Design
+        Its support is taken to be gone.
+    frequency_hz : float or None
+        Of the field, above 0 [Hz]; needed where a dielectric leaks.
+
+    Raises
+    ------
+    BadInput
+        A resistivity without a frequency.
+    MissingValue
+        A dielectric without a permittivity.
+    """
+    taken = permittivities(design)
+    eps = _with(taken, set_losses(design), frequency_hz)
+    return eps, [*taken, *set_losses(design)]
+
+
+def _with(
+    taken: Sequence[MaterialValue], lost: Sequence[MaterialValue], frequency_hz: float | None
+) -> dict[str, complex]:
+    eps: dict[str, complex] = {t.material: t.value for t in taken}
+    for loss in lost:
+        if loss.quantity == "loss_tangent":
+            eps[loss.material] -= 1j * eps[loss.material].real * loss.value
+        elif frequency_hz is None:
+            raise BadInput(
+                f"{loss.material} leaks ({loss.value:g} ohm m), and its share depends on the frequency; "
+                "expected one: --frequency 1.1kHz"
+            )
+        else:
+            eps[loss.material] -= 1j * _conduction(loss.value, frequency_hz)
+    return eps
+
+
+def _conduction(resistivity_ohm_m: float, frequency_hz: float) -> float:
+    """Addition of a leak to the permittivity, minus its imaginary part [-]."""
+    return 1 / (2 * pi * frequency_hz * EPS0_F_PER_M * resistivity_ohm_m)
+
+
+@dataclass(frozen=True)
+class Lost:
+    """Losses of the dielectrics of a whole sensor.
+
+    Attributes
+    ----------
+    tan_delta : float
+        Of the whole, the same at every frequency [-].
+    largest_tangent : float
+        Up to which it may be, where the design states none for its dielectrics [-].
+    leak_s : float
+        Conductance between the electrodes, the same at every frequency [S].
+    taken : tuple of MaterialValue
+        What both rest on; empty where nothing is lost.
+    doubts : tuple of str
+        Why they are to be taken with care.
+    """
+
+    tan_delta: float = 0.0
+    largest_tangent: float = LARGEST_TANGENT
+    leak_s: float = 0.0
+    taken: tuple[MaterialValue, ...] = ()
+    doubts: tuple[str, ...] = ()
+
+
+NOTHING_LOST = Lost()
+
+
+def lost(design: Design) -> Lost:
+    r"""Losses of the dielectrics of a design, as far as the design or a source that it names says.
+
+    A weak leak is a conductance :math:`G = \omega C''`: to first order in :math:`1 / (\omega \varepsilon \varrho)` it
+    does not depend on the frequency, whatever lies in series with what leaks. It is taken at the lowest tone. What a
+    film leaks per area, as a fit finds it, is a conductance of its own beside that.
+
+    Raises
+    ------
+    Unpredictable
+        No model knows the losses of this scene.
+    """
+    taken, sets = permittivities(design), set_losses(design)
+    parts = {quantity: [t for t in sets if t.quantity == quantity] for quantity in LOSSES}
+    tangents, leaks = (_tangent(design, taken, parts[quantity]) for quantity in LOSSES)
+    film = _film_leak(design)
+    through_film_s = sum(t.value for t in film) * design.area_mm2 * M_PER_MM**2
+    largest = _largest(design, taken, parts[LOSSES[0]])
+    leak_s, doubts = 2 * pi * LOWEST_HZ * leaks[1] + through_film_s, tuple(_strong(taken, parts[LOSSES[1]]))
+    return Lost(tangents[0], largest, leak_s, (*sets, *film), doubts)
+
+
+def _largest(design: Design, taken: Sequence[MaterialValue], given: Sequence[MaterialValue]) -> float:
+    """Largest C''/C' [-]: as given, and ``LARGEST_TANGENT`` for each dielectric but air of which none is."""
+    known = {value.material for value in given} | {"air"}
+    assumed = [
+        MaterialValue(name, LOSSES[0], LARGEST_TANGENT, ASSUMED)
+        for name in dict.fromkeys(value.material for value in taken) if name not in known
+    ]  # fmt: skip
+    if not given or known == {"air"}:
+        return LARGEST_TANGENT
+    return _tangent(design, taken, [*given, *assumed])[0]
+
+
+def _film_leak(design: Design) -> list[MaterialValue]:
+    """Leak of the film per area [S/m2], where one is known."""
+    material, source = design.slot("film")
+    try:
+        value = material.value(FILM_LEAK, source or design.used().get(material.name, ""))
+    except MissingValue:
+        return []
+    return [MaterialValue(material.name, FILM_LEAK, value.value, value.source)]
+
+
+def _tangent(design: Design, taken: Sequence[MaterialValue], some: Sequence[MaterialValue]) -> tuple[float, float]:
+    """C''/C' [-] and C'' [F] of the sensor with some of its losses."""
+    if not some:
+        return 0.0, 0.0
+    answer = capacitance(design.in_use, _with(taken, some, LOWEST_HZ), _ACCURACY)
+    if answer.loss_f is None:
+        return 0.0, 0.0
+    loss = (answer.loss_f.lower + answer.loss_f.upper) / 2
+    return loss / answer.capacitance_f.middle(), loss
+
+
+def _strong(taken: Sequence[MaterialValue], leaks: Sequence[MaterialValue]) -> Iterator[str]:
+    eps = {t.material: t.value for t in taken}
+    for leak in leaks:
+        share = _conduction(leak.value, LOWEST_HZ) / eps[leak.material]
+        if share > _WEAK:
+            yield (
+                f"{leak.material} leaks {share:.2g} of what it stores at {LOWEST_HZ / 1e3:g} kHz: beyond {_WEAK:g} its "
+                "leak depends on the frequency, and is taken as of that tone"
+            )
+
 
 _TOLD_APART = 1.001  # ratio of permittivities from which on a range counts: that of air does not
 
@@ -79,25 +297,17 @@ def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -
     values, rho = permittivities(body.design), resistivities(body.design)
     eps = {v.material: v.value for v in values}
     cells = body.cells
-    scene, *others = dict.fromkeys(cells.scenes.values())
+    scene = cells.first()
     ranges = ranges and width != inf
     wanted = inf if width == inf else min(width or inf, default_width(scene))
-    said = cells.remarks.get(next(iter(cells.scenes)), ())
+    remarks = cells.remarks.get(next(iter(cells.scenes)), ())
     try:
         answer = of_sensor(cells, eps, wanted)
     except Unpredictable as error:
-        raise Unpredictable("; ".join((*said, str(error)))) from None
+        raise Unpredictable("; ".join((*remarks, str(error)))) from None
     c = answer.capacitance_f
-    found, doubts, unbounded = [c.middle()], list(said), False
-    coarse = 2 * wanted if is_open(scene) else wanted  # whole sensors take long
-    for other in others if ranges else ():
-        try:
-            found.append(capacitance(other, eps, coarse).capacitance_f.middle() * cells.count)
-        except Unpredictable as error:
-            unbounded = unbounded or cells.gap_mm.get(_rule(cells, other)) == 0
-            rule = _rule(cells, other)
-            doubts.append(f"printed by the rule {rule!r} it has no capacitance: {error}")
-    by_width = Interval(min(found), max(found))
+    others, unknown, unbounded = _other_prints(cells, eps, wanted) if ranges else ([], [], False)
+    by_width = Interval(min([c.middle(), *others]), max([c.middle(), *others]))
     thick, thin, layer = _film_ratios(cells, eps) if ranges else (1.0, 1.0, 0.0)
     by_film = Interval(c.middle() * thick, c.middle() * (thin or 1.0))
     by_print = Interval(by_width.lower * thick, by_width.upper * (thin or 1.0))
@@ -107,27 +317,37 @@ def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -
         material=_permittivity_range(body.design, scene, c.middle()) if ranges else Interval(c.middle(), c.middle()),
     )  # fmt: skip
     ends = (rho["top"].value, rho["bottom"].value)
-    resistance, unknown = _resistance(body)
-    doubts += unknown
+    resistance, missing = _resistance(body)
+    doubts = (*remarks, *unknown, *missing)
     return RestState(
-        answer, bounds, resistance, ends, (*values, *rho.values()), by_width, by_film, layer * c.middle(),
-        tuple(doubts),
+        answer, bounds, resistance, ends, (*values, *rho.values()), by_width, by_film, layer * c.middle(), doubts
     )  # fmt: skip
+
+
+def _other_prints(cells: Cells, eps: Mapping[str, float], width: float) -> tuple[list[float], list[str], bool]:
+    """Capacitances of other ways to print it [F], why some have none, and True where one of these is a short."""
+    first, *others = dict.fromkeys(cells.scenes.values())
+    coarse = 2 * width if is_open(first) else width  # whole sensors take long
+    values, doubts, unbounded = [], [], False
+    for scene in others:
+        rule = next(name for name, cell in cells.scenes.items() if cell == scene)
+        try:
+            values.append(capacitance(scene, eps, coarse).capacitance_f.middle() * cells.count)
+        except Unpredictable as error:
+            unbounded |= cells.gap_mm.get(rule) == 0
+            doubts.append(f"printed by the rule {rule!r} it has no capacitance: {error}")
+    return values, doubts, unbounded
 
 
 def _resistance(body: Body) -> tuple[dict[str, Bounds], list[str]]:
     """Of the electrodes that reach from end to end, and why another has none."""
-    found, said = dict[str, Bounds](), list[str]()
+    resistance, reasons = dict[str, Bounds](), list[str]()
     for end in ENDS:
         try:
-            found |= electrode_resistance(body, (end,))
+            resistance |= electrode_resistance(body, (end,))
         except OutOfRange as error:
-            said.append(f"no resistance: {error}")
-    return found, said
-
-
-def _rule(cells: Cells, scene: Scene) -> str:
-    return next(name for name, cell in cells.scenes.items() if cell == scene)
+            reasons.append(f"no resistance: {error}")
+    return resistance, reasons
 
 
 def _film_ratios(cells: Cells, eps: Mapping[str, float]) -> tuple[float, float | None, float]:
@@ -164,15 +384,15 @@ def permittivity_ratios(design: Design, scene: Scene) -> dict[str, tuple[float, 
     values = permittivities(design)
     eps = {v.material: v.value for v in values}
     usual = capacitance(scene, eps).capacitance_f.middle()
-    found = {}
+    ratios = {}
     for value in values:
         low, high = spread(design, value)
         if high > _TOLD_APART * low:
             ends = (
                 capacitance(scene, eps | {value.material: end}).capacitance_f.middle() / usual for end in (low, high)
             )
-            found[value.material] = (next(ends), next(ends))
-    return found
+            ratios[value.material] = (next(ends), next(ends))
+    return ratios
 
 
 class Added(NamedTuple):

@@ -636,31 +636,28 @@ def from_json(text: str) -> Prediction:
 
 def _of_schema_2(data: dict[str, Any]) -> dict[str, Any]:
     """Resolutions were numbers, without what ways to print differ by."""
-    found = {"schema": SCHEMA, **{k: v for k, v in data.items() if k not in ("schema", "drawn")}}
+    fields = {"schema": SCHEMA, **{k: v for k, v in data.items() if k not in ("schema", "drawn")}}
     for name, unit in (("force_resolution", "N"), ("position_resolution", "m")):
-        value = found.pop(f"{name}_{unit.lower()}", None)
-        found[name] = value and Bounds.of(float(value), unit)
-    return {**found, "drawn": data.get("drawn") and _of_schema_2(data["drawn"])}
+        value = fields.pop(f"{name}_{unit.lower()}", None)
+        fields[name] = value and Bounds.of(float(value), unit)
+    return {**fields, "drawn": data.get("drawn") and _of_schema_2(data["drawn"])}
 
 
 def _of_schema_1(data: dict[str, Any]) -> Prediction:
     """A prediction of version 0.1.0: of the drawing, its capacitance between bounds of the model alone."""
-    reason = data.get("reason") or ""
-    touches = "electrodes touch" in reason
-    status: Literal["predicted", "short", "not predicted"] = "short" if touches else "not predicted"
-    capacitance = data.get("capacitance_f")
-    if capacitance:
-        status = "predicted"
-    press = (data.get("identifiability") or {}).get("press") or {}
+    data = {key: value for key, value in data.items() if value}
+    reason, known = data.get("reason", ""), data.get("identifiability", {})
+    unpredicted: Literal["short", "not predicted"] = "short" if "electrodes touch" in reason else "not predicted"
+    press = known.get("press") or {}
     return Prediction(
-        1, "", "", "drawn", status, press.get("force_n", nan), press.get("position_m", nan), reason,
-        capacitance=_old_bounds(capacitance, "F"),
-        resistance={end: Bounds.of(ohm, "ohm") for end, ohm in (data.get("electrode_resistance_ohm") or {}).items()},
+        1, "", "", "drawn", "predicted" if "capacitance_f" in data else unpredicted, press.get("force_n", nan),
+        press.get("position_m", nan), reason,
+        capacitance=_old_bounds(data.get("capacitance_f"), "F"),
+        resistance={end: Bounds.of(ohm, "ohm") for end, ohm in data.get("electrode_resistance_ohm", {}).items()},
         corner_frequency=_old_bounds(data.get("corner_frequency_hz"), "Hz"),
-        impedance=tuple(_old_impedance(tone) for tone in data.get("impedance_ohm") or ()),
-        identifiability=of_schema_1(data.get("identifiability") or {}),
-        values=tuple(MaterialValue(**value) for value in data.get("values") or ()),
-        assumptions=tuple(data.get("assumptions") or ()),
+        impedance=tuple(_old_impedance(tone) for tone in data.get("impedance_ohm", ())),
+        identifiability=of_schema_1(known), values=tuple(MaterialValue(**value) for value in data.get("values", ())),
+        assumptions=tuple(data.get("assumptions", ())),
     )  # fmt: skip
 
 

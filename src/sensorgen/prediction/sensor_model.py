@@ -11,10 +11,9 @@ from sensorgen.design.values import film as film_of
 from sensorgen.models import pressure
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.compression_law import Law, gap_m, law_of
-from sensorgen.prediction.losses import Lost, lost
 from sensorgen.prediction.mesh_ladder import PressedPiece
 from sensorgen.prediction.query import FLAT, Tip
-from sensorgen.prediction.rest_state import RestState, rest_state
+from sensorgen.prediction.rest_state import Lost, RestState, lost, rest_state
 from sensorgen.scene.sections import square_to
 from sensorgen.scene.slabs import is_open
 
@@ -51,8 +50,8 @@ class SensorModel:
     @property
     def values(self) -> tuple[MaterialValue, ...]:
         """Material values, each once."""
-        found = (*self.rest.values, *self.piezoresistance.values(), *self.lost.taken, *self.law.taken)
-        return tuple(dict.fromkeys(found))
+        values = (*self.rest.values, *self.piezoresistance.values(), *self.lost.taken, *self.law.taken)
+        return tuple(dict.fromkeys(values))
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -143,11 +142,11 @@ def _no_line(body: Body, rest: RestState) -> str:
 def _thickness_m(body: Body, rest: RestState) -> tuple[float, float]:
     """Of plates that have the electrodes' resistance, cogs included [m]."""
     p = body.design.params
-    found = [
+    thickness_m = [
         rho * p.length_mm / (p.width_mm * rest.resistance[end].value) if rho else p.electrode_mm * M_PER_MM
         for end, rho in zip(ENDS, rest.resistivity_ohm_m, strict=True)
     ]
-    return found[0], found[1]
+    return thickness_m[0], thickness_m[1]
 
 
 def _contact(body: Body, law: Law, pressed: PressedPiece, profile: str, radius_m: float) -> pressure.RoundContact:

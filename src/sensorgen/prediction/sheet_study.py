@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import inf
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sensorgen.core.document import Cell, Column, Facts, Part, Table, to_json
 from sensorgen.core.errors import OutOfRange
@@ -27,85 +27,7 @@ from sensorgen.prediction.sensor_model import SensorModel
 
 PLACES = 7  # along each side
 BOUNDLESS = 1e6  # N or m: a larger error has no meaning
-Map = tuple[tuple[float, ...], ...]
 Rectangle = tuple[tuple[float, float], tuple[float, float]]  # x and y, from and to [mm]
-
-
-@dataclass(frozen=True)
-class Parts:
-    """Impedances by frequency, port and port: real and imaginary parts [ohm]."""
-
-    re: tuple[Map, ...]
-    im: tuple[Map, ...]
-
-
-@dataclass(frozen=True)
-class ContactRecord:
-    """Standard errors with one set of contacts, as JSON has them; null where undefined.
-
-    Attributes
-    ----------
-    verdict : str
-        Whether it locates a load.
-    located : float
-        Share of the sheet where it does [-].
-    frequency_hz, best_frequency_hz : tuple of float
-        All frequencies, and the same by information [Hz].
-    cells : int
-        Resolution of the grid [-].
-    impedance_ohm : Parts
-        Of the unloaded sheet.
-    x_m, y_m : tuple of float
-        Places of the load [m].
-    sigma_force_n, sigma_x_m, sigma_y_m : tuple of tuple of float
-        By x and y [N], [m], [m].
-    """
-
-    verdict: str
-    located: float
-    frequency_hz: tuple[float, ...]
-    best_frequency_hz: tuple[float, ...]
-    cells: int
-    impedance_ohm: Parts
-    x_m: tuple[float, ...]
-    y_m: tuple[float, ...]
-    sigma_force_n: Map
-    sigma_x_m: Map
-    sigma_y_m: Map
-
-
-@dataclass(frozen=True)
-class SheetRecord:
-    """A study of a sheet, as JSON has it.
-
-    Attributes
-    ----------
-    force_n, tip_mm, noise : float
-        The load, the side of its square tip, and the noise of a reading relative to abs(Z) [N], [mm], [-].
-    doubts : tuple of str
-        Why the numbers are uncertain.
-    length_m, width_m : float
-        Of the sheet [m].
-    sheet_resistance_ohm : dict of str to float
-        Of each electrode [ohm].
-    capacitance_f_per_m2 : float
-        Unloaded [F/m2].
-    capacitance_factor : float
-        Rise of the capacitance under the tip [-].
-    contacts : dict of str to ContactRecord
-        By set of contacts.
-    """
-
-    force_n: float
-    tip_mm: float
-    noise: float
-    doubts: tuple[str, ...]
-    length_m: float
-    width_m: float
-    sheet_resistance_ohm: dict[str, float]
-    capacitance_f_per_m2: float
-    capacitance_factor: float
-    contacts: dict[str, ContactRecord]
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,10 +85,10 @@ class SheetStudy:
             Column("best frequencies", key="best_frequencies"),
         )  # fmt: skip
         rows: list[tuple[Cell, ...]] = []
-        for name, found in self.bounds.items():
-            errors = (float(np.median(found.sigma()[..., k])) for k in range(3))
-            best = ", ".join(si(float(found.frequency_hz[k]), "Hz") for k in found.best_tones()[:2])
-            located = round(100 * found.located())
+        for name, errors_of in self.bounds.items():
+            errors = (float(np.median(errors_of.sigma()[..., k])) for k in range(3))
+            best = ", ".join(si(float(errors_of.frequency_hz[k]), "Hz") for k in errors_of.best_tones()[:2])
+            located = round(100 * errors_of.located())
             rows.append((name, *(e if e < BOUNDLESS else inf for e in errors), located, best))
         yield Table("contacts", "", columns, tuple(rows))
         yield ""
@@ -174,30 +96,31 @@ class SheetStudy:
             "Medians over the sheet of the smallest standard errors; located: twice as well as a uniform distribution, "
             "in x and in y."
         )
-        yield Facts(tuple((name, found.verdict()) for name, found in self.bounds.items()))
-
-    def record(self) -> SheetRecord:
-        """All of it with maps of the errors and impedances of the unloaded sheet."""
-        return SheetRecord(
-            self.force_n, self.press.length_m / M_PER_MM, self.noise, self.doubts, self.sheet.length_m,
-            self.sheet.width_m, dict(zip(("top", "bottom"), self.sheet.sheet_resistance_ohm, strict=True)),
-            float(self.sheet.capacitances().mean()), self.press.capacitance_factor,
-            {name: self._contact(name, found) for name, found in self.bounds.items()},
-        )  # fmt: skip
-
-    def _contact(self, name: str, found: PressErrors) -> ContactRecord:
-        z = impedance(self.sheet, self.ports[name], found.frequency_hz, cells=found.cells)
-        force, x, y = np.moveaxis(found.sigma(), -1, 0)
-        return ContactRecord(
-            found.verdict(), found.located(), tuple(found.frequency_hz.tolist()),
-            tuple(float(found.frequency_hz[k]) for k in found.best_tones()), found.cells,
-            Parts(tuple(map(_map, z.real)), tuple(map(_map, z.imag))), tuple(found.x_m.tolist()),
-            tuple(found.y_m.tolist()), _map(force), _map(x), _map(y),
-        )  # fmt: skip
+        yield Facts(tuple((name, errors_of.verdict()) for name, errors_of in self.bounds.items()))
 
     def to_json(self) -> str:
-        """The record as indented JSON."""
-        return to_json(self.record())
+        """Study as indented JSON, with maps of the errors, and impedances of the unloaded sheet by port and port."""
+        sheet = self.sheet
+        return to_json({
+            "force_n": self.force_n, "tip_mm": self.press.length_m / M_PER_MM, "noise": self.noise,
+            "doubts": self.doubts, "length_m": sheet.length_m, "width_m": sheet.width_m,
+            "sheet_resistance_ohm": dict(zip(("top", "bottom"), sheet.sheet_resistance_ohm, strict=True)),
+            "capacitance_f_per_m2": float(sheet.capacitances().mean()),
+            "capacitance_factor": self.press.capacitance_factor,
+            "contacts": {name: self._contact(name, errors) for name, errors in self.bounds.items()},
+        })  # fmt: skip
+
+    def _contact(self, name: str, errors: PressErrors) -> dict[str, Any]:
+        """Standard errors with one set of contacts by x and y [N], [m], [m]; frequencies also by information."""
+        z = impedance(self.sheet, self.ports[name], errors.frequency_hz, cells=errors.cells)
+        force, x, y = np.moveaxis(errors.sigma(), -1, 0)
+        return {
+            "verdict": errors.verdict(), "located": errors.located(), "frequency_hz": errors.frequency_hz.tolist(),
+            "best_frequency_hz": [float(errors.frequency_hz[k]) for k in errors.best_tones()], "cells": errors.cells,
+            "impedance_ohm": {"re": z.real.tolist(), "im": z.imag.tolist()}, "x_m": errors.x_m.tolist(),
+            "y_m": errors.y_m.tolist(), "sigma_force_n": force.tolist(), "sigma_x_m": x.tolist(),
+            "sigma_y_m": y.tolist(),
+        }  # fmt: skip
 
 
 def study(
@@ -265,10 +188,6 @@ def _press(sensor: Sensor, tip_m: float, force_n: float) -> tuple[SheetPatch, di
     per_newton = {"capacitance_factor": factor**2 * slope / area}
     per_newton |= {f"{end}_resistance_factor": rise for end, rise in zip(("top", "bottom"), rises, strict=True)}
     return SheetPatch(0.0, 0.0, tip_m, tip_m, factor, (top, bottom)), per_newton
-
-
-def _map(values: NDArray[np.float64]) -> Map:
-    return tuple(tuple(row) for row in values.tolist())
 
 
 def _metres(value_m: float) -> str:

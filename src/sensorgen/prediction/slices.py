@@ -119,8 +119,8 @@ def combined(
         permittivities(design), resistivities(design)
     except MissingValue as error:
         own.append(unpredicted(str(error)))
-    found = [*own, *(advised(f, names) for f in of_print), *(f for f in drawn.findings if f.rule not in replaced)]
-    found = list(map(partial(_at_crossing, design), found))
-    waived = [f if f.rule == GCODE else w for f, w in zip(found, design.waived(found), strict=True)]
-    listed = grouped([*waived, *design.idle_waivers(found)])
+    findings = [*own, *(advised(f, names) for f in of_print), *(f for f in drawn.findings if f.rule not in replaced)]
+    findings = list(map(partial(_at_crossing, design), findings))
+    waived = [f if f.rule == GCODE else w for f, w in zip(findings, design.waived(findings), strict=True)]
+    listed = grouped([*waived, *design.idle_waivers(findings)])
     return PrintReview(drawn.meshes, listed, source, drawn=drawn, file=file)

@@ -82,9 +82,9 @@ class Sweep(Displayed, Generic[Result]):
 
     def problems(self) -> Sequence[str]:
         """Problem of the first that has one, and the number of those that have."""
-        found = [(result.design, problem) for result in self.results for problem in result.problems()[:1]]
-        more = f" ({len(found)} of {len(self.results)} like this)" if len(found) > 1 else ""
-        return [f"{design}: {problem}{more}" for design, problem in found[:1]]
+        problems = [(result.design, problem) for result in self.results for problem in result.problems()[:1]]
+        more = f" ({len(problems)} of {len(self.results)} like this)" if len(problems) > 1 else ""
+        return [f"{design}: {problem}{more}" for design, problem in problems[:1]]
 
     def to_json(self) -> str:
         """A list of the results, each with the value of the setting before it."""
@@ -93,48 +93,59 @@ class Sweep(Displayed, Generic[Result]):
         return json.dumps(rows, indent=2, ensure_ascii=False) + "\n"
 
 
-def sweep(
-    key: str | tuple[str, ...], points: Sequence[tuple[Any, Body]], work: Callable[[Body], Result],
-    failed: Callable[[Body, str], Result], *, refused: tuple[type[SensorgenError], ...], keep: bool = True,
-    jobs: int = 1, cluster: str = "", done: Callable[[], None] = lambda: None,
-) -> Sweep[Result]:  # fmt: skip
-    """Work on each body, those whose answer is not cached in several processes.
+@dataclass(frozen=True)
+class Sweeper(Generic[Result]):
+    """One kind of question along a setting; where a point has no answer, the reason stands in its place.
 
-    Parameters
+    Attributes
     ----------
-    key : str, or tuple of str
-        The setting that is varied, or the settings.
-    points : sequence of (value, Body)
-        Its values, and the body of each.
-    work : callable
-        Gives the result of a body; a function of a module, or a partial of one, so that another process can find it.
+    answer : callable
+        From a body and ``asked`` to a result; a function of a module, so that another process can find it.
     failed : callable
-        Makes a result of a body and the reason why it has none.
+        From a body and the reason why it has no answer to a result.
     refused : tuple of type
         Errors that are about one point alone; any other SensorgenError, or a library that is not installed, stops all.
-    keep : bool
-        Read the cache and store new answers.
-    jobs : int
-        How many processes at once, 1 or more.
-    cluster : str
-        Of Dask, in place of processes, as of :func:`sensorgen.core.parallel.in_parallel`.
-    done : callable
-        Called after each point.
-
-    Raises
-    ------
-    SensorgenError
-        Not in ``refused``; a cluster that cannot be reached. A point that ends its process, as when the memory is full,
-        has that as its reason.
     """
-    attempt = partial(said, work, refused=refused)
-    found: dict[int, Result | str] = {}
-    given = [(body,) for _, body in points]
-    for k, one in remembered(attempt, given, jobs, cluster=cluster, keep=keep, lost=lambda _, reason: reason):
-        found[k] = one
-        done()
-    results = []
-    for k, (_, body) in enumerate(points):
-        known = found[k]
-        results.append(failed(body, known) if isinstance(known, str) else known)
-    return Sweep(key, tuple(value for value, _ in points), tuple(results))
+
+    answer: Callable[..., Result]
+    failed: Callable[[Body, str], Result]
+    refused: tuple[type[SensorgenError], ...]
+
+    def __call__(
+        self, key: str | tuple[str, ...], points: Sequence[tuple[Any, Body]], asked: Any, jobs: int = 1,
+        done: Callable[[], None] = lambda: None, cluster: str = "",
+    ) -> Sweep[Result]:  # fmt: skip
+        """Answer for each body, those that are not cached in several processes.
+
+        Parameters
+        ----------
+        key : str, or tuple of str
+            The setting that is varied, or the settings.
+        points : sequence of (value, Body)
+            Its values, and the body of each.
+        asked
+            The question; its ``keep``, if it has one, is false where answers are neither read nor stored.
+        jobs : int
+            How many processes at once, 1 or more.
+        done : callable
+            Called after each point.
+        cluster : str
+            Of Dask, in place of processes, as of :func:`sensorgen.core.parallel.in_parallel`.
+
+        Raises
+        ------
+        SensorgenError
+            Not in ``refused``; a cluster that cannot be reached. A point that ends its process, as when the memory is
+            full, has that as its reason.
+        """
+        attempt = partial(said, partial(self.answer, asked=asked), refused=self.refused)
+        bodies, keep = [(body,) for _, body in points], getattr(asked, "keep", True)
+        answers: dict[int, Result | str] = {}
+        for k, one in remembered(attempt, bodies, jobs, cluster=cluster, keep=keep, lost=lambda _, reason: reason):
+            answers[k] = one
+            done()
+        results = (
+            self.failed(body, answer) if isinstance(answer := answers[k], str) else answer
+            for k, (_, body) in enumerate(points)
+        )
+        return Sweep(key, tuple(value for value, _ in points), tuple(results))

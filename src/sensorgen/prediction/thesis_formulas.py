@@ -17,9 +17,9 @@ from sensorgen.design.design import Design
 from sensorgen.design.values import MaterialValue, permittivities
 from sensorgen.models import thesis_cells
 from sensorgen.prediction import capacitance as planner
-from sensorgen.prediction import losses
 from sensorgen.prediction.capacitance import PLANE, Unpredictable
 from sensorgen.prediction.capacitance_answer import CapacitanceQuestion
+from sensorgen.prediction.rest_state import set_losses
 from sensorgen.prediction.sweep import Sweep
 
 NAMES = (*thesis_cells.NAMED, thesis_cells.GEOMETRY)
@@ -156,7 +156,7 @@ def _refuse(design: Design, name: str, press_mm: float | None) -> None:
         raise UnknownName("formula", name, NAMES)
     if design.shape not in SHAPES[name]:
         raise Unpredictable(f"{name} applies to {' and '.join(SHAPES[name])}, not to {design.shape}")
-    if losses.set_losses(design):
+    if set_losses(design):
         raise Unpredictable(f"{name} knows no losses; leave out --model, or the loss")
     if press_mm is not None and name not in PRESSED:
         able = ", ".join(other for other in PRESSED if design.shape in SHAPES[other])
@@ -181,9 +181,9 @@ def _field(design: Design, asked: CapacitanceQuestion, press_mm: float) -> Found
     sizes = asdict(replace(now, length_mm=side_mm, width_mm=side_mm))
     pressed = designs.make(design.model_dump(exclude={"parameters"}) | {"parameters": sizes})
     taken = permittivities(pressed)
-    found = planner.capacitance(
+    solved = planner.capacitance(
         pressed.in_use, {t.material: t.value for t in taken}, asked.width or PLANE, keep=asked.keep
     )
-    value = found.capacitance_f.middle() / (side_mm * M_PER_MM) ** 2 * thesis_cells.stretch(rest, now)
-    by = f"their field by {found.model} within {found.width():.2g}; solved compression: compress"
+    value = solved.capacitance_f.middle() / (side_mm * M_PER_MM) ** 2 * thesis_cells.stretch(rest, now)
+    by = f"their field by {solved.model} within {solved.width():.2g}; solved compression: compress"
     return value, f"{thesis_cells.GEOMETRY_SOURCE}: sizes changed by hand, {by}", taken

@@ -1,11 +1,12 @@
 """Structures in a square array that hang from the top electrode, their tips on a film: what the shapes of it share."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from math import floor
+from dataclasses import dataclass
+from math import cos, floor, pi, sin
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.scene.scene import Body, Envelope, Fill, Piece, Prism, Scene, box, rounded
+from sensorgen.scene.revolved import Revolved
+from sensorgen.scene.scene import Body, Envelope, Fill, Piece, Prism, Scene, box, choice, parameter, rounded
 
 _NO_RIM_MM = 1e-6
 
@@ -14,15 +15,12 @@ _NO_RIM_MM = 1e-6
 class ArrayParams(Envelope):
     """Parameters of every such array."""
 
-    period_mm: float = field(default=1.25, metadata={"help": "Period of the array, both ways.", "range": (0.1, 100.0)})
-    height_mm: float = field(default=0.4, metadata={"help": "Height of a structure.", "range": (0.01, 10.0)})
-    dielectric_mm: float = field(
-        default=0.2, metadata={"help": "Thickness of the film under the tips.", "range": (0.0, 10.0)}
-    )
-    cog: str = field(
-        default="electrode",
-        metadata={"help": "What a structure extends: cogs of the electrode, or a dielectric that carries it.",
-                  "choices": ("electrode", "dielectric")},
+    period_mm: float = parameter(1.25, "Period of the array, both ways.", 0.1, 100.0)
+    height_mm: float = parameter(0.4, "Height of a structure.", 0.01, 10.0)
+    dielectric_mm: float = parameter(0.2, "Thickness of the film under the tips.", 0.0, 10.0)
+    cog: str = choice(
+        "electrode", "What a structure extends: cogs of the electrode, or a dielectric that carries it.", "electrode",
+        "dielectric",
     )  # fmt: skip
 
     def cells(self) -> float:
@@ -67,6 +65,20 @@ class ArrayParams(Envelope):
             )
 
 
+@dataclass(frozen=True)
+class TippedParams(ArrayParams):
+    """Parameters of every array of structures that narrow towards a tip."""
+
+    root_mm: float = parameter(1.0, "Size of a structure at the top electrode.", 0.02, 100.0)
+    tip_mm: float = parameter(0.66, "Size of its blunt tip; 0 for a sharp one.", 0.0, 100.0)
+
+    def __post_init__(self) -> None:
+        """Refuse structures that would run into each other, or that grow towards the tip."""
+        self.refuse_wider(self.root_mm)
+        if self.tip_mm > self.root_mm:
+            raise OutOfRange(f"tip_mm {self.tip_mm:g} is wider than root_mm {self.root_mm:g}: expected at most that")
+
+
 def array_scene(
     p: ArrayParams,
     fill: Fill,
@@ -84,8 +96,7 @@ def array_scene(
         [mm].
     """
     low, film = p.electrode_mm, p.electrode_mm + p.dielectric_mm
-    roof, top = film + p.height_mm, film + p.height_mm + p.electrode_mm
-    counts = p.fitting()
+    roof, counts = film + p.height_mm, p.fitting()
     starts = [(size - n * p.period_mm) / 2 for size, n in zip((p.length_mm, p.width_mm), counts, strict=True)]
     places = [
         (rounded(starts[0] + (i + 0.5) * p.period_mm), rounded(starts[1] + (j + 0.5) * p.period_mm))
@@ -99,29 +110,38 @@ def array_scene(
     if fill.support:
         support = [piece for x, y in places for piece in around(x, y, rounded(film))]
         (x0, y0), (x1, y1) = starts, (p.length_mm - starts[0], p.width_mm - starts[1])
-        rims = (
-            (0.0, x0, 0.0, p.width_mm),
-            (x1, p.length_mm, 0.0, p.width_mm),
-            (x0, x1, 0.0, y0),
-            (x0, x1, y1, p.width_mm),
-        )
+        sides = ((0.0, x0, 0.0, p.width_mm), (x1, p.length_mm, 0.0, p.width_mm))
+        rims = (*sides, (x0, x1, 0.0, y0), (x0, x1, y1, p.width_mm))
         support += [box(*rim, film, roof) for rim in rims if rim[1] - rim[0] > 1e-9 and rim[3] - rim[2] > 1e-9]
     bodies = (
-        Body("bottom_electrode", fill.bottom_electrode, p.plate(0.0, low), "bottom"),
         Body("film", fill.film, p.plate(low, film)),
         Body("support", fill.support, tuple(support)),
         Body("hanging_dielectric", fill.dielectric, () if is_electrode else cogs),
-        Body("top_electrode_with_cogs" if is_electrode else "top_electrode", fill.top_electrode,
-             (cogs if is_electrode else ()) + p.plate(roof, top), "top"),
-        Body("isolation", fill.isolation, p.plate(top, top + p.isolation_mm)),
-    )  # fmt: skip
-    return Scene(bodies, (p.length_mm, p.width_mm, rounded(top + p.isolation_mm)))
+    )
+    return p.between_electrodes(fill, bodies, roof, cogs if is_electrode else None)
+
+
+def revolved_scene(p: TippedParams, fill: Fill, bulge: float = 0.0) -> Scene:
+    """Bodies of an array of round structures, whose flanks are straight, or arcs of a bulge as of ``Revolved``."""
+    tip, base, half = p.tip_mm / 2, p.root_mm / 2, p.period_mm / 2
+
+    def structure(x: float, y: float, z: float) -> list[Piece]:
+        roof = rounded(z + p.height_mm)
+        start = [((0.0, z), 0.0), ((tip, z), bulge)] if tip else [((0.0, z), bulge)]
+        return [Revolved(x, y, *zip(*start, ((base, roof), 0.0), ((0.0, roof), 0.0), strict=True))]
+
+    def around(x: float, y: float, z: float) -> list[Piece]:
+        roof = rounded(z + p.height_mm)
+        corners = [(tip, z), (half, z), (half, roof), *([(base, roof)] if base < half else [])]
+        bulges = (*(0.0 for _ in corners[1:]), -bulge or 0.0)
+        ring = [Revolved(x, y, tuple(corners), bulges)] if tip < half else []
+        return [*ring, *beside_round(x, y, p.period_mm, z, roof)]
+
+    return array_scene(p, fill, structure, around)
 
 
 def beside_round(x_mm: float, y_mm: float, period_mm: float, z0: float, z1: float) -> list[Piece]:
     """Parts of a square cell beyond the circle in it, as upright prisms with chords for arcs."""
-    from math import cos, pi, sin
-
     half, quarter = period_mm / 2, 24
     arc = [(half * sin(pi / 2 * k / quarter), half * cos(pi / 2 * k / quarter)) for k in range(quarter + 1)]
     arc[0], arc[-1] = (0.0, half), (half, 0.0)

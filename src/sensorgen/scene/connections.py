@@ -39,21 +39,16 @@ class Short:
 
 
 def groups(count: int, one: Whole, other: Whole) -> Whole:
-    """Number of the connected group of each of ``count`` things, of which some pairs are joined.
+    """Number of the connected group of each of ``count`` things, of which some pairs are joined; by their first things.
 
     >>> groups(4, np.array([0, 3]), np.array([3, 1])).tolist()
     [0, 0, 1, 0]
     """
-    label = np.arange(count)
-    while True:
-        low, found = np.minimum(label[one], label[other]), label.copy()
-        for ends in (one, other):  # the first of each group takes the least first of its neighbours
-            np.minimum.at(found, label[ends], low)
-        while (found[found] != found).any():
-            found = found[found]
-        if (found == label).all():
-            return (np.cumsum(label == np.arange(count)) - 1)[label]
-        label = found
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    joined = coo_array((np.ones(len(one)), (one, other)), (count, count))
+    return np.asarray(connected_components(joined, directed=False)[1], np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,16 +72,16 @@ class _Pieces:
         label = groups(len(self.bodies), *pairs)
         drawn = np.array([body.terminal for body in self.bodies])
         volume = shapely.area(self.outlines) * np.diff(self.spans_mm)[:, 0]
-        held: dict[int, list[str]] = {}
+        terminals_of: dict[int, list[str]] = {}
         for terminal in sorted({*drawn.tolist()} - {"", FLOATING}):
             sizes = np.bincount(label[drawn == terminal], volume[drawn == terminal])
-            held.setdefault(int(sizes.argmax()), []).append(terminal)
-        found = [
-            own if own in (here := held.get(piece, [FLOATING])) else here[0]
+            terminals_of.setdefault(int(sizes.argmax()), []).append(terminal)
+        terminals = [
+            own if own in (here := terminals_of.get(piece, [FLOATING])) else here[0]
             for own, piece in zip(drawn.tolist(), label.tolist(), strict=True)
         ]
-        shorts = [(i, j) for i, j in pairs.T.tolist() if found[i] != found[j]]
-        return found, shorts, len(set(label.tolist()) - held.keys())
+        shorts = [(i, j) for i, j in pairs.T.tolist() if terminals[i] != terminals[j]]
+        return terminals, shorts, len(set(label.tolist()) - terminals_of.keys())
 
 
 @dataclass(frozen=True)
@@ -114,8 +109,8 @@ class Connected:
         """Differences from two electrodes apart, in words."""
         one = "a piece of conductor touches no electrode"
         many = f"{self.floating} pieces of conductor touch no electrode"
-        said = [] if not self.floating else [f"{one if self.floating == 1 else many}: solved as floating"]
-        return (*(f"short: {short.words()}" for short in self.shorts), *said)
+        floating_words = [] if not self.floating else [f"{one if self.floating == 1 else many}: solved as floating"]
+        return (*(f"short: {short.words()}" for short in self.shorts), *floating_words)
 
 
 def connected_layers(layers: Sequence[LayerRegions], bodies: Sequence[Body], conducts: Conducts) -> Connected:
@@ -141,16 +136,16 @@ def connected_layers(layers: Sequence[LayerRegions], bodies: Sequence[Body], con
     if not pieces:
         return Connected(tuple(layers), tuple(bodies), ())
     spans = np.array([(layers[number].bottom_mm, layers[number].top_mm) for number, _, _ in pieces])
-    found = _Pieces([body for _, body, _ in pieces], np.array([part for *_, part in pieces]), spans)
-    terminals, pairs, floating = found.terminals()
+    conductors = _Pieces([body for _, body, _ in pieces], np.array([part for *_, part in pieces]), spans)
+    terminals, pairs, floating = conductors.terminals()
     renamed: dict[tuple[str, str], Body] = {}
     regions: list[dict[str, list[shapely.Polygon]]] = [{} for _ in layers]
     for (number, body, part), terminal in zip(pieces, terminals, strict=True):
         own = renamed.setdefault((body.name, terminal), _as(body, terminal))
         regions[number].setdefault(own.name, []).append(part)
-    made = [_replaced(layer, named.keys(), here) for layer, here in zip(layers, regions, strict=True)]
+    renamed_layers = [_replaced(layer, named.keys(), here) for layer, here in zip(layers, regions, strict=True)]
     others = [own for (name, terminal), own in renamed.items() if named[name].terminal != terminal]
-    return Connected(tuple(made), (*bodies, *others), tuple(_shorts(found, pairs)), floating)
+    return Connected(tuple(renamed_layers), (*bodies, *others), tuple(_shorts(conductors, pairs)), floating)
 
 
 def _replaced(
@@ -194,10 +189,10 @@ def connected_scene(scene: Scene, conducts: Conducts) -> Scene:
     terminals, *_ = _Pieces([b for b, _ in pieces], outlines, spans).terminals()
     if all(body.terminal == terminal for (body, _), terminal in zip(pieces, terminals, strict=True)):
         return scene
-    made: dict[str, tuple[Body, list[Piece]]] = {}
+    by_name: dict[str, tuple[Body, list[Piece]]] = {}
     given = iter(terminals)
     for body in scene.bodies:
         for piece in body.pieces:
             own = _as(body, next(given)) if body.terminal or conducts(body.material) else body
-            made.setdefault(own.name, (own, []))[1].append(piece)
-    return replace(scene, bodies=tuple(replace(body, pieces=tuple(own)) for body, own in made.values()))
+            by_name.setdefault(own.name, (own, []))[1].append(piece)
+    return replace(scene, bodies=tuple(replace(body, pieces=tuple(own)) for body, own in by_name.values()))

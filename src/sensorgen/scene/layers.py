@@ -54,32 +54,32 @@ class LayerRegions:
 
 def parts(region: Region) -> list[Polygon]:
     """Separate polygons of a region, from left to right."""
-    found = shapely.get_parts(region)
-    found = found[shapely.area(found) > 0]
-    order: list[Polygon] = found[np.lexsort(shapely.bounds(found).T[::-1])].tolist()
+    polygons = shapely.get_parts(region)
+    polygons = polygons[shapely.area(polygons) > 0]
+    order: list[Polygon] = polygons[np.lexsort(shapely.bounds(polygons).T[::-1])].tolist()
     return order
 
 
 def united(polygons: Sequence[Polygon]) -> Region:
     """Union of polygons; those that a line along y or x parts from their neighbours need no overlay."""
-    found = shapely.get_parts(np.array(polygons, dtype=object))
-    found = found[shapely.area(found) > 0]
-    bounds = shapely.bounds(found)
+    separate = shapely.get_parts(np.array(polygons, dtype=object))
+    separate = separate[shapely.area(separate) > 0]
+    bounds = shapely.bounds(separate)
     for axis in (0, 1):
         rising = bounds[bounds[:, axis].argsort()]
         if (rising[1:, axis] > rising[:-1, axis + 2] + SLIVER_MM).all():
-            return shapely.multipolygons(found) if len(found) != 1 else found[0]
-    return shapely.union_all(found)
+            return shapely.multipolygons(separate) if len(separate) != 1 else separate[0]
+    return shapely.union_all(separate)
 
 
 def cleaned(region: Region) -> Region:
     """A region without parts narrower than a sliver, which are rounding."""
-    found = shapely.get_parts(region)
-    low, high = shapely.bounds(found).reshape(-1, 2, 2).swapaxes(0, 1)
+    polygons = shapely.get_parts(region)
+    low, high = shapely.bounds(polygons).reshape(-1, 2, 2).swapaxes(0, 1)
     wide = (high - low > SLIVER_MM).all(1)
     if wide.all():
         return region
-    return shapely.multipolygons(found[wide])
+    return shapely.multipolygons(polygons[wide])
 
 
 def are_boxes(polygons: Sequence[Polygon] | NDArray[np.object_]) -> NDArray[np.bool_]:
@@ -98,12 +98,12 @@ def is_rectilinear(region: Region) -> bool:
 
 def narrow_mm(polygons: Sequence[Polygon] | NDArray[np.object_]) -> NDArray[np.float64]:
     """Smaller side of the smallest rectangle around each polygon (n,) [mm]."""
-    found = np.array(polygons, dtype=object)
-    x0, y0, x1, y1 = shapely.bounds(found).T
+    outlines_of = np.array(polygons, dtype=object)
+    x0, y0, x1, y1 = shapely.bounds(outlines_of).T
     narrow: NDArray[np.float64] = np.minimum(x1 - x0, y1 - y0)
-    turned = ~are_boxes(found)
+    turned = ~are_boxes(outlines_of)
     if turned.any():
-        corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(found[turned])).reshape(-1, 5, 2)
+        corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(outlines_of[turned])).reshape(-1, 5, 2)
         narrow[turned] = np.hypot(*np.diff(corners[:, :3], axis=1).T).min(axis=0)
     return narrow
 
@@ -123,8 +123,8 @@ def drawn(scene: Scene, boundaries_mm: tuple[float, ...]) -> tuple[LayerRegions,
     for bottom, top in pairwise(boundaries_mm):
         middle = rounded((bottom + top) / 2)
         at = middle - _BELOW_MM if middle in faces else middle
-        found = {body.name: region_at(body, at) for body in scene.bodies}
-        regions = {name: region for name, region in found.items() if not region.is_empty}
+        by_body = {body.name: region_at(body, at) for body in scene.bodies}
+        regions = {name: region for name, region in by_body.items() if not region.is_empty}
         layers.append(LayerRegions(bottom, top, regions, _along(regions, scene)))
     return tuple(layers)
 
@@ -150,10 +150,10 @@ def _united(outlines: frozenset[Outline]) -> Region:
 
 def _along(regions: Mapping[str, Region], scene: Scene) -> str:
     """The axis along which everything runs from edge to edge, "y" first; "" where there is none."""
-    found = shapely.get_parts(list(regions.values()))
-    if not are_boxes(found).all():
+    polygons = shapely.get_parts(list(regions.values()))
+    if not are_boxes(polygons).all():
         return ""
-    low, high = shapely.bounds(found).reshape(-1, 2, 2).swapaxes(0, 1)
+    low, high = shapely.bounds(polygons).reshape(-1, 2, 2).swapaxes(0, 1)
     whole = (low < SLIVER_MM) & (high > np.array(scene.size_mm[:2]) - SLIVER_MM)
     return "y" if whole[:, 1].all() else "x" if whole[:, 0].all() else ""
 
@@ -166,17 +166,17 @@ def scene_of(layers: Sequence[LayerRegions], like: Scene) -> Scene:
     bodies = []
     for body in like.bodies:
         growing: dict[Outline, tuple[float, float]] = {}
-        found: list[Prism] = []
+        prisms: list[Prism] = []
         for layer in layers:
             for outline in outlines(layer.region(body.name)):
                 bottom, top = growing.get(outline, (layer.bottom_mm, layer.bottom_mm))
                 if top < layer.bottom_mm - SLIVER_MM:
-                    found.append(_prism(outline, bottom, top))
+                    prisms.append(_prism(outline, bottom, top))
                     bottom = layer.bottom_mm
                 growing[outline] = (bottom, layer.top_mm)
-        found += [_prism(outline, *span) for outline, span in growing.items()]
-        found.sort(key=lambda p: (p.start_mm, p.outline))
-        bodies.append(replace(body, pieces=tuple(found)))
+        prisms += [_prism(outline, *span) for outline, span in growing.items()]
+        prisms.sort(key=lambda p: (p.start_mm, p.outline))
+        bodies.append(replace(body, pieces=tuple(prisms)))
     size = (*like.size_mm[:2], layers[-1].top_mm if layers else 0.0)
     return replace(like, bodies=tuple(bodies), size_mm=size)
 

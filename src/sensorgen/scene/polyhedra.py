@@ -10,6 +10,7 @@ from sensorgen.scene.scene import (
     AXES,
     PLANE,
     SLIVER_MM,
+    Move,
     Outline,
     Piece,
     Place,
@@ -129,14 +130,11 @@ class Polyhedron:
         loops = [without_straight([crossing(edge) for edge in ring]) for ring in _rings(after)]
         return _without_holes([loop for loop in loops if len(loop) > 2 and abs(area_mm2(loop)) > SLIVER_MM**2])
 
-    def turned_over(self, size_mm: Place) -> "Polyhedron":
-        """It in a box of some size that is turned by half a turn about x."""
-        _, width, height = size_mm
-        return replace(self, vertices=tuple((x, rounded(width - y), rounded(height - z)) for x, y, z in self.vertices))
-
-    def stretched(self, factor: float) -> "Polyhedron":
-        """It scaled in x and y."""
-        return replace(self, vertices=tuple((rounded(x * factor), rounded(y * factor), z) for x, y, z in self.vertices))
+    def moved(self, move: Move) -> "Polyhedron":
+        """It at another place, scaled or turned."""
+        flat = move.outline("z", tuple((x, y) for x, y, _ in self.vertices))
+        heights = (move.at("z", z) for _, _, z in self.vertices)
+        return replace(self, vertices=tuple((x, y, z) for (x, y), z in zip(flat, heights, strict=True)))
 
 
 def _rings(after: dict[tuple[int, int], tuple[int, int]]) -> Iterator[list[tuple[int, int]]]:
@@ -279,17 +277,14 @@ class Loft:
             for a, b in zip(self.lower, self.upper, strict=True)
         )
 
-    def turned_over(self, size_mm: Place) -> "Loft":
-        """It in a box of some size that is turned by half a turn about x."""
-        lower, upper = (tuple((x, rounded(size_mm[1] - y)) for x, y in o) for o in (self.upper, self.lower))
-        return Loft(lower, upper, rounded(size_mm[2] - self.top_mm), rounded(size_mm[2] - self.bottom_mm))
-
-    def stretched(self, factor: float) -> "Loft":
-        """It scaled in x and y."""
-        lower, upper = (
-            tuple((rounded(x * factor), rounded(y * factor)) for x, y in o) for o in (self.lower, self.upper)
-        )
-        return Loft(lower, upper, self.bottom_mm, self.top_mm)
+    def moved(self, move: Move) -> "Loft":
+        """It at another place, scaled or turned."""
+        ends = [
+            (move.at("z", z), move.outline("z", o))
+            for z, o in ((self.bottom_mm, self.lower), (self.top_mm, self.upper))
+        ]
+        (bottom, lower), (top, upper) = sorted(ends)
+        return Loft(lower, upper, bottom, top)
 
     def faces(self) -> list[tuple[Place, ...]]:
         """Corners of its flat faces, flanks first [mm]."""
@@ -317,16 +312,16 @@ def _of_loft(loft: Loft) -> Polyhedron:
     n, numbers = len(loft.lower), dict[Place, int]()
     ends = [(o, z) for o, z in ((loft.lower, loft.bottom_mm), (loft.upper, loft.top_mm))]
     ring = [numbers.setdefault((x, y, z), len(numbers)) for o, z in ends for x, y in o]
-    found = []
+    triangles = []
     for k in range(n):
         before = (k - 1) % n
         a, b, c, d = ring[before], ring[k], ring[n + k], ring[n + before]
-        found += [(a, b, c), (a, c, d)]
+        triangles += [(a, b, c), (a, c, d)]
     for (outline, _), first in zip(ends, (0, n), strict=True):
         if abs(area_mm2(outline)) > SLIVER_MM**2:
             cap = [tuple(ring[first + k] for k in triangle) for triangle in triangulated(outline)]
-            found += [(c, b, a) for a, b, c in cap] if first == 0 else [(a, b, c) for a, b, c in cap]
-    return Polyhedron(tuple(numbers), tuple(t for t in found if len(set(t)) == 3))
+            triangles += [(c, b, a) for a, b, c in cap] if first == 0 else [(a, b, c) for a, b, c in cap]
+    return Polyhedron(tuple(numbers), tuple(t for t in triangles if len(set(t)) == 3))
 
 
 def triangulated(outline: Outline) -> list[tuple[int, int, int]]:

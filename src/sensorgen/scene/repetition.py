@@ -1,18 +1,22 @@
-"""The repeating cell of a plan: the part of some regions that mirrors or shifts along x and y make into the whole.
+"""The repeating cell of a plan, of regions or of boxes: the part that mirrors or shifts make into the whole.
 
 Unlike :mod:`sensorgen.scene.unit_cell` it reads polygons of any direction: posts have mirrors, strips at 45 degrees
 shifts only. A pattern without either is continued by its own mirror image.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import shapely
 from shapely.affinity import scale, translate
 
-from sensorgen.core.arrays import Real
+from sensorgen.core.arrays import Real, Whole
 from sensorgen.scene.layers import Region
+from sensorgen.scene.scene import Body, Scene
+from sensorgen.scene.sections import ROUNDING_MM
+from sensorgen.scene.unit_cell import Band, Slice, affordable
 
 _CUTS = (0.137, 0.311, 0.523, 0.741, 0.887)  # of the width: lines along which repetition is looked for first
 _SAME_MM = 1e-6  # places nearer than this are one
@@ -108,7 +112,7 @@ def _is_plain(region: Region, size_mm: Sequence[float], axis: int) -> bool:
 
 def _crossings(looks: Sequence[Region], axis: int, whole: float, wide: float) -> list[tuple[Real, Real]]:
     """Where lines along the axis cross outlines, in order, and a number for which, and whether it is entered."""
-    found = []
+    lines_of = []
     for share in _CUTS:
         ends = np.array([[-1.0, share * wide], [whole + 1.0, share * wide]])
         line = shapely.linestrings(ends if axis == 0 else ends[:, ::-1])
@@ -122,8 +126,8 @@ def _crossings(looks: Sequence[Region], axis: int, whole: float, wide: float) ->
         every = np.concatenate(at)
         inside = (every > _SAME_MM) & (every < whole - _SAME_MM)
         order = np.argsort(every[inside], kind="stable")
-        found.append((every[inside][order], np.concatenate(kind)[inside][order]))
-    return found
+        lines_of.append((every[inside][order], np.concatenate(kind)[inside][order]))
+    return lines_of
 
 
 def _shifts(at: Real, kind: Real, period: float, whole: float) -> bool:
@@ -155,12 +159,12 @@ def halved(sides: tuple[Repeat, Repeat], regions: Sequence[Region]) -> tuple[Rep
     regions : sequence of Region
         All that lies in it.
     """
-    found = list(sides)
+    halves = list(sides)
     for axis, side in enumerate(sides):
         middle = (side.low_mm + side.high_mm) / 2
         if len(side.shares) == 1 and not side.shifts and are_mirrored(regions, axis, middle):
-            found[axis] = Repeat(side.low_mm, middle, False, np.array([side.low_mm, middle]), 2 * side.shares)
-    return found[0], found[1]
+            halves[axis] = Repeat(side.low_mm, middle, False, np.array([side.low_mm, middle]), 2 * side.shares)
+    return halves[0], halves[1]
 
 
 def are_mirrored(regions: Sequence[Region], axis: int, at_mm: float) -> bool:
@@ -179,3 +183,76 @@ def _around(at_mm: float, axis: int, size_mm: Sequence[float]) -> tuple[float, .
 
 def _are_same(one: Region, other: Region) -> bool:
     return bool(shapely.symmetric_difference(one, other).area < _SAME * max(one.area, other.area, _SAME_MM))
+
+
+@dataclass(frozen=True)
+class Raster:
+    """Boxes between planes.
+
+    Attributes
+    ----------
+    planes_mm : three arrays
+        Where the planes lie on x, y and z [mm].
+    fill : (i, j, k) array
+        Number of what is in each box.
+    shares : (i, j) array
+        How often each place of the cell, or a mirror image, occurs in the scene [-].
+    """
+
+    planes_mm: tuple[Real, Real, Real]
+    fill: Whole
+    shares: Real
+
+
+def raster(
+    scene: Scene, number: Callable[[Body], int], air: int, outer_mm: Sequence[Sequence[float]], evenly: bool = True
+) -> Raster:
+    """The cell of a scene of boxes, between mirrors at its four sides.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of boxes.
+    number : callable
+        From a body to what ``fill`` says of it, 0 or more; the same for bodies that are alike.
+    air : int
+        What it says of air.
+    outer_mm : three sequences of float
+        Planes on x, y and z beside those of the boxes [mm].
+    evenly : bool
+        Whether a piece that occurs a whole number of times is preferred, where it is affordable.
+
+    Raises
+    ------
+    ValueError
+        A piece is no box, or bodies overlap.
+    """
+    pieces = [(body, p) for body in scene.bodies for p in body.pieces]
+    if not all(p.is_box() for _, p in pieces):
+        raise ValueError("not all of it is boxes")
+    planes: list[Real] = []
+    for axis, outer in zip("xyz", outer_mm, strict=True):
+        edges = np.unique(np.array([*outer, *(x for _, p in pieces for x in p.span(axis))]))
+        planes.append(edges[np.diff(edges, prepend=-np.inf) > ROUNDING_MM])
+    fill = np.full([len(p) - 1 for p in planes], -1)
+    for body, piece in pieces:
+        ends = [np.searchsorted(p, np.array(piece.span(a)) - ROUNDING_MM) for a, p in zip("xyz", planes, strict=True)]
+        here = tuple(slice(*end) for end in ends)
+        if (fill[here] >= 0).any():
+            raise ValueError(f"{body.name} overlaps its neighbour")
+        fill[here] = number(body)
+    fill[fill < 0] = air
+    shares = []
+    for k in (0, 1):
+        # What a walk along the axis meets: one level band, named by all that stands on this place.
+        looks: dict[bytes, str] = {}
+        names = [looks.setdefault(layer.tobytes(), str(len(looks))) for layer in np.moveaxis(fill, k, 0)]
+        bands = [(Band(name, "", (0.0, 0.0), (1.0, 1.0)),) for name in names]
+        walk = [Slice(a, b, band) for (a, b), band in zip(pairwise(planes[k].tolist()), bands, strict=True)]
+        cell = affordable(tuple(walk), evenly)
+        middles = [(s.left_mm + s.right_mm) / 2 for s in cell.slices]
+        fill = fill.take(np.searchsorted(planes[k], middles) - 1, k)
+        planes[k] = np.array([cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)])
+        shares.append(np.array(cell.shares))
+    x, y, z = planes
+    return Raster((x, y, z), fill, np.outer(shares[0], shares[1]))

@@ -1,6 +1,6 @@
 """Bodies of revolution about an upright axis, of straight edges and arcs: exact volume, cuts as polygons."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -11,8 +11,8 @@ from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import (
     AXES,
     SLIVER_MM,
+    Move,
     Outline,
-    Place,
     Point,
     area_mm2,
     described,
@@ -34,19 +34,20 @@ class _Edge(NamedTuple):
 
     def at_height(self, z_mm: float) -> float:
         """Radius at a height between its ends."""
-        (ra, za), (rb, zb) = self.start, self.end
-        if self.centre is None:
-            return ra if za == zb else ra + (z_mm - za) / (zb - za) * (rb - ra)
-        rc, zc = self.centre
-        return rc + _leg(self.start, self.centre, z_mm - zc) * (1.0 if ra + rb > 2 * rc else -1.0)
+        return self._at(1, z_mm)
 
     def at_radius(self, r_mm: float) -> float:
         """Height at a radius between its ends."""
-        (ra, za), (rb, zb) = self.start, self.end
+        return self._at(0, r_mm)
+
+    def _at(self, k: int, value_mm: float) -> float:
+        """The other coordinate where the one of a number, 0 or 1, has a value between those of its ends."""
+        a, b = self.start[1 - k], self.end[1 - k]
         if self.centre is None:
-            return za if ra == rb else za + (r_mm - ra) / (rb - ra) * (zb - za)
-        rc, zc = self.centre
-        return zc + _leg(self.start, self.centre, r_mm - rc) * (1.0 if za + zb > 2 * zc else -1.0)
+            along = self.end[k] - self.start[k]
+            return a if not along else a + (value_mm - self.start[k]) / along * (b - a)
+        middle = self.centre[1 - k]
+        return middle + _leg(self.start, self.centre, value_mm - self.centre[k]) * (1.0 if a + b > 2 * middle else -1.0)
 
     def middle(self) -> Point:
         """Point half-way along it."""
@@ -89,10 +90,10 @@ def _leg(on: Point, centre: Point, other: float) -> float:
 @lru_cache(maxsize=64)
 def _edges(outline: Outline, bulges: tuple[float, ...]) -> tuple[_Edge, ...]:
     """Edges of a profile, arcs cut where they are level or upright."""
-    found = []
+    edges = []
     for a, b, bulge in zip(outline, outline[1:] + outline[:1], bulges, strict=True):
         if bulge == 0:
-            found.append(_Edge(a, b))
+            edges.append(_Edge(a, b))
             continue
         du, dv, lift = b[0] - a[0], b[1] - a[1], (1 - bulge * bulge) / (4 * bulge)
         centre = ((a[0] + b[0]) / 2 - dv * lift, (a[1] + b[1]) / 2 + du * lift)
@@ -103,8 +104,8 @@ def _edges(outline: Outline, bulges: tuple[float, ...]) -> tuple[_Edge, ...]:
         way = {0: (1.0, 0.0), 1: (0.0, 1.0), 2: (-1.0, 0.0), 3: (0.0, -1.0)}
         stops = [tuple(c + radius * w for c, w in zip(centre, way[k % 4], strict=True)) for k in quarters]
         places = [a, *((u, v) for u, v in (stops if turn > 0 else stops[::-1])), b]
-        found += [_Edge(start, end, centre) for start, end in pairwise(places)]
-    return tuple(found)
+        edges += [_Edge(start, end, centre) for start, end in pairwise(places)]
+    return tuple(edges)
 
 
 @dataclass(frozen=True)
@@ -163,15 +164,15 @@ class Revolved:
 
     def volume_mm3(self, low_mm: float = -inf, high_mm: float = inf) -> float:
         """Exact volume, of all of it or between two heights [mm3]."""
-        found = []
+        volumes = []
         for edge in self._edges():
             (_, za), (_, zb) = edge.start, edge.end
             ends = [min(max(z, low_mm), high_mm) for z in (za, zb)]
             if ends[0] != ends[1]:
                 a, b = ((edge.at_height(z), z) if z != given[1] else given
                         for z, given in zip(ends, (edge.start, edge.end), strict=True))  # fmt: skip
-                found.append(_Edge(a, b, edge.centre).volume_mm3())
-        return sum(found)
+                volumes.append(_Edge(a, b, edge.centre).volume_mm3())
+        return sum(volumes)
 
     def is_box(self) -> bool:
         """False: no box has curved faces."""
@@ -208,32 +209,34 @@ class Revolved:
 
     def profile(self, chord_mm: float) -> list[Point]:
         """Corners of the profile, with those of chords at most ``chord_mm`` from its arcs [mm]."""
-        found = []
+        corners = []
         for edge in self._edges():
             short = [edge]
             while edge.centre and _off_chord(short[0].middle(), short[0].start, short[0].end) > chord_mm:
                 short = [half for whole in short for half in whole.halves()]
-            found += [part.start for part in short]
-        return found
+            corners += [part.start for part in short]
+        return corners
 
-    def turned_over(self, size_mm: Place) -> "Revolved":
-        """It in a box of some size that is turned by half a turn about x."""
-        outline = tuple((r, rounded(size_mm[2] - z)) for r, z in self.outline)
-        return Revolved(self.x_mm, rounded(size_mm[1] - self.y_mm), outline, tuple(-bulge for bulge in self.bulges))
+    def moved(self, move: Move) -> "Revolved":
+        """It at another place, scaled or turned."""
+        factor, turn = abs(move.scale[0]), -1 if move.scale[2] < 0 else 1
+        corners = list(zip(self.outline, self.bulges, strict=True)) if factor == 1 else list(self._stretched(factor))
+        ((x, y),) = move.outline("z", ((self.x_mm, self.y_mm),))
+        outline = tuple((r, move.at("z", z)) for (r, z), _ in corners)
+        return Revolved(x, y, outline, tuple(turn * bulge for _, bulge in corners))
 
-    def stretched(self, factor: float) -> "Revolved":
-        """It scaled in x and y; arcs become short ones through the ellipse's points, exact to 1e-5 of the stretch."""
-        outline, bulges = [], []
-        for edge, straight in ((e, e.centre is None) for e in self._edges()):
+    def _stretched(self, factor: float) -> Iterator[tuple[Point, float]]:
+        """Corners and bulges of the profile scaled along the radius.
+
+        Arcs become short ones through the ellipse's points, exact to 1e-5 of the stretch.
+        """
+        for edge in self._edges():
             short = [edge]
-            while not straight and len(short) < pi / 2 / _ARC:
+            while edge.centre and len(short) < pi / 2 / _ARC:
                 short = [half for whole in short for half in whole.halves()]
             for part in short:
-                a, b = ((r * factor, z) for r, z in (part.start, part.end))
-                middle = part.middle()
-                outline.append((rounded(a[0]), rounded(a[1])))
-                bulges.append(0.0 if straight else _bulge(a, (middle[0] * factor, middle[1]), b))
-        return Revolved(rounded(self.x_mm * factor), rounded(self.y_mm * factor), tuple(outline), tuple(bulges))
+                a, middle, b = ((r * factor, z) for r, z in (part.start, part.middle(), part.end))
+                yield (rounded(a[0]), rounded(a[1])), _bulge(a, middle, b) if edge.centre else 0.0
 
     def _edges(self) -> tuple[_Edge, ...]:
         return _edges(self.outline, self.bulges)
@@ -287,62 +290,43 @@ def _arc(radius_mm: float, quarters: int) -> Outline:
 
 @lru_cache(maxsize=64)
 def _beside_axis(outline: Outline, bulges: tuple[float, ...], away_mm: float) -> tuple[Outline, ...]:
-    """Outlines of the upright cut at some distance from the axis, in (along, z), the axis at 0 [mm]."""
-    chains = _chains(_edges(outline, bulges), away_mm)
-    if len(chains) == 1 and chains[0][0][0] > 0:  # all of the profile lies further out
-        loop = chains[0]
-        return tuple(loop[:-1]), tuple((-u, z) for u, z in reversed(loop[:-1]))
-    ends = sorted((z, k, last) for k, chain in enumerate(chains) for last, (_, z) in enumerate((chain[0], chain[-1])))
-    partner = {
-        a[1:]: b[1:] for one, two in zip(ends[::2], ends[1::2], strict=True) for a, b in ((one, two), (two, one))
-    }
-    found, left = [], set(range(len(chains)))
-    while left:
-        k = first = min(left)
-        loop, passes = [], 0
-        while passes == 0 or k != first:
-            left.discard(k)
-            loop += chains[k]
-            passes += 1
-            k = partner[k, 1][0]
-        if passes == 1 and abs(loop[0][1] - loop[-1][1]) > SLIVER_MM:  # both halves share one edge: they are one
-            found.append((*loop, *((-u, z) for u, z in reversed(loop[1:-1]))))
-        else:
-            found += [tuple(loop), tuple((-u, z) for u, z in reversed(loop))]
-    smooth = map(without_straight, found)
+    """Outlines of the upright cut at some distance from the axis, in (along, z), the axis at 0 [mm].
+
+    The half on one side is the profile, its radii seen at that distance and those within it at the axis; it and its
+    mirror image are one where they share an edge, but for a hole, which outlines do not have.
+    """
+    import shapely
+
+    half = shapely.make_valid(shapely.Polygon(_seen(outline, bulges, away_mm)))
+    halves = half, shapely.transform(half, lambda places: places * [-1.0, 1.0])
+    whole = shapely.get_parts(shapely.union_all(halves))
+    if any(shapely.get_num_interior_rings(part) > 0 for part in whole):
+        whole = shapely.get_parts(halves)
+    rings = (shapely.get_coordinates(shapely.orient_polygons(part))[:-1].tolist() for part in whole if part.area > 0)
+    smooth = (without_straight([(u, z) for u, z in ring]) for ring in rings)
     return tuple(o for o in smooth if len(o) > 2 and area_mm2(o) > SLIVER_MM**2)
 
 
-def _chains(edges: Sequence[_Edge], away_mm: float) -> list[list[Point]]:
-    """Runs of a profile's edges beyond some radius, as the upright cut at that distance shows them, to ``CHORD_MM``."""
-    runs: list[list[_Edge]] = []
-    inside = False
-    start = next((k for k, e in enumerate(edges) if e.start[0] <= away_mm), 0)
-    for edge in (*edges[start:], *edges[:start]):
+def _seen(outline: Outline, bulges: tuple[float, ...], away_mm: float) -> list[Point]:
+    """Corners of a profile as the upright cut at some distance from the axis shows them, to ``CHORD_MM``."""
+    ring: list[Point] = []
+    for edge in _edges(outline, bulges):
         a, b, centre = edge
-        if a[0] > away_mm or b[0] > away_mm:
-            low = (away_mm, edge.at_radius(away_mm)) if min(a[0], b[0]) <= away_mm else None
-            part = _Edge(low if low and a[0] <= away_mm else a, low if low and b[0] <= away_mm else b, centre)
-            if inside:
-                runs[-1].append(part)
+        todo = [edge]
+        if min(a[0], b[0]) < away_mm < max(a[0], b[0]):
+            at = (away_mm, edge.at_radius(away_mm))
+            todo = [_Edge(a, at, centre), _Edge(at, b, centre)]
+        if centre:
+            todo = [quarter for part in todo for half in part.halves() for quarter in half.halves()]
+        todo.reverse()
+        while todo:
+            part = todo.pop()
+            start, middle, end = (_shown(p, away_mm) for p in (part.start, part.middle(), part.end))
+            if _off_chord(middle, start, end) > 0.7 * CHORD_MM:  # the middle is not where a chord is furthest off
+                todo += part.halves()[::-1]
             else:
-                runs.append([part])
-        inside = b[0] > away_mm
-    found = []
-    for run in runs:
-        points = [_shown(run[0].start, away_mm)]
-        for edge in run:
-            todo = [edge] if edge.centre is None else [h for half in edge.halves() for h in half.halves()]
-            todo.reverse()
-            while todo:
-                part = todo.pop()
-                a, middle, b = (_shown(p, away_mm) for p in (part.start, part.middle(), part.end))
-                if _off_chord(middle, a, b) > 0.7 * CHORD_MM:  # the middle is not where a chord is furthest off
-                    todo += part.halves()[::-1]
-                else:
-                    points.append(b)
-        found.append(points)
-    return found
+                ring.append(end)
+    return ring
 
 
 def _shown(point: Point, away_mm: float) -> Point:

@@ -48,11 +48,38 @@ class Piece(Protocol):
     def cut(self, axis: str, at_mm: float) -> list[Outline]:
         """Outlines in which the plane ``axis = at_mm`` cuts it, in ``PLANE[axis]`` [mm]."""
 
-    def turned_over(self, size_mm: Place) -> Self:
-        """It in a box of some size that is turned by half a turn about x."""
+    def moved(self, move: "Move") -> Self:
+        """It at another place, scaled or turned."""
 
-    def stretched(self, factor: float) -> Self:
-        """It scaled in x and y."""
+
+@dataclass(frozen=True)
+class Move:
+    """Scale and then shift along each axis, before which x and y may be exchanged.
+
+    Attributes
+    ----------
+    scale : (float, float, float)
+        Along x, y and z: alike along x and y, 1 or -1 along z; below 0 it mirrors [-].
+    shift_mm : (float, float, float)
+        Along x, y and z [mm].
+    exchanges : bool
+        Whether x and y are exchanged: the mirror image about the line x = y.
+    """
+
+    scale: Place = (1, 1, 1)
+    shift_mm: Place = (0, 0, 0)
+    exchanges: bool = False
+
+    def at(self, axis: str, value_mm: float) -> float:
+        """Coordinate along an axis after the move [mm]."""
+        k = AXES.index(axis)
+        return rounded(self.scale[k] * value_mm + self.shift_mm[k])
+
+    def outline(self, axis: str, outline: Outline) -> Outline:
+        """Outline in ``PLANE[axis]`` after the move [mm]."""
+        first, second = PLANE[axis]
+        turned = ((v, u) for u, v in outline) if self.exchanges and axis == "z" else outline
+        return tuple((self.at(first, u), self.at(second, v)) for u, v in turned)
 
 
 @dataclass(frozen=True)
@@ -148,22 +175,15 @@ class Prism:
             return [rectangle(self.start_mm, self.end_mm, low, high) for low, high in runs]
         return [rectangle(low, high, self.start_mm, self.end_mm) for low, high in runs]
 
-    def turned_over(self, size_mm: Place) -> "Prism":
-        """It in a box of some size that is turned by half a turn about x."""
-        _, width, height = (rounded(s) for s in size_mm)
-        if self.axis == "x":
-            return replace(self, outline=tuple((rounded(width - y), rounded(height - z)) for y, z in self.outline))
-        size, extent = (height, width) if self.axis == "y" else (width, height)
-        outline = tuple((x, rounded(size - v)) for x, v in reversed(self.outline))
-        start, end = rounded(extent - self.end_mm), rounded(extent - self.start_mm)
-        return replace(self, outline=outline, start_mm=start, end_mm=end)
+    def moved(self, move: Move) -> "Prism":
+        """It at another place, scaled or turned.
 
-    def stretched(self, factor: float) -> "Prism":
-        """It scaled in x and y."""
-        first, second = (1.0 if axis == "z" else factor for axis in PLANE[self.axis])
-        along = 1.0 if self.axis == "z" else factor
-        outline = tuple((rounded(u * first), rounded(v * second)) for u, v in self.outline)
-        return replace(self, outline=outline, start_mm=self.start_mm * along, end_mm=self.end_mm * along)
+        >>> Prism("y", ((0, 5), (1, 5), (1, 6)), 2, 3).moved(Move(shift_mm=(0, 0, 3), exchanges=True))
+        Prism(axis='x', outline=((0, 8), (1, 8), (1, 9)), start_mm=2, end_mm=3)
+        """
+        axis = {"x": "y", "y": "x", "z": "z"}[self.axis] if move.exchanges else self.axis
+        start, end = sorted(move.at(axis, at) for at in (self.start_mm, self.end_mm))
+        return Prism(axis, move.outline(axis, self.outline), start, end)
 
 
 @dataclass(frozen=True)
@@ -225,14 +245,17 @@ class Scene:
 
     def turned_over(self) -> "Scene":
         """The scene turned by half a turn about x, to be printed upside down."""
-        bodies = (replace(b, pieces=tuple(p.turned_over(self.size_mm) for p in b.pieces)) for b in self.bodies)
-        return replace(self, bodies=tuple(bodies))
+        _, width, height = self.size_mm
+        return self._moved(Move((1, -1, -1), (0, width, height)))
 
     def stretched(self, factor: float) -> "Scene":
         """The scene scaled by ``factor`` [-] in x and y."""
         length, width, height = self.size_mm
-        bodies = (replace(b, pieces=tuple(p.stretched(factor) for p in b.pieces)) for b in self.bodies)
-        return replace(self, bodies=tuple(bodies), size_mm=(length * factor, width * factor, height))
+        return replace(self._moved(Move((factor, factor, 1))), size_mm=(length * factor, width * factor, height))
+
+    def _moved(self, move: Move) -> "Scene":
+        bodies = (replace(b, pieces=tuple(p.moved(move) for p in b.pieces)) for b in self.bodies)
+        return replace(self, bodies=tuple(bodies))
 
 
 @dataclass(frozen=True)
@@ -247,6 +270,16 @@ class Fill:
     support: str = ""
 
 
+def parameter(default: float, about: str, low: float, high: float, **more: Any) -> Any:
+    """Field of a shape's parameter, with its help and its range."""
+    return field(default=default, metadata={"help": about, "range": (low, high), **more})
+
+
+def choice(default: str, about: str, *choices: str) -> Any:
+    """Field of a shape's parameter that is one of several words."""
+    return field(default=default, metadata={"help": about, "choices": choices})
+
+
 @dataclass(frozen=True)
 class Envelope:
     """Parameters that every shape has.
@@ -254,12 +287,10 @@ class Envelope:
     The ranges in the metadata are those of sense for a printed sensor, far wider than any printer's.
     """
 
-    length_mm: float = field(default=100.0, metadata={"help": "Length of the sensor, along x.", "range": (1.0, 1000.0)})
-    width_mm: float = field(default=10.0, metadata={"help": "Width of the sensor, along y.", "range": (1.0, 1000.0)})
-    electrode_mm: float = field(default=0.3, metadata={"help": "Thickness of each electrode.", "range": (0.01, 10.0)})
-    isolation_mm: float = field(
-        default=0.0, metadata={"help": "Isolation layer over the top electrode; 0 leaves it out.", "range": (0.0, 10.0)}
-    )
+    length_mm: float = parameter(100.0, "Length of the sensor, along x.", 1.0, 1000.0)
+    width_mm: float = parameter(10.0, "Width of the sensor, along y.", 1.0, 1000.0)
+    electrode_mm: float = parameter(0.3, "Thickness of each electrode.", 0.01, 10.0)
+    isolation_mm: float = parameter(0.0, "Isolation layer over the top electrode; 0 leaves it out.", 0.0, 10.0)
 
     def cells(self) -> float:
         """Number of cells of a repeating pattern in the sensor; 1 without a pattern [-]."""
@@ -269,6 +300,19 @@ class Envelope:
         """All of the plan between two heights; nothing where they are one [mm]."""
         plates = (box(0.0, self.length_mm, 0.0, self.width_mm, low_mm, high_mm),)
         return plates if high_mm - low_mm > SLIVER_MM else ()
+
+    def between_electrodes(
+        self, fill: Fill, bodies: Sequence[Body], roof_mm: float, cogs: tuple[Piece, ...] | None = None
+    ) -> Scene:
+        """Scene of bodies between two plain electrodes, the upper one from a height on, perhaps with cogs [mm]."""
+        name, top = "top_electrode" if cogs is None else "top_electrode_with_cogs", roof_mm + self.electrode_mm
+        every = (
+            Body("bottom_electrode", fill.bottom_electrode, self.plate(0.0, self.electrode_mm), "bottom"),
+            *bodies,
+            Body(name, fill.top_electrode, (cogs or ()) + self.plate(roof_mm, top), "top"),
+            Body("isolation", fill.isolation, self.plate(top, top + self.isolation_mm)),
+        )
+        return Scene(every, (self.length_mm, self.width_mm, rounded(top + self.isolation_mm)))
 
 
 def seen_from_above(piece: Piece) -> Outline:

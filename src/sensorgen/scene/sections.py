@@ -48,10 +48,10 @@ def sections(scene: Scene) -> list[Section]:
 
 @lru_cache(maxsize=8)
 def _fewest(scene: Scene) -> list[Section]:
-    found = [_sections(scene, n) for n in "yx" if _is_constant(scene, n)]
-    if not found:
+    every = [_sections(scene, n) for n in "yx" if _is_constant(scene, n)]
+    if not every:
         raise ValueError("no direction in which this scene is made of constant cross-sections")
-    return min(found, key=len)
+    return min(every, key=len)
 
 
 def square_to(scene: Scene, normal: str) -> list[Section]:
@@ -73,14 +73,14 @@ def _sections(scene: Scene, normal: str) -> list[Section]:
             slabs[k].append(index)
     looks: dict[object, int] = {}
     look = [looks.setdefault((body.name, shadow(p, normal)), len(looks)) for _, body, p in spans]
-    found: dict[tuple[int, ...], tuple[float, float, list[int]]] = {}
+    by_look: dict[tuple[int, ...], tuple[float, float, list[int]]] = {}
     for (low, high), here in zip(pairwise(cuts), slabs, strict=True):
         key = tuple(look[i] for i in here)
-        depth, at, members = found.get(key, (0.0, (low + high) / 2, here))
-        found[key] = (depth + high - low, at, members)
+        depth, at, members = by_look.get(key, (0.0, (low + high) / 2, here))
+        by_look[key] = (depth + high - low, at, members)
     return [
         Section(across, depth, at, tuple((spans[i][1], o) for i in members for o in spans[i][2].cut(normal, at)))
-        for depth, at, members in found.values()
+        for depth, at, members in by_look.values()
     ]
 
 
@@ -117,11 +117,11 @@ def alike(section: Section, digits: int = 12) -> list[int]:
     Sizes are equal where they are to so many digits after the point [mm].
     """
     firsts: dict[object, int] = {}
-    found = []
+    numbers = []
     for k, column in enumerate(_columns(section)):
         lines = ((own.body.name, *(round(z, digits) for z in own.bottom_mm + own.top_mm)) for own in column.layers)
-        found.append(firsts.setdefault((round(column.right_mm - column.left_mm, digits), *lines), k))
-    return found
+        numbers.append(firsts.setdefault((round(column.right_mm - column.left_mm, digits), *lines), k))
+    return numbers
 
 
 @lru_cache(maxsize=8)
@@ -136,8 +136,8 @@ def _columns(section: Section) -> list[SectionColumn]:
                 left, right = va + (cuts[k] - ua) * slope, va + (cuts[k + 1] - ua) * slope
                 edges[k].append(((left, vb if cuts[k + 1] == ub else right), number))
     return [
-        SectionColumn(left, right, _layers(section, found))
-        for (left, right), found in zip(pairwise(cuts), edges, strict=True)
+        SectionColumn(left, right, _layers(section, crossing))
+        for (left, right), crossing in zip(pairwise(cuts), edges, strict=True)
         if right - left > ROUNDING_MM
     ]
 
@@ -145,10 +145,10 @@ def _columns(section: Section) -> list[SectionColumn]:
 def overlap(scene: Scene) -> str | None:
     """Where bodies run into each other, or an outline into itself; None where nowhere, or where no section tells."""
     try:
-        found = sections(scene)
+        cuts_of = sections(scene)
     except ValueError:
         return None
-    for section in found:
+    for section in cuts_of:
         for column in columns(section):
             for below, above in pairwise(column.layers):
                 if min(a - b for a, b in zip(above.bottom_mm, below.top_mm, strict=True)) < -ROUNDING_MM:

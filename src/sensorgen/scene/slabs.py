@@ -55,7 +55,7 @@ def slabs(scene: Scene, cuts: int = CUTS) -> tuple[Slab, ...]:
     levels = np.unique(np.array(heights).round(9))
     levels = levels[np.append(True, np.diff(levels) > SLIVER_MM)]
     faces = [_faces(piece) for _, piece in slanted]
-    found = []
+    cut_slabs = []
     for low, high in pairwise(levels.tolist()):
         inner, outer = defaultdict[Body, "list[Region]"](list), defaultdict[Body, "list[Region]"](list)
         for body, piece in upright:
@@ -68,8 +68,8 @@ def slabs(scene: Scene, cuts: int = CUTS) -> tuple[Slab, ...]:
                 inner[body].append(least)
                 outer[body].append(most)
         united = [{b: shapely.union_all(own) for b, own in some.items()} for some in (inner, outer)]
-        found.append(Slab(low, high, united[0], united[1]))
-    return tuple(found)
+        cut_slabs.append(Slab(low, high, united[0], united[1]))
+    return tuple(cut_slabs)
 
 
 def covered(scene: Scene, terminal: str) -> bool:

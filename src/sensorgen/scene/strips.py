@@ -1,19 +1,23 @@
 """Strips across a sensor that follow each other along one of its axes: what the shapes of them share."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import ceil
 
-from sensorgen.scene.scene import SLIVER_MM, Envelope, Prism, box
+from sensorgen.core.errors import OutOfRange
+from sensorgen.scene.scene import SLIVER_MM, Envelope, Prism, box, choice, parameter
 
 
 @dataclass(frozen=True)
 class StripParams(Envelope):
     """Parameters of every such pattern."""
 
-    period_mm: float = field(default=2.0, metadata={"help": "Period of the pattern.", "range": (0.1, 100.0)})
-    along: str = field(
-        default="x", metadata={"help": "Axis along which the strips follow each other.", "choices": ("x", "y")}
-    )
+    period_mm: float = parameter(2.0, "Period of the pattern.", 0.1, 100.0)
+    along: str = choice("x", "Axis along which the strips follow each other.", "x", "y")
+
+    def refuse_whole(self, name: str) -> None:
+        """Refuse a width that leaves nothing of the period."""
+        if (width_mm := getattr(self, name)) >= self.period_mm:
+            raise OutOfRange(f"{name} {width_mm:g} leaves nothing of period_mm {self.period_mm:g}: expected less")
 
     def cells(self) -> float:
         """Number of cells of the pattern in the sensor [-]."""

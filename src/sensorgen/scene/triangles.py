@@ -1,36 +1,25 @@
 """Rows of triangles between a bottom and a top electrode: what the shapes of one and of two layers share."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import ceil
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.scene.scene import Body, Envelope, Fill, Outline, Point, Prism, clipped, rectangle
+from sensorgen.scene.scene import Body, Envelope, Fill, Outline, Point, Prism, choice, clipped, parameter, rectangle
 
 
 @dataclass(frozen=True)
 class TriangleParams(Envelope):
     """Parameters of the triangular microstructure."""
 
-    period_mm: float = field(default=2.0, metadata={"help": "Period of the pattern.", "range": (0.1, 100.0)})
-    hang_height_mm: float = field(
-        default=0.5, metadata={"help": "Height of the hanging triangles.", "range": (0.01, 10.0)}
+    period_mm: float = parameter(2.0, "Period of the pattern.", 0.1, 100.0)
+    hang_height_mm: float = parameter(0.5, "Height of the hanging triangles.", 0.01, 10.0)
+    lower_height_mm: float = parameter(0.24, "Height of the triangles on the film.", 0.01, 10.0)
+    dielectric_mm: float = parameter(0.2, "Thickness of the film under the apexes.", 0.0, 10.0)
+    along: str = choice("x", "Axis along which the pattern repeats (x: triX, y: triY).", "x", "y")
+    tip_mm: float = parameter(
+        0.0, "Width of the hanging triangles' flat tips; 0 for sharp ones.", 0.0, 50.0, later=True
     )
-    lower_height_mm: float = field(
-        default=0.24, metadata={"help": "Height of the triangles on the film.", "range": (0.01, 10.0)}
-    )
-    dielectric_mm: float = field(
-        default=0.2, metadata={"help": "Thickness of the film under the apexes.", "range": (0.0, 10.0)}
-    )
-    along: str = field(
-        default="x",
-        metadata={"help": "Axis along which the pattern repeats (x: triX, y: triY).", "choices": ("x", "y")},
-    )
-    tip_mm: float = field(
-        default=0.0,
-        metadata={"help": "Width of the hanging triangles' flat tips; 0 for sharp ones.", "range": (0.0, 50.0),
-                  "later": True},
-    )  # fmt: skip
 
     def __post_init__(self) -> None:
         """Refuse triangles that would run into each other."""

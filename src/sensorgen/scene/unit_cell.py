@@ -6,7 +6,7 @@ no fringe arises there; a section without such planes is continued by its own mi
 """
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 from itertools import pairwise
@@ -109,21 +109,18 @@ def cell(section: Section, height_mm: float, evenly: bool = True) -> SectionCell
     ValueError
         Outlines overlap, or an outline is open.
     """
-    return mirrored(tuple(_slice(column, height_mm) for column in columns(section)), evenly)
+    return mirrored(tuple(slices(section, height_mm)), evenly)
+
+
+def slices(section: Section, height_mm: float, *, layered: bool = False) -> list[Slice]:
+    """Columns of a section with the air between them; ``layered`` keeps each layer, a conductor with its material."""
+    return [_slice(column, height_mm, layered) for column in columns(section)]
 
 
 @lru_cache(maxsize=16)
 def mirrored(slices: tuple[Slice, ...], evenly: bool = True) -> SectionCell:
     """The smallest run of slices that mirrors at its own two sides continue to all of them."""
-    # Slices as wide as their interfaces are straight
-    whole: list[Slice] = []
-    for here in slices:
-        last = whole[-1] if whole else None
-        joined = Slice(last.left_mm, here.right_mm, _bridged(last, here)) if last else None
-        if last and joined and len(joined.bands) == len(last.bands) and _runs_on(joined, last, here):
-            whole[-1] = joined
-        else:
-            whole.append(here)
+    whole = straightened(slices)
     # Where a mirror may stand: between slices, and in the middle of level ones
     edges = {whole[0].left_mm, *(s.right_mm for s in whole)}
     places = sorted(edges | {(s.left_mm + s.right_mm) / 2 for s in whole if s.is_flat()})
@@ -133,9 +130,22 @@ def mirrored(slices: tuple[Slice, ...], evenly: bool = True) -> SectionCell:
         for low, high in _pairs(places, end):
             if not fits(low - places[0], high - low, end - places[0]) or not (is_mirror(low) and is_mirror(high)):
                 continue
-            if _repeats(whole, low, high):
+            if repeats(whole, low, high):
                 return _cell(whole, low, high)
     return SectionCell(tuple(whole), (1.0,) * len(whole))
+
+
+def straightened(slices: Sequence[Slice]) -> list[Slice]:
+    """Slices as wide as their interfaces are straight."""
+    whole: list[Slice] = []
+    for here in slices:
+        last = whole[-1] if whole else None
+        joined = Slice(last.left_mm, here.right_mm, _bridged(last, here)) if last else None
+        if last and joined and len(joined.bands) == len(last.bands) and _runs_on(joined, last, here):
+            whole[-1] = joined
+        else:
+            whole.append(here)
+    return whole
 
 
 def affordable(slices: tuple[Slice, ...], evenly: bool = True) -> SectionCell:
@@ -148,7 +158,7 @@ def affordable(slices: tuple[Slice, ...], evenly: bool = True) -> SectionCell:
     return even if len(even.slices) <= LARGER * len(smallest.slices) else smallest
 
 
-def _slice(column: SectionColumn, height_mm: float) -> Slice:
+def _slice(column: SectionColumn, height_mm: float, layered: bool) -> Slice:
     """A column with the air between its layers; layers of one material that touch are one."""
     bands: list[Band] = []
     at = (0.0, 0.0)
@@ -157,18 +167,20 @@ def _slice(column: SectionColumn, height_mm: float) -> Slice:
             raise ValueError(f"outlines overlap near {column.left_mm:g} mm: {layer.body.name} runs into its neighbour")
         terminal = layer.body.terminal
         bands.append(Band("air", "", at, layer.bottom_mm))
-        bands.append(Band("" if terminal else layer.body.material, terminal, layer.bottom_mm, layer.top_mm))
+        bands.append(
+            Band("" if terminal and not layered else layer.body.material, terminal, layer.bottom_mm, layer.top_mm)
+        )
         at = layer.top_mm
     bands.append(Band("air", "", at, (height_mm, height_mm)))
     # Bands without those of no height, and neighbours of one material as one
-    found: list[Band] = []
+    joined: list[Band] = []
     for band in bands:
         if max(t - b for b, t in zip(band.bottom_mm, band.top_mm, strict=True)) <= ROUNDING_MM:
             continue
-        if found and found[-1].is_same(band):
-            band = Band(band.material, band.terminal, found.pop().bottom_mm, band.top_mm)
-        found.append(band)
-    return Slice(column.left_mm, column.right_mm, tuple(found))
+        if joined and joined[-1].is_same(band) and not layered:
+            band = Band(band.material, band.terminal, joined.pop().bottom_mm, band.top_mm)
+        joined.append(band)
+    return Slice(column.left_mm, column.right_mm, tuple(joined))
 
 
 def _bridged(last: Slice, here: Slice) -> tuple[Band, ...]:
@@ -222,15 +234,15 @@ def _pairs(places: list[float], end_mm: float) -> Iterator[Point]:
         reach *= 2
 
 
-def _is_mirror(slices: list[Slice], at: float) -> bool:
+def _is_mirror(slices: Sequence[Slice], at: float) -> bool:
     """True where a place mirrors both its sides, as far as the nearer end reaches."""
     reach = min(at - slices[0].left_mm, slices[-1].right_mm - at)
-    return reach <= ROUNDING_MM or _repeats(_cut(slices, at - reach, at + reach), at, at + reach)
+    return reach <= ROUNDING_MM or repeats(cut(slices, at - reach, at + reach), at, at + reach)
 
 
-def _repeats(slices: list[Slice], low: float, high: float) -> bool:
+def repeats(slices: Sequence[Slice], low: float, high: float) -> bool:
     """True where mirrors at two places make the whole section from the part between them."""
-    inside = _cut(slices, low, high)
+    inside = cut(slices, low, high)
     lefts = [s.left_mm for s in inside]
     for piece in _folded(slices, low, high):
         at = max(bisect_right(lefts, (piece.left_mm + piece.right_mm) / 2) - 1, 0)
@@ -248,7 +260,7 @@ def _agree(piece: Slice, place: Slice) -> bool:
     return all(abs(a - b) < 10 * ROUNDING_MM for _, mine, other in ends for a, b in zip(mine, other, strict=True))
 
 
-def _cut(slices: list[Slice], low: float, high: float) -> list[Slice]:
+def cut(slices: Sequence[Slice], low: float, high: float) -> list[Slice]:
     """The slices between two places."""
     first = bisect_right(slices, low + ROUNDING_MM, key=lambda s: s.right_mm)
     last = bisect_left(slices, high - ROUNDING_MM, key=lambda s: s.left_mm)
@@ -258,14 +270,14 @@ def _cut(slices: list[Slice], low: float, high: float) -> list[Slice]:
     return inside
 
 
-def _folded(slices: list[Slice], low: float, high: float) -> Iterator[Slice]:
+def _folded(slices: Sequence[Slice], low: float, high: float) -> Iterator[Slice]:
     """Every piece of the section, mirrored until it lies between two places."""
     width = high - low
     for s in slices:
         first, last = (floor((x - low) / width) for x in (s.left_mm + ROUNDING_MM, s.right_mm - ROUNDING_MM))
         for k in range(first, last + 1):
             start = low + k * width
-            for piece in _cut([s], start, start + width):
+            for piece in cut([s], start, start + width):
                 left, right, bands = piece.left_mm - start, piece.right_mm - start, piece.bands
                 if k % 2:
                     left, right = width - right, width - left
@@ -276,10 +288,10 @@ def _folded(slices: list[Slice], low: float, high: float) -> Iterator[Slice]:
 def _cell(slices: list[Slice], low: float, high: float) -> SectionCell:
     """The piece between two places, cut where a sensor's end falls into it, and how often each part occurs."""
     pieces = [(p.left_mm, p.right_mm) for p in _folded(slices, low, high)]
-    inside = _cut(slices, low, high)
+    inside = cut(slices, low, high)
     ends = sorted({x for piece in pieces for x in piece} | {x for s in inside for x in (s.left_mm, s.right_mm)})
     distinct = [x for k, x in enumerate(ends) if k == 0 or x - ends[k - 1] > 10 * ROUNDING_MM]
-    parts = [p for a, b in pairwise(distinct) for p in _cut(inside, a, b)]
+    parts = [p for a, b in pairwise(distinct) for p in cut(inside, a, b)]
     middles = [(p.left_mm + p.right_mm) / 2 for p in parts]
     shares = [float(sum(a < m < b for a, b in pieces)) for m in middles]
     if max(shares) == min(shares):

@@ -71,10 +71,10 @@ def piece(line: LineMatrices, length_m: Real) -> Moving:
     if not np.isfinite(size):
         raise OutOfRange("the stack's numbers are too extreme for double precision")
     halvings = max(0, int(np.ceil(np.log2(size / _SMALL) / 2))) if size > _SMALL else 0
-    made = _short(line, length_m * 0.5**halvings)
+    doubled = _short(line, length_m * 0.5**halvings)
     for _ in range(halvings):
-        made = _doubled(made)
-    return made
+        doubled = _doubled(doubled)
+    return doubled
 
 
 def _short(line: LineMatrices, length_m: Real) -> Moving:
@@ -94,11 +94,11 @@ def _short(line: LineMatrices, length_m: Real) -> Moving:
     inverse = np.linalg.inv(np.eye(n) + rest)
     opened, shorted, passed = -inverse @ shunt, -series @ inverse, _turned(inverse)  # type: ignore[arg-type]
     by_lost = passed @ _turned(by_rest) @ passed
-    found = LinePiece(opened, shorted, passed, passed @ _turned(rest))
+    short = LinePiece(opened, shorted, passed, passed @ _turned(rest))
     by = LinePiece(
         -inverse @ (by_shunt + by_rest @ opened), -(by_series + shorted @ by_rest) @ inverse, -by_lost, by_lost
     )  # fmt: skip
-    return Moving(found, by)
+    return Moving(short, by)
 
 
 def _generator(
@@ -210,20 +210,20 @@ def inverse(admittance_s: Complex) -> Complex:
 
 def side_by_side(name: str, values: Sequence[ArrayLike]) -> NDArray[Any]:
     """The tracks' or films' values along a last axis."""
-    found = [passive(name, value) for value in values]
-    check_fit(f"the values of {name} in a section", found)
-    return np.stack(np.broadcast_arrays(*found), axis=-1)
+    columns = [passive(name, value) for value in values]
+    check_fit(f"the values of {name} in a section", columns)
+    return np.stack(np.broadcast_arrays(*columns), axis=-1)
 
 
 def loops(r: NDArray[Any]) -> NDArray[Any]:
     """Resistance matrix of the loops: each runs through its two tracks, neighbours share one in opposite directions."""
     n = r.shape[-1] - 1
     own, shared = r[..., 1:] + r[..., :-1], r[..., 1:-1]
-    found = np.zeros((*r.shape[:-1], n, n))
+    matrix = np.zeros((*r.shape[:-1], n, n))
     k = np.arange(n)
-    found[..., k, k] = own
-    found[..., k[1:], k[:-1]] = found[..., k[:-1], k[1:]] = -shared
-    return found
+    matrix[..., k, k] = own
+    matrix[..., k[1:], k[:-1]] = matrix[..., k[:-1], k[1:]] = -shared
+    return matrix
 
 
 def diagonal(values: NDArray[Any]) -> Complex:
@@ -233,8 +233,8 @@ def diagonal(values: NDArray[Any]) -> Complex:
 
 def directions(deep: int, *changes: Complex | float) -> Complex:
     """The directions of interest along one axis in front of ``deep`` others."""
-    found = np.stack(np.broadcast_arrays(*(np.asarray(change, complex) for change in changes)))
-    return found.reshape(len(changes), *(1,) * (deep + 1 - found.ndim), *found.shape[1:])
+    stacked = np.stack(np.broadcast_arrays(*(np.asarray(change, complex) for change in changes)))
+    return stacked.reshape(len(changes), *(1,) * (deep + 1 - stacked.ndim), *stacked.shape[1:])
 
 
 class GroundTie(NamedTuple):

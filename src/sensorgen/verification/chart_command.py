@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import click
 
-from sensorgen.cli import render, show
+from sensorgen.cli import render
 from sensorgen.cli.body_options import BodyChoice
 from sensorgen.cli.commands import arguments, options_of
 from sensorgen.cli.designs import DesignGroup
@@ -52,7 +52,7 @@ def _of_design(
 
     needed("matplotlib", "plotly")
     keys = quantity or QUANTITIES
-    with show.progress(keys) as step:
+    with render.progress(keys) as step:
 
         def on(words: str) -> None:
             step(words.partition(":")[0])
@@ -101,7 +101,7 @@ def _of_scenes(
         if name not in chart.SCENES:
             raise UnknownName("standard scene", name, chart.SCENES)
     names = scene or chart.SCENES
-    with show.progress(names) as step:
+    with render.progress(names) as step:
         points = chart.points(names, budget, step)
     rows = [vars(one) for one in (*points, *chart.silent(names, points))]
     text = io.StringIO()

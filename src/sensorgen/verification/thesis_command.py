@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
-from sensorgen.cli import FOUND_ERRORS, render, show
+from sensorgen.cli import FOUND_ERRORS, render
 from sensorgen.cli.commands import command as of_function
 from sensorgen.core.errors import NotInstalled
 from sensorgen.core.options import Option
@@ -36,7 +36,7 @@ def command(
 
     if find_spec("ngsolve") is None:  # other models would answer, and differ
         raise NotInstalled("thesis needs the solver NGSolve: pip install 'sensorgen[fem]'")
-    with show.progress(CHAPTERS) as step:
+    with render.progress(CHAPTERS) as step:
         rows = thesis.rows(step)
     made: dict[str, Callable[[Sequence[thesis.ReproducedItem]], str]] = {
         "html": thesis.html, "md": thesis.markdown,

@@ -21,17 +21,17 @@ from sensorgen.design.body import Body
 from sensorgen.design.design import Design
 from sensorgen.design.settings import varied
 from sensorgen.measure.log import Log
-from sensorgen.prediction import bodies, compression, evaluate, swept_prediction
+from sensorgen.prediction import bodies, compression, evaluate
 from sensorgen.prediction import capacitance_answer as at_rest
 from sensorgen.prediction.calibration.calibration import Calibration
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
-from sensorgen.prediction.loaded import Loaded, loaded
+from sensorgen.prediction.loaded import Loaded, PredictedPoint, loaded
+from sensorgen.prediction.loaded import sweep as predicted_sweep
 from sensorgen.prediction.planning import sensor_model
 from sensorgen.prediction.query import DEFAULT, NOISE, TONES_HZ, Query, Tip
 from sensorgen.prediction.results import Prediction
 from sensorgen.prediction.slices import reviewed
 from sensorgen.prediction.sweep import Sweep
-from sensorgen.prediction.swept_prediction import PredictedPoint
 from sensorgen.solvers.contact.boundary import BoundaryConditions
 from sensorgen.workflows import build as builds
 from sensorgen.workflows import display as display
@@ -136,7 +136,7 @@ def predict(
     if not isinstance(what, Design | Body):
         if forces or positions:
             raise BadInput("force_n and position_mm are of one design; expected Design or Body, or neither of them")
-        return swept_prediction.sweep("design", _points(what), query, 1, _silent)
+        return predicted_sweep("design", _points(what), query, 1, _silent)
     if not forces and not positions:
         return evaluate.evaluate(_body(what), query)
     return loaded(_body(what), query, forces, positions)
@@ -171,7 +171,7 @@ def sweep(
     points = [(chosen, _body(one)) for chosen, one in varied(_named(design), values)]
     if unloaded:
         return at_rest.sweep(tuple(values), points, at_rest.CapacitanceQuestion(query.accuracy), jobs, _silent)
-    return swept_prediction.sweep(tuple(values), points, query, jobs, _silent)
+    return predicted_sweep(tuple(values), points, query, jobs, _silent)
 
 
 def cell(
@@ -310,17 +310,19 @@ def export_design(design: Design, path: str | Path, gcode: str | Path | None = N
 
     design = _named(design)
     content = None if gcode is None else Path(gcode).read_bytes()
-    made = asprinted.body(design, paths.read(content, design.machine)) if content else reviewed(design).printed(design)
-    return exports.export(made, Path(path))
+    printed = (
+        asprinted.body(design, paths.read(content, design.machine)) if content else reviewed(design).printed(design)
+    )
+    return exports.export(printed, Path(path))
 
 
 def show(design: Design, path: str | Path = "") -> Path:
     """Write a design as one offline page, as ``sensorgen show`` does, and give its name: ``NAME.html`` if not given."""
-    from sensorgen.workflows import preview
+    from sensorgen.workflows import decision
 
     design = _named(design)
     file = Path(path or f"{design.name}.html")
-    files.replace(file, preview.page_of(design).encode())
+    files.replace(file, decision.page_of(design).encode())
     return file
 
 
@@ -356,10 +358,10 @@ def report(log: Log, iteration: int | None = None, *specimens: str, path: str | 
     from sensorgen.analysis.report import contents, pieces
 
     file = Path(path)
-    made = contents.report(log, iteration, specimens=specimens)
+    compared = contents.report(log, iteration, specimens=specimens)
     with files.replacing(file) as target:
-        target.writelines(piece.encode() for piece in pieces(made, file.suffix.lstrip(".") or "html"))
-    return made
+        target.writelines(piece.encode() for piece in pieces(compared, file.suffix.lstrip(".") or "html"))
+    return compared
 
 
 def invert(what: Design | Body, frequency_hz: Sequence[float], impedance_ohm: ArrayLike, *, noise: float) -> Estimates:
@@ -405,7 +407,7 @@ def calibrate(log: Log, *specimens: str, bench: Bench | None = None) -> list[Cal
     ``Calibration.inverter()`` then finds force and position. Parameters and errors as of
     :func:`sensorgen.analysis.calibration.calibrate`.
     """
-    return [made.calibration for made in calibrations.calibrate(log, specimens, bench)]
+    return [work.calibration for work in calibrations.calibrate(log, specimens, bench)]
 
 
 def compare(log: Log, iteration: int) -> Comparison:
@@ -427,10 +429,10 @@ def _named(design: Design) -> Design:
 
 def _numbers(name: str, values: ArrayLike) -> tuple[float, ...]:
     """Rising numbers from 0 on."""
-    found = np.atleast_1d(np.asarray(values, float))
-    if found.ndim > 1 or not (np.isfinite(found).all() and (found >= 0).all() and (np.diff(found) > 0).all()):
+    numbers = np.atleast_1d(np.asarray(values, float))
+    if numbers.ndim > 1 or not (np.isfinite(numbers).all() and (numbers >= 0).all() and (np.diff(numbers) > 0).all()):
         raise BadInput(f"{name}={values!r:.60}; expected a number, or rising numbers, from 0 on")
-    return tuple(found.tolist())
+    return tuple(numbers.tolist())
 
 
 def _several(what: object) -> Sequence[Any]:

@@ -166,17 +166,17 @@ def build(
     """
     folder = out / design.name
     with ExitStack() as stack:
-        held = reviewed(design, step, folder=folder)
-        if held.errors(strict) and not force:
-            raise Unprintable(held.findings, held.errors(strict))
-        held = held.with_meshes(design)
+        review = reviewed(design, step, folder=folder)
+        if review.errors(strict) and not force:
+            raise Unprintable(review.findings, review.errors(strict))
+        review = review.with_meshes(design)
         stage = stack.enter_context(store.staging(folder))
         step("prediction")
-        predicted = evaluate(bodies.of_file(design, held.file))
-        made = decision.decision(design, held, budget_s, step=step)
+        predicted = evaluate(bodies.of_file(design, review.file))
+        final = decision.decision(design, review, budget_s, step=step)
         built = Built(
-            design.name, folder, (), made.verdict, made.findings, timeless(predicted), tuple(compensated), (),
-            made.trial, made.advice, held.source,
+            design.name, folder, (), final.verdict, final.findings, timeless(predicted), tuple(compensated), (),
+            final.trial, final.advice, review.source,
         )  # fmt: skip
         decided(built)
         job = None
@@ -185,7 +185,7 @@ def build(
 
             kernel = stack.enter_context(CadProcess())  # its import runs beside everything below
             job = kernel.submit(design.printed, _colours(design), design.name, stage / f"{design.name}.step")
-        for name, content in _files(design, held, predicted, made, step):
+        for name, content in _files(design, review, predicted, final, step):
             store.write(stage, {name: content})
         if job:
             _await(job, step)
@@ -207,11 +207,11 @@ def _replaced(folder: Path, design: Design) -> tuple[str, ...]:
 
 
 def _files(
-    design: Design, held: PrintReview, predicted: Prediction, decided: Decision, step: Step
+    design: Design, review: PrintReview, predicted: Prediction, decided: Decision, step: Step
 ) -> Iterator[tuple[str, bytes]]:
     name, primed = design.name, tower(design.machine, design.layers, len(design.used()))
     step("3MF")
-    parts, settings = parts_of(design, held.meshes), prusa.profile(design.machine, design.layers, loads(design))
+    parts, settings = parts_of(design, review.meshes), prusa.profile(design.machine, design.layers, loads(design))
     for family in threemf.FAMILIES:
         content = threemf.content(family, name, parts, _centre_mm(design, family), primed, settings)
         yield f"{name}.{family}.3mf", content
@@ -219,10 +219,10 @@ def _files(
     for path, text in profiles(design).items():
         yield path, text.encode()
     step("drawing")
-    printed = held.printed(design)
-    yield f"{name}.svg", draw(design, held, printed.scene, printed.provenance).encode()
-    yield f"{name}.html", decided.page(printed, held, predicted).encode()
-    yield "check.json", document.to_json(report(design, held)).encode()
+    printed = review.printed(design)
+    yield f"{name}.svg", draw(design, review, printed.scene, printed.provenance).encode()
+    yield f"{name}.html", decided.page(printed, review, predicted).encode()
+    yield "check.json", document.to_json(report(design, review)).encode()
     yield "prediction.json", json_bytes(json.loads(to_json(predicted)))
     yield "design.json", json_bytes(design.model_dump(mode="json"))
     if design.layout:
@@ -243,17 +243,17 @@ def _await(job: "Future[None]", step: Step) -> None:
 
 def profiles(design: Design) -> dict[str, str]:
     """Slicer profiles, by file name: PrusaSlicer, Cura and Orca, for every quality that ships and the design's own."""
-    found, machine = loads(design), design.machine
+    by_tool, machine = loads(design), design.machine
     texts: dict[str, str] = {}
     # The design's own quality comes last: Cura's machine definition, one for all, then starts with it.
     others = (printer.load_quality(name) for name in QUALITIES if name != design.layers.name)
     for quality in (*others, design.layers):
         for at, since in folders("prusa").items():
-            texts[f"profiles/{at}/{machine.name}-{quality.name}.ini"] = prusa.profile(machine, quality, found, since)
+            texts[f"profiles/{at}/{machine.name}-{quality.name}.ini"] = prusa.profile(machine, quality, by_tool, since)
         for at, since in folders("cura").items():
-            own = cura.profiles(machine, quality, found, since)
+            own = cura.profiles(machine, quality, by_tool, since)
             texts |= {f"profiles/{at}/{path}": text for path, text in own.items()}
-        own = orca.profiles(machine, quality, found)
+        own = orca.profiles(machine, quality, by_tool)
         texts |= {f"profiles/orca/{path}": text for path, text in own.items()}
     return texts
 
@@ -281,13 +281,13 @@ def _manifest(design: Design, stage: Path) -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """Versions of this software, of Python and of the libraries that the results depend on."""
-    found = {"sensorgen": __version__, "python": platform.python_version()}
+    by_name = {"sensorgen": __version__, "python": platform.python_version()}
     for name in LIBRARIES:
         try:
-            found[name] = version(name)
+            by_name[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+            by_name[name] = "not installed"
+    return by_name
 
 
 def json_bytes(data: Mapping[str, Any]) -> bytes:

@@ -4,10 +4,11 @@ Asked for, its stiffness too: the pressure per displacement of its top.
 """
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property, partial
-from math import exp, inf, log, prod
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from math import copysign, exp, inf, log, prod
+from typing import Any
 
 from sensorgen.checks.widths import GAP_CLOSES
 from sensorgen.core.document import Facts, Part
@@ -15,31 +16,32 @@ from sensorgen.core.errors import OutOfRange, SensorgenError
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design, make, name_of
 from sensorgen.design.printer import load_quality, quality_names
+from sensorgen.prediction import bodies
 from sensorgen.scene.scene import SLIVER_MM
 from sensorgen.workflows import moves
-from sensorgen.workflows.moves import Key, Value
+from sensorgen.workflows.moves import Key
+from sensorgen.workflows.search import Candidate, Nearest
 
 BAKE = 0.2  # what the bake takes off in the plane (thesis 6.2)
-MOST_SLICES = 6  # with that of the design as it was
 FILM_LAYERS = 2  # of a film at least: through one layer leads every slit between two lines
-GAP_WITHIN = 0.03  # relative error of the gap
-WITHIN = 0.02  # of the capacitance, that ends the search
-STIFFNESS_WITHIN = 0.1  # the same of the stiffness, which whole layers leave few values
+GAP, CAPACITANCE, STIFFNESS = "gap_mm", "capacitance_pf", "stiffness_kpa_per_mm"
+UNITS = {GAP: "mm", CAPACITANCE: "pF", STIFFNESS: "kPa/mm"}
+WITHIN = {GAP: 0.03, CAPACITANCE: 0.02, STIFFNESS: 0.1}  # relative errors; whole layers leave few stiffnesses
 PRESSURE_PA = 80e3  # 8 N on 10 x 10 mm: under which a stiffness is meant
-FARTHEST = 1.2  # distance of changed heights, as of moves.distance [-]
+FARTHEST = 2.0  # distance of a change, as of moves.distance [-]
+MOST_SLICES = 6  # with that of the design as it was
 _MARGIN = 1.04  # by which strips may be narrower without a layer less: at the limit itself a slicer may drop it
 _STEP = log(1.12)  # from one width or period to the next, in logarithms
 _SHARES = (log(0.5), log(5.0))  # of its own value, that a width or a period may take, in logarithms
-_STIFFNESS = "stiffness_kpa_per_mm"
-_ACCURACY = 1e-2  # of a capacitance, relative
+_LEAST_STEP, _LONGEST_STEP = 0.05, 0.3  # to a width that a capacitance leads to, in logarithms
 _STEEPEST = 5.0  # power of a width or period that a capacitance may follow; steeper, lines come or go [-]
-_MOST_TRIED, _MOST_SOLVED = 250, 30  # designs whose gap, and whose capacitance is found, before it gives up
-_PERIODS = 4  # of a sensor by which prints are estimated
+_ACCURACY = 1e-2  # of a capacitance, relative
+_MOST_TRIED, _MOST_SOLVED = 800, 60  # designs whose gap, and whose capacitance is found, before it gives up
 _MOST_PRESSED = 12  # designs whose stiffness is found
+_PERIODS = 4  # of a sensor by which prints are estimated
 
 BodyOf = Callable[[Design], Body]
-_Changes = dict[Key, Value]
-_End = tuple[float, float]  # share, and ln of the capacitance over that asked
+Quantities = Mapping[str, float]  # those of UNITS that are known
 
 
 @dataclass(frozen=True)
@@ -68,34 +70,6 @@ def document(changes: Sequence[Adjustment]) -> Iterator[Part]:
         yield "compensated for the print:"
         yield Facts(tuple((f"  {c.what}", f"{c.before:.4g} -> {c.after:.4g}: {c.why}") for c in changes))
         yield ""
-
-
-@dataclass(frozen=True)
-class CompensatedDesign:
-    """A design with its electrode gap [mm], capacitance [pF] and stiffness [kPa/mm]; None where it has none."""
-
-    design: Design
-    gap_mm: float
-    capacitance_pf: float | None
-    stiffness_kpa_per_mm: float | None = None
-
-    def off(self, asked: "CompensatedDesign") -> float:
-        """Ln of the capacitance over the one asked for; 0 where none is asked for, infinite where there is none."""
-        return _off(self.capacitance_pf, asked.capacitance_pf)
-
-    def stiffer(self, asked: "CompensatedDesign") -> float:
-        """Ln of the stiffness over the one asked for, as of the capacitance."""
-        return _off(self.stiffness_kpa_per_mm, asked.stiffness_kpa_per_mm)
-
-    def words(self) -> str:
-        """All in words."""
-        parts = [f"a gap of {self.gap_mm:g} mm", *([f"{self.capacitance_pf:.3g} pF"] if self.capacitance_pf else [])]
-        parts += [f"{self.stiffness_kpa_per_mm:.3g} kPa/mm"] if self.stiffness_kpa_per_mm else []
-        return " and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else parts[0]
-
-
-def _off(value: float | None, asked: float | None) -> float:
-    return 0.0 if asked is None else log(value / asked) if value else inf
 
 
 def compensated(
@@ -136,40 +110,35 @@ def compensated(
     OutOfRange
         No design was found that is printed so; the message has the nearest. A stiffness that only 3D would give.
     """
-    from sensorgen.prediction.bodies import drawn
-
-    asked = _print(design, drawn, stiffness=stiffness)
-    now, changes = printable(design, walls, bake=bake, gap_mm=asked.gap_mm)
-    is_near = abs(_attainable_mm(now, asked.gap_mm) - asked.gap_mm) <= GAP_WITHIN * asked.gap_mm
-    by_slice = sliced if is_near else None  # of what cannot be, the nearest alone is sliced
-    before = _print(now, by_slice, stiffness=stiffness) if by_slice else _estimate(now, walls, stiffness=stiffness)
-    if not 0 < asked.gap_mm < inf:
+    asked = quantities(design, bodies.drawn, stiffness=stiffness)
+    now, changes = printable(design, walls, bake=bake, gap_mm=asked[GAP])
+    if not 0 < asked[GAP] < inf:
         return now, changes
-    wanted = replace(asked, design=now, gap_mm=_attainable_mm(now, asked.gap_mm))
-    after = before if _reached(before, wanted) else _searched(before, wanted, walls, by_slice, step)
-    if sliced and not is_near:
-        after = _print(after.design, sliced, stiffness=stiffness)
-    if not (_reached(after, wanted) and is_near):
-        layers = f"{FILM_LAYERS} layers at least, {wanted.gap_mm:g} mm at layers of {now.layers.layer_mm:g} mm"
-        why = f" of {design.name} by {walls} walls" if is_near else f": a film has {layers}"
-        raise OutOfRange(f"{asked.words()} cannot be printed{why}; nearest: {_nearest(design, after, asked)}")
-    if after is before:
+    wanted = dict(asked) | {GAP: _attainable_mm(now, asked[GAP])}
+    is_near = abs(_off(wanted, asked, GAP)) <= WITHIN[GAP]
+    search = CompensationSearch(now, wanted, walls, sliced if is_near else None, step)
+    search.run(search.changed({}))
+    after = search.best or search.nearest()
+    made, printed = moves.changed(now, after.values), search.quantities(after)
+    if not is_near:  # the nearest alone is sliced
+        printed = quantities(made, sliced, stiffness=stiffness) if sliced else printed
+        layers = f"{FILM_LAYERS} layers at least, {wanted[GAP]:g} mm at layers of {now.layers.layer_mm:g} mm"
+        raise _refused(f": a film has {layers}", design, made, printed, asked)
+    if search.best is None:
+        raise _refused(f" of {design.name} by {walls} walls", design, made, printed, asked)
+    if not after.values:
         return now, changes
-    old, new = asdict(now.params), asdict(after.design.params)
     why = "gap, capacitance and stiffness" if stiffness else "gap and capacitance"
-    changes += [Adjustment(name, old[name], new[name], why) for name in old if old[name] != new[name]]
-    return _named(after.design, design), [*changes, *_comes_out(before, after, asked)]
+    changes += [Adjustment(key[-1], _own(now, key), float(value), why) for key, value in after.values.items()]
+    return _named(made, design), [*changes, *_comes_out(search.quantities(search.first), printed, asked)]
 
 
-def _comes_out(before: CompensatedDesign, after: CompensatedDesign, asked: CompensatedDesign) -> Iterator[Adjustment]:
+def _comes_out(before: Quantities, after: Quantities, asked: Quantities) -> Iterator[Adjustment]:
     """Quantities of the print before and after all changes."""
-    yield Adjustment("electrode gap as printed [mm]", before.gap_mm, after.gap_mm, f"{asked.gap_mm:g} mm asked")
-    for name, unit in (("capacitance", "pF"), ("stiffness", "kPa/mm")):
-        was, now, meant = (
-            getattr(one, f"{name}_{unit.replace('/', '_per_').lower()}") for one in (before, after, asked)
-        )
-        if now and meant:
-            yield Adjustment(f"{name} as printed [{unit}]", was or 0.0, now, f"{meant:.4g} {unit} asked")
+    for key, name in ((GAP, "electrode gap"), (CAPACITANCE, "capacitance"), (STIFFNESS, "stiffness")):
+        if key in after and key in asked:
+            what, why = f"{name} as printed [{UNITS[key]}]", f"{asked[key]:.4g} {UNITS[key]} asked"
+            yield Adjustment(what, before.get(key, 0.0), after[key], why)
 
 
 def _named(changed: Design, design: Design) -> Design:
@@ -181,200 +150,236 @@ def _named(changed: Design, design: Design) -> Design:
     return make(data | ({"name": design.name.removesuffix("-compensated")[:88] + "-compensated"} if own else {}))
 
 
-def found(body: Body, *, stiffness: bool = False) -> CompensatedDesign:
-    """Gap, capacitance and, asked for, stiffness of a body, by its most likely cell.
+def words(quantities: Quantities) -> str:
+    """Quantities in words."""
+    *most, last = [f"{'a gap of ' * (key == GAP)}{value:.3g} {UNITS[key]}" for key, value in quantities.items()]
+    return " and ".join([", ".join(most), last]) if most else last
+
+
+def _refused(why: str, design: Design, nearest: Design, printed: Quantities, asked: Quantities) -> OutOfRange:
+    """The refusal, with the nearest print, what makes it and what it costs."""
+    old, new = (asdict(each.params) | {"quality": each.quality} for each in (design, nearest))
+    values = ", ".join(f"{k} {v if isinstance(v, str) else f'{v:.4g}'}" for k, v in new.items() if v != old[k])
+    errors = [
+        f"; its {name} is off by {exp(_off(printed, asked, key)) - 1:+.0%}"
+        for key, name in ((GAP, "gap"), (CAPACITANCE, "capacitance")) if key in printed
+    ]  # fmt: skip
+    layers = [len(one.layers.boundaries_mm(one.printed.size_mm[2])) - 1 for one in (design, nearest)]
+    by = values or "the design as it is"
+    best = f"{words(printed)} by {by}{''.join(errors)}; {layers[1]} layers for {layers[0]}"
+    return OutOfRange(f"{words(asked)} cannot be printed{why}; nearest: {best}")
+
+
+def _off(quantities: Quantities, asked: Quantities, key: str) -> float:
+    """Ln of a quantity over the one asked for; 0 where none is asked for, infinite where there is none."""
+    if key not in asked:
+        return 0.0
+    return log(quantities[key] / asked[key]) if key in quantities else inf
+
+
+def _own(design: Design, key: Key) -> float:
+    return float(moves.own(design, key) or 0.0)
+
+
+def quantities(design: Design, body: BodyOf, *, stiffness: bool = False) -> Quantities:
+    """Quantities of a design's body; of an array, of a few cells without rims, counted to all of its cells.
 
     Raises
     ------
     OutOfRange
         A stiffness is asked for that is not known: of a cell that is no cross-section, or that the solver gives up.
     """
+    is_array = hasattr(design.params, "fitting")
+    few = moves.short(design, periods=_PERIODS) if is_array or isinstance(body, partial) else design
+    one = of_body(body(few), stiffness=stiffness)
+    sizes = [p.fitting() if hasattr(p, "fitting") else (p.length_mm, p.width_mm) for p in (design.params, few.params)]
+    larger = prod(sizes[0]) / prod(sizes[1])
+    return {key: value * larger if key == CAPACITANCE else value for key, value in one.items()}
+
+
+def of_body(body: Body, *, stiffness: bool = False) -> Quantities:
+    """Gap, capacitance and, asked for, stiffness of a body, by its most likely cell; raises as :func:`quantities`."""
     from sensorgen.design.values import permittivities
     from sensorgen.prediction.capacitance import Unpredictable, capacitance
     from sensorgen.prediction.compression_law import at_a_few_pressures, gap_m
     from sensorgen.prediction.mesh_ladder import PressedPiece
 
     cells, eps = body.cells, {v.material: v.value for v in permittivities(body.design)}
-    gap = next(iter(cells.gap_mm.values()))
+    one = {GAP: next(iter(cells.gap_mm.values()))}
     try:
         answer = capacitance(cells.first(), eps, _ACCURACY)
     except Unpredictable:
-        return CompensatedDesign(body.design, gap, None)
-    c = answer.times(cells.count).capacitance_f.middle() * 1e12
+        return one
+    one[CAPACITANCE] = answer.times(cells.count).capacitance_f.middle() * 1e12
     if not stiffness:
-        return CompensatedDesign(body.design, gap, c)
+        return one
     law = at_a_few_pressures(body.design, PressedPiece(cells.first(), cells.period_mm), answer, PRESSURE_PA)
     if law is None:
         raise OutOfRange(
             f"{body.design.name}: its stiffness is not known without solving it in 3D, or not at all; "
             "--compensate print keeps gap and capacitance"
         )
-    pa_per_m = law.compression.foundation_stiffness_pa_per_m(gap_m(cells.first()))
-    return CompensatedDesign(body.design, gap, c, pa_per_m * 1e-6)
+    return one | {STIFFNESS: law.compression.foundation_stiffness_pa_per_m(gap_m(cells.first())) * 1e-6}
 
 
-def _reached(now: CompensatedDesign, wanted: CompensatedDesign) -> bool:
-    near = abs(now.gap_mm - wanted.gap_mm) <= GAP_WITHIN * wanted.gap_mm
-    return near and abs(now.off(wanted)) <= WITHIN and abs(now.stiffer(wanted)) <= STIFFNESS_WITHIN
+class CompensationSearch(Nearest):
+    """The nearest change whose print is the wanted one: heights in whole layers, and one width or the period.
 
-
-def _searched(
-    before: CompensatedDesign, wanted: CompensatedDesign, walls: str, sliced: BodyOf | None, step: Callable[[str], None]
-) -> CompensatedDesign:  # fmt: skip
-    """The print that is wanted, or the nearest: by the estimate, or by slices that correct it in turn."""
-    search, nearest = _CompensationSearch(wanted, walls), before
-    for count in range(1, MOST_SLICES):
-        step(f"design {count}" if sliced else "designs")
-        best = search.run()
-        if best is None:
-            break
-        real = best if sliced is None else _print(best.design, sliced, stiffness=bool(wanted.stiffness_kpa_per_mm))
-        nearest = min(nearest, real, key=lambda one: _distance(one, wanted))
-        if nearest is not real or sliced is None or _reached(real, wanted):
-            break
-        pairs = {key: [getattr(one, key) for one in (wanted, best, real)] for key in ("capacitance_pf", _STIFFNESS)}
-        search.wanted = replace(wanted, **{key: w * b / r for key, (w, b, r) in pairs.items() if w and b and r})
-        if abs(real.gap_mm - best.gap_mm) > SLIVER_MM:
-            search.margin *= _MARGIN**2
-            search.tried.clear()
-    return nearest
-
-
-def _distance(one: CompensatedDesign, wanted: CompensatedDesign) -> tuple[float, float]:
-    return round(abs(one.gap_mm - wanted.gap_mm), 6), abs(one.off(wanted)) + abs(one.stiffer(wanted))
-
-
-def _nearest(design: Design, nearest: CompensatedDesign, asked: CompensatedDesign) -> str:
-    """The nearest print, what makes it and what it costs."""
-    old, new = (asdict(each.params) | {"quality": each.quality} for each in (design, nearest.design))
-    values = ", ".join(f"{k} {v if isinstance(v, str) else f'{v:.4g}'}" for k, v in new.items() if v != old[k])
-    off = f"; its gap is off by {nearest.gap_mm / asked.gap_mm - 1:+.0%}"
-    off += f", its capacitance by {exp(nearest.off(asked)) - 1:+.0%}" if nearest.off(asked) < inf else ""
-    layers = [len(one.layers.boundaries_mm(one.printed.size_mm[2])) - 1 for one in (design, nearest.design)]
-    return f"{nearest.words()} by {values or 'the design as it is'}{off}; {layers[1]} layers for {layers[0]}"
-
-
-@dataclass(eq=False)
-class _CompensationSearch:
-    """Designs whose estimated print is the wanted one: heights in whole layers, and one width or the period.
-
-    The margin is the factor by which the width or period may shrink without another gap.
+    Prints are estimated, and where estimates are as wanted, sliced; slices correct what is wanted of estimates.
     """
 
-    wanted: CompensatedDesign
-    walls: str
-    margin: float = _MARGIN
-    best: CompensatedDesign | None = field(default=None, init=False)
-    least: float = field(default=inf, init=False)
-    tried: dict[frozenset[tuple[Key, Value]], CompensatedDesign | None] = field(default_factory=dict, init=False)
-    pressed: list[CompensatedDesign] = field(default_factory=list, init=False)
-    before: tuple[int, int] = field(default=(0, 0), init=False)
+    def __init__(
+        self, design: Design, wanted: Quantities, walls: str, sliced: BodyOf | None, step: Callable[[str], None]
+    ) -> None:  # fmt: skip
+        super().__init__(design, FARTHEST)
+        self.wanted, self.walls, self.body_of, self.step = wanted, walls, sliced or bodies.drawn, step
+        self.aim = dict(wanted)  # of estimates
+        self.margin = _MARGIN  # factor by which the width or period may shrink without another gap
+        self.widths = _widths(design, walls)
+        self.estimates: dict[Candidate, Quantities] = {}
+        self.prints: dict[Candidate, Quantities] = {}
+        self.best: Candidate | None = None
+        self.pressed = 0
+        self.works = [self._at_rest, *[self._pressed] * (STIFFNESS in wanted), *[self._sliced] * bool(sliced)]
 
-    def run(self) -> CompensatedDesign | None:
-        """The wanted print with the least changes, else the nearest; estimates of a search before stay."""
-        self.best, self.least, self.before = None, inf, self._count()
-        self.pressed.clear()
-        moves.walk(self.wanted.design, self.visit, FARTHEST)
-        known = self.pressed or [one for one in self.tried.values() if one]
-        return self.best or min(known, key=lambda one: _distance(one, self.wanted), default=None)
+    @property
+    def first(self) -> Candidate:
+        """The design as it was."""
+        return next(iter(self.estimates))
 
-    @cached_property
-    def widths(self) -> list[Key]:
-        """Lengths in the plane that may change."""
-        return _widths(self.wanted.design, self.walls)
+    def quantities(self, one: Candidate) -> Quantities:
+        """Those of its print, where it was sliced, or of its estimate."""
+        return self.prints.get(one) or self.estimates[one]
 
-    def visit(self, heights: moves.Changes, far: float) -> Iterable[tuple[Key, Value]] | None:
-        """Try every width with these heights, and give the next heights; None where no further one can be better."""
-        if far >= self.least or self._exhausted():
-            return None
-        try:
-            now = moves.changed(self.wanted.design, heights)
-        except SensorgenError:
+    def nearest(self) -> Candidate:
+        """The design whose print is nearest to the wanted one."""
+
+        def distance(one: Candidate) -> tuple[float, float]:
+            gap, *others = (abs(_off(self.quantities(one), self.wanted, key)) for key in UNITS)
+            return round(gap, 6), sum(others)
+
+        return min(self.prints or self.estimates, key=distance)
+
+    def order(self, one: Candidate) -> tuple[float, ...]:
+        """Distance; of a width that a capacitance leads to, half way from the design before."""
+        far, done = super().order(one)
+        if one.before and self._width(one) and self._capacitance_off(one.before) is not None:
+            far = (far + one.before.distance) / 2
+        return far, done
+
+    def is_over(self) -> bool:
+        """Test whether the wanted print, or nothing after many tries, was found."""
+        solved = sum(CAPACITANCE in one for one in self.estimates.values())
+        most = len(self.estimates) > _MOST_TRIED or solved > _MOST_SOLVED or self.pressed > _MOST_PRESSED
+        return self.best is not None or most or len(self.prints) >= MOST_SLICES
+
+    def work(self, one: Candidate) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        """Gap and capacitance of an estimate, its stiffness, the print."""
+        self.step(f"design {len(self.estimates)}")
+        return self.works[one.stage], (one,)
+
+    def take(self, one: Candidate, answer: Quantities) -> Iterable[Candidate]:
+        """Go up with what is as wanted, and with the design as it was; from others on to their neighbours."""
+        is_print = self.works[one.stage - 1] == self._sliced
+        if is_print:
+            self.prints[one] = answer
+            self._correct(one)
+        else:
+            self.estimates[one] = answer
+        aim = self.wanted if is_print or not one.values else self.aim
+        keys = list(aim) if one.stage > 1 else [GAP, CAPACITANCE]
+        is_reached = all(abs(_off(answer, aim, key)) <= WITHIN[key] for key in keys)
+        if one.stage < len(self.works) and (is_reached or not one.values):
+            return [one]
+        if is_reached:
+            self.best = one
             return ()
-        for key in self.widths:
-            for way in (_STEP, -_STEP):
-                hit, further = self._along(dict(heights), key, way, self.least - far)
-                if hit and (one := self._stiff_enough(hit)):
-                    self.best, self.least = one, far + further
-        layer, film = self.wanted.design.layers.layer_mm, ("parameters", "dielectric_mm")
-        thick = (FILM_LAYERS * layer - SLIVER_MM, self.wanted.gap_mm + SLIVER_MM)
-        return [
-            (key, to)
-            for key, to in moves.steps(now, ("film", "height"))
-            if key != film or thick[0] <= float(to) <= thick[1]
-        ]
+        return self._neighbours(one)
 
-    def _stiff_enough(self, hit: CompensatedDesign) -> CompensatedDesign | None:
-        """A print with its stiffness, if it is the wanted one, where one is wanted."""
-        if self.wanted.stiffness_kpa_per_mm is None:
-            return hit
+    def _at_rest(self, one: Candidate) -> Quantities:
+        """Gap with the margin, and the capacitance where that is the wanted one; nothing of what cannot be made."""
+        narrower = {key: float(value) / self.margin for key, value in one.values.items() if key in self.widths}
         try:
-            one = replace(_estimate(hit.design, self.walls, stiffness=True), gap_mm=hit.gap_mm)
-        except SensorgenError:  # the solver gives up
+            for each in (one.values, {**one.values, **narrower}) if narrower else (one.values,):
+                gap = _gap_mm(moves.short(self.base, each, _PERIODS), self.walls)
+                if abs(gap - self.wanted[GAP]) > SLIVER_MM:
+                    return {GAP: gap}
+            return self._estimate(one)
+        except SensorgenError:
+            return {}
+
+    def _pressed(self, one: Candidate) -> Quantities:
+        """Stiffness too, unless the solver gives up."""
+        self.pressed += 1
+        try:
+            return self._estimate(one, stiffness=True)
+        except SensorgenError:
+            return self.estimates[one]
+
+    def _estimate(self, one: Candidate, *, stiffness: bool = False) -> Quantities:
+        """Quantities of the print of a few periods by the rules of slicers, counted to the whole sensor."""
+        by_rules = partial(bodies.estimated, walls=self.walls)
+        return quantities(moves.changed(self.base, one.values), by_rules, stiffness=stiffness)
+
+    def _sliced(self, one: Candidate) -> Quantities:
+        """Those of a real print."""
+        return quantities(moves.changed(self.base, one.values), self.body_of, stiffness=STIFFNESS in self.wanted)
+
+    def _correct(self, one: Candidate) -> None:
+        """Correct what is wanted of estimates by a print; where its gap is another one, the margin."""
+        estimate, real = self.estimates[one], self.prints[one]
+        if abs(real[GAP] - estimate.get(GAP, inf)) > SLIVER_MM:
+            self.margin *= _MARGIN**2 if one.values else 1.0
+            return
+        for key in (CAPACITANCE, STIFFNESS):
+            if key in self.wanted and key in estimate and key in real:
+                self.aim[key] = self.wanted[key] * estimate[key] / real[key]
+
+    def _neighbours(self, one: Candidate) -> Iterator[Candidate]:
+        """Heights by a layer and the first steps of each width; of a changed width the next steps."""
+        width = self._width(one)
+        if width is None and GAP in self.estimates[one]:
+            yield from self._heights(one)
+        for key in [width] if width else self.widths * (GAP in self.estimates[one]):
+            for share in self._shares(one, key):
+                if _SHARES[0] <= share <= _SHARES[1]:
+                    value = round(_own(self.base, key) * exp(share), 3)
+                    yield from self.changed({**one.values, key: value}, one)
+
+    def _width(self, one: Candidate) -> Key | None:
+        """The width or period that is changed, if any."""
+        return next((key for key in one.values if key in self.widths), None)
+
+    def _heights(self, one: Candidate) -> Iterator[Candidate]:
+        """One layer more or less; of the film at least two, and not above the wanted gap."""
+        layer, film = self.base.layers.layer_mm, ("parameters", "dielectric_mm")
+        least, most = FILM_LAYERS * layer - SLIVER_MM, self.wanted[GAP] + SLIVER_MM
+        for key, to in moves.steps(moves.changed(self.base, one.values), ("film", "height")):
+            if key != film or least <= float(to) <= most:
+                yield from self.changed({**one.values, key: to}, one)
+
+    def _capacitance_off(self, one: Candidate) -> float | None:
+        """Ln of an estimated capacitance over that aimed at; None where the gap is not the wanted one."""
+        known, gap = self.estimates[one], self.quantities(one).get(GAP, inf)
+        if CAPACITANCE not in known or abs(gap - self.wanted[GAP]) > SLIVER_MM:
             return None
-        self.pressed.append(one)
-        return one if abs(one.stiffer(self.wanted)) <= STIFFNESS_WITHIN else None
+        return _off(known, self.aim, CAPACITANCE)
 
-    def _count(self) -> tuple[int, int]:
-        """Designs whose gap, and whose capacitance is known [-]."""
-        return len(self.tried), sum(bool(one and one.capacitance_pf) for one in self.tried.values())
+    def _share(self, one: Candidate, key: Key) -> float:
+        """Ln of a width over that of the design as it was."""
+        return log(float(one.values[key]) / _own(self.base, key)) if key in one.values else 0.0
 
-    def _exhausted(self) -> bool:
-        tried, solved = (now - then for now, then in zip(self._count(), self.before, strict=True))
-        return tried > _MOST_TRIED or solved > _MOST_SOLVED or len(self.pressed) > _MOST_PRESSED
-
-    def _along(self, heights: _Changes, key: Key, way: float, most: float) -> tuple[CompensatedDesign | None, float]:
-        """The first print with the wanted capacitance on the way up or down from a width, and how far it is."""
-        start, share = float(moves.own(self.wanted.design, key) or 0.0), 0.0
-        before: tuple[float, CompensatedDesign] | None = None
-        while _SHARES[0] <= share <= _SHARES[1] and abs(share) < most and not self._exhausted():
-            here = self._at(heights | {key: start * exp(share)})
-            if here and abs(here.off(self.wanted)) <= WITHIN / 2:
-                return here, abs(share)
-            if here and before:
-                one, other = before[1].off(self.wanted), here.off(self.wanted)
-                if (one > 0) != (other > 0):
-                    return self._between(heights, key, start, (before[0], one), (share, other)), abs(share)
-                if abs(other) > abs(one):  # the other way
-                    break
-            before = (share, here) if here else None
-            share += way * (2 if here and abs(here.off(self.wanted)) > abs(3 * way) else 1)
-        return None, inf
-
-    def _between(self, heights: _Changes, key: Key, start: float, low: _End, high: _End) -> CompensatedDesign | None:
-        """Regula falsi and halvings in turn, between values above and below the wanted one; None at a jump."""
-        for half in (False, True) * 6:
-            if abs(high[1] - low[1]) > _STEEPEST * abs(high[0] - low[0]):
-                return None
-            share = low[0] + (high[0] - low[0]) * (0.5 if half else low[1] / (low[1] - high[1]))
-            here = self._at(heights | {key: start * exp(share)})
-            if here is None or abs(here.off(self.wanted)) <= WITHIN / 4:
-                return here
-            middle = share, here.off(self.wanted)
-            low, high = (middle, high) if (middle[1] > 0) == (low[1] > 0) else (low, middle)
-        return None
-
-    def _at(self, changes: _Changes) -> CompensatedDesign | None:
-        """The estimate of a changed design, if it has the wanted gap, with the margin."""
-        changes = {key: round(float(value), 3) for key, value in changes.items()}
-        mark = frozenset(changes.items())
-        if mark not in self.tried:
-            try:
-                self.tried[mark] = self._estimated(changes)
-            except SensorgenError:  # such a design cannot be made
-                self.tried[mark] = None
-        one = self.tried[mark]
-        return one if one and one.gap_mm == self.wanted.gap_mm and one.off(self.wanted) < inf else None
-
-    def _estimated(self, changes: _Changes) -> CompensatedDesign:
-        """Gap with the margin; where that is the wanted one, the capacitance too."""
-        now = self.wanted.design
-        narrower = {k: float(v) / self.margin for k, v in changes.items() if k in self.widths}
-        for each in (changes, changes | narrower):
-            gap = _gap_mm(moves.short(now, each, _PERIODS), self.walls)
-            if abs(gap - self.wanted.gap_mm) > SLIVER_MM:
-                return CompensatedDesign(moves.changed(now, changes), gap, None)
-        return replace(_estimate(moves.changed(now, changes), self.walls), gap_mm=self.wanted.gap_mm)
+    def _shares(self, one: Candidate, key: Key) -> Iterator[float]:
+        """Shares to try next: wider where the gap is too large, and onwards; where it is right, by the secant."""
+        share, off = self._share(one, key), self._capacitance_off(one)
+        before = one.before if one.before and self._width(one) else one
+        start, was = self._share(before, key), self._capacitance_off(before)
+        if off is None:
+            yield share + copysign(_STEP, share - start or self.quantities(one)[GAP] - self.wanted[GAP])
+        elif was is None or before is one:
+            yield from (share + step for step in (max(abs(off), _LEAST_STEP), -max(abs(off), _LEAST_STEP)))
+        elif 0 < abs(power := (off - was) / (share - start)) <= _STEEPEST:
+            yield share + max(-_LONGEST_STEP, min(-off / power, _LONGEST_STEP))
 
 
 def _widths(design: Design, walls: str) -> list[Key]:
@@ -393,24 +398,6 @@ def _attainable_mm(design: Design, gap_mm: float) -> float:
     layer = design.layers.layer_mm
     least = FILM_LAYERS if getattr(design.params, "dielectric_mm", 0.0) else 1
     return round(max(round(gap_mm / layer), least) * layer, 9) if gap_mm < inf else gap_mm
-
-
-def _print(design: Design, body: BodyOf, *, stiffness: bool = False) -> CompensatedDesign:
-    """Quantities of a body; of an array, of a few cells without rims, counted to all of its cells."""
-    is_array = hasattr(design.params, "fitting")
-    few = moves.short(design, periods=_PERIODS) if is_array or isinstance(body, partial) else design
-    one = found(body(few), stiffness=stiffness)
-    params = design.params, few.params
-    sizes = [p.fitting() if hasattr(p, "fitting") else (p.length_mm, p.width_mm) for p in params]
-    larger = prod(sizes[0]) / prod(sizes[1])
-    return replace(one, design=design, capacitance_pf=one.capacitance_pf and one.capacitance_pf * larger)
-
-
-def _estimate(design: Design, walls: str, *, stiffness: bool = False) -> CompensatedDesign:
-    """Quantities of the print of a few periods by the rules of slicers, counted to the whole sensor."""
-    from sensorgen.prediction.bodies import estimated
-
-    return _print(design, partial(estimated, walls=walls), stiffness=stiffness)
 
 
 def _gap_mm(design: Design, walls: str) -> float:
@@ -442,7 +429,7 @@ def printable(
 def _layer_mm(design: Design, gap_mm: float) -> float:
     """Layer height nearest to the design's own with the gap in whole layers; the least where there is none [mm]."""
     own, machine = design.layers.layer_mm, design.machine
-    if not 0 < gap_mm < inf or abs(_attainable_mm(design, gap_mm) - gap_mm) <= GAP_WITHIN * gap_mm:
+    if not 0 < gap_mm < inf or abs(_attainable_mm(design, gap_mm) - gap_mm) <= WITHIN[GAP] * gap_mm:
         return own
     counts = range(FILM_LAYERS, int(gap_mm / machine.min_layer_mm + SLIVER_MM) + 1)
     fit = [one for n in counts if (one := round(gap_mm / n, 3)) <= 0.75 * machine.nozzle_mm]  # microns: Cura's grid

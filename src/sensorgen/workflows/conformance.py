@@ -156,20 +156,22 @@ def conformance(word: str, step: Step = lambda _: None) -> PackReport:
         raise _nothing(word)
     for file in files:
         step(file.name)
-        where = f"{file.kind}/{file.path.name}"
-        try:
-            if file.pack.where != "shipped" and file.name in packs.shipped_names(file.kind):
-                findings.append(
-                    _finding("name", where, f"a {packs.SINGULAR[file.kind]} of that name ships", "rename it")
-                )
-                continue
-            faults = _shape(file, step) if file.kind == "shapes" else _TESTS[file.kind](file)
-            findings += [_finding(rule, where, *words) for rule, *words in faults]
-        except SensorgenError as error:
-            kind = _kind_of(file.path)
-            advice = f"it holds a {packs.SINGULAR[kind]}: move it to {kind}" if kind and kind != file.kind else ""
-            findings.append(_finding("read", where, str(error), advice or "correct the file"))
+        findings += _of_file(file, step)
     return PackReport(word, len(files), counts(findings), tuple(findings))
+
+
+def _of_file(file: File, step: Step) -> list[Finding]:
+    """Findings about one file."""
+    where = f"{file.kind}/{file.path.name}"
+    try:
+        if file.pack.where != "shipped" and file.name in packs.shipped_names(file.kind):
+            return [_finding("name", where, f"a {packs.SINGULAR[file.kind]} of that name ships", "rename it")]
+        faults = _shape(file, step) if file.kind == "shapes" else _TESTS[file.kind](file)
+        return [_finding(rule, where, *words) for rule, *words in faults]
+    except SensorgenError as error:
+        kind = _kind_of(file.path)
+        advice = f"it holds a {packs.SINGULAR[kind]}: move it to {kind}" if kind and kind != file.kind else ""
+        return [_finding("read", where, str(error), advice or "correct the file")]
 
 
 def _finding(rule: str, where: str, message: str, advice: str) -> Finding:
@@ -198,34 +200,35 @@ def _kind_of(path: Path) -> Kind | Literal[""]:
 def _misplaced(pack: Pack) -> Faults:
     """Files that nothing reads: of another ending or name than those of their folder, or in no folder of a kind."""
     for kind in packs.SINGULAR:
-        read = {f"{name}{packs.suffix(kind)}" for name in pack.names(kind)}
-        for path in _listed(pack.place(kind)):
-            if path.name not in read and path.suffix in (".yaml", ".yml", ".py") and path.name != "__init__.py":
+        read = {f"{name}{packs.suffix(kind)}" for name in pack.names(kind)} | {"__init__.py"}
+        for path in _listed(pack.place(kind), (".yaml", ".yml", ".py")):
+            if path.name not in read:
                 yield f"{kind}/{path.name}", "nothing reads this file", _where_to(path, kind)
     for folder in _listed(pack.folder):
         near = nearest(folder.name, packs.SINGULAR)
         if near and folder.is_dir() and folder.name not in packs.SINGULAR:
             yield f"{folder.name}/", "nothing reads this folder", f"rename it to {near}"
     if (pack.folder / packs.MANIFEST).exists():  # else a folder with designs, whose files are named by their paths
-        for path in _listed(pack.folder):
-            kind_of = _kind_of(path) if path.suffix in (".yaml", ".yml") and path.name != packs.MANIFEST else ""
-            if kind_of:
+        for path in _listed(pack.folder, (".yaml", ".yml")):
+            if path.name != packs.MANIFEST and (kind_of := _kind_of(path)):
                 yield path.name, f"nothing reads this {packs.SINGULAR[kind_of]} here", f"move it to {kind_of}"
 
 
-def _listed(folder: Path) -> list[Path]:
+def _listed(folder: Path, endings: str | tuple[str, ...] = "") -> list[Path]:
     try:
-        return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+        return sorted(
+            path for path in folder.iterdir() if not path.name.startswith(".") and path.name.endswith(endings)
+        )
     except OSError:
         return []
 
 
 def _where_to(path: Path, kind: Kind) -> str:
     """Advice on a file that nothing reads."""
-    found = _kind_of(path) or kind
+    right = _kind_of(path) or kind
     name = re.sub("[^a-z0-9]+", "-", path.stem.lower()).strip("-") or "own"
-    folder = "" if found == kind else f"move it to {found}, as "
-    return f"{folder or 'rename it to '}{name}{packs.suffix(found)}"
+    folder = "" if right == kind else f"move it to {right}, as "
+    return f"{folder or 'rename it to '}{name}{packs.suffix(right)}"
 
 
 def _twice(pack: Pack, files: Sequence[File]) -> Faults:
@@ -244,24 +247,28 @@ def _twice(pack: Pack, files: Sequence[File]) -> Faults:
 
 
 def _material(file: File) -> Faults:
-    made = materials.parse(file.name, file.text())
-    cited = {*made.citations, *materials.shipped_citations()}
+    material = materials.parse(file.name, file.text())
+    cited = {*material.citations, *materials.shipped_citations()}
     known = {*materials.quantities(), *materials.print_quantities()}
-    for quantity, values in (*made.properties.items(), *made.print.items()):
+    for quantity, values in (*material.properties.items(), *material.print.items()):
         if quantity not in known:
             yield "quantity", str(UnknownName("quantity", quantity, known)), "take a name that sensorgen reads"
-        if values and not any(value.default for value in values):
-            usable = [value.source for value in values if not value.implausible and math.isfinite(value.value)]
-            if usable:
-                yield "default", f"{quantity} has no default value", f"add 'default: true' to that of {usable[0]}"
-        for value in values:
-            if value.source not in cited:
-                where = "say under 'citations' where it is published"
-                yield "source", f"{quantity}: source {value.source!r} is not explained", where
-            if value.default and value.implausible:
-                yield "default", f"{quantity} of {value.source} is implausible and a default", "remove one of them"
-    if not made.properties and not made.print:
+        yield from _material_values(quantity, values, cited)
+    if not material.properties and not material.print:
         yield "values", "no values", "add at least one quantity"
+
+
+def _material_values(quantity: str, values: Sequence[materials.Value], cited: set[str]) -> Faults:
+    """Faults of the values of one quantity."""
+    usable = [value.source for value in values if not value.implausible and math.isfinite(value.value)]
+    if usable and not any(value.default for value in values):
+        yield "default", f"{quantity} has no default value", f"add 'default: true' to that of {usable[0]}"
+    for value in values:
+        if value.source not in cited:
+            where = "say under 'citations' where it is published"
+            yield "source", f"{quantity}: source {value.source!r} is not explained", where
+        if value.default and value.implausible:
+            yield "default", f"{quantity} of {value.source} is implausible and a default", "remove one of them"
 
 
 def _program(file: File, text: str) -> Faults:
@@ -292,24 +299,27 @@ def _shape(file: File, step: Step) -> Faults:
         name: value for f in fields(form.Params) if (name := f.name) in _SMALL
         for value in (min(max(_SMALL[name], f.metadata["range"][0]), f.metadata["range"][1]),)
     }  # fmt: skip
-    cases = list(_cases(form.Params, usual))
-    found = dict[tuple[str, str], tuple[str, str, set[str]]]()
+    yield from _of_scenes(form, list(_cases(form.Params, usual)), lambda about: step(f"{file.name}: {about}"))
+
+
+def _of_scenes(form: Any, cases: Sequence[tuple[str, dict[str, Any]]], step: Step) -> Faults:
+    """Faults of the scenes of some sets of parameters, alike ones once."""
+    alike = dict[tuple[str, str], tuple[str, str, set[str]]]()
     for about, changed in cases:
-        step(f"{file.name}: {about or 'defaults'}")
+        step(about or "defaults")
         for rule, message, advice in _tried(form, changed, about):
-            alike = rule, _NUMBER.sub("", message)
-            found.setdefault(alike, (about + message, advice, set()))[2].add(about)
-    for (rule, _), (message, advice, where) in found.items():
+            alike.setdefault((rule, _NUMBER.sub("", message)), (about + message, advice, set()))[2].add(about)
+    for (rule, _), (message, advice, where) in alike.items():
         yield rule, message + (f" (in {len(where)} of {len(cases)} sensors tried)" if len(where) > 1 else ""), advice
 
 
 def _tried(form: Any, changed: dict[str, Any], about: str) -> Faults:
     """Faults of the scenes of one set of parameters: of two materials, of three, and with a support."""
     try:
-        made = form.Params(**changed)
-        if 0 < made.cells() < designs.MAX_CELLS:
+        params = form.Params(**changed)
+        if 0 < params.cells() < designs.MAX_CELLS:
             for fill in (Fill(), Fill(support="bvoh"), Fill(film="pla")):
-                yield from _scene_faults(form.scene(made, fill), fill)
+                yield from _scene_faults(form.scene(params, fill), fill)
     except OutOfRange:
         if not about:
             raise
@@ -341,8 +351,8 @@ def _scene_faults(scene: Scene, fill: Fill) -> Faults:
     terminals = sorted(body.terminal for body in scene.bodies if body.terminal)
     if terminals not in (["bottom", "top"], ["bottom", "middle", "top"]):
         yield "terminals", f"terminals are {terminals}", "give one body 'top', and one 'bottom'"
-    made = {body.name: meshes.mesh(body) for body in scene.bodies}
-    for body, fault in validity.faults(scene, made):
+    by_body = {body.name: meshes.mesh(body) for body in scene.bodies}
+    for body, fault in validity.faults(scene, by_body):
         yield "scene", f"{body}: {fault}", advice
     volume, box = sum(body.volume_mm3() for body in scene.bodies), math.prod(scene.size_mm)
     is_round = any(piece.is_round() for body in scene.bodies for piece in body.pieces)
@@ -356,13 +366,13 @@ def _scene_faults(scene: Scene, fill: Fill) -> Faults:
 
 def _printer(file: File) -> Faults:
     own_text = None if file.pack.where == "shipped" else file.text()
-    made, quality = printer.load_printer(file.name, own_text), printer.load_quality("fine")
-    layer_mm = max(quality.layer_mm, made.min_layer_mm)
+    machine_, quality = printer.load_printer(file.name, own_text), printer.load_quality("fine")
+    layer_mm = max(quality.layer_mm, machine_.min_layer_mm)
     quality = quality.model_copy(update={"layer_mm": layer_mm, "first_layer_mm": layer_mm})
-    loads = dict(zip(made.tool_numbers, map(ToolLoad, map(materials.load, ("etpu", "x60"))), strict=False))
-    yield from machine.faults(made, quality, loads)
+    loads = dict(zip(machine_.tool_numbers, map(ToolLoad, map(materials.load, ("etpu", "x60"))), strict=False))
+    yield from machine.faults(machine_, quality, loads)
     try:
-        made.check_tools(file.pack.folder)
+        machine_.check_tools(file.pack.folder)
     except SensorgenError as error:
         yield "tools", str(error), "correct the name, or leave it out"
 
@@ -371,35 +381,35 @@ def _quality(file: File) -> Faults:
     quality = printer.load_quality(file.name, None if file.pack.where == "shipped" else file.text())
     errors = []
     for name in printer.printer_names():
-        made = printer.load_printer(name)
-        loads = {made.tool_numbers[0]: ToolLoad(materials.load("etpu"))}
-        errors += [message for rule, message, _ in machine.faults(made, quality, loads) if rule == "profile"][:1]
+        machine_ = printer.load_printer(name)
+        loads = {machine_.tool_numbers[0]: ToolLoad(materials.load("etpu"))}
+        errors += [message for rule, message, _ in machine.faults(machine_, quality, loads) if rule == "profile"][:1]
     if len(errors) == len(printer.printer_names()):
         yield "profile", f"no printer that ships can print it: {errors[0]}", "correct layers and speeds"
 
 
 def _instrument(file: File) -> Faults:
-    made = accuracy.parse(file.text(), file.path.name)
-    type_ = made.name.split()[-1]
-    if not made.ranges and not made.bands:
+    instrument = accuracy.parse(file.text(), file.path.name)
+    type_ = instrument.name.split()[-1]
+    if not instrument.ranges and not instrument.bands:
         yield "limits", "neither ranges nor bands", "add the maker's limits of error"
-    if not accuracy.is_of(made, f"MAKER,{type_},0,1.0"):
+    if not accuracy.is_of(instrument, f"MAKER,{type_},0,1.0"):
         yield "name", f"a reading of {type_!r} would not name it", "end 'name' with the type"
-    for one in made.ranges:
-        sure = made.dc_ohm(one.ohm / 2, 4)
+    for one in instrument.ranges:
+        sure = instrument.dc_ohm(one.ohm / 2, 4)
         if sure is None or not 0 < sure < one.ohm:
             yield "limits", f"{one.ohm / 2:g} ohm is known to {sure} ohm", "correct the range"
-    z_ohm = complex(0, -math.sqrt(made.least_ohm * min(made.most_ohm, 1e12)) or -1.0)
-    for band in made.bands:
+    z_ohm = complex(0, -math.sqrt(instrument.least_ohm * min(instrument.most_ohm, 1e12)) or -1.0)
+    for band in instrument.bands:
         middle = math.sqrt(band.from_hz * band.to_hz)
-        sure = made.ac("X", z_ohm.imag, middle, z_ohm)
+        sure = instrument.ac("X", z_ohm.imag, middle, z_ohm)
         if sure is None or not 0 < sure < abs(z_ohm):
             yield "limits", f"{abs(z_ohm):g} ohm at {middle:g} Hz are known to {sure} ohm", "correct the band"
 
 
 def _source(file: File) -> Faults:
-    made = materials.own_source(file.name, file.text())
-    for name, values in made.materials.items():
+    source = materials.own_source(file.name, file.text())
+    for name, values in source.materials.items():
         for quantity, value in values.items():
             given, advised = materials.Value(source=file.name, **dict(value)), quantity in materials.print_quantities()
             if wrong := materials.fault(quantity, given, advised=advised):

@@ -1,16 +1,20 @@
-"""Decision to print a design: verdict, the numbers that decide, each finding once, and changes that were tried."""
+"""Decision to print a design: verdict, the numbers that decide, findings, changes that were tried; and its page."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from sensorgen.checks.review import CheckReport, Review, report
+from sensorgen.checks.review import STEPS as CHECKS
+from sensorgen.checks.review import CheckReport, Review, Step, report
 from sensorgen.core.document import Part
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.findings import Refused, headline, listed
 from sensorgen.design.design import Design
-from sensorgen.prediction.slices import PrintReview
+from sensorgen.prediction import bodies
+from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.slices import PrintReview, reviewed
 from sensorgen.workflows.changes import Advice
 from sensorgen.workflows.trial import Trial, table, trial
 
@@ -18,8 +22,8 @@ if TYPE_CHECKING:
     from sensorgen.asprinted.printed import Printed
     from sensorgen.prediction.results import Prediction
 
+
 STEPS = ("prediction", "changes", "done")
-Step = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -108,19 +112,46 @@ def decision(
     step : callable
         Called with the next step, for a progress display.
     """
-    made, advice, start_s = None, None, time.process_time()
+    tried, advice, start_s = None, None, time.process_time()
     reason = "" if predict else "checks alone (--budget 0)"
     if predict and held.meshes:
         step("prediction")
         try:
-            made = trial(design, held=held)
+            tried = trial(design, held=held)
         except SensorgenError as error:
             reason = str(error)
-    if made:
-        reason = made.reason if made.status == "not predicted" else ""
+    if tried:
+        reason = tried.reason if tried.status == "not predicted" else ""
         if budget_s is not None:
             from sensorgen.workflows.advice import advised
 
             step("changes")
-            advice = advised(design, made, budget_s, step, time.process_time() - start_s)
-    return Decision(**vars(report(design, held)), trial=made, reason=reason, advice=advice)
+            advice = advised(design, tried, budget_s, step, time.process_time() - start_s)
+    return Decision(**vars(report(design, held)), trial=tried, reason=reason, advice=advice)
+
+
+PAGE_STEPS = (*CHECKS, "prediction", "page", "done")
+
+
+def page_of(design: Design, *, folder: Path | None = None, step: Step = lambda _: None) -> str:
+    """The page of a design, as HTML, with advice where it is stored.
+
+    Parameters
+    ----------
+    design : Design
+        What is shown.
+    folder : Path, optional
+        With the design's files, as of :func:`sensorgen.workflows.trial.trial`.
+    step : callable
+        Called with the next step, for a progress display.
+
+    Raises
+    ------
+    SensorgenError
+        A name or value of the design is missing.
+    """
+    printing = reviewed(design, step, folder=folder)
+    decided = decision(design, printing, 0.0, step=step)
+    predicted = evaluate(bodies.of_file(design, printing.file))
+    step("page")
+    return decided.page(printing.printed(design), printing, predicted)

@@ -81,10 +81,10 @@ class Demo:
 
     def document(self) -> Iterator[Part]:
         """Values and presses, found beside true."""
-        held = sum(one.holds == "yes" for one in self.found)
+        right = sum(one.holds == "yes" for one in self.found)
         yield f"Material values of {len(self.inverted)} virtual prints, by {KNOWN} known presses each"
         yield Table.of("values", "", self.found)
-        yield f"{held} of {len(self.found)} intervals hold the truth"
+        yield f"{right} of {len(self.found)} intervals hold the truth"
         yield ""
         yield f"{UNKNOWN} further presses of each, found by its calibration"
         yield Table.of("presses", "", self.inverted)
@@ -117,10 +117,10 @@ def demo(folder: Path, *, count: int = 5, seed: int = 1, step: Callable[[str], N
     plan = folder / "column.yaml"
     store.replace(plan, _PLAN.format(count=count).encode())
     step("print: batch column.yaml")
-    made = batch.make(plan, folder, gcode=False, force=True)
+    printed = batch.make(plan, folder, gcode=False, force=True)
     with Log(folder / LOG, create=True) as log:
-        importing.import_file(log, made.folder / "batch.json", {})
-        names = sorted(made.record.specimens)
+        importing.import_file(log, printed.folder / "batch.json", {})
+        names = sorted(printed.record.specimens)
         works = [(folder, name, seed + k) for k, name in enumerate(names)]
         truths: dict[str, Mapping[str, float]] = {}
         step(f"run: {count} prints, {KNOWN} and {UNKNOWN} presses each")
@@ -169,35 +169,35 @@ def _evaluated(
     runs = {name: sorted(run.number for run in log.recordings(specimen=name)) for name in names}
     step("calibrate")
     first = [numbers[0] for numbers in runs.values()]
-    made = calibration.calibrate(log, names, calibration.Bench(5e-3), first, step=step)
-    log.add(calibration.rows(log, [one.calibration for one in made]))
+    works = calibration.calibrate(log, names, calibration.Bench(5e-3), first, step=step)
+    log.add(calibration.rows(log, [one.calibration for one in works]))
     step("invert")
-    inverted = tuple(_inverted(log, one, runs[one.calibration.specimen][1]) for one in made)
+    inverted = tuple(_inverted(log, one, runs[one.calibration.specimen][1]) for one in works)
     step("report")
     page = folder / "report.html"
     with store.replacing(page) as target:
         target.writelines(piece.encode() for piece in pieces(report(log, None, specimens=names), "html"))
-    found = tuple(each for one in made for each in _found(one, truths[one.calibration.specimen]))
-    return Demo(str(folder), str(page), found, inverted)
+    values = tuple(each for one in works for each in _found(one, truths[one.calibration.specimen]))
+    return Demo(str(folder), str(page), values, inverted)
 
 
-def _found(made: "CalibrationWork", truth: Mapping[str, float]) -> Iterator[DemoValues]:
+def _found(work: "CalibrationWork", truth: Mapping[str, float]) -> Iterator[DemoValues]:
     """Values of a specimen's materials beside the true ones."""
-    for value in made.calibration.materials():
+    for value in work.calibration.materials():
         true = truth[value.quantity]
         holds = "yes" if value.lower <= true <= value.upper else "no"
         yield DemoValues(
-            made.calibration.specimen, value.material, value.quantity, true, value.lower, value.upper, holds
+            work.calibration.specimen, value.material, value.quantity, true, value.lower, value.upper, holds
         )
 
 
-def _inverted(log: "Log", made: "CalibrationWork", number: int) -> Inverted:
+def _inverted(log: "Log", work: "CalibrationWork", number: int) -> Inverted:
     """Presses of a recording by a calibration that did not know them."""
     from sensorgen.analysis.calibration.pairs import known_presses
-    from sensorgen.prediction.calibration.coverage import coverage_of
+    from sensorgen.prediction.calibration.calibration import coverage_of
 
-    name = made.calibration.specimen
+    name = work.calibration.specimen
     rows = [run for run in log.recordings(specimen=name) if run.number == number]
     data, _, _ = known_presses(log, name, rows)
-    of = coverage_of(made.calibration.inverter().batch(data.ratio), data.presses)
+    of = coverage_of(work.calibration.inverter().batch(data.ratio), data.presses)
     return Inverted(name, of.presses, of.force_error_n, of.force, 1e3 * of.position_error_m, of.position)

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 
 @display.html.register(Review)
-def _(found: Review) -> str:
-    return document.html([findings.table(found.findings)])
+def _(of: Review) -> str:
+    return document.html([findings.table(of.findings)])
 
 
 @display.html.register(Design)
@@ -30,44 +30,44 @@ def _(design: Design) -> str:
 
 
 @display.figure.register(Review)
-def _(found: Review) -> "Figure":
+def _(of: Review) -> "Figure":
     from sensorgen.analysis.plots import results, static
 
-    return static.whole(results.findings(found))
+    return static.whole(results.findings(of))
 
 
 @display.figure.register(Sweep)
-def _(found: Sweep[Any]) -> "Figure":
+def _(of: Sweep[Any]) -> "Figure":
     from sensorgen.analysis.plots import results, static
 
-    return static.whole(results.sweep(found))
+    return static.whole(results.sweep(of))
 
 
 @display.figure.register(CompressionResult)
-def _(found: CompressionResult) -> "Figure":
+def _(of: CompressionResult) -> "Figure":
     from sensorgen.analysis.plots import compression, static
 
-    return static.whole(compression.figure(found))
+    return static.whole(compression.figure(of))
 
 
 @display.figure.register(Loaded)
-def _(found: Loaded) -> "Figure":
+def _(of: Loaded) -> "Figure":
     from sensorgen.analysis.plots import response, static
 
-    z = found.impedance
+    z = of.impedance
     axes = (np.asarray(z.force_n), np.asarray(z.position_mm))
-    return static.whole(response.lines(z.frequency_hz, *axes, z.impedance_ohm, found.prediction.design))
+    return static.whole(response.lines(z.frequency_hz, *axes, z.impedance_ohm, of.prediction.design))
 
 
 @display.figure.register(Prediction)
-def _(found: Prediction) -> "Figure":
+def _(of: Prediction) -> "Figure":
     """Relative range of each quantity: model, print and material."""
     from matplotlib.figure import Figure
 
-    quantities = {"capacitance": found.capacitance, **{f"{e} electrode": r for e, r in found.resistance.items()}}
+    quantities = {"capacitance": of.capacitance, **{f"{e} electrode": r for e, r in of.resistance.items()}}
     shown = {name: b for name, b in quantities.items() if b and b.value}
-    made = Figure(figsize=(7, 0.7 * len(shown) + 1.2), layout="constrained")
-    axes = made.subplots()
+    figure = Figure(figsize=(7, 0.7 * len(shown) + 1.2), layout="constrained")
+    axes = figure.subplots()
     for k, bounds in enumerate(shown.values()):
         for shift, (kind, part) in enumerate(
             {"model": bounds.model, "print": bounds.print, "material": bounds.material}.items()
@@ -78,5 +78,5 @@ def _(found: Prediction) -> "Figure":
     axes.set_xscale("log")
     axes.set_xlabel("relative to the best value")
     axes.legend()
-    axes.set_title(f"{found.design}, {found.body}")
-    return made
+    axes.set_title(f"{of.design}, {of.body}")
+    return figure

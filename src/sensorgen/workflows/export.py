@@ -71,8 +71,8 @@ def _stl(printed: Printed, path: Path) -> dict[Path, bytes]:
     bodies = printed.design.printed.bodies
     groups = {"": [body.name for body in bodies]}
     groups |= {f"-{m}": [body.name for body in bodies if body.material == m] for m in {b.material for b in bodies}}
-    made = _closed(printed, groups)
-    return {path.with_stem(path.stem + name): stl.content(made[name], np.zeros(3)) for name in sorted(made)}
+    meshes = _closed(printed, groups)
+    return {path.with_stem(path.stem + name): stl.content(meshes[name], np.zeros(3)) for name in sorted(meshes)}
 
 
 def _3mf(printed: Printed) -> bytes:
@@ -81,8 +81,8 @@ def _3mf(printed: Printed) -> bytes:
 
     design = printed.design
     material = {body.name: body.material for body in design.printed.bodies}
-    made = _closed(printed, {name: [name] for name in material})
-    parts = [part_of(design, name, material[name], mesh) for name, mesh in made.items()]
+    meshes = _closed(printed, {name: [name] for name in material})
+    parts = [part_of(design, name, material[name], mesh) for name, mesh in meshes.items()]
     return threemf.content("orca", design.name, parts, design.machine.bed_centre_mm())
 
 
@@ -94,8 +94,8 @@ def _vtu(printed: Printed, voxel_mm: float | None) -> bytes:
     design, bodies = printed.design, printed.design.printed.bodies
     known = {value.material: value.value for value in permittivities(design)}
     pitch_mm = design.layers.layer_mm / 2 if voxel_mm is None else voxel_mm
-    made = voxels(printed.first, [body.name for body in bodies], design.printed.size_mm, pitch_mm)
-    return vtu.content(made, bodies, known)
+    grid = voxels(printed.first, [body.name for body in bodies], design.printed.size_mm, pitch_mm)
+    return vtu.content(grid, bodies, known)
 
 
 def _step(printed: Printed) -> bytes:

@@ -1,9 +1,8 @@
 """Single steps from a design to a neighbour on the printable grid: layers for heights, line widths for widths."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
-from heapq import heappop, heappush
-from math import ceil, floor, inf, log
+from math import ceil, floor, log
 from types import MappingProxyType
 from typing import Any
 
@@ -63,49 +62,6 @@ def with_values(data: Mapping[str, Any], changes: Changes) -> dict[str, Any]:
             at[part] = at = dict(at.get(part) or {})
         at[key[-1]] = value
     return made
-
-
-def walk(
-    design: Design, visit: Callable[[Changes, float], Iterable[tuple[Key, Value]] | None], farthest: float,
-    starts: Iterable[Changes] = (),
-) -> float:  # fmt: skip
-    """Visit changes of a design by distance (Dijkstra), from none on.
-
-    Parameters
-    ----------
-    design : Design
-        As it is.
-    visit : callable
-        Of changes and their distance: steps that go on from there, or None to end.
-    farthest : float
-        Largest distance that is visited [-].
-    starts : iterable of changes
-        Visited first.
-
-    Returns
-    -------
-    float
-        Distance up to which all were visited; infinite where none is left [-].
-    """
-    heap: list[tuple[float, int, Changes]] = [(0.0, 0, {})]
-    seen: set[frozenset[tuple[Key, Value]]] = {frozenset()}
-
-    def push(changes: Changes, *, first: bool = False) -> None:
-        mark, far = frozenset(changes.items()), distance(design, changes)
-        if mark not in seen and far <= farthest:
-            seen.add(mark)
-            heappush(heap, (0.0 if first else far, len(seen), changes))
-
-    for together in starts:
-        push(together, first=True)
-    while heap:
-        far, _, changes = heappop(heap)
-        further = visit(changes, far)
-        if further is None:
-            return far
-        for key, value in further:
-            push({k: v for k, v in {**changes, key: value}.items() if v != own(design, k)})
-    return inf
 
 
 def own(design: Design, key: Key) -> Value | None:

@@ -76,10 +76,10 @@ def read(path: Path, what: str) -> tuple[dict[str, Any], tuple[str, ...]]:
     """
     twice: list[str] = []
 
-    def pairs(found: list[tuple[str, Any]]) -> dict[str, Any]:
-        names = [name for name, _ in found]
+    def pairs(items: list[tuple[str, Any]]) -> dict[str, Any]:
+        names = [name for name, _ in items]
         twice.extend(sorted({name for name in names if names.count(name) > 1} if len(set(names)) < len(names) else ()))
-        return dict(found)
+        return dict(items)
 
     try:
         data = json.loads(path.read_text("utf-8"), object_pairs_hook=pairs)
@@ -145,10 +145,10 @@ def build_differences(folder: Path, design: Design, log: "Log | None" = None) ->
     if log:
         wrong += _against_log(folder, str(key), data, log)
     for note in sorted(folder.glob("*.gcode.json")):
-        made = _note(note)
-        if made.get("design") != key:
-            wrong.append(f"{note.stem} was sliced from design {shown(made.get('design'))}, not from this one")
-        elif made.get(SEAL) != sha256(note.with_suffix("").read_bytes()).hexdigest():
+        sliced = _note(note)
+        if sliced.get("design") != key:
+            wrong.append(f"{note.stem} was sliced from design {shown(sliced.get('design'))}, not from this one")
+        elif sliced.get(SEAL) != sha256(note.with_suffix("").read_bytes()).hexdigest():
             wrong.append(f"{note.stem} is not what was sliced")
     return _compared(folder, store.MANIFEST, data["files"], tuple(wrong), others=True)
 
@@ -172,19 +172,15 @@ def _against_log(folder: Path, key: str, data: Mapping[str, Any], log: "Log") ->
         yield f"{store.MANIFEST} has another design {key} than the log"
     stored = [json.loads(row.data) for row in log.entries(Prediction, superseded=True, design_id=key)]
     with suppress(OSError, ValueError):
-        found = json.loads((folder / "prediction.json").read_text("utf-8"))
-        if stored and "schema" in stored[-1] and found not in stored:
+        here = json.loads((folder / "prediction.json").read_text("utf-8"))
+        if stored and "schema" in stored[-1] and here not in stored:
             yield f"prediction.json is none of the {len(stored)} predictions that the log has of design {key}"
 
 
 def _compared(
     folder: Path, record: str, known: Mapping[str, str], wrong: tuple[str, ...], *, others: bool
 ) -> Differences:
-    try:
-        links = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_symlink())
-        here = {name: value for name, value in store.hashes(folder).items() if name not in (record, *links)}
-    except OSError as error:
-        raise BadInput(f"cannot read {error.filename!r}: {error.strerror or error}") from None
+    links, here = _there(folder, record)
     links = [name for name in links if name != record and (not others or name in known)]
     return Differences(
         missing=tuple(sorted(set(known) - set(here) - set(links))),
@@ -192,6 +188,15 @@ def _compared(
         extra=() if others else tuple(sorted(set(here) - set(known))),
         links=tuple(links), record=wrong,
     )  # fmt: skip
+
+
+def _there(folder: Path, record: str) -> tuple[list[str], dict[str, str]]:
+    """Links in a folder, and the hashes of its files but for these and the record."""
+    try:
+        links = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_symlink())
+        return links, {name: value for name, value in store.hashes(folder).items() if name not in (record, *links)}
+    except OSError as error:
+        raise BadInput(f"cannot read {error.filename!r}: {error.strerror or error}") from None
 
 
 def set_aside(folder: Path, design: Design) -> tuple[str, ...]:

@@ -107,23 +107,25 @@ def slice_design(
     step("checks")
     drawn = review(design, walls=rule(slicer, design.walls) if slicer in SLICERS else "")
     if (drawn.errors(strict) or of_own_machine(design)) and not force:
-        held = estimated(design, drawn)
-        raise Unprintable(held.findings, held.errors(strict))
-    made = slice_now(design, slicer, program=program, time_limit_s=time_limit_s, strict=strict, step=step)
-    report = made.report
-    held = combined(design, drawn, report.slicer.words, report.of_print(), PrintFile(made.record(), made.content))
+        whole = estimated(design, drawn)
+        raise Unprintable(whole.findings, whole.errors(strict))
+    sliced = slice_now(design, slicer, program=program, time_limit_s=time_limit_s, strict=strict, step=step)
+    report = sliced.report
+    whole = combined(design, drawn, report.slicer.words, report.of_print(), PrintFile(sliced.record(), sliced.content))
     page = ""
-    if made.printed.lines and len(made.printed.lines.number):
-        travel = {"as sliced": made.lifted.before, "as written": made.lifted.after}
-        page = pages.of_print(made.printed, held.findings, {when: found.stretches() for when, found in travel.items()})
+    if sliced.printed.lines and len(sliced.printed.lines.number):
+        travel = {"as sliced": sliced.lifted.before, "as written": sliced.lifted.after}
+        page = pages.of_print(
+            sliced.printed, whole.findings, {when: course.stretches() for when, course in travel.items()}
+        )
     stem = f"{design.name}.{slicer}"
     passed, refused = (f"{stem}.gcode", f"{stem}.gcode.json"), (f"{stem}.refused.gcode", f"{stem}.refused.json")
     names, others = (refused, passed) if report.refused else (passed, refused)
     result = SlicedFile(
-        **vars(report), gcode=names[0], verdict=held.verdict, all_findings=tuple(held.findings),
+        **vars(report), gcode=names[0], verdict=whole.verdict, all_findings=tuple(whole.findings),
         compensated=tuple(compensated),
     )  # fmt: skip
-    return _written(result, out / design.name, made.content, page, others)
+    return _written(result, out / design.name, sliced.content, page, others)
 
 
 def _written(result: SlicedFile, folder: Path, content: bytes, page: str, others: tuple[str, ...]) -> SlicedFile:

@@ -5,9 +5,9 @@ import json
 from sensorgen.core.errors import MissingValue
 from sensorgen.design.design import Design
 from sensorgen.measure.log import notes
-from sensorgen.measure.log.batches import design_row, designs, prediction
 from sensorgen.measure.log.entries import Entry, Prediction
 from sensorgen.measure.log.logbook import Log
+from sensorgen.measure.log.prints import design_row, designs, prediction
 
 
 def predict(log: Log, specimen: str) -> list[Entry]:

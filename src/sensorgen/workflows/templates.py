@@ -1,5 +1,6 @@
 """New files of a user's own, from commented templates that pass their checks as they are."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -67,8 +68,8 @@ def new(what: What, name: str, pack: str = "") -> NewFile:
         The file cannot be written.
     """
     kind = KINDS[what]
-    if (kind and not packs.is_name(kind, name)) or (not kind and not packs.is_name("shapes", name)):
-        example = "block_tip" if what == "shape" else "lab-eel"
+    if not packs.is_name(kind or "shapes", name):
+        example = {"shape": "block_tip"}.get(what, "lab-eel")
         raise BadInput(f"{name!r:.60} cannot be a {what}'s name; expected small letters and digits, as {example}")
     if pack and not packs.NAME.fullmatch(pack):
         raise BadInput(f"--pack {pack!r:.60}; expected small letters, digits and '-', as lab-filaments")
@@ -76,7 +77,7 @@ def new(what: What, name: str, pack: str = "") -> NewFile:
         raise BadInput(f"a {what} {name!r} ships with sensorgen (pack {ships.name}); choose another name")
     home = packs.Pack(pack, "own", packs.place() / pack) if pack else packs.beside(Path())
     file = home.path(kind, name) if kind else home.folder / f"{name}.yaml"
-    if file.exists() or file.is_symlink():
+    if os.path.lexists(file):
         raise BadInput(f"{str(file)!r} exists; choose another name, or delete it first")
     template = Path(packs.__file__).parent / "templates" / f"{what}{packs.suffix(kind) if kind else '.yaml'}"
     files.replace(file, yamlfile.text(template).replace("NAME", name).encode())

@@ -78,9 +78,9 @@ def tiles(design: Design) -> tuple[tuple[Tile, Design], ...]:
     )
 
 
-def table(found: tuple[tuple[Tile, Design], ...]) -> Table:
+def table(placed: tuple[tuple[Tile, Design], ...]) -> Table:
     """Places of tiles."""
-    return Table.of("tiles", "", tuple(tile for tile, _ in found))
+    return Table.of("tiles", "", tuple(tile for tile, _ in placed))
 
 
 def _fits(of: ArrayLayout, design: Design) -> bool:

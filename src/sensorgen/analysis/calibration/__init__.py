@@ -1,11 +1,9 @@
 """Calibrate specimens by what the log has of them, and keep the result there."""
 
 import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from math import hypot, log
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,25 +11,25 @@ from sensorgen.analysis.calibration.meters import readings_of
 from sensorgen.analysis.calibration.pairs import known_presses, nothing_recorded
 from sensorgen.core.arrays import Real
 from sensorgen.core.document import Part
-from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, within
+from sensorgen.core.errors import BadInput, MissingValue, within
 from sensorgen.core.version import __version__
 from sensorgen.design.body import BodyOf
 from sensorgen.design.design import Design
-from sensorgen.measure.log import BenchRun, Log, Reading, batches, notes
+from sensorgen.measure.log import BenchRun, Log, Reading, notes, prints
 from sensorgen.measure.log import Calibration as Row
 from sensorgen.measure.log.entries import Specimen
 from sensorgen.prediction import bodies
-from sensorgen.prediction.calibration.baseline import RestChange
-from sensorgen.prediction.calibration.calibration import BEYOND, Calibration, from_json
-from sensorgen.prediction.calibration.coverage import coverage_of, held_out
+from sensorgen.prediction.calibration.bench import Bench as Bench
+from sensorgen.prediction.calibration.bench import spread_of as spread_of
+from sensorgen.prediction.calibration.calibration import BEYOND, Calibration, coverage_of, from_json, held_out
 from sensorgen.prediction.calibration.fitting import Data, calibrated, gain, loosened, shared, widened
 from sensorgen.prediction.calibration.inversion import InvertedPresses
 from sensorgen.prediction.calibration.materials import links
-from sensorgen.prediction.calibration.rest import checked
-from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, Spread, spread_at
+from sensorgen.prediction.calibration.rest import RestChange, checked
+from sensorgen.prediction.calibration.specimen import SpecimenModel
 from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
 from sensorgen.prediction.planning import sensor_model
-from sensorgen.prediction.query import TONES_HZ, Query, Tip
+from sensorgen.prediction.query import TONES_HZ, Query
 from sensorgen.prediction.sensor_model import SensorModel
 
 FEWEST_RECHECK = 3  # presses from which on a change can be told
@@ -85,38 +83,6 @@ class Together:
         return (texts[0] if len(texts) == 1 else "[" + ",\n".join(texts) + "]") + "\n"
 
 
-@dataclass(frozen=True)
-class Bench:
-    """Tip and force of the bench.
-
-    Attributes
-    ----------
-    tip_m : float or None
-        Length of the tip along the sensor [m]; the design's if None.
-    force_offset_n : (float, float)
-        Mean and standard deviation of what the sensor feels above the force that the rig says [N].
-    block : mapping
-        ``block`` and ``height_mm`` of the tip, in place of the design's.
-    """
-
-    tip_m: float | None = None
-    force_offset_n: tuple[float, float] = (0.0, 0.1)
-    block: Mapping[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        """Refuse what is no tip and no deviation."""
-        if not (self.tip_m is None or self.tip_m > 0) or not self.force_offset_n[1] > 0:
-            raise BadInput(
-                f"a tip of {(self.tip_m or 0.0) * 1e3:g} mm and an offset of {self.force_offset_n[0]:g} +- "
-                f"{self.force_offset_n[1]:g} N; expected a length and a deviation above 0"
-            )
-
-    def tip(self, design: Design) -> Tip:
-        """The tip that presses a design."""
-        tip = design.tip.model_copy(update=dict(self.block)).tip()
-        return tip if self.tip_m is None else replace(tip, length_m=self.tip_m)
-
-
 def design_of(log: Log, specimen: str) -> tuple[str, Design]:
     """A specimen's name in the log, and the design that it was printed of.
 
@@ -132,63 +98,15 @@ def design_of(log: Log, specimen: str) -> tuple[str, Design]:
     if bound is None:
         with suppress(BadInput):
             name = notes.specimen(specimen).specimen
-    found = batches.designs(log).get(bound.design_id) if bound else None
-    if found is None:
+    design = prints.designs(log).get(bound.design_id) if bound else None
+    if design is None:
         with suppress(BadInput):
-            found = notes.design_of(specimen)
-    if found is None:
+            design = notes.design_of(specimen)
+    if design is None:
         raise MissingValue(
             f"no design is known of {specimen!r:.80}: sensorgen log specimen {specimen!r:.80} --design FILE binds it"
         )
-    return name, found
-
-
-def spread_of(predicted: SensorModel, bench: Bench) -> Spread:
-    """Spread of the specimens of a design, from what its prediction leaves open."""
-    mean, sd = bench.force_offset_n
-    usual, c = spread_at(predicted.sensor), predicted.rest.capacitance
-    ends = [np.log(end / r.value) for r in predicted.rest.resistance.values() for end in (r.lower, r.upper)]
-    moduli = [v for v in predicted.values if v.quantity == "youngs_modulus_pa"]
-    middle, by_print, by_print_shape = print_spread(predicted)
-    return replace(
-        usual, force_n=sd, force_offset_n=mean,
-        resistance=max(usual.resistance, float(np.ptp(ends)) / _SURE) if ends else usual.resistance,
-        capacitance=max(usual.capacitance, float(np.log(c.upper / c.lower)) / _SURE),
-        law=hypot(usual.law if moduli else 2 * usual.law, by_print), law_middle=middle,
-        law_shape=hypot(usual.law_shape, by_print_shape),
-    )  # fmt: skip
-
-
-def print_spread(predicted: SensorModel) -> tuple[float, float, float]:
-    """Mean of ln of the rise by what is printed, and standard deviations as a whole and from force to force.
-
-    The estimate of a print is one of several cells: electrodes between the least and the largest gap of the rules of
-    slicers, the film thinner or thicker, and at best the cell as drawn. Between gaps the rise is taken to change with
-    their square at most: the field over the gap, and the displacement of a film that gets thinner. All 0 for a drawing.
-    """
-    if predicted.body.is_drawn:
-        return 0.0, 0.0, 0.0
-    by_drawing = _ln_rise_as_drawn(predicted)
-    ends = [0.0, *by_drawing.tolist()]
-    cells = predicted.body.cells
-    error, (first, *_) = cells.film.error_mm if cells.film else 0.0, cells.gap_mm.values()
-    gaps = [gap for gap in cells.gap_mm.values() if error < gap < np.inf]
-    if first in gaps:
-        ends += [2 * log(first / end) for end in (min(gaps) - error, max(gaps) + error)]
-    return (max(ends) + min(ends)) / 2, (max(ends) - min(ends)) / _SURE, float(np.ptp(by_drawing)) / _SURE
-
-
-def _ln_rise_as_drawn(predicted: SensorModel) -> Real:
-    """Ln of the rise of the cell as drawn over the predicted one, at forces that both laws know; 0 without a law."""
-    sensor = predicted.sensor
-    try:
-        drawn = sensor_model(bodies.drawn(predicted.body.design), Query(tip=Tip(sensor.tip_m)))[0].sensor
-    except SensorgenError:
-        return np.zeros(1)
-    models = [SpecimenModel(one, np.array(TONES_HZ), Spread()) for one in (drawn, sensor)]
-    stress = np.minimum(np.array(FORCES_N) / (sensor.width_m * sensor.tip_m), min(one.most_pa for one in models))
-    shares = [one.compression.capacitive_strain(stress)[0] for one in (drawn, sensor)]
-    return np.asarray(np.subtract(*(np.log(share / (1 - share)) for share in shares)))
+    return name, design
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,16 +188,18 @@ def stored(log: Log, specimen: str) -> Calibration | None:
     row = next(iter(log.entries(Row, last=1, specimen=specimen)), None)
     if row is None:
         return None
-    found = from_json(row.data)
+    calibration = from_json(row.data)
     again = f"calibrate it again: sensorgen calibrate {specimen!r}"
-    if design_of(log, specimen)[1].id() != found.design_id:
-        raise BadInput(f"{specimen} was calibrated as {found.design} ({found.design_id}), but is no longer; {again}")
+    if design_of(log, specimen)[1].id() != calibration.design_id:
+        raise BadInput(
+            f"{specimen} was calibrated as {calibration.design} ({calibration.design_id}), but is no longer; {again}"
+        )
     current = {row.uid for row in (*log.recordings(specimen=specimen), *log.entries(Reading, specimen=specimen))}
-    if lost := set(found.rows) - current:
+    if lost := set(calibration.rows) - current:
         raise BadInput(
             f"{specimen}: {len(lost)} recordings or readings of its calibration were withdrawn or corrected; {again}"
         )
-    return found
+    return calibration
 
 
 def calibrate(
@@ -313,28 +233,29 @@ def calibrate(
     if len(set(specimens)) < len(specimens):
         raise BadInput(f"a specimen stands twice in {', '.join(specimens)}; expected each once")
     _check_numbers(log, [design_of(log, specimen)[0] for specimen in specimens], recordings)
-    found = []
+    entries = []
     for specimen in specimens:
         step(specimen)
-        found.append(known(log, specimen, bench, recordings, body_of))
-    posteriors = [calibrated(one.model, one.data) for one in found]
+        entries.append(known(log, specimen, bench, recordings, body_of))
+    posteriors = [calibrated(one.model, one.data) for one in entries]
     if len(posteriors) > 1:
-        posteriors = shared([one.model for one in found], posteriors, _INSTRUMENT)
-    made = []
-    for one, posterior in zip(found, posteriors, strict=True):
+        posteriors = shared([one.model for one in entries], posteriors, _INSTRUMENT)
+    works = []
+    for one, posterior in zip(entries, posteriors, strict=True):
         most = float(one.data.presses.force_n.max(initial=0.0)) or 6.0
-        held = held_out(one.model, one.data, BEYOND * most, step)
-        others = ", ".join(other.specimen for other in found if other is not one)
+        left_out = held_out(one.model, one.data, BEYOND * most, step)
+        others = ", ".join(other.specimen for other in entries if other is not one)
         notes = (*one.notes, *_off(one, posterior.at))
         notes += (f"lead, stray and offsets shared with {others}",) if others else ()
         calibration = Calibration(
-            one.specimen, one.design.name, one.design.id(), one.model, posterior, most, held[0] if held else None,
-            one.rows, tuple(gain(one.model, one.data, posterior.at).tolist()) if one.recorded else (), notes,
+            one.specimen, one.design.name, one.design.id(), one.model, posterior, most,
+            left_out[0] if left_out else None, one.rows,
+            tuple(gain(one.model, one.data, posterior.at).tolist()) if one.recorded else (), notes,
             links(one.predicted),
         )  # fmt: skip
         calibration = replace(calibration, notes=(*notes, *calibration.departures()))
-        made.append(CalibrationWork(calibration, one.data, held[1] if held else None))
-    return made
+        works.append(CalibrationWork(calibration, one.data, left_out[1] if left_out else None))
+    return works
 
 
 def _chosen(log: Log, name: str, numbers: Sequence[int]) -> list[BenchRun]:
@@ -398,9 +319,9 @@ class Recheck:
 
     def document(self) -> Iterator[Part]:
         """Paragraphs and tables of the presses."""
-        said = "ALARM: the calibration no longer held" if self.alarm else "the calibration still held"
+        verdict = "ALARM: the calibration no longer held" if self.alarm else "the calibration still held"
         yield (
-            f"{said}: {self.inside} of {self.presses} known forces in their 90 % intervals, their mean off by "
+            f"{verdict}: {self.inside} of {self.presses} known forces in their 90 % intervals, their mean off by "
             f"{self.z:+.1f} standard errors"
         )
         if self.change:
@@ -470,11 +391,11 @@ def recheck(log: Log, specimen: str, recordings: Sequence[int]) -> Recheck:
 
 def rows(log: Log, calibrations: Sequence[Calibration]) -> list[Row]:
     """Rows of the log for calibrations."""
-    found = []
-    for made in calibrations:
-        of = next((s for s in log.specimens() if s.specimen == made.specimen), Specimen(specimen=made.specimen))
-        found.append(Row(
-            **vars(of), uid=uuid.uuid4().hex, written=made.specimen, design_id=made.design_id, design=made.design,
-            source="sensorgen calibrate", version=__version__, data=made.to_json(),
+    known, logged = {one.specimen: one for one in reversed(log.specimens())}, []
+    for one in calibrations:
+        of = known.get(one.specimen, Specimen(specimen=one.specimen))
+        logged.append(Row(
+            **vars(of), uid=uuid.uuid4().hex, written=one.specimen, design_id=one.design_id, design=one.design,
+            source="sensorgen calibrate", version=__version__, data=one.to_json(),
         ))  # fmt: skip
-    return found
+    return logged

@@ -46,11 +46,11 @@ def readings_of(
         return None, [], []
     state = logged[-1].baked
     counted = [one for one in logged if one.baked == state]
-    found = of_iteration(log, None, body_of=body_of, specimens=[name])
+    comparison = of_iteration(log, None, body_of=body_of, specimens=[name])
     numbers = {one.number for one in counted}
     ranges = [
-        each for row in found.direct if row.predicted and row.reading.number in numbers
-        and (each := allowed(row, found.bodies[row.predicted.design]))
+        each for row in comparison.direct if row.predicted and row.reading.number in numbers
+        and (each := allowed(row, comparison.bodies[row.predicted.design]))
     ]  # fmt: skip
     left_out = list[str]()
     measured = [each for one in counted for each in _alternating(one, left_out)]

@@ -9,53 +9,52 @@ from sensorgen.analysis.plots import pages
 from sensorgen.analysis.plots.figure import BLUE, COLOURS, GREY, ORANGE, Axis, Curve, Figure, Panel
 from sensorgen.core import document
 from sensorgen.core.units import M_PER_MM
-from sensorgen.prediction.calibration.calibration import Calibration
-from sensorgen.prediction.calibration.coverage import inside
+from sensorgen.prediction.calibration.calibration import Calibration, inside
 from sensorgen.prediction.calibration.inversion import LEVEL
 from sensorgen.prediction.inverse.verdict import NORMAL_90
 
 _RESIDUALS = ("residual of the magnitude [%]", "residual of the phase [0.01 rad]")  # measured less fitted
 
 
-def html(made: Sequence[CalibrationWork | Recheck]) -> str:
+def html(works: Sequence[CalibrationWork | Recheck]) -> str:
     """A page for the browser; raises MissingValue where Plotly is not installed."""
     sections = []
-    for number, one in enumerate(made):
+    for number, one in enumerate(works):
         fit = (*_presses(one, number), *_left_over(one, number)) if isinstance(one, CalibrationWork) else ()
         figures, specimen = (*fit, _parameters(one.calibration, number)), document.visible(one.calibration.specimen)
         sections.append(pages.PageSection(f"specimen-{number}", specimen, figures, tuple(one.document())))
     return pages.page(f"Calibration of {', '.join(section.title for section in sections)}", (), sections)
 
 
-def _presses(made: CalibrationWork, number: int) -> list[Figure]:
+def _presses(work: CalibrationWork, number: int) -> list[Figure]:
     """Force and position of known presses against what was found of them without them."""
-    if made.held is None:
+    if work.held is None:
         return []
-    known, found = made.data.presses, made.held
+    known, inverted = work.data.presses, work.held
     panels = []
-    force, place = inside(found, known)
-    for truth, middle, ends, held, words in (
-        (known.force_n, found.force_n, found.force_90_n, force, "force [N]"),
-        (known.position_m / M_PER_MM, found.position_m / M_PER_MM, found.position_90_m / M_PER_MM, place,
+    force, place = inside(inverted, known)
+    for truth, middle, ends, within, words in (
+        (known.force_n, inverted.force_n, inverted.force_90_n, force, "force [N]"),
+        (known.position_m / M_PER_MM, inverted.position_m / M_PER_MM, inverted.position_90_m / M_PER_MM, place,
          "position [mm]"),
     ):  # fmt: skip
         most = float(max(truth.max(), ends.max()))
         content = [Curve("line", "true", [0, most], [0, most], colour=GREY, dash="dash")]
-        for name, rows, colour in ((f"in the {LEVEL:.0%} interval", held, BLUE), ("outside", ~held, ORANGE)):
+        for name, rows, colour in ((f"in the {LEVEL:.0%} interval", within, BLUE), ("outside", ~within, ORANGE)):
             if rows.any():
                 content.append(Curve(
                     "points", name, middle[rows], truth[rows], low=ends[rows, 0], high=ends[rows, 1], colour=colour
                 ))  # fmt: skip
         panels.append(Panel(tuple(content), Axis(f"found {words}"), Axis(f"known {words}")))
-    title = f"{made.calibration.specimen}: each press found again from the others"
+    title = f"{work.calibration.specimen}: each press found again from the others"
     alt = "Force and position that were found, with their intervals, against those that are known."
     return [Figure(f"presses-{number}", title, alt, {"": tuple(panels)}, columns=2)]
 
 
-def _left_over(made: CalibrationWork, number: int) -> list[Figure]:
+def _left_over(work: CalibrationWork, number: int) -> list[Figure]:
     """Residuals of the ratios of presses at each tone over force, and of the reading at rest over frequency."""
-    model, data = made.calibration.model, made.data
-    specimen, at = made.calibration.specimen, made.calibration.posterior.at
+    model, data = work.calibration.model, work.data
+    specimen, at = work.calibration.specimen, work.calibration.posterior.at
     khz = model.frequency_hz / 1e3
     rest = 100 * (data.rest - model.rest(at))
     panels = tuple(

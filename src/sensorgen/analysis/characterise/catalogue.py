@@ -26,10 +26,7 @@ PLATE_RADIUS_MM, ELECTRODE_MM, UPPER_MM = 10.0, 0.4, 0.2  # of plates: radius, a
 PAD_MM = 8.0  # of the lower electrode, for a probe
 _STRAIN = 0.04  # that the proposed load makes
 _MOST_N = 100.0  # of a usual stand
-_ROOM, _ROOM_OF_ONE = (
-    1.5,
-    4.0,
-)  # beyond several sources' values, and beyond a single one: sources differ up to twelvefold
+_ROOM, _ROOM_OF_ONE = 1.5, 4.0  # beyond several sources' values, or a single one: sources differ up to twelvefold
 _FRINGE = 0.97  # of the closed form of plates, whose film ends: 0.96 to 0.97 by finite volumes
 _FILL = 0.015  # coupons of one plate differ in how well they are filled [-]
 _TAPS_MM, _WIDTH_MM, _SENSOR_MM = 40.0, 6.0, 10.0  # between taps; width of ladders, and of bars, wide as sensors
@@ -304,17 +301,10 @@ def _ladder(material: str, degrees: float | None, height: float, line_m: float) 
     def expected(values: Values, sizes: Values) -> tuple[Real, ...]:
         w, h = sizes["width_mm"] * M_PER_MM, sizes["height_mm"] * M_PER_MM
         along = values["along_ohm_m"] if degrees is not None else _crossed_ohm_m(values, line_m)
-        strip = STRIP_MM * M_PER_MM
+        strip, spreading = STRIP_MM * M_PER_MM, sizes["spreading"]
+        through, terminal_ohm_m2 = values["through_ohm_m"], values["terminal_ohm_m2"]
         ends = [
-            closed.ladder_contact(
-                along,
-                values["through_ohm_m"],
-                values["terminal_ohm_m2"] * sizes[f"strip_{k + 1}"],
-                strip,
-                w,
-                h,
-                sizes["spreading"],
-            )
+            closed.ladder_contact(along, through, terminal_ohm_m2 * sizes[f"strip_{k + 1}"], strip, w, h, spreading)
             for k in range(len(LADDER_MM) + 1)
         ]
         return tuple(

@@ -76,11 +76,9 @@ def linearised(
         for k, size in enumerate(sizes)
     }
     with np.errstate(all="ignore"):
-        found = np.log(np.stack(coupon.expected(physical(unknowns, points), around), axis=-1))
-    by_size = (found[1 + p :] - found[0]) / 0.05  # for one standard deviation each
-    return Linearisation(
-        found[0], ((found[1 : 1 + p] - found[0]) / steps[:, None]).T, np.diag(noise**2) + by_size.T @ by_size
-    )
+        ln = np.log(np.stack(coupon.expected(physical(unknowns, points), around), axis=-1))
+    by_size = (ln[1 + p :] - ln[0]) / 0.05  # for one standard deviation each
+    return Linearisation(ln[0], ((ln[1 : 1 + p] - ln[0]) / steps[:, None]).T, np.diag(noise**2) + by_size.T @ by_size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +223,7 @@ def gradient(unknowns: Sequence[Parameter], at: Real, steps: Real, target: Coupo
 def _quantiles(means: Real, sigmas: Real, weights: Real, *, linear: bool) -> Interval95:
     from scipy.special import ndtr
 
-    found = []
+    ends = []
     for level in (0.5, 0.025, 0.975):
         low, high = (means - 9 * sigmas).min(), (means + 9 * sigmas).max()
         for _ in range(60):
@@ -233,8 +231,8 @@ def _quantiles(means: Real, sigmas: Real, weights: Real, *, linear: bool) -> Int
             below = weights @ ndtr((middle - means) / sigmas) < level
             low, high = (middle, high) if below else (low, middle)
         value = float(high if linear else np.exp(high))
-        found.append(0.0 if linear and abs(value) < 1e-9 * float(sigmas.max()) else value)
-    return Interval95(*found)
+        ends.append(0.0 if linear and abs(value) < 1e-9 * float(sigmas.max()) else value)
+    return Interval95(*ends)
 
 
 def _before(unknowns: Sequence[Parameter]) -> Mode:

@@ -101,12 +101,12 @@ def noise_of(coupon: Coupon, unknowns: Sequence[Parameter], theta: Real, meters:
     return np.array([meters.noise(r, float(v)) for r, v in zip(coupon.readings, expected, strict=True)])
 
 
-def select(found: Candidates, count: int, fits: Fits) -> tuple[int, ...]:
+def select(candidates: Candidates, count: int, fits: Fits) -> tuple[int, ...]:
     """The best set of at most ``count`` coupons, by exchange from the best one that greed finds.
 
     Parameters
     ----------
-    found : Candidates
+    candidates : Candidates
         The catalogue.
     count : int
         Most coupons.
@@ -126,16 +126,9 @@ def select(found: Candidates, count: int, fits: Fits) -> tuple[int, ...]:
     """
     chosen: tuple[int, ...] = ()
     while True:
-        least = found.worth(chosen) + _GAIN if chosen else -np.inf
-        better = next(
-            (
-                s
-                for step in (_one_step, _two_steps)
-                for s in _ranked(found, step(found, chosen, count), least)
-                if fits(s)
-            ),
-            None,
-        )
+        least = candidates.worth(chosen) + _GAIN if chosen else -np.inf
+        steps = (_ranked(candidates, step(candidates, chosen, count), least) for step in (_one_step, _two_steps))
+        better = next((each for ranked in steps for each in ranked if fits(each)), None)
         if better is None:
             break
         chosen = better
@@ -144,26 +137,26 @@ def select(found: Candidates, count: int, fits: Fits) -> tuple[int, ...]:
     return chosen
 
 
-def _ranked(found: Candidates, sets: set[tuple[int, ...]], least: float) -> list[tuple[int, ...]]:
+def _ranked(candidates: Candidates, sets: set[tuple[int, ...]], least: float) -> list[tuple[int, ...]]:
     """Sets that are worth more than ``least``, the best first."""
-    worth = {s: found.worth(s) for s in sorted(sets) if s and all(s.count(k) <= COPIES for k in s)}
+    worth = {s: candidates.worth(s) for s in sorted(sets) if s and all(s.count(k) <= COPIES for k in s)}
     return sorted((s for s, value in worth.items() if value > least), key=lambda s: -worth[s])
 
 
-def _one_step(found: Candidates, chosen: tuple[int, ...], count: int) -> set[tuple[int, ...]]:
+def _one_step(candidates: Candidates, chosen: tuple[int, ...], count: int) -> set[tuple[int, ...]]:
     """One coupon more, less, or another one."""
-    every = range(len(found.coupons))
+    every = range(len(candidates.coupons))
     steps = {tuple(sorted((*chosen, k))) for k in every} if len(chosen) < count else set()
     for left in _without_one(chosen):
         steps |= {tuple(sorted((*left, k))) for k in every} | {left}
     return steps
 
 
-def _two_steps(found: Candidates, chosen: tuple[int, ...], count: int) -> set[tuple[int, ...]]:
+def _two_steps(candidates: Candidates, chosen: tuple[int, ...], count: int) -> set[tuple[int, ...]]:
     """One coupon for two, and two for two others; these of the same kinds alone where there are too many pairs."""
-    every = range(len(found.coupons))
+    every = range(len(candidates.coupons))
     few = len(chosen) ** 2 * len(every) ** 2 <= _MOST_PAIRS
-    kinds = [few or (coupon.kind, coupon.material) for coupon in found.coupons]
+    kinds = [few or (coupon.kind, coupon.material) for coupon in candidates.coupons]
     alike = {k: [j for j, kind in enumerate(kinds) if kind == kinds[k]] for k in chosen}
     steps: set[tuple[int, ...]] = set()
     for m, n in combinations(range(len(chosen)), 2):

@@ -15,7 +15,7 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
 from sensorgen.design.values import resistivities
 from sensorgen.measure.signal.leakage import electrode_and_leak
-from sensorgen.prediction.electrodes import electrode_resistance
+from sensorgen.prediction.rest_state import electrode_resistance
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,8 @@ from sensorgen.measure.log import Entry, Log, Withdrawal
 from sensorgen.measure.log import Prediction as Stored
 from sensorgen.measure.signal.leakage import along_ohm, leak_s
 from sensorgen.prediction.evaluate import evaluate
-from sensorgen.prediction.losses import NOTHING_LOST, Lost, lost
 from sensorgen.prediction.quantities import impedance_at
+from sensorgen.prediction.rest_state import NOTHING_LOST, Lost, lost
 from sensorgen.prediction.results import Prediction, from_json
 
 _MOST_FILMS = 1 << 14  # readings across films, of one design, that are kept with what they predict
@@ -156,7 +156,7 @@ def stored_or_made(
     """
     for first in sorted(stored, key=lambda p: p.number):
         try:
-            found = from_json(first.data)
+            prediction = from_json(first.data)
             why = next((row.reason for row in log.superseding(first) if isinstance(row, Withdrawal)), "")
         except BadInput as error:
             why = str(error)
@@ -175,7 +175,7 @@ def stored_or_made(
             place += f"; anchored {anchor.logged_at} in {anchor.file}"
             place += f", {later} record{'s' * (later > 1)} later" if later else ""
         return Predicted(
-            body.design.name, body.design.id(), found, first.logged_at, first.version, before, place, _losses(body)
+            body.design.name, body.design.id(), prediction, first.logged_at, first.version, before, place, _losses(body)
         )  # fmt: skip
     return predicted(body)
 

@@ -91,9 +91,9 @@ def runs(
         name = f"recording {entry.number}, {entry.specimen}"
         with _noted(left_out, name):
             parts, pressed = read_again(log, entry)
-            for found in parts:
-                with _noted(left_out, name + (f", part {found[0].source.part}" if found[0].source.part else "")):
-                    yield from _of_part(entry, found, pressed)
+            for lockins in parts:
+                with _noted(left_out, name + (f", part {lockins[0].source.part}" if lockins[0].source.part else "")):
+                    yield from _of_part(entry, lockins, pressed)
 
 
 @contextmanager
@@ -109,16 +109,16 @@ def _noted(left_out: list[tuple[str, str]], name: str) -> Iterator[None]:
         left_out.append((name, f"{type(error).__name__}: {error}; a fault of sensorgen, please report it"))
 
 
-def _of_part(entry: BenchRun, found: Sequence[Recording], pressed: RigLog | None) -> Iterator[RecordedRun]:
+def _of_part(entry: BenchRun, lockins: Sequence[Recording], pressed: RigLog | None) -> Iterator[RecordedRun]:
     """All lock-ins of a part, each with the rig's log, or without if they cannot be joined."""
-    beside: Sequence[Joined | None] = [None] * len(found)
+    beside: Sequence[Joined | None] = [None] * len(lockins)
     without = "no log of the rig: force and position are not known"
     if pressed is not None:
         try:
-            beside, without = joined_all(found, pressed), ""
+            beside, without = joined_all(lockins, pressed), ""
         except SensorgenError as error:
             without = f"not joined with the rig's log: {error}"
-    for recording, with_rig in zip(found, beside, strict=True):
+    for recording, with_rig in zip(lockins, beside, strict=True):
         done = processed(recording, with_rig)
         one, counts = done.recording, done.recording.counts()
         marked = {name: count for name, count in counts.items() if count and name not in ("samples", "valid")}

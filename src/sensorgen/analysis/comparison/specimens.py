@@ -17,8 +17,8 @@ from sensorgen.design.design import Design
 from sensorgen.design.specimen_name import SpecimenName, design_of, parse
 from sensorgen.measure import accuracy
 from sensorgen.measure.log import BenchRun, Entry, Log, Prediction, Print, Reading, Withdrawal
-from sensorgen.measure.log.batches import designs as on_beds
 from sensorgen.measure.log.logbook import conflict
+from sensorgen.measure.log.prints import designs as on_beds
 from sensorgen.measure.signal.verdicts import (
     INTACT_OHM,
     Evidence,
@@ -124,8 +124,8 @@ class Comparison:
     @cached_property
     def by_bake(self) -> Lazy[Compared]:
         """The last reading of each specimen before the bake, after it, and where that is not known."""
-        found = {(row.reading.specimen, row.reading.words.baked): k for k, row in enumerate(self.direct)}
-        return self.direct.at(found.values())
+        last = {(row.reading.specimen, row.reading.words.baked): k for k, row in enumerate(self.direct)}
+        return self.direct.at(last.values())
 
 
 def of_iteration(
@@ -161,33 +161,33 @@ def of_iteration(
         ids[names[specimen]].add(printed[specimen].design_id)  # another version of sensorgen may have named it
     left_out += _other_designs(measured.designs, set(refused).union(*ids.values()))
     begun = _begun(log, iteration, specimens, names)
-    made, found = {}, {}
+    built, expected = {}, {}
     for name, design in designs.items():
         step(name)
-        made[name] = body_of(design)
+        built[name] = body_of(design)
         stored = [p for each in ids[name] for p in log.entries(Prediction, superseded=True, design_id=each)]
-        found[name] = stored_or_made(made[name], log, stored, begun.get(name, []), left_out)
+        expected[name] = stored_or_made(built[name], log, stored, begun.get(name, []), left_out)
     by_shape: dict[str, array[float]] = {}
     for reading in measured.rows:
         by_shape.setdefault(reading.shape, array("d")).extend(least(_evidence(reading, None)))
     usual = {shape: expected_from(values) for shape, values in by_shape.items()}
 
-    kept: dict[int, Compared] = {}
+    cached: dict[int, Compared] = {}
 
     def compared(place: int) -> Compared:
-        if place in kept:
-            return kept[place]
+        if place in cached:
+            return cached[place]
         reading = measured.rows[place]
-        of = found.get(names.get(reading.specimen, ""))
+        of = expected.get(names.get(reading.specimen, ""))
         evidence = _evidence(reading, of, usual[reading.shape])
         row = Compared(reading, of, evidence, verdict(evidence, _intact_ohm(of, reading.words.instrument)))
-        if len(kept) < _KEPT:
-            kept[place] = row
+        if len(cached) < _KEPT:
+            cached[place] = row
         return row
 
     rows = Lazy(compared, range(len(measured.rows)))
     ac = {reading.number for reading in measured.alternating}
-    return Comparison(rows, measured.alternating, made, names, found, (*left_out, *_first(_unused(rows, ac))))
+    return Comparison(rows, measured.alternating, built, names, expected, (*left_out, *_first(_unused(rows, ac))))
 
 
 def _label(design: Design, alike: Mapping[str, int]) -> str:
@@ -199,7 +199,7 @@ def _begun(
     log: Log, iteration: int | None, specimens: Sequence[str], names: Mapping[str, str]
 ) -> dict[str, list[Entry]]:
     """The first reading and the first recording of each design; all of them where several machines wrote the log."""
-    found: dict[str, dict[object, Entry]] = {}
+    first: dict[str, dict[object, Entry]] = {}
     kinds: tuple[type[Reading | BenchRun], ...] = (Reading, BenchRun)
     for kind in kinds:
         if log.merged:
@@ -209,8 +209,8 @@ def _begun(
             rows = iter(sorted(filter(None, (next(of, None) for of in each)), key=lambda row: row.number))
         for row in rows:
             if row.specimen in names:
-                found.setdefault(names[row.specimen], {}).setdefault((kind, row.number * log.merged), row)
-    return {name: list(rows.values()) for name, rows in found.items()}
+                first.setdefault(names[row.specimen], {}).setdefault((kind, row.number * log.merged), row)
+    return {name: list(rows.values()) for name, rows in first.items()}
 
 
 def _superseded(log: Log, iteration: int | None, specimens: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -236,15 +236,15 @@ def _first(left_out: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
 
 def _printed(log: Log, left_out: list[tuple[str, str]]) -> dict[str, Print]:
     """The latest print of each specimen; one that two machines have bound to different designs is left out."""
-    found: dict[str, Print] = {}
+    latest: dict[str, Print] = {}
     for row in log.prints():
-        before = found.setdefault(row.specimen, row)
+        before = latest.setdefault(row.specimen, row)
         if before.design_id != row.design_id:
             both = f"{before.design} ({before.design_id}) and {row.design} ({row.design_id})"
             left_out.append((f"design of {row.specimen}", f"bound to {both}: withdraw one of the prints"))
             row = replace(row, design_id="", design="")
-        found[row.specimen] = row
-    return found
+        latest[row.specimen] = row
+    return latest
 
 
 def _by_specimen(
@@ -252,22 +252,22 @@ def _by_specimen(
     refused: dict[str, str], left_out: list[tuple[str, str]],
 ) -> dict[str, Design]:  # fmt: skip
     """The designs of specimens: those that they are bound to, else what their names stand for."""
-    found: dict[str, Design] = {}
+    by_name: dict[str, Design] = {}
     recorded = on_beds(log, refused)
-    made: dict[SpecimenName, Design | None] = {}
+    by_kind: dict[SpecimenName, Design | None] = {}
     for specimen in log.specimens(iteration=iteration):
         name, of = specimen.specimen, printed.get(specimen.specimen)
         if specimens and name not in specimens:
             continue
         if of and of.design_id in recorded:
-            found[name] = recorded[of.design_id]
+            by_name[name] = recorded[of.design_id]
             continue
         if of and of.design_id in refused:
             left_out.append((f"{UNTRUSTED} {name}, {of.design}", refused[of.design_id]))
             continue
         try:
             kind = replace(parse(name), iteration=None, replicate=None, place="")
-            design = made[kind] if kind in made else made.setdefault(kind, design_of(kind))
+            design = by_kind[kind] if kind in by_kind else by_kind.setdefault(kind, design_of(kind))
         except SensorgenError as error:
             left_out.append((f"design of {name}", str(error)))
             continue
@@ -279,8 +279,8 @@ def _by_specimen(
         elif design is None:
             left_out.append((f"design of {name}", "its name stands for no design"))
         else:
-            found[name] = design
-    return found
+            by_name[name] = design
+    return by_name
 
 
 def _other_designs(logged: Iterable[tuple[str, str]], known: Container[str]) -> list[tuple[str, str]]:

@@ -20,7 +20,7 @@ from sensorgen.design.design import Design
 from sensorgen.measure.log import BenchRun, Log, Reading
 from sensorgen.measure.log.notes import specimen as named
 from sensorgen.prediction import bodies
-from sensorgen.prediction.electrodes import electrode_resistance
+from sensorgen.prediction.rest_state import electrode_resistance
 
 HELD_BACK = 0.25  # of the specimens
 SEED = 23

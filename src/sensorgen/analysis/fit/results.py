@@ -8,6 +8,8 @@ from math import exp
 from typing import Annotated
 
 from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.version import __version__
+from sensorgen.design.materials import own
 
 LEVEL = 0.95  # of the intervals
 
@@ -155,3 +157,23 @@ class Fit:
         if self.groups:
             inside, total = sum(g.inside for g in self.groups), sum(g.readings for g in self.groups)
             yield Table.of("groups", f"Leaving out a group: {inside} of {total} readings within the range", self.groups)
+
+
+def text(fit: Fit) -> str:
+    """The file of the source.
+
+    Parameters
+    ----------
+    fit : Fit
+        As :func:`sensorgen.analysis.fit.fit` makes it.
+    """
+    about = (
+        f"fit of {fit.of}: {fit.specimens} specimens, {len(fit.held_back)} held back (seed "
+        f"{fit.seed}); sensorgen {__version__}; data {fit.log[:16]}"
+    )
+    materials: dict[str, list[own.SourceValue]] = {}
+    for one in fit.values:
+        value = own.SourceValue(one.quantity, one.value, one.low, one.high, one.note)
+        materials.setdefault(one.material, []).append(value)
+    open_ = (f"not determined: {' '.join(f'{untold.parameter}: {untold.why}'.split())}" for untold in fit.untold)
+    return own.written(about, materials, open_)

@@ -82,13 +82,12 @@ def figure(pressures: "PressureMaps", true: "Real | None" = None, name: str = "m
 
 
 def course(pressures: "PressureMaps", true: "Real", name: str, title: str) -> Figure:
-    """Total force over time and the trace of the centre of pressure, recovered and true on the same crossings."""
-    layout, area = pressures.model.layout, pressures.model.pitch_area_m2
-    newtons = np.where(np.isfinite(pressures.pressure_kpa), true * 1e3 * area, 0.0)
+    """Total force over time and the trace of the centre of pressure, recovered and true."""
+    layout, newtons = pressures.model.layout, true * 1e3 * pressures.model.pitch_area_m2
     total = newtons.sum((1, 2))
     with np.errstate(invalid="ignore"):
         x, y = newtons.sum(1) @ layout.x_mm / total, newtons.sum(2) @ layout.y_mm / total
-    force, (own_x, own_y) = pressures.force_n[0], pressures.centre_mm
+    force, (own_x, own_y, *_) = pressures.force_n[0], pressures.centre_mm
     panels = [
         Panel(
             (

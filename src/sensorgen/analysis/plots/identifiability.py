@@ -8,9 +8,8 @@ from sensorgen.analysis.plots.figure import BLUE, GREY, ORANGE, Axis, Curve, Fig
 from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.identifiability.fisher import LeastErrors, Setup, bounds, slopes
+from sensorgen.prediction.identifiability.fisher import LeastErrors, Setup, bounds, required, slopes
 from sensorgen.prediction.identifiability.identify import HIGHEST_HZ, surface
-from sensorgen.prediction.identifiability.verdict import required
 from sensorgen.prediction.query import FORCE_N, NOISE
 
 FORCES, POSITIONS, FREQUENCIES = 60, 161, 121

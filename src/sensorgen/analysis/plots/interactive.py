@@ -39,11 +39,8 @@ def _all_traces(panels: Sequence[Panel]) -> Iterator[Data]:
             if trace.get("showlegend"):
                 trace["showlegend"] = trace["name"] not in named
                 named.add(trace["name"])
-            yield (
-                trace
-                | ({"yaxis": f"y{k + 1}"} if k else {})
-                | ({"xaxis": f"x{k + 1}"} if k and not _alike(panels) else {})
-            )
+            axes = "y" if _alike(panels) else "yx"
+            yield trace | ({f"{axis}axis": f"{axis}{k + 1}" for axis in axes} if k else {})
 
 
 def _traces(panel: Panel, domain: list[float]) -> Iterator[Data]:
@@ -147,38 +144,40 @@ def _body(body: BodyTriangles) -> Data:
 
 def _map(part: Map, panel: Panel, domain: list[float]) -> Iterator[Data]:
     """The colours, and the lines along which the quantity has certain values; log scales as powers of ten."""
-    low, high = part.span
     values = np.log10(part.values) if part.log else part.values
-    ends = {"zmin": log10(low), "zmax": log10(high)} if part.log else {"zmin": low, "zmax": high}
+    low, high = (log10(end) for end in part.span) if part.log else part.span
     colours: Any = _DIVERGING if part.signed else "Viridis"
     bar: Data = {"thickness": 12, "title": {"text": escape(part.label), "side": "right"}, "y": sum(domain) / 2,
                  "len": domain[1] - domain[0], "lenmode": "fraction"}  # fmt: skip
     if part.log:
-        ticks = np.arange(np.ceil(log10(low)), np.floor(log10(high)) + 1)
+        ticks = np.arange(np.ceil(low), np.floor(high) + 1)
         bar |= {"tickvals": ticks.tolist(), "ticktext": [f"{10.0**t:g}" for t in ticks]}
     across, up = (escape(axis.title.partition(" [")[0]) for axis in (panel.x, panel.y))
     if part.values.ndim == 2 and part.x.ndim == 1:
         grid = {"x": packed(part.x), "y": packed(part.y), "z": packed(values)}
         value = "customdata" if part.log else "z"
-        yield grid | ends | {
+        yield grid | {"zmin": low, "zmax": high} | {
             "type": "heatmap", "colorscale": colours, "reversescale": part.log, "colorbar": bar,
             "hovertemplate": f"{across} %{{x:.4g}}, {up} %{{y:.4g}}: %{{{value}:.5g}}<extra></extra>",
         } | ({"customdata": packed(part.values)} if part.log else {})  # fmt: skip
-        for k, level in enumerate(part.levels if part.log else ()):
-            at = log10(level)
-            yield grid | {
-                "type": "contour", "showscale": False, "hoverinfo": "skip", "contours": {
-                    "coloring": "lines", "start": at, "end": at, "size": 1
-                }, "line": {"dash": "dash" if k else "solid", "width": 2}, "colorscale": [[0, "#fff"], [1, "#fff"]],
-            }  # fmt: skip
+        yield from (grid | _level(log10(level), solid=not k) for k, level in enumerate(part.levels if part.log else ()))
         return
     every = max(1, round((part.values.size / _MOST_MARKS) ** (1 / part.values.ndim)))
     x, y, colour = (v[(slice(None, None, every),) * v.ndim].ravel() for v in (part.x, part.y, values))
     yield {
         "type": "scatter", "mode": "markers", "x": packed(x), "y": packed(y), "showlegend": False,
         "hovertemplate": f"{across} %{{x:.5g}}, {up} %{{y:.5g}}: %{{marker.color:.5g}}<extra></extra>",
-        "marker": {"size": 5, "color": packed(colour), "colorscale": colours, "cmin": ends["zmin"],
-                   "cmax": ends["zmax"], "colorbar": bar},
+        "marker": {"size": 5, "color": packed(colour), "colorscale": colours, "cmin": low, "cmax": high,
+                   "colorbar": bar},
+    }  # fmt: skip
+
+
+def _level(at: float, *, solid: bool) -> Data:
+    """White line along which a quantity has a value."""
+    return {
+        "type": "contour", "showscale": False, "hoverinfo": "skip",
+        "contours": {"coloring": "lines", "start": at, "end": at, "size": 1},
+        "line": {"dash": "solid" if solid else "dash", "width": 2}, "colorscale": [[0, "#fff"], [1, "#fff"]],
     }  # fmt: skip
 
 

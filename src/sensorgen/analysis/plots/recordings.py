@@ -29,10 +29,9 @@ from sensorgen.analysis.plots.figure import (
 from sensorgen.analysis.plots.pages import PageSection, page
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.recording.samples import Complex, Real
-from sensorgen.measure.signal.hysteresis import Hysteresis
-from sensorgen.measure.signal.presses import Pairs
+from sensorgen.measure.signal.presses import Pairs, Surface, normalised, surface
+from sensorgen.measure.signal.run import Hysteresis
 from sensorgen.measure.signal.schedule import Step
-from sensorgen.measure.signal.surfaces import Surface, normalised, surface
 
 PARTS = {"resistance": ("R", "real"), "reactance": ("X", "imag")}
 _TIME, _FORCE, _POSITION = Axis("time [s]"), Axis("force [N]"), Axis("position [mm]")
@@ -104,7 +103,7 @@ def differences(run: DrawnRecording, part: str, key: str = "") -> Figure:
     Raises
     ------
     BadInput
-        As :func:`sensorgen.measure.signal.surfaces.surface`; no loads.
+        As :func:`sensorgen.measure.signal.presses.surface`; no loads.
     """
     if run.pairs is None:
         raise BadInput(f"{run.name}: no loads of known force")
@@ -133,7 +132,7 @@ def compared(
     tones_hz : (m,) array
         Frequencies [Hz].
     together : bool
-        As :func:`sensorgen.measure.signal.surfaces.normalised`.
+        As :func:`sensorgen.measure.signal.presses.normalised`.
     key : str
         Name of the figure.
     left_out : str

@@ -81,9 +81,7 @@ def drawn(figure: Figure, panels: Sequence[Panel], title: str = "") -> "Drawn":
     columns = min(figure.columns, len(panels))
     wide, tall = _PANEL_IN[min(columns, len(_PANEL_IN)) - 1]
     rows = [panels[k : k + columns] for k in range(0, len(panels), columns)]
-    heights = [
-        max(0.6 + _ROW_IN * len(p.y.names) if p.y.names else 4.0 if p.solid else tall for p in row) for row in rows
-    ]
+    heights = [max(_height_in(panel, tall) for panel in row) for row in rows]
     width = max(_MARGIN_IN + columns * wide + 1.6 * figure.beside, 6.5)
     canvas = Drawn(figsize=(width, _FRAME_IN + sum(heights)), dpi=100, layout="constrained")
     canvas.suptitle(title, fontsize="large", x=0.01, ha="left", wrap=True)
@@ -100,6 +98,10 @@ def drawn(figure: Figure, panels: Sequence[Panel], title: str = "") -> "Drawn":
         ncols = min(len(named), 6 if canvas.get_figwidth() > 9 else 4)
         canvas.legend(named.values(), named.keys(), loc="outside lower left", ncols=ncols, frameon=False)
     return canvas
+
+
+def _height_in(panel: Panel, tall: float) -> float:
+    return 0.6 + _ROW_IN * len(panel.y.names) if panel.y.names else 4.0 if panel.solid else tall
 
 
 def _titled(axes: "Axes", panel: Panel, below: Sequence[Panel], before: Sequence[Panel]) -> None:
@@ -198,11 +200,12 @@ def _map(axes: "Axes", part: Map, label: str) -> None:
     extend = _EXTEND[smallest < low - least, largest > high + least]
     shown = "{x:g}" if part.log else ScalarFormatter(useOffset=False)
     bar = axes.figure.colorbar(mesh, ax=axes, extend=extend, format=shown, label=label)
+    colour, width, alpha, others = ("white", 1.4, 1.0, "dashed") if part.log else ("black", 0.4, 0.6, "solid")
     for k, level in enumerate(part.levels):
         if smallest < level < largest:
-            style, colour = ("dashed" if k and part.log else "solid"), "white" if part.log else "black"
-            axes.contour(part.x, part.y, part.values, levels=[level], colors=colour, linestyles=style,
-                         linewidths=1.4 if part.log else 0.4, alpha=1.0 if part.log else 0.6)  # fmt: skip
+            style = others if k else "solid"
+            axes.contour(part.x, part.y, part.values, levels=[level], colors=colour, linestyles=style, linewidths=width,
+                         alpha=alpha)  # fmt: skip
             if part.log:
                 bar.ax.axhline(level, color=colour, linestyle=style)
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from markupsafe import Markup
 
 from sensorgen.analysis.plots import layers, pages
-from sensorgen.analysis.preview import error_maps, geometry
+from sensorgen.analysis.preview import geometry
 from sensorgen.asprinted.printed import Printed
 from sensorgen.checks.review import Review, draw
 from sensorgen.core.document import Part
 from sensorgen.core.findings import headline
-from sensorgen.prediction.identifiability.results import metres, newtons
+from sensorgen.prediction.identifiability.results import GUESS, Identifiability, Rows, metres, newtons
 from sensorgen.prediction.results import Changes, Prediction, Term
 
 _SEEN = 1.0  # per cent: shorter bars are left out
@@ -50,7 +50,7 @@ def page(
         sheet=Markup(sheet),  # noqa: S704 - our own drawing, which escapes its text
         data=pages.packed(data),
         numbers=[*numbers], advice=[*advice], listed=listed,
-        known=predicted.identifiability, maps=error_maps.maps(predicted.identifiability),
+        known=predicted.identifiability, maps=maps(predicted.identifiability),
         reason=predicted.reason, assumptions=predicted.assumptions, tornado=tuple(_tornado(predicted)),
     )  # fmt: skip
 
@@ -74,3 +74,55 @@ def _tornado(predicted: Prediction) -> Iterator[Bar]:
         if max(force, place) >= _SEEN or term.turns:
             words = newtons(c.force_n) if force else "–", metres(c.position_m) if place else "–"
             yield Bar(term, words, (force, place))
+
+
+@dataclass(frozen=True)
+class MapSquare:
+    """Column and row in the picture, grade from 0, and the value in words."""
+
+    column: int
+    row: int
+    grade: int
+    words: str
+
+
+@dataclass(frozen=True)
+class ErrorMapShown:
+    """A map: what it shows, what counts as resolved, numbers of columns and rows, and its cells."""
+
+    title: str
+    required: str
+    columns: int
+    rows: int
+    cells: tuple[MapSquare, ...]
+    ends: tuple[str, str, str, str]  # of the position and of the force axis
+
+
+def maps(known: Identifiability | None) -> tuple[ErrorMapShown, ...]:
+    """Both maps; none where nothing is known."""
+    if known is None or not known.map.force_n:
+        return ()
+    of, need = known.map, known.required
+    force, length = max(abs(f) for f in of.force_n), max(of.position_m)
+    return (
+        _map(known, "force", of.sigma_force_n, need.sigma_force_n or 0.0, GUESS * force),
+        _map(known, "position", of.sigma_position_m, need.sigma_position_m or 0.0, GUESS * length),
+    )
+
+
+def _map(known: Identifiability, quantity: str, sigma: Rows, need: float, useless: float) -> ErrorMapShown:
+    of, words = known.map, newtons if quantity == "force" else metres
+    cells = []
+    for r, (force, row) in enumerate(zip(of.force_n, sigma, strict=True)):
+        for c, (place, value) in enumerate(zip(of.position_m, row, strict=True)):
+            if not force:
+                continue
+            grade = 3 if value is None else 0 if value <= need else 1 if value < useless else 2
+            shown = "undefined" if value is None else words(value) if grade < 2 else "no information"
+            cells.append(MapSquare(c, len(of.force_n) - 1 - r, grade, f"{force:g} N at {place * 1e3:.3g} mm: {shown}"))
+    ends = (f"{min(of.position_m) * 1e3:g}", f"{max(of.position_m) * 1e3:g} mm", f"{min(of.force_n):g}",
+            f"{max(of.force_n):g} N")  # fmt: skip
+    rows = len(of.force_n) - (0.0 in of.force_n)
+    return ErrorMapShown(
+        f"error of {quantity}", f"{words(need)} or better", len(of.position_m), rows, tuple(cells), ends
+    )

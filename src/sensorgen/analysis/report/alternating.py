@@ -1,5 +1,7 @@
 """AC readings of specimens, frequency by frequency, beside the prediction of the print."""
 
+from cmath import phase
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import degrees, inf, isfinite, nan, pi
@@ -8,13 +10,14 @@ from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison, Predicted
 from sensorgen.analysis.plots.figure import BLUE, GREY, Axis, Curve, Figure, Panel
-from sensorgen.core.document import Cell, Column, Table
+from sensorgen.core.document import Cell, Column, Table, some
 from sensorgen.core.units import frequency_text
 from sensorgen.measure import accuracy
 from sensorgen.measure.log import Reading
 from sensorgen.prediction.query import TONES_HZ
 
-_F_PER_PF = 1e-12
+F_PER_PF = 1e-12
+BAKED = {True: "baked", False: "not baked", None: "unknown"}
 NOTE = (
     "The uncertainty is the standard one: scatter of the repeats (type A) and the instrument's limit of error over the "
     "root of 3, or what was stated (type B), added in squares. A specimen is a capacitor at a frequency where its "
@@ -72,31 +75,27 @@ def rows(comparison: Comparison) -> list[AcRow]:
 
 def _row(reading: Reading, frequency_hz: float, of: Predicted | None) -> AcRow:
     at = accuracy.at_frequency(reading, frequency_hz)
-    meter, about = at.meter, at.z_ohm
-    z = about if at.impedances else None
+    z = at.z_ohm if at.impedances else None
     c, size = at.value("Cp"), at.value("Z")
     c_range, z_range = _predicted(of, frequency_hz)
-    in_pf = [None if each is None else each / _F_PER_PF for each in c_range]
-    outside = meter is not None and about is not None and meter.ac("Z", abs(about), frequency_hz, about) is None
-    flags = (
-        "negative resistance" if (z.real if z is not None else at.value("R").value) < 0 else "",
-        f"outside the range of {meter.name}" if meter and outside else "",
-        "no positive capacitance" if isfinite(c.value) and c.value <= 0 else "",
-    )
+    in_pf = [None if each is None else each / F_PER_PF for each in c_range]
     return AcRow(
-        reading.number, reading.specimen, of.design if of else "",
-        {True: "baked", False: "not baked", None: "unknown"}[reading.baked], frequency_hz,
-        c.value / _F_PER_PF, c.error / _F_PER_PF, in_pf[0], in_pf[1], in_pf[2],
-        c.value / c_range[0] if c_range[0] else nan, size.value, size.error, z_range[0], z_range[1], z_range[2],
-        size.value / z_range[0] if z_range[0] else nan, degrees(_phase(z)) if z else nan,
-        verdict(z) if z is not None else "", "; ".join(filter(None, flags)),
+        reading.number, reading.specimen, of.design if of else "", BAKED[reading.baked], frequency_hz,
+        c.value / F_PER_PF, c.error / F_PER_PF, in_pf[0], in_pf[1], in_pf[2],
+        c.value / c_range[0] if c_range[0] else nan, size.value, size.error, *z_range,
+        size.value / z_range[0] if z_range[0] else nan, degrees(phase(z)) if z else nan,
+        verdict(z) if z is not None else "", "; ".join(_flags(at, frequency_hz)),
     )  # fmt: skip
 
 
-def _phase(z: complex) -> float:
-    from cmath import phase
-
-    return phase(z)
+def _flags(at: accuracy.At, frequency_hz: float) -> Iterator[str]:
+    meter, z, c = at.meter, at.z_ohm, at.value("Cp")
+    if (z.real if z is not None and at.impedances else at.value("R").value) < 0:
+        yield "negative resistance"
+    if meter and z is not None and meter.ac("Z", abs(z), frequency_hz, z) is None:
+        yield f"outside the range of {meter.name}"
+    if isfinite(c.value) and c.value <= 0:
+        yield "no positive capacitance"
 
 
 _Range = tuple[float | None, float | None, float | None]
@@ -120,12 +119,18 @@ def table(rows: Sequence[AcRow]) -> Table:
     return Table.of("ac", "AC readings and their prediction as printed, by frequency", tuple(rows))
 
 
+def _compared(rows: Sequence[AcRow]) -> list[AcRow]:
+    """Rows whose capacitance can be compared with a prediction."""
+    return [row for row in rows if isfinite(row.c_ratio) and row.c_ratio > 0]
+
+
 def headline(rows: Sequence[AcRow]) -> Iterator[str]:
     """Capacitance against the prediction, in one sentence."""
-    known = [row for row in rows if isfinite(row.c_ratio) and row.c_ratio > 0]
+    known = _compared(rows)
     if not known:
         return
-    lowest = min({row.frequency_hz for row in known}, key=lambda f: (-sum(r.frequency_hz == f for r in known), f))
+    counts = Counter(row.frequency_hz for row in known)
+    lowest = min(counts, key=lambda f: (-counts[f], f))
     here = [row for row in known if row.frequency_hz == lowest]
     inside = sum(row.c_from_pf <= row.c_pf <= row.c_to_pf for row in here)  # type: ignore[operator]
     at = at_text(lowest)
@@ -156,17 +161,17 @@ def at_text(frequency_hz: float) -> str:
 
 def findings(rows: Sequence[AcRow]) -> Iterator[str]:
     """From which frequency on each specimen is a capacitor, and how many values are flagged."""
+    verdicts: dict[str, dict[float, str]] = {}
+    for row in rows:
+        if row.verdict:
+            verdicts.setdefault(row.specimen, {})[row.frequency_hz] = row.verdict
     sentences: dict[str, list[str]] = {}
-    for specimen in dict.fromkeys(row.specimen for row in rows if row.verdict):
-        last = {row.frequency_hz: row.verdict for row in rows if row.specimen == specimen and row.verdict}
-        sentences.setdefault(capacitor_from(last), []).append(specimen)
-    for words, specimens in sentences.items():
-        names = ", ".join(specimens[:8]) + (f" and {len(specimens) - 8} more" if len(specimens) > 8 else "")
-        yield f"By frequency: {names}: {words}."
-    flagged = [row for row in rows if row.flag]
-    if flagged:
-        kinds = dict.fromkeys(kind for row in flagged for kind in row.flag.split("; "))
-        counted = ", ".join(f"{sum(kind in row.flag for row in flagged)} {kind}" for kind in kinds)
+    for specimen, of in verdicts.items():
+        sentences.setdefault(capacitor_from(of), []).append(specimen)
+    yield from (f"By frequency: {some(names, 8)}: {words}." for words, names in sentences.items())
+    if flagged := [row.flag for row in rows if row.flag]:
+        kinds = Counter(kind for flag in flagged for kind in flag.split("; "))
+        counted = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
         yield f"Flagged: {len(flagged)} of {len(rows)} AC values ({counted}): check contacts, compensation and range."
 
 
@@ -205,7 +210,7 @@ def behind_leak(comparison: Comparison) -> Iterator[str]:
 
 def figures(rows: Sequence[AcRow]) -> Iterator[Figure]:
     """Measured over predicted capacitance, by frequency."""
-    known = [row for row in rows if isfinite(row.c_ratio) and row.c_ratio > 0]
+    known = _compared(rows)
     if len(known) < 2:
         return
     ends = [min(row.frequency_hz for row in known), max(row.frequency_hz for row in known)]

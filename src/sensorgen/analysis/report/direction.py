@@ -9,6 +9,7 @@ from typing import Annotated
 
 from sensorgen.analysis.comparison import Compared, Comparison
 from sensorgen.analysis.report.electrodes import usable
+from sensorgen.analysis.report.yields import film_text
 from sensorgen.core.document import Column, Table
 
 _ORDERS = 20_000  # that are enumerated
@@ -35,23 +36,19 @@ class DirectionRow:
 def rows(comparison: Comparison) -> list[DirectionRow]:
     """A row for each shape and film with both directions, two specimens of each at least."""
     last = {row.reading.specimen: row for row in usable(comparison)}
-    groups: dict[tuple[str, float | None], dict[str, list[str]]] = {}
-    for name, row in last.items():
-        of = row.evidence
-        if of.axes:
-            groups.setdefault((of.shape, of.film_mm), {}).setdefault(of.axes, []).append(name)
+    groups: dict[tuple[str, float | None], dict[str, list[Compared]]] = {}
+    for row in last.values():
+        if axes := row.evidence.axes:
+            groups.setdefault((row.evidence.shape, row.evidence.film_mm), {}).setdefault(axes, []).append(row)
     tests = []
     for (shape, film_mm), by in sorted(groups.items(), key=lambda item: (item[0][0], item[0][1] is None, item[0][1])):
-        if len(by) != 2 or min(map(len, by.values())) < 2:
-            continue
-        (first, ones), (second, others) = sorted(by.items())
-        one, other = (_by_plate([last[name] for name in names]) for names in (ones, others))
-        expected = [_predicted([last[name] for name in names]) for names in (ones, others)]
-        tests.append(DirectionRow(
-            shape, "unknown" if film_mm is None else f"{film_mm:g} mm", first, len(ones), median(one), second,
-            len(others), median(other), median(other) / median(one), expected[1] / expected[0],
-            rank_p(one, other),
-        ))  # fmt: skip
+        if len(by) == 2 and min(map(len, by.values())) > 1:
+            (first, ones), (second, others) = sorted(by.items())
+            one, other, p = median(_by_plate(ones)), median(_by_plate(others)), rank_p(*map(_by_plate, (ones, others)))
+            tests.append(DirectionRow(
+                shape, film_text(film_mm), first, len(ones), one, second, len(others), other, other / one,
+                _predicted(others) / _predicted(ones), p,
+            ))  # fmt: skip
     return tests
 
 

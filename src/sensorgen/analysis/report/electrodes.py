@@ -28,6 +28,10 @@ NOTES = (
 )
 
 
+_LEAST, _HIGHEST = "the least reading along an electrode", "the highest of several readings along an electrode"
+_UNCERTAINTY = "standard uncertainty: scatter, and the meter's limit of error"
+
+
 @dataclass(frozen=True)
 class ReadingRow:
     """A reading beside its prediction."""
@@ -35,15 +39,9 @@ class ReadingRow:
     number: Annotated[int, Column("reading", "", "number in the log")]
     specimen: Annotated[str, Column("specimen")]
     design: Annotated[str, Column("design")]
-    measured_ohm: Annotated[
-        float, Column("electrode resistance measured", "ohm", "the least reading along an electrode")
-    ]
-    highest_ohm: Annotated[
-        float, Column("highest reading", "ohm", "the highest of several readings along an electrode")
-    ]
-    error_ohm: Annotated[
-        float, Column("± electrode resistance", "ohm", "standard uncertainty: scatter, and the meter's limit of error")
-    ]
+    measured_ohm: Annotated[float, Column("electrode resistance measured", "ohm", _LEAST)]
+    highest_ohm: Annotated[float, Column("highest reading", "ohm", _HIGHEST)]
+    error_ohm: Annotated[float, Column("± electrode resistance", "ohm", _UNCERTAINTY)]
     lower_ohm: Annotated[float, Column("predicted from", "ohm", "lower bound")]
     predicted_ohm: Annotated[float, Column("predicted", "ohm", "most likely value")]
     upper_ohm: Annotated[float, Column("predicted to", "ohm", "upper bound")]
@@ -151,12 +149,12 @@ def headline(comparison: Comparison) -> Iterator[str]:
 
 def findings(comparison: Comparison) -> Iterator[str]:
     """When predictions were made, and which electrodes touch as drawn."""
-    every = list(comparison.predictions.values())
-    before = sum(bool(p.stored_at) and p.before is True for p in every)
+    every = [(bool(p.stored_at), p.before) for p in comparison.predictions.values()]
+    before = every.count((True, True))
     late = {
-        "by the clocks of the log alone": sum(bool(p.stored_at) and p.before is None for p in every),
-        "stored after a measurement": sum(bool(p.stored_at) and p.before is False for p in every),
-        "made after the measurement": sum(not p.stored_at for p in every),
+        "by the clocks of the log alone": every.count((True, None)),
+        "stored after a measurement": every.count((True, False)),
+        "made after the measurement": sum(not stored for stored, _ in every),
     }
     if every:
         rest = "".join(f"; {count} {how}" for how, count in late.items() if count)
@@ -187,23 +185,20 @@ def figures(comparison: Comparison) -> tuple[Figure, ...]:
 def _names(rows: Sequence[Compared]) -> tuple[str, ...]:
     """Names of the rows, with the reading's number where a specimen was measured twice."""
     count = Counter(row.reading.specimen for row in rows)
-    return tuple(
-        row.reading.specimen + (f" (no. {row.reading.number})" if count[row.reading.specimen] > 1 else "")
-        for row in rows
-    )
+    named = ((row.reading.specimen, row.reading.number) for row in rows)
+    return tuple(f"{name} (no. {number})" if count[name] > 1 else name for name, number in named)
 
 
 def _ratios(rows: Sequence[Compared], left_out: str) -> Figure:
-    names, values = _names(rows), [exp(row.residual) for row in rows]
+    names = _names(rows)
     bounds = [row.expected_ohm for row in rows]
     low, high = ([getattr(b, end) / b.value if b else 1.0 for b in bounds] for end in ("lower", "upper"))
     curves = [Curve("ranges", "predicted interval", [1.0] * len(rows), names, low, high, colour=GREY)]
     for word in dict.fromkeys(row.verdict.word for row in rows):
-        here = [k for k, row in enumerate(rows) if row.verdict.word == word]
-        curves.append(
-            Curve("points", word, [values[k] for k in here], [names[k] for k in here],
-                  text=["; ".join(rows[k].verdict.reasons) for k in here], colour=VERDICT_COLOURS[word])
-        )  # fmt: skip
+        here = [(name, row) for name, row in zip(names, rows, strict=True) if row.verdict.word == word]
+        points = [exp(row.residual) for _, row in here], [name for name, _ in here]
+        text = ["; ".join(row.verdict.reasons) for _, row in here]
+        curves.append(Curve("points", word, *points, text=text, colour=VERDICT_COLOURS[word]))
     panel = Panel(tuple(curves), Axis("measured / predicted", log=True), Axis(names=names))
     inside = sum(bool(row.inside) for row in rows)
     alt = (

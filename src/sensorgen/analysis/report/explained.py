@@ -6,6 +6,7 @@ the part of that sum that it takes away.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from math import exp, inf, log, nan, sqrt
@@ -145,17 +146,12 @@ def _impedances(comparison: Comparison, recorded: Sequence[RecordedRun]) -> Iter
     """Z at rest, and its change under load, where a line can be made of the design."""
     known: list[tuple[RecordedRun, Movable]] = []
     for run in recorded:
-        of = (
-            Movable(comparison.bodies[comparison.names[run.entry.specimen]])
-            if run.entry.specimen in comparison.names
-            else None
-        )
-        try:
-            if of is not None and np.isfinite(run.rest_ohm).all():
+        name = comparison.names.get(run.entry.specimen)
+        if name is not None and np.isfinite(run.rest_ohm).all():
+            of = Movable(comparison.bodies[name])
+            with suppress(SensorgenError):
                 _ = of.model.sensor
                 known.append((run, of))
-        except SensorgenError:
-            continue
     if known:
         rest = np.concatenate([np.log(run.rest_ohm) for run, _ in known])
         yield MeasurementKind("impedance at rest", rest, partial(_modelled, known, loaded=False))

@@ -6,7 +6,7 @@ from math import isfinite, nan
 from typing import Annotated, NamedTuple
 
 from sensorgen.analysis.comparison import Compared, Comparison
-from sensorgen.analysis.report.alternating import AcRow, at_text
+from sensorgen.analysis.report.alternating import BAKED, AcRow, at_text
 from sensorgen.core.document import Cell, Column, Table
 
 NOTE = (
@@ -16,7 +16,6 @@ NOTE = (
 )
 _Before = tuple[Compared, dict[float, float]]  # the reading before, and C by frequency in its state [pF]
 _UNTOLD = None, "", ""  # bake, defects and remark of a reading of which none is known
-_BAKE = {True: "baked", False: "not baked", None: ""}
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,8 @@ def rows(comparison: Comparison, ac: Sequence[AcRow]) -> list[HistoryRow]:
     listed, before = [], dict[str, _Before]()
     for row in comparison.rows:
         name = row.reading.specimen
-        shrinkage = _shrinkage(comparison, name)
+        body = comparison.bodies.get(comparison.names.get(name, ""))
+        shrinkage = body.design.shrinkage if body else 0.0
         earlier, c = before.get(name), measured.get(row.reading.number, {})
         state = _state(row)
         known = (state != _UNTOLD or shrinkage) and not (earlier and state == _state(earlier[0]))
@@ -55,12 +55,6 @@ def rows(comparison: Comparison, ac: Sequence[AcRow]) -> list[HistoryRow]:
         c_before = earlier[1] if earlier and not known else {}
         before[name] = row, {**c_before, **{f: pf for f, (pf, _) in c.items()}}
     return listed
-
-
-def _shrinkage(comparison: Comparison, specimen: str) -> float:
-    """By which the bake shrinks a specimen, as its design has it [-]; 0 without a design."""
-    body = comparison.bodies.get(comparison.names.get(specimen, ""))
-    return body.design.shrinkage if body else 0.0
 
 
 def _state(row: Compared) -> tuple[bool | None, str, str]:
@@ -72,9 +66,9 @@ def _row(
     row: Compared, earlier: _Before | None, c: dict[float, tuple[float, float]], shrinkage: float
 ) -> HistoryRow:  # fmt: skip
     words, change = row.reading.words, _since(row, *earlier, c) if earlier else _by_prediction(row, c)
-    lowest = min(change.c, default=None)
+    lowest, bake = min(change.c, default=None), "" if words.baked is None else BAKED[words.baked]
     return HistoryRow(
-        row.reading.number, row.reading.specimen, _BAKE[words.baked], 100 * shrinkage or None, words.defects,
+        row.reading.number, row.reading.specimen, bake, 100 * shrinkage or None, words.defects,
         words.remark, change.against, change.electrode, change.film, change.c.get(lowest or nan, nan),
         at_text(lowest) if lowest else "", (1 - shrinkage) ** 2 if change.baked and shrinkage else None,
         row.verdict.word,

@@ -11,14 +11,13 @@ from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.comparison.runs import RecordedRun
 from sensorgen.analysis.plots import recordings as plots
 from sensorgen.analysis.plots.figure import BLUE, ORANGE, Axis, Curve, Figure, Panel
-from sensorgen.analysis.report.alternating import at_text, capacitor_from, verdict
+from sensorgen.analysis.report.alternating import F_PER_PF, at_text, capacitor_from, verdict
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.document import Cell, Column, Table
 from sensorgen.core.errors import SensorgenError
 from sensorgen.core.units import si
 
 _SAME = 1e-6  # relative: frequencies nearer than this are the same
-_F_PER_PF = 1e-12
 _SURE = 3.0  # standard errors by which a reading is beyond a range
 
 
@@ -70,22 +69,20 @@ def impedances(recorded: Sequence[RecordedRun], comparison: Comparison) -> Table
     rows: list[ImpedanceRow] = []
     for run in recorded:
         of = comparison.predictions.get(comparison.names.get(run.entry.specimen, ""))
-        capacitance = [
-            None if c is None else c / _F_PER_PF for c in _predicted(of.prediction.capacitance if of else None)
-        ]
+        known = of.prediction.impedance if of else ()
+        c = [None if c is None else c / F_PER_PF for c in _predicted(of.prediction.capacitance if of else None)]
         noise = np.hypot(run.noise_ohm.real, run.noise_ohm.imag) / np.abs(run.rest_ohm) / 2**0.5
         measured = zip(run.tones_hz.tolist(), run.rest_ohm, run.rest_error_ohm, noise.tolist(), strict=True)
         for f, z, error, share in measured:
-            known = of.prediction.impedance if of else ()
-            expected = next((e for e in known if abs(e.frequency_hz / f - 1) < _SAME), None)
-            middle = complex(expected.re.value, expected.im.value) if expected else complex("nan")
+            e = next((e for e in known if abs(e.frequency_hz / f - 1) < _SAME), None)
+            middle = complex(e.re.value, e.im.value) if e else complex("nan")
             off = (complex(z) - middle) / abs(middle)
             rows.append(ImpedanceRow(
                 run.name, of.design if of else "", f,
-                float(z.real), float(error.real), *_predicted(expected.re if expected else None),
-                float(z.imag), float(error.imag), *_predicted(expected.im if expected else None),
-                off.real if expected else None, off.imag if expected else None, 100 * share, verdict(complex(z)),
-                float(-1 / (2 * pi * f * z.imag)) / _F_PER_PF, *capacitance,
+                float(z.real), float(error.real), *_predicted(e.re if e else None),
+                float(z.imag), float(error.imag), *_predicted(e.im if e else None), off.real if e else None,
+                off.imag if e else None, 100 * share, verdict(complex(z)),
+                float(-1 / (2 * pi * f * z.imag)) / F_PER_PF, c[0], c[1], c[2],
             ))  # fmt: skip
     return Table.of("impedance", "Impedance at rest and its prediction, by frequency", rows)
 
@@ -127,22 +124,21 @@ def findings(recorded: Sequence[RecordedRun], table: Table | None) -> Iterator[s
     for run in recorded:
         mine = [row for row in rows if row.recording == run.name]
         verdicts = {row.frequency_hz: row.verdict for row in mine}
-        negative = [at_text(f) for f, word in verdicts.items() if word == "negative resistance"]
-        if negative:
+        if negative := [at_text(f) for f, word in verdicts.items() if word == "negative resistance"]:
             at = ", ".join(negative)
             yield f"Flagged: {run.name} has a negative resistance at {at}: check the bridge's calibration."
-        off = {part: ", ".join(_outside(mine, part)) for part in "RX"}
-        if where_off := " and ".join(f"{part} at {where}" for part, where in off.items() if where):
-            yield f"Flagged: {run.name} is outside the predicted range by its {where_off}."
-        if run.pairs is not None or not mine:
-            continue
-        low = min(mine, key=lambda row: row.frequency_hz)
-        c = f", C {low.c_pf:.4g} pF" if low.c_pf > 0 else ""
-        yield (
-            f"{run.name}, nothing pressed: |Z| {si(hypot(low.r_ohm, low.x_ohm), 'ohm')} at "
-            f"{at_text(low.frequency_hz)}{c}; noise of a sample {low.noise_percent:.2g} % of |Z|; "
-            f"{capacitor_from(verdicts)}."
-        )
+        if off := [f"{part} at {where}" for part in "RX" if (where := ", ".join(_outside(mine, part)))]:
+            yield f"Flagged: {run.name} is outside the predicted range by its {' and '.join(off)}."
+        if run.pairs is None and mine:
+            yield _at_rest(run.name, min(mine, key=lambda row: row.frequency_hz), verdicts)
+
+
+def _at_rest(name: str, low: ImpedanceRow, verdicts: dict[float, str]) -> str:
+    c = f", C {low.c_pf:.4g} pF" if low.c_pf > 0 else ""
+    return (
+        f"{name}, nothing pressed: |Z| {si(hypot(low.r_ohm, low.x_ohm), 'ohm')} at {at_text(low.frequency_hz)}{c}; "
+        f"noise of a sample {low.noise_percent:.2g} % of |Z|; {capacitor_from(verdicts)}."
+    )
 
 
 def _outside(rows: Sequence[ImpedanceRow], part: str) -> Iterator[str]:

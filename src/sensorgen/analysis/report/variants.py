@@ -113,9 +113,5 @@ def _bodies(design: Design) -> Iterator[BodyTriangles]:
     """The bodies of the sensor in use, as triangles."""
     for body in design.in_use.bodies:
         body_mesh = mesh(body)
-        yield BodyTriangles(
-            body.name.replace("_", " "),
-            body_mesh.vertices_mm,
-            body_mesh.triangles,
-            design.material(body.material).colour,
-        )
+        name, colour = body.name.replace("_", " "), design.material(body.material).colour
+        yield BodyTriangles(name, body_mesh.vertices_mm, body_mesh.triangles, colour)

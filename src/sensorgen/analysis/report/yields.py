@@ -7,6 +7,7 @@ from typing import Annotated
 
 from sensorgen.analysis.comparison import Comparison
 from sensorgen.analysis.plots.figure import BLUE, BROWN, GREY, MOST_POINTS, PURPLE, Axis, Curve, Figure, Panel
+from sensorgen.analysis.report.alternating import BAKED
 from sensorgen.analysis.report.electrodes import VERDICT_COLOURS
 from sensorgen.core.document import Cell, Column, Table
 from sensorgen.measure.signal.verdicts import ORDER, REACTANCES, WORDS, Evidence
@@ -17,25 +18,26 @@ _LOOKS = {  # none with the colour of a verdict
     "tri": {"colour": BLUE, "symbol": "circle"}, "rect": {"colour": PURPLE, "symbol": "square"},
     "reference": {"colour": BROWN, "symbol": "diamond"},
 }  # fmt: skip
-
 _OTHER = {"colour": BROWN, "symbol": "x"}
 
 
-def _film(of: Evidence) -> str:
-    return f"{of.film_mm:g} mm" if of.film_mm is not None else "unknown"
+def film_text(film_mm: float | None) -> str:
+    """Thickness of a film, as tables have it."""
+    return "unknown" if film_mm is None else f"{film_mm:g} mm"
 
 
 BY: dict[str, Callable[[Evidence], tuple[Hashable, ...]]] = {
     "shape": lambda of: (of.shape or "unknown",),
-    "film": lambda of: (_film(of),),
-    "shape and film": lambda of: (of.shape or "unknown", _film(of)),
+    "film": lambda of: (film_text(of.film_mm),),
+    "shape and film": lambda of: (of.shape or "unknown", film_text(of.film_mm)),
     "direction": lambda of: (of.shape or "unknown", of.axes or "unknown"),
-    "bake": lambda of: ({True: "baked", False: "not baked", None: "unknown"}[of.baked],),
+    "bake": lambda of: (BAKED[of.baked],),
     "plate": lambda of: (of.plate or "unknown",),
     "defect": lambda of: (of.defects or "none",),
     "remark": lambda of: (of.remark or "none",),
 }
 TESTED = ("film", "shape")  # groups that are tested for a difference
+_OVERLOAD = "The median R_Z is an overload."
 DIFFER = 0.05 / len(TESTED)  # p value below which one is affirmed: together wrong in 1 of 20 logs
 
 
@@ -108,14 +110,11 @@ def findings(comparison: Comparison) -> Iterator[str]:
     such, whole = both.where(lambda row: bool(row.verdict.same_order)), everything(comparison)
     design = sum(row.evidence.touching for row in such)
     implausible = sum(row.verdict.electrode != "sound" for row in such)
-    of = ", ".join(
-        f"{n} {words}" for n, words in ((design, "by design"), (implausible, "with an implausible electrode")) if n
-    )
-    ratio = (
-        f"Median ratio {whole.median_ratio:.3g}." if isfinite(whole.median_ratio) else "The median R_Z is an overload."
-    )
+    kinds = ((design, "by design"), (implausible, "with an implausible electrode"))
+    of = ", ".join(f"{count} {words}" for count, words in kinds if count)
+    ratio = f"Median ratio {whole.median_ratio:.3g}." if isfinite(whole.median_ratio) else _OVERLOAD
     yield (
-        f"{len(such)} of {len(both)} sensors are shorted or leaking{f' ({of})' if of else ''}: film "
+        f"{len(such)} of {len(both)} sensors are shorted or leaking{of and f' ({of})'}: film "
         f"resistance at most {ORDER:g} times the electrode's. {ratio}"
     )
     yield from _parted(comparison)
@@ -125,26 +124,30 @@ def findings(comparison: Comparison) -> Iterator[str]:
             f"{_range(whole.shorted)} of such prints, 95 % confidence."
         )
     for by in TESTED:
-        known = [g for g in judged(comparison, by) if g.shorted.total]
-        if len(known) > 1:
-            chance = dependence(known)
-            parts = ", ".join(f"{_name(g)}: {g.shorted.count} of {g.shorted.total}" for g in known)
-            differ = "a significant difference" if chance < DIFFER else "no significant difference"
-            yield f"Shorted or leaking by {by}: {parts}; {differ} (p = {chance:.2g})."
+        yield from _difference(comparison, by)
+
+
+def _difference(comparison: Comparison, by: str) -> Iterator[str]:
+    """Shares of the groups of one kind, and whether they differ; nothing of a single group."""
+    known = [g for g in judged(comparison, by) if g.shorted.total]
+    if len(known) > 1:
+        chance = dependence(known)
+        parts = ", ".join(f"{_name(g)}: {g.shorted.count} of {g.shorted.total}" for g in known)
+        differ = "a significant difference" if chance < DIFFER else "no significant difference"
+        yield f"Shorted or leaking by {by}: {parts}; {differ} (p = {chance:.2g})."
 
 
 def _parted(comparison: Comparison) -> Iterator[str]:
     """Specimens whose electrodes touch as drawn, judged by their gap as printed."""
-    rows = [
-        row for row in comparison.last if row.predicted and row.predicted.parted and row.verdict.same_order is not None
-    ]
-    if rows:
-        gaps = {row.predicted.design: row.predicted.prediction.gap for row in rows if row.predicted}
+    parted = comparison.last.where(lambda row: bool(row.predicted and row.predicted.parted))
+    orders = [row.verdict.same_order for row in parted if row.verdict.same_order is not None]
+    if orders:
+        of = (row.predicted for row in parted if row.predicted and row.verdict.same_order is not None)
+        gaps = {one.design: one.prediction.gap for one in of}
         gap = "; ".join(f"{name} {bounds.words()}" for name, bounds in sorted(gaps.items()) if bounds)
-        count = sum(bool(row.verdict.same_order) for row in rows)
         yield (
-            f"Electrodes that touch as drawn, but have a gap as printed ({gap}): {count} of {len(rows)} such sensors "
-            "are shorted or leaking."
+            f"Electrodes that touch as drawn, but have a gap as printed ({gap}): {sum(orders)} of {len(orders)} such "
+            "sensors are shorted or leaking."
         )
 
 

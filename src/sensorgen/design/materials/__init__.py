@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 
 from sensorgen.core import yamlfile
 from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, SensorgenError, UnknownName
-from sensorgen.core.records import Line, Strict, checked
+from sensorgen.core.records import Line, Strict, checked, stated
 from sensorgen.design import packs
 from sensorgen.design.packs import Kind
 
@@ -106,7 +106,7 @@ class Material(Strict):
     properties: dict[str, list[Value]]
     print: dict[str, list[Value]] = Field(default={})
     drying: str = ""
-    citations: dict[str, str] = Field(default={}, description="What the names of its sources mean.")
+    citations: dict[str, str] = stated({}, "What the names of its sources mean.")
 
     def sources(self) -> set[str]:
         """Names of all sources that this material quotes."""
@@ -265,18 +265,18 @@ def own_source(source: str, text: str | None = None, texts: Texts = NO_TEXTS) ->
     BadInput
         Its file is damaged, or has the name of a source that ships.
     """
-    made = _own(source, text)
+    content = _own(source, text)
     try:
         if source in shipped_citations():
             raise BadInput(f"{source} is the name of a source that ships with sensorgen; expected another name")
-        for name, values in made.materials.items():
+        for name, values in content.materials.items():
             _check_values(name, {key: value.value for key, value in values.items()}, texts)
             for quantity, value in values.items():
                 if wrong := disorder(value, advised=quantity in print_quantities()):
                     raise OutOfRange(f"{quantity} of {name} {wrong}")
     except (BadInput, UnknownName, OutOfRange) as error:
         raise error.within(f"{source}.yaml") from None
-    return made
+    return content
 
 
 def _own(source: str, text: str | None) -> Own:
@@ -325,10 +325,10 @@ def parse(name: str, text: str) -> Material:
     """
     file = f"{name}.yaml"
     try:
-        made = checked(Material, {**yamlfile.parse(text, file), "name": name})
+        material = checked(Material, {**yamlfile.parse(text, file), "name": name})
     except BadInput as error:
         raise error.within(file) from None
-    for group, values in (("properties", made.properties), ("print", made.print)):
+    for group, values in (("properties", material.properties), ("print", material.print)):
         for quantity, several in values.items():
             for k, each in enumerate(several):
                 if wrong := fault(quantity, each, advised=group == "print"):
@@ -336,7 +336,7 @@ def parse(name: str, text: str) -> Material:
                     raise OutOfRange(f"{file}, line {line}: {quantity} of {each.source} {wrong}")
             if sum(each.default for each in several) > 1:
                 raise BadInput(f"{file}: {quantity} has two values with default: true; expected one")
-    return made
+    return material
 
 
 def first_form(material: Material) -> Material:
@@ -392,8 +392,8 @@ def citations() -> dict[str, str]:
 def cited(texts: Texts) -> dict[str, str]:
     """References by the sources of a design's own files."""
     own_materials = (parse(name, text) for name, text in texts.get("materials", {}).items())
-    said = {key: value for material in own_materials for key, value in material.citations.items()}
-    return said | {name: _own(name, text).about for name, text in texts.get("sources", {}).items()}
+    meanings = {key: value for material in own_materials for key, value in material.citations.items()}
+    return meanings | {name: _own(name, text).about for name, text in texts.get("sources", {}).items()}
 
 
 @cache
@@ -402,5 +402,5 @@ def shipped_citations() -> dict[str, str]:
     text = (resources.files(__name__) / "sources.yaml").read_text("utf-8")
     data = yamlfile.parse(text, "sources.yaml")
     theses = {str(name): f"{data['thesis']}: {where}" for name, where in data["sources"].items()}
-    more = {key: said for name in names() for key, said in _shipped(name).citations.items()}
+    more = {key: meaning for name in names() for key, meaning in _shipped(name).citations.items()}
     return more | theses | {str(name): str(what) for name, what in data["others"].items()}

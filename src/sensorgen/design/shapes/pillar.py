@@ -9,17 +9,17 @@ One cell, cut through its middle (e: conductor, x: dielectric, blank: air)::
     eeeeeeeeeeeeeeeeeeee   bottom electrode
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from sensorgen.scene.array import ArrayParams, array_scene
-from sensorgen.scene.scene import Fill, Piece, Scene, box
+from sensorgen.scene.scene import Fill, Piece, Scene, box, parameter
 
 
 @dataclass(frozen=True)
 class Params(ArrayParams):
     """Parameters of the pillars."""
 
-    side_mm: float = field(default=0.8, metadata={"help": "Side of a pillar.", "range": (0.02, 100.0)})
+    side_mm: float = parameter(0.8, "Side of a pillar.", 0.02, 100.0)
 
     def __post_init__(self) -> None:
         """Refuse pillars that would run into each other."""

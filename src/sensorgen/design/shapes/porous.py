@@ -9,28 +9,22 @@ Cut across the lines of every other layer (e: conductor, x: dielectric, blank: a
     eeeeeeeeeeeeeeeeeeee   bottom electrode
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from math import floor
 
 from sensorgen.core.errors import OutOfRange
-from sensorgen.scene.scene import SLIVER_MM, Body, Envelope, Fill, Prism, Scene, box, rounded
+from sensorgen.scene.scene import SLIVER_MM, Body, Envelope, Fill, Prism, Scene, box, parameter
 
 
 @dataclass(frozen=True)
 class Params(Envelope):
     """Parameters of the porous plate."""
 
-    dielectric_mm: float = field(
-        default=0.6, metadata={"help": "Thickness of the porous plate.", "range": (0.01, 10.0)}
-    )
-    line_mm: float = field(default=0.5, metadata={"help": "Width of a line of the infill.", "range": (0.02, 50.0)})
-    space_mm: float = field(
-        default=0.4, metadata={"help": "Least air between two lines; they are spread evenly.", "range": (0.02, 50.0)}
-    )
-    layer_mm: float = field(
-        default=0.1, metadata={"help": "Height after which the lines change direction.", "range": (0.01, 10.0)}
-    )
+    dielectric_mm: float = parameter(0.6, "Thickness of the porous plate.", 0.01, 10.0)
+    line_mm: float = parameter(0.5, "Width of a line of the infill.", 0.02, 50.0)
+    space_mm: float = parameter(0.4, "Least air between two lines; they are spread evenly.", 0.02, 50.0)
+    layer_mm: float = parameter(0.1, "Height after which the lines change direction.", 0.01, 10.0)
 
     def __post_init__(self) -> None:
         """Refuse plates that are no whole number of layers."""
@@ -54,24 +48,20 @@ class Params(Envelope):
 def scene(p: Params, fill: Fill) -> Scene:
     """Bodies of the porous plate; the lowest lines run along y."""
     low = p.electrode_mm
-    high, top = low + p.dielectric_mm, low + p.dielectric_mm + p.electrode_mm
 
     def lines(of_air: bool) -> tuple[Prism, ...]:
-        found = []
+        laid = []
         for layer in range(round(p.dielectric_mm / p.layer_mm)):
             z = (low + layer * p.layer_mm, low + (layer + 1) * p.layer_mm)
             for a, b in _places(p, p.width_mm if layer % 2 else p.length_mm, of_air):
-                found.append(box(0.0, p.length_mm, a, b, *z) if layer % 2 else box(a, b, 0.0, p.width_mm, *z))
-        return tuple(found)
+                laid.append(box(0.0, p.length_mm, a, b, *z) if layer % 2 else box(a, b, 0.0, p.width_mm, *z))
+        return tuple(laid)
 
     bodies = (
-        Body("bottom_electrode", fill.bottom_electrode, p.plate(0.0, low), "bottom"),
         Body("porous_dielectric", fill.dielectric, lines(of_air=False)),
         Body("support", fill.support, lines(of_air=True) if fill.support else ()),
-        Body("top_electrode", fill.top_electrode, p.plate(high, top), "top"),
-        Body("isolation", fill.isolation, p.plate(top, top + p.isolation_mm)),
     )
-    return Scene(bodies, (p.length_mm, p.width_mm, rounded(top + p.isolation_mm)))
+    return p.between_electrodes(fill, bodies, low + p.dielectric_mm)
 
 
 def _places(p: Params, end_mm: float, of_air: bool) -> list[tuple[float, float]]:

@@ -10,30 +10,19 @@ One cell, cut through its middle (e: conductor, x: dielectric, blank: air)::
     eeeeeeeeeeeeeeeeeeee   bottom electrode
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from sensorgen.core.errors import OutOfRange
-from sensorgen.scene.array import ArrayParams, array_scene
+from sensorgen.scene.array import TippedParams, array_scene
 from sensorgen.scene.polyhedra import Loft
-from sensorgen.scene.scene import Fill, Outline, Piece, Scene, rectangle, rounded
+from sensorgen.scene.scene import Fill, Outline, Piece, Scene, parameter, rectangle, rounded
 
 
 @dataclass(frozen=True)
-class Params(ArrayParams):
+class Params(TippedParams):
     """Parameters of the pyramids."""
 
-    root_mm: float = field(
-        default=1.0, metadata={"help": "Side of a pyramid at the top electrode.", "range": (0.02, 100.0)}
-    )
-    tip_mm: float = field(
-        default=0.66, metadata={"help": "Side of its blunt tip; 0 for a sharp one.", "range": (0.0, 100.0)}
-    )
-
-    def __post_init__(self) -> None:
-        """Refuse pyramids that would run into each other, or that grow towards the tip."""
-        self.refuse_wider(self.root_mm)
-        if self.tip_mm > self.root_mm:
-            raise OutOfRange(f"tip_mm {self.tip_mm:g} is wider than root_mm {self.root_mm:g}: expected at most that")
+    root_mm: float = parameter(1.0, "Side of a pyramid at the top electrode.", 0.02, 100.0)
+    tip_mm: float = parameter(0.66, "Side of its blunt tip; 0 for a sharp one.", 0.0, 100.0)
 
 
 def scene(p: Params, fill: Fill) -> Scene:

@@ -10,7 +10,7 @@ cross: all of them are at the top electrode's potential.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import ceil, cos, floor, radians, sin
 
 from sensorgen.scene.scene import (
@@ -24,9 +24,11 @@ from sensorgen.scene.scene import (
     Scene,
     area_mm2,
     box,
+    choice,
+    parameter,
     rectangle,
     rounded,
-)  # fmt: skip
+)
 
 SHORT = "sq"  # as the thesis's specimens are named: sqXY, sqYX
 
@@ -35,28 +37,14 @@ SHORT = "sq"  # as the thesis's specimens are named: sqXY, sqYX
 class Params(Envelope):
     """Parameters of the crossed strips."""
 
-    etpu_width_mm: float = field(default=0.7, metadata={"help": "Width of a conductor strip.", "range": (0.02, 50.0)})
-    air_width_mm: float = field(
-        default=0.3, metadata={"help": "Air between a conductor strip and its neighbours.", "range": (0.02, 50.0)}
-    )
-    x60_width_mm: float = field(default=0.7, metadata={"help": "Width of a dielectric strip.", "range": (0.02, 50.0)})
-    upper_height_mm: float = field(
-        default=0.3, metadata={"help": "Height of the upper strip layer.", "range": (0.01, 10.0)}
-    )
-    lower_height_mm: float = field(
-        default=0.3, metadata={"help": "Height of the lower strip layer.", "range": (0.01, 10.0)}
-    )
-    dielectric_mm: float = field(
-        default=0.2, metadata={"help": "Thickness of the film under the strips.", "range": (0.0, 10.0)}
-    )
-    along: str = field(
-        default="xy",
-        metadata={"help": "Direction of the upper, then of the lower strips (xy: sqXY).", "choices": ("xy", "yx")},
-    )
-    angle_deg: float = field(
-        default=90.0,
-        metadata={"help": "Angle from the lower to the upper strips [degree].", "range": (10.0, 170.0), "later": True},
-    )
+    etpu_width_mm: float = parameter(0.7, "Width of a conductor strip.", 0.02, 50.0)
+    air_width_mm: float = parameter(0.3, "Air between a conductor strip and its neighbours.", 0.02, 50.0)
+    x60_width_mm: float = parameter(0.7, "Width of a dielectric strip.", 0.02, 50.0)
+    upper_height_mm: float = parameter(0.3, "Height of the upper strip layer.", 0.01, 10.0)
+    lower_height_mm: float = parameter(0.3, "Height of the lower strip layer.", 0.01, 10.0)
+    dielectric_mm: float = parameter(0.2, "Thickness of the film under the strips.", 0.0, 10.0)
+    along: str = choice("xy", "Direction of the upper, then of the lower strips (xy: sqXY).", "xy", "yx")
+    angle_deg: float = parameter(90.0, "Angle from the lower to the upper strips [degree].", 10.0, 170.0, later=True)
 
     @property
     def period_mm(self) -> float:
@@ -74,7 +62,6 @@ def scene(p: Params, fill: Fill) -> Scene:
     film = low + p.dielectric_mm
     middle = film + p.lower_height_mm
     roof = middle + p.upper_height_mm
-    top = roof + p.electrode_mm
     upper, lower = p.along[0], p.along[1]
 
     def both(part: str) -> tuple[Prism, ...]:
@@ -86,16 +73,12 @@ def scene(p: Params, fill: Fill) -> Scene:
         way = radians(90.0 - p.angle_deg if lower == "y" else p.angle_deg)
         return tuple(Prism("z", outline, rounded(middle), rounded(roof)) for outline in _slanted(p, part, way))
 
-    feet = _strips(p, "x60", lower, film, middle)
     bodies = [
-        Body("bottom_electrode", fill.bottom_electrode, p.plate(0.0, low), "bottom"),
-        *_lower(p.plate(low, film), feet, fill),
+        *_lower(p.plate(low, film), _strips(p, "x60", lower, film, middle), fill),
         Body("support", fill.support, both("air") if fill.support else ()),
         Body("hanging_dielectric", fill.dielectric, upper_strips("x60")),
-        Body("top_electrode_with_cogs", fill.top_electrode, both("etpu") + p.plate(roof, top), "top"),
-        Body("isolation", fill.isolation, p.plate(top, top + p.isolation_mm)),
     ]
-    return Scene(tuple(bodies), (p.length_mm, p.width_mm, rounded(top + p.isolation_mm)))
+    return p.between_electrodes(fill, bodies, roof, both("etpu"))
 
 
 def _lower(film: tuple[Prism, ...], feet: tuple[Prism, ...], fill: Fill) -> list[Body]:
@@ -127,15 +110,15 @@ def _slanted(p: Params, part: str, way: float) -> Iterator[Outline]:
 
 def _beyond(outline: Outline, across: Point, at_mm: float, side: float) -> Outline:
     """The part of a convex outline on one side of a line (Sutherland and Hodgman, 1974)."""
-    kept: list[Point] = []
+    corners: list[Point] = []
     away = [side * (x * across[0] + y * across[1] - at_mm) for x, y in outline]
     for k, (x, y) in enumerate(outline):
         (u, v), before = outline[k - 1], away[k - 1]
         if (before > 0) != (away[k] > 0):
             share = before / (before - away[k])
-            kept.append((rounded(u + share * (x - u)), rounded(v + share * (y - v))))
-        kept += [(x, y)] if away[k] > 0 else []
-    return tuple(point for k, point in enumerate(kept) if point != kept[k - 1])
+            corners.append((rounded(u + share * (x - u)), rounded(v + share * (y - v))))
+        corners += [(x, y)] if away[k] > 0 else []
+    return tuple(point for k, point in enumerate(corners) if point != corners[k - 1])
 
 
 def _runs(p: Params, part: str) -> list[tuple[float, float]]:

@@ -4,11 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from sensorgen.core.arrays import Mask, Real, Whole
 
 SAG_MM = 0.005  # how far a chord may be from its arc: a tenth of what the printer can place
 MOST_CHORDS = 720
@@ -38,14 +35,14 @@ class Arcs:
     [[3.142], [[-1.0, 0.0, 0.0]], [[1.0, 1.0, 0.0]]]
     """
 
-    row: Ints
-    start_mm: Floats
-    end_mm: Floats
-    centre_mm: Floats
-    turn: Floats
+    row: Whole
+    start_mm: Real
+    end_mm: Real
+    centre_mm: Real
+    turn: Real
 
     @classmethod
-    def of(cls, row: Ints, start_mm: Floats, end_mm: Floats, centre_mm: Floats, clockwise: Mask) -> "Arcs":
+    def of(cls, row: Whole, start_mm: Real, end_mm: Real, centre_mm: Real, clockwise: Mask) -> "Arcs":
         """Arcs between two places; the same place twice means a full circle. Clockwise is as seen from above: G2."""
         first, last = (_angle(place[:, :2] - centre_mm) for place in (start_mm, end_mm))
         left = (last - first) % math.tau
@@ -62,16 +59,16 @@ class Arcs:
         """The arcs of a mask."""
         return Arcs(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
-    def radius_mm(self) -> Floats:
+    def radius_mm(self) -> Real:
         """Radius at the start of each [mm]."""
         off = self.start_mm[:, :2] - self.centre_mm
         return np.asarray(np.hypot(off[:, 0], off[:, 1]))
 
-    def across_mm(self) -> Floats:
+    def across_mm(self) -> Real:
         """Length of each in plan [mm]."""
         return np.asarray(self.radius_mm() * np.abs(self.turn))
 
-    def box_mm(self) -> tuple[Floats, Floats]:
+    def box_mm(self) -> tuple[Real, Real]:
         """Lowest and highest place of each on every axis, (n, 3) [mm]."""
         low, high = np.minimum(self.start_mm, self.end_mm), np.maximum(self.start_mm, self.end_mm)
         first = _angle(self.start_mm[:, :2] - self.centre_mm)
@@ -83,7 +80,7 @@ class Arcs:
             bound[:, axis] = np.where(way < np.abs(self.turn), worse(bound[:, axis], edge), bound[:, axis])
         return low, high
 
-    def chords(self) -> tuple[Ints, Floats, Floats]:
+    def chords(self) -> tuple[Whole, Real, Real]:
         """Chords of all arcs in order: which arc each belongs to, and where it starts and ends, (m, 3) [mm]."""
         sag = np.minimum(SAG_MM / (2 * np.maximum(self.radius_mm(), SAG_MM)), 0.5)
         angle = 4 * np.arcsin(np.sqrt(sag))  # acos(1 - sag / radius) would be 0 for a large one
@@ -101,11 +98,11 @@ class Arcs:
         return which, ends[0], ends[1]
 
 
-def _angle(off: Floats) -> Floats:
+def _angle(off: Real) -> Real:
     return np.asarray(np.arctan2(off[:, 1], off[:, 0]))
 
 
-def centres_of_radius(start: Floats, end: Floats, radius: Floats, clockwise: Mask) -> Floats:
+def centres_of_radius(start: Real, end: Real, radius: Real, clockwise: Mask) -> Real:
     """Middles of arcs of given radii, (n, 2) [mm]; nan where none leads from start to end.
 
     Parameters

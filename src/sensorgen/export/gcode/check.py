@@ -33,9 +33,9 @@ class Checked(FileNeeds):
         bad = SEVERITIES[: 2 if strict else 1]
         return [f for f in self.findings if f.severity in bad]
 
-    def with_more(self, found: Iterable[GcodeFinding]) -> Self:
+    def with_more(self, findings: Iterable[GcodeFinding]) -> Self:
         """Add further findings."""
-        return replace(self, findings=merged([*self.findings, *found]))
+        return replace(self, findings=merged([*self.findings, *findings]))
 
     def counts(self) -> dict[str, int]:
         """Number of findings of each severity [-]."""
@@ -67,11 +67,7 @@ class CheckedFile(Checked):
 
 
 def check(
-    source: Source,
-    machine: Printer,
-    loaded: Mapping[int, str] | None = None,
-    *,
-    others_empty: bool = False,
+    source: Source, machine: Printer, loaded: Mapping[int, str] | None = None, *, others_empty: bool = False
 ) -> Checked:
     """Check a file, whoever has sliced it.
 
@@ -102,16 +98,12 @@ def check(
 
 
 def check_motion(
-    motion: Motion,
-    machine: Printer,
-    loaded: Mapping[int, str] | None = None,
-    *,
-    others_empty: bool = False,
+    motion: Motion, machine: Printer, loaded: Mapping[int, str] | None = None, *, others_empty: bool = False,
     texts: materials.Texts = materials.NO_TEXTS,
-) -> Checked:
+) -> Checked:  # fmt: skip
     """Check a file that was followed; see :func:`check`, and for ``texts`` :func:`sensorgen.design.materials.load`."""
     known = {*materials.names(), *texts.get("materials", ())}
     loads = {tool: materials.load(name, texts=texts) for tool, name in (loaded or {}).items() if name in known}
-    found = [*limits.check(motion, machine), *commands.check(motion, machine, loads)]
-    found += limits.check_loaded(motion, machine, loads, others_empty=others_empty)
-    return Checked(**vars(report(motion, machine, dict(loaded or {}), texts)), findings=merged(found))
+    findings = [*limits.check(motion, machine), *commands.check(motion, machine, loads)]
+    findings += limits.check_loaded(motion, machine, loads, others_empty=others_empty)
+    return Checked(**vars(report(motion, machine, dict(loaded or {}), texts)), findings=merged(findings))

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from sensorgen.core.arrays import Mask, Real, Whole
+
 Bytes = NDArray[np.uint8]
-Mask = NDArray[np.bool_]
 
 WORDS = "XYZEFIJR"  # of a move or an arc, in the order of the columns
 SPACE, DIGIT, SIGN, DOT, WORD, END, OTHER = range(7)  # sorts of bytes
@@ -46,12 +45,12 @@ class Columns:
         All other lines that are not empty [-].
     """
 
-    start: Ints
-    end: Ints
-    plain: Ints
-    code: Floats
-    words: Floats
-    rest: Ints
+    start: Whole
+    end: Whole
+    plain: Whole
+    code: Real
+    words: Real
+    rest: Whole
 
 
 def read(text: bytes) -> Columns:
@@ -90,10 +89,10 @@ def read(text: bytes) -> Columns:
     return Columns(start, end, line, data[start[line] + 1] - float(ord("0")), words, np.flatnonzero(rest))
 
 
-def _numbers(data: Bytes, start: Ints, stop: Ints, line: Ints) -> tuple[Ints, Floats]:
+def _numbers(data: Bytes, start: Whole, stop: Whole, line: Whole) -> tuple[Whole, Real]:
     """Those of some lines whose words are numbers, each letter once, and these numbers."""
 
-    def words_of(line: Ints) -> tuple[Bytes, Ints, Ints]:
+    def words_of(line: Whole) -> tuple[Bytes, Whole, Whole]:
         """Bytes behind G0 to G3 of some lines; of each word the number of its line, and its place in the bytes."""
         edges = np.zeros(len(data) + 1, np.int8)
         edges[start[line] + 2] = 1

@@ -191,22 +191,16 @@ def crossings(
 
 def printed_lines(motion: Motion, machine: Printer, numbering: Numbering) -> PrintedLines:
     """The lines of the bodies with their widths by volume."""
-    found = paths_of(motion, machine, numbering).model()
-    level = np.round(found.end_mm[:, 2] / _LEVEL_MM).astype(np.int64)
+    paths = paths_of(motion, machine, numbering).model()
+    level = np.round(paths.end_mm[:, 2] / _LEVEL_MM).astype(np.int64)
     tops = np.unique(level)
     rise = np.diff(tops, prepend=0)[np.searchsorted(tops, level)] * _LEVEL_MM
     height = np.where(
-        np.isfinite(found.height_mm) & (found.height_mm > 0), found.height_mm, np.maximum(rise, _LEVEL_MM)
+        np.isfinite(paths.height_mm) & (paths.height_mm > 0), paths.height_mm, np.maximum(rise, _LEVEL_MM)
     )
-    width = found.volume_mm3(machine.filament_mm) / (found.length_mm() * height)
-    return PrintedLines(
-        found.start_mm[:, :2],
-        found.end_mm[:, :2],
-        np.asarray(level * _LEVEL_MM, float),
-        width,
-        found.tool,
-        found.number,
-    )
+    width = paths.volume_mm3(machine.filament_mm) / (paths.length_mm() * height)
+    top, ends = np.asarray(level * _LEVEL_MM, float), (paths.start_mm[:, :2], paths.end_mm[:, :2])
+    return PrintedLines(*ends, top, width, paths.tool, paths.number)
 
 
 def _cut(motion: Motion, tool: Whole, rows: Whole) -> MovePieces:
@@ -228,8 +222,8 @@ def _blocks(motion: Motion, tool: Whole, rows: Whole) -> Iterator[MovePieces]:
 
 def _counts(way_mm: Real) -> Whole:
     """Number of pieces that each way in plan is cut to."""
-    found: Whole = np.maximum(np.ceil(np.hypot(*way_mm.T) / _PIECE_MM), 1).astype(np.int64)
-    return found
+    counts: Whole = np.maximum(np.ceil(np.hypot(*way_mm.T) / _PIECE_MM), 1).astype(np.int64)
+    return counts
 
 
 def _shares(count: Whole) -> tuple[Whole, Real, Real]:
@@ -250,20 +244,14 @@ def _over(blocks: Iterator[MovePieces], lines: PrintedLines, within_mm: float, g
 
 
 def _points(
-    pieces: MovePieces,
-    lines: PrintedLines,
-    within_mm: float,
-    pitch_mm: float,
-    piece: Whole,
-    line: Whole,
-    low: Real,
+    pieces: MovePieces, lines: PrintedLines, within_mm: float, pitch_mm: float, piece: Whole, line: Whole, low: Real,
     high: Real,
-) -> Points:
+) -> Points:  # fmt: skip
     """Points of pieces at which the highest of the lines met is of another tool."""
     foreign = lines.tool[line] != pieces.tool[piece]
     mine = np.unique(piece[foreign])  # pieces that need points
-    kept = np.isin(piece, mine)
-    piece, line, low, high, foreign = piece[kept], line[kept], low[kept], high[kept], foreign[kept]
+    needed = np.isin(piece, mine)
+    piece, line, low, high, foreign = piece[needed], line[needed], low[needed], high[needed], foreign[needed]
     start, way = pieces.start_mm[mine], (pieces.end_mm - pieces.start_mm)[mine]
     length = np.hypot(*way[:, :2].T)
     count = np.maximum(np.ceil(length / pitch_mm), 1).astype(np.int64)
@@ -326,13 +314,13 @@ class _Level:
 
 def _levels(lines: PrintedLines) -> dict[int, list[_Level]]:
     """Lines by tool and height."""
-    found = {}
+    levels = {}
     for tool in np.unique(lines.tool).tolist():
         mine = np.flatnonzero(lines.tool == tool)
         mine = mine[np.argsort(lines.top_mm[mine], kind="stable")]
         first = np.flatnonzero(np.diff(lines.top_mm[mine])) + 1
-        found[tool] = [_Level.of(lines, rows) for rows in np.split(mine, first)]
-    return found
+        levels[tool] = [_Level.of(lines, rows) for rows in np.split(mine, first)]
+    return levels
 
 
 def _meetings(

@@ -20,9 +20,8 @@ from sensorgen.design.printer import Printer
 from sensorgen.export.gcode.crossings import CONTACT_MM, FACE_MM, NEAR_MM, Crossings, crossings
 from sensorgen.export.gcode.files import Source, text_of
 from sensorgen.export.gcode.motion import follow
-from sensorgen.export.gcode.moves import Motion
+from sensorgen.export.gcode.moves import Motion, seconds
 from sensorgen.export.gcode.paths import Numbering
-from sensorgen.export.gcode.timing import seconds
 
 LIFT_MM = 0.2  # 0.4 mm took twice the time and left no less contact
 COUNTED_MM = 0.5  # a crossing is longer than this
@@ -198,30 +197,30 @@ def lift(source: Source, machine: Printer, numbering: Numbering = "printer") -> 
     """
     text = text_of(source)
     motion = follow(text, machine.control.prime_macro)
-    found, drawn = crossings(motion, machine, numbering), retracted(motion, machine)
-    before = summed(motion, found, machine)
-    if not len(found.travel.row):
-        return Lifted(text, motion, found, found, Lifting(before, before, 0, 0, 0.0))
+    passed, drawn = crossings(motion, machine, numbering), retracted(motion, machine)
+    before = summed(motion, passed, machine)
+    if not len(passed.travel.row):
+        return Lifted(text, motion, passed, passed, Lifting(before, before, 0, 0, 0.0))
     odd = next((e for e in motion.events if e.command.code in ("G91", "G20")), None)
     if odd:
         raise BadInput(
             f"line {odd.number}: {odd.command.code}; travel is lifted in files with absolute places in mm alone: slice "
             "with G90 and G21"
         )
-    writer = _Lifts(text, motion, machine, found, drawn)
+    writer = _Lifts(text, motion, machine, passed, drawn)
     lifted = writer.text()
     again = follow(lifted, machine.control.prime_macro)
-    rubbing_mm = found.rubbing_mm[motion.extruded_mm > 0]  # its lines are the same, and in the same order
+    rubbing_mm = passed.rubbing_mm[motion.extruded_mm > 0]  # its lines are the same, and in the same order
     left = crossings(again, machine, numbering, rubbing_mm)
     took = [float(seconds(m, machine.max_speed_mm_s).sum()) for m in (motion, again)]
     after = summed(again, left, machine)
     lifting = Lifting(before, after, writer.lifts, writer.retractions, took[1] - took[0])
-    return Lifted(lifted, again, found, left, lifting)
+    return Lifted(lifted, again, passed, left, lifting)
 
 
-def summed(motion: Motion, found: Crossings, machine: Printer) -> Drags:
+def summed(motion: Motion, passed: Crossings, machine: Printer) -> Drags:
     """Sums by tool, and by tool and layer."""
-    points, count, drawn = found.travel, len(motion.rows), retracted(motion, machine)
+    points, count, drawn = passed.travel, len(motion.rows), retracted(motion, machine)
     touches = points.gap_mm <= CONTACT_MM
     contact, near = (
         np.bincount(points.row[rows], points.length_mm[rows], minlength=count) for rows in (touches, ~touches)
@@ -229,13 +228,13 @@ def summed(motion: Motion, found: Crossings, machine: Printer) -> Drags:
     # a crossing is all travel between two printed lines
     stretch = np.cumsum(motion.extruded_mm > 0)
     tools = []
-    for tool in np.unique(found.tool[(contact + near + found.rubbing_mm) > 0]).tolist():
-        mine = found.tool == tool
+    for tool in np.unique(passed.tool[(contact + near + passed.rubbing_mm) > 0]).tolist():
+        mine = passed.tool == tool
         whole = np.bincount(stretch[mine], (contact + near)[mine]) > COUNTED_MM
         bare = np.bincount(stretch[mine], ((contact + near) * ~drawn)[mine]) > COUNTED_MM
-        sums = [float(v[mine].sum()) for v in (contact, near, found.rubbing_mm)]
+        sums = [float(v[mine].sum()) for v in (contact, near, passed.rubbing_mm)]
         tools.append(ToolTravel(tool, sums[0], sums[1], int(whole.sum()), int(bare.sum()), sums[2]))
-    keys = np.column_stack([np.round(points.place_mm[:, 2], 2), found.tool[points.row]])
+    keys = np.column_stack([np.round(points.place_mm[:, 2], 2), passed.tool[points.row]])
     found_keys, place = np.unique(keys, axis=0, return_inverse=True)
     lengths = [
         np.bincount(place.ravel()[rows], points.length_mm[rows], len(found_keys)).tolist()
@@ -247,7 +246,7 @@ def summed(motion: Motion, found: Crossings, machine: Printer) -> Drags:
 
 def habits(motion: Motion) -> dict[float, tuple[float, float]]:
     """Length of the usual retraction of each tool of the file [mm], and its feed [mm/min]."""
-    tools, found = motion.tools.column(len(motion.rows), -1.0), {}
+    tools, retractions = motion.tools.column(len(motion.rows), -1.0), {}
     drawn = (motion.filament_mm < 0) & (motion.across_mm == 0)
     for tool in np.unique(tools[drawn]).tolist():
         rows = np.flatnonzero(drawn & (tools == tool))
@@ -255,31 +254,31 @@ def habits(motion: Motion) -> dict[float, tuple[float, float]]:
             np.round(-motion.filament_mm[rows], 4), return_index=True, return_counts=True
         )
         most = counts.argmax()
-        found[tool] = float(lengths[most]), float(motion.feed_mm_min[rows[first[most]]])
-    return found
+        retractions[tool] = float(lengths[most]), float(motion.feed_mm_min[rows[first[most]]])
+    return retractions
 
 
 def retracted(motion: Motion, machine: Printer) -> Mask:
     """Moves during which the filament is drawn back."""
     count = len(motion.rows)
-    tools, found = motion.tools.column(count, -1.0), np.zeros(count, bool)
+    tools, back = motion.tools.column(count, -1.0), np.zeros(count, bool)
     owed = motion.extruded_mm - motion.filament_mm
     usual = habits(motion)
     for tool in np.unique(tools).tolist():
         mine = tools == tool
-        found[mine] = np.cumsum(owed[mine]) > _RETRACTED * usual.get(tool, (np.inf, 0.0))[0]
+        back[mine] = np.cumsum(owed[mine]) > _RETRACTED * usual.get(tool, (np.inf, 0.0))[0]
     if machine.control.firmware_retraction:  # G10 without temperatures or places, until G11
         for event in motion.events:
             if event.command.code == "G11" or (event.command.code == "G10" and not event.command.has("PSRLXYZ")):
-                found[event.row :] = event.command.code == "G10"
-    return found
+                back[event.row :] = event.command.code == "G10"
+    return back
 
 
 class _Lifts:
     """A file in lines, and what is written between them."""
 
-    def __init__(self, text: bytes, motion: Motion, machine: Printer, found: Crossings, drawn: Mask) -> None:
-        self.lines, self.motion, self.machine, self.found = text.split(b"\n"), motion, machine, found
+    def __init__(self, text: bytes, motion: Motion, machine: Printer, passed: Crossings, drawn: Mask) -> None:
+        self.lines, self.motion, self.machine, self.passed = text.split(b"\n"), motion, machine, passed
         self.retracted, self.number = drawn, motion.number
         self.habits, self.tools = habits(motion), motion.tools.column(len(motion.rows), -1.0)
         self.relative_e = motion.absolute_e.column(len(motion.rows), 1.0) == 0
@@ -290,19 +289,19 @@ class _Lifts:
         before: dict[int, list[str]] = {}
         after: dict[int, list[str]] = {}
         top = np.full(len(self.number), -np.inf)
-        points = self.found.travel
+        points = self.passed.travel
         np.maximum.at(top, points.row, points.place_mm[:, 2] - points.gap_mm)
         self.over_mm = np.bincount(points.row, points.length_mm, minlength=len(self.number))
         for first, last in self._groups(np.unique(points.row)):
             self._lift(first, last, top, before, after)
-        made, done = list[bytes](), 0
+        lines, done = list[bytes](), 0
         for number in sorted({*before, *after}):
-            made += self.lines[done : number - 1]
-            made += [text.encode() for text in before.get(number, ())]
-            made.append(self.lines[number - 1])
-            made += [text.encode() for text in after.get(number, ())]
+            lines += self.lines[done : number - 1]
+            lines += [text.encode() for text in before.get(number, ())]
+            lines.append(self.lines[number - 1])
+            lines += [text.encode() for text in after.get(number, ())]
             done = number
-        return b"\n".join([*made, *self.lines[done:]])
+        return b"\n".join([*lines, *self.lines[done:]])
 
     def _groups(self, rows: Whole) -> Iterator[tuple[int, int]]:
         """First and last of the moves that are made in one lift: nothing but travel lies between them."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import partialmethod
 
 from sensorgen.core.findings import SEVERITIES
 
@@ -37,24 +38,22 @@ class GcodeFinding:
 class Findings(list[GcodeFinding]):
     """Findings of a check as it goes on."""
 
-    def error(self, rule: str, line: int, message: str, advice: str) -> None:
-        """Add a finding that refuses the file."""
-        self.append(GcodeFinding(rule, "error", line, message, advice))
+    def add(self, severity: str, rule: str, line: int, message: str, advice: str) -> None:
+        """Add one; an error refuses the file."""
+        self.append(GcodeFinding(rule, severity, line, message, advice))
 
-    def warning(self, rule: str, line: int, message: str, advice: str) -> None:
-        """Add a finding that does not."""
-        self.append(GcodeFinding(rule, "warning", line, message, advice))
+    error, warning, info = partialmethod(add, "error"), partialmethod(add, "warning"), partialmethod(add, "info")
 
 
-def merged(found: Iterable[GcodeFinding]) -> tuple[GcodeFinding, ...]:
+def merged(findings: Iterable[GcodeFinding]) -> tuple[GcodeFinding, ...]:
     """Findings of the same words as one, which has the first line; the severe first, and then by line.
 
     Bytes of the file that are no UTF-8 are written out, so that any text can hold them.
     """
-    kept: dict[tuple[str, str, str], GcodeFinding] = {}
-    for given in found:
+    by_words: dict[tuple[str, str, str], GcodeFinding] = {}
+    for given in findings:
         f = replace(given, message=given.message.encode("utf-8", "backslashreplace").decode())
         key = (f.rule, f.severity, f.message)
-        old = kept.get(key)
-        kept[key] = f if old is None else replace(old, count=old.count + f.count)
-    return tuple(sorted(kept.values(), key=lambda f: (SEVERITIES.index(f.severity), f.line, f.rule)))
+        old = by_words.get(key)
+        by_words[key] = f if old is None else replace(old, count=old.count + f.count)
+    return tuple(sorted(by_words.values(), key=lambda f: (SEVERITIES.index(f.severity), f.line, f.rule)))

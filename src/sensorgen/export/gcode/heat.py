@@ -6,13 +6,14 @@ from math import isnan, nan
 
 from sensorgen.design.materials import Material
 from sensorgen.design.printer import Printer
-from sensorgen.export.gcode.found import Findings, GcodeFinding
+from sensorgen.export.gcode.found import Findings
 from sensorgen.export.gcode.moves import Event
+from sensorgen.export.gcode.words import Command
 
 WITHIN_C = 15.0  # slicers raise a temperature by less after the first layer without waiting
 BED_WITHIN_C = 15.0  # sources that give the bed one temperature differ by as much: 60 to 75 C for the same TPU
 STANDBY_BELOW_C = 10.0  # of a tool that waits, below the temperature at which it prints
-_NAMED = {"G10": "is set", "M116": "is waited for", "M568": "gets a state"}  # what happens to a tool that P names
+_NAMED = {"G10": "is set", "M568": "gets a state"}  # what happens to a tool that P names
 
 
 @dataclass
@@ -27,13 +28,17 @@ class Heat:
     awaited_c: float = 0.0  # no hotter than this it is known to be
     rested: bool = False  # in the turret at its standby temperature, and not waited for since
 
+    def wait(self) -> None:
+        """Wait for the temperature."""
+        self.awaited_c, self.rested = self.active_c, False
+
 
 class Heaters:
     """All heaters of a printer, cold at first, while its file is followed."""
 
-    def __init__(self, machine: Printer, loaded: Mapping[int, Material], found: Findings) -> None:
+    def __init__(self, machine: Printer, loaded: Mapping[int, Material], findings: Findings) -> None:
         """Take the material of each tool, as far as it is known, and the list that findings go to."""
-        self.machine, self.found = machine, found
+        self.machine, self.findings = machine, findings
         self.materials = dict(loaded)
         self.tools = {tool: Heat() for tool in machine.tool_numbers}
         self.bed = Heat()
@@ -52,7 +57,7 @@ class Heaters:
         if control.standby_c is not None and heat.rests_c is not None and not low_c <= heat.rests_c <= high_c:
             message = f"tool {tool} has waited at {heat.rests_c:g} C between its lines"
             advice = f"keep it at {low_c:g} to {high_c:g} C (G10 P{tool} R..)"
-            self.found.error("standby", number, message, advice)
+            self.findings.error("standby", number, message, advice)
 
     def take(self, tool: int, number: int, *, waits: bool) -> None:
         """A tool is taken, by a macro that ``waits`` for its heat or not; it goes on, also where it was off before."""
@@ -61,7 +66,7 @@ class Heaters:
             heat = self.tools[tool]
             heat.on, heat.rested = True, self.machine.control.names_tools and heat.standby_c < heat.active_c
             if waits:
-                _wait(heat)
+                heat.wait()
 
     def hot(self) -> list[int]:
         """Tools that are heated."""
@@ -73,7 +78,7 @@ class Heaters:
         given_c = heat.active_c if heat and heat.on else 0.0
         if heat and given_c < coldest_c:
             message = f"tool {tool} moves filament at {given_c:g} C; below {coldest_c:g} C it is cold"
-            self.found.error("cold", number, message, f"heat it before (G10 P{tool} S..)")
+            self.findings.error("cold", number, message, f"heat it before (G10 P{tool} S..)")
 
     def check_printing(self, tool: int, number: int) -> None:
         """Check that the tool that prints a line, and the bed, suit its material and have been waited for."""
@@ -81,16 +86,16 @@ class Heaters:
         heat, advice = self.tools.get(tool), f"wait for it before (M116 P{tool})"
         if heat and heat.active_c > heat.awaited_c + WITHIN_C:
             message = f"tool {tool} prints without waiting for its {heat.active_c:g} C"
-            self.found.error("wait", number, message, advice)
+            self.findings.error("wait", number, message, advice)
         elif heat and heat.rested:
             message = f"tool {tool} prints at {heat.active_c:g} C straight from standby ({heat.standby_c:g} C)"
             known = tool in self.materials and self.machine.macro("tpost") is not None  # which has no wait
             low_c = self.materials[tool].print_range("nozzle_temperature_c", WITHIN_C)[0] if known else 0.0
             severity = "error" if heat.standby_c < low_c else "warning"
-            self.found.append(GcodeFinding("wait", severity, number, message, advice))
+            self.findings.add(severity, "wait", number, message, advice)
         if self.bed.active_c > self.bed.awaited_c + WITHIN_C:
             message = f"lines are printed without waiting for the bed's {self.bed.active_c:g} C"
-            self.found.error("wait", number, message, "wait for it before (M190)")
+            self.findings.error("wait", number, message, "wait for it before (M190)")
 
     def _check_material(self, tool: int, number: int) -> None:
         material, heat = self.materials.get(tool), self.tools.get(tool)
@@ -103,32 +108,49 @@ class Heaters:
             low_c, high_c = material.print_range(quantity, BED_WITHIN_C if what == "the bed" else WITHIN_C)
             if not low_c <= given_c <= high_c:
                 message = f"{what} is at {given_c:g} C for {material.name}; its sources give {low_c:g} to {high_c:g} C"
-                self.found.error("material", number, message, f"set it in this range ({command}..)")
+                self.findings.error("material", number, message, f"set it in this range ({command}..)")
 
     def obey(self, event: Event, in_hand: int) -> None:
         """Follow a command that sets a temperature or names a tool by P; G10 with L does neither."""
         command, code = event.command, event.command.code
         if code in ("M140", "M190"):
-            self._check_hot(event, "the bed", self.machine.max_bed_c)
-            given_c = command.number("S" if command.has("S") else "R")
-            self.bed.active_c = self.bed.active_c if given_c is None or isnan(given_c) else given_c
-            self.bed.awaited_c = min(self.bed.awaited_c, self.bed.active_c)
-            if code == "M190":
-                _wait(self.bed)
+            self._set_bed(event)
         elif code in ("M104", "M109"):
             self._set(event, "T", in_hand)
+        elif code == "M116":
+            self._await(event)
         elif code in _NAMED and not (code == "G10" and command.has("L")):
-            if code != "M116" and command.has("SR"):
-                self._set(event, "P", in_hand)
-            elif command.has("P"):
-                self.check_tool(event.number, _tool(event, "P", 0), _NAMED[code])
-            heat = self.tools.get(_tool(event, "P", in_hand))  # type: ignore[call-overload]
-            if heat and code == "M568" and command.has("A"):  # off, standby or on
-                heat.on = command.number("A") != 0
-            if code == "M116":
-                every = [*self.tools.values(), self.bed]
-                for one in ([heat] if heat else []) if command.has("P") else every:
-                    _wait(one)
+            self._name(event, in_hand)
+
+    def _await(self, event: Event) -> None:
+        """Wait for the tool that P names, or for all."""
+        if event.command.has("P"):
+            tool = _tool(event, "P", 0)
+            self.check_tool(event.number, tool, "is waited for")
+            heats = [self.tools[int(tool)]] if tool in self.tools else []
+        else:
+            heats = [*self.tools.values(), self.bed]
+        for heat in heats:
+            heat.wait()
+
+    def _set_bed(self, event: Event) -> None:
+        command = event.command
+        self._check_hot(event, "the bed", self.machine.max_bed_c)
+        self.bed.active_c = _given(command, "S" if command.has("S") else "R", self.bed.active_c)
+        self.bed.awaited_c = min(self.bed.awaited_c, self.bed.active_c)
+        if command.code == "M190":
+            self.bed.wait()
+
+    def _name(self, event: Event, in_hand: int) -> None:
+        """Set the tool that P names, or its state."""
+        command, code = event.command, event.command.code
+        if command.has("SR"):
+            self._set(event, "P", in_hand)
+        elif command.has("P"):
+            self.check_tool(event.number, _tool(event, "P", 0), _NAMED[code])
+        heat = self.tools.get(_tool(event, "P", in_hand))  # type: ignore[call-overload]
+        if heat and code == "M568" and command.has("A"):  # off, standby or on
+            heat.on = command.number("A") != 0
 
     def _set(self, event: Event, letter: str, in_hand: int) -> None:
         """Set a tool's temperatures: of the one that ``letter`` names, or else the one in hand."""
@@ -137,16 +159,15 @@ class Heaters:
             self.check_tool(event.number, tool, "gets a temperature")
         elif self.machine.control.names_tools:
             message, advice = f"{command.code} sets a temperature and names no tool", f"G10 P{max(in_hand, 1)} S.. R.."
-            self.found.error("temperature", event.number, message, f"name it: {advice}")
+            self.findings.error("temperature", event.number, message, f"name it: {advice}")
         self._check_hot(event, "a tool", self.machine.max_nozzle_c)
         if tool in self.tools:
-            heat, active_c, standby_c = self.tools[int(tool)], command.number("S"), command.number("R")
-            heat.active_c = heat.active_c if active_c is None or isnan(active_c) else active_c
-            heat.standby_c = heat.standby_c if standby_c is None or isnan(standby_c) else standby_c
-            heat.stated |= standby_c is not None
+            heat = self.tools[int(tool)]
+            heat.active_c, heat.standby_c = _given(command, "S", heat.active_c), _given(command, "R", heat.standby_c)
+            heat.stated |= command.has("R")
             heat.awaited_c = min(heat.awaited_c, heat.active_c)
             if command.code == "M109":
-                _wait(heat)
+                heat.wait()
             heat.on |= command.code in ("M104", "M109")  # G10 and M568 S leave on or off what is
 
     def check_tool(self, number: int, tool: float, what: str) -> None:
@@ -154,17 +175,19 @@ class Heaters:
         if tool not in self.machine.tool_numbers:
             known = ", ".join(map(str, self.machine.tool_numbers))
             message = f"tool {tool:g} {what}; {self.machine.name} has {known}"
-            self.found.error("tool", number, message, "give the printer's own number; slicers count from 0")
+            self.findings.error("tool", number, message, "give the printer's own number; slicers count from 0")
 
     def _check_hot(self, event: Event, what: str, most_c: float) -> None:
         for value_c in (event.command.number("S"), event.command.number("R")):
             if value_c is not None and not value_c <= most_c:
                 message = f"{what} is set to {value_c:g} C; the limit is {most_c:g} C"
-                self.found.error("temperature", event.number, message, "print cooler")
+                self.findings.error("temperature", event.number, message, "print cooler")
 
 
-def _wait(heat: Heat) -> None:
-    heat.awaited_c, heat.rested = heat.active_c, False
+def _given(command: Command, letter: str, before_c: float) -> float:
+    """Temperature that a command sets; the one before where it gives none [C]."""
+    value_c = command.number(letter)
+    return before_c if value_c is None or isnan(value_c) else value_c
 
 
 def _tool(event: Event, letter: str, in_hand: int) -> float:

@@ -56,10 +56,10 @@ def effect(text: str) -> Effect:
     """
     offset, place, relative, waits = [0.0] * 3, [nan] * 3, None, False
     for line in text.splitlines():
-        said = words.parse(line)
-        if said.faults:
+        parsed = words.parse(line)
+        if parsed.faults:
             raise BadInput(f"macros: {line.strip()[:60]!r} cannot be followed; state its effect: lift_mm, return_mm")
-        for command in said.commands:
+        for command in parsed.commands:
             waits |= command.code == "M116"
             relative = {"G90": False, "G91": True}.get(command.code, relative)
             if command.code in ("G0", "G1"):

@@ -4,10 +4,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import macros
 from sensorgen.export.gcode.arcs import Arcs, centres_of_radius
-from sensorgen.export.gcode.columns import WORDS, Floats, Ints, Mask
+from sensorgen.export.gcode.columns import WORDS
 from sensorgen.export.gcode.files import Source, text_of
 from sensorgen.export.gcode.macros import Effect
 from sensorgen.export.gcode.moves import NO_TOOL, Event, FileFault, ModalValues, Motion, ToolChange
@@ -51,19 +52,19 @@ def executed(source: Source, machine: Printer) -> Motion:
 class _Steps:
     """All moves of a file, and between them the places that it names anew, as G92 does."""
 
-    def __init__(self, said: GcodeFile) -> None:
-        self.said = said
-        self.place, table = said.table()
+    def __init__(self, file: GcodeFile) -> None:
+        self.file = file
+        self.place, table = file.table()
         self.code = table[:, 0]
         self.moves = self.code < PLACE
         numbers = table[:, 1:]
-        numbers *= self._held(said.scale, 1.0)[:, None]
+        numbers *= self._held(file.scale, 1.0)[:, None]
         self.words = dict(zip(WORDS, np.clip(numbers, -MOST_MM, MOST_MM, out=numbers).T, strict=True))
-        self.sets = ((self._held(said.relative, 0.0) == 0) | ~self.moves) & (self.code != OFFSET)
+        self.sets = ((self._held(file.relative, 0.0) == 0) | ~self.moves) & (self.code != OFFSET)
 
     def motion(self) -> Motion:
         """The file as moves in columns."""
-        said = self.said
+        file = self.file
         rows = np.empty((np.count_nonzero(self.moves), 10))
         for k, column in enumerate(self._columns()):
             rows[:, k] = column if len(column) == len(rows) else column[self.moves]
@@ -78,28 +79,28 @@ class _Steps:
             given = straight & np.any([~np.isnan(self.words[letter]) for letter in letters], axis=0)
             faults += [FileFault(n >> SHIFT, what) for n in self.place[given].tolist()]
         arcs, wrong = self._arcs(rows)
-        told = [*said.events, *said.odd]
-        before = iter(self._rows([*(place for place, _ in told), *(place for place, _, _ in said.changes)]))
+        told = [*file.events, *file.odd]
+        before = iter(self._rows([*(place for place, _ in told), *(place for place, _, _ in file.changes)]))
         events = [Event(next(before), place >> SHIFT, command) for place, command in told]
-        changes = [ToolChange(next(before), place >> SHIFT, tool, macro) for place, tool, macro in said.changes]
+        changes = [ToolChange(next(before), place >> SHIFT, tool, macro) for place, tool, macro in file.changes]
         return Motion(
-            rows, arcs, events[: len(said.events)], events[len(said.events) :], changes, self._track(said.tools),
-            tuple(said.kinds), self._track(said.kind),
-            self._track(said.width_mm), self._track(said.height_mm), self._track(said.layer),
-            self._track(said.absolute_e), sorted([*said.faults, *faults, *wrong], key=lambda fault: fault.number),
-            said.lines, said.maker, self._z_stated(),
+            rows, arcs, events[: len(file.events)], events[len(file.events) :], changes, self._track(file.tools),
+            tuple(file.kinds), self._track(file.kind),
+            self._track(file.width_mm), self._track(file.height_mm), self._track(file.layer),
+            self._track(file.absolute_e), sorted([*file.faults, *faults, *wrong], key=lambda fault: fault.number),
+            file.lines, file.maker, self._z_stated(),
         )  # fmt: skip
 
-    def _columns(self) -> Iterator[Floats]:
+    def _columns(self) -> Iterator[Real]:
         """Columns of ``Motion.rows``, for each step; one by one, since a million moves take room."""
         for axis in "XYZ":
             yield _before(_state(self.words[axis], self.sets))
         for axis in "XYZ":
             yield _state(self.words[axis], self.sets)
-        given, absolute = self.words["E"], self._held(self.said.absolute_e, 1.0) > 0
+        given, absolute = self.words["E"], self._held(self.file.absolute_e, 1.0) > 0
         at = _state(given, absolute | ~self.moves)
         filament = np.where(self.moves & ~np.isnan(given), np.where(absolute, at - _before(at), given), 0.0)
-        yield _extruded(filament, self._held(self.said.tools, NO_TOOL))
+        yield _extruded(filament, self._held(self.file.tools, NO_TOOL))
         yield filament
         last = _last(~np.isnan(self.words["F"]))
         yield np.where(last < 0, DEFAULT_FEED_MM_MIN, self.words["F"][last])
@@ -108,16 +109,16 @@ class _Steps:
     def _z_stated(self) -> Mask:
         """Z has been stated since the last change of tool, for each move."""
         turned = np.zeros(len(self.place) + 1, bool)
-        turned[np.searchsorted(self.place, np.array(self.said.turns, np.int64))] = True
+        turned[np.searchsorted(self.place, np.array(self.file.turns, np.int64))] = True
         stated = _last(self.sets & ~np.isnan(self.words["Z"]))
         return np.asarray(stated >= _last(turned[:-1]))[self.moves]
 
-    def _held(self, holding: Holding, before: float) -> Floats:
+    def _held(self, holding: Holding, before: float) -> Real:
         """Value that applies to each step."""
         rows = np.searchsorted(self.place, np.array(holding.places, np.int64))
         return ModalValues(rows.tolist(), holding.values.tolist()).column(len(self.place), before)
 
-    def _arcs(self, rows: Floats) -> tuple[Arcs, list[FileFault]]:
+    def _arcs(self, rows: Real) -> tuple[Arcs, list[FileFault]]:
         """Moves that are arcs, and what is wrong with those that cannot be."""
         code = self.code[self.moves]
         row = np.flatnonzero((code == 2) | (code == 3))
@@ -130,7 +131,7 @@ class _Steps:
             _fitting(start[:, :2] + offset, start, end),
             centres_of_radius(start[:, :2], end[:, :2], radius, clockwise),
         )
-        centre[self._held(self.said.level, 1.0)[step] == 0] = np.nan
+        centre[self._held(self.file.level, 1.0)[step] == 0] = np.nan
         fits = ~np.isnan(centre).any(axis=1)
         faults = [
             FileFault(int(rows[k, 9]), f"G{int(code[k])} without a centre that fits; taken as a straight line")
@@ -140,31 +141,31 @@ class _Steps:
 
     def _rows(self, places: Sequence[int]) -> list[int]:
         """Number of moves before each of some places."""
-        found: list[int] = np.searchsorted(self.place[self.moves], np.array(places, np.int64)).tolist()
-        return found
+        counts: list[int] = np.searchsorted(self.place[self.moves], np.array(places, np.int64)).tolist()
+        return counts
 
     def _track(self, holding: Holding) -> ModalValues:
         return ModalValues(self._rows(holding.places), holding.values.tolist())
 
 
-def _last(given: Mask) -> Ints:
+def _last(given: Mask) -> Whole:
     """For each step the last one until it that is marked; -1 before the first."""
     return np.asarray(np.maximum.accumulate(np.where(given, np.arange(len(given)), -1)))
 
 
-def _state(given: Floats, sets: Mask) -> Floats:
+def _state(given: Real, sets: Mask) -> Real:
     """Where an axis is after each step, which sets it to what is given or moves it by that; 0 at the start."""
     by = np.where(np.isnan(given) | sets, 0.0, given).cumsum()
     last = _last(sets & ~np.isnan(given))
     return np.asarray(np.where(last < 0, by, given[last] + (by - by[last])))
 
 
-def _before(state: Floats) -> Floats:
+def _before(state: Real) -> Real:
     """The state before each step."""
     return np.concatenate([np.zeros_like(state[:1]), state[:-1]])
 
 
-def _extruded(filament: Floats, tool: Floats) -> Floats:
+def _extruded(filament: Real, tool: Real) -> Real:
     """Filament that each step extrudes: what goes beyond making good for what its tool has drawn back [mm]."""
     extruded = np.maximum(filament, 0.0)
     for one in np.unique(tool[filament < 0]):
@@ -182,7 +183,7 @@ def _extruded(filament: Floats, tool: Floats) -> Floats:
     return extruded
 
 
-def _fitting(centre: Floats, start: Floats, end: Floats) -> Floats:
+def _fitting(centre: Real, start: Real, end: Real) -> Real:
     """Middles that are about as far from the start as from the end of their arc; nan for others."""
     radii = np.array([np.hypot(*(centre - place[:, :2]).T) for place in (start, end)])
     near, far = radii.min(axis=0), radii.max(axis=0)

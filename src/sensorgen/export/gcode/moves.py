@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sensorgen.core.arrays import Mask, Real, Whole
+from sensorgen.design.printer import MaxSpeed
 from sensorgen.export.gcode.arcs import Arcs
 from sensorgen.export.gcode.words import Command
-
-Floats = NDArray[np.float64]
 
 NO_TOOL = -1
 
@@ -51,10 +50,10 @@ class ModalValues:
     rows: list[int]
     values: list[float]
 
-    def column(self, count: int, before: float = math.nan) -> Floats:
+    def column(self, count: int, before: float = math.nan) -> Real:
         """Value that applies to each of ``count`` moves."""
         edges = np.array([0, *self.rows, count], dtype=np.int64)
-        spans: NDArray[np.int64] = edges[1:] - edges[:-1]
+        spans: Whole = edges[1:] - edges[:-1]
         return np.repeat(np.array([before, *self.values]), spans)
 
 
@@ -93,7 +92,7 @@ class Motion:
         Z has been stated since the last change of tool, by the move itself or before it.
     """
 
-    rows: Floats
+    rows: Real
     arcs: Arcs
     events: Sequence[Event]
     odd: Sequence[Event]
@@ -108,56 +107,79 @@ class Motion:
     faults: Sequence[FileFault]
     lines: int
     maker: str
-    z_stated: NDArray[np.bool_]
+    z_stated: Mask
 
     @property
-    def start_mm(self) -> Floats:
+    def start_mm(self) -> Real:
         """Where each move starts, (n, 3) [mm]."""
         return self.rows[:, 0:3]
 
     @property
-    def end_mm(self) -> Floats:
+    def end_mm(self) -> Real:
         """Where each move ends, (n, 3) [mm]."""
         return self.rows[:, 3:6]
 
     @property
-    def extruded_mm(self) -> Floats:
+    def extruded_mm(self) -> Real:
         """Filament that each move extrudes, without what makes good for a retraction [mm]."""
         return self.rows[:, 6]
 
     @property
-    def filament_mm(self) -> Floats:
+    def filament_mm(self) -> Real:
         """Filament that each move pushes, or draws back if negative [mm]."""
         return self.rows[:, 7]
 
     @property
-    def feed_mm_min(self) -> Floats:
+    def feed_mm_min(self) -> Real:
         """Feed that the file asks for [mm/min]."""
         return self.rows[:, 8]
 
     @property
-    def number(self) -> NDArray[np.int64]:
+    def number(self) -> Whole:
         """Line of each move, from 1 [-]."""
         return self.rows[:, 9].astype(np.int64)
 
     @cached_property
-    def across_mm(self) -> Floats:
+    def across_mm(self) -> Real:
         """Way of the nozzle in plan, in each move [mm]."""
         step = self.rows[:, 3:5] - self.rows[:, 0:2]
-        way: Floats = np.hypot(step[:, 0], step[:, 1])
+        way: Real = np.hypot(step[:, 0], step[:, 1])
         way[self.arcs.row] = self.arcs.across_mm()
         return way
 
     @cached_property
-    def length_mm(self) -> Floats:
+    def length_mm(self) -> Real:
         """Way of the nozzle in each move [mm]."""
-        way: Floats = np.hypot(self.across_mm, self.rows[:, 5] - self.rows[:, 2])
+        way: Real = np.hypot(self.across_mm, self.rows[:, 5] - self.rows[:, 2])
         return way
 
-    def box_mm(self) -> tuple[Floats, Floats]:
+    def box_mm(self) -> tuple[Real, Real]:
         """Lowest and highest place of each move, (n, 3) twice [mm]; a straight one counts by its end."""
         if not len(self.arcs):
             return self.end_mm, self.end_mm
         low, high = self.end_mm.copy(), self.end_mm.copy()
         low[self.arcs.row], high[self.arcs.row] = self.arcs.box_mm()
         return low, high
+
+
+def seconds(motion: Motion, fastest: MaxSpeed) -> Real:
+    """Duration of each move, (n,) [s].
+
+    The feed is that of the nozzle, or of the filament where the nozzle rests; an axis that could not follow
+    slows the whole move, as the firmware does. Accelerations are the printer's own and unknown here, so a
+    print takes longer than the sum.
+
+    Parameters
+    ----------
+    motion : Motion
+        The moves.
+    fastest : MaxSpeed
+        The axes' limits [mm/s].
+    """
+    filament = np.abs(motion.filament_mm)
+    across, up = motion.across_mm, np.abs(motion.rows[:, 5] - motion.rows[:, 2])
+    way = np.hypot(across, up)
+    longest: Real = np.where(way > 0, way, filament) / np.maximum(motion.feed_mm_min / 60, 1e-3)
+    for length, limit in ((across, fastest.xy), (up, fastest.z), (filament, fastest.extruder)):
+        np.maximum(longest, length / limit, out=longest)
+    return longest

@@ -146,9 +146,9 @@ def _straight(motion: Motion, rows: Integers) -> tuple[Integers, Floats, Floats,
     bent = np.isin(motion.arcs.row, rows)
     which, start, end = motion.arcs.chosen(bent).chords()
     row = motion.arcs.row[bent]
-    kept = rows[~np.isin(rows, row)]
-    every = np.concatenate([kept, row[which]])
+    straight = rows[~np.isin(rows, row)]
+    every = np.concatenate([straight, row[which]])
     order = np.argsort(every, kind="stable")
-    starts, ends = np.concatenate([motion.start_mm[kept], start]), np.concatenate([motion.end_mm[kept], end])
-    share = np.concatenate([np.ones(len(kept)), 1.0 / np.bincount(which, minlength=1)[which]])
+    starts, ends = np.concatenate([motion.start_mm[straight], start]), np.concatenate([motion.end_mm[straight], end])
+    share = np.concatenate([np.ones(len(straight)), 1.0 / np.bincount(which, minlength=1)[which]])
     return every[order], starts[order], ends[order], share[order]

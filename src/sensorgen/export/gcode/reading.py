@@ -11,8 +11,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from sensorgen.core.arrays import Real, Whole
 from sensorgen.export.gcode import columns, remarks, words
-from sensorgen.export.gcode.columns import Floats, Ints
 from sensorgen.export.gcode.macros import Effect
 from sensorgen.export.gcode.moves import NO_TOOL, FileFault
 from sensorgen.export.gcode.words import Command
@@ -83,8 +83,8 @@ class GcodeFile:
         head, _, tail = prime_macro.partition("{tool}")
         self._macro = re.compile(f"{re.escape(head)}([0-9]+){re.escape(tail)}") if prime_macro else None
         self._change = change
-        self._places: list[Ints] = []
-        self._rows: list[Floats] = []
+        self._places: list[Whole] = []
+        self._rows: list[Real] = []
         self._own_places, self._own_rows = array("q"), array("d")
         self._sets = {
             "G17": (self.level, 1.0), "G18": (self.level, 0.0), "G19": (self.level, 0.0),
@@ -97,7 +97,7 @@ class GcodeFile:
             self._read(text[start:end])
             start = end
 
-    def table(self) -> tuple[Ints, Floats]:
+    def table(self) -> tuple[Whole, Real]:
         """Places and rows of all moves, in order: the code, and the numbers of ``columns.WORDS``; once."""
         own = np.array(self._own_rows).reshape(-1, 1 + len(columns.WORDS))
         places, rows = (
@@ -111,18 +111,18 @@ class GcodeFile:
         return places[order], rows[order]
 
     def _read(self, piece: bytes) -> None:
-        found = columns.read(piece)
+        table = columns.read(piece)
         first = self.lines + 1
-        self._places.append((found.plain + first) << SHIFT)
-        self._rows.append(np.column_stack([found.code, found.words]))
-        for row in found.rest.tolist():
-            line = piece[found.start[row] : found.end[row]]
+        self._places.append((table.plain + first) << SHIFT)
+        self._rows.append(np.column_stack([table.code, table.words]))
+        for row in table.rest.tolist():
+            line = piece[table.start[row] : table.end[row]]
             text = line.decode("utf-8", "surrogateescape")
             if text[0] == ";" and line.isascii():
                 self._remark(text[1:], (first + row) << SHIFT)
             elif not text.isspace():
                 self._other(text, first + row)
-        self.lines += len(found.start)
+        self.lines += len(table.start)
 
     def _remark(self, text: str, place: int) -> None:
         for quantity, value in _note(text):
@@ -139,16 +139,16 @@ class GcodeFile:
                 self.layer.put(place, last + 1 if quantity == remarks.NEXT_LAYER else value)
 
     def _other(self, text: str, number: int) -> None:
-        said = words.parse(text)
+        parsed = words.parse(text)
         place = number << SHIFT
-        if said.remark:
-            self._remark(said.remark, place)
+        if parsed.remark:
+            self._remark(parsed.remark, place)
         if not text.isascii():
             foreign = not text.partition(";")[0].isascii()
             self._fault(place, "characters that are not ASCII" + ("" if foreign else " in a comment"), severe=foreign)
-        for what in said.faults:
+        for what in parsed.faults:
             self._fault(place, what, severe=not words.is_meta(text))
-        for here, command in enumerate(said.commands, place):
+        for here, command in enumerate(parsed.commands, place):
             if command.code[0] == "T":
                 self._select(command.code[1:], here)
             elif command.code in self._sets:
@@ -169,18 +169,17 @@ class GcodeFile:
     def _position(self, command: Command, place: int) -> None:
         """Add a row for a move, or for a command that names the place anew."""
         if command.code in _MOVES:
-            numbers = [self._number(command, letter, place) for letter in columns.WORDS]
+            self._row(place, float(command.code[1:]), [self._number(command, name, place) for name in columns.WORDS])
             if any(letter not in columns.WORDS for letter, _ in command.words):
                 self.odd.append((place, command))
             if command.has("H") and command.number("H") != 0:
                 self._fault(place, f"H{command.text('H')} of {command.code}: an axis goes until it meets something")
         elif command.code == "G92":
-            numbers = [0.0 if not command.has("XYZE") else self._number(command, letter, place) for letter in "XYZE"]
+            named = command.has("XYZE")
+            self._row(place, PLACE, [self._number(command, name, place) if named else 0.0 for name in "XYZE"])
         elif command.code == "G28":
-            numbers = [0.0 if not command.has("XYZ") or command.has(letter) else np.nan for letter in "XYZ"]
-        else:
-            return
-        self._row(place, float(command.code[1:]) if command.code in _MOVES else PLACE, numbers)
+            homed = [name for name in "XYZ" if command.has(name)] or "XYZ"
+            self._row(place, PLACE, [0.0 if name in homed else np.nan for name in "XYZ"])
 
     def _row(self, place: int, code: float, numbers: Sequence[float]) -> None:
         self._own_places.append(place)

@@ -24,8 +24,7 @@ import numpy as np
 from sensorgen.core.errors import BadInput
 from sensorgen.design.printer import Printer
 from sensorgen.export.gcode import words
-from sensorgen.export.gcode.moves import NO_TOOL, Motion
-from sensorgen.export.gcode.timing import seconds
+from sensorgen.export.gcode.moves import NO_TOOL, Motion, seconds
 from sensorgen.export.gcode.words import Command
 
 
@@ -80,8 +79,8 @@ def ready(text: bytes, motion: Motion, machine: Printer) -> Iterator[bytes]:
     for number in sorted({*commands, *before, end, len(starts)} - {0}):
         place = int(np.searchsorted(moves, done, side="right"))
         move = int(moves[place]) if place < len(moves) else maxsize
-        if move <= number and (held := writer.take()):
-            yield text[starts[done] : starts[move - 1]] + _coded(held)
+        if move <= number and (waiting := writer.take()):
+            yield text[starts[done] : starts[move - 1]] + _coded(waiting)
             done = move - 1
         yield text[starts[done] : starts[number - 1]] + _coded(before.get(number, ()))
         done = min(number, len(starts) - 1)
@@ -90,8 +89,8 @@ def ready(text: bytes, motion: Motion, machine: Printer) -> Iterator[bytes]:
         yield _coded(writer.cold() if number == end else ())
         if writer.ended:
             break
-    said = commands.union(moves.tolist())
-    yield from (text[starts[n] : starts[n + 1]] for n in range(done, len(starts) - 1) if n + 1 not in said)
+    numbered = commands.union(moves.tolist())
+    yield from (text[starts[n] : starts[n + 1]] for n in range(done, len(starts) - 1) if n + 1 not in numbered)
 
 
 def _coded(lines: Iterable[str]) -> bytes:
@@ -140,7 +139,7 @@ class _Writer:
     def __init__(self, machine: Printer) -> None:
         self.machine, self.control = machine, machine.control
         self.tool: int | None = None  # the printer's number
-        self.held: list[str] = []  # taking the first tool, until the axes are homed
+        self.waiting: list[str] = []  # taking the first tool, until the axes are homed
         self.homed = machine.tool_at_start() is not None  # such a printer may take tools at any time
         self.ended = False
         self.hot: list[int] = []
@@ -148,26 +147,28 @@ class _Writer:
 
     def line(self, line: str) -> Iterator[str]:
         """A line that may have to change; its comment stays behind the first command, or goes with what it spoke of."""
-        said = words.parse(line)
-        made = [self._command(command) for command in said.commands]
-        if all(new is None for new in made):
+        parsed = words.parse(line)
+        changed = [self._command(command) for command in parsed.commands]
+        if all(new is None for new in changed):
             yield line
         else:
             code, semicolon, remark = line.rstrip("\r\n").partition(";")
             gap = code[len(code.rstrip()) :]
             texts = (
-                text for c, new in zip(said.commands, made, strict=True) for text in ([str(c)] if new is None else new)
+                text
+                for c, new in zip(parsed.commands, changed, strict=True)
+                for text in ([str(c)] if new is None else new)
             )
             for place, text in enumerate(texts):
                 yield f"{text}{gap}{semicolon}{remark}\n" if place == 0 and semicolon else f"{text}\n"
-        for command in said.commands:
+        for command in parsed.commands:
             self.homed |= command.code in self.control.homes
             self.ended |= command.code in self.control.ends
 
     def take(self) -> list[str]:
         """Lines that waited for the first move."""
-        held, self.held = self.held, []
-        return held
+        lines, self.waiting = self.waiting, []
+        return lines
 
     def cold(self) -> Iterator[str]:
         """Switch the tools off that the file has heated."""
@@ -203,7 +204,7 @@ class _Writer:
             self.offset_mm = offset_mm
         if self.homed:
             return texts
-        self.held = [f"{text}\n" for text in texts]
+        self.waiting = [f"{text}\n" for text in texts]
         return []
 
     def _tool_settings(self, command: Command) -> Sequence[str] | None:

@@ -56,8 +56,8 @@ def read(remark: str) -> list[Note]:
 def _simplify3d(remark: str) -> list[Note]:
     if remark.startswith("feature "):
         return [(KIND, remark.removeprefix("feature ").strip().lower())]
-    if found := _LAYER_AND_Z.match(remark):
-        return [(LAYER, float(found[1]))]
-    found = _TOOL_LINE.fullmatch(remark)
-    pairs = ((HEIGHT, found[1]), (WIDTH, found[2])) if found else ()
+    if match := _LAYER_AND_Z.match(remark):
+        return [(LAYER, float(match[1]))]
+    match = _TOOL_LINE.fullmatch(remark)
+    pairs = ((HEIGHT, match[1]), (WIDTH, match[2])) if match else ()
     return [(quantity, float(value)) for quantity, value in pairs if _LENGTH.fullmatch(value)]

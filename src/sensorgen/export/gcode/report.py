@@ -12,9 +12,8 @@ from sensorgen.core.document import Column, Facts, Part, Table
 from sensorgen.core.errors import MissingValue, UnknownName
 from sensorgen.design import materials
 from sensorgen.design.printer import Printer
-from sensorgen.export.gcode.moves import NO_TOOL, Motion
+from sensorgen.export.gcode.moves import NO_TOOL, Motion, seconds
 from sensorgen.export.gcode.paths import NOT_MODEL
-from sensorgen.export.gcode.timing import seconds
 
 
 @dataclass(frozen=True)
@@ -99,13 +98,6 @@ def report(
     texts : mapping
         As of :func:`sensorgen.design.materials.load`.
     """
-    printed = (motion.extruded_mm > 0) & (motion.length_mm > 0)
-    low, high = motion.box_mm()  # axis by axis: a copy of all places would take much room
-    corners = (
-        [tuple(float(of(box[printed, k])) for k in range(3)) for box, of in ((low, np.min), (high, np.max))]
-        if printed.any()
-        else None
-    )
     taken = [change.tool for change in motion.changes if change.tool != NO_TOOL]
     waits = (e.command for e in motion.events if e.command.code == "G4")
     dwells_s = sum((w.number("S") or 0.0) + (w.number("P") or 0.0) / 1000 for w in waits)
@@ -117,8 +109,17 @@ def report(
         time_s=moving_s + (dwells_s if 0 <= dwells_s < math.inf else 0.0),
         tools=tuple(_tools(motion, machine, usual(machine) | (loaded or {}), texts)),
         tool_changes=sum(a != b for a, b in pairwise(taken)),
-        box_mm=(corners[0], corners[1]) if corners else None,
+        box_mm=_box_mm(motion),
     )
+
+
+def _box_mm(motion: Motion) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+    """Lowest and highest corner of what is printed [mm]; None of nothing."""
+    printed, (low, high) = (motion.extruded_mm > 0) & (motion.length_mm > 0), motion.box_mm()
+    if not printed.any():
+        return None
+    axes = range(3)  # one by one: a copy of all places would take much room
+    return tuple(float(low[printed, k].min()) for k in axes), tuple(float(high[printed, k].max()) for k in axes)
 
 
 def usual(machine: Printer) -> dict[int, str]:

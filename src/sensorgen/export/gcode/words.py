@@ -125,12 +125,12 @@ def _read(text: str) -> GcodeLine:
             remark = remark or token["bracket"]
         elif kind == "checksum":
             given, line = int(token["checksum"]), text[: token.start("checksum") - 1].encode("utf-8", "surrogateescape")
-            if (found := reduce(lambda a, b: a ^ b, line, 0)) != given:
-                faults.append(f"checksum {given} is wrong: the line makes {found}")
+            if (checksum := reduce(lambda a, b: a ^ b, line, 0)) != given:
+                faults.append(f"checksum {given} is wrong: the line makes {checksum}")
         else:
             faults.append(f"{token['junk']!r} means nothing here")
-    made = tuple(Command(code, tuple(words)) for code, words in commands)
-    return GcodeLine(made, remark, tuple(faults[:_MOST_FAULTS]))
+    parsed = tuple(Command(code, tuple(words)) for code, words in commands)
+    return GcodeLine(parsed, remark, tuple(faults[:_MOST_FAULTS]))
 
 
 def _take(commands: list[tuple[str, list[tuple[str, str]]]], letter: str, value: str) -> list[str]:

@@ -158,9 +158,9 @@ def unknown(settings: EngineSettings, program: str = "") -> set[str]:
         path = resources(program) / "definitions" / f"{name}.def.json"
         nodes = [json.loads(path.read_text("utf-8"))["settings"]]
         while nodes:
-            found = nodes.pop()
-            known |= found.keys()
-            nodes += [node["children"] for node in found.values() if "children" in node]
+            group = nodes.pop()
+            known |= group.keys()
+            nodes += [node["children"] for node in group.values() if "children" in node]
     told = (settings.common, *settings.tools.values(), *settings.unused.values())
     return {key for values in told for key in values} - known
 

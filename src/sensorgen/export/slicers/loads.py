@@ -105,22 +105,19 @@ def recipe(printer: Printer, quality: Quality, tool: int, load: ToolLoad) -> Rec
 
     def value(quantity: str, what: str, low: float, high: float, own: float | None = None) -> float:
         try:
-            found = load.material.value(quantity, load.source).value if own is None else own
+            number = load.material.value(quantity, load.source).value if own is None else own
         except MissingValue as error:
             advice = "add it under 'print' in the material's file, or load another material"
             raise MissingValue(f"tool {tool}: {error}; {advice}") from None
-        return _between(where, what, found, low, high)
+        return _between(where, what, number, low, high)
 
     walls = value("wall_lines", "walls [lines]", 1, 100, load.profile.wall_lines.get(load.material.name))
     if walls != round(walls):
         raise OutOfRange(f"{where}: walls [lines] is {walls:g}; expected a whole number")
     line_mm = load.profile.line_mm.get(load.material.name, printer.line_mm())
     flow_percent = value("flow_percent", "flow [%]", 10, 200)
-    most_mm2_s = (
-        MELTED
-        * load.material.print_range("max_flow_mm3_s", 0.0)[1]
-        / (max(quality.layer_mm, quality.first_layer_mm) * flow_percent / 100)
-    )
+    melted_mm3_s = MELTED * load.material.print_range("max_flow_mm3_s", 0.0)[1]
+    most_mm2_s = melted_mm3_s / (max(quality.layer_mm, quality.first_layer_mm) * flow_percent / 100)
     return Recipe(
         material=load.material,
         source=load.source,
@@ -166,13 +163,13 @@ def recipes(printer: Printer, quality: Quality, loads: Mapping[int, ToolLoad]) -
     _between(printer.name, "layer height [mm]", quality.layer_mm, printer.min_layer_mm, printer.nozzle_mm)
     _between(printer.name, "first layer height [mm]", quality.first_layer_mm, printer.min_layer_mm, printer.nozzle_mm)
     _between(quality.name, "travel speed [mm/s]", quality.travel_speed_mm_s, 1, printer.max_speed_mm_s.xy)
-    made = {tool: recipe(printer, quality, tool, loads[tool]) for tool in sorted(loads)}
+    by_tool = {tool: recipe(printer, quality, tool, loads[tool]) for tool in sorted(loads)}
     if any(load.profile != next(iter(loads.values())).profile for load in loads.values()):
         raise BadInput("one plate, two slicer profiles: give all its designs the same 'profile'")
-    if len({r.bed_c for r in made.values()}) > 1:
-        each = ", ".join(f"{r.material.name} on tool {tool} {r.bed_c:g} C" for tool, r in made.items())
+    if len({r.bed_c for r in by_tool.values()}) > 1:
+        each = ", ".join(f"{r.material.name} on tool {tool} {r.bed_c:g} C" for tool, r in by_tool.items())
         raise BadInput(f"one bed, two temperatures: {each}; name sources that agree, or print without one of them")
-    return {printer.slicer_index(tool): made[tool] for tool in sorted(made, key=printer.slicer_index)}
+    return {printer.slicer_index(tool): by_tool[tool] for tool in sorted(by_tool, key=printer.slicer_index)}
 
 
 def overlaid(text: str, settings: Mapping[str, str]) -> str:
@@ -187,22 +184,22 @@ def overlaid(text: str, settings: Mapping[str, str]) -> str:
 
 def by_hand(material: Material) -> list[str]:
     """Settings by hand, in words: the extruder's cam dial, and drying."""
-    found = [f"Drying: {material.drying}"] if material.drying else []
+    notes = [f"Drying: {material.drying}"] if material.drying else []
     if "cam_dial" in material.print:
-        found.insert(0, f"Cam dial of the extruder: {number(material.value('cam_dial').value)}")
-    return found
+        notes.insert(0, f"Cam dial of the extruder: {number(material.value('cam_dial').value)}")
+    return notes
 
 
 def templates(slicer: str, version: Version, **filters: Callable[..., str]) -> "Environment":
     """The profile templates of a slicer, adapted to its version; ``n`` writes numbers."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-    made = Environment(  # noqa: S701 - plain text; XML and JSON are escaped by filters
+    environment = Environment(  # noqa: S701 - plain text; XML and JSON are escaped by filters
         loader=FunctionLoader(partial(template, slicer, version)), undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
-    made.filters |= {"n": number, **filters}
-    return made
+    environment.filters |= {"n": number, **filters}
+    return environment
 
 
 def line_area_mm2(quality: Quality, line_mm: float) -> float:

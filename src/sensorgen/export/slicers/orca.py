@@ -40,24 +40,24 @@ def profiles(printer: Printer, quality: Quality, loads: Mapping[int, ToolLoad]) 
             tower=tower(printer, quality, len(used)), prime_mm3=PRIME_MM3, options=options,
             line_area_mm2=partial(line_area_mm2, quality), per_tool=lambda entry: _texts([entry] * len(tools)),
         )  # fmt: skip
-        found: dict[str, str | list[str]] = json.loads(text)
-        for key in found.keys() & own.keys():
-            old = found[key]
-            found[key] = [own[key]] * len(old) if isinstance(old, list) else own[key]
-        return found
+        settings: dict[str, str | list[str]] = json.loads(text)
+        for key in settings.keys() & own.keys():
+            old = settings[key]
+            settings[key] = [own[key]] * len(old) if isinstance(old, list) else own[key]
+        return settings
 
     process = f"{machine} {quality.name}"
-    made = {
+    presets = {
         f"machine/{machine}.json": preset("machine.json", machine),
         f"process/{process}.json": preset("process.json", process),
     }
     for index, r in used.items():
         name = f"{machine} T{printer.tool_numbers[index]} {r.label}"
-        made[f"filament/{name}.json"] = preset("filament.json", name, r)
+        presets[f"filament/{name}.json"] = preset("filament.json", name, r)
     # What stands in none of them is taken for a setting of the process.
-    known = {key for each in made.values() for key in each}
-    made[f"process/{process}.json"] |= {key: own[key] for key in sorted(own.keys() - known)}
-    return {path: json.dumps(each, indent=4, ensure_ascii=False) + "\n" for path, each in made.items()}
+    known = {key for each in presets.values() for key in each}
+    presets[f"process/{process}.json"] |= {key: own[key] for key in sorted(own.keys() - known)}
+    return {path: json.dumps(each, indent=4, ensure_ascii=False) + "\n" for path, each in presets.items()}
 
 
 @cache

@@ -72,40 +72,33 @@ def run(
     """
     gcode.unlink(missing_ok=True)
     name = Path(command[0]).name
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as output:
         try:
-            code = _wait(command, said, {**os.environ, **(environment or {})}, runner)
+            code = _wait(command, output, {**os.environ, **(environment or {})}, runner)
         except subprocess.TimeoutExpired:
             raise SlicerFailed(
                 f"{name} took more than {runner.time_limit_s:g} s and was ended: slice fewer pieces at once, or give "
-                f"it more time; it last said: {_last_words(said)}"
+                f"it more time; it last said: {_last_words(output)}"
             ) from None
         except OSError as error:
             raise SlicerFailed(f"cannot run {command[0]}: {error.strerror or error}") from None
         if code == NOT_RUN:
-            raise SlicerFailed(f"cannot run {command[0]}: {_last_words(said)}")
+            raise SlicerFailed(f"cannot run {command[0]}: {_last_words(output)}")
         if code != 0:
-            how = (
-                f"failed with exit code {code}"
-                if code > 0
-                else f"was ended by {_SIGNALS.get(-code, f'signal {-code}')}"
-            )
-            raise SlicerFailed(f"{name} {how}: {_last_words(said)}")
+            signalled = f"was ended by {_SIGNALS.get(-code, f'signal {-code}')}"
+            how = f"failed with exit code {code}" if code > 0 else signalled
+            raise SlicerFailed(f"{name} {how}: {_last_words(output)}")
         if not gcode.is_file() or gcode.stat().st_size == 0:
-            raise SlicerFailed(f"{name} ended well but wrote no {gcode}: {_last_words(said)}")
+            raise SlicerFailed(f"{name} ended well but wrote no {gcode}: {_last_words(output)}")
 
 
-def _wait(command: Sequence[str], said: BinaryIO, environment: Mapping[str, str], runner: Runner) -> int:
+def _wait(command: Sequence[str], output: BinaryIO, environment: Mapping[str, str], runner: Runner) -> int:
     """Exit code of a process, which always ends here, together with whatever it started itself."""
     end = time.monotonic() + runner.time_limit_s
     process = subprocess.Popen(  # noqa: S603 - a slicer found by name, with our own arguments
-        on_leash(list(command)),
-        stdin=subprocess.PIPE,
-        stdout=said,
-        stderr=said,
-        env=environment,
+        on_leash(list(command)), stdin=subprocess.PIPE, stdout=output, stderr=output, env=environment,
         start_new_session=True,
-    )
+    )  # fmt: skip
     try:
         while True:
             runner.tick()
@@ -127,11 +120,11 @@ def _wait(command: Sequence[str], said: BinaryIO, environment: Mapping[str, str]
             process.stdin.close()
 
 
-def _last_words(said: BinaryIO) -> str:
+def _last_words(output: BinaryIO) -> str:
     """Errors named by the slicer, or else the end of its output; the rest is licence and progress."""
-    said.seek(max(0, said.seek(0, os.SEEK_END) - _KEPT_BYTES))
-    text = said.read().decode(errors="replace").replace("\t", " ")
+    output.seek(max(0, output.seek(0, os.SEEK_END) - _KEPT_BYTES))
+    text = output.read().decode(errors="replace").replace("\t", " ")
     lines = ["".join(filter(str.isprintable, line)).strip() for line in text.splitlines()]
     errors = [line for line in lines if "error" in line.lower()]
-    kept = [line for line in lines if line and not any(word in line for word in ("[trace]", "[debug]", "[WARNING]"))]
-    return " | ".join((errors or kept)[-KEPT_LINES:]) or "it said nothing"
+    shown = [line for line in lines if line and not any(word in line for word in ("[trace]", "[debug]", "[WARNING]"))]
+    return " | ".join((errors or shown)[-KEPT_LINES:]) or "it said nothing"

@@ -54,8 +54,8 @@ class VersionChange(Strict):
         """The text of the template ``name``, its settings those of this version."""
         lines = []
         for line in text.splitlines():
-            if found := _SETTING.match(line):
-                key, value = found.groups()
+            if setting := _SETTING.match(line):
+                key, value = setting.groups()
                 if key in self.dropped:
                     continue
                 line = f"{self.renamed.get(key, key)} = {self.values.get(key, {}).get(value, value)}"
@@ -72,13 +72,13 @@ def changes(slicer: str) -> dict[Version, VersionChange]:
     BadInput
         A file is not as :class:`VersionChange` has it.
     """
-    found = {}
+    by_version = {}
     for path in (folder() / "versions").glob(f"{slicer}-*.yaml"):
         try:
-            found[parse(path.stem.partition("-")[2])] = checked(VersionChange, yamlfile.read(path))
+            by_version[parse(path.stem.partition("-")[2])] = checked(VersionChange, yamlfile.read(path))
         except BadInput as error:
             raise error.within(str(path)) from None
-    return dict(sorted(found.items()))
+    return dict(sorted(by_version.items()))
 
 
 def folders(slicer: str) -> dict[str, Version]:
@@ -114,16 +114,16 @@ def of_program(slicer: str, program: str) -> Version:
 @cache
 def _said(slicer: str, program: str, _changed_ns: int) -> Version:
     word, pattern = _ASKED[slicer]
-    with tempfile.TemporaryFile() as said:  # a pipe would be waited for as long as a child of its holds it open
+    with tempfile.TemporaryFile() as output:  # a pipe would be waited for as long as a child of its holds it open
         try:
             subprocess.run(  # noqa: S603
-                [program, word], stdout=said, stderr=said, stdin=subprocess.DEVNULL, timeout=_ANSWER_S, check=False
+                [program, word], stdout=output, stderr=output, stdin=subprocess.DEVNULL, timeout=_ANSWER_S, check=False
             )
         except (OSError, subprocess.TimeoutExpired):
             return ()
-        said.seek(0)
-        found = re.search(pattern, said.read().decode("utf-8", "replace"))
-    return parse(found[1]) if found else ()
+        output.seek(0)
+        match = re.search(pattern, output.read().decode("utf-8", "replace"))
+    return parse(match[1]) if match else ()
 
 
 def unknown(title: str, keys: Iterable[str]) -> tuple[Finding, ...]:
@@ -132,11 +132,7 @@ def unknown(title: str, keys: Iterable[str]) -> tuple[Finding, ...]:
         return ()
     return (
         Finding(
-            "11-profile",
-            "warning",
-            "sensor",
-            f"{title} does not know {', '.join(names)}: ignored",
-            "correct the name, or slice with a version that knows the setting",
-            count=len(names),
+            "11-profile", "warning", "sensor", f"{title} does not know {', '.join(names)}: ignored",
+            "correct the name, or slice with a version that knows the setting", count=len(names),
         ),
-    )
+    )  # fmt: skip

@@ -12,8 +12,7 @@ import numpy as np
 from sensorgen.core.errors import BadInput, UnknownName
 from sensorgen.design.tower import Tower
 from sensorgen.export.threemf import core, cura, orca, prusa
-from sensorgen.export.threemf.part import Part, check
-from sensorgen.export.threemf.plate import box_mm, placed
+from sensorgen.export.threemf.part import Part, box_mm, check, placed
 
 __all__ = ["FAMILIES", "Part", "content", "placed", "plate"]
 
@@ -23,13 +22,9 @@ FAMILIES = tuple(_WRITERS)
 
 
 def content(
-    family: str,
-    title: str,
-    parts: Sequence[Part],
-    centre_mm: tuple[float, float],
-    tower: Tower | None = None,
+    family: str, title: str, parts: Sequence[Part], centre_mm: tuple[float, float], tower: Tower | None = None,
     profile: str = "",
-) -> bytes:
+) -> bytes:  # fmt: skip
     """The 3MF of some bodies for one family of slicers.
 
     Parameters
@@ -84,13 +79,9 @@ def content(
 
 
 def plate(
-    family: str,
-    title: str,
-    parts: Sequence[Part],
-    corner_mm: tuple[float, float],
-    tower: Tower | None = None,
+    family: str, title: str, parts: Sequence[Part], corner_mm: tuple[float, float], tower: Tower | None = None,
     profile: str = "",
-) -> bytes:
+) -> bytes:  # fmt: skip
     """The 3MF of a plate with several sensors, each body where it stands.
 
     Parameters

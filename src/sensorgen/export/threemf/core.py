@@ -43,13 +43,9 @@ _ROWS = 1 << 15  # rows of text made at once: some megabytes
 
 
 def model(
-    title: str,
-    metadata: Mapping[str, str],
-    namespaces: Mapping[str, str],
-    parts: Sequence[Part],
-    objects: Iterator[str],
-    shift_mm: NDArray[np.float64],
-) -> Iterator[str]:
+    title: str, metadata: Mapping[str, str], namespaces: Mapping[str, str], parts: Sequence[Part],
+    objects: Iterator[str], shift_mm: NDArray[np.float64],
+) -> Iterator[str]:  # fmt: skip
     """Text of the model file: head, materials, the family's objects, and where the one object stands.
 
     Parameters

@@ -3,11 +3,12 @@
 import html
 import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from sensorgen.core.arrays import Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.design.design import Design
 from sensorgen.export.slicers.loads import load
@@ -115,30 +116,58 @@ def escaped(text: str) -> str:
     return html.escape(text, quote=False).replace('"', "&quot;")
 
 
-def parts_of(design: Design, made: Mapping[str, Mesh]) -> list[Part]:
+def parts_of(design: Design, meshes: Mapping[str, Mesh]) -> list[Part]:
     """Bodies of a design, in the sensor's coordinates.
 
     Parameters
     ----------
     design : Design
         The design.
-    made : mapping of str to Mesh
+    meshes : mapping of str to Mesh
         Mesh of each body, by its name [mm].
     """
-    return [part_of(design, body.name, body.material, made[body.name]) for body in design.printed.bodies]
+    return [part_of(design, body.name, body.material, meshes[body.name]) for body in design.printed.bodies]
 
 
 def part_of(design: Design, name: str, material: str, mesh: Mesh) -> Part:
     """One body, with the tool that the design gives its material."""
-    tool, found = design.tool(material), design.material(material)
+    tool, stuff = design.tool(material), design.material(material)
     settings = volume_settings(design.machine, design.layers, tool, load(design, material))
     if material not in {design.slot(end)[0].name for end in ("top_electrode", "bottom_electrode")}:
         settings["infill_overlap"] = FILM_OVERLAP
-    return Part(
-        name=name,
-        material=found.title,
-        colour=found.colour,
-        extruder=design.machine.slicer_index(tool),
-        mesh=mesh,
-        settings=settings,
-    )
+    extruder = design.machine.slicer_index(tool)
+    return Part(name, stuff.title, stuff.colour, extruder, mesh, settings)
+
+
+def placed(parts: Sequence[Part], centre_mm: tuple[float, float], name: str = "") -> list[Part]:
+    """Bodies of one sensor with the middle of their box over a place of the plate, the lowest point at 0.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        The bodies, in the coordinates of the sensor [mm].
+    centre_mm : (float, float)
+        Where the middle goes [mm].
+    name : str
+        Stands before the names of the bodies, which must differ on the plate.
+
+    Raises
+    ------
+    BadInput
+        No bodies.
+    """
+    if not parts:
+        raise BadInput("no bodies to place: a sensor has at least one")
+    low, high = box_mm(parts)
+    shift_mm = np.array([*centre_mm, 0.0]) - [*((low + high)[:2] / 2), low[2]]
+    lead = f"{name} " if name else ""
+    return [
+        replace(part, name=f"{lead}{part.name}", mesh=replace(part.mesh, vertices_mm=part.mesh.vertices_mm + shift_mm))
+        for part in parts
+    ]
+
+
+def box_mm(parts: Iterable[Part]) -> tuple[Real, Real]:
+    """Lowest and highest corner of the box around bodies, two (3,) arrays [mm]."""
+    ends = [(p.mesh.vertices_mm.min(axis=0), p.mesh.vertices_mm.max(axis=0)) for p in parts]
+    return np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0)

@@ -95,11 +95,11 @@ class Instrument:
 
     def dc_ohm(self, resistance_ohm: float, wires: int | None) -> float | None:
         """Standard uncertainty of a DC resistance [ohm]; None beyond the ranges."""
-        found = next((one for one in self.ranges if abs(resistance_ohm) <= 1.2 * one.ohm), None)
-        if found is None:
+        limits = next((one for one in self.ranges if abs(resistance_ohm) <= 1.2 * one.ohm), None)
+        if limits is None:
             return None
         leads = 0.0 if wires == 4 else self.leads_ohm
-        return (abs(resistance_ohm) * found.reading + found.ohm * found.range + leads) / math.sqrt(3)
+        return (abs(resistance_ohm) * limits.reading + limits.ohm * limits.range + leads) / math.sqrt(3)
 
     def ac(self, quantity: str, value: float, frequency_hz: float, z_ohm: complex) -> float | None:
         """Standard uncertainty of an AC quantity.
@@ -230,8 +230,8 @@ def at_frequency(reading: Reading, frequency_hz: float) -> At:
 
 @cache
 def _all() -> dict[str, Instrument]:
-    made = (parse(file.text(), str(file.path)) for file in packs.files("instruments"))
-    return {one.name: one for one in made}
+    instruments = (parse(file.text(), str(file.path)) for file in packs.files("instruments"))
+    return {one.name: one for one in instruments}
 
 
 def parse(text: str, where: str) -> Instrument:

@@ -121,14 +121,14 @@ def kind(name: str) -> Kind:
     if point is None:
         raise UnknownName("kind of device", name, names())
     try:
-        found = point.load()
+        loaded = point.load()
     except Exception as error:  # whatever somebody else's package makes of it
         raise BadInput(
             f"kind of device {name!r}: {point.value!r} cannot be loaded ({error}); repair or uninstall it"
         ) from None
-    if not isinstance(found, Kind):
+    if not isinstance(loaded, Kind):
         raise BadInput(f"kind of device {name!r}: {point.value!r} is no {Kind.__module__}.Kind; repair or uninstall it")
-    return found
+    return loaded
 
 
 def opened(name: str, address: str, settings: Mapping[str, Any], clock: Clock) -> Device:
@@ -152,8 +152,8 @@ def opened(name: str, address: str, settings: Mapping[str, Any], clock: Clock) -
     DeviceFault
         There is no such line.
     """
-    found = kind(name)
-    return found.open(address, _settings(found, name, settings), clock)
+    of = kind(name)
+    return of.open(address, _settings(of, name, settings), clock)
 
 
 def simulated(name: str, plant: Plant, settings: Mapping[str, Any], clock: Clock) -> Simulated:
@@ -164,15 +164,15 @@ def simulated(name: str, plant: Plant, settings: Mapping[str, Any], clock: Clock
     BadInput
         As :func:`opened`; or the kind has no simulator.
     """
-    found = kind(name)
-    if found.simulate is None:
+    of = kind(name)
+    if of.simulate is None:
         raise BadInput(f"kind of device {name!r} has no simulator")
-    return found.simulate(plant, _settings(found, name, settings), clock)
+    return of.simulate(plant, _settings(of, name, settings), clock)
 
 
-def _settings(found: Kind, name: str, settings: Mapping[str, Any]) -> Strict:
+def _settings(of: Kind, name: str, settings: Mapping[str, Any]) -> Strict:
     try:
-        return checked(found.settings, settings)
+        return checked(of.settings, settings)
     except BadInput as error:
         raise BadInput(f"settings of {name}: {error}") from None
 
@@ -185,15 +185,15 @@ def _installed() -> dict[str, Any]:
         points = list(entry_points(group=GROUP))
     except Exception as error:  # whatever a damaged package makes of it
         raise BadInput(f"entry points of installed packages cannot be read ({error}); repair or uninstall it") from None
-    found: dict[str, Any] = {}
+    by_name: dict[str, Any] = {}
     for point in points:
-        other = found.get(point.name)
+        other = by_name.get(point.name)
         if point.name in _KINDS or (other and other.value != point.value):
             raise BadInput(
                 f"entry point {point.value!r}: there is another kind of device {point.name!r}; uninstall one"
             )
-        found[point.name] = point
-    return found
+        by_name[point.name] = point
+    return by_name
 
 
 def _at_port(
@@ -204,8 +204,8 @@ def _at_port(
     from sensorgen.measure.lab.port import SimulatedPort
 
     def simulate(plant: Plant, given: Any, clock: Clock) -> Simulated:
-        made = simulator(plant, given)
-        return Simulated(driver(SimulatedPort(made, clock), clock, given), made)
+        far_end = simulator(plant, given)
+        return Simulated(driver(SimulatedPort(far_end, clock), clock, given), far_end)
 
     return Kind(role, settings, lambda address, given, clock: driver(port(address, given), clock, given), simulate)
 
@@ -241,8 +241,8 @@ def _handyscope() -> Kind:
     from sensorgen.measure.virtual.handyscope import Analyser, PhasorMeter
 
     def simulate(plant: Plant, given: HandyscopeSettings, clock: Clock) -> Simulated:
-        made = PhasorMeter(plant, clock, Analyser(given.feedback_ohm, given.feedback_f), range_v=given.range_v)
-        return Simulated(made, made)
+        far_end = PhasorMeter(plant, clock, Analyser(given.feedback_ohm, given.feedback_f), range_v=given.range_v)
+        return Simulated(far_end, far_end)
 
     def real(address: str, given: HandyscopeSettings, clock: Clock) -> Device:
         gains = handyscope.gains(Path(given.gains)) if given.gains else ()
@@ -253,21 +253,21 @@ def _handyscope() -> Kind:
 
 
 def _scpi(name: str) -> Kind:
-    from sensorgen.measure.lab import lcr_meter, multimeter, port
+    from sensorgen.measure.lab import meters, port
     from sensorgen.measure.virtual import scpi
 
     def at(address: str, _: Strict) -> port.VisaPort:
         return port.VisaPort(address)
 
-    model = {"hp-4284a": lcr_meter.HP_4284A, "keysight-e4980a": lcr_meter.E4980A}.get(name)
+    model = {"hp-4284a": meters.HP_4284A, "keysight-e4980a": meters.E4980A}.get(name)
     if model:
         return _at_port(
-            "impedance", lcr_meter.Settings, lambda line, clock, given: lcr_meter.LcrMeter(line, clock, model, given),
+            "impedance", meters.LcrSettings, lambda line, clock, given: meters.LcrMeter(line, clock, model, given),
             at, lambda plant, _: scpi.SimulatedLcrMeter(plant, name),
         )  # fmt: skip
     key = {"hp-34401a": "34401A", "keithley-2000": "MODEL 2000"}[name]
     return _at_port(
-        "meter", NoSettings, lambda line, *_: multimeter.Multimeter(line, {key: multimeter.KNOWN[key]}), at,
+        "meter", NoSettings, lambda line, *_: meters.Multimeter(line, {key: meters.KNOWN[key]}), at,
         lambda plant, _: scpi.SimulatedMultimeter(plant, name),
     )  # fmt: skip
 

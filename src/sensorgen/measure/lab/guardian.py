@@ -239,9 +239,9 @@ class Rescue:
 
     def _opened(self, role: str, device: Device) -> Any:
         """A driver on a line that is opened anew; None where it cannot be in time, as while a dying run has it."""
-        made: list[Any] = []
-        self._tried(role, lambda: made.append(rigs.opened(device, self._clock)))
-        return made[0] if made else None
+        drivers: list[Any] = []
+        self._tried(role, lambda: drivers.append(rigs.opened(device, self._clock)))
+        return drivers[0] if drivers else None
 
     def _tried(self, role: str, call: Callable[[], object]) -> bool:
         """Test whether a call worked, tried again until the time is over."""

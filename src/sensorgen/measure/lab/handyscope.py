@@ -34,7 +34,7 @@ from sensorgen.core.records import Strict, checked
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings, WrongDevice
 from sensorgen.measure.signal import waveform
-from sensorgen.measure.signal.multisine import multisine
+from sensorgen.measure.signal.waveform import multisine
 
 RATE_HZ = 1e6
 DEMO = "demo"
@@ -235,8 +235,8 @@ class Handyscope:
         lost = self._missing(heard=bool(parts))
         if parts and not self._settled:
             self._settled, parts = True, parts[1:]
-        found, gap_s = Readings.joined(parts, len(self._tones), lost), lost * self._window / RATE_HZ
-        return replace(found, time_s=found.time_s + gap_s)
+        readings, gap_s = Readings.joined(parts, len(self._tones), lost), lost * self._window / RATE_HZ
+        return replace(readings, time_s=readings.time_s + gap_s)
 
     def stop(self) -> None:
         """End the measurement and switch the generator off."""

@@ -9,14 +9,12 @@ import numpy as np
 
 from sensorgen.core.arrays import Complex
 from sensorgen.measure.lab.clock import Clock
-from sensorgen.measure.lab.controls import Controls
 from sensorgen.measure.lab.devices import DeviceFault, Extension, Place
 from sensorgen.measure.lab.experiment import Experiment
-from sensorgen.measure.lab.live import Sample
+from sensorgen.measure.lab.live import Controls, Sample
 from sensorgen.measure.lab.recorder import Recorder
 from sensorgen.measure.lab.safety import UP_MM, Ended, RunDevices
-from sensorgen.measure.lab.sweeps import Sweeps
-from sensorgen.measure.lab.watch import Watch
+from sensorgen.measure.lab.watch import Sweeps, Watch
 
 PERIOD_S = 0.01
 _STAGE, _RIG_ROW, _VIEW = 10, 4, 5  # periods from one reading, row or picture to the next
@@ -271,8 +269,8 @@ class Loop:
         stop, now = self.experiment.stop, self.clock.now()
         if stop.minutes and now - self.begun_s > stop.minutes * 60:
             raise Ended("rule", f"stop.minutes: {stop.minutes:g} min have passed")
-        found = self.watch.circuit()
-        if found == "open":
+        circuit = self.watch.circuit()
+        if circuit == "open":
             raise DeviceFault("specimen: open circuit; check the cables to it")
-        if found and stop.short:
+        if circuit and stop.short:
             raise Ended("rule", "stop.short: at the lowest frequency the specimen conducts")

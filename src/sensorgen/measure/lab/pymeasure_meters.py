@@ -20,7 +20,7 @@ import numpy as np
 from sensorgen.core.arrays import Real
 from sensorgen.core.errors import NotInstalled, OutOfRange, UnknownName
 from sensorgen.core.records import Line, Strict
-from sensorgen.measure.lab import scpi
+from sensorgen.measure.lab import meters
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import PYMEASURE, DeviceFault, Identity, Readings, Role, WrongDevice
 from sensorgen.measure.lab.port import faults
@@ -51,17 +51,17 @@ def roles() -> dict[str, tuple[Role, Any]]:
         from pymeasure import instruments
     except ImportError:
         raise NotInstalled("meters of PyMeasure need it: pip install 'sensorgen[pymeasure]'") from None
-    found: dict[str, tuple[Role, Any]] = {}
+    by_name: dict[str, tuple[Role, Any]] = {}
     for package in pkgutil.iter_modules(instruments.__path__, f"{instruments.__name__}."):
         with suppress(Exception), warnings.catch_warnings(action="ignore"):  # a maker whose own library is missing
             kinds = vars(import_module(package.name)).items()
             classes = ((name, kind) for name, kind in kinds if isinstance(kind, type))
-            found |= {
+            by_name |= {
                 PYMEASURE + name: (as_what, kind)
                 for name, kind in classes
                 if issubclass(kind, instruments.Instrument) and (as_what := _role(dir(kind)))
             }
-    return dict(sorted(found.items()))
+    return dict(sorted(by_name.items()))
 
 
 def _role(names: list[str]) -> Role | None:
@@ -143,7 +143,7 @@ class _Meter:
             self._meter = type(model, (self._kind,), {"write": write})(self._address)
             if not self.name:
                 self._ask(self._meter)
-        return scpi.identity(model, self.name.rstrip(")"))
+        return meters.identity(model, self.name.rstrip(")"))
 
     def _ask(self, meter: Any) -> None:
         """Ask a meter that was sent nothing yet."""
@@ -153,21 +153,21 @@ class _Meter:
             self.name = model
             return
         self._kind.write(meter, "*IDN?")
-        said = str(meter.read()).strip()
-        if not self._is(said):
-            raise WrongDevice(f"{self._address} is {said!r:.80}; expected {model}, or name yours in settings.model")
-        self.name = f"{model} ({said})"
+        answer = str(meter.read()).strip()
+        if not self._is(answer):
+            raise WrongDevice(f"{self._address} is {answer!r:.80}; expected {model}, or name yours in settings.model")
+        self.name = f"{model} ({answer})"
 
     def _scpi(self) -> bool:
         from pymeasure.instruments import SCPIMixin
 
         return issubclass(self._kind, SCPIMixin)
 
-    def _is(self, said: str) -> bool:
+    def _is(self, answer: str) -> bool:
         """Test whether an answer to ``*IDN?`` is that of the class: its maker, and the number in its name."""
         maker = self._kind.__module__.split(".")[2]
         number = self._settings.model or re.sub(r"\D*", "", self._kind.__name__, count=1)
-        return said.lower().startswith(_HP if maker in _HP else maker) and number in "".join(said.split(",")[1:2])
+        return answer.lower().startswith(_HP if maker in _HP else maker) and number in "".join(answer.split(",")[1:2])
 
     def close(self) -> None:
         """Give the connection back."""

@@ -137,14 +137,14 @@ class Recorder:
         self.journal = Journal(folder / JOURNAL, clock)
         self._synced = SyncedFiles((self.impedance, self.rig, self.journal.file))
 
-    def readings(self, found: Readings) -> None:
+    def readings(self, new: Readings) -> None:
         """Append impedances that came just now."""
-        if not len(found.time_s):
+        if not len(new.time_s):
             return
         stamp = f"{self._clock.epoch():.6f}"
-        valid = [bool(np.isfinite(row).all()) for row in found.impedance_ohm]
-        columns: list[list[float]] = np.ascontiguousarray(found.impedance_ohm).view(float).tolist()
-        rows = zip(found.time_s.tolist(), columns, found.clipped.tolist(), valid, strict=True)
+        valid = [bool(np.isfinite(row).all()) for row in new.impedance_ohm]
+        columns: list[list[float]] = np.ascontiguousarray(new.impedance_ohm).view(float).tolist()
+        rows = zip(new.time_s.tolist(), columns, new.clipped.tolist(), valid, strict=True)
         self.impedance.write(
             "".join(
                 f"{time:.9g},{stamp},{','.join([f'{part:.9g}' for part in values])},{clipped:d},{good:d}\n"
@@ -286,9 +286,9 @@ def log_attempts(log: "Log", folder: Path, clock: Clock) -> "list[BenchRun]":
     journal = Journal(folder / JOURNAL, clock)
     try:
         for attempt in waiting:
-            found, problem = _logged(log, folder, attempt)
-            rows += found
-            journal.note("logged", attempt=attempt["attempt"], rows=[row.number for row in found], problem=problem)
+            new, problem = _logged(log, folder, attempt)
+            rows += new
+            journal.note("logged", attempt=attempt["attempt"], rows=[row.number for row in new], problem=problem)
     finally:
         journal.file.close()
     return rows

@@ -130,11 +130,11 @@ class SerialLink:
             line = self._port.read_until(b"\n", left).decode("ascii", "replace").strip()
             if line != "ok":
                 lines.append(line)
-            elif _NAME in (said := " ".join(lines)):
+            elif _NAME in (answer := " ".join(lines)):
                 lines = []
                 self._identifying -= 1
                 if not self._identifying:
-                    return said
+                    return answer
         raise DeviceFault(
             f"{self.address}, asked M115, answers {' '.join(lines)!r:.80}; check cable, power and baud rate"
         )
@@ -313,12 +313,12 @@ class WebLink:
 
     def _json(self, text: str) -> dict[str, Any]:
         try:
-            found = json.loads(text)
+            answer = json.loads(text)
         except ValueError:
-            found = None
-        if not isinstance(found, dict):
+            answer = None
+        if not isinstance(answer, dict):
             raise DeviceFault(f"{self.address} answers {text!r:.60}; expected JSON")
-        return found
+        return answer
 
 
 class RepRapStage:
@@ -349,14 +349,14 @@ class RepRapStage:
         WrongDevice
             It is no RepRapFirmware, or older than 3, which has no object model.
         """
-        said = self._link.identify()
-        fields = said.partition(_NAME)[2]
+        answer = self._link.identify()
+        fields = answer.partition(_NAME)[2]
         name, _, rest = fields.partition("FIRMWARE_VERSION:")
         version, _, board = rest.partition("ELECTRONICS:")
         major = version.strip().partition(".")[0]
         if "RepRapFirmware" not in name or not (major.isdecimal() and int(major) >= 3):
             raise WrongDevice(
-                f"{self._link.address} answers M115 with {said!r:.100}; expected RepRapFirmware 3 or later"
+                f"{self._link.address} answers M115 with {answer!r:.100}; expected RepRapFirmware 3 or later"
             )
         self._known = True
         return Identity(f"{name.strip()} on {board.split('FIRMWARE_DATE')[0].strip()}", "", version.split()[0])

@@ -11,10 +11,10 @@ from sensorgen.measure.lab import catalogue
 from sensorgen.measure.lab.clock import Clock, RealClock
 from sensorgen.measure.lab.devices import Meter
 from sensorgen.measure.lab.experiment import Device, Devices, Experiment
-from sensorgen.measure.lab.multimeter import Multimeter
+from sensorgen.measure.lab.meters import Multimeter
 from sensorgen.measure.lab.port import VisaPort
 from sensorgen.measure.lab.safety import RunDevices
-from sensorgen.measure.virtual import faults, mechanics, rig
+from sensorgen.measure.virtual import faults, mechanics
 
 _HEARD = 1000  # messages that a simulator remembers
 ROLES = ("actuator", "stage", "impedance")
@@ -50,11 +50,11 @@ def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Run
         As :func:`real`; a virtual specimen that cannot be; a fault of a device that is not in use; a kind without a
         simulator.
     """
-    virtual = experiment.virtual or rig.VirtualSpecimen()
+    virtual = experiment.virtual or mechanics.VirtualSpecimen()
     devices = experiment.devices or SIMULATED
     with within("virtual"):
         _strike(virtual, devices)
-        plant = rig.rig_of(virtual, design, experiment.pressing.length_mm * 1e-3)
+        plant = mechanics.rig_of(virtual, design, experiment.pressing.length_mm * 1e-3)
         plant.specimen.blank  # noqa: B018 - solved now: one that cannot be is refused before the run begins
 
     def made(device: Device) -> Any:
@@ -71,14 +71,14 @@ def simulated(experiment: Experiment, design: Design, clock: Clock) -> tuple[Run
     return RunDevices(**_drivers(devices, made)), plant
 
 
-def _drivers(devices: Devices, made: Callable[[Device], Any]) -> dict[str, Any]:
+def _drivers(devices: Devices, driver_of: Callable[[Device], Any]) -> dict[str, Any]:
     """Drivers by role; where one cannot be made, the others are closed."""
     drivers: dict[str, Any] = {}
     try:
         for role in ROLES:
             with within(f"devices.{role}"):
                 _has_role(role, getattr(devices, role))
-                drivers[role] = made(getattr(devices, role))
+                drivers[role] = driver_of(getattr(devices, role))
     except BaseException:
         for driver in drivers.values():
             driver.close()
@@ -86,7 +86,7 @@ def _drivers(devices: Devices, made: Callable[[Device], Any]) -> dict[str, Any]:
     return drivers
 
 
-def _strike(virtual: rig.VirtualSpecimen, devices: Devices) -> None:
+def _strike(virtual: mechanics.VirtualSpecimen, devices: Devices) -> None:
     """Refuse planted faults of devices that are not in use."""
     struck = {"rig", *(_STRIKES.get(getattr(devices, role).kind, "") for role in ROLES)}
     for one in virtual.faults:

@@ -17,13 +17,12 @@ from sensorgen.core.errors import BadInput, SensorgenError, within
 from sensorgen.core.version import __version__
 from sensorgen.design.design import Design, load, make
 from sensorgen.measure.lab import experiment as experiments
-from sensorgen.measure.lab import plans, preflight, press, recorder, safety
+from sensorgen.measure.lab import press, recorder, safety
 from sensorgen.measure.lab.clock import Clock, SimulatedClock
-from sensorgen.measure.lab.controls import Controls
 from sensorgen.measure.lab.devices import Identity, SelfLifting
-from sensorgen.measure.lab.experiment import Experiment, Next
+from sensorgen.measure.lab.experiment import Choice, DonePress, Experiment, Next, NextPress, PlannedPress
+from sensorgen.measure.lab.live import Controls
 from sensorgen.measure.lab.loop import Alive, Loop, Paused, Predicted, RunView
-from sensorgen.measure.lab.plans import Choice, DonePress, NextPress, PlannedPress
 from sensorgen.measure.lab.recorder import Recorder, RunFolder
 from sensorgen.measure.lab.safety import Ended, RunDevices
 from sensorgen.measure.lab.watch import Watch
@@ -145,25 +144,25 @@ def planned(experiment: Experiment, log: "Log | None" = None) -> PlannedRun:
         notes.specimen(experiment.specimen, log)
     length = experiment.length_mm or _length_mm(design_of(experiment, log))
     experiments.check(experiment, length, 0.0)  # its places, before presses are made of them
-    steps = plans.steps(experiment, length)
+    steps = experiments.steps(experiment, length)
     holds = [part.content.hold_s[1] for part in experiment.plan if isinstance(part.content, Next)]
-    seconds = plans.seconds(steps, max(holds, default=0.0))
+    seconds = experiments.seconds(steps, max(holds, default=0.0))
     experiments.check(experiment, length, seconds)
     return PlannedRun(experiment, length, tuple(steps), seconds)
 
 
 def design_of(experiment: Experiment, log: "Log | None") -> Design | None:
     """Design of the specimen: the virtual one's own, else that in the log, else the one that its name stands for."""
-    from sensorgen.measure.log import batches
+    from sensorgen.measure.log import prints
 
     if experiment.virtual and experiment.virtual.design:
         named = experiment.virtual.design
         with within("virtual.design"):
             return load(Path(named)) if Path(named).suffix else make({"shape": named})
     design_id, _ = notes.design_fields(experiment.specimen, log)
-    found = batches.designs(log).get(design_id) if log else None
+    logged = prints.designs(log).get(design_id) if log else None
     try:
-        return found or notes.design_of(experiment.specimen)
+        return logged or notes.design_of(experiment.specimen)
     except BadInput:
         return None
 
@@ -257,10 +256,10 @@ class _Attempt:
         tones = np.array(experiment.readout.tones_hz)
         stem = f"{'simulated' if self.simulated else 'run'}-{self.folder.name}-{self.number}"
         recorder.trim(self.folder / recorder.JOURNAL)
-        kept = Recorder(self.folder, stem, tones, self.clock)
-        self._begin(kept, stem)
+        recording = Recorder(self.folder, stem, tones, self.clock)
+        self._begin(recording, stem)
         loop = Loop(
-            self.rig, self.clock, kept, experiment, controls, Watch(tones), view, guardian, predicted,
+            self.rig, self.clock, recording, experiment, controls, Watch(tones), view, guardian, predicted,
             steps=len(self.plan.steps),
         )  # fmt: skip
         fault: BaseException | None = None
@@ -279,16 +278,16 @@ class _Attempt:
             problems += safety.close(self.rig)
             if end == "done" and problems:
                 end, reason = "fault", f"{reason}, but at the end {problems[0]}"
-        found = self._ended(loop, kept, end, reason, up, problems)
+        outcome = self._ended(loop, recording, end, reason, up, problems)
         if fault:
             raise fault
-        return found
+        return outcome
 
-    def _begin(self, kept: Recorder, stem: str) -> None:
+    def _begin(self, recording: Recorder, stem: str) -> None:
         experiment = self.plan.experiment
         words = ["simulated"] if self.simulated else []
         words += [f"run {self.folder.name}, attempt {self.number}", *filter(None, [experiment.remark])]
-        kept.journal.note(
+        recording.journal.note(
             "begun", attempt=self.number, stem=stem, specimen=experiment.specimen, simulated=self.simulated,
             remark="; ".join(words), version=__version__, numpy=np.__version__,
             experiment=experiment.model_dump(mode="json", exclude_unset=True), length_mm=self.plan.length_mm,
@@ -297,7 +296,7 @@ class _Attempt:
 
     def _worked(self, loop: Loop, listening: ExitStack) -> tuple[str, str]:
         """All of the run, but for its end."""
-        self.identities = preflight.identified(self.rig)
+        self.identities = press.identified(self.rig)
         loop.recorder.journal.note("identified", **{role: asdict(who) for role, who in self.identities.items()})
         if not self.confirm(self.plan, self.identities):
             raise Ended("abort", "not confirmed; nothing has moved")
@@ -315,7 +314,7 @@ class _Attempt:
         experiment = self.plan.experiment
         low, high = self._places_mm
         middle = experiment.approach.place_mm
-        preflight.prepared(loop, (low + high) / 2 if middle is None else middle)
+        press.prepared(loop, (low + high) / 2 if middle is None else middle)
         for step in self.plan.steps:
             loop.step = step.number
             if step.number not in self.done and not self._step(loop, step):
@@ -324,7 +323,7 @@ class _Attempt:
             if most and loop.presses >= most and self.done < {each.number for each in self.plan.steps}:
                 raise Ended("rule", f"stop.presses: {most} presses are done")
         loop.message = "last rest"
-        loop.wait(plans.AVERAGED_S)
+        loop.wait(experiments.AVERAGED_S)
         return "done", "all presses are done"
 
     @property
@@ -367,14 +366,14 @@ class _Attempt:
         interval = self.plan.experiment.stop.interval
         if interval and choice.interval <= interval:
             return None
-        made = plans.chosen(step, choice, self.plan.experiment.approach)
+        next_one = experiments.chosen(step, choice, self.plan.experiment.approach)
         experiments.check_press(
-            self.plan.experiment, max(made.force_n, made.peak_n), made.place_mm, self.plan.length_mm
+            self.plan.experiment, max(next_one.force_n, next_one.peak_n), next_one.place_mm, self.plan.length_mm
         )  # fmt: skip
-        return made
+        return next_one
 
     def _ended(
-        self, loop: Loop, kept: Recorder, end: str, reason: str, up: bool, problems: tuple[str, ...]
+        self, loop: Loop, recording: Recorder, end: str, reason: str, up: bool, problems: tuple[str, ...]
     ) -> RunResult:
         """Close the files, log them, and tell."""
         watch = loop.watch
@@ -382,12 +381,14 @@ class _Attempt:
                   "late periods": loop.late}  # fmt: skip
         failed = list(problems)
         try:
-            kept.state(0.0, loop.wanted_mm if isfinite(loop.wanted_mm) else 0.0, float("nan"), _error_of(end, reason))
-            kept.journal.note("ended", attempt=self.number, end=end, reason=reason, tip_up=up, problems=problems,
+            recording.state(
+                0.0, loop.wanted_mm if isfinite(loop.wanted_mm) else 0.0, float("nan"), _error_of(end, reason)
+            )
+            recording.journal.note("ended", attempt=self.number, end=end, reason=reason, tip_up=up, problems=problems,
                               counts=counts)  # fmt: skip
         except SensorgenError as error:
             failed.append(str(error))
-        unkept = kept.close()
+        unkept = recording.close()
         rows: list[BenchRun] = []
         try:
             rows = recorder.log_attempts(self.log, self.folder, self.clock)
@@ -436,11 +437,11 @@ def _numbers(values: Real) -> list[float] | None:
 def _pressed(before: RunFolder, steps: Sequence[PlannedPress]) -> list[DonePress]:
     """Presses of earlier attempts, for the choice of further ones."""
     by_number = {step.number: step for step in steps}
-    found = []
+    presses = []
     for event in before.of("done"):
         step = by_number.get(event["step"])
         if step and all(event[name] for name in ("before_ohm", "pressed_ohm", "noise")):
             values = {name: event[name] for name in ("place_mm", "force_n", "peak_n", "hold_s")}
             at_rest, after = (np.array(event[name]).view(complex) for name in ("before_ohm", "pressed_ohm"))
-            found.append(DonePress(replace(step, **values), at_rest, after, np.array(event["noise"])))
-    return found
+            presses.append(DonePress(replace(step, **values), at_rest, after, np.array(event["noise"])))
+    return presses

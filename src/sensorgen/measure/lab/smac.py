@@ -367,10 +367,10 @@ class SmacActuator:
             raise DeviceFault(f"actuator at {self._port.address} is off by itself: status word 0x{status:04X}")
 
     def _taken(self, wanted: Iterable[tuple[int, int]], values: Iterable[int]) -> None:
-        for (what, value), found in zip(wanted, values, strict=True):
-            if found != value:
+        for (what, value), answer in zip(wanted, values, strict=True):
+            if answer != value:
                 raise DeviceFault(
-                    f"actuator at {self._port.address} did not take object 0x{what:X}: set {value}, now {found}"
+                    f"actuator at {self._port.address} did not take object 0x{what:X}: set {value}, now {answer}"
                 )
 
     def _configure(self, pairs: list[tuple[int, int]]) -> None:

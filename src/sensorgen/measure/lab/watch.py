@@ -1,6 +1,7 @@
 """Watch the impedances of a run: means at rest and under a press, drift, short and open circuits, silence."""
 
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import nan
 
@@ -9,6 +10,40 @@ import numpy as np
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.measure.lab.devices import DeviceFault, Readings
 from sensorgen.measure.signal.presses import WINDOW_S
+
+
+@dataclass
+class Sweeps:
+    """Rows with some frequencies missing are put together; whole rows, and those without any number, pass as they are.
+
+    A row of several has the mean of their times; it waits until each of its frequencies was measured.
+    """
+
+    _row: Complex | None = None
+    _times: list[float] = field(default_factory=list)
+    _clipped: bool = False
+
+    def whole(self, readings: Readings) -> Readings:
+        """Rows that are whole now."""
+        known = np.isfinite(readings.impedance_ohm)
+        if (known.all(axis=1) | ~known.any(axis=1)).all():
+            return readings
+        rows = zip(readings.time_s.tolist(), readings.impedance_ohm, readings.clipped.tolist(), strict=True)
+        whole = [row for each in rows for row in self._taken(*each)]
+        return Readings.joined(whole, readings.impedance_ohm.shape[1], readings.lost)
+
+    def _taken(self, time_s: float, row: Complex, clipped: bool) -> Iterator[Readings]:
+        known = np.isfinite(row)
+        if not known.all() and known.any():
+            self._row = row if self._row is None else np.where(known, row, self._row)
+            self._times.append(time_s)
+            self._clipped |= clipped
+            if not np.isfinite(self._row).all():
+                return
+            time_s, row, clipped = float(np.mean(self._times)), self._row, self._clipped
+            self._row, self._times, self._clipped = None, [], False
+        yield Readings(np.array([time_s]), row[None], np.array([clipped]))
+
 
 SILENT_S = 5.0  # without a sound reading, a fault
 _OPEN_F = 0.3e-12  # less than any specimen with its leads
@@ -61,7 +96,7 @@ class Watch:
     def __post_init__(self) -> None:
         self.latest_ohm = np.full(len(self.tones_hz), complex(nan, nan))
 
-    def take(self, found: Readings, now_s: float) -> None:
+    def take(self, readings: Readings, now_s: float) -> None:
         """Take readings that came just now.
 
         Raises
@@ -69,20 +104,20 @@ class Watch:
         DeviceFault
             No sound reading for :data:`SILENT_S`.
         """
-        sound = np.isfinite(found.impedance_ohm).all(axis=1) & (found.impedance_ohm != 0).all(axis=1)
+        sound = np.isfinite(readings.impedance_ohm).all(axis=1) & (readings.impedance_ohm != 0).all(axis=1)
         self.count += len(sound)
-        self.lost += found.lost
-        self.clipped += int(np.count_nonzero(found.clipped))
+        self.lost += readings.lost
+        self.clipped += int(np.count_nonzero(readings.clipped))
         self.invalid += int(np.count_nonzero(~sound))
-        self._course.extend(found.impedance_ohm[sound])
-        for row in found.impedance_ohm[sound & ~found.clipped]:
+        self._course.extend(readings.impedance_ohm[sound])
+        for row in readings.impedance_ohm[sound & ~readings.clipped]:
             self.latest_ohm = row
             self._recent.append((now_s, row))
             self.sound_s = now_s
         while self._recent and self._recent[0][0] < now_s - WINDOW_S:
             self._recent.popleft()
         if now_s - self.sound_s > SILENT_S:
-            what = "clipped" if found.clipped.any() else "no"
+            what = "clipped" if readings.clipped.any() else "no"
             raise DeviceFault(f"impedance meter: {what} readings for {SILENT_S:g} s; check cables, range and specimen")
 
     def circuit(self) -> str:

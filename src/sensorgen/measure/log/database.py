@@ -2,21 +2,182 @@
 
 A commit is on the disk before it returns (WAL, ``synchronous=FULL``). A new file is completed beside its path and then
 linked there, so that two programs that start together share one log, and a killed program leaves no incomplete log.
+A new file takes the same steps as an old one: tables of versions 1 and 2 become records, row by row.
 """
 
+import heapq
+import json
 import os
+import re
 import shutil
 import sqlite3
 import struct
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
+from datetime import UTC, datetime
+from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 from sensorgen.core.errors import BadInput, SensorgenError, Unwritable
 from sensorgen.core.files import part_of, remove_stale_parts, sync_folder
-from sensorgen.measure.log import file_system, migration
-from sensorgen.measure.log.schema import APPLICATION_ID, STEPS, VERSION
+from sensorgen.measure.log import chain
+from sensorgen.measure.log.chain import Record
+from sensorgen.measure.log.entries import INDEXED, KINDS, Migration, columns, encode, indexed
+
+APPLICATION_ID = 0x53474C47  # in the header of the file: "SGLG"
+
+
+def _step(file: str, *tables: str) -> tuple[str, ...]:
+    """Statements of a file, and triggers that refuse to change or delete a row of tables, for every program.
+
+    SQLite keeps the text of a statement, spaces included, and a log is checked by it: never change a file.
+    """
+    statements = (files(__package__) / file).read_text("utf-8").split(";")[:-1]
+    triggers = (
+        f"CREATE TRIGGER {table}_no_{event.lower()} BEFORE {event} ON {table} BEGIN "
+        "SELECT RAISE(ABORT, 'nothing in the log is changed or taken out: log a correction'); END"
+        for table in tables
+        for event in ("UPDATE", "DELETE")
+    )
+    return (*statements, *triggers)
+
+
+STEPS = (  # migrations from each version to the next
+    _step("version1.sql", "specimen", "reading"),
+    _step("version2.sql", "raw_file", "batch", "print", "bench_run", "prediction"),
+    _step("version3.sql", "record"),
+)
+VERSION = len(STEPS)
+_COLUMNS = ("sequence", "id", "parents", "kind", "version", "logged_at", "content", "number", *INDEXED)
+_INSERT = f"INSERT INTO record ({', '.join(_COLUMNS)}) VALUES ({', '.join('?' * len(_COLUMNS))})"  # noqa: S608
+
+
+def insert(connection: sqlite3.Connection, record: Record, sequence: int, number: int | None) -> None:
+    """Store a record with its number among all, and among its kind."""
+    of = (record.id, ",".join(record.parents), record.kind, record.version, record.logged_at, record.content)
+    connection.execute(_INSERT, [sequence, *of, number, *indexed(record.content)])
+
+
+_TABLES = ("raw_file", "batch", "print", "reading", "bench_run", "prediction")  # a row before those that refer to it
+_DROPPED = ("prediction", "bench_run", "print", "batch", "reading", "raw_file", "specimen")
+_TIME = re.compile(r"\S+")
+
+
+def to_records(connection: sqlite3.Connection, version: int) -> None:
+    """Within a transaction: keep each row of each table as a record, in the order of their times, and drop the tables.
+
+    Nothing is judged here: a row that cannot be read stays what it is.
+
+    Parameters
+    ----------
+    connection : sqlite3.Connection
+        Of a log with tables of version 2 and those of version 3, which are empty.
+    version : int
+        Of the file before.
+    """
+    present = {name for (name,) in connection.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")}
+    if not present.issuperset(_DROPPED):
+        return
+    now = datetime.now(UTC).isoformat(timespec="milliseconds")
+    head, sequence = "", 0
+    rows = heapq.merge(*(_rows(connection, table) for table in _TABLES), key=lambda row: row[0])
+    for logged_at, table, number, content in rows:
+        at = logged_at if _TIME.fullmatch(logged_at) else now
+        head, sequence = _append(connection, head, sequence, table, at, content, number)
+    if sequence:
+        content = encode(Migration(uid="", version=version, rows=sequence))
+        head, sequence = _append(connection, head, sequence, "migration", now, content, 1)
+        connection.execute("INSERT INTO head VALUES (1, ?, ?)", [sequence, head])
+    for table in _DROPPED:
+        connection.execute(f"DROP TABLE {table}")
+
+
+def _append(
+    connection: sqlite3.Connection, head: str, sequence: int, kind: str, logged_at: str, content: str, number: int
+) -> tuple[str, int]:
+    record = chain.made([head] if head else [], kind, 1, logged_at, content)
+    insert(connection, record, sequence + 1, number)
+    return record.id, sequence + 1
+
+
+def _rows(connection: sqlite3.Connection, table: str) -> Iterator[tuple[str, str, int, str]]:
+    """Time, table, number and content of the rows of a table."""
+    joined = "NATURAL JOIN specimen" if "specimen" in columns(KINDS[table]) else ""
+    cursor = connection.cursor()
+    cursor.row_factory = sqlite3.Row
+    rows = cursor.execute(f"SELECT * FROM {table} {joined} ORDER BY number")  # noqa: S608
+    for number, row in enumerate(rows, 1):
+        yield str(row["logged_at"]), table, number, _content(table, row)
+
+
+def _content(table: str, row: Any) -> str:
+    kind = KINDS[table]
+    parts = []
+    for name, annotation in columns(kind).items():
+        if name not in row.keys() or name in ("number", "logged_at") or row[name] is None:  # noqa: SIM118 - sqlite3.Row
+            continue
+        value: object = row[name]
+        if annotation == bool | None and value in (0, 1):
+            value = bool(value)
+        listed = annotation in (tuple[float, ...], tuple[str, ...]) and _is_list(value)
+        if value in ("", "[]"):
+            continue
+        parts.append(f'"{name}":{value if listed else json.dumps(value, ensure_ascii=False)}')
+    return f"{{{','.join(parts)}}}"
+
+
+def _is_list(text: object) -> bool:
+    try:
+        return isinstance(json.loads(str(text)), list)
+    except (ValueError, RecursionError):
+        return False
+
+
+# Types in /proc/self/mountinfo: shares, and folders of another machine or program by FUSE; fuseblk is a local disk.
+_SHARED = (
+    "nfs", "nfs4", "cifs", "smb3", "smbfs", "ncpfs", "afs", "9p", "vboxsf", "vmhgfs", "prl_fs", "ceph", "glusterfs",
+    "lustre", "gpfs", "ocfs2", "gfs2", "davfs", "fuse",
+)  # fmt: skip
+_REMOTE_DRIVE = 4  # GetDriveTypeW of Windows
+
+
+def without_locks(path: Path) -> str:
+    """Name of the file system of a path where it is shared, so that SQLite's locks may not work; else "".
+
+    Parameters
+    ----------
+    path : Path
+        Need not exist. On systems other than Linux and Windows always "".
+    """
+    if sys.platform == "win32":
+        return _windows(path)
+    try:
+        mounts = Path("/proc/self/mountinfo").read_text("utf-8", "surrogateescape").splitlines()
+    except OSError:  # not Linux
+        return ""
+    real = os.path.realpath(path.parent)
+    found = ("", "")
+    for line in mounts:
+        before, _, after = line.partition(" - ")
+        point = before.split()[4].encode("utf-8", "surrogateescape").decode("unicode_escape")
+        if real == point or real.startswith(point.rstrip("/") + "/"):
+            found = max(found, (point, after.split()[0]), key=lambda mount: len(mount[0]))
+    kind = found[1]
+    return f"{kind} at {found[0]}" if kind.partition(".")[0] in _SHARED else ""
+
+
+def _windows(path: Path) -> str:
+    import ctypes
+
+    anchor = path.absolute().anchor
+    if anchor.startswith("\\\\"):
+        return f"the share {anchor}"
+    remote = ctypes.windll.kernel32.GetDriveTypeW(anchor) == _REMOTE_DRIVE  # type: ignore[attr-defined,unused-ignore]
+    return f"the network drive {anchor}" if remote else ""
+
 
 WAIT_S = 20.0  # for another writer to finish
 _MAGIC = b"SQLite format 3\0"
@@ -63,7 +224,7 @@ def connect(path: Path, *, create: bool) -> sqlite3.Connection:
         The file cannot be created or migrated.
     """
     with translate_errors(path):
-        shared = file_system.without_locks(path)
+        shared = without_locks(path)
         if shared:
             raise BadInput(
                 f"{str(path)!r} is on {shared}, where programs cannot lock a file, and rows would be lost; keep the "
@@ -253,7 +414,7 @@ def _take_steps(connection: sqlite3.Connection, version: int) -> None:
     for step in STEPS[version:]:
         for statement in step:
             connection.execute(statement)
-    migration.to_records(connection, version)
+    to_records(connection, version)
     connection.execute(f"PRAGMA user_version = {VERSION}")
 
 

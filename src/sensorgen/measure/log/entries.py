@@ -1,10 +1,20 @@
-"""Kinds of rows of the log, one dataclass for each.
+"""Kinds of rows of the log, one dataclass for each, and their fields in JSON and CSV, exact in both directions.
 
 Rows are never changed or deleted. A correction is a new row that names the old one in ``supersedes``; a withdrawal
 does so for a row of any kind.
+
+Records hold a row as a JSON object without the fields that have their default. Infinity, which JSON lacks, is written
+as 9e999, which Python and SQLite read as one. A cell of CSV is text as it is, nothing for None, and JSON for the rest.
+Pydantic is not used here: ``sensorgen log list`` would spend most of its time on the import.
 """
 
-from dataclasses import dataclass, fields
+import json
+import math
+from dataclasses import MISSING, dataclass, fields
+from functools import cache, lru_cache
+from operator import eq
+from types import NoneType
+from typing import Any, Self, TypeVar, cast, get_args, get_type_hints
 
 from sensorgen.core.errors import BadInput
 from sensorgen.measure.immittance import QUANTITIES
@@ -32,6 +42,12 @@ class Entry:
     logged_at: str = ""
     claimed_at: str = ""
     number: int = 0
+
+    def numbered(self, number: int, logged_at: str) -> Self:
+        """The row as the log has it; what makes it a row was checked before, and is not again."""
+        row = object.__new__(type(self))
+        vars(row).update(vars(self), number=number, logged_at=logged_at)
+        return row
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -178,7 +194,7 @@ class BenchRun(_OfSpecimen):
     file, rig_file : str
         SHA-256 of the impedance analyser's file and of the rig's; "" without a rig.
     facts : str
-        Summary as JSON, see :mod:`sensorgen.measure.log.facts`.
+        Summary as JSON, see :mod:`sensorgen.measure.log.bench`.
     """
 
     file: str
@@ -370,3 +386,158 @@ REFERENCES: dict[type[Entry], dict[str, type[Entry]]] = {
     Batch: {"file": RawFile}, Print: {"batch_uid": Batch}, BenchRun: {"file": RawFile, "rig_file": RawFile},
     Reading: {"photo": RawFile, "file": RawFile},
 }  # fmt: skip
+
+
+Value = str | int | float | bool | tuple[float, ...] | tuple[str, ...] | None
+UNHASHED = ("number", "logged_at")  # given by the log, and by the record
+INDEXED: dict[str, type] = {"uid": str, "specimen": str, "iteration": int, "design_id": str, "supersedes": str}
+_Kind = TypeVar("_Kind", bound=Entry)
+_COLUMNS: dict[type[Entry], dict[str, Any]] = {kind: get_type_hints(kind) for kind in KINDS.values()}
+_Kinds = tuple[bool, Any, frozenset[type]]
+
+
+@cache
+def _kinds(annotation: Any) -> _Kinds:
+    """Kinds of a field: True if it may be None, its type in JSON, and the types of its items if that is a list."""
+    if annotation == tuple[float, ...]:
+        return False, list, frozenset((int, float))
+    if annotation == tuple[str, ...]:
+        return False, list, frozenset((str,))
+    kinds = get_args(annotation) or (annotation,)
+    return NoneType in kinds, next(kind for kind in kinds if kind is not NoneType), frozenset()
+
+
+_TEXT = _kinds(str)
+_ENCODER = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"))
+_HELD: dict[type[Entry], dict[str, tuple[_Kinds, object]]] = {  # by a record: types and defaults
+    kind: {f.name: (_kinds(of[f.name]), f.default) for f in fields(kind) if f.name not in UNHASHED}
+    for kind, of in _COLUMNS.items()
+}
+_REQUIRED = {kind: {name for name, (_, usual) in held.items() if usual is MISSING} for kind, held in _HELD.items()}
+
+
+def columns(kind: type[Entry]) -> dict[str, Any]:
+    """Fields of a row with their types."""
+    return _COLUMNS[kind]
+
+
+def encode(entry: Entry) -> str:
+    """Content of a row's record.
+
+    Raises
+    ------
+    BadInput
+        A value that the field cannot have.
+    """
+    kind, data = type(entry), dict[str, Any]()
+    for name, (kinds, usual) in _HELD[kind].items():
+        value = getattr(entry, name)
+        if value != usual:
+            data[name] = value
+            if kinds is not _TEXT or type(value) is not str:
+                _checked(name, kinds, list(value) if isinstance(value, tuple) else value, kind)
+    text = _ENCODER.encode(data)
+    if "Infinity" not in text:
+        return text
+    return f"{{{','.join(f'{json.dumps(name)}:{_json(value)}' for name, value in data.items())}}}"
+
+
+def decode(kind: type[_Kind], content: str, number: int, logged_at: str) -> _Kind:
+    """Row of a record.
+
+    Raises
+    ------
+    BadInput
+        Content that no version of sensorgen writes for this kind.
+    """
+    data, kinds = _object(content), _HELD[kind]
+    if data is None:
+        raise BadInput(f"a {kind.__name__} of which the content is no JSON object: {content!r:.60}")
+    if not (data.keys() <= kinds.keys() and _REQUIRED[kind] <= data.keys()):
+        strange, missing = data.keys() - kinds.keys(), [name for name in kinds if name in _REQUIRED[kind] - data.keys()]
+        wrong = f"has {min(strange)!r:.40}" if strange else f"lacks {missing[0]!r}"
+        raise BadInput(f"a {kind.__name__} {wrong}; expected {', '.join(kinds)}")
+    values = {
+        name: value if kinds[name][0] is _TEXT and type(value) is str else _checked(name, kinds[name][0], value, kind)
+        for name, value in data.items()
+    }
+    return kind(**values, number=number, logged_at=logged_at)  # type: ignore[arg-type]
+
+
+def indexed(content: str) -> tuple[str | int | None, ...]:
+    """Entries of the log's index for a record's content: the fields of ``INDEXED``, None for those that it has not."""
+    fields_ = _object(content) or {}
+    return tuple([fields_[name] if type(fields_.get(name)) is kind else None for name, kind in INDEXED.items()])
+
+
+@lru_cache(maxsize=1)  # a record is decoded, and then indexed
+def _object(content: str) -> dict[str, Any] | None:
+    try:
+        data = json.loads(content)
+    except (ValueError, TypeError, RecursionError):
+        return None
+    return data if isinstance(data, dict) else None
+
+
+def _checked(name: str, kinds: _Kinds, value: Any, kind: type[Any]) -> Value:
+    try:
+        return _value(kinds, value)
+    except (TypeError, ValueError):
+        raise BadInput(f"column {name} of a {kind.__name__} holds {value!r:.60}") from None
+
+
+def word(kind: type[Any]) -> str:
+    """Kind of a row in a sentence.
+
+    >>> from sensorgen.measure.log.entries import BenchRun, DesignRow
+    >>> word(BenchRun), word(DesignRow)
+    ('recording', 'design')
+    """
+    name = NAMES[kind].replace("_", " ")
+    return "recording" if name == "bench run" else name
+
+
+def to_cell(value: Value) -> str:
+    """Value as a cell of CSV; :func:`from_cell` is the inverse."""
+    if value is None:
+        return ""
+    return value if isinstance(value, str) else _json(value)
+
+
+def _json(value: Value) -> str:
+    text = json.dumps(value, ensure_ascii=False)
+    texts = isinstance(value, str) or (isinstance(value, tuple) and value and isinstance(value[0], str))
+    return text if texts else text.replace("Infinity", "9e999")
+
+
+def from_cell(annotation: Any, cell: str) -> Value:
+    """Value of a cell, by the field's type; ValueError, TypeError or RecursionError for any other cell."""
+    optional, kind, _ = _kinds(annotation)
+    if cell == "" and optional:
+        return None
+    return from_json(annotation, cell if kind is str else json.loads(cell))
+
+
+def from_json(annotation: Any, value: Any) -> Value:
+    """Value out of JSON, by the field's type; ValueError or TypeError for any other."""
+    return _value(_kinds(annotation), value)
+
+
+def _value(kinds: _Kinds, value: Any) -> Value:
+    optional, kind, items = kinds
+    if value is None and optional:
+        return None
+    if kind is list:
+        return _listed(items, value)
+    if kind is float and type(value) in (float, int) and math.isfinite(value):
+        return float(value)
+    if type(value) is not kind or kind is float:
+        raise TypeError(f"{value!r:.60} is no {kind.__name__}")
+    return cast(Value, value)
+
+
+def _listed(items: frozenset[type], value: Any) -> Value:
+    """Numbers without nan, or texts."""
+    if type(value) is not list or not items.issuperset(map(type, value)) or not all(map(eq, value, value)):
+        raise ValueError(f"{value!r:.60} is no list of {'texts' if str in items else 'numbers'}")
+    return tuple(value) if str in items else tuple(map(float, value))

@@ -21,7 +21,7 @@ from sensorgen.core.errors import BadInput, MissingValue, Unwritable
 from sensorgen.core.records import shown
 from sensorgen.core.terminal import escaped, harmless
 from sensorgen.measure.csv_table import CsvTable
-from sensorgen.measure.log import fields, files
+from sensorgen.measure.log import entries, files
 from sensorgen.measure.log.entries import (
     NAMES,
     ROWS,
@@ -31,9 +31,12 @@ from sensorgen.measure.log.entries import (
     Print,
     RawFile,
     Reading,
+    Value,
     Withdrawal,
+    from_cell,
+    from_json,
+    to_cell,
 )
-from sensorgen.measure.log.fields import Value, from_cell, from_json, to_cell
 from sensorgen.measure.log.logbook import Log
 
 FORMATS = ("csv", "parquet")
@@ -44,7 +47,7 @@ _LATER_COLUMNS: dict[type[Entry], tuple[str, ...]] = {  # that exports of earlie
     Reading: ("quantity", "value", "frequency_hz", "uncertainty", "wires", "temperature_c", "humidity_percent",
               "photo", "file", "defects"),
 }  # fmt: skip
-_COLUMNS = {kind: {k: v for k, v in fields.columns(kind).items() if k != "number"} for kind in ROWS}
+_COLUMNS = {kind: {k: v for k, v in entries.columns(kind).items() if k != "number"} for kind in ROWS}
 
 
 def columns(kind: type[Entry]) -> dict[str, Any]:
@@ -161,13 +164,13 @@ def from_csv(kind: type[Entry], table: CsvTable) -> Iterator[Entry]:
 def _entry(
     kind: type[Entry], values: Mapping[str, Any], where: str, convert: Callable[[Any, Any], Value]
 ) -> Entry:  # fmt: skip
-    wanted, found = columns(kind), dict[str, Any]()
+    wanted, row = columns(kind), dict[str, Any]()
     for name, value in values.items():
         try:
-            found[name] = convert(wanted[name], value)
+            row[name] = convert(wanted[name], value)
         except (TypeError, ValueError, KeyError, OverflowError, RecursionError):
             raise BadInput(f"{where}, column {name}: {value!r:.60} is not what the log writes there") from None
-    return kind(**found)
+    return kind(**row)
 
 
 def parquet(kind: type[Entry], rows: list[Entry]) -> bytes:

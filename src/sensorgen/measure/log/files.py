@@ -67,20 +67,20 @@ def keep(folder: Path, path: Path, known: RawFile | None = None) -> RawFile:
     Unwritable
         The copy cannot be written.
     """
-    kept = known or raw_file(path)
-    target = place(folder, kept)
+    row = known or raw_file(path)
+    target = place(folder, row)
     with reading(path):
         source = path.open("rb")
     with source, replacing(target) as copy:
         remove_stale_parts(target.parent)
         shutil.copyfileobj(source, copy)
         copy.flush()
-        if _digest(Path(copy.name)) != kept.uid:
+        if _digest(Path(copy.name)) != row.uid:
             raise BadInput(f"{str(path)!r} {'is not the file of that SHA-256' if known else CHANGED}")
         Path(copy.name).chmod(0o444)
-    for made in (target.parent, folder, folder.parent):  # each may be new
-        sync_folder(made)
-    return kept
+    for changed in (target.parent, folder, folder.parent):  # each may be new
+        sync_folder(changed)
+    return row
 
 
 def raw_file(path: Path) -> RawFile:

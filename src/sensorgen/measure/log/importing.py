@@ -1,18 +1,201 @@
 """Import files into the log: tables of readings, print beds, and exported logs; each file as a whole or not at all."""
 
+import json
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from itertools import count
+from operator import attrgetter
 from pathlib import Path
 
 from sensorgen.core.document import Part
-from sensorgen.core.errors import BadInput
-from sensorgen.measure import accuracy, lcr
-from sensorgen.measure.log import batches, edited, exchange, files, notes, tables
+from sensorgen.core.errors import BadInput, UnknownName, within
+from sensorgen.core.records import shown
+from sensorgen.measure import accuracy, csv_table, lcr
+from sensorgen.measure.csv_table import CsvTable
+from sensorgen.measure.input_file import checked_head
+from sensorgen.measure.log import exchange, files, notes, prints
 from sensorgen.measure.log.entries import Entry, RawFile, Reading
 from sensorgen.measure.log.logbook import Log
+from sensorgen.measure.log.notes import reading
+
+MOST_BYTES = 64_000_000
+THESIS = "thesis Table D.1"
+NAMES = {  # our columns, and names that are recognised
+    "specimen": ("specimen", "design", "name", "name_raw", "sensor", "sample", "written"),
+    "y": ("y", "ry", "r_y", "resistance in y", "resistance y", "y_words"),
+    "z": ("z", "rz", "r_z", "resistance in z", "resistance z", "z_words"),
+    "remark": ("remark", "remarks", "comment", "comments"),
+    "baked": ("baked",),
+    "measured_at": ("measured_at", "date", "time", "measured"),
+}
+_TRUTH = {"": None, "yes": True, "true": True, "1": True, "baked": True, "no": False, "false": False, "0": False,
+          "unbaked": False, "not baked": False}  # fmt: skip
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[CsvTable]:
+    """Open a table.
+
+    Raises
+    ------
+    BadInput
+        Missing, no regular file, too large, or without a header.
+    """
+    checked_head(path, MOST_BYTES, "a table as CSV in UTF-8")
+    with csv_table.opened(path) as table:
+        twice = [name for name, count in Counter(table.names).items() if count > 1 and name]
+        if twice:
+            raise table.error(1, f"column {shown(twice[0])} stands twice; expected each once")
+        yield table
+
+
+def readings(table: CsvTable, columns: Mapping[str, str], source: str) -> tuple[Iterator[Reading], list[str]]:
+    """Readings of a table as it is read, and the columns that are ignored.
+
+    Parameters
+    ----------
+    table : CsvTable
+        An open table.
+    columns : mapping
+        From our columns (``NAMES``) to the table's, where the names are not recognised.
+    source : str
+        Name of the table in the log.
+
+    Raises
+    ------
+    BadInput
+        A cell that cannot be parsed; with file, row and column.
+    """
+    places = _places(table, columns)
+    left_out = [name for k, name in enumerate(table.names) if k not in set(places.values()) and name]
+    return _rows(table, places, source), left_out
+
+
+def _rows(table: CsvTable, places: Mapping[str, int], source: str) -> Iterator[Reading]:
+    seen: Counter[str] = Counter()
+    for number, cells in table.text_rows():
+        yield _row(table, number, cells, places, seen, source)
+    if not seen:
+        raise BadInput(f"{table.name}: no rows below the header")
+
+
+def _places(table: CsvTable, columns: Mapping[str, str]) -> dict[str, int]:
+    """Position of each of our columns in the table."""
+    position = {name.casefold(): k for k, name in enumerate(table.names)}
+    places = {ours: position[name] for ours, names in NAMES.items() for name in reversed(names) if name in position}
+    for ours, theirs in columns.items():
+        if ours not in NAMES:
+            raise UnknownName("column of --column", ours, NAMES)
+        if theirs.casefold() not in position:
+            raise UnknownName(f"column of {table.name}", theirs, table.names)
+        places[ours] = position[theirs.casefold()]
+    for needed in (("specimen",), ("y", "z")):
+        if not places.keys() & {*needed}:
+            raise BadInput(
+                f"{table.name}, row 1: no column {' or '.join(needed)} among {shown(', '.join(table.names))}; "
+                f"name it, as --column {needed[0]}=NAME"
+            )
+    return places
+
+
+def _row(
+    table: CsvTable, number: int, row: list[str], places: Mapping[str, int], seen: Counter[str], source: str
+) -> Reading:
+    cells = {ours: row[places[ours]].strip() if ours in places else "" for ours in NAMES}
+    content = json.dumps(list(cells.values()))
+    seen[content] += 1
+    baked = cells["baked"].casefold()
+    with within(f"{table.name}, row {number}"):
+        if baked not in _TRUTH:
+            raise BadInput(f"column baked: {shown(cells['baked'])}; expected yes, no or nothing")
+        return reading(
+            cells["specimen"], cells["y"], cells["z"], remark=cells["remark"], baked=_TRUTH[baked], table=True,
+            measured_at=cells["measured_at"], source=source, source_row=number - 1,
+            uid=sha256(f"{seen[content]} {content}".encode()).hexdigest()[:32],
+        )  # fmt: skip
+
+
+def thesis_readings() -> list[Reading]:
+    """Table D.1 of the thesis, 69 rows as printed.
+
+    >>> rows = thesis_readings()
+    >>> len(rows), rows[11].written, rows[11].y_words, rows[11].z_ohm
+    (69, '23 triX', '0.68k', (45.0,))
+    """
+    with opened(Path(__file__).with_name("table_d1.csv")) as table:
+        return list(readings(table, {}, THESIS)[0])
+
+
+_measured = attrgetter(  # what makes a row another measurement; edits of all else correct it
+    "y_words", "z_words", "y_ohm", "z_ohm", "instrument", "quantity", "value", "frequency_hz", "uncertainty", "wires",
+    "temperature_c", "humidity_percent", "photo", "file", "defects",
+)  # fmt: skip
+
+
+def corrections(log: Log, rows: Iterable[Reading], table: str) -> Iterator[Reading]:
+    """Rows of a table; those that were edited correct the readings that they came from.
+
+    A row was edited where the log has a reading of a table of this name that the table does not have any more: with
+    the same values, for the same specimen or in the same row; or, in a table with other rows that the log has, of the
+    same specimen in the same row.
+
+    Parameters
+    ----------
+    log : Log
+        An open log.
+    rows : iterable of Reading
+        All rows of the table; given on as they come where the log has none of a table of this name.
+    table : str
+        Its name.
+
+    Raises
+    ------
+    BadInput
+        A row that may be another measurement, or an edit.
+    """
+    current = {reading.uid: reading for reading in log.entries(Reading, source=table)}
+    if not current:
+        yield from rows
+        return
+    rows = list(rows)
+    unchanged = {row.uid for row in rows} & current.keys()
+    gone = {uid: reading for uid, reading in current.items() if uid not in unchanged}
+    for row in rows:
+        known = row.uid in unchanged or not gone or next(log.entries(Reading, uid=row.uid), None)
+        yield row if known else _correction(log, row, gone, table, alike=bool(unchanged))
+
+
+def _correction(log: Log, row: Reading, gone: dict[str, Reading], table: str, *, alike: bool) -> Reading:
+    """Row as the correction of one that has gone from its table, and is taken out of these; itself if it is new."""
+    taken_back = next(log.entries(Reading, replaced=True, uid=row.uid), None) is not None  # an edit, perhaps
+    old = _in_place(row, gone.values(), alike=alike) or (None if taken_back else _same(row, gone.values()))
+    if old:
+        del gone[old.uid]
+        uid = sha256(f"{row.uid} {old.uid}".encode()).hexdigest()[:32] if taken_back else row.uid
+        return replace(row, uid=uid, supersedes=old.uid)
+    other = next((old for old in gone.values() if old.specimen == row.specimen), None)
+    if other and not taken_back:
+        raise BadInput(
+            f"{table}, row {(row.source_row or 0) + 1}: not what reading {other.number} of {other.specimen} was in "
+            f"a table of this name. If it corrects that one: sensorgen log withdraw reading {other.number} "
+            "--reason corrected, and import again. If it is another table: give the file another name"
+        )
+    return row
+
+
+def _in_place(row: Reading, gone: Iterable[Reading], *, alike: bool) -> Reading | None:
+    """Reading in a row's place with its values, or, of a table that is ``alike`` otherwise, of its specimen."""
+    here = (old for old in gone if old.source_row == row.source_row)
+    return next((o for o in here if _measured(o) == _measured(row) or (alike and o.specimen == row.specimen)), None)
+
+
+def _same(row: Reading, gone: Iterable[Reading]) -> Reading | None:
+    """Reading of a row's specimen with its values."""
+    return next((o for o in gone if o.specimen == row.specimen and _measured(o) == _measured(row)), None)
+
 
 _MOST_DOUBTS = 5  # of implausible values in one file
 
@@ -54,7 +237,7 @@ class ImportedRecording:
 
 def thesis(log: Log) -> ImportedRecording:
     """Log Table D.1 of the thesis."""
-    return _add(log, tables.thesis())
+    return _add(log, thesis_readings())
 
 
 def lcr_export(
@@ -84,14 +267,14 @@ def lcr_export(
     """
     table = lcr.read(path)
     of = notes.reading(specimen, remark=remark, baked=baked, source=path.name, log=log)
-    kept = files.keep(log.files, path)
-    found = next((name for name in accuracy.names() if accuracy.is_named(name, table.preamble)), "")
+    raw_file = files.keep(log.files, path)
+    meter = next((name for name in accuracy.names() if accuracy.is_named(name, table.preamble)), "")
     row = replace(
         notes.with_readings(replace(of, doubts=(*of.doubts, *table.doubts)), table.readings, _MOST_DOUBTS),
-        uid=sha256(f"{of.specimen} {kept.uid}".encode()).hexdigest()[:32], file=kept.uid,
-        instrument=instrument or found,
+        uid=sha256(f"{of.specimen} {raw_file.uid}".encode()).hexdigest()[:32], file=raw_file.uid,
+        instrument=instrument or meter,
     )  # fmt: skip
-    new = [row for row in log.add([kept, row]) if isinstance(row, Reading)]
+    new = [row for row in log.add([raw_file, row]) if isinstance(row, Reading)]
     return ImportedRecording(
         table.rows, table.rows * len(new), sum(bool(row.doubts) for row in new), left_out=table.left_out
     )
@@ -107,7 +290,7 @@ def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> ImportedRec
     path : Path
         A table as CSV, ``batch.json``, an exported ``.csv`` or ``.parquet``, or the folder of an exported log.
     columns : mapping
-        From sensorgen's columns to the table's, as in :func:`sensorgen.measure.log.tables.readings`.
+        From sensorgen's columns to the table's, as in :func:`sensorgen.measure.log.importing.readings`.
 
     Raises
     ------
@@ -115,10 +298,15 @@ def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> ImportedRec
         A file that cannot be read; with its name, row and column. Nothing is logged then.
     """
     if path.suffix.lower() == ".json":
-        return _add(log, list(batches.rows(path, files.keep(log.files, path))))
-    if not path.is_dir():
-        with _table(log, path, columns) as (rows, left_out):
-            return _add(log, rows, left_out)
+        return _add(log, list(prints.rows(path, files.keep(log.files, path))))
+    if path.is_dir():
+        return _add(log, _exported(log, path))
+    with _table(log, path, columns) as (rows, left_out):
+        return _add(log, rows, left_out)
+
+
+def _exported(log: Log, path: Path) -> list[Entry]:
+    """Rows of an exported log, whose raw files are kept."""
     exported: list[Entry] = []
     for kind, name in exchange.FILES.items():
         file = next((p for suffix in exchange.FORMATS if (p := path / f"{name}.{suffix}").is_file()), None)
@@ -126,15 +314,15 @@ def import_file(log: Log, path: Path, columns: Mapping[str, str]) -> ImportedRec
             continue
         if file is None:
             raise BadInput(f"{str(path)!r} has no {name}.csv; expected the folder of an exported log")
-        with _table(log, file, {}) as (found, _):
-            rows = list(found)
+        with _table(log, file, {}) as (table, _):
+            rows = list(table)
         if not all(isinstance(row, kind) for row in rows):
             raise BadInput(f"{file}: columns of another table; expected those of {name}")
         exported += rows
     for row in exported:
         if isinstance(row, RawFile):
             files.keep(log.files, path / "files" / row.uid, row)
-    return _add(log, exported)
+    return exported
 
 
 @contextmanager
@@ -145,19 +333,19 @@ def _table(log: Log, path: Path, columns: Mapping[str, str]) -> Iterator[tuple[I
         return
     if not columns and lcr.looks_like(path) and not _is_log_table(path):
         raise BadInput(f"{path}: the export of an LCR meter; say of which specimen, as --specimen S1")
-    with tables.opened(path) as table:
+    with opened(path) as table:
         if kind := exchange.kind_of(table.names):
             yield exchange.from_csv(kind, table), ()
         else:
-            rows, left_out = tables.readings(table, columns, path.name)
-            yield edited.corrections(log, rows, path.name), left_out
+            rows, left_out = readings(table, columns, path.name)
+            yield corrections(log, rows, path.name), left_out
 
 
 def _is_log_table(path: Path) -> bool:
     """Test whether a file is an exported table of a log, or has a column of specimens."""
-    with suppress(BadInput), tables.opened(path) as table:
+    with suppress(BadInput), opened(path) as table:
         return exchange.kind_of(table.names) is not None or bool(
-            {name.casefold() for name in table.names} & {*tables.NAMES["specimen"]}
+            {name.casefold() for name in table.names} & {*NAMES["specimen"]}
         )
     return False
 

@@ -10,7 +10,7 @@ from typing import Any
 from sensorgen.core.document import Cell, Column, Facts, Part, Table
 from sensorgen.core.units import frequency_text, si
 from sensorgen.measure.immittance import shown_value
-from sensorgen.measure.log import facts
+from sensorgen.measure.log import bench
 from sensorgen.measure.log.entries import BenchRun, Entry, Prediction, Print, Reading, Withdrawal
 from sensorgen.measure.log.logbook import Log, conflict
 
@@ -94,7 +94,7 @@ class Detail:
             ("claimed", row.claimed_at),
         )
         doubts = (("doubtful", doubt) for doubt in getattr(row, "doubts", ()))
-        summary = facts.from_json(row.facts).words() if isinstance(row, BenchRun) else ()
+        summary = bench.from_json(row.facts).words() if isinstance(row, BenchRun) else ()
         rows = ((name, fact) for name, fact in (*known, *doubts, *summary, *self.remarks) if fact)
         yield Facts(tuple((f"  {name}", fact) for name, fact in rows))
 
@@ -127,12 +127,12 @@ def _air(r: Reading) -> Iterator[str]:
 
 def _ac_lines(r: Reading) -> list[str]:
     """AC quantities of a reading, repeats side by side, as ``Cp 24.9 pF / 25.1 pF at 10kHz``."""
-    found: dict[tuple[str, float], list[str]] = {}
+    repeats: dict[tuple[str, float], list[str]] = {}
     stated = r.uncertainty or (0.0,) * len(r.value)
     for quantity, value, frequency, plus_minus in zip(r.quantity, r.value, r.frequency_hz, stated, strict=True):
         text = shown_value(quantity, value) + (f" ± {shown_value(quantity, plus_minus)}" if plus_minus else "")
-        found.setdefault((quantity, frequency), []).append(text)
-    return [f"{name} {' / '.join(values)} at {frequency_text(f)}" for (name, f), values in found.items()]
+        repeats.setdefault((quantity, frequency), []).append(text)
+    return [f"{name} {' / '.join(values)} at {frequency_text(f)}" for (name, f), values in repeats.items()]
 
 
 def _ac(r: Reading) -> str:
@@ -166,8 +166,8 @@ def details(log: Log, entries: Iterable[Entry]) -> Details:
 
 def logged(log: Log, entries: Iterable[Entry], known: str) -> Details:
     """New rows with hints; ``known`` is what to say where the log had all of them."""
-    found = (Detail(entry, (*_corrections(entry, log), *_near(entry, log))) for entry in entries)
-    return Details(tuple(found), known)
+    rows = (Detail(entry, (*_corrections(entry, log), *_near(entry, log))) for entry in entries)
+    return Details(tuple(rows), known)
 
 
 def _near(entry: Entry, log: Log) -> Iterator[tuple[str, str]]:
@@ -197,15 +197,15 @@ def short(values: Sequence[float]) -> str:
     >>> short((0.8, 650.0, 2300.0, 1.1e6, float("inf"))), short(())
     ('0.8 / 650 / 2.3k / 1.1M / OL', '-')
     """
-    found = (
+    words = (
         "OL" if isinf(value) else f"{value:g}" if abs(value) < 1 else si(value, "").replace(" ", "") for value in values
     )
-    return " / ".join(found) or "-"
+    return " / ".join(words) or "-"
 
 
 def _ohms(words: str, values: Sequence[float]) -> str:
-    found = ", ".join("OL" if isinf(value) else si(value, "ohm") for value in values) or "-"
-    return f"{found}, written {words!r}" if words else ""
+    shown = ", ".join("OL" if isinf(value) else si(value, "ohm") for value in values) or "-"
+    return f"{shown}, written {words!r}" if words else ""
 
 
 def _remark(r: Reading) -> str:

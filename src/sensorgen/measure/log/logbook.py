@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import uuid
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -12,9 +13,10 @@ from typing import Any, Self, TypeVar
 
 from sensorgen.core import paths
 from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, UnknownName, within
-from sensorgen.measure.log import chain, database, files, schema
+from sensorgen.measure.log import chain, database, files
 from sensorgen.measure.log.chain import Record
 from sensorgen.measure.log.entries import (
+    INDEXED,
     KINDS,
     NAMES,
     REFERENCES,
@@ -31,9 +33,13 @@ from sensorgen.measure.log.entries import (
     RawFile,
     Reading,
     Specimen,
+    Value,
     Withdrawal,
+    columns,
+    decode,
+    encode,
+    word,
 )
-from sensorgen.measure.log.fields import INDEXED, Value, columns, decode, encode, word
 
 PLACE = "SENSORGEN_LOG"  # environment variable with another file
 _FROM_PRINT = ("batch", "design_id", "design")
@@ -177,20 +183,16 @@ class Log:
         BadInput
             The log is damaged; rows given before are sound.
         """
-        for name in equal:
-            if name not in columns(kind):
-                raise UnknownName(f"column of a {kind.__name__}", name, columns(kind))
-        asked = {
-            name: value for name, value in equal.items() if name in (*INDEXED, "number") and value not in ("", None)
-        }
-        current = f"uid IN ({_SUPERSEDED})" if replaced else _current(superseded=superseded)
-        where = " AND ".join((*(f"{name} = ?" for name in asked), current))
+        if strange := equal.keys() - columns(kind).keys():
+            raise UnknownName(f"column of a {kind.__name__}", min(strange), columns(kind))
+        asked = {name: equal[name] for name in (*INDEXED, "number") if equal.get(name) not in ("", None)}
+        where = " AND ".join((*(f"{name} = ?" for name in asked), _current(superseded=superseded, replaced=replaced)))
         sql = (
             "SELECT kind, content, number, logged_at FROM record "  # noqa: S608
             f"WHERE kind = ?1 AND number IS NOT NULL AND {where} ORDER BY number {'DESC' if last else ''}"
         )
-        found = (self._row(*row) for row in self._rows(sql, [NAMES[kind], *asked.values()]))
-        wanted = (row for row in found if all(getattr(row, name) == value for name, value in equal.items()))
+        rows = (self._row(*row) for row in self._rows(sql, [NAMES[kind], *asked.values()]))
+        wanted = (row for row in rows if all(getattr(row, name) == value for name, value in equal.items()))
         yield from reversed(list(itertools.islice(wanted, last))) if last else wanted
 
     def about(
@@ -280,8 +282,8 @@ class Log:
         """
         if self._ancestry is None:  # the first of each kind stands for all
             others = list({type(row): row for row in sorted(others, key=lambda row: -row.number)}.values())
-        found = {self._before(first, other) for other in others}
-        return False if False in found else None if None in found else True
+        orders = {self._before(first, other) for other in others}
+        return False if False in orders else None if None in orders else True
 
     def _before(self, first: Entry, second: Entry) -> bool | None:
         (one, key), (other, its_key) = self.record_of(first), self.record_of(second)
@@ -379,8 +381,8 @@ class Log:
 
     def sequence(self, key: str) -> int:
         """Number of the record with that identity; 0 if the log does not have it."""
-        found = self._connection.execute("SELECT sequence FROM record WHERE id = ?", [key]).fetchone()
-        return found[0] if found else 0
+        row = self._connection.execute("SELECT sequence FROM record WHERE id = ?", [key]).fetchone()
+        return row[0] if row else 0
 
     def received(self, record: Record) -> Entry:
         """Row of another machine's record; parameters and errors as :meth:`merging`."""
@@ -412,7 +414,21 @@ class Log:
             if entry.logged_at and not _same(known, entry, but=("number", "logged_at", "claimed_at")):
                 raise BadInput(f"row {entry.uid} has other content in the log; expected the same")
             return None
-        self._check_references(entry)
+        self._check(entry)
+        if isinstance(entry, Reading | BenchRun) and not (entry.batch or entry.logged_at):
+            entry = self._with_print(entry, writer)
+        if entry.logged_at and not entry.claimed_at:
+            entry = dataclasses.replace(entry, claimed_at=entry.logged_at)
+        version = VERSIONS.get(NAMES[kind], 1)
+        record = chain.made([writer.head] if writer.head else [], NAMES[kind], version, now, encode(entry))
+        return entry.numbered(writer.append(record, copy=False), now)
+
+    def _check(self, entry: Entry) -> None:
+        """Refuse a row that refers to none, corrects none, cannot be read later, or gives a name a second design."""
+        for name, kind in REFERENCES.get(type(entry), {}).items():
+            uid = getattr(entry, name)
+            if uid and not self._exists(kind, uid):
+                raise BadInput(f"a {word(type(entry))} refers to {word(kind)} {uid!r:.80}, which the log does not have")
         self._check_correction(entry)
         if isinstance(entry, Prediction):
             _check_prediction(entry)
@@ -420,19 +436,6 @@ class Log:
             before = self.bound(entry.specimen)
             if before and before.design_id != entry.design_id:
                 raise BadInput(_two_designs(before, entry))
-        if isinstance(entry, Reading | BenchRun) and not (entry.batch or entry.logged_at):
-            entry = self._with_print(entry, writer)
-        if entry.logged_at and not entry.claimed_at:
-            entry = dataclasses.replace(entry, claimed_at=entry.logged_at)
-        version = VERSIONS.get(NAMES[kind], 1)
-        record = chain.made([writer.head] if writer.head else [], NAMES[kind], version, now, encode(entry))
-        return dataclasses.replace(entry, logged_at=now, number=writer.append(record, copy=False))
-
-    def _check_references(self, entry: Entry) -> None:
-        for name, kind in REFERENCES.get(type(entry), {}).items():
-            uid = getattr(entry, name)
-            if uid and not self._exists(kind, uid):
-                raise BadInput(f"a {word(type(entry))} refers to {word(kind)} {uid!r:.80}, which the log does not have")
 
     def _check_correction(self, entry: Entry) -> None:
         """Refuse a correction or withdrawal of a row that is missing or has one."""
@@ -464,8 +467,8 @@ class Log:
             "SELECT other.kind, other.content, other.number, other.logged_at FROM record row, record other "  # noqa: S608
             f"WHERE row.kind = ?1 AND row.number = ?2 AND {_PREFERRED} ORDER BY other.logged_at DESC, other.id DESC"
         )
-        found = next(self._rows(sql, [NAMES[type(entry)], entry.number]), None)
-        return self._row(*found) if found else None
+        row = next(self._rows(sql, [NAMES[type(entry)], entry.number]), None)
+        return self._row(*row) if row else None
 
     def conflicts(self) -> list[str]:
         """Corrections that two machines have made of one row, until the one that does not count is withdrawn."""
@@ -583,7 +586,7 @@ class _Appender:
         self._numbers[record.kind] += not copy
         number = None if copy else self._numbers[record.kind]
         self.sequence, self.head = self.sequence + 1, record.id
-        schema.insert(self._connection, record, self.sequence, number)
+        database.insert(self._connection, record, self.sequence, number)
         return number or 0
 
     def finish(self) -> None:
@@ -594,7 +597,10 @@ class _Appender:
             self._connection.execute(sql, [self.sequence, self.head])
 
 
-def _current(*, superseded: bool) -> str:
+def _current(*, superseded: bool, replaced: bool = False) -> str:
+    """Condition on rows: those that no later row corrects or withdraws, all, or those that one does alone."""
+    if replaced:
+        return f"uid IN ({_SUPERSEDED})"
     return "TRUE" if superseded else f"uid NOT IN ({_SUPERSEDED})"
 
 
@@ -635,3 +641,33 @@ def _record(row: Sequence[Any]) -> Record:
 
 def _parents(text: str) -> tuple[str, ...]:
     return tuple(text.split(",")) if text else ()
+
+
+def withdraw(log: Log, kind: str, number: int, reason: str) -> Entry:
+    """Log that a row is withdrawn.
+
+    Parameters
+    ----------
+    log : Log
+        An open log.
+    kind : str
+        Kind of the row: reading, recording, prediction, calibration, print, batch, design or raw-file.
+    number : int
+        Its number among its kind.
+    reason : str
+        Why; must not be empty.
+
+    Raises
+    ------
+    BadInput
+        No reason, no such row, or one that is out of use already.
+    """
+    if not reason.strip():
+        raise BadInput("an empty reason; expected why the row is withdrawn")
+    name = {"recording": "bench_run"}.get(kind, kind.replace("-", "_"))
+    row = next(log.entries(KINDS[name], superseded=True, number=number), None)
+    if row is None:
+        raise BadInput(
+            f"no {kind} {number} in the log {str(log.path)!r}; sensorgen log list and log show have the numbers"
+        )
+    return log.add([Withdrawal(uid=uuid.uuid4().hex, of=name, supersedes=row.uid, reason=reason)])[0]

@@ -1,23 +1,137 @@
-"""Transcribe notes of a measurement to a row of the log, with a list of doubts."""
+"""Transcribe notes of a measurement to a row of the log: names, resistances as ``0.65k``, and a list of doubts."""
 
 import dataclasses
+import math
 import re
 import uuid
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
 from functools import lru_cache
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from sensorgen.core.errors import BadInput, SensorgenError, within
+from sensorgen.core.records import shown
 from sensorgen.core.units import frequency_text
 from sensorgen.design import specimen_name
 from sensorgen.design.design import Design
 from sensorgen.measure import immittance
-from sensorgen.measure.log import resistances
+from sensorgen.measure.immittance import NUMBER, decimal
 from sensorgen.measure.log.entries import SPECIMEN_COLUMNS, Print, Reading, Specimen
-from sensorgen.measure.log.resistances import Resistances
 
 if TYPE_CHECKING:
     from sensorgen.measure.log.logbook import Log
+
+
+OVERLOAD = math.inf  # beyond the meter's range [ohm]
+SCPI_OVERLOAD_OHM = 9.9e37  # SCPI 1999, 7.2.1.4: what an instrument sends for infinity
+MOST_OHM = 1e16  # no meter reads more
+LEADS_OHM = 1.0  # typical resistance of leads and contacts
+MAX_CHARACTERS = 200
+EXPECTED = "a resistance such as 650, 0.65k, 2.3k / 3.8k, 1.2M or OL"
+
+_NUMBER = re.compile(rf"(?P<number>{NUMBER})\s*(?P<prefix>meg|[kmg])?\s*(?:Ω|ω|ohms?|r)?", re.IGNORECASE)
+_LETTER_AS_POINT = re.compile(r"([0-9]+)([kKMGR])([0-9]+)")  # IEC 60062: 4k7
+_OVERLOAD = re.compile(r"\+?(o\.?l\.?|0\.?l|ovld|ovrld|overload|over ?range|inf(inity)?|∞|open)|>.*", re.IGNORECASE)
+_NO_READING = re.compile(r"[-–—]*|n\.?/?a\.?|nan|none|\?+", re.IGNORECASE)
+_THOUSANDS = re.compile(r"[-+]?[0-9]{1,3},[0-9]{3}")
+_SIGNS = str.maketrans({"\u2126": "Ω", "\u2212": "-"})  # the ohm sign apart from omega, the true minus sign
+_FACTOR = {"": "1", "k": "1e3", "m": "1e6", "meg": "1e6", "g": "1e9"}
+
+
+@dataclass(frozen=True)
+class Resistances:
+    """Readings in a text.
+
+    Attributes
+    ----------
+    ohm : tuple of float
+        In their order [ohm]; ``OVERLOAD`` beyond the meter's range. Empty where nothing was measured: a missing reading
+        is never 0.
+    doubts : tuple of str
+        What was interpreted otherwise than by SI, and what may be a slip.
+    mega : tuple of str
+        Readings in which a small m was interpreted as mega.
+    """
+
+    ohm: tuple[float, ...]
+    doubts: tuple[str, ...]
+    mega: tuple[str, ...] = ()
+
+
+@lru_cache(maxsize=1 << 14)
+def parse(text: str, *, mega: bool = False) -> Resistances:
+    """Parse a cell of a table of resistances, or typed text.
+
+    Parameters
+    ----------
+    text : str
+        Readings with ``/`` or ``;`` between them; in ohms unless they have a unit.
+    mega : bool
+        Whether a small m is known to mean mega, so that it raises no doubt.
+
+    Raises
+    ------
+    BadInput
+        Not a resistance.
+
+    Examples
+    --------
+    >>> parse("2.3k / 3.8k").ohm, parse("0,65 kΩ").ohm, parse("OL").ohm, parse("").ohm
+    ((2300.0, 3800.0), (650.0,), (inf,), ())
+    >>> parse("1.1m").doubts
+    ("'1.1m': m read as mega (milli would be below the contact resistance)",)
+    """
+    if len(text) > MAX_CHARACTERS:
+        raise BadInput(f"{shown(text)} has {len(text)} characters; expected {EXPECTED}")
+    stripped = text.translate(_SIGNS).strip()
+    if _NO_READING.fullmatch(stripped):
+        return Resistances((), (f"{shown(stripped)} taken for no reading",) if stripped else ())
+    parts = [_parsed(part.strip(), text, mega=mega) for part in re.split("[/;|]", stripped)]
+    ohm, doubts, small_m = zip(*parts, strict=True)
+    repeats = [f"{len(ohm)} readings: repeats, or several points of contact"] if len(ohm) > 1 else []
+    return Resistances(ohm, tuple(dict.fromkeys(chain(*doubts, repeats))), tuple(filter(None, small_m)))
+
+
+def _parsed(part: str, text: str, *, mega: bool) -> tuple[float, Sequence[str], str]:
+    """A reading of a text [ohm], doubts about it, and its word where a small m stands for mega."""
+    if _OVERLOAD.fullmatch(part):
+        return OVERLOAD, [] if part.upper() == "OL" else [f"{shown(part)} taken for overload"], ""
+    match = _NUMBER.fullmatch(_LETTER_AS_POINT.sub(r"\1.\3\2", part))
+    if not match:
+        hint = "; between readings write /" if "," in part else ""
+        raise BadInput(f"{shown(text)} is no resistance; expected {EXPECTED}{hint}")
+    ohm, prefix = _ohm(match, text), match["prefix"] or ""
+    doubts = list(_doubts(part, "" if mega and prefix == "m" else prefix, ohm))
+    return ohm, doubts, part if prefix == "m" else ""
+
+
+def _ohm(match: re.Match[str], text: str) -> float:
+    """The number, rounded once [ohm]."""
+    ohm = float(decimal(match["number"]) * Decimal(_FACTOR[(match["prefix"] or "").lower()]))
+    if math.isclose(ohm, SCPI_OVERLOAD_OHM):
+        return OVERLOAD
+    if abs(ohm) > MOST_OHM:
+        raise BadInput(f"{shown(text)}: {ohm:g} ohm is more than any meter reads; expected {EXPECTED}")
+    return ohm
+
+
+def _doubts(part: str, prefix: str, ohm: float) -> Iterator[str]:
+    written = shown(part)
+    if prefix == "m":
+        yield f"{written}: m read as mega (milli would be below the contact resistance)"
+    if prefix == "K":
+        yield f"{written}: upper-case K read as kilo"
+    if _THOUSANDS.fullmatch(part):
+        yield f"{written}: comma read as the decimal one, {ohm:g} ohm; thousands would be {part.replace(',', '')} ohm"
+    if ohm == 0:
+        yield "0 ohm: a short circuit, or a reading below the meter's resolution"
+    elif ohm < 0:
+        yield f"{written}: a resistance below 0"
+    elif ohm < LEADS_OHM:
+        yield f"{written}: {ohm:g} ohm is less than leads and contacts have; a k lost?"
+
 
 MAX_REMARK = 10_000  # characters
 FIRST_WITH_FILMS = 22  # iteration from which on the thesis writes films into names
@@ -93,27 +207,35 @@ def reading(
     """
     if len(remark) > MAX_REMARK:
         raise BadInput(f"a remark of {len(remark)} characters; expected at most {MAX_REMARK}")
-    if any("\0" in text for text in (remark, written, y_words, z_words)):
+    if "\0" in "".join((remark, written, y_words, z_words)):
         raise BadInput("a zero byte in a name, a value or a remark; expected text")
-    of, bound = specimen(written, log), _bound(written, log)
+    of, (design_id, design) = specimen(written, log), design_fields(written, log)
     y, z = resistance("y", y_words, mega=mega), resistance("z", z_words, mega=mega)
-    unbaked = bool(_UNBAKED.search(remark))
-    film_expected = (of.iteration or 0) < FIRST_WITH_FILMS
-    assumed = () if bound else _by_name(written)[2]
-    doubts = [doubt for doubt in assumed if doubt != specimen_name.NO_FILM or film_expected]
+    doubts = [] if _bound(written, log) else _assumed(written, of)
     doubts += [f"{axis}: {doubt}" for axis, parsed in (("y", y), ("z", z)) for doubt in parsed.doubts]
-    if table and not (y.ohm and z.ohm):
-        blank = f"{'z' if y.ohm else 'y'} blank: not measured, or an overload"
-        doubts.append(blank if y.ohm or z.ohm else "no measurement")
-    if unbaked and baked:
-        doubts.append("baked, but the remark says that it is not")
-    design_id, design = design_fields(written, log)
+    doubts += _blanks(y, z) if table else []
+    if _UNBAKED.search(remark):
+        doubts += ["baked, but the remark says that it is not"] if baked else []
+        baked = bool(baked)
     return Reading(
         **vars(of), uid=uid or uuid.uuid4().hex, design_id=design_id, design=design, written=written,
         y_words=y_words, z_words=z_words, y_ohm=y.ohm, z_ohm=z.ohm, remark=remark, doubts=tuple(doubts),
-        baked=False if baked is None and unbaked else baked, measured_at=measured_at, instrument=instrument,
+        baked=baked, measured_at=measured_at, instrument=instrument,
         source=source, source_row=source_row, supersedes=supersedes,
     )  # fmt: skip
+
+
+def _blanks(y: Resistances, z: Resistances) -> list[str]:
+    """Doubt about a row of a table without one of its readings, or both."""
+    if not (y.ohm or z.ohm):
+        return ["no measurement"]
+    return [] if y.ohm and z.ohm else [f"{'z' if y.ohm else 'y'} blank: not measured, or an overload"]
+
+
+def _assumed(written: str, of: Specimen) -> list[str]:
+    """Doubts about a name that is bound to no design; one without a film is usual in early iterations only."""
+    film_expected = (of.iteration or 0) < FIRST_WITH_FILMS
+    return [doubt for doubt in _by_name(written)[2] if doubt != specimen_name.NO_FILM or film_expected]
 
 
 def with_ac(of: Reading, typed: Mapping[str, Sequence[str]]) -> Reading:
@@ -169,7 +291,7 @@ def resistance(axis: str, text: str, *, mega: bool = False) -> Resistances:
         Not a resistance; the message names the axis.
     """
     with within(f"resistance in {axis.upper()}"):
-        return resistances.parse(text, mega=mega)
+        return parse(text, mega=mega)
 
 
 def design_fields(written: str, log: "Log | None" = None) -> tuple[str, str]:

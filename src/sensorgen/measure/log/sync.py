@@ -23,8 +23,7 @@ from sensorgen.core.errors import BadInput, Unwritable
 from sensorgen.core.records import shown
 from sensorgen.measure.log import files
 from sensorgen.measure.log.chain import Record
-from sensorgen.measure.log.entries import NAMES, RawFile
-from sensorgen.measure.log.fields import decode
+from sensorgen.measure.log.entries import NAMES, RawFile, decode
 from sensorgen.measure.log.logbook import Log
 
 MOST_BYTES = 2_000_000_000  # of an archive when unpacked
@@ -117,25 +116,29 @@ def _opened(place: Path, *, create: bool) -> Iterator[Path]:
     if not create and not place.exists():
         raise BadInput(f"no folder or .zip at {str(place)!r}; expected what sensorgen log backup or sync wrote")
     try:
-        if place.suffix.lower() != ".zip":
-            if place.exists() and not place.is_dir():
-                raise BadInput(f"{str(place)!r} is a file; expected a folder or a .zip")
-            if not create and not (place / "records").is_dir():
-                raise BadInput(f"{str(place)!r} has no folder 'records'; expected what log backup or sync wrote")
-            place.mkdir(parents=True, exist_ok=True)
-            yield place
+        if place.suffix.lower() == ".zip":
+            with tempfile.TemporaryDirectory(prefix="sensorgen-") as folder:
+                yield from _unpacked(place, Path(folder), create=create)
             return
-        with tempfile.TemporaryDirectory(prefix="sensorgen-") as temporary:
-            folder = Path(temporary)
-            if place.exists():
-                _unpack(place, folder)
-            yield folder
-            if create:
-                with store.replacing(place) as target, zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
-                    for file in sorted(path for path in folder.rglob("*") if path.is_file()):
-                        archive.write(file, file.relative_to(folder).as_posix())
+        if place.exists() and not place.is_dir():
+            raise BadInput(f"{str(place)!r} is a file; expected a folder or a .zip")
+        if not create and not (place / "records").is_dir():
+            raise BadInput(f"{str(place)!r} has no folder 'records'; expected what log backup or sync wrote")
+        place.mkdir(parents=True, exist_ok=True)
+        yield place
     except OSError as error:
         raise Unwritable(f"cannot use {str(place)!r}: {error.strerror or error}") from None
+
+
+def _unpacked(place: Path, folder: Path, *, create: bool) -> Iterator[Path]:
+    """The folder of an archive, which is packed again at the end where it may be written."""
+    if place.exists():
+        _unpack(place, folder)
+    yield folder
+    if create:
+        with store.replacing(place) as target, zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+            for file in sorted(path for path in folder.rglob("*") if path.is_file()):
+                archive.write(file, file.relative_to(folder).as_posix())
 
 
 def _unpack(place: Path, folder: Path) -> None:
@@ -241,10 +244,10 @@ def _push(log: Log, folder: Path, there: Sequence[int]) -> int:
         _refuse_link(folder / name)
     for file in log.entries(RawFile, superseded=True):
         target = files.place(folder / "files", file)
-        kept = files.place(log.files, file)
-        if not target.is_file() and kept.is_file():
+        ours = files.place(log.files, file)
+        if not target.is_file() and ours.is_file():
             _refuse_link(target.parent)
-            with store.replacing(target) as copy, kept.open("rb") as source:
+            with store.replacing(target) as copy, ours.open("rb") as source:
                 shutil.copyfileobj(source, copy)
     sent, digest, part = 0, sha256(), store.part_of(folder / "records" / "new.jsonl")
     part.parent.mkdir(exist_ok=True)

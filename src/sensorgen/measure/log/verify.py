@@ -1,18 +1,82 @@
-"""Verify a log: the chain of its records, SQLite's integrity, references between rows, raw files, and anchors."""
+"""Verify a log: the chain of its records, SQLite's integrity, references between rows, raw files, and anchors.
+
+An anchor is the head of the log in a file outside, for git, a notebook or mail: proof that its records were there then.
+"""
 
 import re
+import uuid
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 from sensorgen.core.document import Part
-from sensorgen.core.errors import BadInput
+from sensorgen.core.errors import BadInput, Unwritable
 from sensorgen.core.files import reading
 from sensorgen.measure.log import chain, files
-from sensorgen.measure.log.entries import KINDS, REFERENCES, ROWS, Entry, RawFile
-from sensorgen.measure.log.fields import indexed, word
+from sensorgen.measure.log.entries import KINDS, REFERENCES, ROWS, Anchor, Entry, RawFile, Value, indexed, word
 from sensorgen.measure.log.logbook import Log
+
+
+@dataclass(frozen=True)
+class Head:
+    """The last record of a log.
+
+    Attributes
+    ----------
+    records : int
+        Number of records.
+    head : str
+        Identity of the last one, which depends on all before it.
+    log : str
+        The log's file.
+    """
+
+    records: int
+    head: str
+    log: str
+
+    def document(self) -> Iterator[Part]:
+        """The identity first."""
+        yield self.head or "the log is empty"
+        yield f"record {self.records} of {self.log}"
+
+
+def head(log: Log) -> Head:
+    """The last record of an open log."""
+    return Head(*log.head(), str(log.path))
+
+
+def anchor(log: Log, file: Path) -> Head:
+    """Append the head to a text file, and log that it was done.
+
+    Parameters
+    ----------
+    log : Log
+        An open log.
+    file : Path
+        A text file, which is made if it is missing.
+
+    Raises
+    ------
+    BadInput
+        The log is empty.
+    Unwritable
+        The file cannot be written.
+    """
+    last = head(log)
+    if not last.head:
+        raise BadInput(f"the log {str(log.path)!r} is empty: nothing to anchor")
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    try:
+        with file.open("a", encoding="utf-8") as text:
+            text.write(f"{now} record {last.records} {last.head} {log.path.name}\n")
+    except OSError as error:
+        raise Unwritable(f"cannot write to {str(file)!r}: {error.strerror or error}") from None
+    log.add([Anchor(uid=uuid.uuid4().hex, head=last.head, file=file.name)])
+    return last
+
 
 MOST_FAULTS = 40  # that are shown to people; JSON has all
 _ANCHORED = re.compile(r"\b[0-9a-f]{64}\b")
@@ -64,9 +128,9 @@ def verified(log: Log, anchors: Path | None = None) -> Verified:
         A text file with heads of the log, as ``sensorgen log anchor`` writes it, or a mail that has them.
     """
     notes: list[str] = []
-    found = (*faults(log, notes), *(_anchor_faults(log, anchors, notes) if anchors else ()))
-    rows = 0 if found else sum(log.count(kind, superseded=True) for kind in ROWS)
-    return Verified(str(log.path), rows, found, "" if found else log.head()[1], tuple(notes))
+    wrong = (*faults(log, notes), *(_anchor_faults(log, anchors, notes) if anchors else ()))
+    rows = 0 if wrong else sum(log.count(kind, superseded=True) for kind in ROWS)
+    return Verified(str(log.path), rows, wrong, "" if wrong else log.head()[1], tuple(notes))
 
 
 def faults(log: Log, notes: list[str] | None = None) -> Iterator[str]:
@@ -96,17 +160,9 @@ def _chain_faults(log: Log, notes: list[str]) -> Iterator[str]:
     """Records that are changed, missing or out of order."""
     counts: Counter[str] = Counter()
     before, clock, place, late = "", "", 0, list[int]()
-    for record, sequence, number, index in log.stored():
-        place += 1
-        if not chain.sound(record) or record.kind not in KINDS:
-            yield f"record {place}, a {record.kind!r:.40}, is not what was logged"
-        if index != indexed(record.content):
-            yield f"record {place}: the index does not have what the record holds"
-        if sequence != place or not _follows(log, record, sequence, before):
-            yield f"record {place} follows one that is missing or was moved"
-        counts[record.kind] += number is not None
-        if number != counts[record.kind] and not (number is None and log.is_copy(sequence)):
-            yield f"record {place} has number {number} among its kind; expected {counts[record.kind]}"
+    for place, stored in enumerate(log.stored(), 1):
+        record = stored[0]
+        yield from _record_faults(log, place, before, counts, *stored)
         if record.parents == (before,) and record.logged_at < clock:
             late.append(place)
         before, clock = record.id, record.logged_at
@@ -116,6 +172,22 @@ def _chain_faults(log: Log, notes: list[str]) -> Iterator[str]:
     if late:
         back = "the clock was set back; the order of the records holds"
         notes.append(f"{len(late)} records are dated before the one that they follow, the first is {late[0]}: {back}")
+
+
+def _record_faults(
+    log: Log, place: int, before: str, counts: Counter[str], record: chain.Record, sequence: int, number: int | None,
+    index: tuple[Value, ...],
+) -> Iterator[str]:  # fmt: skip
+    """Faults of one record, by its place and the record before; the counts by kind rise with it."""
+    if not chain.sound(record) or record.kind not in KINDS:
+        yield f"record {place}, a {record.kind!r:.40}, is not what was logged"
+    if index != indexed(record.content):
+        yield f"record {place}: the index does not have what the record holds"
+    if sequence != place or not _follows(log, record, sequence, before):
+        yield f"record {place} follows one that is missing or was moved"
+    counts[record.kind] += number is not None
+    if number != counts[record.kind] and not (number is None and log.is_copy(sequence)):
+        yield f"record {place} has number {number} among its kind; expected {counts[record.kind]}"
 
 
 def _follows(log: Log, record: chain.Record, sequence: int, before: str) -> bool:

@@ -3,12 +3,83 @@
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from sensorgen.core.errors import BadInput, within
 from sensorgen.measure.input_file import checked_head
-from sensorgen.measure.recording import hdf, matfive, table, tiepie
-from sensorgen.measure.recording.samples import Recording, Source, at_pauses, numbered
+from sensorgen.measure.recording import samples
+from sensorgen.measure.recording.samples import (
+    MOST_TONES,
+    MOST_VALUES,
+    Complex,
+    Real,
+    Recording,
+    Source,
+    at_pauses,
+    blank,
+    numbered,
+    rate_hz,
+    sifted,
+)
 from sensorgen.measure.recording.spool import MOST_BYTES, FileSpool
+
+if TYPE_CHECKING:
+    from sensorgen.measure.readings import Readings
+
+TIME, STAMP, CLIPPED, VALID = "time_s", "stamp_s", "clipped", "valid"
+
+
+def recordings(path: Path, columns: Mapping[str, str]) -> Iterator[tuple[Recording]]:
+    """Read a recording from a CSV file, one stretch after the other.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    columns : mapping of str to str
+        From the file's column names to sensorgen's: ``time_s``, ``stamp_s``, ``clipped``, ``valid``, and
+        ``re_ohm_1.1kHz``, ``im_ohm_1.1kHz`` for every frequency.
+
+    Raises
+    ------
+    BadInput
+        As :func:`sensorgen.measure.readings.readings`; no time, or a time that does not rise.
+    """
+    from sensorgen.measure.readings import readings
+
+    with readings(str(path), columns, (TIME, STAMP, CLIPPED, VALID)) as file:
+        if not {TIME, STAMP} & set(file.numbers):
+            message = f"no column {TIME} and none {STAMP} (seconds since 1970); name it with a map of columns"
+            raise BadInput(f"{path}: {message}")
+        if len(file.frequency_hz) > MOST_TONES:
+            raise BadInput(f"{path}: {len(file.frequency_hz)} frequencies; expected up to {MOST_TONES}")
+        most, blocks, count = MOST_VALUES // (len(file.frequency_hz) + 2), [], 0
+        for block in file.blocks():
+            blocks.append((block.impedance_ohm, block.numbers))
+            count += len(block.rows)
+            if count >= most:
+                yield (_stretch(path, file, blocks),)
+                blocks, count = [], 0
+        if blocks:
+            yield (_stretch(path, file, blocks),)
+
+
+def _stretch(path: Path, file: "Readings", blocks: list[tuple[Complex, Real]]) -> Recording:
+    impedance = np.concatenate([z for z, _ in blocks])
+    beside = dict(zip(file.numbers, np.concatenate([numbers for _, numbers in blocks]).T, strict=True))
+    blocks.clear()
+    with within(str(path)):
+        rebuilt = samples.rebuilt(len(impedance), beside.get(TIME), beside.get(STAMP))
+    marks = blank(len(impedance)) | rebuilt.marks | sifted(impedance)
+    if CLIPPED in beside:
+        marks["clipped"] = beside[CLIPPED] == 1
+    if VALID in beside:
+        marks["invalid"] = beside[VALID] != 1
+    source = Source(path.name, "CSV", rate_hz=rate_hz(rebuilt.time_s), notes=rebuilt.notes)
+    return Recording(rebuilt.time_s, file.frequency_hz, impedance, marks, rebuilt.clock, source)
+
 
 _HDF = b"\x89HDF\r\n\x1a\n"
 _HDF_PLACES = (0, 512, 1024, 2048)
@@ -49,7 +120,7 @@ def parts(path: Path | str, columns: Mapping[str, str] | None = None) -> Iterato
     path : Path or str
         TiePieLCR's .mat (MATLAB 5, either byte order, or 7.3), an HDF5 file with the same variables, or CSV.
     columns : mapping of str to str, optional
-        For CSV only: from the file's column names to sensorgen's, see :mod:`sensorgen.measure.recording.table`.
+        For CSV only: from the file's column names to sensorgen's, as ``time_s`` and ``stamp_s``.
 
     Yields
     ------
@@ -70,7 +141,7 @@ def parts(path: Path | str, columns: Mapping[str, str] | None = None) -> Iterato
     if any(head[at : at + len(_HDF)] == _HDF for at in _HDF_PLACES):
         file_format = "MATLAB 7.3" if matlab else "HDF5"
     spool = FileSpool()
-    stretches = table.recordings(path, columns or {}) if file_format == "CSV" else _stretches(path, file_format, spool)
+    stretches = recordings(path, columns or {}) if file_format == "CSV" else _stretches(path, file_format, spool)
     try:
         yield from numbered(_relieved(path, stretches, spool))
     except OSError as error:
@@ -78,6 +149,8 @@ def parts(path: Path | str, columns: Mapping[str, str] | None = None) -> Iterato
 
 
 def _stretches(path: Path, file_format: str, spool: FileSpool) -> Iterator[tuple[Recording, ...]]:
+    from sensorgen.measure.recording import hdf, matfive, tiepie
+
     with within(str(path)):
         if file_format == "MATLAB 5":
             tree = matfive.variables(spool.file(path), tiepie.WANTED, spool)

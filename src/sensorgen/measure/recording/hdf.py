@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import BadInput, MissingValue, within
-from sensorgen.measure.recording.matfive import Split
+from sensorgen.measure.recording.matfive import Split, characters
 from sensorgen.measure.recording.spool import FileSpool
 
 _DEEPEST = 12
@@ -79,10 +79,7 @@ class _Reader:
             raise BadInput(f"{item.name}: groups within each other without end; expected a recording")
         if isinstance(item, self._h5.Group):
             return self._struct(item, depth)
-        if not isinstance(item, self._h5.Dataset):
-            raise BadInput(f"{item.name}: neither a group nor a dataset")
-        if item.is_virtual or item.external:
-            raise BadInput(f"{item.name}: its data lie in another file; expected them in this one")
+        self._check(item)
         if (place := self._h5.h5o.get_info(item.id).addr) in self._known:
             return self._known[place]
         with within(item.name):
@@ -90,12 +87,22 @@ class _Reader:
         if item.chunks and prod(item.chunks) * item.dtype.itemsize > _MOST_CHUNK:
             raise BadInput(f"{item.name}: chunks of {item.chunks} values; expected chunks up to {_MOST_CHUNK >> 20} MB")
         if self._refers(item):
-            if item.size > _MOST_ITEMS:
-                raise BadInput(f"{item.name}: {item.size} references; expected up to {_MOST_ITEMS}")
-            # HDF5 has the axes the other way round: its rows one after the other are MATLAB's columns
-            return [self._item(self._file[ref], depth + 1) for ref in np.asarray(item[()]).ravel() if ref]
+            return self._referred(item, depth)
         self._known[place] = np.empty((0, 0)) if item.attrs.get("MATLAB_empty") else self._array(item)
         return self._known[place]
+
+    def _check(self, item: Any) -> None:
+        """Refuse what is no dataset of this file."""
+        if not isinstance(item, self._h5.Dataset):
+            raise BadInput(f"{item.name}: neither a group nor a dataset")
+        if item.is_virtual or item.external:
+            raise BadInput(f"{item.name}: its data lie in another file; expected them in this one")
+
+    def _referred(self, item: Any, depth: int) -> list[Any]:
+        """Contents that references lead to; HDF5's rows, one after the other, are MATLAB's columns."""
+        if item.size > _MOST_ITEMS:
+            raise BadInput(f"{item.name}: {item.size} references; expected up to {_MOST_ITEMS}")
+        return [self._item(self._file[ref], depth + 1) for ref in np.asarray(item[()]).ravel() if ref]
 
     def _refers(self, item: Any) -> bool:
         return isinstance(item, self._h5.Dataset) and self._h5.check_ref_dtype(item.dtype) is self._h5.Reference
@@ -107,39 +114,32 @@ class _Reader:
         if members and all(self._refers(item) and _CLASS not in item.attrs for item in members):
             count = min(map(len, fields.values()))
             return [{name: values[i] for name, values in fields.items()} for i in range(count)]
-        for name in group.attrs:
-            if not name.startswith("MATLAB_"):
-                if group.attrs.get_id(name).get_storage_size() > _MOST_TEXT:
-                    raise BadInput(f"{group.name}: attribute {name!r:.80} is larger than {_MOST_TEXT} bytes")
-                value = group.attrs[name]
-                text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
-                fields[name] = text if isinstance(text, str) else np.atleast_2d(np.asarray(text))
-        return [fields]
+        return [fields | {name: _attribute(group, name) for name in group.attrs if not name.startswith("MATLAB_")}]
 
     def _array(self, item: Any) -> Any:
-        names = item.dtype.names
-        plain = names and all(item.dtype[name].kind in "iuf" for name in names)
-        if plain and {n.lower() for n in names} in ({"real", "imag"}, {"r", "i"}):
+        if self._is_complex(item.dtype):
             raw = self._numbers(item)
-            real, imag = (raw[n] for n in sorted(names, key=str.lower, reverse=True))
-            matlab = _CLASS in item.attrs
-            return Split(real.T, imag.T) if matlab else Split(real, imag)
+            real, imag = (raw[n] for n in sorted(item.dtype.names, key=str.lower, reverse=True))
+            return Split(real.T, imag.T) if _CLASS in item.attrs else Split(real, imag)
         if self._h5.check_string_dtype(item.dtype):
             if item.size != 1 or item.dtype.itemsize > _MOST_TEXT:
                 raise BadInput(f"{item.name}: {item.size} texts; expected one text, or numbers")
-            texts = np.asarray(item[()]).ravel()
-            return texts[0].decode("utf-8", "replace") if isinstance(texts[0], bytes) else str(texts[0])
-        if item.dtype.kind in "iufcb":
-            values = self._numbers(item)
-        else:
+            return _decoded(np.asarray(item[()]).ravel()[0])
+        if item.dtype.kind not in "iufcb":
             raise BadInput(f"{item.name}: data of type {item.dtype}; expected numbers, complex numbers or text")
-        if _CLASS not in item.attrs:
-            return values
-        if item.attrs[_CLASS] in (b"char", "char"):
+        values = self._numbers(item)
+        if item.attrs.get(_CLASS) in (b"char", "char"):
             if values.nbytes > _MOST_TEXT:
                 raise BadInput(f"{item.name}: a text of {values.nbytes} bytes; expected up to {_MOST_TEXT}")
-            return "".join(chr(int(c)) if 0 <= c < 0xD800 else "\ufffd" for c in values.ravel())
-        return values.T
+            return characters(values.ravel())
+        return values.T if _CLASS in item.attrs else values
+
+    @staticmethod
+    def _is_complex(kind: np.dtype[Any]) -> bool:
+        """Test whether numbers have a real and an imaginary part, by their names."""
+        names = kind.names or ()
+        pair = {name.lower() for name in names} in ({"real", "imag"}, {"r", "i"})
+        return pair and all(kind[name].kind in "iuf" for name in names)
 
     def _numbers(self, item: Any) -> NDArray[Any]:
         """Numbers of a dataset, read block by block."""
@@ -149,6 +149,17 @@ class _Reader:
             return np.empty(item.shape, item.dtype)
         content = self._spool.held(np.ascontiguousarray(item[at]).tobytes() for at in _places(item))
         return np.frombuffer(content, item.dtype).reshape(item.shape)
+
+
+def _attribute(group: Any, name: str) -> Any:
+    if group.attrs.get_id(name).get_storage_size() > _MOST_TEXT:
+        raise BadInput(f"{group.name}: attribute {name!r:.80} is larger than {_MOST_TEXT} bytes")
+    value = group.attrs[name]
+    return _decoded(value) if isinstance(value, bytes | str) else np.atleast_2d(np.asarray(value))
+
+
+def _decoded(text: Any) -> str:
+    return text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)
 
 
 def _places(item: Any) -> Iterator[tuple[Any, ...]]:

@@ -87,6 +87,19 @@ def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = n
     stamped = common_clock and rig.stamped
     within_s = min(within_s, _STAMPED_S) if stamped else within_s
     times = [one.real_s() if common_clock else one.time_s for one in recordings]
+    best = _best(recordings, times, rig, within_s)
+    if best.by_chance or (stamped and abs(best.offset_s) > within_s):  # its refinement looks beyond
+        if not common_clock and not _overlap(times[0], rig):
+            raise BadInput(
+                f"the force explains {best.explained:.1%} of the readings: too little to find the offset of the "
+                "clocks; expected time stamps, or times of both files that count from the same moment"
+            )
+        best = replace(best, offset_s=0.0, error_s=np.nan, skew=0.0, skew_error=np.nan)
+    return tuple(_joined(one, rig, time, best) for one, time in zip(recordings, times, strict=True))
+
+
+def _best(recordings: Sequence[Recording], times: Sequence[Real], rig: RigLog, within_s: float) -> Offset:
+    """Offset with the least standard error; one of a lock-in that responds goes before."""
     offsets: list[Offset] = []
     faults: list[BadInput] = []
     for one, time in zip(recordings, times, strict=True):
@@ -96,15 +109,7 @@ def joined_all(recordings: Sequence[Recording], rig: RigLog, within_s: float = n
             faults.append(error)
     if not offsets:
         raise faults[0]
-    best = min(offsets, key=lambda offset: (offset.by_chance, offset.error_s))
-    if best.by_chance or (stamped and abs(best.offset_s) > within_s):  # its refinement looks beyond
-        if not common_clock and not _overlap(times[0], rig):
-            raise BadInput(
-                f"the force explains {best.explained:.1%} of the readings: too little to find the offset of the "
-                "clocks; expected time stamps, or times of both files that count from the same moment"
-            )
-        best = replace(best, offset_s=0.0, error_s=np.nan, skew=0.0, skew_error=np.nan)
-    return tuple(_joined(one, rig, time, best) for one, time in zip(recordings, times, strict=True))
+    return min(offsets, key=lambda offset: (offset.by_chance, offset.error_s))
 
 
 def _overlap(time: Real, rig: RigLog) -> bool:
@@ -120,10 +125,10 @@ def _joined(recording: Recording, rig: RigLog, time: Real, offset: Offset) -> Jo
     rows, force, set_force, position = rig.sound()
     before = np.searchsorted(rows, at, side="right") - 1
     inside = (before >= 0) & (at <= rows[-1])
-    held = np.clip(before, 0, len(rows) - 1)
+    last = np.clip(before, 0, len(rows) - 1)
     step = float(np.median(np.diff(rows)))
-    after = np.minimum(held + 1, len(rows) - 1)
-    silent = ~inside | ((rows[after] - rows[held] > _SILENT * step) & (at - rows[held] > step))
+    after = np.minimum(last + 1, len(rows) - 1)
+    silent = ~inside | ((rows[after] - rows[last] > _SILENT * step) & (at - rows[last] > step))
     mask = np.where(silent, np.nan, 1.0)
     finite = np.isfinite(rig.time_s)
     order = np.argsort(rig.time_s[finite], kind="stable")
@@ -136,7 +141,7 @@ def _joined(recording: Recording, rig: RigLog, time: Real, offset: Offset) -> Jo
     if silent.any():
         notes.append(f"{np.count_nonzero(silent)} samples while the rig was silent")
     return Joined(
-        replace(recording, marks=marks), np.interp(at, rows, force) * mask, set_force[held] * mask,
-        position[held] * mask, offset.offset_s, offset.error_s, offset.skew, offset.skew_error,
+        replace(recording, marks=marks), np.interp(at, rows, force) * mask, set_force[last] * mask,
+        position[last] * mask, offset.offset_s, offset.error_s, offset.skew, offset.skew_error,
         offset.explained, tuple(notes),
     )  # fmt: skip

@@ -212,6 +212,11 @@ def _text(piece: _Element, order: str) -> str:
     return bytes(piece.data).decode(encoding, "replace")
 
 
+def characters(codes: NDArray[Any]) -> str:
+    """Text of numbers, with replacement characters where they are none."""
+    return "".join(chr(int(c)) if 0 <= c < 0xD800 else "\ufffd" for c in codes)
+
+
 class _Array:
     """An array element and its sub-elements, read one after the other."""
 
@@ -305,7 +310,7 @@ class _Array:
         piece = self._next()
         self._short(piece)
         if piece.type in _NUMBERS and piece.type > 2:
-            text = "".join(chr(int(c)) if 0 <= c < 0xD800 else "\ufffd" for c in self._numbers(piece))
+            text = characters(self._numbers(piece))
         elif piece.type in _TEXTS:
             text = _text(piece, self._order)
         else:

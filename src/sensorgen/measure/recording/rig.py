@@ -85,14 +85,18 @@ def rig(path: Path | str, columns: Mapping[str, str] | None = None) -> RigLog:
         raise BadInput(f"cannot read {str(path)!r}: {error.strerror or error}") from None
 
 
+def _check_names(table: CsvTable, time_name: str) -> None:
+    for needed in (time_name, *_NEEDED):
+        if table.names.count(needed) != 1:
+            expected = ", ".join((_TIME, *_NEEDED))
+            message = f"columns {listed(table.names)}; expected {expected} once each, and {_FORCE} and {_ERROR} if "
+            raise table.error(1, f"{message}available: {needed} is not there once")
+
+
 def _read(table: CsvTable) -> RigLog:
     names = table.names
     time_name = _STAMP if _STAMP in names else _TIME
-    for needed in (time_name, *_NEEDED):
-        if names.count(needed) != 1:
-            expected = ", ".join((_TIME, *_NEEDED))
-            message = f"columns {listed(names)}; expected {expected} once each, and {_FORCE} and {_ERROR} if "
-            raise table.error(1, f"{message}available: {needed} is not there once")
+    _check_names(table, time_name)
     force, error = ([names.index(name)] if name in names else [] for name in (_FORCE, _ERROR))
     needed_columns = [names.index(name) for name in (time_name, *_NEEDED)]
     numbers, reported = [], []

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.errors import BadInput, within
-from sensorgen.measure.recording import clock
+from sensorgen.measure.recording import samples
 from sensorgen.measure.recording.matfive import Split
 from sensorgen.measure.recording.samples import (
     MOST_TONES,
@@ -123,16 +123,16 @@ def _vector(value: Any, name: str) -> Vector:
     numeric = isinstance(value, np.ndarray | Split) and value.dtype.kind in "iufcb"
     if not numeric or value.size != max(value.shape, default=1):
         raise BadInput(f"{name} is {_described(value)}; expected numbers one after the other")
-    found: Vector = value.real.reshape(-1)
-    return found
+    vector: Vector = value.real.reshape(-1)
+    return vector
 
 
 def _few(value: Any, name: str) -> Real:
     """A setting of some numbers."""
-    found = _vector(value, name)
-    if len(found) > MOST_TONES:
-        raise BadInput(f"{name}: {len(found)} numbers; expected up to {MOST_TONES}")
-    return np.asarray(found, float)
+    vector = _vector(value, name)
+    if len(vector) > MOST_TONES:
+        raise BadInput(f"{name}: {len(vector)} numbers; expected up to {MOST_TONES}")
+    return np.asarray(vector, float)
 
 
 def _number(settings: Tree, name: str) -> float:
@@ -204,7 +204,7 @@ class _LockIn:
         for half, part in zip((z.real, z.imag), self.parts, strict=False):
             half[:] = part[at]
         with within(f"impedance_time of {self.name}"):
-            rebuilt = clock.rebuilt(len(z), time, stamps)
+            rebuilt = samples.rebuilt(len(z), time, stamps)
         rate, bandwidth = rate_hz(rebuilt.time_s), _number(self.settings, "bandwidth")
         marks = blank(len(z)) | rebuilt.marks | sifted(z) | {"clipped": self.clipping(np.asarray(time))}
         if at.start == 0 and bandwidth > 0 and np.isfinite(rate):  # until the demodulator's filter has settled

@@ -80,19 +80,19 @@ class Live:
         """Filter the next samples (n, m); where a sample is nan, the last reading is held and the result is nan."""
         from scipy.signal import sosfilt, sosfilt_zi
 
-        missing, held = np.isnan(block), np.array(block)
+        missing, filled = np.isnan(block), np.array(block)
         last = np.full(block.shape[1], np.nan, block.dtype) if self._last is None else self._last
         for j in np.flatnonzero(missing.any(axis=0)):  # gaps get the reading before, at the begin the first one
             gap, before = missing[:, j], np.maximum.accumulate(np.where(missing[:, j], -1, np.arange(len(block))))
-            first = held[np.argmin(gap), j] if np.isnan(last[j]) and not gap.all() else last[j]
-            held[:, j] = np.where(before >= 0, held[before, j], first)
-        if len(held):
-            self._last = held[-1].copy()
+            first = filled[np.argmin(gap), j] if np.isnan(last[j]) and not gap.all() else last[j]
+            filled[:, j] = np.where(before >= 0, filled[before, j], first)
+        if len(filled):
+            self._last = filled[-1].copy()
         if self._state is None:
             self._state = np.full((len(self._sections), 2, block.shape[1]), np.nan, block.dtype)
         fresh = np.isnan(self._state[0, 0]) & bool(len(block))  # a column begins with its own first reading
-        self._state[:, :, fresh] = sosfilt_zi(self._sections)[:, :, None] * held[:1, fresh]
-        filtered, self._state = sosfilt(self._sections, held, axis=0, zi=self._state)
+        self._state[:, :, fresh] = sosfilt_zi(self._sections)[:, :, None] * filled[:1, fresh]
+        filtered, self._state = sosfilt(self._sections, filled, axis=0, zi=self._state)
         return np.where(missing, np.nan, filtered)
 
 

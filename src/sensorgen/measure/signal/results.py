@@ -6,16 +6,19 @@ from math import floor, hypot, isnan, log10, pi, sqrt
 
 import numpy as np
 
-from sensorgen.core.document import Column, Facts, Part, Table
+from sensorgen.core.document import Cell, Column, Facts, Part, Table
 from sensorgen.core.units import frequency_text
-from sensorgen.measure.log import facts
+from sensorgen.measure.log import bench
 from sensorgen.measure.recording import RigLog
 from sensorgen.measure.recording.samples import Complex, Real
-from sensorgen.measure.signal.hysteresis import Hysteresis, Ways
 from sensorgen.measure.signal.presses import Pairs
-from sensorgen.measure.signal.run import Processed
+from sensorgen.measure.signal.run import Hysteresis, Processed, Ways
 
 Values = tuple[float, ...]
+_AT_REST = (
+    Column("at rest", "Hz", si=True), Column("R", "ohm", right=True), Column("X", "ohm", right=True),
+    Column("noise", "%", digits=2), Column("Cs", "F", si=True),
+)  # fmt: skip
 
 
 def _ends(tones_hz: Sequence[float]) -> list[int]:
@@ -23,8 +26,8 @@ def _ends(tones_hz: Sequence[float]) -> list[int]:
     return sorted({0, len(tones_hz) - 1})
 
 
-def _values(found: Real) -> Values:
-    return tuple(found.tolist())
+def _values(array: Real) -> Values:
+    return tuple(array.tolist())
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,11 @@ class RestResult:
     noise_re_ohm: float
     noise_im_ohm: float
     capacitance_f: float | None
+
+    def row(self) -> tuple[Cell, ...]:
+        """Frequency, R and X, their noise over abs(Z) [%], and series capacitance."""
+        noise = hypot(self.noise_re_ohm, self.noise_im_ohm) / sqrt(2) / hypot(self.re_ohm, self.im_ohm)
+        return self.frequency_hz, f"{self.re_ohm:.6g}", f"{self.im_ohm:.6g}", 100 * noise, self.capacitance_f
 
 
 @dataclass(frozen=True)
@@ -120,39 +128,33 @@ class RecordingResult:
 
     def document(self) -> Iterator[Part]:
         """Samples, rig, drift, and a line for each press, or for each frequency at rest."""
-        lockin = facts.LockIn(self.tones_hz, self.counts, self.seconds, self.program, lockin=self.lockin)
-        rig: Iterable[tuple[str, str]] = [("rig", "no log: forces and positions are not known")]
-        if self.rig:
-            rig = facts.RigDay(self.rig["rows"], self.rig["errors"]).words()
-        rows = [*lockin.words(), *rig, *(("", note) for note in self.notes)]
-        if self.drift is not None:
-            rows.append(("drift", f"{self.drift:.2%} of Z over the run, fitted to the rest, taken out of the presses"))
-            rows.append(("", f"{self.drift_law}: {self.drift_reason}"))
-        if self.presses:
-            how = "" if self.by_force else ", found by the readings alone"
-            rows.append(("presses", f"{len(self.presses)}{how}; ΔR and ΔX [ohm], standard errors in brackets"))
-        yield Facts(tuple(rows))
+        yield Facts(tuple(self._facts()))
         if self.presses:
             heads = (f"Δ{part} {frequency_text(self.tones_hz[k])}" for k in _ends(self.tones_hz) for part in "RX")
             columns = (Column("start", "s"), Column("force", "N", digits=3), Column("at", "mm", digits=3))
             changes = (Column(head, right=True) for head in heads)
             yield Table("presses", "", (*columns, *changes), tuple(map(self._row, self.presses)))
         if self.rest:
-            heads_at_rest = (
-                Column("at rest", "Hz", si=True), Column("R", "ohm", right=True), Column("X", "ohm", right=True),
-                Column("noise", "%", digits=2), Column("Cs", "F", si=True),
-            )  # fmt: skip
-            rest = tuple(
-                (one.frequency_hz, f"{one.re_ohm:.6g}", f"{one.im_ohm:.6g}",
-                 100 * hypot(one.noise_re_ohm, one.noise_im_ohm) / sqrt(2) / hypot(one.re_ohm, one.im_ohm),
-                 one.capacitance_f)
-                for one in self.rest
-            )  # fmt: skip
-            yield Table("rest", "", heads_at_rest, rest)
+            yield Table("rest", "", _AT_REST, tuple(map(RestResult.row, self.rest)))
             negative = [frequency_text(one.frequency_hz) for one in self.rest if one.re_ohm < 0]
             if negative:
                 yield f"negative resistance at {', '.join(negative)}: check the bridge's calibration"
         yield from self.files
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        """Samples, rig, drift and presses."""
+        yield from bench.LockIn(self.tones_hz, self.counts, self.seconds, self.program, lockin=self.lockin).words()
+        if self.rig:
+            yield from bench.RigDay(self.rig["rows"], self.rig["errors"]).words()
+        else:
+            yield "rig", "no log: forces and positions are not known"
+        yield from (("", note) for note in self.notes)
+        if self.drift is not None:
+            yield "drift", f"{self.drift:.2%} of Z over the run, fitted to the rest, taken out of the presses"
+            yield "", f"{self.drift_law}: {self.drift_reason}"
+        if self.presses:
+            how = "" if self.by_force else ", found by the readings alone"
+            yield "presses", f"{len(self.presses)}{how}; ΔR and ΔX [ohm], standard errors in brackets"
 
     def _row(self, press: PressResult) -> tuple[float | str | None, ...]:
         changes = (
@@ -210,8 +212,8 @@ def _at_rest(worked: Processed) -> Iterator[RestResult]:
 
 def _press(pairs: Pairs, i: int) -> PressResult:
     force_n, position_mm = (None if isnan(v) else float(v) for v in (pairs.force_n[i], pairs.position_mm[i]))
-    found: list[Complex] = [pairs.before_ohm[i], pairs.pressed_ohm[i], pairs.difference_ohm[i], pairs.error_ohm[i]]
-    parts = (_values(part) for z in found for part in (z.real, z.imag))
+    impedances: list[Complex] = [pairs.before_ohm[i], pairs.pressed_ohm[i], pairs.difference_ohm[i], pairs.error_ohm[i]]
+    parts = (_values(part) for z in impedances for part in (z.real, z.imag))
     return PressResult(float(pairs.time_s[i]), force_n, position_mm, *parts)
 
 
@@ -259,10 +261,10 @@ class HysteresisResult:
         yield from (*self.left_out, *self.files)
 
 
-def of_ways(tones_hz: Real, found: Ways, files: Iterable[str] = ()) -> HysteresisResult:
+def of_ways(tones_hz: Real, hysteresis: Ways, files: Iterable[str] = ()) -> HysteresisResult:
     """The result for the hysteresis of a run, and files that were written of it."""
-    presses = tuple(_of_way(start, way) for start, way in found.ways.items())
-    return HysteresisResult(_values(tones_hz), presses, found.left_out, tuple(files))
+    presses = tuple(_of_way(start, way) for start, way in hysteresis.ways.items())
+    return HysteresisResult(_values(tones_hz), presses, hysteresis.left_out, tuple(files))
 
 
 def _of_way(start_s: float, way: Hysteresis) -> PressHysteresis:
@@ -293,9 +295,9 @@ class SetsResult:
         """Least and largest difference of each set, at the first and the last frequency."""
         least = (Column(f"{end} Δ{part}", "ohm") for part in "RX" for end in ("least", "most"))
         rows = (
-            (name, len(found.force_n), frequency_text(self.tones_hz[k]), *_range(found.difference_re_ohm, k),
-             *_range(found.difference_im_ohm, k))
-            for name, found in self.sets.items() for k in _ends(self.tones_hz)
+            (name, len(one.force_n), frequency_text(self.tones_hz[k]), *_range(one.difference_re_ohm, k),
+             *_range(one.difference_im_ohm, k))
+            for name, one in self.sets.items() for k in _ends(self.tones_hz)
         )  # fmt: skip
         yield Table("sets", "", (Column("set"), Column("presses"), Column("frequency"), *least), tuple(rows))
         yield from self.files
@@ -308,11 +310,11 @@ def _range(values: tuple[Values, ...], k: int) -> tuple[float, float]:
 
 def of_sets(tones_hz: Real, sets: Mapping[str, Pairs], files: Iterable[str] = ()) -> SetsResult:
     """The result for recordings by name, and files that were written of them."""
-    found = {
+    results = {
         name: SetResult(
             _values(pairs.force_n), _values(pairs.position_mm), tuple(map(_values, pairs.difference_ohm.real)),
             tuple(map(_values, pairs.difference_ohm.imag)),
         )
         for name, pairs in sets.items()
     }  # fmt: skip
-    return SetsResult(_values(tones_hz), found, tuple(files))
+    return SetsResult(_values(tones_hz), results, tuple(files))

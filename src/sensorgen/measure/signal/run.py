@@ -1,4 +1,4 @@
-"""Process a recording: join it with the rig, filter it, remove its drift, and average its presses."""
+"""Process a recording: join it with the rig, filter it, remove its drift, average its presses; hysteresis of each."""
 
 from dataclasses import dataclass
 
@@ -9,6 +9,7 @@ from sensorgen.measure.recording.join import Joined, joined
 from sensorgen.measure.recording.rig import RigLog
 from sensorgen.measure.recording.samples import Complex, Real, Recording
 from sensorgen.measure.signal import drift, lowpass, presses
+from sensorgen.measure.signal.presses import THRESHOLD_N, by_force
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,12 +75,7 @@ def processed(
     """
     if law:
         drift.check(law)
-    notes, one = list(recording.source.notes), recording
-    force = position = np.full(len(one.time_s), np.nan)
-    if rig is not None:
-        beside = joined(one, rig) if isinstance(rig, RigLog) else rig
-        one, force, position = beside.recording, beside.force_n, beside.set_position_mm
-        notes += [beside.clock_text(), *beside.notes]
+    one, force, position, notes = _beside(recording, rig)
     valid = one.valid()
     filtered = lowpass.filtered(one, cutoff_hz)
     if rig:
@@ -88,13 +84,8 @@ def processed(
         spans = presses.by_readings(one.time_s[valid], one.impedance_ohm[valid])
     removed, pairs, z = None, None, one.impedance_ohm
     if remove_drift and spans:
-        among = (law,) if law else drift.LAWS if rig else drift.BY_TIME
-        unit = np.zeros(len(one.time_s))
-        for start, end in spans:
-            unit[np.searchsorted(one.time_s, start) : np.searchsorted(one.time_s, end, side="right")] = 1.0
-        pressing = force if rig else unit  # 1 N, for laws of drift that need only the times of presses
         try:
-            removed = drift.fitted(one.time_s, z, valid, pressing, among=tuple(among))
+            removed = _drift(one, spans, force if rig else None, law)
             z = removed.removed(one.time_s, z)
         except BadInput as error:
             notes.append(f"drift not removed: {error}")
@@ -104,3 +95,153 @@ def processed(
     except BadInput as error:
         notes.append(f"no presses: {error}")
     return Processed(one, force, *filtered, removed, pairs, rig is not None, tuple(notes))
+
+
+def _beside(recording: Recording, rig: RigLog | Joined | None) -> tuple[Recording, Real, Real, list[str]]:
+    """A recording with force and position, nan without a rig [N], [mm]; and remarks."""
+    notes = list(recording.source.notes)
+    if rig is None:
+        unknown = np.full(len(recording.time_s), np.nan)
+        return recording, unknown, unknown, notes
+    beside = joined(recording, rig) if isinstance(rig, RigLog) else rig
+    notes += [beside.clock_text(), *beside.notes]
+    return beside.recording, beside.force_n, beside.set_position_mm, notes
+
+
+def _drift(one: Recording, spans: list[presses.PressTimes], force_n: Real | None, law: str) -> drift.Drift:
+    """Drift between presses; without a force [N] by a law that needs their times alone."""
+    among = (law,) if law else drift.BY_TIME if force_n is None else tuple(drift.LAWS)
+    if force_n is None:
+        force_n = np.zeros(len(one.time_s))
+        for start, end in spans:
+            force_n[np.searchsorted(one.time_s, start) : np.searchsorted(one.time_s, end, side="right")] = 1.0
+    return drift.fitted(one.time_s, one.impedance_ohm, one.valid(), force_n, among=among)
+
+
+_FORCES = 41
+_INNER = 0.1  # of the span at either end, where loading and unloading meet or the tip lifts off
+
+
+@dataclass(frozen=True, eq=False)
+class Hysteresis:
+    """Hysteresis of one press; a column per reading, as R or X at a frequency.
+
+    Attributes
+    ----------
+    share : (m,) array
+        Largest difference of unloading and loading over the span of the readings [-].
+    error : (m,) array
+        Standard error of the difference at one force; the largest of many is a few of it [-].
+    at_n : (m,) array
+        Force of the largest difference [N].
+    lost : (m,) array
+        Area between the two curves over the area under the loading curve [-].
+    force_n : (k,) array
+        Forces of the two curves [N].
+    up, down : (k, m) array
+        Readings during loading and unloading.
+    """
+
+    share: Real
+    error: Real
+    at_n: Real
+    lost: Real
+    force_n: Real
+    up: Real
+    down: Real
+
+
+def hysteresis(force_n: Real, values: Real) -> Hysteresis:
+    """Hysteresis of one press: loading to the largest force, and unloading.
+
+    Parameters
+    ----------
+    force_n : (n,) array
+        Force over time [N].
+    values : (n, m) array
+        Readings, R or X of every frequency.
+
+    Raises
+    ------
+    BadInput
+        Loading and unloading without a common range of forces.
+    """
+    top = int(np.argmax(force_n))
+    low = max(force_n[: top + 1].min(initial=np.inf), force_n[top:].min(initial=np.inf))
+    high = float(force_n[top])
+    if not high > low or min(top, len(force_n) - 1 - top) < 2:
+        raise BadInput(
+            f"loading and unloading have forces from {low:g} to {high:g} N in common; expected a press with loading "
+            "and unloading"
+        )
+    at = np.linspace(low, high, _FORCES)
+    up, up_error = _curve(force_n[: top + 1], values[: top + 1], at)
+    down, down_error = _curve(force_n[top:], values[top:], at)
+    span = np.ptp(np.vstack([up, down]), axis=0)
+    span = np.where(span > 0, span, np.nan)
+    difference = np.abs(down - up)
+    inner = (at >= low + _INNER * (high - low)) & (at <= high - _INNER * (high - low))
+    where = np.argmax(np.where(inner[:, None], difference, -1.0), axis=0)
+    under = np.trapezoid(np.abs(up - up[0]), at, axis=0)
+    lost = np.trapezoid(difference, at, axis=0) / np.where(under > 0, under, np.nan)
+    share = difference[where, np.arange(values.shape[1])] / span
+    return Hysteresis(share, np.hypot(up_error, down_error) / span, at[where], lost, at, up, down)
+
+
+def _curve(force_n: Real, values: Real, at: Real) -> tuple[Real, Real]:
+    """Readings at given forces, linear between the means nearest to each, and the standard error at one force."""
+    step = (at[-1] - at[0]) / (len(at) - 1)
+    _, places = np.unique(np.round((force_n - at[0]) / step), return_inverse=True)
+    counts = np.bincount(places)
+    forces, *means = (np.bincount(places, column) / counts for column in (force_n, *values.T))
+    curve = np.column_stack([np.interp(at, forces, mean) for mean in means])
+    through = np.column_stack([np.interp(force_n, at, column) for column in curve.T])
+    return curve, np.asarray((values - through).std(axis=0) / np.sqrt(max(len(values) / len(at), 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """Hysteresis of all presses of a run.
+
+    Attributes
+    ----------
+    ways : dict of float to Hysteresis
+        By the begin of the press [s]; columns are R, then X, by frequency.
+    left_out : tuple of str
+        Presses without loading and unloading.
+    """
+
+    ways: dict[float, Hysteresis]
+    left_out: tuple[str, ...]
+
+
+def of_presses(worked: Processed, threshold_n: float = THRESHOLD_N) -> Ways:
+    """Hysteresis of every press of a run, without drift.
+
+    Parameters
+    ----------
+    worked : Processed
+        A recording processed with the rig's log.
+    threshold_n : float
+        Least force of a press [N].
+
+    Raises
+    ------
+    BadInput
+        No press with loading and unloading.
+    """
+    one, valid = worked.recording, worked.recording.valid()
+    time, force = one.time_s[valid], worked.force_n[valid]
+    ways: dict[float, Hysteresis] = {}
+    left_out = []
+    for press in by_force(time, force, threshold_n):
+        during = (time >= press.start_s) & (time <= press.end_s)
+        z = one.impedance_ohm[np.flatnonzero(valid)[during]]
+        clean = worked.drift.removed(time[during], z) if worked.drift else z
+        try:
+            ways[press.start_s] = hysteresis(force[during], np.hstack([clean.real, clean.imag]))
+        except BadInput as error:
+            left_out.append(f"left out: press at {press.start_s:.6g} s: {error}")
+    if not ways:
+        raise BadInput(left_out[0] if left_out else "nothing pressed")
+    return Ways(ways, tuple(left_out))

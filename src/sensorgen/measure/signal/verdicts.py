@@ -143,15 +143,15 @@ def verdict(of: Evidence, intact_ohm: float = INTACT_OHM) -> SignalVerdict:
     """
     if of.expected_ohm <= 0:
         raise OutOfRange(f"{of.name}: {of.expected_ohm:g} ohm expected of an electrode; expected a number above 0")
-    if any(isnan(value) for value in (*of.ry_ohm, *of.rz_ohm)):
+    if any(map(isnan, (*of.ry_ohm, *of.rz_ohm))):
         raise OutOfRange(f"{of.name}: readings {of.ry_ohm} and {of.rz_ohm} ohm; expected numbers, or none")
-    ry, rz = (max(0.0, min(values)) if values else nan for values in (of.ry_ohm, of.rz_ohm))
+    ry, rz = (max(min(values, default=nan), 0.0) for values in (of.ry_ohm, of.rz_ohm))  # nan stays nan, being first
     electrode, why_electrode = _electrode(of, ry)
     film, why_film = _film(ry, rz, of.expected_ohm, intact_ohm)
-    leak = nan if isnan(rz) or isnan(ry) or ry == inf else leak_s(rz, ry)
-    ratio = nan if isnan(ry) or isnan(rz) or ry in (0, inf) else rz / ry
-    grave = [word for word in WORDS[:4] if word in (electrode, film)]
-    word = grave[0] if grave else "unknown" if "unknown" in (electrode, film) else "intact"
+    known = not isnan(rz) and 0 <= ry < inf
+    leak, ratio = leak_s(rz, ry) if known else nan, rz / ry if known and ry else nan
+    grave = [word for word in (*WORDS[:4], "unknown") if word in (electrode, film)]
+    word = next(iter(grave), "intact")
     return SignalVerdict(word, electrode, film, ry, rz, ratio, leak, (why_electrode, why_film), intact_ohm)
 
 

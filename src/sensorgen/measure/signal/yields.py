@@ -134,28 +134,30 @@ def groups(
     order : float
         R_Z over R_Y up to which a specimen counts as shorted [-].
     """
-    members: dict[tuple[Hashable, ...], tuple[Counter[tuple[str, str, bool, bool | None]], array[float]]] = {}
+    members: dict[tuple[Hashable, ...], tuple[_Counts, array[float]]] = {}
     for of, v in judged:
         counts, ratios = members.setdefault(by(of), (Counter(), array("d")))
         counts[of.plate, v.word, of.touching, None if isnan(v.ratio) else v.ratio <= order] += 1
         if not isnan(v.ratio):
             ratios.append(v.ratio)
-    found = []
-    for key in sorted(members, key=lambda key: [(k is None, str(k)) for k in key]):
-        counts, ratios = members[key]
-        words, known, both = Counter[str](), _Plates(), _Plates()
-        for (plate, word, touching, low), count in counts.items():
-            words[word] += count
-            if not touching and word != "unknown":
-                known[plate, word == "intact"] += count
-            if not touching and low is not None:
-                both[plate, low] += count
-        intact, shorted = (_shared(such, confidence) for such in (known, both))
-        found.append(Group(key, intact, shorted, median(ratios) if ratios else nan, words))
-    return found
+    keys = sorted(members, key=lambda key: [(k is None, str(k)) for k in key])
+    return [_group(key, *members[key], confidence) for key in keys]
 
 
 _Plates = Counter[tuple[str, bool]]
+_Counts = Counter[tuple[str, str, bool, bool | None]]  # specimens by plate, verdict, touching, and a ratio of one order
+
+
+def _group(key: tuple[Hashable, ...], counts: _Counts, ratios: "array[float]", confidence: float) -> Group:
+    words, known, both = Counter[str](), _Plates(), _Plates()
+    for (plate, word, touching, low), count in counts.items():
+        words[word] += count
+        if not touching and word != "unknown":
+            known[plate, word == "intact"] += count
+        if not touching and low is not None:
+            both[plate, low] += count
+    intact, shorted = (_shared(such, confidence) for such in (known, both))
+    return Group(key, intact, shorted, median(ratios) if ratios else nan, words)
 
 
 def _shared(such: _Plates, confidence: float) -> CountShare:

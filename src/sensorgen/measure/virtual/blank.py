@@ -16,9 +16,8 @@ from sensorgen.core.arrays import Real
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design, Slots
 from sensorgen.design.values import film, material_value, of_all_materials, resistivities
-from sensorgen.measure.virtual.bricks import bricks
 from sensorgen.measure.virtual.cell import AIR, CellBricks, SectionRaster, Solid, capacitance, conductance, pressed
-from sensorgen.measure.virtual.section import FINE_MM, raster, section_of
+from sensorgen.measure.virtual.section import FINE_MM, bricks, raster, section_of
 from sensorgen.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -63,18 +62,18 @@ class Blank:
         """Pressures [Pa], and the relative rise of C under each, of a dielectric with other values."""
         # a modulus that all materials share scales the pressure exactly; the table holds what their ratio does beside
         ln = np.log(np.maximum(self._table[:, :, 1:] / self._table[:, :, :1] - 1, 1e-12))
-        found = np.exp(_between(_between(ln, _LN_MODULUS, ln_modulus), _LN_PERMITTIVITY, ln_permittivity))
+        ratio = np.exp(_between(_between(ln, _LN_MODULUS, ln_modulus), _LN_PERMITTIVITY, ln_permittivity))
         pressure = np.array(PRESSURES_PA[: self._table.shape[-1]])
-        return pressure * exp(ln_modulus), np.concatenate([[0.0], found])
+        return pressure * exp(ln_modulus), np.concatenate([[0.0], ratio])
 
 
 def _between(values: Real, at: tuple[float, ...], x: float) -> Real:
     """The parabola through three values along the first axis."""
-    found = 0.0
+    total = 0.0
     for k in range(3):
         i, j = (n for n in range(3) if n != k)
-        found = found + values[k] * (x - at[i]) * (x - at[j]) / ((at[k] - at[i]) * (at[k] - at[j]))
-    return np.asarray(found)
+        total = total + values[k] * (x - at[i]) * (x - at[j]) / ((at[k] - at[i]) * (at[k] - at[j]))
+    return np.asarray(total)
 
 
 def blank(design: Design) -> Blank:
@@ -113,7 +112,7 @@ def _stored(design: Design) -> Blank:
 def _source() -> str:
     """Of the code that decides: a new version solves anew."""
     here = Path(__file__)
-    files = (here, *(here.with_name(f"{name}.py") for name in ("bricks", "cell", "section")))
+    files = (here, *(here.with_name(f"{name}.py") for name in ("cell", "section")))
     return sha256(b"".join(f.read_bytes() for f in files)).hexdigest()
 
 
@@ -189,18 +188,18 @@ def _table(
     """Capacitances of a grid's cell, by ln of modulus, of permittivity, and pressure, of those all reach."""
     used = _solids(design)
     number = list(used).index(film(design))
-    found = []
+    rows = []
     for ln_modulus in ln_moduli:
         solids = list(used.values())
         solids[number] = replace(solids[number], modulus_pa=solids[number].modulus_pa * exp(ln_modulus))
         loads = [p * exp(ln_modulus) for p in PRESSURES_PA[:count]]
         places = pressed(grid, [AIR, *solids], loads, _FEWEST).place_m
-        found.append([
+        rows.append([
             [capacitance(grid, _permittivities(solids, number, ln), place) for place in places]
             for ln in ln_permittivities
         ])  # fmt: skip
-    reached = min(len(of[0]) for of in found)
-    return np.array([[row[:reached] for row in of] for of in found])
+    reached = min(len(of[0]) for of in rows)
+    return np.array([[row[:reached] for row in of] for of in rows])
 
 
 def _permittivities(solids: Sequence[Solid], number: int, ln: float) -> list[float]:
@@ -229,12 +228,12 @@ def _as_track(grid: SectionRaster | CellBricks, electrode: int, *, along: bool) 
 
 def _solids(design: Design) -> Mapping[str, Solid]:
     """By material."""
-    found = {}
+    solids = {}
     for name, modulus in of_all_materials(design, "youngs_modulus_pa").items():
         material = design.material(name)
         eps = 1.0 if material.conductor else _value(design, name, "relative_permittivity")
-        found[name] = Solid(modulus.value, _value(design, name, "poisson_ratio"), eps)
-    return found
+        solids[name] = Solid(modulus.value, _value(design, name, "poisson_ratio"), eps)
+    return solids
 
 
 def _value(design: Design, name: str, quantity: str) -> float:

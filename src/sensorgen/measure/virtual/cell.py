@@ -115,9 +115,9 @@ class SectionRaster:
             fixed[number[:, [0, -1]], 0] = True
         np.add.at(top, number[-1], _shares(self.x_m))
         at = np.stack([np.broadcast_to(self.x_m, z.shape), z], -1)
-        kept = (rise[:, 1:] | rise[:, :-1]).T.ravel()
-        of = self.material.T.ravel()[kept], self.electrode.T.ravel()[kept]
-        return ElementGrid(_at_corners(number.T, 2)[kept], _at_corners(at.swapaxes(0, 1), 2)[kept], *of, fixed, top)
+        free = (rise[:, 1:] | rise[:, :-1]).T.ravel()
+        of = self.material.T.ravel()[free], self.electrode.T.ravel()[free]
+        return ElementGrid(_at_corners(number.T, 2)[free], _at_corners(at.swapaxes(0, 1), 2)[free], *of, fixed, top)
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,11 +241,11 @@ def pressed(
             step = min(step, after - at)
             ahead = u + step * rate  # where the last step leads, if that is nearer
             near = body.energy(ahead, at + step) < body.energy(u, at + step)
-            found = body.settled(ahead if near else u, at + step)
-            if found is None:
+            settled = body.settled(ahead if near else u, at + step)
+            if settled is None:
                 step /= 2
                 continue
-            u, rate, at = found, (found - u) / step, at + step
+            u, rate, at = settled, (settled - u) / step, at + step
             step *= 1.5
         if at < after - 1e-9 * after:
             if len(sinks) < (least or len(pressure_pa)):
@@ -369,13 +369,13 @@ def _twists(at_m: Real) -> Real:
     """Stiffness of the hourglass modes of elements of a unit modulus (e, m, m)."""
     dimensions = at_m.shape[-1]
     sign, size = 2 * _corners(dimensions) - 1, np.ptp(at_m, axis=1)
-    found = 0.0
+    most = 0.0
     for count in range(2, dimensions + 1):
         for axes in combinations(range(dimensions), count):
             twist = sign[:, axes].prod(1)
             own = size.prod(1) * (size[:, axes] ** -2).sum(1) * 4.0 ** (count - dimensions)
-            found = found + own[:, None, None] * np.outer(twist, twist)
-    return _each_way(np.asarray(found), dimensions)
+            most = most + own[:, None, None] * np.outer(twist, twist)
+    return _each_way(np.asarray(most), dimensions)
 
 
 def capacitance(raster: SectionRaster | CellBricks, permittivity: Sequence[float], place_m: Real) -> float:
@@ -429,10 +429,10 @@ def _solved(matrix: Any, right: Real) -> Real:
 
     if len(right) < _MOST_DIRECT:
         return np.asarray(splu(matrix).solve(right))
-    found, failed = cg(matrix, right, rtol=_RESIDUAL, M=diags(1 / matrix.diagonal()))
+    solution, failed = cg(matrix, right, rtol=_RESIDUAL, M=diags(1 / matrix.diagonal()))
     if failed:
         raise OutOfRange(f"the field of a cell with {len(right)} unknowns did not converge")
-    return np.asarray(found)
+    return np.asarray(solution)
 
 
 def _potentials(grid: ElementGrid) -> Whole:
@@ -441,11 +441,11 @@ def _potentials(grid: ElementGrid) -> Whole:
     from scipy.sparse.csgraph import connected_components
 
     count = len(grid.top_m)
-    found = np.arange(count)
+    numbers = np.arange(count)
     loose = grid.nodes[grid.electrode > 2]
     pairs = loose[:, :-1].ravel(), loose[:, 1:].ravel()
     _, piece = connected_components(coo_matrix((np.ones(len(pairs[0])), pairs), (count, count)), False)
-    found[loose] = np.unique(piece, return_index=True)[1][piece][loose]
+    numbers[loose] = np.unique(piece, return_index=True)[1][piece][loose]
     for terminal in (2, 1):
-        found[grid.nodes[grid.electrode == terminal]] = -terminal
-    return found
+        numbers[grid.nodes[grid.electrode == terminal]] = -terminal
+    return numbers

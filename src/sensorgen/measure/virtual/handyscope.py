@@ -15,7 +15,7 @@ import numpy as np
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.measure.lab.clock import Clock
 from sensorgen.measure.lab.devices import DeviceFault, Identity, Readings, WrongDevice
-from sensorgen.measure.signal.multisine import multisine
+from sensorgen.measure.signal.waveform import multisine
 from sensorgen.measure.virtual.plant import Plant
 
 FAULTS = ("unplugged", "hung", "data loss", "clipped", "nan", "silent", "generator off", "in use", "wrong device")
@@ -164,11 +164,11 @@ class PhasorMeter:
             raise DeviceFault(f"Handyscope {SERIAL} loses samples again and again")
         self._windows.count += lost
         first = self._windows.count
-        made = [self._measured(self._windows.impedance(self._tones)) for _ in range(count)]
+        windows = [self._measured(self._windows.impedance(self._tones)) for _ in range(count)]
         if count:
             self._heard = now
-        impedance = np.array([z for z, _ in made]).reshape(count, len(self._tones))
-        clipped = np.array([beyond for _, beyond in made], bool)
+        impedance = np.array([z for z, _ in windows]).reshape(count, len(self._tones))
+        clipped = np.array([beyond for _, beyond in windows], bool)
         return Readings(np.asarray((first + np.arange(count) + 0.5) * WINDOW_S), impedance, clipped, lost)
 
     def stop(self) -> None:

@@ -1,15 +1,19 @@
-"""The simulated rig: piston with weight and friction, tip, stage, and the specimen below, as one mechanism."""
+"""Simulated rig: piston with weight and friction, tip, stage and specimen; as an experiment describes it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from math import copysign, exp, inf, sqrt
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from sensorgen.core.arrays import Complex, Real
-from sensorgen.core.errors import BadInput
-from sensorgen.measure.virtual.faults import FaultSchedule
-from sensorgen.measure.virtual.specimen import PressedSpecimen, VirtualLine
+from sensorgen.core.errors import BadInput, UnknownName
+from sensorgen.core.records import Strict
+from sensorgen.design.design import Design
+from sensorgen.measure.virtual.faults import FaultSchedule, Planted
+from sensorgen.measure.virtual.specimen import PressedSpecimen, Truth, VirtualLine, drawn
 
 STEP_S = 2e-3  # of the mechanism
 _OWN_MM_S = 2.0  # of a stage that moves by itself
@@ -235,13 +239,13 @@ class VirtualRig:
             lift = self._lift(ends[1] - ends[0])
         shorted = self.force_n <= truth.short_opens_n
         c, r = self._drift * (truth.drift_c, truth.drift_r)
-        found = self._lines[key].impedance(lift, ends if lift else (0.0, 0.0), c, r, shorted=shorted)
+        impedance = self._lines[key].impedance(lift, ends if lift else (0.0, 0.0), c, r, shorted=shorted)
         if self.fault == "short" and self.force_n < _OPENS_N:
-            found = np.asarray(found * _SHORT_OHM / (found + _SHORT_OHM))
+            impedance = np.asarray(impedance * _SHORT_OHM / (impedance + _SHORT_OHM))
         if self.noise:
             real, imaginary = self.noise * self._interference.standard_normal((2, len(frequency)))
-            found = found * (1 + real + 1j * imaginary)
-        return found
+            impedance = impedance * (1 + real + 1j * imaginary)
+        return impedance
 
     def resistance(self, *, wires: int) -> float:
         """Reading of an ideal multimeter across the bottom electrode [ohm]."""
@@ -317,8 +321,8 @@ class VirtualRig:
         if what not in self._open:
             self._open[what] = Violation(self.time_s, what, self.force_n)
             self.violations.append(self._open[what])
-        found = self._open[what]
-        found.value, found.duration_s = max(found.value, self.force_n), found.duration_s + dt
+        state = self._open[what]
+        state.value, state.duration_s = max(state.value, self.force_n), state.duration_s + dt
 
 
 def _relaxed(dt: float) -> Real:
@@ -331,3 +335,66 @@ def _relaxed(dt: float) -> Real:
 
 _RELAXED: dict[float, Real] = {}
 _CREPT_AT_1_S = _PER_TIME * float(np.sum(1 - np.exp(-1 / np.array(_CREEP_S))))
+
+
+Waves = Annotated[tuple[float, ...], Field(strict=False)]
+
+
+class VirtualSpecimen(Strict):
+    """The section ``virtual`` of an experiment: what a simulated run presses, and what goes wrong.
+
+    Attributes
+    ----------
+    design : str or None
+        File or shape; the design of the specimen in the log if None.
+    seed : int
+        Of materials, errors and drift.
+    truth : mapping
+        Values of :class:`sensorgen.measure.virtual.specimen.Truth` in place of drawn ones.
+    rig : mapping
+        Values of :class:`sensorgen.measure.virtual.mechanics.Mechanics` in place of its defaults.
+    noise : float
+        Relative standard deviation of both parts of a reading, beside the instrument's own noise [-].
+    faults : sequence of Planted
+        What goes wrong, and when.
+    """
+
+    design: str | None = None
+    seed: Annotated[int, Field(ge=0)] = 0
+    truth: dict[str, float | Waves] = Field(default={})
+    rig: dict[str, float] = Field(default={})
+    noise: Annotated[float, Field(ge=0, le=1)] = 0.0
+    faults: tuple[Planted, ...] = Field(default=(), strict=False)
+
+    @model_validator(mode="after")
+    def _known(self) -> "VirtualSpecimen":
+        for given, kind in ((self.truth, Truth), (self.rig, Mechanics)):
+            known = [one.name for one in fields(kind)]
+            for name in given:
+                if name not in known:
+                    raise ValueError(str(UnknownName(f"value of a virtual {kind.__name__.lower()}", name, known)))
+        return self
+
+
+def rig_of(settings: VirtualSpecimen, design: Design, tip_m: float) -> VirtualRig:
+    """The simulated rig of an experiment, with its faults planted.
+
+    Parameters
+    ----------
+    settings : VirtualSpecimen
+        Of the experiment's file.
+    design : Design
+        What the specimen was printed of.
+    tip_m : float
+        Length of the tip along the strip [m].
+
+    Raises
+    ------
+    BadInput, OutOfRange, MissingValue
+        A truth, rig or body that cannot be.
+    """
+    changes: dict[str, Any] = dict(settings.truth)
+    specimen = PressedSpecimen(design, replace(drawn(design, settings.seed), **changes), tip_m)
+    rig = VirtualRig(specimen, Mechanics(**settings.rig), settings.seed, settings.noise)
+    rig.planted = FaultSchedule(settings.faults)
+    return rig

@@ -187,7 +187,7 @@ class RepRapFirmware(Simulator):
             x, z = self._goal["x"], self._goal["z"]
             return f"X:{x:.3f} Y:0.000 Z:{z:.3f} E:0.000 Count 0 0 0 Machine {x:.3f} 0.000 {z:.3f} Bed comp 0.000"
         if name == "M409":
-            key = found.group(1) if (found := _KEY.search(code)) else ""
+            key = match.group(1) if (match := _KEY.search(code)) else ""
             values = {"state.status": self._status(), "move.axes[].machinePosition": self._axes()}
             return json.dumps({"key": key, "flags": "", "result": values.get(key)}) + "\n"
         return "" if name[:1] in "GM" else f"Error: Bad command: {code}"

@@ -45,8 +45,8 @@ class _Instrument(Simulator):
         command, _, value = line.decode("ascii", "replace").strip().partition(" ")
         command, time_s = command.upper(), self._now_s
         if command == "*IDN?":
-            said = "TEKTRONIX,TDS 2000,0,1.0" if self.fault == "identity" else IDENTITIES[self._model]
-            self._later.append((time_s, said))
+            answer = "TEKTRONIX,TDS 2000,0,1.0" if self.fault == "identity" else IDENTITIES[self._model]
+            self._later.append((time_s, answer))
         elif command == "*CLS":
             self._errors.clear()
         elif command == "SYST:ERR?":

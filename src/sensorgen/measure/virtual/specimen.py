@@ -222,14 +222,14 @@ class PressedSpecimen:
             return 0.0
         pressure, rise = self._curve
         p = felt / (self.width_m * covered_m)
-        found = float(np.interp(p, pressure, rise))
+        ratio = float(np.interp(p, pressure, rise))
         if p > pressure[-1]:
-            found += (p - pressure[-1]) * float((rise[-1] - rise[-3]) / (pressure[-1] - pressure[-3]))
+            ratio += (p - pressure[-1]) * float((rise[-1] - rise[-3]) / (pressure[-1] - pressure[-3]))
         if self.truth.law:
             at = min(max(log(felt / 0.2) / log(13 / 0.2), 0.0), 1.0)
-            found *= exp(sum(k * np.cos((n + 1) * np.pi * at) for n, k in enumerate(self.truth.law)))
-        found *= 1 + self.truth.hysteresis * unloading
-        return found * (1 + self.truth.creep * decades)
+            ratio *= exp(sum(k * np.cos((n + 1) * np.pi * at) for n, k in enumerate(self.truth.law)))
+        ratio *= 1 + self.truth.hysteresis * unloading
+        return ratio * (1 + self.truth.creep * decades)
 
     def line(self, frequency_hz: Real) -> "VirtualLine":
         """Line of the specimen at (m,) frequencies [Hz]."""

@@ -43,11 +43,15 @@ class Past:
         Of the last frame; nan before the first [s].
     reading, lagged : (n,) array
         Last reading of each element that is known, and weighted past.
+    most, play : (n,) array
+        Largest reading before, and the reading with a play, of :func:`behind`.
     """
 
     time_s: float = np.nan
     reading: "Real | float" = np.nan
     lagged: "Real | float" = 0.0
+    most: "Real | float" = 0.0
+    play: "Real | float" = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,6 +196,25 @@ def lagged(x: Real, time_s: Real, tau_s: float, past: "Past | None" = None) -> R
     return found
 
 
+def behind(x: Real, share: float, past: "Past | None" = None) -> Real:
+    """Lag of a play behind each column, half as wide as a share of the largest value before.
+
+    Prandtl's operator of hysteresis: -w while x rises, w while it falls. Where x is missing, it is as before.
+
+    >>> x = np.array([[0.0], [1.0], [0.95], [0.5], [0.0]])
+    >>> np.round(behind(x, 0.1)[:, 0], 2).tolist()
+    [0.0, -0.1, -0.05, 0.1, 0.1]
+    """
+    found, past = np.empty_like(x), past or Past()
+    for k, row in enumerate(x):
+        past.reading = np.where(np.isfinite(row), row, past.reading)
+        known = np.nan_to_num(past.reading)
+        past.most = np.maximum(past.most, known)
+        past.play = np.clip(past.play, known - share * past.most, known + share * past.most)
+        found[k] = past.play - known
+    return found
+
+
 @dataclass(frozen=True)
 class LawForm:
     """Form of the law.
@@ -206,24 +229,29 @@ class LawForm:
         With a slow drift of the gain.
     tared : bool
         With a tare of each session; without one a constant takes its place.
+    play : float
+        Half-width of a play by which unloading lags behind loading, over the largest reading before; 0 without [-].
     """
 
     powers: int = _SHAPES
     tau_s: float = 0.0
     drift: bool = False
     tared: bool = True
+    play: float = 0.0
 
     def basis(self, x: Real, time_s: Real, past: "Past | None" = None) -> Real:
         """Terms of the law, (k, n, terms); powers are 0 where a reading is missing."""
         known = np.nan_to_num(x)
         terms = [known**power for power in range(0 if not self.tared else 1, self.powers + 1)]
-        return np.stack([*terms, *([lagged(x, time_s, self.tau_s, past)] if self.tau_s else [])], -1)
+        terms += [lagged(x, time_s, self.tau_s, past)] if self.tau_s else []
+        return np.stack([*terms, *([behind(x, self.play, past)] if self.play else [])], -1)
 
     def words(self) -> str:
         """The form in words."""
         parts = [f"{('', 'straight', 'square', 'cubic')[self.powers]}", *(["tare"] if self.tared else [])]
-        return ", ".join([*parts, *([f"state of {self.tau_s:g} s"] if self.tau_s else []),
-                          *(["gain drift"] if self.drift else [])])  # fmt: skip
+        parts += [f"state of {self.tau_s:g} s"] if self.tau_s else []
+        parts += [f"play of {2 * self.play:.0%}"] if self.play else []
+        return ", ".join([*parts, *(["gain drift"] if self.drift else [])])
 
 
 @dataclass(frozen=True, eq=False)

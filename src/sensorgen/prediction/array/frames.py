@@ -1,8 +1,8 @@
 """Frames of an array to pressure maps: by C/C0 where that suffices, else with the network of the tracks."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from io import BytesIO
 from math import nan
 from typing import Any
@@ -25,11 +25,13 @@ SCATTER = 0.05  # of gain, from cell to cell of one print, before a calibration 
 _STEPS = 25  # of Gauss-Newton with the slopes at rest
 _DONE = 0.02  # of a standard error: a smaller step ends it
 _HEAVIER = 1.1  # times the heaviest frame so far: a later one is compared with the network too
-_SUFFICES = 1.0  # standard error by which C/C0 may differ from the network
+_SUFFICES = 0.5  # standard error by which C/C0 may differ from the network
 _ALIVE = 3.0  # factor of a reading at rest to the predicted one; prints differ by less
+_LEAST_PHASE = 50.0  # degrees that capacitances alone need
 _SHORTED = 10.0  # real part at rest over the predicted magnitude
 _LEAKS = 6  # steps to the conductance of shorts
 _SHOWN = 6  # crossings that are named
+_EVEN = 1e-3  # of a place's weight: planes are even along what no value tells
 _CI = 1.96  # standard errors of 95 %
 
 
@@ -70,21 +72,13 @@ class PressureMaps:
 
         Standard errors of more crossings than one matrix takes grow as those of an array without ends.
         """
-        from scipy.sparse import csc_array, diags_array
-        from scipy.sparse.linalg import splu
-
-        spread, shape = self.model.spread, self.pressure_kpa.shape
+        shape = self.pressure_kpa.shape
         pressure, sigma = (each.reshape(shape[0], -1).copy() for each in (self.pressure_kpa, self.sigma_kpa))
         masks, which = np.unique(np.isfinite(pressure), axis=0, return_inverse=True)
         for k, known in enumerate(masks):
-            own = csc_array(spread[known][:, known])
-            back = splu(csc_array(diags_array(spread[known].sum(1) / own.sum(1)) @ own))
-            at = np.ix_(which.ravel() == k, known)
-            pressure[at] = back.solve(pressure[at].T).T
-            if known.sum() > MOST_DENSE:
-                sigma[at] *= self.model.undone
-            else:
-                sigma[at] = np.sqrt(sigma[at] ** 2 @ (back.solve(np.eye(own.shape[0])) ** 2).T)
+            at, (back, squares) = np.ix_(which.ravel() == k, known), _back(self.model, known.tobytes())
+            pressure[at] = back(pressure[at].T).T
+            sigma[at] = sigma[at] * self.model.undone if squares is None else np.sqrt(sigma[at] ** 2 @ squares)
         lost = ~_known(sigma * PA_PER_KPA)
         pressure[lost] = sigma[lost] = nan
         return replace(self, pressure_kpa=pressure.reshape(shape), sigma_kpa=sigma.reshape(shape))
@@ -95,15 +89,30 @@ class PressureMaps:
         half = (NORMAL_90 if self.calibration else _CI) * self.sigma_kpa
         return self.pressure_kpa - half, self.pressure_kpa + half
 
+    @cached_property
+    def filled(self) -> tuple[Real, Real]:
+        """Pressures with lost crossings by a plane through those around them, and errors [kPa].
+
+        The error is that of such planes at the determined crossings of the frame, as a share; nan where none is around.
+        """
+        lost = np.isnan(self.pressure_kpa) & self.model.here
+        if not lost.any():
+            return self.pressure_kpa, self.sigma_kpa
+        plane = np.maximum(_planes(self.pressure_kpa), 0.0)
+        off, size = (np.nansum(of**2, (1, 2)) for of in (self.pressure_kpa - plane, np.where(lost, 0.0, plane)))
+        error = np.sqrt(off / np.maximum(size, 1e-30))[:, None, None] * plane
+        return np.where(lost, plane, self.pressure_kpa), np.where(lost, error, self.sigma_kpa)
+
     @property
-    def _newtons(self) -> Real:
-        return self.pressure_kpa * PA_PER_KPA * self.model.pitch_area_m2
+    def _newtons(self) -> tuple[Real, Real]:
+        per_kpa = PA_PER_KPA * self.model.pitch_area_m2
+        return per_kpa * self.filled[0], per_kpa * self.filled[1]
 
     @cached_property
     def force_n(self) -> tuple[Real, Real]:
-        """Total force of each frame and its standard error, of determined crossings; nan without any [N]."""
-        sigma, read = self.sigma_kpa * PA_PER_KPA * self.model.pitch_area_m2, np.isfinite(self.pressure_kpa).any((1, 2))
-        force, error = np.nansum(self._newtons, (1, 2)), np.sqrt(np.nansum(sigma**2, (1, 2)))
+        """Total force of each frame and its standard error, lost crossings filled; nan without any [N]."""
+        (newtons, sigma), read = self._newtons, np.isfinite(self.pressure_kpa).any((1, 2))
+        force, error = np.nansum(newtons, (1, 2)), np.sqrt(np.nansum(sigma**2, (1, 2)))
         if self.calibration:
             error = np.hypot(error, self.calibration.common * force)
         return np.where(read, force, np.nan), np.where(read, error, np.nan)
@@ -114,19 +123,25 @@ class PressureMaps:
         return np.asarray(self.pressure_kpa > DETECTED * self.sigma_kpa)
 
     @cached_property
-    def centre_mm(self) -> tuple[Real, Real]:
-        """Centre of pressure of touched crossings and their neighbours, from the print's corner; nan of none [mm].
+    def centre_mm(self) -> tuple[Real, Real, Real, Real]:
+        """Centre of pressure from the print's corner along x and y, and standard errors; nan of no contact [mm].
 
-        Light loads lie beside heavier ones; farther off there is noise, with a long arm.
+        Of crossings whose 5 x 5 together are above three standard errors: light loads count beside each other; farther
+        off there is noise, with a long arm. Lost crossings are filled.
         """
         from scipy import ndimage
 
-        near = ndimage.binary_dilation(self.touched, np.ones((1, 3, 3)))
-        weight = np.where(near, np.nan_to_num(self._newtons), 0.0)
+        newtons, sigma = (np.nan_to_num(of) for of in self._newtons)
+        of, errors = (ndimage.uniform_filter(each, (1, 5, 5), mode="constant") for each in (newtons, sigma**2))
+        near = of > DETECTED / 5 * np.sqrt(np.maximum(errors, 0.0))
+        weight, found = np.where(near, newtons, 0.0), list[Real]()
         total = np.where(self.touched.any((1, 2)), weight.sum((1, 2)), np.nan)
-        layout = self.model.layout
         with np.errstate(invalid="ignore", divide="ignore"):
-            return (weight.sum(1) @ layout.x_mm) / total, (weight.sum(2) @ layout.y_mm) / total
+            for axis, at in ((1, self.model.layout.x_mm), (2, self.model.layout.y_mm)):
+                found.append((weight.sum(axis) @ at) / total)
+                arms = np.array(at) - found[-1][:, None]
+                found.append(np.sqrt(((near * sigma**2).sum(axis) * arms**2).sum(1)) / total)
+        return found[0], found[2], found[1], found[3]
 
     @property
     def area_mm2(self) -> Real:
@@ -141,14 +156,15 @@ class PressureMaps:
 
     @cached_property
     def regions(self) -> dict[str, Real]:
-        """Values of each region by frame, (k,), named as in CSV: of determined crossings, nan without any."""
+        """Values of each region by frame, (k,), named as in CSV; nan without a determined crossing."""
         found = dict[str, Real]()
         for name, inside in self.model.regions.items():
             kpa = self.pressure_kpa[:, inside]
             count = np.isfinite(kpa).sum(1)
-            force = np.where(count, np.nansum(self._newtons[:, inside], 1), np.nan)
+            newtons = self._newtons[0][:, inside]
+            force, filled = np.where(count, np.nansum(newtons, 1), np.nan), np.isfinite(newtons).sum(1)
             peak = np.where(np.isnan(kpa), -np.inf, kpa).max(1)
-            mean = force / (np.maximum(count, 1) * self.model.pitch_area_m2 * PA_PER_KPA)
+            mean = force / (np.maximum(filled, 1) * self.model.pitch_area_m2 * PA_PER_KPA)
             area = self.touched[:, inside].sum(1) * self.model.pitch_area_m2 * 1e6
             values = (force, mean, np.where(count, peak, np.nan), area, inside.sum() - count)
             found |= {f"{name}_{column.key}": of for column, of in zip(_REGION, values, strict=True)}
@@ -164,15 +180,16 @@ class PressureMaps:
 
     def table(self) -> Table:
         """Force, centre of pressure, area and peak of each frame, and for programs those of each region."""
-        (force, sigma), (x, y) = self.force_n, self.centre_mm
+        (force, sigma), (x, y, *errors) = self.force_n, self.centre_mm
         columns = (
             Column("time", "s", key="time_s"), Column("force", "N", key="force_n"),
             Column("sigma F", "N", key="sigma_force_n"), Column("x", "mm", key="x_mm"), Column("y", "mm", key="y_mm"),
             Column("contact", "mm2", key="area_mm2"), Column("peak", "kPa", key="peak_kpa"),
-            Column("not determined", key="undetermined"), *(Column(key, key=key, hidden=True) for key in self.regions),
+            Column("not determined", key="undetermined"), Column("sigma x", "mm", key="sigma_x_mm"),
+            Column("sigma y", "mm", key="sigma_y_mm"), *(Column(key, key=key, hidden=True) for key in self.regions),
         )  # fmt: skip
         dark = (np.isnan(self.pressure_kpa) & self.model.here).sum((1, 2))
-        found = (self.time_s, force, sigma, x, y, self.area_mm2, self.peak_kpa, dark, *self.regions.values())
+        found = (self.time_s, force, sigma, x, y, self.area_mm2, self.peak_kpa, dark, *errors, *self.regions.values())
         return Table("frames", "", columns, tuple(tuple(map(_cell, row)) for row in np.stack(found, 1).tolist()))
 
     def heaviest(self) -> int:
@@ -218,11 +235,12 @@ class PressureMaps:
 
     def npz(self) -> bytes:
         """Maps and numbers of every frame as NPZ."""
-        target, (force, sigma), (x, y) = BytesIO(), self.force_n, self.centre_mm
+        target, (force, sigma), (x, y, x_error, y_error) = BytesIO(), self.force_n, self.centre_mm
         regions: dict[str, Any] = {**self.regions}
         np.savez_compressed(
             target, time_s=self.time_s, pressure_kpa=self.pressure_kpa, sigma_kpa=self.sigma_kpa, force_n=force,
-            sigma_force_n=sigma, centre_x_mm=x, centre_y_mm=y, area_mm2=self.area_mm2, **regions,
+            sigma_force_n=sigma, centre_x_mm=x, centre_y_mm=y, sigma_x_mm=x_error, sigma_y_mm=y_error,
+            area_mm2=self.area_mm2, **regions,
         )  # fmt: skip
         return target.getvalue()
 
@@ -349,14 +367,25 @@ class MapInverter:
             return np.asarray(siemens.imag * self.nominal.siemens.imag > 0)
 
     def refuse_dead(self) -> None:
-        """BadInput where no crossing is alive."""
+        """BadInput where no crossing is alive, or where two capacitances give one reading."""
         if self.alive.any():
+            self._refuse_ambiguous()
             return
         read, predicted = (self._median(each[self.model.here]) for each in (self.rest_s, self.nominal.siemens))
         raise BadInput(
             f"no crossing reads at rest within a factor of {_ALIVE:g} of what is predicted: the median imaginary part "
             f"is {read}, predicted {predicted}; expected siemens, or capacitance_f in farad, of this array"
         )
+
+    def _refuse_ambiguous(self) -> None:
+        """Refuse capacitances alone near 45 degrees: there the imaginary part is largest, and on both sides alike."""
+        nominal = self.nominal.siemens[self.alive]
+        phase = float(np.degrees(np.arctan2(np.abs(nominal.imag), np.abs(nominal.real)).min()))
+        if not self.parts[0].any() and phase < _LEAST_PHASE:
+            raise BadInput(
+                f"capacitances alone at {si(self.readout.frequency_hz[0], 'Hz')}: the tracks turn the "
+                f"phase to {phase:.0f} degrees, where two give one reading; expected siemens, or a lower frequency"
+            )
 
     def _median(self, siemens: Complex) -> str:
         """Median of the imaginary parts, and the capacitance that it is, in words."""
@@ -399,7 +428,7 @@ class MapInverter:
         Gauss-Newton with the slopes at rest; the prior, as wide as full scale, keeps what no reading tells.
         """
         weights, (gain, variance) = self._weights(*self.parts), self.gain
-        c, (m, n) = start, start.shape
+        c, spread = start, np.sqrt(variance).reshape(start.shape)
         for _ in range(_STEPS):
             left = siemens - self.read(c).siemens
             off = np.stack([np.nan_to_num(left.real) * weights[0], np.nan_to_num(left.imag) * weights[1]])
@@ -407,10 +436,10 @@ class MapInverter:
                 step = (gain * off.reshape(2, -1)).sum(0)
             else:
                 step = gain @ off.ravel() - variance * ((c - start) / self.prior_f**2).ravel()
-            c = np.maximum(c + step.reshape(m, n), 1e-3 * start)
-            if (np.abs(step) < _DONE * np.sqrt(variance)).all():
+            before, c = c, np.maximum(c + step.reshape(c.shape), 1e-3 * start)
+            if (np.abs(c - before) < _DONE * spread).all():  # of a dead crossing the step goes on at the bound
                 break
-        return c, (np.abs(step) < np.sqrt(variance)).reshape(m, n)
+        return c, np.abs(c - before) < spread
 
     @cached_property
     def _rest(self) -> tuple[Real, Mask]:
@@ -427,7 +456,7 @@ class MapInverter:
     def by_ratio(self, siemens: Complex) -> Real:
         """Capacitance over that at rest, of each crossing by its own reading alone [-]."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(siemens.imag / self.rest_s.imag)
+            return np.where(self.alive, siemens.imag / self.rest_s.imag, np.nan)
 
     def by_network(self, siemens: Complex) -> Real:
         """Capacitance over that at rest with the network, frame by frame; nan where Gauss-Newton did not settle [-]."""
@@ -453,19 +482,20 @@ class MapInverter:
     def planned(self, siemens: Complex, plan: "MapPlan | None" = None) -> tuple[Real, Real, str]:
         """Capacitance over that at rest (k, m, n), its error by noise (m, n), and by which model, and why.
 
-        C/C0 where it agrees with the network in the heaviest frame, else the network. Of a plan that goes on, frames
-        are compared that are heavier by a tenth than all before.
+        C/C0 up to the first frame in which it differs from the network, from there on the network. Frames are compared
+        that are heavier by a tenth than all before, so that a frame has one answer, alone, in a lot or in a recording.
         """
         ratio, error, plan = self.by_ratio(siemens), self.error, plan or MapPlan()
-        loads = np.nansum(np.where(self.alive, ratio - 1, 0), (1, 2))
-        heaviest = int(loads.argmax())
-        if not plan.network and loads[heaviest] > _HEAVIER * plan.load:
-            plan.worst = max(plan.worst, self._compared(siemens[heaviest], ratio[heaviest]))
-            plan.load = max(float(loads[heaviest]), 0.0)
-        by = plan.words()
-        if not plan.network:
+        loads, light = np.nansum(np.where(self.alive, ratio - 1, 0), (1, 2)), 0
+        while light < len(loads) and not plan.network:
+            if loads[light] > _HEAVIER * plan.load:
+                plan.worst = max(plan.worst, self._compared(siemens[light], ratio[light]))
+                plan.load = max(float(loads[light]), 0.0)
+            light += not plan.network
+        by, solved = plan.words(), siemens[light:]
+        if not len(solved):
             return ratio, error, by
-        ratio = np.where(np.isfinite(siemens.imag), self.by_network(siemens), np.nan)
+        ratio[light:] = np.where(np.isfinite(solved.imag) & self.alive, self.by_network(solved), np.nan)
         if lost := int((np.isnan(ratio) & np.isfinite(siemens.imag) & self.alive).sum()):
             by += f"; {lost} values left out that {_STEPS} steps of Gauss-Newton did not settle"
         return ratio, error, by
@@ -486,6 +516,40 @@ class MapInverter:
             pressure, sigma = PA_PER_KPA * mean, PA_PER_KPA / NORMAL_90 * half
         shown, error_kpa = (np.where(given, each / PA_PER_KPA, np.nan) for each in (pressure, sigma))
         return PressureMaps(self.model, by, time_s, shown, error_kpa, calibration)
+
+
+def _planes(values: Real) -> Real:
+    """Planes through the values within two places around each, weighed by distance, its own left out, (k, m, n)."""
+    from scipy import ndimage
+
+    y, x = np.mgrid[-2:3, -2:3].astype(float)
+    weight = np.where(x**2 + y**2, np.exp(-(x**2 + y**2) / 2), 0.0)
+    known, terms = np.isfinite(values), (np.ones((5, 5)), x, y)
+
+    def moments(of: Real, *more: Real) -> Real:
+        return np.stack(
+            [ndimage.correlate(of, (weight * np.prod([t, *more], 0))[None], mode="constant") for t in terms], -1
+        )
+
+    gram = np.stack([moments(known.astype(float), term) for term in terms], -1)
+    count = gram[..., 0, 0] > 0
+    right = moments(np.where(known, values, 0.0))[..., None]
+    return np.where(count, np.linalg.solve(gram + np.diag([1e-12, _EVEN, _EVEN]), right)[..., 0, 0], np.nan)
+
+
+@lru_cache(maxsize=4)
+def _back(model: ArrayModel, known: bytes) -> tuple[Callable[[Real], Real], "Real | None"]:
+    """Pressures on the surface by those that some crossings carry, and squares of that matrix, transposed, if small."""
+    from scipy.sparse import csc_array, diags_array
+    from scipy.sparse.linalg import splu
+
+    here = np.frombuffer(known, bool)
+    own = csc_array(model.spread[here][:, here])
+    back = splu(csc_array(diags_array(model.spread[here].sum(1) / own.sum(1)) @ own)).solve
+    if own.shape[0] > MOST_DENSE:
+        return back, None
+    inverse = back(np.eye(own.shape[0]))
+    return lambda pressure: inverse @ pressure, (inverse**2).T
 
 
 def _cell(value: float) -> float | None:

@@ -33,12 +33,10 @@ class LiveMaps:
         Of each element.
     day : float
         Of the recording, as the calibration counts them [d].
-    newest : bool
-        Where the network is needed, of the frames of a lot only the newest is inverted.
     plan : MapPlan
         Choice of the model.
     dropped : int
-        Frames that were not inverted: for newer ones, or before any at rest.
+        Frames that were not inverted: before any at rest.
     """
 
     model: ArrayModel
@@ -46,7 +44,6 @@ class LiveMaps:
     scatter: float = SCATTER
     calibration: "ArrayCalibration | None" = None
     day: float = nan
-    newest: bool = False
     plan: MapPlan = field(default_factory=MapPlan)
     dropped: int = 0
     _past: Past = field(default_factory=Past)
@@ -59,7 +56,7 @@ class LiveMaps:
         return bool(self._rest)
 
     def take(self, siemens: Complex, time_s: Real, rest: Mask) -> "PressureMaps | None":
-        """Maps of what cells carry in a lot's loaded frames, (k, m, n) [S], the cover's spread left; None without any.
+        """Maps of a lot's loaded frames, (k, m, n) [S], as of the whole recording; None without any.
 
         Raises
         ------
@@ -72,15 +69,13 @@ class LiveMaps:
         if loaded.size and not self.tared:
             self.dropped += len(loaded)
             return None
-        if self.newest and self.plan.network and loaded.size:
-            self.dropped += len(loaded) - 1
-            loaded = loaded[-1:]
         if not loaded.size:
             return None
         if self._inverter is None:
             self._inverter = at_rest(self.model, self.readout, np.array(self._rest), self.scatter)
         frames = missing(siemens[loaded])
-        return self._inverter.maps(frames, time_s[loaded], self.calibration, self.day, self.plan, self._past)
+        maps = self._inverter.maps(frames, time_s[loaded], self.calibration, self.day, self.plan, self._past)
+        return maps.on_surface()
 
     def _renew(self, frames: Complex) -> None:
         """Another reference: what was at rest before loaded frames is past."""

@@ -34,6 +34,7 @@ from sensorgen.prediction.inverse.verdict import NORMAL_90
 
 LEVEL = 0.9
 TAUS_S = (10.0, 30.0, 100.0, 300.0)
+PLAYS = (0.01, 0.03, 0.1)
 _EARNED = 0.02  # share of the error by which a further term has to lower it
 _FRAMES = 4000  # of a session, at most, by which the interval is set
 _QUIET, _PATTERN = 4.0, 4.0  # standard deviations of noise, and of tares over sessions
@@ -144,7 +145,7 @@ class ArrayCalibration:
     def npz(self) -> bytes:
         """The calibration as NPZ."""
         target, law = BytesIO(), self.law
-        form = (law.form.powers, law.form.tau_s, law.form.drift, law.form.tared)
+        form = (law.form.powers, law.form.tau_s, law.form.drift, law.form.tared, law.form.play)
         error = (self.floor_kpa, self.share, self.reach, self.common)
         np.savez_compressed(
             target, form=np.array(form, float), scale=law.scale, at=law.at, spread=law.spread, alive=law.alive,
@@ -164,11 +165,11 @@ def stored(path: Path) -> ArrayCalibration:
     """
     try:
         with reading(path), np.load(path, allow_pickle=False) as data:
-            powers, tau_s, drift, tared = data["form"].tolist()
+            powers, tau_s, drift, tared, play = (*data["form"].tolist(), 0.0)[:5]
             day, rate, unsure, floor, share, reach, common = data["numbers"].tolist()
             law = ElementLaw(
-                LawForm(int(powers), tau_s, bool(drift), bool(tared)), float(data["scale"]), data["at"], data["spread"],
-                day, rate, unsure, data["alive"],
+                LawForm(int(powers), tau_s, bool(drift), bool(tared), play), float(data["scale"]), data["at"],
+                data["spread"], day, rate, unsure, data["alive"],
             )  # fmt: skip
             names = tuple(data["names"].tolist()) if "names" in data else ()
             return ArrayCalibration(law, floor, share, reach, common, data["tares"], data["quiet"], names)
@@ -205,13 +206,14 @@ def _law(sums: Sequence[Sums], form: LawForm, scale: float) -> ElementLaw:
 def chosen(sessions: Sequence[ArraySession]) -> LawForm:
     """Form of the law that leaves the least error in sessions left out; a further term has to lower it by 2 %.
 
-    Powers first, then one memory state, then a drift of the gain; of one session a cubic.
+    Powers first, then a play, which is alike at all speeds, then a memory in time, then a drift of the gain; of one
+    session a cubic.
     """
     best, error = LawForm(), _left_out(sessions, LawForm())
     if len(sessions) < 2:
         return best
     for options in (
-        [replace(best, powers=power) for power in (1, 2)],
+        [replace(best, powers=power) for power in (1, 2)], [replace(best, play=play) for play in PLAYS],
         [replace(best, tau_s=tau) for tau in TAUS_S], [replace(best, drift=True)],
     ):  # fmt: skip
         base, errors = best, [(_left_out(sessions, _joined(best, option)), option) for option in options]
@@ -226,8 +228,9 @@ def chosen(sessions: Sequence[ArraySession]) -> LawForm:
 def _joined(base: LawForm, option: LawForm) -> LawForm:
     """The base with what an option has beyond the usual form."""
     return replace(
-        base, powers=min(base.powers, option.powers), tau_s=option.tau_s or base.tau_s, drift=option.drift or base.drift
-    )
+        base, powers=min(base.powers, option.powers), tau_s=option.tau_s or base.tau_s,
+        drift=option.drift or base.drift, play=option.play or base.play,
+    )  # fmt: skip
 
 
 def _left_out(sessions: Sequence[ArraySession], form: LawForm) -> float:

@@ -10,7 +10,7 @@ from sensorgen.core.document import Part
 from sensorgen.core.units import M_PER_MM
 from sensorgen.prediction.calibration.inversion import WIDE, InvertedPresses, Verdict
 from sensorgen.prediction.calibration.rest import STALE_S
-from sensorgen.prediction.inverse import statuses
+from sensorgen.prediction.inverse import verdict
 
 COLUMNS = (
     "force_n", "force_low_n", "force_high_n", "position_mm", "position_low_mm", "position_high_mm", "chi2", "tones",
@@ -21,25 +21,25 @@ REST = "rest"
 
 def header(given: Sequence[str]) -> str:
     """Names of the columns, those of the input before."""
-    return statuses.header(given, COLUMNS)
+    return verdict.header(given, COLUMNS)
 
 
-def rows(given: Sequence[Sequence[str]], found: InvertedPresses, rest: Mask) -> str:
+def rows(given: Sequence[Sequence[str]], presses: InvertedPresses, rest: Mask) -> str:
     """Rows of a CSV file, blank where nothing was found.
 
     Parameters
     ----------
     given : sequence of sequence of str
         The input's other cells, row by row.
-    found : InvertedPresses
+    presses : InvertedPresses
         The results.
     rest : (n,) array of bool
         Readings at rest.
     """
-    force, place = found.force_90_n, found.position_90_m / M_PER_MM
-    numbers = np.column_stack([found.force_n, force, found.position_m / M_PER_MM, place, found.chi2])
-    words = np.where(rest, REST, np.array([v.words for v in Verdict])[found.verdict])
-    return statuses.rows(given, numbers, found.tones, words)
+    force, place = presses.force_90_n, presses.position_90_m / M_PER_MM
+    numbers = np.column_stack([presses.force_n, force, presses.position_m / M_PER_MM, place, presses.chi2])
+    words = np.where(rest, REST, np.array([v.words for v in Verdict])[presses.verdict])
+    return verdict.rows(given, numbers, presses.tones, words)
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class CalibratedSummary:
     """Counts blocks of results; of widths each block's median is kept."""
 
     def __init__(self) -> None:
-        self._statuses = statuses.Counts(Verdict)
+        self._statuses = verdict.Counts(Verdict)
         self._widths: list[tuple[float, float]] = []
         self.at_rest = 0
 
@@ -129,15 +129,15 @@ class CalibratedSummary:
         """Readings under load so far."""
         return self._statuses.samples
 
-    def add(self, found: InvertedPresses, rest: Mask) -> None:
+    def add(self, presses: InvertedPresses, rest: Mask) -> None:
         """Count a block."""
         self.at_rest += int(rest.sum())
-        self._statuses.add(found.verdict[~rest])
-        good = ~rest & np.isfinite(found.force_n)
+        self._statuses.add(presses.verdict[~rest])
+        good = ~rest & np.isfinite(presses.force_n)
         if good.any():
             self._widths.append((
-                float(np.median(np.ptp(found.force_90_n[good], axis=1))),
-                float(np.median(np.ptp(found.position_90_m[good], axis=1))) / M_PER_MM,
+                float(np.median(np.ptp(presses.force_90_n[good], axis=1))),
+                float(np.median(np.ptp(presses.position_90_m[good], axis=1))) / M_PER_MM,
             ))  # fmt: skip
 
     def result(

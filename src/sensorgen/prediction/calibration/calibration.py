@@ -1,7 +1,7 @@
 """A calibration as it is stored and shown: it holds all that an inversion needs, and what it could not tell."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from math import sqrt
 from typing import Annotated, Any
@@ -9,20 +9,99 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sensorgen.core.arrays import Real
+from sensorgen.core.arrays import Mask, Real
 from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput
 from sensorgen.models.compression import CapacitanceCurve, Plate
 from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.calibration.baseline import Baseline
-from sensorgen.prediction.calibration.coverage import FEWEST, Coverage
-from sensorgen.prediction.calibration.fitting import Posterior
-from sensorgen.prediction.calibration.inversion import OTHERWISE, Inverter
+from sensorgen.prediction.calibration.fitting import Data, Posterior, calibrated
+from sensorgen.prediction.calibration.inversion import OTHERWISE, InvertedPresses, Inverter
 from sensorgen.prediction.calibration.materials import Link, MaterialEstimate, estimate, source_text
-from sensorgen.prediction.calibration.specimen import FORCES_N, SpecimenModel, Spread
+from sensorgen.prediction.calibration.rest import Baseline
+from sensorgen.prediction.calibration.specimen import FORCES_N, Presses, SpecimenModel, Spread
 from sensorgen.prediction.inference import Parameter
-from sensorgen.prediction.inverse.prior import Prior
+from sensorgen.prediction.inverse.estimator import Prior
 from sensorgen.prediction.inverse.verdict import NORMAL_90
+
+FOLDS = 5
+FEWEST = 10  # presses, with which the others still calibrate
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Presses that were found again from the others.
+
+    Attributes
+    ----------
+    presses : int
+        Number of presses.
+    force, position : int
+        How many lie in their intervals of 90 %.
+    force_width_n, position_width_m : float
+        Medians of the intervals' widths [N], [m].
+    force_error_n, position_error_m : float
+        Root mean squares of median less truth [N], [m].
+    """
+
+    presses: int
+    force: int
+    position: int
+    force_width_n: float
+    position_width_m: float
+    force_error_n: float
+    position_error_m: float
+
+
+def inside(inverted: InvertedPresses, presses: Presses) -> tuple[Mask, Mask]:
+    """Masks of the forces and of the positions that lie in their intervals."""
+    return tuple(  # type: ignore[return-value]
+        (ends[:, 0] <= truth) & (truth <= ends[:, 1])
+        for ends, truth in ((inverted.force_90_n, presses.force_n), (inverted.position_90_m, presses.position_m))
+    )
+
+
+def coverage_of(inverted: InvertedPresses, presses: Presses) -> Coverage:
+    """Of presses that are known."""
+    force, position = inside(inverted, presses)
+    return Coverage(
+        len(force), int(force.sum()), int(position.sum()), float(np.median(np.ptp(inverted.force_90_n, axis=1))),
+        float(np.median(np.ptp(inverted.position_90_m, axis=1))), _rms(inverted.force_n - presses.force_n),
+        _rms(inverted.position_m - presses.position_m),
+    )  # fmt: skip
+
+
+def _rms(off: Real) -> float:
+    return float(np.sqrt(np.mean(off**2)))
+
+
+def held_out(
+    model: SpecimenModel, data: Data, limit_n: float, step: Callable[[str], None] = lambda _: None
+) -> tuple[Coverage, InvertedPresses] | None:  # fmt: skip
+    """Coverage of presses held back in turn; None of fewer presses than ``FEWEST``.
+
+    Parameters
+    ----------
+    model, data
+        As of :func:`sensorgen.prediction.calibration.fitting.calibrated`.
+    limit_n : float
+        Largest force to look for [N].
+    step : callable
+        Called with what is done next.
+    """
+    count = len(data.presses.force_n)
+    if count < FEWEST:
+        return None
+    fold = np.arange(count) % FOLDS
+    parts = []
+    for k in range(FOLDS):
+        step(f"held back: part {k + 1} of {FOLDS}")
+        known = calibrated(model, data.rows(np.flatnonzero(fold != k)))
+        known = replace(known, noise=np.median(data.noise, axis=0))
+        parts.append(Inverter(model, known, force_limit_n=limit_n).batch(data.ratio[fold == k]))
+    order = np.argsort(np.concatenate([np.flatnonzero(fold == k) for k in range(FOLDS)]), kind="stable")
+    inverted = InvertedPresses.joined(parts).rows(order)
+    return coverage_of(inverted, data.presses), inverted
+
 
 SCHEMA = 2
 _TOLD = 0.8  # of the prior's standard deviation: a parameter that keeps more was not identified
@@ -91,14 +170,14 @@ class Calibration:
 
     def departures(self) -> tuple[str, ...]:
         """Remarks on values that no longer lie where they were expected."""
-        found: dict[str, CalibratedValue | MaterialEstimate] = {
+        estimates: dict[str, CalibratedValue | MaterialEstimate] = {
             (f"{one.name} [{one.unit}]" if one.unit else one.name): one for one in self.values()
         }
-        found |= {f"{one.material} {one.quantity}": one for one in self.materials()}
+        estimates |= {f"{one.material} {one.quantity}": one for one in self.materials()}
         return tuple(
             f"{name}: {one.value:.3g} ({one.lower:.3g} to {one.upper:.3g}) has left what was expected, "
             f"{one.before_lower:.3g} to {one.before_upper:.3g}: doubt the design, film (a hole leaks), tip or bench"
-            for name, one in found.items()
+            for name, one in estimates.items()
             if one.lower > one.before_upper or one.upper < one.before_lower
         )
 
@@ -169,16 +248,16 @@ class Calibration:
 
     def document(self) -> Iterator[Part]:
         """Quality of the calibration, its values, and what it could not determine."""
-        p, held = self.posterior, self.held_out
+        p, tested = self.posterior, self.held_out
         by = f"{p.presses} known press{'es' * (p.presses != 1)} up to {self.force_n:.3g} N under a tip of "
         by += f"{self.model.sensor.tip_m * 1e3:g} mm and its readings at rest"
         by = by if p.presses else "its readings at rest alone"
         yield f"{self.specimen}, design {self.design}: calibrated by {by}"
-        if held:
+        if tested:
             yield (
-                f"presses held back in turn, each a mean over a second: {held.force} of {held.presses} forces and "
-                f"{held.position} of {held.presses} positions lie in their 90 % intervals, whose median widths are "
-                f"{held.force_width_n:.3g} N and {held.position_width_m * 1e3:.3g} mm"
+                f"presses held back in turn, each a mean over a second: {tested.force} of {tested.presses} forces and "
+                f"{tested.position} of {tested.presses} positions lie in their 90 % intervals, whose median widths are "
+                f"{tested.force_width_n:.3g} N and {tested.position_width_m * 1e3:.3g} mm"
             )
         elif p.presses:
             yield f"not checked on presses held back: that takes {FEWEST} known presses in one calibration"

@@ -237,6 +237,41 @@ def covariances(model: SpecimenModel, at: Real, data: Data, components: Real, ve
     return np.asarray(own + np.einsum("nik,nk,njk->nij", vectors, variance, vectors))
 
 
+def pairs(force_n: Real, position_m: Real) -> tuple[Real, Real]:
+    """Forces and positions of all points of a grid, along positions first."""
+    force, position = np.meshgrid(force_n, position_m, indexing="ij")
+    return force.ravel(), position.ravel()
+
+
+def usual_presses(posterior: Posterior, force_n: Real, position_m: Real) -> Presses:
+    """Presses with the usual course."""
+    unloading, decades = (np.full(len(force_n), mean) for mean, _ in (posterior.unloading, posterior.decades))
+    return Presses(force_n, position_m, unloading, decades)
+
+
+def readings(model: SpecimenModel, posterior: Posterior, force_n: Real, position_m: Real) -> tuple[Real, Real]:
+    """Expected parts of ratios (points, 2 m), and their covariance with all that is open (points, 2 m, 2 m).
+
+    Parameters
+    ----------
+    model, posterior
+        Of the specimen.
+    force_n, position_m : (f,), (x,) array
+        Of a grid, whose points go along positions first [N], [m].
+    """
+    force, position = pairs(force_n, position_m)
+    presses = usual_presses(posterior, force, position)
+    slopes = model.slopes(posterior.at, presses)
+    vectors = model.scatters(posterior.at, presses)
+    components = posterior.components.copy()
+    courses = (("hysteresis", posterior.unloading[1]), ("creep", posterior.decades[1]))
+    unknown_course = [model.value(name, posterior.at) * sd for name, sd in courses]
+    components[0] = np.sqrt(components[0] ** 2 + np.sum(np.square(unknown_course)))
+    own = covariances(model, posterior.at, Data.unread(presses, posterior.noise), components, vectors)
+    shared = slopes @ posterior.covariance @ slopes.transpose(0, 2, 1)
+    return parts(model.ratio(posterior.at, presses)), own + shared
+
+
 @dataclass(frozen=True, eq=False)
 class _Specimen(LeastSquares):
     """Known presses and readings at rest, of parameters with what was known before."""
@@ -339,8 +374,8 @@ def shared(models: Sequence[SpecimenModel], posteriors: Sequence[Posterior], nam
 
 def widened(model: SpecimenModel, posterior: Posterior) -> Posterior:
     """A posterior that no longer knows how the film yields under the tip, nor where that is: another tip, or day."""
-    kept = [k for k, name in enumerate(model.names) if not name.startswith(("rise", "force", "position"))]
-    loose = np.setdiff1d(np.arange(len(model.names)), kept)
+    fixed = [k for k, name in enumerate(model.names) if not name.startswith(("rise", "force", "position"))]
+    loose = np.setdiff1d(np.arange(len(model.names)), fixed)
     covariance = posterior.covariance.copy()
     covariance[loose] = covariance[:, loose] = 0.0
     usual = min(_SHAPE / model.spread.law_shape, 1.0)  # a print's laws differ by more than those of two tips

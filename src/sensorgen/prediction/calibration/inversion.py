@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput
-from sensorgen.prediction.calibration.fitting import Data, Posterior, covariances
+from sensorgen.prediction.calibration.fitting import Posterior, pairs, readings, usual_presses
 from sensorgen.prediction.calibration.rest import STALE_S
-from sensorgen.prediction.calibration.specimen import Presses, SpecimenModel
+from sensorgen.prediction.calibration.specimen import SpecimenModel
 from sensorgen.prediction.inference import Index, Samples, cramer_rao, parts, whitening
+from sensorgen.prediction.inverse.estimator import Prior
 from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N
-from sensorgen.prediction.inverse.prior import Prior
-from sensorgen.prediction.inverse.statuses import Worded
-from sensorgen.prediction.inverse.verdict import NORMAL_90, chi2_limit
+from sensorgen.prediction.inverse.verdict import NORMAL_90, Worded, chi2_limit
 
 LEVEL = 0.9  # probability of the intervals
 _COARSE = 20, 16  # forces and positions at which covariances are worked out
@@ -151,11 +150,11 @@ class Inverter:
         self._means, self._covariances = (
             _refined(coarse, (self.force_n, self.position_m), v) for v in (mean, covariance)
         )
-        self._mean = parts(model.ratio(posterior.at, _of(posterior, *_pairs(self.force_n, self.position_m))))
+        self._mean = parts(model.ratio(posterior.at, usual_presses(posterior, *pairs(self.force_n, self.position_m))))
         self._weight = np.log(_steps(self.force_n)[:, None] * _steps(self.position_m)).ravel()
         for axis, normal in enumerate(() if prior is None else (prior.force_n, prior.position_m)):
             if normal is not None:
-                at = _pairs(self.force_n, self.position_m)[axis]
+                at = pairs(self.force_n, self.position_m)[axis]
                 self._weight = self._weight - ((at - normal[0]) / normal[1]) ** 2 / 2
         self._tables: dict[bytes, _Table] = {}
         shaped = self._mean.reshape(len(self.force_n), len(self.position_m), -1)
@@ -164,7 +163,9 @@ class Inverter:
             *self._mean.shape, 2
         )
         self._elsewhere = _elsewhere(model, posterior, force_limit_n)
-        fall = -model.scatters(posterior.at, _of(posterior, np.zeros(1), np.full(1, self._length / 2)))[0, :, 1]
+        fall = -model.scatters(posterior.at, usual_presses(posterior, np.zeros(1), np.full(1, self._length / 2)))[
+            0, :, 1
+        ]
         weighted = np.linalg.solve(self._covariances[0], fall)
         self._fall = weighted / np.sqrt(fall @ weighted)
 
@@ -189,25 +190,25 @@ class Inverter:
         if ratio.ndim != 2 or ratio.shape[1] != m:
             raise BadInput(f"readings of shape {ratio.shape}; expected (n, {m}), a column for each calibrated tone")
         measured = np.isfinite(ratio)
-        found = nothing(len(ratio))
+        presses = nothing(len(ratio))
         for pattern in np.unique(measured, axis=0):
             rows = np.flatnonzero((measured == pattern).all(axis=1))
             if pattern.sum() >= _FEW_TONES:
-                self._put(found, rows, ratio, pattern)
-        found.below[:] = parts(ratio) @ self._fall
-        bad = np.flatnonzero(~_one_press(found) & ~_more(found))
+                self._put(presses, rows, ratio, pattern)
+        presses.below[:] = parts(ratio) @ self._fall
+        bad = np.flatnonzero(~_one_press(presses) & ~_more(presses))
         if bad.size:
-            self._without_one(found, bad, ratio, measured)
+            self._without_one(presses, bad, ratio, measured)
         stale = np.zeros(len(ratio), bool) if rest_age_s is None else ~(rest_age_s <= STALE_S)
-        return self._judged(found, stale, np.zeros(len(ratio), bool) if changed is None else changed)
+        return self._judged(presses, stale, np.zeros(len(ratio), bool) if changed is None else changed)
 
-    def _put(self, found: InvertedPresses, rows: Index, ratio: Complex, tones: Mask) -> None:
-        kept = np.flatnonzero(np.tile(tones, 2))
-        table = self._table(tones, kept)
+    def _put(self, presses: InvertedPresses, rows: Index, ratio: Complex, tones: Mask) -> None:
+        columns = np.flatnonzero(np.tile(tones, 2))
+        table = self._table(tones, columns)
 
         def put(some: Index) -> None:
-            block = self._block(parts(ratio[some][:, tones]), table, kept)
-            found.put(some, replace(block, tones=np.full(len(some), tones.sum())))
+            block = self._block(parts(ratio[some][:, tones]), table, columns)
+            presses.put(some, replace(block, tones=np.full(len(some), tones.sum())))
 
         blocks = [rows[start : start + _BLOCK] for start in range(0, len(rows), _BLOCK)]
         if len(blocks) == 1:
@@ -216,7 +217,7 @@ class Inverter:
         with ThreadPoolExecutor(2) as pool:
             list(pool.map(put, blocks))
 
-    def _without_one(self, found: InvertedPresses, rows: Index, ratio: Complex, measured: Mask) -> None:
+    def _without_one(self, presses: InvertedPresses, rows: Index, ratio: Complex, measured: Mask) -> None:
         """Of readings that no press explains, leave out the tone whose absence explains the most."""
         best = nothing(len(rows))
         for tone in range(ratio.shape[1]):
@@ -229,9 +230,9 @@ class Inverter:
             better = (trial.chi2 <= chi2_limit(2 * trial.tones - 2)) & ~(best.chi2 <= trial.chi2)
             best.put(better, trial.rows(better))
         good = np.isfinite(best.chi2)
-        found.put(rows[good], best.rows(good))
+        presses.put(rows[good], best.rows(good))
 
-    def _block(self, reading: Real, table: _Table, kept: Index) -> InvertedPresses:
+    def _block(self, reading: Real, table: _Table, columns: Index) -> InvertedPresses:
         k = reading.shape[1]
         white = (table.root @ reading.T.astype(np.float32)).reshape(-1, k, len(reading))
         white -= table.mean[:, :, None]
@@ -239,7 +240,7 @@ class Inverter:
         best = chi2.argmin(0)
         each = np.arange(len(best))
         if fresh := [int(point) for point in np.unique(best) if np.isnan(table.more[point, 0])]:
-            table.more[fresh] = self._towards_more(table.root.reshape(-1, k, k)[fresh], fresh, kept)
+            table.more[fresh] = self._towards_more(table.root.reshape(-1, k, k)[fresh], fresh, columns)
         more = np.abs(np.einsum("nk,nk->n", table.more[best], white[best, :, each]))
         ln = table.ln_density[:, None] - chi2 / 2
         ln -= ln.max(0)
@@ -263,60 +264,63 @@ class Inverter:
         mixed = (1 - self._otherwise) * force + self._otherwise * share @ force
         return _quantiles(self.force_n, mixed, (_BELOW * out, 1 - (1 - _BELOW) * out))
 
-    def _towards_more(self, root: NDArray[np.float32], points: Sequence[int], kept: Index) -> Real:
+    def _towards_more(self, root: NDArray[np.float32], points: Sequence[int], columns: Index) -> Real:
         """Unit vectors, whitened, in which another capacitance moves a reading the most, and no press (points, k)."""
-        tangent = root @ self._tangents[points][:, kept]
+        tangent = root @ self._tangents[points][:, columns]
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True) + 1e-300
-        other = root @ self._elsewhere[kept]
+        other = root @ self._elsewhere[columns]
         for _ in range(2):  # to rounding
             other = other - tangent @ (np.linalg.pinv(tangent) @ other)
         return np.asarray(np.linalg.svd(other, full_matrices=False)[0][:, :, 0])
 
-    def _table(self, tones: Mask, kept: Index) -> _Table:
+    def _table(self, tones: Mask, columns: Index) -> _Table:
         key = tones.tobytes()
         if key not in self._tables:
-            covariance = self._covariances[:, kept[:, None], kept]
+            covariance = self._covariances[:, columns[:, None], columns]
             root = whitening(covariance)
             ln = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(1) + self._weight
-            mean = np.einsum("gij,gj->gi", root, self._mean[:, kept])
+            mean = np.einsum("gij,gj->gi", root, self._mean[:, columns])
             self._tables[key] = _Table(
-                root.reshape(-1, len(kept)).astype(np.float32), mean.astype(np.float32), ln, np.full(mean.shape, np.nan)
+                root.reshape(-1, len(columns)).astype(np.float32),
+                mean.astype(np.float32),
+                ln,
+                np.full(mean.shape, np.nan),
             )
         return self._tables[key]
 
-    def _judged(self, found: InvertedPresses, stale: Mask, changed: Mask) -> InvertedPresses:
-        expected = 2 * NORMAL_90 * np.interp(found.force_n, *self._position_error_m)
-        wide = np.ptp(found.position_90_m, axis=1) > WIDE * self._length
+    def _judged(self, presses: InvertedPresses, stale: Mask, changed: Mask) -> InvertedPresses:
+        expected = 2 * NORMAL_90 * np.interp(presses.force_n, *self._position_error_m)
+        wide = np.ptp(presses.position_90_m, axis=1) > WIDE * self._length
         rules = (
             (Verdict.FORCE_ONLY, wide & (expected < _LOCATES * self._length)),
-            (Verdict.AT_THE_END, found.force_90_n[:, 1] > self.force_n[-2]),
+            (Verdict.AT_THE_END, presses.force_90_n[:, 1] > self.force_n[-2]),
             (Verdict.NOT_CALIBRATED, np.full(len(wide), self._posterior.presses == 0)),
             (Verdict.STALE_REST, stale),
-            (Verdict.NO_FIT, ~_one_press(found)),
-            (Verdict.MORE, _more(found)),
+            (Verdict.NO_FIT, ~_one_press(presses)),
+            (Verdict.MORE, _more(presses)),
             (Verdict.CHANGED, changed),
-            (Verdict.MISSING, found.tones < _FEW_TONES),
+            (Verdict.MISSING, presses.tones < _FEW_TONES),
         )
-        return replace(found, verdict=Verdict.worst(len(wide), rules))
+        return replace(presses, verdict=Verdict.worst(len(wide), rules))
 
 
-def _one_press(found: InvertedPresses) -> Mask:
+def _one_press(presses: InvertedPresses) -> Mask:
     """Readings that are not known to be of anything but one press."""
-    return ~(found.chi2 > chi2_limit(2 * found.tones - 2))
+    return ~(presses.chi2 > chi2_limit(2 * presses.tones - 2))
 
 
-def _more(found: InvertedPresses) -> Mask:
+def _more(presses: InvertedPresses) -> Mask:
     """Readings that another capacitance besides a press explains, and a press alone does not."""
-    left = found.chi2 - np.square(found.more)
-    return (found.more > _MORE) & (left <= np.maximum(chi2_limit(2 * found.tones - 3), _UNLIKE * found.chi2))
+    left = presses.chi2 - np.square(presses.more)
+    return (presses.more > _MORE) & (left <= np.maximum(chi2_limit(2 * presses.tones - 3), _UNLIKE * presses.chi2))
 
 
-def doubt_rest(found: InvertedPresses, rest: Mask, left: int) -> int:
+def doubt_rest(presses: InvertedPresses, rest: Mask, left: int) -> int:
     """Mark readings below their reading at rest, and those near them, whose rest was read the same way.
 
     Parameters
     ----------
-    found : InvertedPresses
+    presses : InvertedPresses
         Results in the order of time; their verdicts change.
     rest : (n,) array of bool
         Readings at rest.
@@ -329,11 +333,11 @@ def doubt_rest(found: InvertedPresses, rest: Mask, left: int) -> int:
         Readings that are left to be marked after these.
     """
     count = np.cumsum(~rest)
-    low = found.below > _BELOW_REST
+    low = presses.below > _BELOW_REST
     last = np.maximum.accumulate(np.where(low, count, left - _DOUBTED))
     following = np.minimum.accumulate(np.where(low, count, count[-1:] + _DOUBTED)[::-1])[::-1]
     doubted = ~rest & ((count - last < _DOUBTED) | (following - count < _DOUBTED))
-    found.verdict[doubted] = np.maximum(found.verdict[doubted], Verdict.LOADED_REST)
+    presses.verdict[doubted] = np.maximum(presses.verdict[doubted], Verdict.LOADED_REST)
     return max(int(_DOUBTED - (count[-1] - last[-1])), 0) if len(count) else left
 
 
@@ -342,40 +346,6 @@ def nothing(n: int) -> InvertedPresses:
     (force, place, *others), ends = np.full((5, n), np.nan), np.full((2, n, 2), np.nan)
     tones, verdict = np.zeros(n, np.intp), np.full(n, Verdict.MISSING, np.uint8)
     return InvertedPresses(force, place, ends[0], ends[1], others[0], others[1], others[2], tones, verdict)
-
-
-def _pairs(force_n: Real, position_m: Real) -> tuple[Real, Real]:
-    force, position = np.meshgrid(force_n, position_m, indexing="ij")
-    return force.ravel(), position.ravel()
-
-
-def _of(posterior: Posterior, force_n: Real, position_m: Real) -> Presses:
-    """Presses with the usual course."""
-    unloading, decades = (np.full(len(force_n), mean) for mean, _ in (posterior.unloading, posterior.decades))
-    return Presses(force_n, position_m, unloading, decades)
-
-
-def readings(model: SpecimenModel, posterior: Posterior, force_n: Real, position_m: Real) -> tuple[Real, Real]:
-    """Expected parts of ratios (points, 2 m), and their covariance with all that is open (points, 2 m, 2 m).
-
-    Parameters
-    ----------
-    model, posterior
-        Of the specimen.
-    force_n, position_m : (f,), (x,) array
-        Of a grid, whose points go along positions first [N], [m].
-    """
-    force, position = _pairs(force_n, position_m)
-    presses = _of(posterior, force, position)
-    slopes = model.slopes(posterior.at, presses)
-    vectors = model.scatters(posterior.at, presses)
-    components = posterior.components.copy()
-    courses = (("hysteresis", posterior.unloading[1]), ("creep", posterior.decades[1]))
-    unknown_course = [model.value(name, posterior.at) * sd for name, sd in courses]
-    components[0] = np.sqrt(components[0] ** 2 + np.sum(np.square(unknown_course)))
-    own = covariances(model, posterior.at, Data.unread(presses, posterior.noise), components, vectors)
-    shared = slopes @ posterior.covariance @ slopes.transpose(0, 2, 1)
-    return parts(model.ratio(posterior.at, presses)), own + shared
 
 
 def _position_errors(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> Real:
@@ -391,7 +361,7 @@ def _grid(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> tuple[Real
     """Forces and positions, as far apart as a reading can tell them, within limits."""
     shape = len(coarse[0]), len(coarse[1])
     weight = np.linalg.inv(covariance)
-    found = []
+    axes = []
     for axis, at in enumerate(coarse):
         slope = np.asarray(np.gradient(mean.reshape(*shape, -1), at, axis=axis)).reshape(len(mean), -1)
         per_step = np.sqrt(np.einsum("gi,gij,gj->g", slope, weight, slope)).reshape(shape).max(1 - axis)
@@ -399,8 +369,8 @@ def _grid(coarse: tuple[Real, Real], mean: Real, covariance: Real) -> tuple[Real
         passed = passed / passed[-1] + np.linspace(0, 0.5, len(at))  # some everywhere
         steps = float(np.sum((per_step[1:] + per_step[:-1]) / 2 * np.diff(at)))
         count = int(np.clip(steps, _LEAST[axis], _MOST[axis]))
-        found.append(np.interp(np.linspace(0, passed[-1], count), passed, at))
-    return found[0], found[1]
+        axes.append(np.interp(np.linspace(0, passed[-1], count), passed, at))
+    return axes[0], axes[1]
 
 
 def _refined(coarse: tuple[Real, Real], fine: tuple[Real, Real], values: Real) -> Real:
@@ -417,7 +387,7 @@ def _refined(coarse: tuple[Real, Real], fine: tuple[Real, Real], values: Real) -
 def _elsewhere(model: SpecimenModel, posterior: Posterior, force_n: float) -> Real:
     """Parts that a hand at the contacts, and presses along the sensor, add to a reading (2 m, 1 + places)."""
     places = np.linspace(0, model.sensor.length_m, _PLACES)
-    presses = model.ratio(posterior.at, _of(posterior, np.full(_PLACES, force_n / 4), places))
+    presses = model.ratio(posterior.at, usual_presses(posterior, np.full(_PLACES, force_n / 4), places))
     omega = 2 * np.pi * model.frequency_hz
     by_hand = -1j * omega * np.exp(model.rest(posterior.at)) * model.spread.stray_f
     return parts(np.concatenate([by_hand[None], presses])).T
@@ -453,10 +423,10 @@ def _quantiles(grid: Real, density: Real, shares: Sequence[float]) -> Real:
     edges = _edges(grid)
     total = np.concatenate([np.zeros((1, density.shape[1])), np.cumsum(density, 0)])
     total /= total[-1]
-    found = np.empty((density.shape[1], len(shares)))
+    quantiles = np.empty((density.shape[1], len(shares)))
     for k, share in enumerate(shares):
         at = np.clip((total < share).sum(0), 1, len(grid))
-        low, high = total[at - 1, np.arange(len(found))], total[at, np.arange(len(found))]
+        low, high = total[at - 1, np.arange(len(quantiles))], total[at, np.arange(len(quantiles))]
         part = np.clip((share - low) / np.maximum(high - low, 1e-300), 0, 1)
-        found[:, k] = edges[at - 1] + part * (edges[at] - edges[at - 1])
-    return found
+        quantiles[:, k] = edges[at - 1] + part * (edges[at] - edges[at - 1])
+    return quantiles

@@ -116,18 +116,18 @@ def links(predicted: SensorModel) -> tuple[Link, ...]:
     predicted : SensorModel
         Of the body.
     """
-    design, found = predicted.body.design, list[Link]()
+    design, linked = predicted.body.design, list[Link]()
     electrodes = [design.slot(f"{end}_electrode") for end in ("bottom", "top")]
     common = predicted.sensor.common_resistivity_ohm_m()
     if len({material.name for material, _ in electrodes}) == 1:
-        found.append(_link(design, electrodes[0][0].name, "resistivity_ohm_m", "resistance", 1.0, _TRACKS, common))
+        linked.append(_link(design, electrodes[0][0].name, "resistivity_ohm_m", "resistance", 1.0, _TRACKS, common))
     dielectric = film(design)
-    found.append(
+    linked.append(
         _link(design, dielectric, "relative_permittivity", "capacitance", *_capacitance(predicted, dielectric))
     )
     if any(v.material == dielectric and v.quantity == "youngs_modulus_pa" for v in predicted.values):
-        found.append(_link(design, dielectric, "youngs_modulus_pa", "rise", -1.0, _PRESS, shape=_PRESS_SHAPE))
-    return tuple(found)
+        linked.append(_link(design, dielectric, "youngs_modulus_pa", "rise", -1.0, _PRESS, shape=_PRESS_SHAPE))
+    return tuple(linked)
 
 
 def _link(
@@ -192,9 +192,9 @@ def _weights(model: SpecimenModel, link: Link) -> tuple[Real, Real]:
         force = np.array(FORCES_N)
         ends = [_ln_rise(model, force * exp(k * _NUDGE) / (sensor.width_m * sensor.tip_m)) for k in (1, -1)]
         return model.law_weights(), link.slope * (ends[0] - ends[1]) / (2 * _NUDGE)
-    found = np.zeros((1, len(model.names)))
-    found[0, model.names.index(link.parameter)] = getattr(model.spread, link.parameter)
-    return found, np.array([link.slope])
+    weights = np.zeros((1, len(model.names)))
+    weights[0, model.names.index(link.parameter)] = getattr(model.spread, link.parameter)
+    return weights, np.array([link.slope])
 
 
 def _ln_rise(model: SpecimenModel, stress_pa: Real) -> Real:

@@ -198,11 +198,11 @@ class SpecimenModel:
 
     def law_weights(self) -> Real:
         """Ln of the factor on the rise at each of ``FORCES_N``, per standard deviation of each parameter (k, p)."""
-        found = np.zeros((len(FORCES_N), len(self.names)))
+        weights = np.zeros((len(FORCES_N), len(self.names)))
         common = self._at["rise"]
-        found[:, common] = self.spread.law
-        found[:, common + 1 : common + 1 + len(FORCES_N)] = self.spread.law_shape * self._shapes
-        return found
+        weights[:, common] = self.spread.law
+        weights[:, common + 1 : common + 1 + len(FORCES_N)] = self.spread.law_shape * self._shapes
+        return weights
 
     def rest(self, at: Real, frequency_hz: Real | None = None) -> Complex:
         """Ln of the impedance that the bench reads with nothing on the sensor, without its gain.
@@ -317,10 +317,10 @@ class SpecimenModel:
         by = _shares(ln) @ self.law_weights()
         for name, course in (("hysteresis", presses.unloading), ("creep", presses.decades)):
             by[:, self._at[name]] = self.value(name, at) * np.nan_to_num(course)
-        found = self.scatters(at, presses, [0]) * by[:, None]
+        derivatives = self.scatters(at, presses, [0]) * by[:, None]
         others = [k for k, name in enumerate(self.names) if not name.startswith(("rise", "hysteresis", "creep"))]
-        found[..., others] = slopes(lambda near: parts(self.ratio(near, presses)), at, others)
-        return found
+        derivatives[..., others] = slopes(lambda near: parts(self.ratio(near, presses)), at, others)
+        return derivatives
 
     def scatters(self, at: Real, presses: Presses, which: Sequence[int] = range(3)) -> Real:
         """Derivatives of the ratio's parts by ln of the rise, of C and of R since the rest reading, (n, 2 m, 3)."""

@@ -5,6 +5,7 @@ independent. Divided by Z a reading is then ln Z with noise ``noise`` in both pa
 """
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +13,17 @@ from numpy.typing import ArrayLike
 
 from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import OutOfRange
-from sensorgen.models.sensor import Sensor
-from sensorgen.prediction.identifiability.results import StandardErrors, finite
+from sensorgen.models.sensor import Response, Sensor
+from sensorgen.prediction.identifiability.results import (
+    FORCE_SHARE,
+    GUESS,
+    AdvisedFrequencies,
+    FrequencyChoice,
+    StandardErrors,
+    finite,
+    metres,
+    newtons,
+)
 from sensorgen.prediction.inference import cramer_rao, orthogonal
 
 
@@ -87,20 +97,27 @@ def slopes(sensor: Sensor, frequency_hz: ArrayLike, force_n: ArrayLike, position
         As :meth:`sensorgen.models.sensor.Sensor.response`; also where Z is 0.
     """
     force, position = (np.asarray(value, float)[..., None] for value in (force_n, position_m))
-    z, by_force, by_position = sensor.response(np.asarray(frequency_hz, float), force, position)
+    return relative(sensor.response(np.asarray(frequency_hz, float), force, position), force)
+
+
+def relative(response: Response, force_n: ArrayLike) -> Slopes:
+    """Derivatives of ln Z, of those of Z under a force [N]; errors as :func:`slopes`."""
+    z, by_force, by_position = response
     if not z.all():
         raise OutOfRange("Z is 0: a relative change needs a resistance or a capacitance to change")
-    return Slopes(by_force / z, np.where(force == 0, 0.0, by_position / z))  # at the ends rounding would leave residues
+    return Slopes(
+        by_force / z, np.where(np.equal(force_n, 0), 0.0, by_position / z)
+    )  # at the ends rounding would leave residues
 
 
-def bounds(found: Slopes, noise: float) -> LeastErrors:
+def bounds(of: Slopes, noise: float) -> LeastErrors:
     """Cramer-Rao bounds of force and position, both unknown: see :func:`sensorgen.prediction.inference.cramer_rao`.
 
     Slopes are those of ln Z; real and imaginary parts of all frequencies count alike.
 
     Parameters
     ----------
-    found : Slopes
+    of : Slopes
         Frequencies on the last axis.
     noise : float
         Of each part of Z, relative to abs(Z) [-].
@@ -119,28 +136,28 @@ def bounds(found: Slopes, noise: float) -> LeastErrors:
     >>> float(b.force_n), float(b.position_m)
     (0.005, 0.002)
     """
-    force, position, correlation = cramer_rao(*found)
+    force, position, correlation = cramer_rao(*of)
     return LeastErrors(noise * force, noise * position, correlation)
 
 
-def shares(found: Slopes) -> tuple[Real, Real]:
+def shares(of: Slopes) -> tuple[Real, Real]:
     """Share of each frequency in the information on force, and on position, the other being unknown too [-].
 
     The information on one of them, 1/sigma^2, is a sum over frequencies; nan where it is undefined.
     """
-    a, b = found
+    a, b = of
     with np.errstate(all="ignore"):
         force, position = (np.abs(orthogonal(u, v)) ** 2 for u, v in ((a, b), (b, a)))
         return force / force.sum(-1, keepdims=True), position / position.sum(-1, keepdims=True)
 
 
-def undefined(setup: Setup, found: Slopes) -> str:
+def undefined(setup: Setup, of: Slopes) -> str:
     """Why the position of a press is undefined, or ""."""
     if setup.force_n == 0:
         return "without a force there is no press to locate"
-    if not found.by_position_per_m.any():
+    if not of.by_position_per_m.any():
         return "Z does not depend on position"
-    if np.isnan(bounds(found, setup.noise).position_m):
+    if np.isnan(bounds(of, setup.noise).position_m):
         return "these frequencies cannot separate it from force: both change Z in the same direction"
     return ""
 
@@ -167,4 +184,150 @@ def standard_errors(limits: LeastErrors) -> StandardErrors:
         sigma_force_n=finite(limits.force_n),
         sigma_position_m=finite(limits.position_m),
         correlation=finite(limits.correlation),
+    )
+
+
+_FORCE = {"yes": "senses force", "roughly": "senses force only roughly", "no": "cannot sense force"}
+_POSITION = {"yes": "locates a press", "roughly": "locates a press only roughly", "no": "cannot locate a press"}
+
+
+@dataclass(frozen=True)
+class Required:
+    """Required standard errors of a press.
+
+    A quantity is sensed ("yes") where its standard error is at most the required one: a tenth of the force, one length
+    of the tip. It is not ("no") where the error is that of a uniform distribution or more: force range/sqrt(12),
+    sensor length/sqrt(12); a reading then has no information. Between the two it is sensed "roughly".
+
+    Attributes
+    ----------
+    force_n, position_m : float
+        Required standard errors [N], [m].
+    guess_force_n, guess_position_m : float
+        Those of a uniform distribution [N], [m].
+    """
+
+    force_n: float
+    position_m: float
+    guess_force_n: float
+    guess_position_m: float
+
+    def shortfall(self, bounds: LeastErrors) -> Real:
+        """By what factor the worse of both errors exceeds what is required [-]; infinite where undefined."""
+        with np.errstate(all="ignore"):  # without force, nothing is required
+            worse = np.maximum(bounds.force_n / self.force_n, bounds.position_m / self.position_m)
+        return np.where(np.isnan(worse), np.inf, worse)
+
+    def errors(self) -> StandardErrors:
+        """The required standard errors as a result."""
+        return StandardErrors(sigma_force_n=self.force_n, sigma_position_m=self.position_m)
+
+    def force(self, sigma_n: float) -> str:
+        """Verdict on sensing force at a standard error [N]: yes, roughly or no."""
+        return _grade(sigma_n, self.force_n, self.guess_force_n)
+
+    def position(self, sigma_m: float) -> str:
+        """Verdict on locating a press at a standard error [m]: yes, roughly or no."""
+        return _grade(sigma_m, self.position_m, self.guess_position_m)
+
+
+def required(setup: Setup) -> Required:
+    """Requirements of a press: a tenth of its force, and one length of the tip."""
+    force, sensor = abs(setup.force_n), setup.sensor
+    return Required(FORCE_SHARE * force, sensor.tip_m, GUESS * force, GUESS * sensor.length_m)
+
+
+def _grade(sigma: float, serves: float, guess: float) -> str:
+    if sigma <= min(serves, guess):
+        return "yes"
+    return "roughly" if sigma < guess else "no"
+
+
+def verdict(setup: Setup, bounds: LeastErrors, need: Required, reason: str) -> str:
+    """Verdict on a design, in one sentence; ``reason`` says why position is undefined."""
+    where = f"at {setup.force_n:g} N and {setup.position_m * 1e3:g} mm"
+    unless = f"not known, as {setup.assumed}; if it did: " if setup.assumed else ""
+    position = f", but {reason}" if reason else f", position to {metres(bounds.position_m)}"
+    return (
+        f"{unless}at {setup.noise * 100:g} % noise this design {_ability(bounds, need)}: {where} "
+        f"force is known to {newtons(bounds.force_n)}{position}; the sensor is {metres(setup.sensor.length_m)} long"
+    )
+
+
+def bracket(free: LeastErrors, stiff: LeastErrors, need: Required) -> str:
+    """The verdict where the law of compression lies anywhere between a free and a confined film."""
+    certain = ": what it cannot do is certain" if "no" in _grades(free, need) else ""
+    return (
+        f"the film is assumed to expand sideways freely, the softest case{certain}; bonded to stiff electrodes, the "
+        f"stiffest, it {_ability(stiff, need)} ({newtons(stiff.force_n)}, {metres(stiff.position_m)})"
+    )
+
+
+def _ability(bounds: LeastErrors, need: Required) -> str:
+    force, position = _grades(bounds, need)
+    return f"{_FORCE[force]} and {_POSITION[position]}"
+
+
+def _grades(bounds: LeastErrors, need: Required) -> tuple[str, str]:
+    return need.force(float(bounds.force_n)), need.position(float(bounds.position_m))
+
+
+SEARCHED = 40  # frequencies whose combinations are all tried
+PER_DECADE = 20  # of the grid of advised frequencies
+BELOW, ABOVE = 100.0, 10.0  # how far the grid reaches from the corner, as factors
+
+
+def best(setup: Setup, of: Slopes, required: Required) -> tuple[FrequencyChoice, ...]:
+    """The best one, two and three of the given frequencies, all combinations tried.
+
+    Parameters
+    ----------
+    setup : Setup
+        The press and the frequencies. Of more than ``SEARCHED``, as many are taken evenly from the list.
+    of : Slopes
+        At the frequencies, and the press.
+    required : Required
+        Errors that serve; the best choice has the smallest shortfall.
+    """
+    count = len(setup.frequency_hz)
+    taken = np.unique(np.linspace(0, count - 1, min(count, SEARCHED)).astype(int))
+    frequency, among = np.asarray(setup.frequency_hz)[taken], Slopes(*(slope[taken] for slope in of))
+    sizes = range(1, min(3, len(taken)) + 1)
+    return tuple(_best(frequency, among, size, setup.noise, required) for size in sizes)
+
+
+def advised(setup: Setup, required: Required) -> AdvisedFrequencies:
+    """The best single frequency and the best pair on a grid about the corner, up to the instrument's limit."""
+    corner = _corner_hz(setup)
+    low, high = corner / BELOW, min(corner * ABOVE, setup.highest_hz)
+    grid = np.geomspace(low, high, round(PER_DECADE * float(np.log10(high / low))) + 1)
+    on_grid = slopes(setup.sensor, grid, setup.force_n, setup.position_m)
+    single, pair = (_best(grid, on_grid, size, setup.noise, required) for size in (1, 2))
+    return AdvisedFrequencies(float(grid[0]), float(grid[-1]), single, pair)
+
+
+def spread(setup: Setup) -> tuple[float, ...]:
+    """As many frequencies as there are, logarithmically spaced from a tenth of the corner to ten times it [Hz]."""
+    corner, count = _corner_hz(setup), len(setup.frequency_hz)
+    if count == 1:
+        return (corner,)
+    return tuple(np.geomspace(corner / 10, min(10 * corner, setup.highest_hz), count).tolist())
+
+
+def _corner_hz(setup: Setup) -> float:
+    return min(setup.sensor.corner_frequency_hz(), setup.highest_hz)
+
+
+def _best(frequency: Real, of: Slopes, size: int, noise: float, required: Required) -> FrequencyChoice:
+    """The combination of ``size`` frequencies with the smallest shortfall."""
+    chosen = np.array(list(combinations(range(len(frequency)), size)))
+    limits = bounds(Slopes(*(slope[chosen] for slope in of)), noise)
+    short = required.shortfall(limits)
+    k = int(np.argmin(short))
+    if np.isinf(short[k]):
+        return FrequencyChoice(sigma_force_n=None, sigma_position_m=None)
+    return FrequencyChoice(
+        frequency_hz=tuple(frequency[chosen[k]].tolist()),
+        sigma_force_n=float(limits.force_n[k]),
+        sigma_position_m=float(limits.position_m[k]),
     )

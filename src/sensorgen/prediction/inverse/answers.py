@@ -9,7 +9,7 @@ import numpy as np
 
 from sensorgen.core.document import Part
 from sensorgen.core.units import M_PER_MM
-from sensorgen.prediction.inverse import statuses
+from sensorgen.prediction.inverse import verdict
 from sensorgen.prediction.inverse.estimator import Estimates, Estimator
 from sensorgen.prediction.inverse.verdict import Status
 
@@ -23,7 +23,7 @@ _DIAGONAL = np.arange(2)
 
 def header(given: Sequence[str]) -> str:
     """Names of the columns, those of the input before."""
-    return statuses.header(given, COLUMNS)
+    return verdict.header(given, COLUMNS)
 
 
 def rows(given: Sequence[Sequence[str]], estimates: Estimates, *, prior: bool = False) -> str:
@@ -39,22 +39,22 @@ def rows(given: Sequence[Sequence[str]], estimates: Estimates, *, prior: bool = 
         A prior was stated: results then count even where the reading has little information.
     """
     words = np.array([status.words for status in Status])[estimates.status]
-    return statuses.rows(given, _numbers(estimates, prior), estimates.tones, words)
+    return verdict.rows(given, _numbers(estimates, prior), estimates.tones, words)
 
 
-def _numbers(found: Estimates, prior: bool) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _numbers(batch: Estimates, prior: bool) -> np.ndarray[Any, np.dtype[np.float64]]:
     """All columns but the last two; nan is a blank."""
-    counts = np.array([[s.force_counts, s.position_counts] for s in Status])[found.status]
-    counts |= (prior & (found.status <= Status.NOT_IDENTIFIABLE))[:, None]
+    counts = np.array([[s.force_counts, s.position_counts] for s in Status])[batch.status]
+    counts |= (prior & (batch.status <= Status.NOT_IDENTIFIABLE))[:, None]
     force, position = np.where(counts, 1.0, np.nan).T
-    error, error_m = np.sqrt(found.covariance[:, _DIAGONAL, _DIAGONAL]).T
+    error, error_m = np.sqrt(batch.covariance[:, _DIAGONAL, _DIAGONAL]).T
     columns = [
-        found.force_n * force, found.position_m * position * _MM, error, error_m * _MM,
-        found.covariance[:, 0, 1] * _MM, *found.force_90_n.T * force, *found.position_90_m.T * position * _MM,
-        found.other_force_n, found.other_position_m * _MM, found.chi2,
+        batch.force_n * force, batch.position_m * position * _MM, error, error_m * _MM,
+        batch.covariance[:, 0, 1] * _MM, *batch.force_90_n.T * force, *batch.position_90_m.T * position * _MM,
+        batch.other_force_n, batch.other_position_m * _MM, batch.chi2,
     ]  # fmt: skip
     numbers = np.stack(columns, -1)
-    numbers[found.tones == 0] = np.nan
+    numbers[batch.tones == 0] = np.nan
     return numbers
 
 
@@ -117,7 +117,7 @@ class Summary:
 
     def __init__(self, estimator: Estimator, doubts: Sequence[str] = ()) -> None:
         self._estimator, self._doubts = estimator, (*doubts, *estimator.doubts)
-        self._statuses = statuses.Counts(Status)
+        self._statuses = verdict.Counts(Status)
         self._errors: list[tuple[float, float]] = []
         self._excess: list[float] = []
 
@@ -126,15 +126,15 @@ class Summary:
         """Number of samples so far."""
         return self._statuses.samples
 
-    def add(self, found: Estimates) -> None:
+    def add(self, estimates: Estimates) -> None:
         """Count a block."""
-        self._statuses.add(found.status)
-        measured, free = found.tones > 0, found.tones > 1
+        self._statuses.add(estimates.status)
+        measured, free = estimates.tones > 0, estimates.tones > 1
         if measured.any():
-            force, position = np.median(np.sqrt(found.covariance[measured][:, _DIAGONAL, _DIAGONAL]), 0).tolist()
+            force, position = np.median(np.sqrt(estimates.covariance[measured][:, _DIAGONAL, _DIAGONAL]), 0).tolist()
             self._errors.append((force, position * _MM))
         if free.any():
-            self._excess.append(float(np.median(np.sqrt(found.chi2[free] / (2 * found.tones[free] - 2)))))
+            self._excess.append(float(np.median(np.sqrt(estimates.chi2[free] / (2 * estimates.tones[free] - 2)))))
 
     def result(self) -> InversionSummary:
         """The summary so far."""
@@ -169,5 +169,5 @@ class Summary:
 
 def _middle(values: Sequence[float]) -> float | None:
     """Median, None where there is none or it is infinite."""
-    found = median(values) if values else np.inf
-    return found if found < np.inf else None
+    middle = median(values) if values else np.inf
+    return middle if middle < np.inf else None

@@ -1,5 +1,9 @@
-"""Inversion: force and position from impedance, prepared once per sensor, for batches and streams."""
+"""Inversion: force and position from impedance, prepared once per sensor, for batches and streams.
 
+Least squares of presses on the unit square, many samples together; with a prior, means and intervals by quadrature.
+"""
+
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -7,16 +11,225 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sensorgen.core.arrays import Complex, Real
+from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models.sensor import Sensor
+from sensorgen.prediction import inference
 from sensorgen.prediction.inference import Index, LocalFit, Samples, parts
-from sensorgen.prediction.inverse.descent import LOOSE, TIGHT, FitGoal, descend
-from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N, Forward
-from sensorgen.prediction.inverse.prior import PressPosterior, Prior, posterior
-from sensorgen.prediction.inverse.single import PressEstimate, Single
-from sensorgen.prediction.inverse.table import Local, ResponseTable
+from sensorgen.prediction.inverse.forward import FORCE_LIMIT_N, Forward, Local, ResponseTable
 from sensorgen.prediction.inverse.verdict import NORMAL_90, PAIR, Status, covariance, statuses
+
+LOOSE, TIGHT = 0.2, 0.01  # share of the residual that a step still removes when a sample is done (Bates and Watts 1981)
+REACH = 0.1  # farthest that one step moves the position: beyond it the response is not linear
+ROUNDING = 1e-14  # of ln Z: what no step can remove
+_FLOOR = 1e-9  # least information on the square's edge: keeps a singular matrix solvable, far below any reading's own
+
+Model = Callable[[Real], Local]
+
+
+@dataclass(frozen=True)
+class FitGoal:
+    """Goal of a fit: responses with their weights, and a normal prior.
+
+    Attributes
+    ----------
+    response, weight : (n, 2 n_tones) array
+        Measured ln Z; 1/sigma, 0 where it is missing.
+    expected, information : (2,), (2, 2) array
+        The prior's mean, scaled, and the inverse of its covariance, 0 where it is uniform.
+    """
+
+    response: Real
+    weight: Real
+    expected: Real
+    information: Real
+
+    def rows(self, rows: Index) -> "FitGoal":
+        """Some of the samples."""
+        return FitGoal(self.response[rows], self.weight[rows], self.expected, self.information)
+
+    def fit(self, press: Real, local: Local) -> LocalFit:
+        """Fit of the responses by presses."""
+        residual = (self.response - local.value) * self.weight
+        return LocalFit.of(press, residual, local.slope * self.weight[:, None]).with_prior(
+            self.expected, self.information
+        )
+
+
+@dataclass(frozen=True)
+class _Presses(inference.LeastSquares):
+    """Responses to be explained by presses in the unit square, which no step leaves."""
+
+    target: FitGoal
+    model: Model
+    offset: float
+    damping = 1e-3
+
+    def fit(self, at: Real, rows: Index) -> LocalFit:
+        """Fit of some samples by presses."""
+        return self.target.rows(rows).fit(at, self.model(at))
+
+    def step(self, fit: LocalFit, damping: Real) -> Real:
+        """Step to the least squares of the linear model; along an edge where it would leave the square."""
+        (ff, fx), (_, xx) = fit.information.transpose(1, 2, 0)
+        ff, xx = ff * (1 + damping) + _FLOOR, xx * (1 + damping) + _FLOOR
+        by_force, by_position = fit.gradient.T
+        determinant = ff * xx - fx * fx
+        force = (xx * by_force - fx * by_position) / determinant
+        position = (ff * by_position - fx * by_force) / determinant
+        at_force, at_position = fit.at.T
+        inside = _inside(at_position, np.minimum(np.maximum(position, -REACH), REACH))
+        force = np.where(inside == position, force, (by_force - fx * inside) / ff)
+        within = _inside(at_force, force)
+        inside = np.where(within == force, inside, (by_position - fx * within) / xx)
+        return np.stack([within, _inside(at_position, inside)], 1)
+
+    def done(self, fit: LocalFit, step: Real, gain: Real, rows: Index) -> Mask:  # noqa: ARG002
+        """Samples within the accuracy asked for; one far below noise goes on to the end."""
+        rounding = ROUNDING**2 * np.einsum("nk,nk->n", self.target.weight[rows], self.target.weight[rows])
+        return np.asarray(gain <= self.offset**2 * fit.chi2 * np.minimum(fit.chi2, 1.0) + rounding)
+
+
+def descend(target: FitGoal, model: Model, start: Real, offset: float) -> LocalFit:
+    """Least squares from a start in the unit square.
+
+    Parameters
+    ----------
+    target : FitGoal
+        Responses and prior.
+    model : callable
+        Response and derivatives at scaled presses.
+    start : (n, 2) array
+        Scaled presses [-].
+    offset : float
+        Share of the residual at which a sample is done, below noise the residual's share of that [-].
+    """
+    return inference.descend(_Presses(target, model, offset), start)
+
+
+def _inside(at: Real, step: Real) -> Real:
+    """The step, or as much of it as stays on the unit length."""
+    return np.minimum(np.maximum(step, -at), 1.0 - at)
+
+
+GUESS_INFORMATION = 12.0  # 1/variance of a uniform guess on a unit length
+_POSITIONS, _FORCES = 32, 16
+_REACH = 5.0  # standard errors to either side that the quadrature spans
+_STEPS = 3
+_QUADRATURES = 256  # samples at a time: each is evaluated at 512 presses
+
+Normal = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Prior:
+    """A prior on a press: uniform on the sensor and up to the force limit, or normal within these.
+
+    Attributes
+    ----------
+    force_n, position_m : (float, float) or None
+        Mean and standard deviation [N], [m]; None is uniform.
+
+    Examples
+    --------
+    >>> Prior(force_n=(3.0, 1.0)).position_m is None
+    True
+    """
+
+    force_n: Normal | None = None
+    position_m: Normal | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is no distribution."""
+        for name, normal in vars(self).items():
+            if normal is not None and not (np.isfinite(normal).all() and normal[1] > 0):
+                raise OutOfRange(f"prior on {name}: expected a mean and a standard deviation above 0, not {normal}")
+
+    def scaled(self, scale: Real) -> tuple[Real, Real]:
+        """Means (2,) and information (2, 2) on the unit square; 0 where it is uniform."""
+        both = [normal or (0.0, np.inf) for normal in (self.force_n, self.position_m)]
+        mean, deviation = np.array(both).T
+        return mean / scale, np.diag((scale / deviation) ** 2)
+
+
+@dataclass(frozen=True)
+class PressPosterior(Samples):
+    """Posterior of scaled presses; rows are samples."""
+
+    mean: Real
+    covariance: Real
+    low: Real
+    """(n, 2): 5 % of the probability lies below."""
+    high: Real
+    """(n, 2): 95 % lie below."""
+
+
+def posterior(target: FitGoal, table: ResponseTable, fit: LocalFit) -> PressPosterior:
+    """Posterior means, covariances and 90 % intervals of scaled presses.
+
+    Positions are spread over what the fit leaves open, at each of them forces over what that position leaves open: the
+    density may be as curved or cut off as it likes, as long as it has one ridge of forces.
+
+    Parameters
+    ----------
+    target : FitGoal
+        The responses, and the prior.
+    table : ResponseTable
+        The sensor.
+    fit : LocalFit
+        Its least squares.
+    """
+    n = len(fit.at)
+    blocks = np.split(np.arange(n), range(_QUADRATURES, n, _QUADRATURES))
+    return PressPosterior.joined([_posterior(target.rows(rows), table, fit.rows(rows)) for rows in blocks])
+
+
+def _posterior(target: FitGoal, table: ResponseTable, fit: LocalFit) -> PressPosterior:
+    information = fit.information + np.eye(2) * GUESS_INFORMATION
+    deviation = np.sqrt(np.linalg.inv(information)[:, 1, 1])
+    x, dx = _spread(fit.at[:, 1], deviation, _POSITIONS)
+    repeated = np.repeat(np.arange(len(x)), _POSITIONS)
+    ridge, width = _ridge(target.rows(repeated), table, np.repeat(fit.at[:, 0], _POSITIONS), x.ravel())
+    force, df = _spread(ridge, width, _FORCES)
+    every = np.repeat(repeated, _FORCES)
+    press = np.stack([force.ravel(), np.repeat(x.ravel(), _FORCES)], -1)
+    chi2 = target.rows(every).fit(press, table.at(press)).chi2.reshape(len(x), -1)
+    weight = np.exp((chi2.min(1, keepdims=True) - chi2) / 2) * np.repeat(df.reshape(x.shape), _FORCES, 1) * dx[:, None]
+    return _moments(press.reshape(len(x), -1, 2), weight / weight.sum(1, keepdims=True))
+
+
+def _spread(middle: Real, deviation: Real, count: int) -> tuple[Real, Real]:
+    """Middles of equal steps over what is within reach and within the square, (n, count), and the steps (n,)."""
+    low = np.clip(middle - _REACH * deviation, 0.0, 1.0)
+    step = (np.clip(middle + _REACH * deviation, 0.0, 1.0) - low) / count
+    return low[:, None] + step[:, None] * (np.arange(count) + 0.5), step
+
+
+def _ridge(target: FitGoal, table: ResponseTable, force: Real, position: Real) -> tuple[Real, Real]:
+    """The most probable force at each position, and its standard error."""
+    for _ in range(_STEPS):
+        press = np.stack([force, position], -1)
+        fit = target.fit(press, table.at(press))
+        information = fit.information[:, 0, 0] + GUESS_INFORMATION
+        force = np.clip(force + fit.gradient[:, 0] / information, 0.0, 1.0)
+    return force, 1 / np.sqrt(information)
+
+
+def _moments(press: Real, weight: Real) -> PressPosterior:
+    mean = np.einsum("nk,nki->ni", weight, press)
+    off = press - mean[:, None]
+    covariance = np.einsum("nk,nki,nkj->nij", weight, off, off)
+    low, high = (np.stack([_quantile(press[:, :, i], weight, p) for i in (0, 1)], -1) for p in (0.05, 0.95))
+    return PressPosterior(mean, covariance, low, high)
+
+
+def _quantile(value: Real, weight: Real, share: float) -> Real:
+    """Value below which a share of the weight lies, each weight counted half on either side of its value."""
+    order = np.argsort(value, 1)
+    value, weight = np.take_along_axis(value, order, 1), np.take_along_axis(weight, order, 1)
+    total = np.cumsum(weight, 1) - weight / 2
+    return np.array([np.interp(share, t, v) for t, v in zip(total, value, strict=True)])
+
 
 NOISE = 1e-3
 _DIAGONAL = np.arange(2)
@@ -57,6 +270,15 @@ class Estimates(Samples):
     tones: NDArray[np.intp]
     other_force_n: Real
     other_position_m: Real
+
+
+class PressEstimate(NamedTuple):
+    """One estimate of a stream, as those of a batch [N], [m]."""
+
+    force_n: float
+    position_m: float
+    covariance: Real
+    status: Status
 
 
 class _Pair(NamedTuple):
@@ -115,7 +337,6 @@ class Estimator:
         self.scale = self._table.scale
         rival, gap = self._table.rivals(self._sigma)
         self._rival = np.where(gap < _RIVAL, rival, -1)
-        self._single = Single(self._forward, self._table, self._sigma, self._rival)
         self._expected, self._information = (prior or Prior()).scaled(self.scale)
 
     @property
@@ -126,22 +347,10 @@ class Estimator:
         return ("one frequency gives two numbers for two unknowns: bad readings cannot be detected",)
 
     def one(self, impedance_ohm: ArrayLike) -> PressEstimate:
-        """The press behind one reading (n_tones,) [ohm]; errors as :meth:`batch`.
-
-        A complete reading that one press explains takes a shorter way to the same result.
-        """
-        z = self._readings(np.asarray(impedance_ohm)[None])
-        if self.prior is None and (z != 0).all() and np.isfinite(z).all():
-            plain = self._single.press(parts(np.log(z)))
-            if plain is not None:
-                return plain
-        found = self._block(z)
-        return PressEstimate(
-            float(found.force_n[0]),
-            float(found.position_m[0]),
-            found.covariance[0],
-            Status(int(found.status[0])),  # type: ignore[call-arg]
-        )
+        """The press behind one reading (n_tones,) [ohm]; errors as :meth:`batch`."""
+        estimates = self._block(self._readings(np.asarray(impedance_ohm)[None]))
+        force, position, status = estimates.force_n[0], estimates.position_m[0], Status(int(estimates.status[0]))  # type: ignore[call-arg]
+        return PressEstimate(float(force), float(position), estimates.covariance[0], status)
 
     def batch(self, impedance_ohm: ArrayLike) -> Estimates:
         """The presses behind readings (n, n_tones) [ohm].
@@ -176,14 +385,13 @@ class Estimator:
         response = parts(np.log(np.where(measured, z, 1.0)))
         weight = np.tile(measured, 2) / self._sigma
         target = FitGoal(response, weight, self._expected, self._information)
-        found = self._least_squares(target)
-        own = covariance(found.best.information - self._information)
+        pair = self._least_squares(target)
+        own = covariance(pair.best.information - self._information)
         tones = measured.sum(1)
         ambiguous = np.zeros(len(z), bool)
-        ambiguous[found.rows] = True
-        status = statuses(found.best, own[:, _DIAGONAL, _DIAGONAL], tones, ambiguous)
-        known = self._known(target, found.best)
-        return self._in_si(found, known, status, tones)
+        ambiguous[pair.rows] = True
+        status = statuses(pair.best, own[:, _DIAGONAL, _DIAGONAL], tones, ambiguous)
+        return self._in_si(pair, self._known(target, pair.best), status, tones)
 
     def _known(self, target: FitGoal, fit: LocalFit) -> PressPosterior:
         """Means, covariances and intervals of scaled presses."""
@@ -218,11 +426,11 @@ class Estimator:
         return Local(exact, self._table.at(press).slope)
 
     def _in_si(
-        self, found: _Pair, known: PressPosterior, status: NDArray[np.uint8], tones: NDArray[np.intp]
+        self, pair: _Pair, known: PressPosterior, status: NDArray[np.uint8], tones: NDArray[np.intp]
     ) -> Estimates:
         empty = status == Status.MISSING
         others = np.full((len(tones), 2), np.nan)
-        others[found.rows] = found.others
+        others[pair.rows] = pair.others
         mean, low, high = (
             np.where(empty[:, None], np.nan, a) * self.scale for a in (known.mean, known.low, known.high)
         )
@@ -233,7 +441,7 @@ class Estimator:
             force_90_n=np.stack([low[:, 0], high[:, 0]], -1),
             position_90_m=np.stack([low[:, 1], high[:, 1]], -1),
             status=status,
-            chi2=found.best.chi2,
+            chi2=pair.best.chi2,
             tones=tones,
             other_force_n=others[:, 0] * self.scale[0],
             other_position_m=others[:, 1] * self.scale[1],

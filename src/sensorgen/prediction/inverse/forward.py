@@ -1,14 +1,20 @@
-"""Forward model of one sensor at fixed frequencies, for arrays of presses and for one press in plain numbers."""
+"""Forward model of one sensor at fixed frequencies: exact, and as a table in which responses are looked up.
 
-import cmath
+In the table everything is scaled: force by its limit, position by the sensor's length, so that a press is a point of
+the unit square. The table only has to lead to the solution; the exact model has the last word.
+"""
+
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from sensorgen.core.arrays import Complex, Real
+from sensorgen.core.arrays import Complex, Mask, Real
 from sensorgen.core.errors import BadInput, OutOfRange
 from sensorgen.models import line
 from sensorgen.models.sensor import UNIFORM, Sensor
+from sensorgen.prediction.inference import Index, parts
+from sensorgen.solvers.line.inputs import far_load
 
 FORCE_LIMIT_N = 13.0  # the rig's largest force, thesis chapter 6
 _HALVINGS = 40
@@ -42,7 +48,9 @@ class Forward:
         self.sensor, self.frequency_hz = sensor, tones(frequency_hz)
         self.susceptance: Real = 2 * np.pi * self.frequency_hz * sensor.capacitance_f_per_m
         self.loose = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * self.susceptance
-        self.track, self.track_per_pascal = sensor.track_ohm_per_m()
+        track, self.track_per_pascal = sensor.track_ohm_per_m()
+        self.track: Real = np.asarray(track)
+        self._load = far_load(sensor.far_end)
 
     def log_impedance(self, force_n: Real, position_m: Real) -> Complex:
         """Natural logarithm of Z/ohm, (n, n_tones); parameters and errors as :meth:`Sensor.impedance`.
@@ -56,9 +64,9 @@ class Forward:
         pressed = sensor.leak_s_per_m + (sensor.tan_delta + 1j) * (self.susceptance / (1 - thinning))
         under = self.track + stress * self.track_per_pascal
         right = np.maximum(sensor.length_m - patch.left_m - patch.length_m, 0.0)
-        z = line.cascade(
-            [self.track, under, self.track], [self.loose, pressed, self.loose],
-            [patch.left_m, patch.length_m, right], sensor.far_end,
+        z = line.through(
+            [self.track, under, self.track], [self.loose, pressed, self.loose], [patch.left_m, patch.length_m, right],
+            self._load,
         )  # fmt: skip
         return np.log(sensor.at_leads(z, self.frequency_hz))
 
@@ -91,88 +99,228 @@ def tones(frequency_hz: ArrayLike) -> Real:
         No list of numbers; none at all, one that is not above 0 and finite, or two that are equal.
     """
     try:
-        found = np.atleast_1d(np.asarray(frequency_hz, np.float64))
+        hz = np.atleast_1d(np.asarray(frequency_hz, np.float64))
     except (TypeError, ValueError):
         raise BadInput(f"frequencies are numbers in Hz, not {str(frequency_hz)[:60]!r}") from None
-    if found.ndim != 1 or not found.size:
-        raise BadInput(f"expected a list of frequencies in Hz, not an array of shape {found.shape}")
-    bad = ~((found > 0) & (found < np.inf))
+    if hz.ndim != 1 or not hz.size:
+        raise BadInput(f"expected a list of frequencies in Hz, not an array of shape {hz.shape}")
+    bad = ~((hz > 0) & (hz < np.inf))
     if bad.any():
-        raise OutOfRange(f"a frequency of {found[bad][0]:g} Hz; expected a number above 0")
-    if len(np.unique(found)) < len(found):
+        raise OutOfRange(f"a frequency of {hz[bad][0]:g} Hz; expected a number above 0")
+    if len(np.unique(hz)) < len(hz):
         raise OutOfRange("the same frequency twice: give each once")
-    return found
+    return hz
 
 
-Section = tuple[float, list[complex], float]
+FORCE_CELLS = 24
+POSITION_CELLS = 40  # where the whole tip is on the sensor
+END_CELLS = 3  # where it overhangs, at each end
+_BEND = 1.5  # force cells grow by this power: a soft cell stiffens, so the response bends most at small forces
+_DEGREE = 4
+_ORDERS = np.arange(_DEGREE)
+_TO_POWERS = np.linalg.inv((np.arange(_DEGREE) / (_DEGREE - 1))[:, None] ** _ORDERS)
+
+_SLOPES = np.array([[2.0], [3.0]])  # of the square and the cube
+_FIRST_ORDER = [2, 1]  # by force, by position; the others are the value and the mixed derivative
+_TINY = np.float32(1e-30)
+_SMALL_PRODUCT = 1 << 18  # multiplications up to which BLAS keeps to one thread: more only wait for each other here
+
+Float32 = NDArray[np.float32]
 
 
-class Scalar:
-    """Exact ln Z of one press; as :class:`Forward`, whose numbers it takes and which its tests hold it against.
+class Local(NamedTuple):
+    """A response and its derivatives by scaled force and position: real and imaginary parts of ln Z, one after one."""
+
+    value: Real
+    """(n, 2 n_tones)."""
+    slope: Real
+    """(n, 2, 2 n_tones)."""
+
+
+class ResponseTable:
+    """Responses of one sensor over the unit square.
 
     Parameters
     ----------
     forward : Forward
-        The model for many presses.
-
-    Examples
-    --------
-    >>> from sensorgen.models.compression import unconfined
-    >>> from sensorgen.models.sensor import Sensor
-    >>> forward = Forward(Sensor(0.1, 0.01, (3e-4, 3e-4), (5.0, 5.0), 7.6e-10, unconfined(6e5)), [1e3, 1e5])
-    >>> found = Scalar(forward).log_impedance(3.0, 0.05)
-    >>> np.allclose(found, forward.log_impedance(np.array([3.0]), np.array([0.05])), rtol=1e-14)
-    True
+        The exact model.
+    force_limit_n : float
+        Force that the square's edge stands for [N].
     """
 
-    def __init__(self, forward: Forward) -> None:
-        self._sensor = forward.sensor
-        self._susceptance = forward.susceptance.tolist()
-        self._loose = forward.loose.tolist()
-        self._track, self._frequency_hz = (forward.track, forward.track_per_pascal), forward.frequency_hz
-        far_ohm = complex(line.cascade([0.0], [0.0], [0.0], self._sensor.far_end))  # of no line: what lies behind it
-        self._load = None if cmath.isinf(far_ohm) else far_ohm
+    def __init__(self, forward: Forward, force_limit_n: float) -> None:
+        self.scale = np.array([force_limit_n, forward.sensor.length_m])
+        self.edges = _edges(forward)
+        force, position = (_thirds(edges) * scale for edges, scale in zip(self.edges, self.scale, strict=True))
+        values = parts(forward.log_impedance(*_pairs(force, position).T))
+        self.coefficients = _cubics(values.reshape(len(force), len(position), -1))
+        self._borders = [edges[1:-1] for edges in self.edges]
+        self._per_width = [1 / np.diff(edges) for edges in self.edges]
+        self.shape = len(self.edges[0]) - 1, len(self.edges[1]) - 1
+        forces, positions = ((edges[1:] + edges[:-1]) / 2 for edges in self.edges)
+        self.middles = _pairs(forces, positions)
+        seeds = _pairs(self.edges[0][1::2], positions)
+        local, reach = self.at(seeds), np.repeat(np.diff(self.edges[0][::2]), len(positions))
+        self._filters = _Filters.around(seeds, local.value, local.slope[:, 0], reach)
 
-    def log_impedance(self, force_n: float, position_m: float) -> list[complex]:
-        """Natural logarithm of Z/ohm, per frequency; errors as :meth:`Sensor.impedance`."""
-        sensor, (track, per_pascal) = self._sensor, self._track
-        left = max(position_m - sensor.tip_m / 2, 0.0)
-        end = min(position_m + sensor.tip_m / 2, sensor.length_m)
-        stress = force_n / (sensor.width_m * (end - left))
-        stiffer = (sensor.tan_delta + 1j) / (1 - float(sensor.compression.capacitive_strain(np.asarray(stress))[0]))
-        pressed = [sensor.leak_s_per_m + stiffer * b for b in self._susceptance]
-        right = sensor.length_m - end, self._loose, track
-        return self._from_far_end(right, (end - left, pressed, track + stress * per_pascal), (left, self._loose, track))
+    def at(self, press: Real) -> Local:
+        """Interpolated response at scaled presses (n, 2)."""
+        n, axes = len(press), range(2)
+        cell = np.zeros(n, np.intp)
+        powers = np.empty((2, n, 2, _DEGREE))  # of the place within the cell, and their derivatives
+        for axis in axes:
+            k = np.searchsorted(self._borders[axis], press[:, axis], side="right")
+            cell *= self.shape[axis]
+            cell += k
+            per_width = self._per_width[axis][k]
+            t = (press[:, axis] - self.edges[axis][k]) * per_width
+            value, slope = powers[axis].transpose(1, 2, 0)
+            value[0], value[1], value[2] = 1.0, t, t * t
+            value[3] = value[2] * t
+            slope[0], slope[1] = 0.0, per_width
+            slope[2:] = value[1:3] * _SLOPES * per_width
+        rows = self.coefficients[cell]
+        along = (powers[0] @ rows).reshape(n, 2, _DEGREE, rows.shape[2] // _DEGREE)
+        both = powers[1][:, None] @ along
+        return Local(both[:, 0, 0], both.reshape(n, 4, -1)[:, _FIRST_ORDER] if n else both[:, 0])
 
-    def _from_far_end(self, *sections: Section) -> list[complex]:
-        """As :meth:`Forward._from_far_end`."""
-        passed = [self._load or 0j] * len(self._loose)
-        for length, y, r in sections:
-            if length > 0:
-                step = self._open if self._load is None else self._closed
-                passed = [step(q, y_k, r, length) for q, y_k in zip(passed, y, strict=True)]
-        sign = -1.0 if self._load is None else 1.0
-        return self._at_leads([sign * cmath.log(q) for q in passed])
+    def nearest(self, response: Real, weight: Real) -> Real:
+        """Presses near each response (n, 2): a matched filter over positions, at each with the best force.
 
-    def _at_leads(self, ln_z: list[complex]) -> list[complex]:
-        """Natural logarithm of Z/ohm at the meter, of that of the sensor."""
-        if not self._sensor.lead_f and not self._sensor.lead_ohm:
-            return ln_z
-        at_meter = self._sensor.at_leads(np.exp(ln_z), self._frequency_hz)
-        return [cmath.log(z) for z in at_meter.tolist()]
+        Parameters
+        ----------
+        response, weight : (n, 2 n_tones) array
+            Measured ln Z, anything finite where it is missing; 1/sigma, 0 where it is missing.
+        """
+        filters = self._filters
+        size = max(1, _SMALL_PRODUCT // filters.response.size)
+        seeds = [
+            filters.nearest(response[start : start + size], weight[start : start + size])
+            for start in range(0, max(len(response), 1), size)
+        ]
+        seed, shift = (np.concatenate(column) for column in zip(*seeds, strict=True))
+        press = filters.seeds[seed]
+        least = self.edges[0][1] / 2  # at no force nothing depends on the position: a search that starts there stays
+        press[:, 0] = np.minimum(np.maximum(press[:, 0] + shift, least), 1.0)
+        return press  # type: ignore[no-any-return]
 
-    @staticmethod
-    def _open(q: complex, y: complex, r: float, length: float) -> complex:
-        along = _along(y * r, length)
-        return (q + y * along) / (1.0 + q * r * along)
+    def cell(self, press: Real) -> Index:
+        """Number of the cell that a press (n, 2) is in."""
+        force, position = (np.searchsorted(self._borders[axis], press[:, axis], side="right") for axis in (0, 1))
+        return np.asarray(force * self.shape[1] + position)
 
-    @staticmethod
-    def _closed(q: complex, y: complex, r: float, length: float) -> complex:
-        along = _along(y * r, length)
-        return (q + r * along) / (1.0 + q * y * along)
+    def rivals(self, sigma: Real) -> tuple[Index, Real]:
+        """For every cell, the cell of the nearest other minimum of the distance, or -1; and a lower limit of it.
+
+        The distance, in units of noise, is the one that is left for a press anywhere in the two cells.
+        """
+        local = self.at(self.middles)
+        scaled, slopes = local.value / sigma, local.slope[:, 0] / sigma
+        reach = np.repeat(np.diff(self.edges[0]), self.shape[1]) / 2
+        curvature = np.einsum("ki,ki->k", slopes, slopes)
+        rival, gap, spacing = np.full(len(scaled), -1), np.full(len(scaled), np.inf), np.zeros(len(scaled))
+        for k, own in enumerate(scaled):
+            off = own - scaled
+            along = np.einsum("ki,ki->k", off, slopes)
+            shift = np.clip(along / curvature, -reach, reach)
+            square = np.einsum("ki,ki->k", off, off) - shift * (2 * along - curvature * shift)
+            distance = np.sqrt(np.maximum(square, 0.0)).reshape(self.shape)
+            near, aside = _around(self.shape, k)
+            other = np.where(_minima(distance) & ~near, distance, np.inf)
+            best = int(np.argmin(other))
+            gap[k], spacing[k] = other.flat[best], distance[aside].max()
+            rival[k] = best if gap[k] < np.inf else -1
+        return rival, gap - (spacing + spacing[rival]) / 2
 
 
-def _along(squared: complex, length: float) -> complex:
-    """Length times tanh(z)/z, z the length times the root: right to rounding of its magnitude, all that counts here."""
-    z = cmath.sqrt(squared) * length
-    return length * cmath.tanh(z) / z if z else complex(length)
+class _Filters(NamedTuple):
+    """Seeds as a matched filter takes them, in single precision: (2 n_tones, k) each, and what is summed of them."""
+
+    seeds: Real
+    origin: Real
+    response: Float32
+    by_force: Float32
+    squares: Float32
+    products: Float32
+    curvatures: Float32
+    least: Float32
+    most: Float32
+
+    @classmethod
+    def around(cls, seeds: Real, response: Real, by_force: Real, reach: Real) -> "_Filters":
+        """From presses (k, 2), their responses (k, 2 n_tones), derivatives by force, and how far these reach."""
+        origin = response.mean(0)
+        off, along = (response - origin).T, by_force.T
+        least = np.maximum(-reach, -seeds[:, 0])  # no force below 0, or it would explain what presses elsewhere do
+        arrays = (2 * off, along, off * off, off * along, along * along, least, reach)
+        return cls(seeds, origin, *(np.ascontiguousarray(a, np.float32) for a in arrays))
+
+    def nearest(self, response: Real, weight: Real) -> tuple[Index, Real]:
+        """Seed and shift in force of the smallest weighted distance to each response."""
+        square = (weight * weight).astype(np.float32)
+        square = square[:1] if (square == square[:1]).all() else square
+        wanted = square * (response - self.origin).astype(np.float32)
+        along = wanted @ self.by_force
+        along -= square @ self.products
+        curvature = square @ self.curvatures
+        curvature += _TINY
+        shift = along / curvature
+        np.minimum(shift, self.most, out=shift)
+        np.maximum(shift, self.least, out=shift)
+        along *= 2
+        along -= curvature * shift
+        along *= shift
+        along += wanted @ self.response
+        along -= square @ self.squares
+        seed = along.argmax(1)
+        return seed, shift[np.arange(len(seed)), seed].astype(float)
+
+
+def _edges(forward: Forward) -> tuple[Real, Real]:
+    """Borders of the cells in the unit square; the ends, where the tip overhangs, have cells of their own."""
+    half = min(forward.sensor.tip_m / forward.sensor.length_m / 2, 0.5)
+    parts = [
+        np.linspace(0, half, END_CELLS + 1),
+        np.linspace(half, 1 - half, POSITION_CELLS + 1),
+        np.linspace(1 - half, 1, END_CELLS + 1),
+    ]
+    return np.linspace(0, 1, FORCE_CELLS + 1) ** _BEND, np.unique(np.concatenate(parts))
+
+
+def _pairs(forces: Real, positions: Real) -> Real:
+    """All pairs, (n, 2)."""
+    return np.stack(np.meshgrid(forces, positions, indexing="ij"), -1).reshape(-1, 2)
+
+
+def _thirds(edges: Real) -> Real:
+    """Points at the thirds of every cell."""
+    thirds = edges[:-1, None] + np.diff(edges)[:, None] * np.arange(3) / 3
+    return np.append(thirds.ravel(), edges[-1])
+
+
+def _cubics(values: Real) -> Real:
+    """Coefficients of the cubic in both directions of every cell, (cells, 4, 4 * 2 n_tones)."""
+    step = _DEGREE - 1
+    forces, positions = (values.shape[0] - 1) // step, (values.shape[1] - 1) // step
+    i = (np.arange(forces) * step)[:, None, None, None] + _ORDERS[:, None]
+    j = (np.arange(positions) * step)[None, :, None, None] + _ORDERS
+    blocks = values[i, j]
+    powers = np.einsum("pi,qj,abijk->abpqk", _TO_POWERS, _TO_POWERS, blocks)
+    return np.ascontiguousarray(powers.reshape(forces * positions, _DEGREE, -1))
+
+
+def _minima(distance: Real) -> Mask:
+    """Cells that are below all their neighbours, those at the border among the ones that they have."""
+    around = np.pad(distance, 1, constant_values=np.inf)
+    rows, columns = distance.shape
+    lowest = np.ones(distance.shape, bool)
+    for i, j in [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]:
+        lowest &= distance < around[i : i + rows, j : j + columns]
+    return lowest
+
+
+def _around(shape: tuple[int, int], seed: int) -> tuple[Mask, Mask]:
+    """Cells that touch the seed's, and those among them at the same force."""
+    row, column = divmod(seed, shape[1])
+    rows, columns = abs(np.arange(shape[0]) - row)[:, None], abs(np.arange(shape[1]) - column)
+    return np.maximum(rows, columns) <= 1, (rows == 0) & (columns == 1)

@@ -17,9 +17,9 @@ from collections.abc import Iterator, Sequence
 from importlib import resources
 
 from sensorgen.core.findings import Finding
-from sensorgen.scene.drawing import dimensions, layers, markers, overview, panels, titleblock
-from sensorgen.scene.drawing.panels import Colours, ViewPanel
-from sensorgen.scene.drawing.paper import ARROWS, box, element, escaped, line
+from sensorgen.scene.drawing import dimensions, layers, markers, panels, titleblock
+from sensorgen.scene.drawing.panels import Colours
+from sensorgen.scene.drawing.paper import ARROWS, ViewPanel, box, element, escaped, line
 from sensorgen.scene.drawing.view import Measure, heights, nearest, views, widths
 from sensorgen.scene.scene import Point, Scene
 
@@ -66,7 +66,7 @@ def svg(
     """
     grid = list(boundaries_mm) or [0.0, scene.size_mm[2]]
     lanes, details = _details(scene, grid)
-    wholes = overview.arrange(details, scene.size_mm[2], LEFT, RIGHT, OVERVIEW + 10)
+    wholes = panels.arrange_wholes(details, scene.size_mm[2], LEFT, RIGHT, OVERVIEW + 10)
     letters, marked = panels.letters(scene.bodies), markers.ranked(findings)
     entries = markers.placed(marked, letters, (LEFT + 2, FOOT + 8.5, SPLIT - 3, BOTTOM - 2))
     shown = [entry.mark for entry in entries]
@@ -85,7 +85,11 @@ def svg(
         *(part for panel in details if printed for part in panels.outlined(panel, printed)),
         *marks,
         *markers.on_detail(shown, details, grid, taken),
-        *(p for d, w, n in zip(details, wholes, NAMES, strict=False) for p in overview.draw(d, w, n, scene, materials)),
+        *(
+            p
+            for d, w, n in zip(details, wholes, NAMES, strict=False)
+            for p in panels.draw_whole(d, w, n, scene, materials)
+        ),
         *markers.on_overview(shown, details, wholes),
         *markers.listed(entries, marked, LEFT + 2, FOOT + 3.5, SPLIT - LEFT - 5),
         line("frame", 6, FOOT - 2, WIDTH - 6, FOOT - 2) + line("frame", SPLIT, FOOT - 2, SPLIT, HEIGHT - 6),

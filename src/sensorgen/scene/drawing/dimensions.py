@@ -3,8 +3,7 @@
 from collections.abc import Iterator, Sequence
 from itertools import accumulate, pairwise
 
-from sensorgen.scene.drawing.panels import ViewPanel
-from sensorgen.scene.drawing.paper import ViewFrame, line, number, seen, spread, text, width
+from sensorgen.scene.drawing.paper import ViewFrame, ViewPanel, line, number, seen, spread, text, width
 from sensorgen.scene.drawing.view import Gap, Measure
 from sensorgen.scene.scene import Point
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from math import cos, hypot, pi, sin
 
 from sensorgen.core.findings import Finding, counted, counts, grouped
-from sensorgen.scene.drawing.panels import GUTTER, Room, ViewPanel
-from sensorgen.scene.drawing.paper import element, fitted, line, spread, text, wrapped
+from sensorgen.scene.drawing.panels import GUTTER, Room
+from sensorgen.scene.drawing.paper import ViewPanel, element, fitted, line, spread, text, wrapped
 from sensorgen.scene.scene import AXES, Point
 
 RADIUS, CLEAR = 2.1, 4.5  # of a marker; from one marker's centre to the next [mm]

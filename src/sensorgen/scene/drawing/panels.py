@@ -1,12 +1,13 @@
 """Views on the page: their scale, their room, and the materials in them."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import floor, log10
 
-from sensorgen.scene.drawing.paper import ViewFrame, element, fitted, number, text
-from sensorgen.scene.drawing.view import View
-from sensorgen.scene.scene import Body, Point, Scene, clipped
+from sensorgen.scene.drawing import dimensions
+from sensorgen.scene.drawing.paper import ViewFrame, ViewPanel, box, element, fitted, number, text
+from sensorgen.scene.drawing.view import Measure, View
+from sensorgen.scene.scene import AXES, Body, Point, Scene, clipped
 
 GUTTER = 8.0  # between a view and what is right of it: room for markers [mm]
 CAPTION = 78.0  # room for the words over a view [mm]
@@ -15,21 +16,13 @@ LOWEST = 12.0  # a view that is flatter on paper shows nothing [mm]
 LARGER = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
 ASIDE = 0.4  # place of a letter across its column: left of the middle, where no line of symmetry runs
 SMALLER = (1.0, 2.0, 5.0)  # 1:2 and 1:5 are read at a glance, 1:1.67 is not
+STRIP_HEIGHT = 9.0  # of the strip on paper [mm]
+FINEST = 0.25  # a period that is shorter on paper is not drawn [mm]
+MOST_CORNERS = 6000
+STRIP_LEFT, STRIP_RIGHT = 14.0, 4.0  # room beside a strip [mm]
 
 Colours = Mapping[str, tuple[str, str]]
 MISSING_COLOUR = "#c8c8c8"
-
-
-@dataclass(frozen=True)
-class ViewPanel:
-    """A view and where it stands on the page."""
-
-    view: View
-    frame: ViewFrame
-
-    def place(self, at_mm: Point) -> Point:
-        """Place on the page of a point (along, z) of the section [mm]."""
-        return self.frame.x(at_mm[0]), self.frame.y(at_mm[1])
 
 
 Room = tuple[float, float, float, float]  # left, top, right, bottom on the page [mm]
@@ -160,3 +153,44 @@ def outlined(panel: ViewPanel, printed: Scene) -> Iterator[str]:
         path = "".join(panel.frame.outline(part) for o in seen if (part := clipped(o, view.end_mm)))
         if path:
             yield element("path", "halo-line", "", d=path) + element("path", "printed", "", d=path, data_body=body.name)
+
+
+def arrange_wholes(
+    details: Sequence[ViewPanel], height_mm: float, left: float, right: float, top: float
+) -> list[ViewPanel]:
+    """A strip for each detail view, side by side on the page [mm]."""
+    each = (right - left) / len(details)
+    up = STRIP_HEIGHT / height_mm
+    panels = []
+    for k, detail in enumerate(details):
+        view = replace(detail.view, end_mm=detail.view.extent_mm)
+        along = min((each - STRIP_LEFT - STRIP_RIGHT) / view.extent_mm, up)
+        start = left + k * each + STRIP_LEFT
+        panels.append(
+            ViewPanel(view, ViewFrame(start, top + STRIP_HEIGHT, start + view.extent_mm * along, top, along, up))
+        )
+    return panels
+
+
+def draw_whole(detail: ViewPanel, whole: ViewPanel, name: str, scene: Scene, colours: Colours) -> Iterator[str]:
+    """The strip with its detail window, its length and its height."""
+    frame, view = whole.frame, whole.view
+    long, ratio = frame.right - frame.left, frame.per_mm_up / frame.per_mm
+    shortened = detail.view.end_mm < view.extent_mm
+    words = [f"Overview {name}: all of {view.section.across}, {number(scene.size_mm[AXES.index(view.normal)])} mm deep"]
+    words += [f"period {number(view.repeat_mm())} mm"] if view.period_mm else []
+    words.append(f"height × {ratio:.3g}" if ratio > 1.0005 else "true to scale")
+    words += ["dashed: the detail above"] if shortened else []
+    yield text("bold", frame.left, frame.top - 6.6, "; ".join(words))
+    corners = sum(len(outline) for _, outline in view.section.regions)
+    if corners <= MOST_CORNERS and not 0 < view.repeat_mm() * frame.per_mm < FINEST:
+        yield from materials(whole, colours, "body far")
+    else:
+        fine = fitted(f"a period of {number(view.repeat_mm())} mm is too fine to be drawn here", long)
+        yield box("fine", frame.left, frame.top, long, STRIP_HEIGHT)
+        yield text("small middle", frame.left + long / 2, frame.top + STRIP_HEIGHT / 2 + 0.8, fine)
+    if shortened:
+        window = detail.view.end_mm * frame.per_mm
+        yield box("window", frame.left - 0.4, frame.top - 0.6, window + 0.8, STRIP_HEIGHT + 1.2)
+    yield from dimensions.beside(frame, [[Measure(0.0, scene.size_mm[2])]])
+    yield from dimensions.rows(frame, [[Measure(0.0, view.extent_mm)]], frame.bed + 4.6, dimensions.ROW)

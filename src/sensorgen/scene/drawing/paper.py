@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 from unicodedata import east_asian_width
 
+from sensorgen.scene.drawing.view import View
 from sensorgen.scene.scene import Point
 
 ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"})
@@ -56,6 +57,18 @@ class ViewFrame:
     def outline(self, points: Iterable[Point]) -> str:
         """Path of a closed outline [mm]."""
         return "M" + "L".join(f"{number(self.x(u))} {number(self.y(z))}" for u, z in points) + "Z"
+
+
+@dataclass(frozen=True)
+class ViewPanel:
+    """A view and where it stands on the page."""
+
+    view: View
+    frame: ViewFrame
+
+    def place(self, at_mm: Point) -> Point:
+        """Place on the page of a point (along, z) of the section [mm]."""
+        return self.frame.x(at_mm[0]), self.frame.y(at_mm[1])
 
 
 def number(value: float) -> str:

@@ -43,14 +43,14 @@ class View:
     @cached_property
     def regions(self) -> list[Region]:
         """Cut bodies, as far as the view reaches."""
-        found = []
+        cut_bodies = []
         for body, outline in self.section.regions:
             along = [u for u, _ in outline]
             if max(along) <= self.end_mm:
-                found.append((body, outline))
+                cut_bodies.append((body, outline))
             elif min(along) < self.end_mm and (part := clipped(outline, self.end_mm)):
-                found.append((body, part))
-        return found
+                cut_bodies.append((body, part))
+        return cut_bodies
 
     @cached_property
     def cut(self) -> Section:
@@ -214,14 +214,14 @@ def nearest(view: View) -> Gap | None:
     for body, outline in view.regions:
         if body.terminal:
             terminals.setdefault(body.terminal, []).append(outline)
-    found = []
+    gaps = []
     for corners, others in permutations(terminals.values(), 2):
         edges = [edge for outline in others for edge in _sides(outline)]
         for a, b in (side for outline in corners for side in _sides(outline)):
             between = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
             for place, at_corner in ((a, True), (between, False)):
-                found += [Gap(place, _foot(place, *edge), at_corner) for edge in edges]
-    return min(found, key=lambda gap: (round(gap.value_mm, 6), gap.at_corner, abs(gap.near[0] - middle)), default=None)
+                gaps += [Gap(place, _foot(place, *edge), at_corner) for edge in edges]
+    return min(gaps, key=lambda gap: (round(gap.value_mm, 6), gap.at_corner, abs(gap.near[0] - middle)), default=None)
 
 
 def _levels(view: View) -> Iterator[float]:
@@ -250,19 +250,19 @@ def _reach(view: View, at_mm: float | None, end: Callable[..., float]) -> float:
 
 def _new(measures: Iterable[Measure], known: Sequence[Measure], by_value: bool = False) -> list[Measure]:
     """Those that no other one tells already."""
-    kept: list[Measure] = []
+    new: list[Measure] = []
     for m in measures:
-        if not any(abs(m.value_mm - k.value_mm) < SAME_MM if by_value else m.same(k) for k in [*known, *kept]):
-            kept.append(m)
-    return kept
+        if not any(abs(m.value_mm - k.value_mm) < SAME_MM if by_value else m.same(k) for k in [*known, *new]):
+            new.append(m)
+    return new
 
 
 def _distinct(values: Iterable[float]) -> list[float]:
-    kept: list[float] = []
+    distinct: list[float] = []
     for value in sorted(values):
-        if not kept or value - kept[-1] > SAME_MM:
-            kept.append(value)
-    return kept
+        if not distinct or value - distinct[-1] > SAME_MM:
+            distinct.append(value)
+    return distinct
 
 
 def _sides(outline: Outline) -> Iterator[tuple[Point, Point]]:

@@ -11,18 +11,13 @@
 Nothing here imports it, and no other user of the kernel shares the process.
 """
 
-import pickle
-import signal
-import subprocess
-import sys
-import tempfile
-import threading
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import CadFailed, SensorgenError
+from sensorgen.core.worker import Worker, WorkerEnded
 from sensorgen.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -30,7 +25,6 @@ if TYPE_CHECKING:
 
 # Import and work take 4 s together; a cold disk, a slow machine and a large sensor may need twenty times as much.
 TIMEOUT_S = 300.0
-GRACE_S = 5.0  # from the end of its output to the end of the process
 WORKER = ("-P", "-m", "sensorgen.scene.geometry.solids")  # -P: no module of the user's current folder takes part
 
 
@@ -49,27 +43,21 @@ class CadProcess:
         timeout_s : float
             How long one file may take, including what is left of loading build123d [s].
         """
-        self.timeout_s = timeout_s
-        self._late = False
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115  (closed in __exit__; a pipe nobody reads would fill up)
-        self._process = subprocess.Popen(  # noqa: S603  (this Python, and a module of our own)
-            [sys.executable, *WORKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said
-        )
+        self._worker = Worker("the CAD process", WORKER, timeout_s)
         self._thread = ThreadPoolExecutor(1, "cad")  # sends and waits, so that the caller need not
 
     def __enter__(self) -> "CadProcess":
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._process.kill()  # it holds nothing that needs closing, and Python's own way out takes a second
+        self._worker.process.kill()
         self._thread.shutdown(cancel_futures=True)
-        self._process.communicate()
-        self._said.close()
+        self._worker.stop()
 
     @property
     def pid(self) -> int:
         """Number of the process."""
-        return self._process.pid
+        return self._worker.process.pid
 
     def submit(self, scene: Scene, colours: Mapping[str, str], title: str, path: Path) -> Future[None]:
         """Have a STEP file written; returns at once.
@@ -103,38 +91,10 @@ class CadProcess:
 
     def _exchange(self, name: str, *arguments: Any) -> Any:
         """Send one job and wait for its answer."""
-        stdin, stdout = self._process.stdin, self._process.stdout
-        assert stdin is not None and stdout is not None  # noqa: PT018, S101  (both are pipes, see above)
-        clock = threading.Timer(self.timeout_s, self._expire)
-        clock.start()
         try:
-            stdin.write(pickle.dumps((name, arguments)))
-            stdin.flush()
-            answer = pickle.load(stdout)  # noqa: S301  (from the process that we started)
-        except (OSError, EOFError, pickle.UnpicklingError):
-            raise CadFailed(self._obituary()) from None
-        finally:
-            clock.cancel()
+            answer = self._worker.ask((name, arguments))
+        except WorkerEnded as error:
+            raise CadFailed(str(error)) from None
         if isinstance(answer, SensorgenError):
             raise answer
         return answer
-
-    def _expire(self) -> None:
-        self._late = True
-        self._process.kill()
-
-    def _obituary(self) -> str:
-        """Why there is no answer."""
-        if self._late:
-            return f"the CAD process took more than {self.timeout_s:g} s and was stopped: try a smaller one, or again"
-        try:
-            code = self._process.wait(GRACE_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            return "the CAD process gave an answer that cannot be read, and was stopped"
-        if code < 0:
-            return f"the CAD process was ended by {signal.Signals(-code).name}: there may be too little memory"
-        self._said.seek(0)
-        lines = self._said.read().decode(errors="replace").splitlines()
-        last = next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
-        return f"the CAD process ended with exit code {code}: {last}"

@@ -45,10 +45,10 @@ def _pieces(mesh: Mesh, near_mm: float) -> tuple[Piece, ...]:
     area = np.linalg.norm(mesh.normals_mm2(), axis=1).sum() / 2
     best: tuple[Piece, ...] = ()
     for axis in "zyx":
-        made = _prisms(mesh, axis, near_mm)
-        same = abs(sum(prism.volume_mm3() for prism in made) - exact) <= _VOLUME_RATIO * exact + near_mm * area
-        if made and same and (not best or len(made) < len(best)):
-            best = made
+        prisms = _prisms(mesh, axis, near_mm)
+        same = abs(sum(prism.volume_mm3() for prism in prisms) - exact) <= _VOLUME_RATIO * exact + near_mm * area
+        if prisms and same and (not best or len(prisms) < len(best)):
+            best = prisms
     if best:
         return best
     places = [(x, y, z) for x, y, z in mesh.vertices_mm.tolist()]
@@ -70,7 +70,7 @@ def _prisms(mesh: Mesh, axis: str, near_mm: float) -> tuple[Prism, ...]:
     starts = heights[np.append(True, np.diff(heights) > 4 * near_mm)]
     at = np.searchsorted(starts + 4 * near_mm, corners[caps, :, k].mean(1))
     levels = [_rounded(float(value)) for value in starts]
-    region, found = shapely.Polygon(), []
+    region, prisms = shapely.Polygon(), []
     growing: dict[Outline, float] = {}
     faces = defaultdict(list)
     for number, place, looks_up in zip(caps.tolist(), at.tolist(), (normal[caps] > 0).tolist(), strict=True):
@@ -81,12 +81,12 @@ def _prisms(mesh: Mesh, axis: str, near_mm: float) -> tuple[Prism, ...]:
         now: dict[Outline, float] = {}
         for outline in outlines(region):
             now[outline] = growing.pop(outline, low)
-        found += [_prism(axis, outline, start, low) for outline, start in growing.items()]
+        prisms += [_prism(axis, outline, start, low) for outline, start in growing.items()]
         growing = now
-        if len(found) + len(now) > MOST_PRISMS:
+        if len(prisms) + len(now) > MOST_PRISMS:
             return ()
-    found += [_prism(axis, outline, start, levels[-1]) for outline, start in growing.items()]
-    return tuple(sorted(found, key=lambda p: (p.start_mm, p.outline)))
+    prisms += [_prism(axis, outline, start, levels[-1]) for outline, start in growing.items()]
+    return tuple(sorted(prisms, key=lambda p: (p.start_mm, p.outline)))
 
 
 def _region(mesh: Mesh, faces: Sequence[int], plane: Sequence[int], near_mm: float) -> shapely.Geometry:
@@ -105,9 +105,9 @@ def _region(mesh: Mesh, faces: Sequence[int], plane: Sequence[int], near_mm: flo
 def _prism(axis: str, outline: Outline, start_mm: float, end_mm: float) -> Prism:
     """A prism; boxes along z, whichever axis they came from."""
     u, v = zip(*outline, strict=True)
-    made = Prism(axis, tuple((_rounded(a), _rounded(b)) for a, b in outline), start_mm, end_mm)
-    if not made.is_box():
-        return made
+    prism = Prism(axis, tuple((_rounded(a), _rounded(b)) for a, b in outline), start_mm, end_mm)
+    if not prism.is_box():
+        return prism
     spans = dict(zip(PLANE[axis], ((min(u), max(u)), (min(v), max(v))), strict=True)) | {axis: (start_mm, end_mm)}
     return box(*(_rounded(value) for name in AXES for value in spans[name]))
 

@@ -18,16 +18,13 @@ cells     compound         fused
 """
 
 import gc
-import os
-import pickle
 import re
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import CadFailed, SensorgenError, Unwritable
-from sensorgen.core.leash import end_with_parent
+from sensorgen.core.worker import answer_input
 from sensorgen.scene.geometry.step_files import read_step
 from sensorgen.scene.scene import AXES, PLANE, Body, Piece, Point, Prism, Scene
 
@@ -252,36 +249,26 @@ def _step_string(text: str) -> bytes:
     return f"'{''.join(characters())}'".encode("ascii")
 
 
-def main() -> None:
-    """Do each job on standard input, a function's name and arguments, until it ends; answer its result or error."""
-    end_with_parent()
-    with os.fdopen(os.dup(1), "wb") as answers:
-        os.dup2(2, 1)  # what the kernel prints is no answer
-        gc.disable()  # what the import makes lives for good: not to look through it for garbage saves a tenth of it
-        import build123d  # noqa: F401
+def _load() -> None:
+    gc.disable()  # what the import makes lives for good: not to look through it for garbage saves a tenth of it
+    import build123d  # noqa: F401
 
-        gc.freeze()
-        gc.enable()
-        for name, arguments in _jobs(sys.stdin.buffer):
-            try:
-                work: Callable[..., object] = write_step if name == "write_step" else read_step
-                answer = work(*arguments)
-            except SensorgenError as error:
-                answer = error
-            except Exception as error:  # the process lives on, and the user learns of it
-                what = arguments[2] if name == "write_step" else arguments[0].name
-                answer = CadFailed(f"the CAD process failed on {what!r}: {type(error).__name__}: {error}")
-            pickle.dump(answer, answers)
-            answers.flush()
+    gc.freeze()
+    gc.enable()
 
 
-def _jobs(stream: BinaryIO) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    while True:
-        try:
-            yield pickle.load(stream)  # noqa: S301  (from the process that started this one)
-        except EOFError:
-            return
+def _answer(job: tuple[str, tuple[Any, ...]]) -> object:
+    """Result or error of a job: a function's name, and arguments."""
+    name, arguments = job
+    try:
+        work: Callable[..., object] = write_step if name == "write_step" else read_step
+        return work(*arguments)
+    except SensorgenError as error:
+        return error
+    except Exception as error:  # the process lives on, and the user learns of it
+        what = arguments[2] if name == "write_step" else arguments[0].name
+        return CadFailed(f"the CAD process failed on {what!r}: {type(error).__name__}: {error}")
 
 
 if __name__ == "__main__":
-    main()
+    answer_input(_answer, _load)

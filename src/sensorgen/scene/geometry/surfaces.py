@@ -128,8 +128,8 @@ def _open(faces: Whole) -> Whole:
     n = int(edges.max(initial=0)) + 1
     there, back = edges @ [n, 1], edges @ [1, n]
     keys = np.unique(there)
-    found = np.searchsorted(keys, back).clip(max=max(len(keys) - 1, 0))
-    has = keys[found] == back if len(keys) else np.zeros(0, bool)
+    place = np.searchsorted(keys, back).clip(max=max(len(keys) - 1, 0))
+    has = keys[place] == back if len(keys) else np.zeros(0, bool)
     return np.flatnonzero(~has)
 
 
@@ -269,13 +269,13 @@ def _shells(points: Real, faces: Whole, mates: Whole) -> list[Mesh]:
     vertex = groups(len(mates), np.append(number, following), np.append(following[mates], mates))
     label = groups(len(faces), number // 3, mates // 3)
     places = points[faces.reshape(-1)]
-    found = []
+    shells = []
     for k in range(int(label.max(initial=-1)) + 1):
         own = vertex.reshape(-1, 3)[label == k]
         _, first, back = np.unique(own, return_index=True, return_inverse=True)
         where = np.flatnonzero(np.repeat(label == k, 3))[first]
-        found.append(Mesh(places[where], back.reshape(-1, 3).astype(np.int32)))
-    return found
+        shells.append(Mesh(places[where], back.reshape(-1, 3).astype(np.int32)))
+    return shells
 
 
 def _outwards(shells: Sequence[Mesh]) -> tuple[list[Mesh], int, list[SurfaceFault]]:

@@ -34,7 +34,7 @@ class AirMap:
     @cached_property
     def _gaps(self) -> list[tuple[int, Whole, Whole]]:
         """Along each axis with gaps, the nodes of the faces below and above each of them (k, 9)."""
-        mesh, found = self.solid, []
+        mesh, gaps = self.solid, []
         number = np.full(mesh.bricks.fill.shape, -1)
         number[tuple(mesh.boxes.T)] = np.arange(len(mesh.boxes))
         lattice = mesh.nodes.reshape(-1, 3, 3, 3)
@@ -43,8 +43,8 @@ class AirMap:
                 lattice[number[tuple(boxes.T)]].take(end, axis + 1).reshape(-1, 9)
                 for boxes, end in ((below, 2), (above, 0))
             )
-            found += [(axis, near, far)] if len(near) else []
-        return found
+            gaps += [(axis, near, far)] if len(near) else []
+        return gaps
 
     def displacements_m(self, moved_m: Real, share: float) -> Real:
         """Displacements of all nodes (3n,) from those of the solid ones (n, 3) [m].
@@ -104,16 +104,16 @@ def _bulged(gap: Real, nodes: Whole, least: float) -> Real:
 
     Coefficients of Bernstein's polynomials bound a parabola: all are held above. Faces share nodes.
     """
-    found = gap.reshape(-1, 3, 3).copy()
-    found[:, 1, _ENDS] = np.maximum(found[:, 1, _ENDS], found[:, _ENDS][:, :, _ENDS].sum(axis=1) / 4 + least / 2)
-    found[:, _ENDS, 1] = np.maximum(found[:, _ENDS, 1], found[:, _ENDS][:, :, _ENDS].sum(axis=2) / 4 + least / 2)
+    raised = gap.reshape(-1, 3, 3).copy()
+    raised[:, 1, _ENDS] = np.maximum(raised[:, 1, _ENDS], raised[:, _ENDS][:, :, _ENDS].sum(axis=1) / 4 + least / 2)
+    raised[:, _ENDS, 1] = np.maximum(raised[:, _ENDS, 1], raised[:, _ENDS][:, :, _ENDS].sum(axis=2) / 4 + least / 2)
     highest = np.zeros(nodes.max() + 1)
-    np.maximum.at(highest, nodes, found.reshape(nodes.shape))
-    found = highest[nodes].reshape(-1, 3, 3)
-    edges = found[:, 1, _ENDS].sum(axis=1) + found[:, _ENDS, 1].sum(axis=1)
-    corners = found[:, _ENDS][:, :, _ENDS].sum((1, 2))
-    found[:, 1, 1] = np.maximum(found[:, 1, 1], (least + edges - corners / 4) / 4)
-    return found.reshape(-1, 9)
+    np.maximum.at(highest, nodes, raised.reshape(nodes.shape))
+    raised = highest[nodes].reshape(-1, 3, 3)
+    edges = raised[:, 1, _ENDS].sum(axis=1) + raised[:, _ENDS, 1].sum(axis=1)
+    corners = raised[:, _ENDS][:, :, _ENDS].sum((1, 2))
+    raised[:, 1, 1] = np.maximum(raised[:, 1, 1], (least + edges - corners / 4) / 4)
+    return raised.reshape(-1, 9)
 
 
 def _spread(slide: Real, faces: Whole) -> Real:
@@ -121,7 +121,7 @@ def _spread(slide: Real, faces: Whole) -> Real:
 
     Where the corner of a face slides alone, its parabola would turn back.
     """
-    found, lattice = slide.copy(), faces.reshape(-1, 3, 3)
+    slides, lattice = slide.copy(), faces.reshape(-1, 3, 3)
     corners = lattice[:, _ENDS][:, :, _ENDS]
     between = (
         (lattice[:, 1, _ENDS], lattice[:, _ENDS].transpose(1, 0, 2)[..., _ENDS]),
@@ -130,22 +130,22 @@ def _spread(slide: Real, faces: Whole) -> Real:
     )
     for middle, around in between:
         still = (slide[middle] == 0).all(axis=-1)
-        found[middle[still]] = slide[around].mean(axis=0)[still]
-    return found
+        slides[middle[still]] = slide[around].mean(axis=0)[still]
+    return slides
 
 
 def _harmonic(mesh: BrickMesh, matrix: csr_matrix, given: Real, axis: int) -> Real:
     """One component, NaN where unknown; at the mirrors across its axis it is as elsewhere on them."""
-    found, place = given.copy(), mesh.points_m[:, axis]
+    values, place = given.copy(), mesh.points_m[:, axis]
     for end in (place.min(), place.max()):
         at = np.abs(place - end) < _ROUNDING * np.ptp(place)
-        known = found[at & ~np.isnan(found)]
-        found[at & np.isnan(found)] = known.mean() if axis < 2 and len(known) else 0.0
-    free = np.isnan(found)
+        known = values[at & ~np.isnan(values)]
+        values[at & np.isnan(values)] = known.mean() if axis < 2 and len(known) else 0.0
+    free = np.isnan(values)
     if free.any():
-        found[free] = 0.0
-        found[free] = solved_by_lu(matrix[free][:, free], -(matrix @ found)[free])
-    return found
+        values[free] = 0.0
+        values[free] = solved_by_lu(matrix[free][:, free], -(matrix @ values)[free])
+    return values
 
 
 def _differences(mesh: BrickMesh) -> csr_matrix:

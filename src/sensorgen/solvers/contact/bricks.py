@@ -9,7 +9,7 @@ import numpy as np
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.errors import BadInput
 from sensorgen.core.units import M_PER_MM
-from sensorgen.scene.raster import raster
+from sensorgen.scene.repetition import raster
 from sensorgen.scene.scene import Scene
 from sensorgen.solvers.contact.cell import AIR, Region
 from sensorgen.solvers.contact.element import BRICK, BRICK_CORNERS, BRICK_INNER, BRICK_OUTER, ElementMesh

@@ -1,4 +1,9 @@
-"""A field's mesh that a cell's deformation carries along, while no gap closes: one mesh serves for all loads."""
+"""A field's mesh that a cell's deformation carries along, while no gap closes: one mesh serves for all loads.
+
+Where a gap closes from its tip, faces slide along each other, and triangles of the air between them turn over by as
+much as their own area. With their volumes held above 0, as a pulled-back permittivity needs them, the rise of tri with
+a film of 0.1 mm was 8.5 % off at 100 kPa and half of it at 1.1 MPa: such cells are meshed anew at each load.
+"""
 
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,6 +1,6 @@
 """Unit cell of a cross-section as edges with a region on each side, for a mesher; of any prismatic scene."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -8,7 +8,8 @@ import shapely
 
 from sensorgen.core.errors import BadInput
 from sensorgen.scene.scene import Point, Scene
-from sensorgen.scene.sections import SectionColumn, columns, sections
+from sensorgen.scene.sections import sections
+from sensorgen.scene.unit_cell import Slice, cut, repeats, slices, straightened
 
 OUTSIDE = 0  # the region beyond the cell
 AIR = "air"
@@ -72,6 +73,9 @@ class ContactCell:
         return region != OUTSIDE and self.regions[region - 1].material != AIR
 
 
+Strip = tuple[float, float, list[tuple[Region, Point, Point]]]
+
+
 def cell_of(scene: Scene, period_mm: float | None) -> ContactCell:
     """The cell of a prismatic scene: half a period between two mirrors where there are such, else a whole one.
 
@@ -89,86 +93,26 @@ def cell_of(scene: Scene, period_mm: float | None) -> ContactCell:
     """
     try:
         found = sections(scene)
+        whole = straightened(slices(found[0], 0.0, layered=True))
     except ValueError as error:
         raise BadInput(f"compression needs a prismatic scene: {error}") from None
     if len(found) > 1:
         raise BadInput(f"compression needs one cross-section; this scene has {len(found)}: it must be solved in 3D")
-    whole = columns(found[0])
     start, end = whole[0].left_mm, whole[-1].right_mm
-    uniform = len(_strips(whole, start, end)) == 1
-    period = period_mm or (min(end - start, max(whole[0].layers[-1].top_mm)) if uniform else end - start)
+    period = period_mm or (min(end - start, max(whole[0].bands[-1].top_mm)) if len(whole) == 1 else end - start)
     if period > (end - start) * (1 + 1e-9):
         raise BadInput(f"the sensor is {end - start:g} mm long, less than its period of {period:g} mm")
-    axes = {place for c in whole for place in (c.left_mm, (c.left_mm + c.right_mm) / 2)}
+    axes = {place for s in whole for place in (s.left_mm, (s.left_mm + s.right_mm) / 2)}
     for axis in sorted(axes):
-        if axis + period <= end + _SLIVER_MM and _is_mirror(whole, axis, period):
-            return _cell(whole, axis, axis + period / 2, mirrored=True)
-    return _cell(whole, start, start + period, mirrored=False)
+        middle, stop = axis + period / 2, axis + period
+        if stop <= end + _SLIVER_MM and repeats(cut(whole, axis, stop), axis, middle):
+            return between(whole, axis, middle, mirrored=True)
+    return between(whole, start, start + period, mirrored=False)
 
 
-Strip = tuple[float, float, list[tuple[Region, Point, Point]]]
-
-
-def _is_mirror(whole: list[SectionColumn], axis: float, period: float) -> bool:
-    """Test whether the half period after ``axis`` and the one after that are mirror images."""
-    middle, end = axis + period / 2, axis + period
-    ahead = _strips(whole, axis, middle)
-    turned: list[Strip] = [
-        (axis + end - b, axis + end - a, [(region, low[::-1], high[::-1]) for region, low, high in layers])
-        for a, b, layers in reversed(_strips(whole, middle, end))
-    ]
-    return [_look(strip) for strip in ahead] == [_look(strip) for strip in turned]
-
-
-def _look(strip: Strip) -> tuple[object, ...]:
-    left, right, layers = strip
-    return round(left, 6), round(right, 6), [(r, *(round(v, 6) for v in (*low, *high))) for r, low, high in layers]
-
-
-def _strips(whole: list[SectionColumn], left: float, right: float) -> list[Strip]:
-    """Columns between two places, air between their layers: left, right, and each region with bottom and top line.
-
-    Columns that only go on with what the one before them began are one.
-    """
-    found: list[Strip] = []
-    for c in whole:
-        a, b = max(c.left_mm, left), min(c.right_mm, right)
-        if b - a > _SLIVER_MM:
-            layers: list[tuple[Region, Point, Point]] = []
-            for layer in c.layers:
-                low, high = (_at(c, line, a, b) for line in (layer.bottom_mm, layer.top_mm))
-                below = layers[-1][2] if layers else low
-                if max(low[k] - below[k] for k in range(2)) > _SLIVER_MM:
-                    layers.append((Region(AIR, ""), below, low))
-                layers.append((Region(layer.body.material, layer.body.terminal), low, high))
-            strip = (a, b, layers)
-            found[-1:] = _joined(found[-1], strip) if found else [strip]
-    return found
-
-
-def _joined(one: Strip, other: Strip) -> list[Strip]:
-    """Merge two neighbours where all of their lines continue straight."""
-    (a, b, before), (_, c, after) = one, other
-    if [r for r, *_ in before] != [r for r, *_ in after]:
-        return [one, other]
-    for (_, *lines), (_, *others) in zip(before, after, strict=True):
-        for u, v in zip(lines, others, strict=True):
-            bent = (v[1] - v[0]) * (b - a) - (u[1] - u[0]) * (c - b)
-            if abs(u[1] - v[0]) > _SLIVER_MM or abs(bent) > _SLIVER_MM * (c - a):
-                return [one, other]
-    layers = [(r, (u[0], x[1]), (v[0], y[1])) for (r, u, v), (_, x, y) in zip(before, after, strict=True)]
-    return [(a, c, layers)]
-
-
-def _at(column: SectionColumn, line: Point, left: float, right: float) -> Point:
-    """The heights of a line of a column at two places in it."""
-    slope = (line[1] - line[0]) / (column.right_mm - column.left_mm)
-    a, b = (line[0] + slope * (u - column.left_mm) for u in (left, right))
-    return (line[0] if left == column.left_mm else a, line[1] if right == column.right_mm else b)
-
-
-def _cell(whole: list[SectionColumn], left: float, right: float, *, mirrored: bool) -> ContactCell:
-    strips = _strips(whole, left, right)
+def between(whole: Sequence[Slice], left: float, right: float, *, mirrored: bool) -> ContactCell:
+    """Edges of the part of a cross-section between two places [mm]; air below it and above it is outside."""
+    strips = [(s.left_mm, s.right_mm, _layers(s)) for s in cut(whole, left, right)]
     regions = list(dict.fromkeys(region for _, _, layers in strips for region, _, _ in layers))
     number = {region: k + 1 for k, region in enumerate(regions)}
     edges: dict[Edge, tuple[int, int]] = {}
@@ -180,6 +124,12 @@ def _cell(whole: list[SectionColumn], left: float, right: float, *, mirrored: bo
         _uprights(edges, before, after, number)
     kept = {edge: sides for edge, sides in edges.items() if sides[0] != sides[1]}
     return ContactCell(kept, tuple(regions), left, right, mirrored)
+
+
+def _layers(strip: Slice) -> list[tuple[Region, Point, Point]]:
+    """Regions from the lowest body of a slice up, each with its bottom and top line."""
+    bands = strip.bands[1:] if strip.bands[0].material == AIR else strip.bands
+    return [(Region(b.material, b.terminal), b.bottom_mm, b.top_mm) for b in bands]
 
 
 def partition(bodies: Mapping[Region, shapely.Geometry], whole: shapely.Polygon, *, turned: bool) -> ContactCell:

@@ -1,10 +1,10 @@
-"""Merge contacting boundaries so that the deformed cell can be meshed without slivers of air.
+"""Outlines of a deformed cell, contacting boundaries merged so that it can be meshed without slivers of air.
 
 Each of two faces in contact runs over the points of the other, so that both become one line. Mirrors at the cell's ends
 are faces as well; points that touch one are put onto it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -13,8 +13,9 @@ from shapely import STRtree, box
 
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.units import M_PER_MM
-from sensorgen.solvers.contact.cell import OUTSIDE
+from sensorgen.solvers.contact.cell import OUTSIDE, ContactCell
 from sensorgen.solvers.contact.contact import Faces
+from sensorgen.solvers.contact.mesh import TriangleMesh, at_border
 
 Run = tuple[int, int]
 Sides = dict[Run, tuple[int, int]]
@@ -25,6 +26,7 @@ _ONE = 0.25  # points that touch and are nearer than this share of a side become
 _PAST = 0.1  # how far past its ends a side is still touched [-]
 _CORNER = 0.1  # sine of the angle by which a face turns at a corner, at least [-]
 _AGAINST = -0.3  # faces whose normals' product is above this do not look at each other [-]
+_ROUND = [0, 3, 1, 4, 2, 5]  # the nodes of a triangle, in turn
 
 
 @dataclass(frozen=True)
@@ -143,15 +145,15 @@ def closed(edges: Sides, air: int, places: Real, faces: Faces) -> Sides:
     border = _Air(np.array([*known], int), np.array([*known.values()], bool), behind, places)
     instead, touched = _joined(border, _fixed(edges, air, faces))
     ways = dict(zip(map(tuple, border.runs.tolist()), _ways(border, instead, touched), strict=True))
-    found: Sides = {}
+    merged: Sides = {}
     for run, sides in edges.items():
         way = ways.get(run) or ways.get(run[::-1], [])[::-1] or instead[list(run)].tolist()
         for a, b in pairwise(way):
             if a != b:
                 key, here = ((a, b), sides) if a < b else ((b, a), sides[::-1])
-                before = found.get(key, (air, air))
-                found[key] = (before[0] if here[0] == air else here[0], before[1] if here[1] == air else here[1])
-    return found
+                before = merged.get(key, (air, air))
+                merged[key] = (before[0] if here[0] == air else here[0], before[1] if here[1] == air else here[1])
+    return merged
 
 
 def _halves(faces: Faces) -> Whole:
@@ -162,15 +164,15 @@ def _halves(faces: Faces) -> Whole:
 def _fixed(edges: Sides, air: int, faces: Faces) -> Mask:
     """Points that stay where they are: where a face turns by more than a tenth or ends, and ends of other edges."""
     drawn = faces.points_m
-    found = np.zeros(len(drawn), bool)
-    found[[k for run, sides in edges.items() if air not in sides or OUTSIDE in sides for k in run]] = True
+    is_fixed = np.zeros(len(drawn), bool)
+    is_fixed[[k for run, sides in edges.items() if air not in sides or OUTSIDE in sides for k in run]] = True
     after = dict(_halves(faces).tolist())
     before = {b: a for a, b in after.items()}
-    found[list(set(after) ^ set(before))] = True
+    is_fixed[list(set(after) ^ set(before))] = True
     both = np.array([(before[k], k, after[k]) for k in after if k in before], int).reshape(-1, 3)
     u, v = drawn[both[:, 1]] - drawn[both[:, 0]], drawn[both[:, 2]] - drawn[both[:, 1]]
-    found[both[:, 1]] |= abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) > _CORNER * np.hypot(*u.T) * np.hypot(*v.T)
-    return found
+    is_fixed[both[:, 1]] |= abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) > _CORNER * np.hypot(*u.T) * np.hypot(*v.T)
+    return is_fixed
 
 
 def _joined(border: _Air, fixed: Mask) -> tuple[Whole, Mask]:
@@ -188,8 +190,8 @@ def _joined(border: _Air, fixed: Mask) -> tuple[Whole, Mask]:
     for pair in pairs[one[np.argsort(apart[one], kind="stable")]].tolist():
         if used.isdisjoint(pair):
             used.update(pair)
-            kept, gone = sorted(pair, key=lambda p: (not fixed[p], p))
-            instead[gone] = kept
+            stays, gone = sorted(pair, key=lambda p: (not fixed[p], p))
+            instead[gone] = stays
             touched[pair] = True
     return instead, touched
 
@@ -202,10 +204,63 @@ def _ways(border: _Air, instead: Whole, touched: Mask) -> list[list[int]]:
     near = near[np.lexsort((seen.share[near], seen.run[near]))]
     points = instead[border.points[seen.row[near]]]
     last = np.cumsum(np.bincount(seen.run[near], minlength=len(border.runs)))
-    found = []
+    chains = []
     ends = instead[border.runs].tolist()
     for (a, b), mirror, over in zip(ends, border.mirror, np.split(points, last[:-1]), strict=True):
         if mirror:
             border.places[over, 0] = border.places[a, 0]
-        found.append([a, *(p for p in over.tolist() if p not in (a, b)), b])
-    return found
+        chains.append([a, *(p for p in over.tolist() if p not in (a, b)), b])
+    return chains
+
+
+def deformed(cell: ContactCell, mesh: TriangleMesh, faces: Faces, u_m: Real) -> ContactCell:
+    """The cell at given displacements (2n) [m]; the sides of gaps become two straight pieces each."""
+    places = (mesh.points_m + u_m.reshape(-1, 2)) / M_PER_MM
+    sides_of = _edges(cell, mesh)
+    if u_m.any():
+        sides_of = closed(sides_of, cell.air, places, faces)
+    edges = {}
+    for (a, b), sides in sides_of.items():
+        p, q = (tuple(np.round(places[k], 9).tolist()) for k in (a, b))
+        if sides[0] != sides[1] and p != q:
+            edges[(p, q) if p < q else (q, p)] = sides if p < q else sides[::-1]
+    return replace(cell, edges=edges, right_mm=float(np.round(places[mesh.points_m[:, 0].argmax(), 0], 9)))
+
+
+def misfit(cell: ContactCell, mesh: TriangleMesh, u_m: Real) -> float:
+    """Largest change of a solid's area by what was closed, over that area [-]; ``cell`` has the closed outlines."""
+    places = (mesh.points_m + u_m.reshape(-1, 2)) / M_PER_MM
+    x, y = places[mesh.outer[:, _ROUND]].transpose(2, 0, 1)
+    areas = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) / 2
+    pressed = np.bincount(mesh.region, areas, len(cell.regions) + 1)
+    outlined = np.zeros(len(pressed))
+    for (a, b), sides in cell.edges.items():
+        half = (a[0] * b[1] - a[1] * b[0]) / 2
+        outlined[sides[0]] += half
+        outlined[sides[1]] -= half
+    solid = pressed > 0
+    return float(np.abs(outlined[solid] / pressed[solid] - 1).max())
+
+
+def _edges(cell: ContactCell, mesh: TriangleMesh) -> Sides:
+    """Sides between different regions: (node, node) to the regions on their left and right; halved but at walls."""
+    sides_of: Sides = {}
+    air, x, middles = cell.air, mesh.points_m[:, 0], mesh.rim[:, 2]
+    walls = set(middles[np.isin(x[middles], (x.min(), x.max()))].tolist())  # middles of sides at the cell's ends
+    for k in range(3):
+        for (a, m, b), region in zip(
+            mesh.outer[:, [k, k + 3, (k + 1) % 3]].tolist(), mesh.region.tolist(), strict=True
+        ):
+            for p, q in ((a, b),) if m in walls else ((a, m), (m, b)):
+                if (q, p) in sides_of:
+                    sides_of[q, p] = (sides_of[q, p][0], region)
+                else:
+                    sides_of[p, q] = (region, OUTSIDE)
+    for a, b, m in mesh.rim[~at_border(mesh)].tolist():
+        for run in ((a, m), (m, b)):
+            sides_of[run] = (sides_of[run][0], air)
+    nodes = {tuple(np.round(p / M_PER_MM, 9).tolist()): k for k, p in enumerate(mesh.points_m)}
+    for (p, q), sides in cell.edges.items():
+        if air != OUTSIDE and set(sides) == {air, OUTSIDE}:
+            sides_of[nodes[p], nodes[q]] = sides
+    return {run: sides for run, sides in sides_of.items() if sides[0] != sides[1]}

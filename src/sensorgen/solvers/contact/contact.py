@@ -135,11 +135,11 @@ class Faces:
     @cached_property
     def _depth_m(self) -> Real:
         """Largest depth of each point in another body: a side's length, or less where its own is thin [m]."""
-        found = np.repeat(self._edges_m.min(axis=1), len(self._at))
+        depth = np.repeat(self._edges_m.min(axis=1), len(self._at))
         rays = self.rays(self.points_m)
-        back, _, _, distance = hit(rays, self.points_m[self.nodes], np.zeros(len(found)), inwards=True)
-        found[back] = np.minimum(found[back], _THIN * distance)
-        return found
+        back, _, _, distance = hit(rays, self.points_m[self.nodes], np.zeros(len(depth)), inwards=True)
+        depth[back] = np.minimum(depth[back], _THIN * distance)
+        return depth
 
     @cached_property
     def depth_m(self) -> Real:
@@ -155,7 +155,7 @@ class Faces:
         frame = [first] if self._ways == 1 else [first, np.cross(normal, first)]
         return Rays((self.shapes @ faces).reshape(-1, self._ways + 1), normal, np.stack(frame, axis=1))
 
-    def project(self, places_m: Real, penalty_pa: float, kept: FacePairs | None = None) -> FacePairs:
+    def project(self, places_m: Real, penalty_pa: float, stuck: FacePairs | None = None) -> FacePairs:
         """Find the partner of every point at given places of the nodes (n, d); those of ``kept`` stay as they are."""
         rays = self.rays(places_m)
         # Points whose partner is on another face
@@ -167,10 +167,10 @@ class Faces:
         _, looks = on_faces(s, faces[face])
         slips = tuple(self._rows(weights, nodes, rays.tangents[point, k]) for k in range(self._ways))
         met = self._pairs(self._rows(weights, nodes, -looks), slips, point, 0, _PASS * penalty_pa)
-        made = [met, *self._mirrored(places_m, rays, penalty_pa)]
-        if kept is None:
-            return _joined(made)
-        return _joined([*(p.some(~np.isin(p.point, kept.point)) for p in made), kept])
+        parts = [met, *self._mirrored(places_m, rays, penalty_pa)]
+        if stuck is None:
+            return _joined(parts)
+        return _joined([*(p.some(~np.isin(p.point, stuck.point)) for p in parts), stuck])
 
     def _mirrored(self, places_m: Real, rays: Rays, penalty_pa: float) -> Iterator[FacePairs]:
         """Points that look at a mirror; its image slips as they do."""
@@ -192,9 +192,9 @@ class Faces:
         d = ways.shape[1]
         values, columns = weights[..., None] * ways[:, None], d * nodes[..., None] + np.arange(d)
         starts = np.arange(len(nodes) + 1) * (d * nodes.shape[1])
-        found = csr_matrix((values.ravel(), columns.ravel(), starts), (len(nodes), self.points_m.size))
-        found.eliminate_zeros()
-        return found
+        weighted = csr_matrix((values.ravel(), columns.ravel(), starts), (len(nodes), self.points_m.size))
+        weighted.eliminate_zeros()
+        return weighted
 
     def _pairs(
         self, gap: csr_matrix, slips: tuple[csr_matrix, ...], point: Whole, first: int, penalty_pa: float
@@ -267,23 +267,23 @@ def face_values(s: Real) -> Real:
 def face_slopes(s: Real) -> Real:
     """Their derivatives (..., d - 1, f)."""
     lines = np.moveaxis(s, -1, 0)
-    found = [[(line_values, line_slopes)[int(a == b)](c) for b, c in enumerate(lines)] for a in range(len(lines))]
-    return np.stack([_products(factors) for factors in found], axis=-2)
+    slopes = [[(line_values, line_slopes)[int(a == b)](c) for b, c in enumerate(lines)] for a in range(len(lines))]
+    return np.stack([_products(factors) for factors in slopes], axis=-2)
 
 
 def _products(factors: list[Real]) -> Real:
-    found = factors[0]
+    product = factors[0]
     for other in factors[1:]:
-        found = (found[..., :, None] * other[..., None, :]).reshape(
-            *found.shape[:-1], found.shape[-1] * other.shape[-1]
+        product = (product[..., :, None] * other[..., None, :]).reshape(
+            *product.shape[:-1], product.shape[-1] * other.shape[-1]
         )
-    return found
+    return product
 
 
 def _normals(tangents: Real) -> Real:
     """Unit normals from tangents (k, d - 1, d)."""
-    found = tangents[:, 0, ::-1] * [1.0, -1.0] if tangents.shape[1] == 1 else np.cross(tangents[:, 0], tangents[:, 1])
-    return np.asarray(found / np.sqrt((found**2).sum(axis=1))[:, None])
+    normals = tangents[:, 0, ::-1] * [1.0, -1.0] if tangents.shape[1] == 1 else np.cross(tangents[:, 0], tangents[:, 1])
+    return np.asarray(normals / np.sqrt((normals**2).sum(axis=1))[:, None])
 
 
 def on_faces(s: Real, faces: Real) -> tuple[Real, Real]:

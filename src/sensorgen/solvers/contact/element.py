@@ -76,8 +76,8 @@ def line_slopes(s: Real) -> Real:
 def brick_gradients(at: Real) -> Real:
     """Derivatives of the 27 nodal functions of a brick on a lattice, ``at`` along each axis: (points, 27, 3)."""
     pair = line_values(at), line_slopes(at)
-    found = [np.einsum("ai,bj,ck->abcijk", *(pair[int(a == axis)] for a in range(3))) for axis in range(3)]
-    return np.stack([f.reshape(len(at) ** 3, 27) for f in found], axis=-1)
+    gradients = [np.einsum("ai,bj,ck->abcijk", *(pair[int(a == axis)] for a in range(3))) for axis in range(3)]
+    return np.stack([f.reshape(len(at) ** 3, 27) for f in gradients], axis=-1)
 
 
 BRICK_INNER, BRICK_CORNERS = 13, np.array([0, 2, 6, 8, 18, 20, 24, 26])
@@ -272,8 +272,8 @@ class Elements:
         """Condensed residual and its derivative at a state whose J is above 0; the last one is kept."""
         if not (self._last and self._last[0][0] is u and self._last[0][1] is inner):
             parts = list(self._condensed(u, inner))
-            found = Tangent(*(np.concatenate([getattr(p, key.name) for p in parts]) for key in fields(Tangent)))
-            self._last[:] = [(u, inner, found)]
+            tangent = Tangent(*(np.concatenate([getattr(p, key.name) for p in parts]) for key in fields(Tangent)))
+            self._last[:] = [(u, inner, tangent)]
         return self._last[0][2]
 
     def _condensed(self, u: Real, inner: Inner) -> Iterator[Tangent]:
@@ -317,9 +317,9 @@ class Elements:
                     block += (w * mu)[..., None, None] * metric
                 else:
                     block += (w * hydro / volume)[..., None, None] * mixed_minors(h, i, k)
-                found = np.matmul(flat.T, np.matmul(block, g).reshape(m, -1, n))
-                matrix[:, i:size:d, k:size:d] = found
-                matrix[:, k:size:d, i:size:d] = found.transpose(0, 2, 1)
+                part = np.matmul(flat.T, np.matmul(block, g).reshape(m, -1, n))
+                matrix[:, i:size:d, k:size:d] = part
+                matrix[:, k:size:d, i:size:d] = part.transpose(0, 2, 1)
         along = np.matmul(table.gradients, rate.transpose(0, 1, 3, 2)).reshape(m, -1, size)  # dJ to the displacements
         if hoops is not None:
             out = slice(0, size, d)
@@ -346,10 +346,10 @@ def cofactor(h: Real) -> Real:
     """Derivative of the determinant of matrices (..., d, d): det h h^-T."""
     if h.shape[-1] == 2:
         return np.asarray(h[..., ::-1, ::-1] * [[1.0, -1.0], [-1.0, 1.0]])
-    found = np.empty_like(h)
+    cofactors = np.empty_like(h)
     for i in range(3):
-        found[..., i, :] = np.cross(h[..., (i + 1) % 3, :], h[..., (i + 2) % 3, :])
-    return found
+        cofactors[..., i, :] = np.cross(h[..., (i + 1) % 3, :], h[..., (i + 2) % 3, :])
+    return cofactors
 
 
 def determinant(h: Real) -> Real:
@@ -363,9 +363,9 @@ def mixed_minors(h: Real, i: int, k: int) -> Real:
     """Second derivative of the determinant with respect to rows i < k: (..., d, d), or (d, d) in two dimensions."""
     if h.shape[-1] == 2:
         return np.array([[0.0, 1.0], [-1.0, 0.0]])
-    found = np.zeros_like(h)
+    minors = np.zeros_like(h)
     rest, sign = h[..., 3 - i - k, :], 1.0 if k == i + 1 else -1.0
     for a in range(3):
-        found[..., a, (a + 1) % 3] = sign * rest[..., (a + 2) % 3]
-        found[..., (a + 1) % 3, a] = -sign * rest[..., (a + 2) % 3]
-    return found
+        minors[..., a, (a + 1) % 3] = sign * rest[..., (a + 2) % 3]
+        minors[..., (a + 1) % 3, a] = -sign * rest[..., (a + 2) % 3]
+    return minors

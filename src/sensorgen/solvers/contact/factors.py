@@ -30,8 +30,8 @@ def solved_by_lu(matrix: csr_matrix, right: Real, pivot: float = 0.0) -> Real:
     """
     # columns one by one (relax, panel_size): the factors are too sparse for panels to pay
     how = {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}, "relax": 1, "panel_size": 1}
-    found: Real = splu(matrix.tocsc(), diag_pivot_thresh=pivot, **how).solve(right)
-    return found
+    solution: Real = splu(matrix.tocsc(), diag_pivot_thresh=pivot, **how).solve(right)
+    return solution
 
 
 def by_lu(matrix: csr_matrix, right: Real) -> Real | None:
@@ -43,7 +43,7 @@ def by_lu(matrix: csr_matrix, right: Real) -> Real | None:
 
 
 @dataclass(frozen=True)
-class Front:
+class FrontalMatrix:
     """Unknowns that are eliminated together.
 
     Attributes
@@ -72,7 +72,7 @@ class Order:
     """In what order unknowns are eliminated, and in which fronts."""
 
     turn: Whole
-    fronts: list[Front]
+    fronts: list[FrontalMatrix]
 
 
 def order_of(matrix: csr_matrix, places: Whole) -> Order:
@@ -92,12 +92,12 @@ def order_of(matrix: csr_matrix, places: Whole) -> Order:
     turn = np.concatenate([own for own, _ in pieces])
     ends = np.cumsum([len(own) for own, _ in pieces])
     turned = matrix[turn][:, turn]
-    fronts: list[Front] = []
+    fronts: list[FrontalMatrix] = []
     for (own, children), stop in zip(pieces, ends.tolist(), strict=True):
         start = stop - len(own)
         near = [turned.indices[turned.indptr[start] : turned.indptr[stop]], *(fronts[c].outer for c in children)]
         outer = np.unique(np.concatenate(near))
-        fronts.append(Front(start, stop, outer[outer >= stop].astype(np.int64), children))
+        fronts.append(FrontalMatrix(start, stop, outer[outer >= stop].astype(np.int64), children))
     return Order(turn, fronts)
 
 
@@ -144,9 +144,9 @@ class Factors:
         for front, (inverse, coupling) in zip(reversed(self.order.fronts), reversed(self.parts), strict=True):
             own = x[front.start : front.stop] - coupling @ x[front.outer]
             x[front.start : front.stop] = own @ inverse
-        found = np.empty_like(x)
-        found[self.order.turn] = x
-        return found
+        solution = np.empty_like(x)
+        solution[self.order.turn] = x
+        return solution
 
 
 def factored(matrix: csr_matrix, order: Order) -> Factors | None:
@@ -195,24 +195,24 @@ class Solver:
 
     def __call__(self, matrix: csr_matrix, right: Real) -> Real | None:
         """Solution of a positive system, or None where it is not."""
-        found = self._iterated(matrix, right)
-        if found is None:
+        solution = self._iterated(matrix, right)
+        if solution is None:
             self._factors = factored(matrix, order_of(matrix, self.places))
-            found = self._iterated(matrix, right)
-        return found
+            solution = self._iterated(matrix, right)
+        return solution
 
     def _iterated(self, matrix: csr_matrix, right: Real) -> Real | None:
         if self._factors is None:
             return None
-        for found, residual, _ in iterations(matrix, right, self._factors):
+        for solution, residual, _ in iterations(matrix, right, self._factors):
             if np.abs(residual).max() < self.enough * np.abs(right).max():
-                return found
+                return solution
         return None
 
 
 def iterations(matrix: csr_matrix, right: Real, factors: Factors) -> Iterator[tuple[Real, Real, float]]:
     """Solution, residual and its energy in the factors' norm, turn by turn, while these serve."""
-    found, residual = np.zeros_like(right), right.copy()
+    solution, residual = np.zeros_like(right), right.copy()
     direction, power = np.zeros_like(right), 1.0
     for _ in range(_MOST_TURNS):
         way = factors.solve(residual)
@@ -225,5 +225,5 @@ def iterations(matrix: csr_matrix, right: Real, factors: Factors) -> Iterator[tu
         if not bearing > 0:
             return
         share = power / bearing
-        found, residual = found + share * direction, residual - share * pushed
-        yield found, residual, power
+        solution, residual = solution + share * direction, residual - share * pushed
+        yield solution, residual, power

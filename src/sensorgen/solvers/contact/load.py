@@ -148,10 +148,10 @@ class Problem:
         here = number[self.elements.freedoms]
         size, n = here.shape[1], self.free.shape[1]
         rows, columns = np.repeat(here, size, axis=1).ravel(), np.tile(here, (1, size)).ravel()
-        kept = np.flatnonzero((rows >= 0) & (columns >= 0))
-        entries, place = np.unique(rows[kept] * n + columns[kept], return_inverse=True)
+        inside = np.flatnonzero((rows >= 0) & (columns >= 0))
+        entries, place = np.unique(rows[inside] * n + columns[inside], return_inverse=True)
         starts = np.searchsorted(entries, n * np.arange(n + 1))
-        return csr_matrix((np.zeros(len(entries)), entries % n, starts), (n, n)), kept, place
+        return csr_matrix((np.zeros(len(entries)), entries % n, starts), (n, n)), inside, place
 
     def contact_forces(self, pairs: FacePairs, u: Real) -> tuple[Real, csr_matrix]:
         """Forces of the contact, and its stiffness on the free displacements."""
@@ -180,8 +180,8 @@ class Problem:
         local, free = self.elements.tangent(u, inner), self.free
         force, stiffness = self.contact_forces(pairs, u)
         force += np.bincount(self.elements.freedoms.ravel(), local.force.ravel(), len(force))
-        empty, kept, place = self._pattern
-        data = np.bincount(place, local.stiffness.ravel()[kept], empty.nnz)
+        empty, inside, place = self._pattern
+        data = np.bincount(place, local.stiffness.ravel()[inside], empty.nnz)
         whole = csr_matrix((data, empty.indices, empty.indptr), empty.shape)
         stiffness = whole + stiffness if stiffness.nnz else whole  # a sum forgets zeros, and the pattern with them
         return free.T @ (force - pressure_pa * self.load), stiffness, local
@@ -235,24 +235,24 @@ class Problem:
         start = self.extrapolated(state, before, pressure_pa)
         starts = [start] if start is state else [start, state]
         tries = (self.newton(start, pressure_pa, state.pairs, _NEARLY) for start in starts)
-        found = next((done for done in tries if done), None)
-        if found is None:
+        reached = next((done for done in tries if done), None)
+        if reached is None:
             return None
-        stuck = self._stuck(state.u_m, found) if self.stick else None
-        pairs = self.project(found.u_m, stuck)
+        stuck = self._stuck(state.u_m, reached) if self.stick else None
+        pairs = self.project(reached.u_m, stuck)
         for _ in range(self.updates):
-            again = self.newton(found, pressure_pa, pairs, _ENOUGH)
+            again = self.newton(reached, pressure_pa, pairs, _ENOUGH)
             if again is None:
                 stays = keeps and self.sound is not None
-                found = self.newton(found, pressure_pa, found.pairs, _ENOUGH) if stays else None
+                reached = self.newton(reached, pressure_pa, reached.pairs, _ENOUGH) if stays else None
                 break
-            found, pairs = again, self.project(again.u_m, stuck)
-            depths = np.zeros((2, 1 + max(p.point.max(initial=0) for p in (found.pairs, pairs))))
-            for depth, seen in zip(depths, (found.pairs, pairs), strict=True):
-                depth[seen.point] = np.maximum(-self.gaps(seen, found.u_m), 0.0) / seen.length_m
+            reached, pairs = again, self.project(again.u_m, stuck)
+            depths = np.zeros((2, 1 + max(p.point.max(initial=0) for p in (reached.pairs, pairs))))
+            for depth, seen in zip(depths, (reached.pairs, pairs), strict=True):
+                depth[seen.point] = np.maximum(-self.gaps(seen, reached.u_m), 0.0) / seen.length_m
             if np.ptp(depths, axis=0).max() < self.settled:
                 break
-        return found if found and (self.sound is None or self.sound(self.places(found.u_m))) else None
+        return reached if reached and (self.sound is None or self.sound(self.places(reached.u_m))) else None
 
     def _stuck(self, before: Real, state: State) -> FacePairs:
         """Pairs that touch now and stick from where they first did, between the displacements before and those now."""

@@ -159,30 +159,30 @@ class _System:
         energies, tensors = (np.concatenate([part[k] for part in parts]) for k in range(2))
         n, b = len(self.places), self.number.shape[1]
         rows, columns = np.repeat(self.number, b, axis=1).ravel(), np.tile(self.number, (1, b)).ravel()
-        kept, free = (rows >= 0) & (columns >= 0), self.number >= 0
-        matrix = coo_matrix((energies.ravel()[kept], (rows[kept], columns[kept])), (n, n)).tocsr()
+        coupled, free = (rows >= 0) & (columns >= 0), self.number >= 0
+        matrix = coo_matrix((energies.ravel()[coupled], (rows[coupled], columns[coupled])), (n, n)).tocsr()
         pushed = np.einsum("mij,mj->mi", energies, self.one)
         push: Real = np.bincount(self.number[free], pushed[free], n).astype(float)
-        held = float((pushed * self.one).sum())
+        constant = float((pushed * self.one).sum())
         if len(self._tensors):
             apart = float(np.trace(np.linalg.solve(self._tensors, tensors), axis1=-2, axis2=-1).max())
-            if apart < _LIKE and (found := self._iterated(matrix, push, held, apart)):
-                return found
+            if apart < _LIKE and (bounds := self._iterated(matrix, push, constant, apart)):
+                return bounds
         self.factors = factored(matrix, order_of(matrix, self.places))
         self._tensors, self._unknowns = tensors, np.zeros_like(push)
-        found = self._iterated(matrix, push, held, 3.0)
-        if found is None:
+        bounds = self._iterated(matrix, push, constant, 3.0)
+        if bounds is None:
             raise BadInput("the field's equations could not be solved on this cell")
-        return found
+        return bounds
 
-    def _iterated(self, matrix: csr_matrix, push: Real, held: float, apart: float) -> tuple[float, float] | None:
+    def _iterated(self, matrix: csr_matrix, push: Real, constant: float, apart: float) -> tuple[float, float] | None:
         """Nearly the least of held + x' K x + 2 push' x, and by how much less it may be at most."""
         if self.factors is None:
             return None
         start = self._unknowns
         for step, left, power in iterations(matrix, -push - matrix @ start, self.factors):
             x = start + step
-            energy = held + float(push @ x - x @ left)
+            energy = constant + float(push @ x - x @ left)
             if apart * power < _SMALL * energy:
                 self._unknowns = x
                 return energy, apart * power
@@ -245,8 +245,8 @@ def _fluxes(moved: Real, eps: Real, order: int) -> tuple[Real, Real]:
     given = np.matmul(drive.T, np.linalg.solve(mass, drive))
     k = len(faces)
     coupling = given[:, k:, :k]
-    held = np.matmul(coupling.transpose(0, 2, 1), np.linalg.solve(given[:, k:, k:], coupling))
-    return given[:, :k, :k] - held, plain
+    inner = np.matmul(coupling.transpose(0, 2, 1), np.linalg.solve(given[:, k:, k:], coupling))
+    return given[:, :k, :k] - inner, plain
 
 
 @cache
@@ -260,8 +260,8 @@ def _hats(order: int) -> tuple[Real, Real, Real]:
 
 def _lattice(factors: list[Real]) -> Real:
     """Products of functions (points, functions) of the three axes, on the lattice of their points."""
-    found = np.einsum("ai,bj,ck->abcijk", *factors)
-    return np.asarray(found.reshape(int(np.prod(found.shape[:3])), -1))
+    products = np.einsum("ai,bj,ck->abcijk", *factors)
+    return np.asarray(products.reshape(int(np.prod(products.shape[:3])), -1))
 
 
 def _weights(weight: Real) -> Real:

@@ -3,13 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import atan2, pi
 
 import numpy as np
 
 from sensorgen.core.arrays import Mask, Real, Whole
 from sensorgen.core.units import M_PER_MM
 from sensorgen.scene.scene import Point
-from sensorgen.solvers.contact import mesher, rings
+from sensorgen.solvers.contact import mesher
 from sensorgen.solvers.contact.cell import BLOCK, OUTSIDE, ContactCell, Edge
 from sensorgen.solvers.contact.element import TRIANGLE, ElementMesh
 
@@ -20,6 +21,8 @@ _RINGS = 4  # around a notch
 _LEVEL = 0.1  # slope of the first chord of a dome, at most [-]
 _SIDES = ((0, 1), (1, 2), (2, 0))
 _BLOCK = 0.5  # largest triangle of a block on the top, over growth and the cell's width [-]
+_SHARP = 0.3  # an outline that turns by less is no corner [rad]
+_RATIO = 0.5  # of a ring to the one around it [-]
 
 
 @dataclass(frozen=True)
@@ -130,8 +133,8 @@ def mesh_of(cell: ContactCell, fineness: Fineness) -> TriangleMesh:
     for place in sharp:
         if cell.turned and _is_flat(cell, place):
             net = _parted(net, nearest(net.points_m, place))
-    tips = [nearest(net.points_m, place) for place in rings.notches(cell)]
-    return of_triangles(*rings.ringed(net.points_m, net.corners, net.region, tips, _RINGS), turned=cell.turned)
+    tips = [nearest(net.points_m, place) for place in notches(cell)]
+    return of_triangles(*ringed(net.points_m, net.corners, net.region, tips, _RINGS), turned=cell.turned)
 
 
 def _cut(
@@ -176,13 +179,13 @@ def triangulated(
     ``coarser_mm`` is the largest triangle of regions that may have larger ones than ``coarse_mm``.
     ``quick`` makes Delaunay triangles with one optimisation step; for potentials they are as good as a front.
     """
-    made = mesher.mesh([*edges.items()], coarse_mm, growth, coarser_mm or {}, quick=quick)
+    output = mesher.mesh([*edges.items()], coarse_mm, growth, coarser_mm or {}, quick=quick)
     behind = [min(pair) for pair in edges.values()]
     marked: dict[int, list[Run]] = {}
-    for (a, b), number in zip(made.sides.tolist(), made.edge.tolist(), strict=True):
+    for (a, b), number in zip(output.sides.tolist(), output.edge.tolist(), strict=True):
         if behind[number - 1] < 0:
             marked.setdefault(behind[number - 1], []).append((a, b))
-    return Net(made.points * M_PER_MM, made.corners, made.region, marked)
+    return Net(output.points * M_PER_MM, output.corners, output.region, marked)
 
 
 def nearest(points_m: Real, place_mm: Point) -> int:
@@ -198,8 +201,8 @@ def cuts(length_mm: float, first_mm: float, last_mm: float, fineness: Fineness) 
     """
     half = length_mm / 2
     ahead, behind = (grown(half, size, fineness) / length_mm for size in (first_mm, last_mm))
-    found = [*ahead[:-1], 0.5, *(1 - behind[-2::-1])] if len(ahead) + len(behind) > 2 else []
-    return [float(t) for t in found]
+    places = [*ahead[:-1], 0.5, *(1 - behind[-2::-1])] if len(ahead) + len(behind) > 2 else []
+    return [float(t) for t in places]
 
 
 def grown(reach: float, size: float, fineness: Fineness) -> Real:
@@ -212,3 +215,72 @@ def grown(reach: float, size: float, fineness: Fineness) -> Real:
     t = whole * np.arange(1, max(1, round(whole)) + 1) / max(1, round(whole))
     grown = np.where(t < turns, size / growth * np.expm1(growth * t), bend + (t - turns) * fineness.coarse_mm)
     return np.asarray(grown)
+
+
+def sharp_corners(edges: Mapping[Edge, tuple[int, int]], left_mm: float, right_mm: float) -> list[Point]:
+    """Where the border between two regions turns, ends or branches; the walls of the cell are mirrors."""
+    ways: dict[Point, list[Real]] = {}
+    for (p, q), sides in edges.items():
+        if min(sides) > 0:
+            way = np.subtract(q, p) / np.hypot(*np.subtract(q, p))
+            for place, out in ((p, way), (q, -way)):
+                ways.setdefault(place, []).append(out)
+                if place[0] in (left_mm, right_mm) and out[0]:
+                    ways[place].append(out * (-1, 1))
+    return [place for place, out_of in ways.items() if len(out_of) != 2 or out_of[0] @ out_of[1] >= -np.cos(_SHARP)]
+
+
+def notches(cell: ContactCell) -> list[Point]:
+    """Where the solids fill more than half a turn around a corner; the walls of the cell are mirrors."""
+    ways: dict[Point, list[tuple[float, bool]]] = {}
+    for edge, sides in cell.edges.items():
+        left, right = (cell.solid(side) for side in sides)
+        if left != right:
+            for (p, q), solid in ((edge, left), (edge[::-1], right)):
+                ways.setdefault(p, []).append((atan2(q[1] - p[1], q[0] - p[0]), solid))
+    alone = {place: out_of for place, out_of in ways.items() if len(out_of) == 2}
+    halves = {place: pi / 2 if place[0] in (cell.left_mm, cell.right_mm) else pi for place in alone}
+    angles = {place: _filled(out_of) for place, out_of in alone.items()}
+    return [place for place, half in halves.items() if angles[place] > half and abs(angles[place] - pi) > _SHARP]
+
+
+def _filled(ways: list[tuple[float, bool]]) -> float:
+    """Solid angle between two directions [rad]; each with whether the solid is on its left."""
+    (one, solid), (other, _) = ways
+    return (other - one if solid else one - other) % (2 * pi)
+
+
+def ringed(points: Real, triangles: Whole, region: Whole, tips: list[int], count: int) -> tuple[Real, Whole, Whole]:
+    """Points (n, 2), corners of triangles (m, 3) and their regions, with so many rings around some of the points."""
+    is_tip = np.zeros(len(points) + 1, bool)
+    is_tip[tips] = True
+    at: dict[int, dict[int, list[int]]] = {tip: {} for tip in tips}  # triangles there: corners and region, by number
+    triangle_sets, gone, total = [], set[int](), 0
+
+    def add(new: Whole, regions: Whole) -> None:
+        beside = is_tip[np.minimum(new, len(is_tip) - 1)]
+        for k in np.flatnonzero(beside.any(axis=1)).tolist():
+            for corner in new[k, beside[k]].tolist():
+                at[corner][total + k] = [*new[k].tolist(), int(regions[k])]
+        triangle_sets.append(np.column_stack([new, regions]))
+
+    add(triangles, region)
+    for tip in tips:
+        # Cut all sides that start at a point at the same shares, and so each triangle there into a small one and pairs
+        total = sum(map(len, triangle_sets))
+        whole = {k: own for k, own in at[tip].items() if k not in gone}
+        gone.update(whole)
+        rows = np.array(list(whole.values()))
+        here, fill = rows[:, :3], rows[:, 3]
+        first = (here == tip).argmax(axis=1)
+        _, *ends = np.take_along_axis(here, (first[:, None] + np.arange(3)) % 3, axis=1).T
+        beside = np.unique(ends)
+        levels = np.arange(count)[:, None] * len(beside)
+        a, b = (np.vstack([k, len(points) + levels + np.searchsorted(beside, k)]) for k in ends)
+        sides = [(a[1:], a[:-1], b[:-1]), (a[1:], b[:-1], b[1:]), (np.full_like(a[-1], tip), a[-1], b[-1])]
+        new = np.concatenate([np.stack(side, axis=-1).reshape(-1, 3) for side in sides])
+        near = points[tip] + _RATIO ** np.arange(1, count + 1)[:, None, None] * (points[beside] - points[tip])
+        points = np.concatenate([points, near.reshape(-1, 2)])
+        add(new, np.tile(fill, 2 * count + 1))
+    left = np.concatenate(triangle_sets)[~np.isin(np.arange(sum(map(len, triangle_sets))), list(gone))]
+    return points, left[:, :3], left[:, 3]

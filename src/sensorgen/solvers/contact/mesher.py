@@ -5,12 +5,7 @@ Run as a program it is the far end of :func:`mesh`, which starts it when needed,
 
 import atexit
 import os
-import pickle
-import signal
-import subprocess
-import sys
 import threading
-import time
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from typing import Any, NamedTuple
@@ -19,7 +14,7 @@ import numpy as np
 
 from sensorgen.core.arrays import Real, Whole
 from sensorgen.core.errors import BadInput, NotInstalled
-from sensorgen.core.leash import end_with_parent
+from sensorgen.core.worker import Worker, WorkerEnded, answer_input
 
 Edge = tuple[tuple[float, float], tuple[float, float]]
 
@@ -80,49 +75,25 @@ def check() -> None:
 
 
 _LOCK = threading.Lock()
-_running: dict[int, "subprocess.Popen[bytes]"] = {}  # by the process that started it
+_running: dict[int, Worker] = {}  # by the process that started it
 
 
 def _exchange(question: tuple[Any, ...]) -> Any:
     """The mesher's answer; a text where it has none."""
-    process = _running.get(os.getpid()) or _started()
-    stdin, stdout = process.stdin, process.stdout
-    assert stdin is not None and stdout is not None  # noqa: PT018, S101  (both are pipes)
-    until = time.monotonic() + _TIMEOUT_S
-    clock = threading.Timer(_TIMEOUT_S, process.kill)
-    clock.start()
-    try:
-        stdin.write(pickle.dumps(question))
-        stdin.flush()
-        return pickle.load(stdout)  # noqa: S301  (from the process that we started)
-    except (OSError, EOFError, pickle.UnpicklingError):
-        late = time.monotonic() >= until
-        _stop()
-        code = process.returncode
-        ended = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-        return f"the mesher took more than {_TIMEOUT_S:g} s" if late else f"the mesher ended with {ended}"
-    finally:
-        clock.cancel()
-
-
-def _started() -> "subprocess.Popen[bytes]":
     if not _running:
         atexit.register(_stop)
-    process = subprocess.Popen(  # noqa: S603  (this Python, and a module of our own)
-        [sys.executable, *_WORKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
-    )
-    _running[os.getpid()] = process
-    return process
+    worker = _running.get(os.getpid()) or _running.setdefault(os.getpid(), Worker("the mesher", _WORKER, _TIMEOUT_S))
+    try:
+        return worker.ask(question)
+    except WorkerEnded as error:
+        _stop()
+        return str(error)
 
 
 def _stop() -> None:
-    process = _running.pop(os.getpid(), None)
-    if process:
-        process.kill()
-        for pipe in (process.stdin, process.stdout):
-            if pipe:
-                pipe.close()
-        process.wait()
+    worker = _running.pop(os.getpid(), None)
+    if worker:
+        worker.stop()
 
 
 def _made(
@@ -161,19 +132,5 @@ def _geometry(edges: list[tuple[Edge, tuple[int, int]]]) -> Any:
     return geometry
 
 
-def main() -> None:
-    """Answer each question on standard input until it ends."""
-    end_with_parent()
-    with os.fdopen(os.dup(1), "wb") as answers:
-        os.dup2(2, 1)  # what Netgen prints is no answer
-        while True:
-            try:
-                question = pickle.load(sys.stdin.buffer)  # noqa: S301  (from the process that started this one)
-            except EOFError:
-                return
-            pickle.dump(_made(*question), answers)
-            answers.flush()
-
-
 if __name__ == "__main__":
-    main()
+    answer_input(lambda question: _made(*question))

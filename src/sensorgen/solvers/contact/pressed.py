@@ -224,8 +224,8 @@ def solve(
         every.append(state)
         if state.pressure_pa in stress_pa:
             step(state.pressure_pa)
-    found = _checked(problem, every, stress_pa, source)
-    return found, LoadSteps(problem, mesh, [state for state in every if state.pressure_pa in stress_pa])
+    checked = _checked(problem, every, stress_pa, source)
+    return checked, LoadSteps(problem, mesh, [state for state in every if state.pressure_pa in stress_pa])
 
 
 def _checked(problem: "Problem", every: "Sequence[State]", stress_pa: Sequence[float], source: str) -> Pressed:
@@ -250,9 +250,9 @@ def _checked(problem: "Problem", every: "Sequence[State]", stress_pa: Sequence[f
         f"faces run into each other by {depth.max():.2g} of a side": depth.max() > DEEPEST,
         f"work and energy differ by {imbalance[-1]:.1%}": abs(imbalance[-1]) > _BALANCE,
     }
-    said = (f"feet hang free as drawn: the top falls {fall * 1e6:.4g} um before they carry",) if fall > 0 else ()
+    remarks = (f"feet hang free as drawn: the top falls {fall * 1e6:.4g} um before they carry",) if fall > 0 else ()
     wrong = tuple(words for words, holds in faults.items() if holds)
-    return Pressed(stress, down, (), (), volume, depth, imbalance, fall, wrong, said, source)
+    return Pressed(stress, down, (), (), volume, depth, imbalance, fall, wrong, remarks, source)
 
 
 def _imbalance(stress: Real, moved: Real, energy: Real) -> Real:
@@ -261,15 +261,15 @@ def _imbalance(stress: Real, moved: Real, energy: Real) -> Real:
     As far as the sum over load steps tells: less by what it changes where every other step is left out. Where a gap
     closes within a step, the sum is off by a percent, whatever the mesh.
     """
-    found, error = np.zeros(len(stress)), np.zeros(len(stress))
+    share, error = np.zeros(len(stress)), np.zeros(len(stress))
     if len(stress) < 3:
-        return found
-    found[2:] = (_work(stress[1:], moved[1:])[1:] - (energy[2:] - energy[1])) / energy[2:]
+        return share
+    share[2:] = (_work(stress[1:], moved[1:])[1:] - (energy[2:] - energy[1])) / energy[2:]
     if len(stress) > 3:
         fewer = np.unique([*range(1, len(stress), 2), len(stress) - 1])
         apart = _work(stress[1:], moved[1:])[fewer - 1] - _work(stress[fewer], moved[fewer])
         error = np.interp(np.arange(len(stress)), fewer, np.maximum.accumulate(abs(apart)) / energy[fewer])
-    return np.sign(found) * np.maximum(abs(found) - error, 0.0)
+    return np.sign(share) * np.maximum(abs(share) - error, 0.0)
 
 
 def _work(stress: Real, moved: Real) -> Real:
@@ -283,9 +283,9 @@ def _work(stress: Real, moved: Real) -> Real:
     return np.concatenate([[0.0], np.cumsum(half * (weights @ (np.exp(at + law(at)) * law(at, 1))))])
 
 
-def with_capacitances(found: Pressed, bounds: Sequence[Interval | None]) -> Pressed:
+def with_capacitances(curve: Pressed, bounds: Sequence[Interval | None]) -> Pressed:
     """Add the capacitance of the deformed outlines, and its faults."""
-    faults, known = list(found.faults), [c.middle() for c in bounds if c]
+    faults, known = list(curve.faults), [c.middle() for c in bounds if c]
     if len(known) < len(bounds):
         unknown = len(bounds) - len(known)
         faults.append(
@@ -293,7 +293,7 @@ def with_capacitances(found: Pressed, bounds: Sequence[Interval | None]) -> Pres
         )
     if any(after < before * (1 - _LEVELS) for before, after in pairwise(known)):
         faults.append("the capacitance falls under pressure: some outlines were closed in the wrong place")
-    return replace(found, capacitance_f_per_m2=tuple(bounds), faults=tuple(faults))
+    return replace(curve, capacitance_f_per_m2=tuple(bounds), faults=tuple(faults))
 
 
 def joined(parts: Sequence[Pressed], last_pa: float) -> Pressed:
@@ -301,25 +301,25 @@ def joined(parts: Sequence[Pressed], last_pa: float) -> Pressed:
 
     That one of them ended early is a fault only where none goes on.
     """
-    kept = [parts[0], *(part for part in parts[1:] if len(part.stress_pa) > 1)]
+    used = [parts[0], *(part for part in parts[1:] if len(part.stress_pa) > 1)]
     arrays = ("stress_pa", "displacement_m", "volume_ratio", "penetration", "imbalance")
     lists = ("capacitance_f_per_m2", "carried", "apex_m")
-    tails = [part if part is kept[0] else replace(part, **{k: getattr(part, k)[1:] for k in _BY_LOAD}) for part in kept]
+    tails = [part if part is used[0] else replace(part, **{k: getattr(part, k)[1:] for k in _BY_LOAD}) for part in used]
     whole: dict[str, Any] = {k: np.concatenate([getattr(part, k) for part in tails]) for k in arrays}
     whole |= {k: tuple(each for part in tails for each in getattr(part, k)) for k in lists}
     reached = whole["stress_pa"][-1]
     short = (
         [f"converged up to {reached / 1e3:.4g} of {last_pa / 1e3:.4g} kPa"] if reached < last_pa * (1 - 1e-9) else []
     )
-    faults = dict.fromkeys(fault for part in kept for fault in part.faults if not fault.startswith("converged up to"))
-    doubts = dict.fromkeys(doubt for part in kept for doubt in part.doubts)
-    return replace(kept[0], faults=(*short, *faults), doubts=tuple(doubts), **whole)
+    faults = dict.fromkeys(fault for part in used for fault in part.faults if not fault.startswith("converged up to"))
+    doubts = dict.fromkeys(doubt for part in used for doubt in part.doubts)
+    return replace(used[0], faults=(*short, *faults), doubts=tuple(doubts), **whole)
 
 
-def compared(found: Pressed, finer: Pressed) -> Pressed:
+def compared(coarser: Pressed, finer: Pressed) -> Pressed:
     """The finer of two solutions, with a fault where they differ by more than 1 %."""
-    n = min(len(found.stress_pa), len(finer.stress_pa))
-    apart = float(np.max(np.abs(found.displacement_m[1:n] / finer.displacement_m[1:n] - 1), initial=0.0))
+    n = min(len(coarser.stress_pa), len(finer.stress_pa))
+    apart = float(np.max(np.abs(coarser.displacement_m[1:n] / finer.displacement_m[1:n] - 1), initial=0.0))
     if apart <= _LEVELS:
         return finer
     return replace(finer, faults=(*finer.faults, f"two meshes differ by {apart:.1%} in displacement"))

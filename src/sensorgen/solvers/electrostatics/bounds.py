@@ -79,8 +79,8 @@ class FieldStep:
 
 def narrowest(steps: Iterable[FieldStep]) -> Interval:
     """The narrowest interval of some steps; all from 0 on where there are none."""
-    found = (step.interval for step in steps)
-    return min(found, key=lambda interval: interval.upper - interval.lower, default=Interval(0.0, np.inf))
+    intervals = (step.interval for step in steps)
+    return min(intervals, key=lambda interval: interval.upper - interval.lower, default=Interval(0.0, np.inf))
 
 
 def third_conductor(scene: Scene) -> str | None:
@@ -109,7 +109,7 @@ def check(permittivity: Mapping[str, complex], width: float) -> None:
         raise OutOfRange(f"accuracy is {width:g}; expected a number above 0, as 1e-4")
 
 
-def whole(found: Energies, shares: Sequence[float]) -> Interval:
+def whole(energies: Energies, shares: Sequence[float]) -> Interval:
     r"""All cells of the sensor from one, and the cut ones at its ends from the energy in their part of it.
 
     With weights w up to W on parts of the cell, the energy norm of the exact field differs from the computed one by at
@@ -124,7 +124,7 @@ def whole(found: Energies, shares: Sequence[float]) -> Interval:
     Unsolved
         The lower bound is not above 0.
     """
-    below, above, rounding = found.lower, found.upper, max(found.rounding, ROUNDING)
+    below, above, rounding = energies.lower, energies.upper, max(energies.rounding, ROUNDING)
     if not (below > 0 and np.isfinite(above)):
         raise Unsolved(f"doubles do not solve this scene: its lower bound is {below:.3g}, its upper one {above:.3g}")
     if below > above * (1 + rounding):
@@ -133,9 +133,9 @@ def whole(found: Energies, shares: Sequence[float]) -> Interval:
             "and use --model columns meanwhile"
         )
     least, most = min(shares), max(shares)
-    apart = above - below + found.rounding * (above + below)
-    part, off = np.sqrt(found.part), np.sqrt((most - least) * max(apart, 0.0))
-    lower = least * below + max(part - (1 + found.enclosed) * off, 0.0) ** 2
+    apart = above - below + energies.rounding * (above + below)
+    part, off = np.sqrt(energies.part), np.sqrt((most - least) * max(apart, 0.0))
+    lower = least * below + max(part - (1 + energies.enclosed) * off, 0.0) ** 2
     upper = least * above + (part + off) ** 2
     return Interval(float(min(lower, upper) * (1 - rounding)), float(upper * (1 + rounding)))
 
@@ -201,20 +201,20 @@ class Fields:
     rounding: float = 0.0
 
 
-def disc(found: Fields, turn: Turned, shares: Sequence[float]) -> Disc:
+def disc(fields: Fields, turn: Turned, shares: Sequence[float]) -> Disc:
     r"""Where the capacitance of the whole sensor lies, whose cell's regions occur as often as ``shares`` say.
 
     In the regions that occur more often, by w up to W, the energy is off by no more than
     :math:`\kappa (2 \sqrt{W s}\,\eta + W \eta^2)`, s the size of the part.
     """
     least, most = min(shares), max(shares) - min(shares)
-    beyond = 2 * np.sqrt(most * found.size * found.apart) + most * found.apart
+    beyond = 2 * np.sqrt(most * fields.size * fields.apart) + most * fields.apart
     t = turn.tangent
-    cells = [(found.energy, turn.kappa() * found.apart)]  # values of the whole cell, and their errors
+    cells = [(fields.energy, turn.kappa() * fields.apart)]  # values of the whole cell, and their errors
     if t < 1:
-        cells.append(((found.energy + found.lower) / 2, found.apart / 2 * np.sqrt((1 + t) / (1 - t))))
+        cells.append(((fields.energy + fields.lower) / 2, fields.apart / 2 * np.sqrt((1 + t) / (1 - t))))
     discs = []
     for value, error in cells:
-        centre, off = complex(least * value + found.part), least * error + turn.kappa() * beyond
-        discs.append(Disc(centre, float(off + max(found.rounding, ROUNDING) * abs(centre))))
+        centre, off = complex(least * value + fields.part), least * error + turn.kappa() * beyond
+        discs.append(Disc(centre, float(off + max(fields.rounding, ROUNDING) * abs(centre))))
     return min(discs, key=lambda disc: disc.radius)

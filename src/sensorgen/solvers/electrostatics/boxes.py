@@ -65,16 +65,16 @@ class Element:
         sizes = count * self.pitch + 1
         place = boxes[:, None, :] * self.pitch + self.numbers[None, :, :3]
         flat = (place[..., 0] * sizes[1] + place[..., 1]) * sizes[2] + place[..., 2]
-        found: Whole = flat * 3 + self.numbers[:, 3]
-        return found
+        numbers: Whole = flat * 3 + self.numbers[:, 3]
+        return numbers
 
     def condensed(self, scale: Real) -> Real:
         """Energy of the shared unknowns when those inside have found their best values, of a box of three scales."""
         shared, coupling, inner = (
             sum(s * g for s, g in zip(scale, of, strict=True)) for of in (self.outer, self.coupling, self.inner)
         )
-        found: Real = shared - coupling.T @ (coupling / inner[:, None])
-        return found
+        energy: Real = shared - coupling.T @ (coupling / inner[:, None])
+        return energy
 
 
 @cache
@@ -181,13 +181,13 @@ def traces(order: int, flux_order: int) -> Real:
     along = (legendre @ turn).T @ (weight[:, None] * modes)
     places = np.indices((order + 1,) * 3).reshape(3, -1).T
     places = places[(places < 2).any(1)]
-    found = np.zeros((6 * n * n, len(places)))
+    moments = np.zeros((6 * n * n, len(places)))
     for axis, side in np.ndindex(3, 2):
         here = np.flatnonzero(places[:, axis] == side)
         first, second = (along[:, places[here, a]] for a in range(3) if a != axis)
         face = (2 * axis + side) * n * n
-        found[face : face + n * n, here] = (first[:, None] * second[None]).reshape(n * n, -1)
-    return found
+        moments[face : face + n * n, here] = (first[:, None] * second[None]).reshape(n * n, -1)
+    return moments
 
 
 def _worked_out(order: int) -> tuple[Real, Real, Real, Real]:
@@ -201,8 +201,8 @@ def _worked_out(order: int) -> tuple[Real, Real, Real, Real]:
     return drive @ drive.T, -turn.T @ divergence @ drive.T, squares, turn
 
 
-def _three(found: Real) -> tuple[Real, Real, Real]:
-    return found[0], found[1], found[2]
+def _three(arrays: Real) -> tuple[Real, Real, Real]:
+    return arrays[0], arrays[1], arrays[2]
 
 
 Matrix = NDArray[Any]
@@ -258,8 +258,8 @@ class Boxes:
 
     def solved(self) -> Matrix:
         """The unknowns of each box (n, b) that have the least energy."""
-        found: Matrix = self.least(keep=True).values()[self.ids] * self.scale
-        return found
+        unknowns: Matrix = self.least(keep=True).values()[self.ids] * self.scale
+        return unknowns
 
     def pushed(self, load: Matrix) -> "Boxes":
         """Boxes with both electrodes at 0 V and forces (n, b) on the unknowns."""
@@ -305,11 +305,11 @@ class Pair:
 
     def apart(self, u: Matrix, level: Matrix, rho: Real) -> float:
         r"""Distance of fields with these unknowns, :math:`\int |\varepsilon \nabla u - D|^2 / \rho`."""
-        found = np.empty(len(rho))
+        squares = np.empty(len(rho))
         for box, (here, there) in enumerate(zip(u, level, strict=True)):
             into, out = self.potential.shape(box) @ here, self.flux.shape(box) @ there
-            found[box] = (here.conj() @ into - 2 * (self.seen @ here) @ out.conj() + there.conj() @ out).real
-        return max(float((abs(self.flux.eps) ** 2 / rho) @ found), 0.0)
+            squares[box] = (here.conj() @ into - 2 * (self.seen @ here) @ out.conj() + there.conj() @ out).real
+        return max(float((abs(self.flux.eps) ** 2 / rho) @ squares), 0.0)
 
     def part(self, level: Matrix, rho: Real) -> tuple[Any, float]:
         """Energy of a flux, by its unknowns, weighted with how often boxes occur beyond the least; and kappa squared.
@@ -329,6 +329,6 @@ def whole(cell: Interval, part: float, unmet: float, shares: Real) -> Interval:
     """Bounds of all that a sensor holds, from those of its cell and :meth:`Pair.part`."""
     least, most = float(shares.min()), float(shares.max())
     off, kappa = np.sqrt(cell.upper - cell.lower), np.sqrt(unmet)
-    found, worst = least * cell.lower + part, min(off, kappa / least) if least else off
-    lower, upper = found + worst * (least * worst - 2 * kappa), found + off * (2 * kappa + most * off)
+    energy, worst = least * cell.lower + part, min(off, kappa / least) if least else off
+    lower, upper = energy + worst * (least * worst - 2 * kappa), energy + off * (2 * kappa + most * off)
     return Interval(float(lower), float(upper))

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from sensorgen.core.arrays import Mask, Real, Whole
-from sensorgen.scene.raster import raster
+from sensorgen.scene.repetition import raster
 from sensorgen.scene.scene import Body, Scene
 from sensorgen.solvers.electrostatics.corners import exponent
 
@@ -95,24 +95,24 @@ def _cell(scene: Scene, evenly: bool = True) -> Grid:
     def number(body: Body) -> int:
         return names.index(f"@{body.terminal}" if body.terminal else body.material)
 
-    found = raster(scene, number, names.index("air"), [(0.0, size) for size in scene.size_mm], evenly)
-    return Grid(found.planes_mm, found.fill, names, found.shares)
+    boxes = raster(scene, number, names.index("air"), [(0.0, size) for size in scene.size_mm], evenly)
+    return Grid(boxes.planes_mm, boxes.fill, names, boxes.shares)
 
 
 def reached(fill: Whole, terminal: int) -> Mask:
     """Dielectric boxes, 2 or more, that a walk through dielectric reaches from one electrode, 0 or 1."""
-    found = fill == terminal
-    allowed = found | (fill > 1)
+    reach = fill == terminal
+    allowed = reach | (fill > 1)
     while True:
-        grown = found.copy()
+        grown = reach.copy()
         for axis in range(3):
-            ahead, back = (np.moveaxis(m, axis, 0) for m in (grown, found))
+            ahead, back = (np.moveaxis(m, axis, 0) for m in (grown, reach))
             ahead[1:] |= back[:-1]
             ahead[:-1] |= back[1:]
         grown &= allowed
-        if (grown == found).all():
-            return np.asarray(found & (fill > 1))
-        found = grown
+        if (grown == reach).all():
+            return np.asarray(reach & (fill > 1))
+        reach = grown
 
 
 def layered(coarse: Grid, values: Sequence[float], layers: int) -> Grid:
@@ -161,12 +161,12 @@ def _wanted(around: list[int], values: Sequence[float], layers: int) -> int:
 
 def _graded(planes: Real, layers: list[int]) -> tuple[Real, Whole]:
     """Planes with layers between them, and from which interval each layer comes."""
-    found, owners = [planes[0]], []
+    finer, owners = [planes[0]], []
     for k, (a, b) in enumerate(pairwise(planes.tolist())):
         half = (b - a) / 2
         left = a + half * RATIO ** np.arange(layers[k], 0, -1)
         right = b - half * RATIO ** np.arange(1, layers[k + 1] + 1)
         inner = [*left.tolist(), *right.tolist(), b]
-        found += inner
+        finer += inner
         owners += [k] * len(inner)
-    return np.array(found), np.array(owners)
+    return np.array(finer), np.array(owners)

@@ -140,22 +140,22 @@ class Cone:
     def inside(self, values: Numbers) -> tuple[Numbers, Numbers]:
         """Values in all rings' triangles (rings, s, 2, k) and in the innermost (s, k), from those ``matrix`` takes."""
         m = self.layout.outer
-        held = values[m:]
+        fixed = values[m:]
         rims = np.stack([values[:m], self.innermost @ values])
         for amid in reversed(self.between):
             finer = np.empty((2 * len(rims) - 1, m), rims.dtype)
-            finer[::2], finer[1::2] = rims, _pairs(rims, held) @ amid.T
+            finer[::2], finer[1::2] = rims, _pairs(rims, fixed) @ amid.T
             rims = finer
-        pairs, last = _pairs(rims, held), np.concatenate([rims[-1], held])
+        pairs, last = _pairs(rims, fixed), np.concatenate([rims[-1], fixed])
         rings = np.concatenate([np.zeros((len(pairs), 1)), pairs, pairs @ self.in_ring.T], axis=1)
         tip = np.concatenate([[0.0], last, self.at_tip @ last])
         layout = self.layout
         return rings[:, layout.ring] * layout.ring_signs, tip[layout.tip] * layout.tip_signs
 
 
-def _pairs(rims: Numbers, held: Numbers) -> Numbers:
+def _pairs(rims: Numbers, fixed: Numbers) -> Numbers:
     """Each rim beside the next, and the held value."""
-    return np.concatenate([rims[:-1], rims[1:], np.broadcast_to(held, (len(rims) - 1, len(held)))], axis=1)
+    return np.concatenate([rims[:-1], rims[1:], np.broadcast_to(fixed, (len(rims) - 1, len(fixed)))], axis=1)
 
 
 def _assembled(ids: Whole, signs: Real, matrices: Numbers) -> Numbers:
@@ -166,10 +166,10 @@ def _assembled(ids: Whole, signs: Real, matrices: Numbers) -> Numbers:
 
 def _doubled(ring: Numbers, m: int) -> tuple[Numbers, Numbers]:
     """Two rings as one, without the unknowns amid them, and the matrix that gives those."""
-    outer, inner, held = slice(m), slice(m, 2 * m), slice(2 * m, None)
-    mixed = np.concatenate([ring[inner, outer], ring[outer, inner], ring[inner, held] + ring[outer, held]], axis=1)
+    outer, inner, fixed = slice(m), slice(m, 2 * m), slice(2 * m, None)
+    mixed = np.concatenate([ring[inner, outer], ring[outer, inner], ring[inner, fixed] + ring[outer, fixed]], axis=1)
     amid = -np.linalg.solve(ring[inner, inner] + ring[outer, outer], mixed)
     apart = ring.copy()
     apart[outer, inner] = apart[inner, outer] = 0.0
-    apart[held, held] *= 2
+    apart[fixed, fixed] *= 2
     return apart + mixed.T @ amid, amid

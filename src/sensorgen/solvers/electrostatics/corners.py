@@ -36,7 +36,7 @@ def exponents(mesh: Triangles, permittivity: Mapping[str, float]) -> dict[int, f
     dict of int to float
         Corner's number to lambda [-].
     """
-    found: dict[int, float] = {}
+    lowest: dict[int, float] = {}
     for corner, (around,) in fans(mesh.triangles).items():
         edges = [tuple(sorted((corner, around.spokes[k]))) for k in (0, -1)]
         ends = None if around.closed else tuple(edge in mesh.terminals for edge in edges)
@@ -50,8 +50,8 @@ def exponents(mesh: Triangles, permittivity: Mapping[str, float]) -> dict[int, f
             sectors.append((round(angle + before, 12), eps))
         value = exponent(tuple(sectors), ends)
         if value < _HIGHEST:
-            found[corner] = value
-    return found
+            lowest[corner] = value
+    return lowest
 
 
 _Sectors = tuple[tuple[float, float], ...]

@@ -61,8 +61,8 @@ class EnergySolution:
         """Of all unknowns (count,)."""
         values = np.zeros(self.count, np.result_type(self.energy, *(m.dtype for _, _, m in self.steps[:1])))
         values[1] = 1.0
-        for gone, kept, others in reversed(self.steps):
-            values[gone] = others @ values[kept]
+        for gone, rest, others in reversed(self.steps):
+            values[gone] = others @ values[rest]
         return values
 
 
@@ -75,22 +75,22 @@ class _Joined:
     seen: Whole
 
 
-def eliminated(matrix: Numbers, kept: int) -> tuple[Numbers, Numbers]:
-    """Energy of the first ``kept`` unknowns at the best of the others, and the matrix that gives those."""
-    mixed = matrix[kept:, :kept]
-    others = -np.linalg.solve(matrix[kept:, kept:], mixed)
-    return matrix[:kept, :kept] + mixed.T @ others, others
+def eliminated(matrix: Numbers, count: int) -> tuple[Numbers, Numbers]:
+    """Energy of the first ``count`` unknowns at the best of the others, and the matrix that gives those."""
+    mixed = matrix[count:, :count]
+    others = -np.linalg.solve(matrix[count:, count:], mixed)
+    return matrix[:count, :count] + mixed.T @ others, others
 
 
-def _condensed(matrix: Numbers, kept: int) -> Numbers:
+def _condensed(matrix: Numbers, count: int) -> Numbers:
     """The first result of :func:`eliminated` alone, in half the time where it is real."""
     from scipy.linalg import solve_triangular
 
     if np.iscomplexobj(matrix):
-        return eliminated(matrix, kept)[0]
-    factor = np.linalg.cholesky(matrix[kept:, kept:])
-    half = solve_triangular(factor, matrix[kept:, :kept], lower=True, check_finite=False)
-    return np.asarray(matrix[:kept, :kept] - half.T @ half)
+        return eliminated(matrix, count)[0]
+    factor = np.linalg.cholesky(matrix[count:, count:])
+    half = solve_triangular(factor, matrix[count:, :count], lower=True, check_finite=False)
+    return np.asarray(matrix[:count, :count] - half.T @ half)
 
 
 def added(size: int, parts: Iterable[tuple[Whole, Numbers]]) -> Numbers:
@@ -99,9 +99,9 @@ def added(size: int, parts: Iterable[tuple[Whole, Numbers]]) -> Numbers:
         *(((at[..., :, None] * size + at[..., None, :]).ravel(), m.ravel()) for at, m in parts), strict=True
     )
     entries = np.concatenate(values)
-    found = np.zeros(size * size, entries.dtype)
-    np.add.at(found, np.concatenate(places), entries)
-    return found.reshape(size, size)
+    total = np.zeros(size * size, entries.dtype)
+    np.add.at(total, np.concatenate(places), entries)
+    return total.reshape(size, size)
 
 
 def least(blocks: Sequence[Block], count: int, *, leaf: int = _LEAF, keep: bool = True) -> EnergySolution:
@@ -120,7 +120,7 @@ def least(blocks: Sequence[Block], count: int, *, leaf: int = _LEAF, keep: bool 
     """
     total = np.bincount(np.concatenate([b.ids for b in blocks]), minlength=count)
     total[:HELD] = np.iinfo(total.dtype).max
-    places, found = np.array([b.place for b in blocks]), EnergySolution(count)
+    places, solution = np.array([b.place for b in blocks]), EnergySolution(count)
 
     def joined(which: Whole) -> _Joined:
         """Some blocks without the unknowns that no other block shares."""
@@ -129,22 +129,22 @@ def least(blocks: Sequence[Block], count: int, *, leaf: int = _LEAF, keep: bool 
         else:
             leaves = [(b.ids, b.matrix() if callable(b.matrix) else b.matrix) for b in map(blocks.__getitem__, which)]
             parts = [_Joined(ids, matrix, np.ones_like(ids)) for ids, matrix in leaves]
-        both, kept = _sum(parts, total)
-        if kept == len(both.ids):
+        both, shared = _sum(parts, total)
+        if shared == len(both.ids):
             return both
         if keep:
-            matrix, others = eliminated(both.matrix, kept)
-            found.steps.append((both.ids[kept:], both.ids[:kept], others))
+            matrix, others = eliminated(both.matrix, shared)
+            solution.steps.append((both.ids[shared:], both.ids[:shared], others))
         else:
-            matrix = _condensed(both.matrix, kept)
-        return _Joined(both.ids[:kept], matrix, both.seen[:kept])
+            matrix = _condensed(both.matrix, shared)
+        return _Joined(both.ids[:shared], matrix, both.seen[:shared])
 
     left = joined(np.arange(len(blocks)))
     if (left.ids >= HELD).any():
         raise ArithmeticError(f"{(left.ids >= HELD).sum()} unknowns are left: this is a fault of the solver")
     at = np.flatnonzero(left.ids == 1)
-    found.energy = left.matrix[at, at].sum()
-    return found
+    solution.energy = left.matrix[at, at].sum()
+    return solution
 
 
 def _halves(which: Whole, places: NDArray[Any]) -> tuple[Whole, Whole]:
@@ -166,7 +166,7 @@ def _sum(parts: list[_Joined], total: Whole) -> tuple[_Joined, int]:
     turned = np.empty_like(order)
     turned[order] = np.arange(len(order))
     places = np.split(turned[at], np.cumsum([len(p.ids) for p in parts])[:-1])
-    ids, seen, kept = ids[order], seen[order], len(ids) - int(done.sum())
+    ids, seen, shared = ids[order], seen[order], len(ids) - int(done.sum())
     if len(parts) > 2 or len(np.unique(places[0])) < len(places[0]):
         matrix = added(len(ids), zip(places, (p.matrix for p in parts), strict=True))
     else:  # large, and each unknown once
@@ -174,4 +174,4 @@ def _sum(parts: list[_Joined], total: Whole) -> tuple[_Joined, int]:
         for place, part in zip(places, parts, strict=True):
             flat[(place[:, None] * len(ids) + place).ravel()] += part.matrix.ravel()
         matrix = flat.reshape(len(ids), len(ids))
-    return _Joined(ids, matrix, seen), kept
+    return _Joined(ids, matrix, seen), shared

@@ -44,15 +44,15 @@ def enclosing(cell: LayerCell, grid_mm: float, far_mm: float, loose_mm: float, *
         Two conductors touch when they have grown.
     """
     order = np.argsort(cell.permittivity, kind="stable")[::-1]
-    found = [_levels(cell, own, order) for own in cell.regions]
+    levels_of = [_levels(cell, own, order) for own in cell.regions]
     far = _far(cell, far_mm)
     moved: list[Levels] = []
     k = 0
-    while k < len(found):
-        group, more = found[k], k + 1
-        while far[k] and more < len(found) and far[more]:
-            wider = [_both(pair, outwards) for pair in zip(group, found[more], strict=True)]
-            other = [_both(pair, not outwards) for pair in zip(group, found[more], strict=True)]
+    while k < len(levels_of):
+        group, more = levels_of[k], k + 1
+        while far[k] and more < len(levels_of) and far[more]:
+            wider = [_both(pair, outwards) for pair in zip(group, levels_of[more], strict=True)]
+            other = [_both(pair, not outwards) for pair in zip(group, levels_of[more], strict=True)]
             if any(not shapely.equals(a, b) and not _near(a, b, outwards, 2 * loose_mm) for a, b in
                    zip(wider, other, strict=True)):  # fmt: skip
                 break
@@ -84,14 +84,14 @@ def _regions(cell: LayerCell, levels: Levels, order: Any) -> dict[int, Any]:
     metal = [k for k in range(cell.conductors) if not levels[k].is_empty]
     if any(shapely.intersects(levels[a], levels[b]) for a, b in combinations(metal, 2)):
         raise Unsolved("conductors are nearer than the grid that outlines are rounded to")
-    found = {k: levels[k] for k in metal}
+    filled = {k: levels[k] for k in metal}
     inside = shapely.union_all([levels[k] for k in metal])
     steps = [*levels[cell.conductors :], shapely.box(0.0, 0.0, *cell.size_mm)]
     for kind, level in zip(order.tolist(), steps, strict=True):
         part, inside = shapely.difference(level, inside), shapely.union_all([inside, level])
         if kind < len(cell.permittivity) - 1 and not part.is_empty:
-            found[cell.conductors + kind] = part
-    return found
+            filled[cell.conductors + kind] = part
+    return filled
 
 
 def _far(cell: LayerCell, far_mm: float) -> list[bool]:
@@ -100,13 +100,13 @@ def _far(cell: LayerCell, far_mm: float) -> list[bool]:
     holds = [np.array([k in own for own in cell.regions]) for k in range(cell.conductors)]
     spans = {k: (low[own].min(), high[own].max()) for k, own in enumerate(holds) if own.any()}
     area = cell.size_mm[0] * cell.size_mm[1]
-    found = []
+    far = []
     for here, (bottom, top) in zip(cell.regions, zip(low, high, strict=True), strict=True):
         metal = [k for k in here if k < cell.conductors]
         plate = sum(shapely.area(here[k]) for k in metal) > (1 - _FULL) * area
         apart = min((max(bottom - z1, z0 - top) for k, (z0, z1) in spans.items() if [k] != metal), default=np.inf)
-        found.append(len(metal) == 1 and not plate and apart > far_mm)
-    return found
+        far.append(len(metal) == 1 and not plate and apart > far_mm)
+    return far
 
 
 def _both(pair: Sequence[Any], outwards: bool) -> Any:

@@ -50,7 +50,7 @@ def flow(mesh: Triangles, cones: Collection[int]) -> Flow:
     rim = [(corner, fan.spokes[0]) for corner, fan in around.items() if not fan.closed]  # counter-clockwise
     walls = [e for e in rim if _named(e) not in mesh.terminals]
     loops, mirrors = _groups(rim), _groups(walls)
-    held: dict[int, int] = {}
+    unknown_of: dict[int, int] = {}
     lifts: dict[int, list[tuple[int, int]]] = defaultdict(list)
     starts = {a for a, b in rim if _named((a, b)) in mesh.terminals}
     ends = starts - set(cones)  # a cut ends with an electrode to its left, lest it part a mirror's value
@@ -58,7 +58,7 @@ def flow(mesh: Triangles, cones: Collection[int]) -> Flow:
     count = HELD
     for piece in _connected(around):
         values, count = _on_mirrors(piece, mirrors, (piece & loops.keys()) - set(cones), count)
-        held |= values
+        unknown_of |= values
         start = loops[min(point for point, value in values.items() if value == 0)]
         rims = {k: loops[k] for k in piece if k in loops}
         for path in _cuts(around, rims, start, carrying & set(rims.values()) | {start}, ends, cones):
@@ -66,7 +66,7 @@ def flow(mesh: Triangles, cones: Collection[int]) -> Flow:
                 lifts[number].append((corner, count))
             count += 1
     top = [e for e in rim if mesh.terminals.get(_named(e)) == "top"]
-    return Flow(held, {_named(e) for e in walls}, dict(lifts), top, _rise(top, lifts, around), count)
+    return Flow(unknown_of, {_named(e) for e in walls}, dict(lifts), top, _rise(top, lifts, around), count)
 
 
 def _connected(around: Mapping[int, Fan]) -> list[set[int]]:
@@ -110,15 +110,15 @@ def _groups(edges: Iterable[Edge]) -> dict[int, int]:
     for a, b in edges:
         beside[a].append(b)
         beside[b].append(a)
-    found: dict[int, int] = {}
+    least: dict[int, int] = {}
     for start in sorted(beside):
-        todo = [start] if start not in found else []
+        todo = [start] if start not in least else []
         while todo:
             k = todo.pop()
-            if k not in found:
-                found[k] = start
+            if k not in least:
+                least[k] = start
                 todo += beside[k]
-    return found
+    return least
 
 
 def _cuts(

@@ -67,10 +67,10 @@ class _Share:
 
     def values(self, unknowns: Numbers) -> Numbers:
         """On the block."""
-        found = unknowns[self.ids]
+        own = unknowns[self.ids]
         for place, jump in self.jumps:
-            found[place] += unknowns[jump]
-        return np.asarray(found * self.signs)
+            own[place] += unknowns[jump]
+        return np.asarray(own * self.signs)
 
 
 @dataclass(frozen=True)
@@ -170,9 +170,9 @@ class PlaneProblem:
         on_side = first[np.searchsorted(mesh.sides[0], mesh.names(a, b))]
         modes = np.arange(self.order - 1)
         sign = np.where((a > b)[:, None], (-1.0) ** modes, 1.0)
-        held = vertex[[corner]] if layout.held else vertex[:0]
-        ids = np.concatenate([vertex[free], (on_side[:, None] + modes).ravel(), held])
-        signs = np.concatenate([np.ones(len(free)), sign.ravel(), np.ones(len(held))])
+        fixed = vertex[[corner]] if layout.held else vertex[:0]
+        ids = np.concatenate([vertex[free], (on_side[:, None] + modes).ravel(), fixed])
+        signs = np.concatenate([np.ones(len(free)), sign.ravel(), np.ones(len(fixed))])
         lifts = {lift for n in fan.members for lift in self.lifts.get(n, ())}
         return _Share(ids, signs, [(free.tolist().index(point), jump) for point, jump in sorted(lifts)])
 
@@ -207,8 +207,8 @@ class Plane:
     def potential(self, weight: Numbers) -> Field:
         """The best potential, 0 V at the bottom and 1 V at the top; ``weight`` (n,) of each triangle."""
         ends = self.mesh.triangles.terminals
-        held = {point: int(name == "top") for edge, name in ends.items() for point in edge}
-        return self._grounded(self._problem(weight, held, set(ends), {}, HELD).solved())
+        volts = {point: int(name == "top") for edge, name in ends.items() for point in edge}
+        return self._grounded(self._problem(weight, volts, set(ends), {}, HELD).solved())
 
     def stream(self, weight: Numbers) -> Field:
         """The function whose curl is the flux at which twice what flows into the top, less its energy, is most."""
@@ -234,8 +234,8 @@ class Plane:
         size = abs(crossed(self.order))
         return self._over(f.moduli(), g.moduli(), size, [(size, size)] * len(f.cones))
 
-    def _problem(self, weight: Numbers, *held: Any) -> PlaneProblem:
-        return PlaneProblem(self.mesh, self.order, self._plain_energy, self._cone_energies, weight, *held)
+    def _problem(self, weight: Numbers, *boundary: Any) -> PlaneProblem:
+        return PlaneProblem(self.mesh, self.order, self._plain_energy, self._cone_energies, weight, *boundary)
 
     def _grounded(self, f: Field) -> Field:
         """Less the value at one end of each triangle's shortest side.
@@ -252,12 +252,12 @@ class Plane:
         return Field(_less(f.plain, plain), cones)
 
     def _over(self, f: Field, g: Field, plain: Real, cones: Sequence[tuple[Real, Real]]) -> Numbers:
-        found = np.zeros(len(self.mesh.corners), np.result_type(f.plain, g.plain))
-        found[self.mesh.plain] = _product(f.plain, plain, g.plain)
+        by_triangle = np.zeros(len(self.mesh.corners), np.result_type(f.plain, g.plain))
+        by_triangle[self.mesh.plain] = _product(f.plain, plain, g.plain)
         for fan, (rings, tips), mine, other in zip(self.mesh.fans.values(), cones, f.cones, g.cones, strict=True):
-            found[fan.members] = _product(mine[0], rings, other[0]).sum(axis=(0, 2))
-            found[fan.members] += _product(mine[1], tips, other[1])
-        return found
+            by_triangle[fan.members] = _product(mine[0], rings, other[0]).sum(axis=(0, 2))
+            by_triangle[fan.members] += _product(mine[1], tips, other[1])
+        return by_triangle
 
     @property
     def _plain_energy(self) -> Real:
@@ -272,8 +272,8 @@ class Plane:
 
     @cached_property
     def _matrices(self) -> list[Real]:
-        found = condensed(np.concatenate(self._shapes), self.order)
-        return np.split(found, np.cumsum([len(s) for s in self._shapes])[:-1])
+        energies = condensed(np.concatenate(self._shapes), self.order)
+        return np.split(energies, np.cumsum([len(s) for s in self._shapes])[:-1])
 
     @cached_property
     def _shapes(self) -> list[Real]:
@@ -290,9 +290,9 @@ class Plane:
 def _less(values: Numbers, corner: Whole) -> Numbers:
     """Values on triangles (..., k) less the one at a corner of each."""
     place = np.broadcast_to(corner, values.shape[:-1])[..., None]
-    found: Numbers = values.copy()
-    found[..., :3] -= np.take_along_axis(values, place, axis=-1)
-    return found
+    reduced: Numbers = values.copy()
+    reduced[..., :3] -= np.take_along_axis(values, place, axis=-1)
+    return reduced
 
 
 def _product(f: Numbers, matrix: Numbers, g: Numbers) -> Numbers:

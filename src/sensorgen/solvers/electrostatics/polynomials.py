@@ -53,15 +53,15 @@ def _reference(order: int) -> Real:
     root = np.sqrt(np.outer(weight * (1 - at), weight).ravel())
     along = np.array([f[1:] * root for f in _functions(x, y, order)])
     a, b = along[:, 0], along[:, 1]
-    found = np.stack([f @ f.T for f in (a, b, b - a)])
+    products = np.stack([f @ f.T for f in (a, b, b - a)])
     n = 3 * order
-    even = found.sum(axis=0) / 2
+    even = products.sum(axis=0) / 2
     change = np.eye(len(even))
     if len(even) > n:
         root = np.linalg.inv(np.linalg.cholesky(even[n:, n:]))
         change[n:, n:] = root
         change[3:n, n:] = -even[3:n, n:] @ root.T @ root  # straight functions are orthogonal to the inner ones
-    return np.asarray(change @ found @ change.T)
+    return np.asarray(change @ products @ change.T)
 
 
 def _functions(x: Real, y: Real, order: int) -> list[Real]:
@@ -90,20 +90,20 @@ def _times(f: Real, g: Real) -> Real:
 def _integrated(s: Real, t: Real, order: int) -> list[Real]:
     """Integrated Legendre polynomials t^n L_n(s / t) of degree 2 to ``order``, of unit slope's norm for t = 1."""
     square = _times(t, t)
-    found = [s, (_times(s, s) - square) / 2]
+    functions = [s, (_times(s, s) - square) / 2]
     for n in range(2, order):
-        found.append(((2 * n - 1) * _times(s, found[-1]) - (n - 2) * _times(square, found[-2])) / (n + 1))
-    return [f * np.sqrt(n - 0.5) for n, f in enumerate(found[1:order], 2)]
+        functions.append(((2 * n - 1) * _times(s, functions[-1]) - (n - 2) * _times(square, functions[-2])) / (n + 1))
+    return [f * np.sqrt(n - 0.5) for n, f in enumerate(functions[1:order], 2)]
 
 
 def _jacobi(x: Real, one: Real, a: int, degree: int) -> list[Real]:
     """Jacobi polynomials P^(a, 0) of degree 0 to ``degree``."""
-    found = [one, (a * one + (a + 2) * x) / 2]
+    functions = [one, (a * one + (a + 2) * x) / 2]
     for n in range(2, degree + 1):
         across = (2 * n + a) * (2 * n + a - 2) * x + a * a * one
-        last = 2 * (n + a - 1) * (n - 1) * (2 * n + a) * found[-2]
-        found.append(((2 * n + a - 1) * _times(across, found[-1]) - last) / (2 * n * (n + a) * (2 * n + a - 2)))
-    return found[: degree + 1]
+        last = 2 * (n + a - 1) * (n - 1) * (2 * n + a) * functions[-2]
+        functions.append(((2 * n + a - 1) * _times(across, functions[-1]) - last) / (2 * n * (n + a) * (2 * n + a - 2)))
+    return functions[: degree + 1]
 
 
 @cache
@@ -114,11 +114,11 @@ def crossed(order: int) -> Real:
     here = [(t - s) / 2, (t + s) / 2, *_integrated(s, t, order)]
     value, slope = (np.array([f[k] for f in here]) for k in (0, 1))
     along = (value * weight) @ slope.T
-    found = np.zeros((3 * order, 3 * order))
+    matrix = np.zeros((3 * order, 3 * order))
     for number, (a, b) in enumerate(SIDES):
         ids = np.array([a, b, *range(3 + number * (order - 1), 3 + (number + 1) * (order - 1))])
-        found[np.ix_(ids, ids)] += along
-    return found
+        matrix[np.ix_(ids, ids)] += along
+    return matrix
 
 
 def numbered(corners: Whole, vertex: Whole, first: Whole, order: int) -> tuple[Whole, Real]:

@@ -155,8 +155,8 @@ def plan(cell: LayerCell, beside_mm: Sequence[float], grid_mm: float) -> PlanTri
 
 def _simpler(region: Any, by: float) -> Any:
     """A region with fewer corners; itself where it is too narrow for that."""
-    found = shapely.simplify(region, by)
-    return found if shapely.area(found) > region.area / 2 else region
+    simple = shapely.simplify(region, by)
+    return simple if shapely.area(simple) > region.area / 2 else region
 
 
 def beyond(region: Any, size: Sequence[float], periodic: Sequence[bool], far: float) -> Any:
@@ -192,11 +192,11 @@ def _repeated(noded: Any, size: Sequence[float], periodic: Sequence[bool]) -> An
 def _filled(layers: Sequence[dict[int, Any]], faces: Any, cell: LayerCell) -> Whole:
     """Filling of each face in every layer, by a place inside it."""
     inside = shapely.point_on_surface(faces)
-    found = np.full((len(layers), len(faces)), cell.conductors + len(cell.permittivity) - 1)
-    for row, layer in zip(found, layers, strict=True):
+    fill = np.full((len(layers), len(faces)), cell.conductors + len(cell.permittivity) - 1)
+    for row, layer in zip(fill, layers, strict=True):
         for kind, region in layer.items():
             row[shapely.STRtree(shapely.get_parts(region)).query(inside, predicate="within")[0]] = kind
-    return found
+    return fill
 
 
 @dataclass(frozen=True)
@@ -267,11 +267,11 @@ class PrismMesh:
         NGSolve wants both faces of a pair: where a cut through beads meets a conductor on one side only, the conductor
         is meshed too, with all its faces held.
         """
-        found, (near, far, _, _) = self.free.copy(), self._seams.T
-        while (more := found[:, near] & ~found[:, far]).any():
+        filled, (near, far, _, _) = self.free.copy(), self._seams.T
+        while (more := filled[:, near] & ~filled[:, far]).any():
             layer, which = np.nonzero(more)
-            found[layer, far[which]] = True
-        return found
+            filled[layer, far[which]] = True
+        return filled
 
     @cached_property
     def _kinds(self) -> Whole:
@@ -304,25 +304,25 @@ class PrismMesh:
         number = np.full(count * len(self.heights_mm), -1)
         number[used] = np.arange(len(used))
         prisms = number[prisms]
-        made = netgen.Mesh(3)
-        made.AddPoints(np.column_stack([flat.points_mm[used % count], self.heights_mm[used // count]]))
+        mesh = netgen.Mesh(3)
+        mesh.AddPoints(np.column_stack([flat.points_mm[used % count], self.heights_mm[used // count]]))
         for k in range(self.cell.conductors):
-            made.Add(netgen.FaceDescriptor(surfnr=k + 1, domin=1, domout=0, bc=k + 1))
-            made.SetBCName(k, f"c{k}")
+            mesh.Add(netgen.FaceDescriptor(surfnr=k + 1, domin=1, domout=0, bc=k + 1))
+            mesh.SetBCName(k, f"c{k}")
         for k in range(len(self.cell.permittivity)):
             own = prisms[kinds == self.cell.conductors + k]
-            made.AddElements(dim=3, index=k + 1, data=np.ascontiguousarray(own, dtype=np.int32), base=0)
-            made.SetMaterial(k + 1, f"d{k}")
+            mesh.AddElements(dim=3, index=k + 1, data=np.ascontiguousarray(own, dtype=np.int32), base=0)
+            mesh.SetMaterial(k + 1, f"d{k}")
         for k, faces in self._surfaces():
-            made.AddElements(dim=2, index=k + 1, data=np.ascontiguousarray(number[faces], dtype=np.int32), base=0)
+            mesh.AddElements(dim=2, index=k + 1, data=np.ascontiguousarray(number[faces], dtype=np.int32), base=0)
         for axis in (0, 1):
             if self.cell.periodic[axis]:
                 for a, b in self._opposite(axis, used, count):
-                    made.AddPointIdentification(
+                    mesh.AddPointIdentification(
                         netgen.PointId(int(number[a]) + 1), netgen.PointId(int(number[b]) + 1),
                         identnr=axis + 1, type=2,
                     )  # fmt: skip
-        return ngsolve.Mesh(made)
+        return ngsolve.Mesh(mesh)
 
     def _surfaces(self) -> list[tuple[int, Whole]]:
         """Triangles and quadrilaterals at which prisms meet each conductor."""
@@ -335,13 +335,13 @@ class PrismMesh:
                 found.append((k, flat.triangles[which] + ((layer + 1) * count)[:, None]))
         near, far, a, b = np.concatenate([self._neighbours, self._seams]).T
         metal = np.where(self.free[:, near], self.fill[:, far], first)
-        held = self.meshed & ~self.free
-        metal = np.where(held[:, near], self.fill[:, near], metal)
+        metal_too = self.meshed & ~self.free
+        metal = np.where(metal_too[:, near], self.fill[:, near], metal)
         for k in range(first):
             layer, which = np.nonzero(metal == k)
             ring = np.column_stack([a[which], b[which], b[which], a[which]]) + (layer * count)[:, None]
             found.append((k, ring + np.array([0, 0, count, count])))
-            layer, which = np.nonzero(held & (self.fill == k))
+            layer, which = np.nonzero(metal_too & (self.fill == k))
             found += [(k, flat.triangles[which] + ((layer + up) * count)[:, None]) for up in (0, 1)]
         alike = {(k, faces.shape[1]) for k, faces in found}
         return [
@@ -360,13 +360,13 @@ class PrismMesh:
     def _seams(self) -> Whole:
         """Neighbours across sides that repeat, with the points of its own edge."""
         (edges, owner), at = self._edges, self.plan.points_mm
-        found = [np.zeros((0, 4), np.int64)]
+        seams = [np.zeros((0, 4), np.int64)]
         for axis in np.flatnonzero(self.cell.periodic):
             sides = [(abs(at[edges, axis] - end) < _SAME_MM).all(1) for end in (0.0, self.cell.size_mm[axis])]
             rising = [np.flatnonzero(s)[np.argsort(at[edges[s], 1 - axis].sum(1))] for s in sides]
             for here, there in (rising, rising[::-1]):
-                found.append(np.column_stack([owner[here], owner[there], edges[here]]))
-        return np.concatenate(found)
+                seams.append(np.column_stack([owner[here], owner[there], edges[here]]))
+        return np.concatenate(seams)
 
     @cached_property
     def _edges(self) -> tuple[Whole, Whole]:
@@ -446,29 +446,42 @@ def _lower(mesh: PrismMesh, order: int) -> tuple[float, int]:
     """Thomson's functional of the best flux, and its unknowns."""
     import ngsolve as ng
 
-    space, cell = mesh.netgen, mesh.cell
     eps, names = _coefficients(mesh)
-    normal = ng.specialcf.normal(3)
-    plain = ng.FacetFESpace(space, order=order - 1, dirichlet="|".join(names))
-    facet = ng.Periodic(plain) if any(cell.periodic) else plain
-    below = ng.HDiv(space, order=order - 1, discontinuous=True, hodivfree=True) * ng.L2(space, order=0) * facet
-    (d, q, w), (e, r, z) = below.TnT()
-    form = ng.BilinearForm(below, symmetric=True, condense=True)
-    form += -(d * e / eps - q * ng.div(e) - r * ng.div(d)) * ng.dx
-    form += -(w * (e * normal) + z * (d * normal)) * ng.dx(element_boundary=True)
-    lower, found = balanced(form, lambda f: f.components[2], names)
-    field = found.components[0]
-    energy = ng.Integrate(field * field / eps, space, order=2 * order)
-    charges = [
-        -ng.Integrate(one.components[2] * (field * normal) * ng.dx(element_boundary=True), space)
-        for one in indicators(below, lambda f: f.components[2], names)
-    ]
+    field, lower, charges, unknowns = fluxes(mesh.netgen, eps, names, order - 1, periodic=any(mesh.cell.periodic))
+    energy = ng.Integrate(field * field / eps, mesh.netgen, order=2 * order)
     wrong = max(
         abs(energy - lower), abs(charges[TOP] - lower), abs(charges[BOTTOM] + lower), *map(abs, charges[2:]), 0.0
     )
     if not wrong < _BALANCE * lower:
         raise Unsolved(f"energy and charges differ by {wrong / lower:.1g}: triangles too slender for doubles")
-    return lower, facet.ndof
+    return lower, unknowns
+
+
+def fluxes(
+    space: Any, eps: Any, metal: Sequence[str], order: int, *, periodic: bool = False
+) -> tuple[Any, float, list[float], int]:
+    """The best flux of an order, its energy, the charge that it brings to each conductor, and the unknowns.
+
+    Its normal component is continuous in every moment of that order, which is all that it has: reference elements hold
+    the product of flux and face unchanged, however they are curved.
+    """
+    import ngsolve as ng
+
+    normal = ng.specialcf.normal(3)
+    plain = ng.FacetFESpace(space, order=order, dirichlet="|".join(metal))
+    facet = ng.Periodic(plain) if periodic else plain
+    below = ng.HDiv(space, order=order, discontinuous=True, hodivfree=True) * ng.L2(space, order=0) * facet
+    (d, q, w), (e, r, z) = below.TnT()
+    form = ng.BilinearForm(below, symmetric=True, condense=True)
+    form += -(d * e / eps - q * ng.div(e) - r * ng.div(d)) * ng.dx
+    form += -(w * (e * normal) + z * (d * normal)) * ng.dx(element_boundary=True)
+    energy, best = balanced(form, lambda f: f.components[2], metal)
+    field = best.components[0]
+    charges = [
+        -float(ng.Integrate(one.components[2] * (field * normal) * ng.dx(element_boundary=True), space))
+        for one in indicators(below, lambda f: f.components[2], metal)
+    ]
+    return field, energy, charges, facet.ndof
 
 
 def _coefficients(mesh: PrismMesh) -> tuple[Any, list[str]]:
@@ -481,12 +494,12 @@ def indicators(space: Any, part: Any, conductors: Sequence[str]) -> list[Any]:
     """Functions that are 1 on one conductor each."""
     import ngsolve as ng
 
-    mesh, found = space.mesh, [ng.GridFunction(space) for _ in conductors]
-    for name, one in zip(conductors, found, strict=True):
+    mesh, ones = space.mesh, [ng.GridFunction(space) for _ in conductors]
+    for name, one in zip(conductors, ones, strict=True):
         part(one).Set(ng.CF(1), definedon=mesh.Boundaries(name))
         values = one.vec.FV().NumPy()
         values[:] = values > _SET  # a constant is 1 in lowest order; where sides repeat, Set averages over too many
-    return found
+    return ones
 
 
 def balanced(form: Any, part: Any, conductors: Sequence[str]) -> tuple[float, Any]:
@@ -508,20 +521,20 @@ def balanced(form: Any, part: Any, conductors: Sequence[str]) -> tuple[float, An
     with ng.TaskManager() if free.NumSet() > _MANY else nullcontext():
         form.Assemble()
         inverse = form.mat.Inverse(free, "sparsecholesky")  # slivers take CG with BDDC a thousand iterations
-        found = indicators(space, part, conductors)[TOP:]
-        rest = found[0].vec.CreateVector()
-        for f in found:
+        lifts = indicators(space, part, conductors)[TOP:]
+        rest = lifts[0].vec.CreateVector()
+        for f in lifts:
             for _ in range(2):
                 rest.data = form.mat * f.vec
                 f.vec.data -= inverse * rest
         images = []
-        for f in found:
+        for f in lifts:
             rest.data = form.mat * f.vec
             images.append(rest.Copy())
-        energy = np.array([[ng.InnerProduct(f.vec, image) for image in images] for f in found])
+        energy = np.array([[ng.InnerProduct(f.vec, image) for image in images] for f in lifts])
         share = np.append(1.0, -np.linalg.solve(energy[1:, 1:], energy[1:, 0]))
         best = ng.GridFunction(space)
-        for c, f in zip(share.tolist(), found, strict=True):
+        for c, f in zip(share.tolist(), lifts, strict=True):
             best.vec.data += c * f.vec
         best.vec.data += form.harmonic_extension * best.vec
     return float(share @ energy @ share), best

@@ -5,7 +5,7 @@ finely that quadrature does not count: what is left is the distance of the curve
 which the bounds are moved outwards.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from math import inf
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from sensorgen.scene.revolved import Revolved
 from sensorgen.solvers.electrostatics.bounds import Energies
-from sensorgen.solvers.electrostatics.prisms import balanced, indicators
+from sensorgen.solvers.electrostatics.prisms import TOP, balanced, fluxes
 from sensorgen.solvers.electrostatics.round_cell import RoundCell, profile
 from sensorgen.solvers.electrostatics.round_mesh import BETWEEN, MORE, RoundMesh, mesh_of
 
@@ -90,31 +90,9 @@ def solved(mesh: RoundMesh, order: int) -> Energies:
         for n, weight in enumerate(cell.weights().tolist())
         if weight
     )
-    flux, charge, unknowns = fluxes(space, space.MaterialCF(least), metal, order - 1)
-    lower = 2 * charge - ng.Integrate(flux * flux / space.MaterialCF(least), space, order=fine)
+    flux, _, charges, unknowns = fluxes(space, space.MaterialCF(least), metal, order - 1)
+    lower = 2 * charges[TOP] - ng.Integrate(flux * flux / space.MaterialCF(least), space, order=fine)
     return Energies(lower, upper, part, unknowns, _moved(mesh, density) / upper, bool(mesh.touches))
-
-
-def fluxes(space: Any, eps: Any, metal: Sequence[str], order: int) -> tuple[Any, float, int]:
-    """The best flux of an order, the charge that it brings to the top electrode, and the unknowns that it couples.
-
-    Its normal component is continuous in every moment of that order, which is all that it has: reference elements hold
-    the product of flux and face unchanged, however they are curved.
-    """
-    import ngsolve as ng
-
-    normal = ng.specialcf.normal(3)
-    facet = ng.FacetFESpace(space, order=order, dirichlet="|".join(metal))
-    below = ng.HDiv(space, order=order, discontinuous=True, hodivfree=True) * ng.L2(space, order=0) * facet
-    (d, q, w), (e, r, z) = below.TnT()
-    form = ng.BilinearForm(below, symmetric=True, condense=True)
-    form += -(d * e / eps - q * ng.div(e) - r * ng.div(d)) * ng.dx
-    form += -(w * (e * normal) + z * (d * normal)) * ng.dx(element_boundary=True)
-    _, found = balanced(form, lambda f: f.components[2], metal)
-    flux = found.components[0]
-    one = indicators(below, lambda f: f.components[2], metal)[1].components[2]
-    charge = -ng.Integrate(one * (flux * normal) * ng.dx(element_boundary=True), space)
-    return flux, float(charge), facet.ndof
 
 
 def _moved(mesh: RoundMesh, density: Any) -> float:

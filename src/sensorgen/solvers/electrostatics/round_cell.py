@@ -76,12 +76,12 @@ class RoundCell:
         for axis in (0, 1):
             low, high = self.low_mm[axis], self.high_mm[axis]
             p[:, axis] = high - abs(high - low - abs(p[:, axis] - low))
-        found = (p[:, 2] < self.low_mm[2]) | (p[:, 2] > self.high_mm[2])
+        is_metal = (p[:, 2] < self.low_mm[2]) | (p[:, 2] > self.high_mm[2])
         for spans, piece, kind in self.boxes():
             near = ((p > spans[:, 0]) & (p < spans[:, 1])).all(1)
             if kind < self.conductors and near.any():
-                found[near] |= inside(piece, p[near])
-        return np.asarray(found)
+                is_metal[near] |= inside(piece, p[near])
+        return np.asarray(is_metal)
 
     def sizes(self, along: Real, times: float, longest_mm: float) -> list[Sized]:
         """Places on round faces and on some edges (n, 3), by the distance of bodies that the piece does not touch.
@@ -93,9 +93,9 @@ class RoundCell:
         times : float
             Longest edge of elements over that distance [-].
         longest_mm : float
-            Beyond which no place is listed [mm].
+            Beyond which no place is sized [mm].
         """
-        turn, boxes, found = np.linspace(0, 2 * np.pi, 33)[:-1], self.boxes(), []
+        turn, boxes, sized = np.linspace(0, 2 * np.pi, 33)[:-1], self.boxes(), []
         for own, piece, kind in boxes:
             others = [box for box, _, its in boxes if its != kind and not _meet(box, own)]
             if isinstance(piece, Revolved):
@@ -109,8 +109,8 @@ class RoundCell:
                 off = [np.maximum(box[:, 0] - places, 0) + np.maximum(places - box[:, 1], 0) for box in others]
                 size = times * np.linalg.norm(off, axis=2).min(0)
                 near = size < longest_mm
-                found += [(x, y, z, h) for (x, y, z), h in zip(places[near].tolist(), size[near].tolist(), strict=True)]
-        return found
+                sized += [(x, y, z, h) for (x, y, z), h in zip(places[near].tolist(), size[near].tolist(), strict=True)]
+        return sized
 
 
 class ProfileEdge(NamedTuple):
@@ -195,7 +195,7 @@ class DomeTouch:
 
     def sizes(self, cell: RoundCell, gap_mm: float, times: float) -> list[Sized]:
         """Places in the gap beyond a height, by its height there, as :meth:`Cell.sizes` has them."""
-        found = []
+        sized = []
         for r in np.geomspace(self.rim_mm(gap_mm), 0.7 * self.radius_mm, 24).tolist():
             gap = self.radius_mm - sqrt(self.radius_mm**2 - r**2)
             turn = np.arange(0.0, 2 * np.pi, max(gap / r, 0.05))
@@ -203,8 +203,8 @@ class DomeTouch:
             places = np.column_stack(
                 [self.piece.x_mm + r * np.cos(turn), self.piece.y_mm + r * np.sin(turn), 0 * turn + z]
             )
-            found += [(x, y, at, times * gap) for x, y, at in places[cell.holds(places)].tolist()]
-        return found
+            sized += [(x, y, at, times * gap) for x, y, at in places[cell.holds(places)].tolist()]
+        return sized
 
 
 def _faces(box: Real, at_mm: Real, z_mm: float, upwards: bool) -> bool:
@@ -215,7 +215,7 @@ def _faces(box: Real, at_mm: Real, z_mm: float, upwards: bool) -> bool:
 
 def touches(cell: RoundCell) -> list[DomeTouch]:
     """All places in a cell where a dome meets a level face."""
-    found = []
+    places_of = []
     for own, piece, kind in cell.boxes():
         if not isinstance(piece, Revolved):
             continue
@@ -227,8 +227,8 @@ def touches(cell: RoundCell) -> list[DomeTouch]:
                 way = -1.0 if upwards else 1.0
                 metal = [box[2, int(upwards)] for box, its in others if its < cell.conductors]
                 apart = min((off for end in metal if (off := way * (end - z)) > SAME_MM), default=radius)
-                found.append(DomeTouch(piece, kind, z, upwards, radius, float(apart)))
-    return found
+                places_of.append(DomeTouch(piece, kind, z, upwards, radius, float(apart)))
+    return places_of
 
 
 def inside(piece: Piece, places_mm: Real) -> Mask:

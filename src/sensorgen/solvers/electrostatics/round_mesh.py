@@ -102,15 +102,15 @@ def mesh_of(cell: RoundCell, order: int, layers: int, closed: float) -> RoundMes
         for size in sizes:
             wanted.RestrictH(*size)
         try:
-            made = geometry.GenerateMesh(wanted)
+            coarse = geometry.GenerateMesh(wanted)
         except NgException:
             longest, growth = _FINER * longest, _SLOWER * growth
             continue
-        unknowns = len(made.Elements3D()) * order * (order + 1)
+        unknowns = len(coarse.Elements3D()) * order * (order + 1)
         if unknowns > _MOST:
             raise Unsolved(f"{unknowns} unknowns; meshes of up to {_MOST} are solved")
-        rounds, (middles, spans) = _named(made), _elements(made)
-        mesh = ng.Mesh(made)
+        rounds, (middles, spans) = _named(coarse), _elements(coarse)
+        mesh = ng.Mesh(coarse)
         if grading.any:
             mesh.RefineHP(layers, _SHRINK)
         mesh.Curve(order + 1)
@@ -134,21 +134,21 @@ def unsound(mesh: Any, order: int) -> Mask:
     return np.asarray(np.minimum.reduceat(volumes, first) * np.maximum.reduceat(volumes, first) <= 0)
 
 
-def _named(made: Any) -> Mask:
+def _named(netgen_mesh: Any) -> Mask:
     """Name the boundaries of a mesh, and tell which are round."""
     rounds = []
-    for k in range(made.GetNFaceDescriptors()):
-        name, face = made.GetBCName(k), made.FaceDescriptor(k + 1)
+    for k in range(netgen_mesh.GetNFaceDescriptors()):
+        name, face = netgen_mesh.GetBCName(k), netgen_mesh.FaceDescriptor(k + 1)
         between = bool(face.domin and face.domout)
         rounds.append(name.endswith(ROUND))
-        held = name[0] == "c" or (name[0] == "t" and between)
-        made.SetBCName(k, name.removesuffix(ROUND) if held else (SIDE, BETWEEN)[between])
+        stays = name[0] == "c" or (name[0] == "t" and between)
+        netgen_mesh.SetBCName(k, name.removesuffix(ROUND) if stays else (SIDE, BETWEEN)[between])
     return np.array(rounds)
 
 
-def _elements(made: Any) -> tuple[Real, Real]:
+def _elements(netgen_mesh: Any) -> tuple[Real, Real]:
     """Middles of tetrahedra (n, 3) and their longest extents [mm]."""
-    corners = made.Coordinates()[made.Elements3D().NumPy()["nodes"][:, :4] - 1]
+    corners = netgen_mesh.Coordinates()[netgen_mesh.Elements3D().NumPy()["nodes"][:, :4] - 1]
     return corners.mean(1), np.ptp(corners, axis=1).max(1)
 
 
@@ -189,9 +189,9 @@ def _named_faces(solids: Sequence[Any]) -> dict[str, list[Any]]:
     return faces
 
 
-def _refuse_open(cell: RoundCell, kept: Sequence[Any]) -> None:
+def _refuse_open(cell: RoundCell, dielectrics: Sequence[Any]) -> None:
     """Refuse a dielectric that reaches the bottom or the top of the cell."""
-    for face in (face for one in kept for face in one.faces if (face.name or "x")[0] != "c"):
+    for face in (face for one in dielectrics for face in one.faces if (face.name or "x")[0] != "c"):
         low, high = face.bounding_box
         for end in (cell.low_mm[2], cell.high_mm[2]):
             if max(abs(low.z - end), abs(high.z - end)) < SAME_MM * 10:
@@ -325,12 +325,12 @@ class _Grading:
 
     def _is_corner(self, place: tuple[float, ...], ways: Sequence[Real]) -> bool:
         """Test whether marked edges, mirrored at the sides of the cell, end or turn at a place."""
-        found = list(ways)
+        every = list(ways)
         for axis in (0, 1):
             if (
                 min(abs(place[axis] - self.cell.low_mm[axis]), abs(place[axis] - self.cell.high_mm[axis]))
                 < SAME_MM * 10
             ):
-                found += [way * np.where(np.arange(3) == axis, -1, 1) for way in found]
-        distinct = np.array(list({tuple((way + 0.0).round(2).tolist()) for way in found})).reshape(-1, 3)
+                every += [way * np.where(np.arange(3) == axis, -1, 1) for way in every]
+        distinct = np.array(list({tuple((way + 0.0).round(2).tolist()) for way in every})).reshape(-1, 3)
         return len(distinct) != 2 or bool((distinct.sum(0) ** 2).sum() > 0.5)

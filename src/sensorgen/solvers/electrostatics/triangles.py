@@ -11,8 +11,8 @@ from math import atan2, hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from sensorgen.scene.sections import ROUNDING_MM
-from sensorgen.scene.unit_cell import SectionCell
+from sensorgen.scene.sections import ROUNDING_MM, Section
+from sensorgen.scene.unit_cell import SectionCell, cell
 
 Edge = tuple[int, int]
 Triangle = tuple[int, int, int]
@@ -49,9 +49,9 @@ def triangles(cell: SectionCell) -> Triangles:
     ValueError
         The electrodes touch, none lies opposite the other, or the field between them would leave the sensor.
     """
-    points, found = _all(cell)
+    points, filled = _all(cell)
     top, bottom = (
-        {p for corners, (what, _) in found if what == f"@{end}" for p in corners} for end in ("top", "bottom")
+        {p for corners, (what, _) in filled if what == f"@{end}" for p in corners} for end in ("top", "bottom")
     )
     places = sorted((*points[p], p in top) for p in top | bottom)
     for (x, z, end), (at, above, other) in pairwise(places):
@@ -59,7 +59,7 @@ def triangles(cell: SectionCell) -> Triangles:
             raise ValueError("the electrodes touch: the capacitance grows without bound")
     if top & bottom:
         raise ValueError("the electrodes touch: the capacitance grows without bound")
-    mesh, owners, inside = _triangulated(points, found)
+    mesh, owners, inside = _triangulated(points, filled)
     _refuse_open(points, owners, inside, cell)
     return mesh
 
@@ -75,34 +75,34 @@ def insulated(cell: SectionCell) -> Triangles:
     return _triangulated(*_all(cell))[0]
 
 
-def _triangulated(points: NDArray[np.float64], found: "_Found") -> tuple[Triangles, dict[Edge, list[int]], set[int]]:
+def _triangulated(points: NDArray[np.float64], filled: "_Filled") -> tuple[Triangles, dict[Edge, list[int]], set[int]]:
     """The mesh of all dielectric between the electrodes; the triangles at each edge; those that were kept."""
     owners: dict[Edge, list[int]] = defaultdict(list)
-    for number, (corners, _) in enumerate(found):
+    for number, (corners, _) in enumerate(filled):
         for edge in edges_of(corners):
             owners[edge].append(number)
-    inside = _between_electrodes(found, owners)
+    inside = _between_electrodes(filled, owners)
     terminals = {}
     for edge, sides in owners.items():
-        names = {found[n][1][0] for n in sides}
+        names = {filled[n][1][0] for n in sides}
         if names & {"@top", "@bottom"} and any(n in inside for n in sides):
             terminals[edge] = next(n[1:] for n in names if n.startswith("@"))
-    kept = sorted(inside)
-    regions = [found[n][1] for n in kept]
-    mesh = Triangles(points, flipped(points, [found[n][0] for n in kept], regions), regions, terminals)
+    numbers = sorted(inside)
+    regions = [filled[n][1] for n in numbers]
+    mesh = Triangles(points, flipped(points, [filled[n][0] for n in numbers], regions), regions, terminals)
     return apart(mesh), owners, inside
 
 
-def _between_electrodes(found: "_Found", owners: Mapping[Edge, Sequence[int]]) -> set[int]:
+def _between_electrodes(filled: "_Filled", owners: Mapping[Edge, Sequence[int]]) -> set[int]:
     """Dielectric triangles whose field runs from one electrode to the other."""
     beside: dict[int, list[int]] = defaultdict(list)
     for pair in (sides for sides in owners.values() if len(sides) == 2):
         beside[pair[0]].append(pair[1])
         beside[pair[1]].append(pair[0])
-    left = {n for n, (_, (what, _)) in enumerate(found) if what and not what.startswith("@")}
+    left = {n for n, (_, (what, _)) in enumerate(filled) if what and not what.startswith("@")}
     inside: set[int] = set()
     while left:
-        piece, ends = _piece(found, beside, left)
+        piece, ends = _piece(filled, beside, left)
         left -= piece
         inside |= piece if len(ends) == 2 else set()
     if not inside:
@@ -112,15 +112,15 @@ def _between_electrodes(found: "_Found", owners: Mapping[Edge, Sequence[int]]) -
 
 def apart(mesh: Triangles) -> Triangles:
     """Triangles with a point for each of the pieces that only touch there: no field runs through a point."""
-    for corner, found in fans(mesh.triangles).items():
-        if len(found) > 1:
+    for corner, meeting in fans(mesh.triangles).items():
+        if len(meeting) > 1:
             # One of a corner's fans with a new point at the same place
             new = len(mesh.points)
             corners, terminals = list(mesh.triangles), dict(mesh.terminals)
-            for n in found[1].members:
+            for n in meeting[1].members:
                 a, b, c = (new if k == corner else k for k in corners[n])
                 corners[n] = (a, b, c)
-            for spoke in found[1].spokes:
+            for spoke in meeting[1].spokes:
                 if name := terminals.pop((min(corner, spoke), max(corner, spoke)), ""):
                     terminals[spoke, new] = name
             return apart(Triangles(np.vstack([mesh.points, mesh.points[corner]]), corners, mesh.regions, terminals))
@@ -133,10 +133,10 @@ def edges_of(corners: Triangle) -> list[Edge]:
     return [(min(e), max(e)) for e in ((a, b), (b, c), (c, a))]
 
 
-_Found = list[tuple[Triangle, tuple[str, float]]]
+_Filled = list[tuple[Triangle, tuple[str, float]]]
 
 
-def _all(cell: SectionCell) -> tuple[NDArray[np.float64], _Found]:
+def _all(cell: SectionCell) -> tuple[NDArray[np.float64], _Filled]:
     """All triangles of a cell, those of electrodes with "@top" or "@bottom" for a material."""
     ends = [cell.slices[0].left_mm, *(s.right_mm for s in cell.slices)]
     levels = []  # heights at which anything meets the line between slice k - 1 and slice k
@@ -146,7 +146,7 @@ def _all(cell: SectionCell) -> tuple[NDArray[np.float64], _Found]:
         levels.append([z for n, z in enumerate(heights) if n == 0 or z - heights[n - 1] > ROUNDING_MM])
     first = np.concatenate([[0], np.cumsum([len(z) for z in levels])])
     points = np.array([(x, z) for x, heights in zip(ends, levels, strict=True) for z in heights])
-    found: _Found = []
+    filled: _Filled = []
     for k, (here, share) in enumerate(zip(cell.slices, cell.shares, strict=True)):
         for band in here.bands:
             taken = []  # levels from the band's lower to its upper line, at its left and right side
@@ -157,8 +157,8 @@ def _all(cell: SectionCell) -> tuple[NDArray[np.float64], _Found]:
             left, right = taken
             region = (f"@{band.terminal}" if band.terminal else band.material, share)
             polygon = [*left[::-1], *right]
-            found += [(corners, region) for corners in fan(points[polygon], polygon)]
-    return points, found
+            filled += [(corners, region) for corners in fan(points[polygon], polygon)]
+    return points, filled
 
 
 def fan(places: NDArray[np.float64], polygon: list[int]) -> Iterable[Triangle]:
@@ -191,14 +191,14 @@ _FLAT = 1e-12  # sine of the angle of three corners on a line
 _CONTACT_MM = 1e-7  # a gap below a tenth of a nanometre is contact
 
 
-def _piece(found: _Found, beside: dict[int, list[int]], left: set[int]) -> tuple[set[int], set[str]]:
+def _piece(filled: _Filled, beside: dict[int, list[int]], left: set[int]) -> tuple[set[int], set[str]]:
     """A connected piece of dielectric, and the electrodes that it touches."""
     todo = [next(iter(left))]
     piece, ends = set(todo), set()
     while todo:
         for n in beside[todo.pop()]:
-            if found[n][1][0].startswith("@"):
-                ends.add(found[n][1][0])
+            if filled[n][1][0].startswith("@"):
+                ends.add(filled[n][1][0])
             elif n in left and n not in piece:
                 piece.add(n)
                 todo.append(n)
@@ -234,8 +234,8 @@ def flipped(points: NDArray[np.float64], triangles: Sequence[Triangle], regions:
     regions : list
         Of each triangle; edges between different ones stay.
     """
-    made = list(triangles)
-    owner = {edge: n for n, corners in enumerate(made) for edge in _turns(corners)}
+    corners_of = list(triangles)
+    owner = {edge: n for n, corners in enumerate(corners_of) for edge in _turns(corners)}
     todo = [edge for edge in owner if edge[0] < edge[1]]
     places: list[tuple[float, float]] = [(float(x), float(y)) for x, y in points]
     while todo:
@@ -243,15 +243,15 @@ def flipped(points: NDArray[np.float64], triangles: Sequence[Triangle], regions:
         one, other = owner.get((a, b)), owner.get((b, a))
         if one is None or other is None or regions[one] != regions[other]:
             continue
-        c, d = _third(made[one], a, b), _third(made[other], a, b)
+        c, d = _third(corners_of[one], a, b), _third(corners_of[other], a, b)
         if not _is_better(*(places[k] for k in (a, b, c, d))):
             continue
         del owner[a, b], owner[b, a]
-        made[one], made[other] = (a, d, c), (d, b, c)
+        corners_of[one], corners_of[other] = (a, d, c), (d, b, c)
         for n in (one, other):
-            owner.update(dict.fromkeys(_turns(made[n]), n))
+            owner.update(dict.fromkeys(_turns(corners_of[n]), n))
         todo += [(a, d), (d, b), (b, c), (c, a)]
-    return made
+    return corners_of
 
 
 def _turns(corners: Triangle) -> list[Edge]:
@@ -311,7 +311,7 @@ def fans(triangles: Sequence[Triangle]) -> dict[int, list[Fan]]:
     around: dict[int, dict[int, tuple[int, int]]] = defaultdict(dict)
     for number, (a, b, c) in enumerate(triangles):
         around[a][b], around[b][c], around[c][a] = (number, c), (number, a), (number, b)
-    found: dict[int, list[Fan]] = defaultdict(list)
+    by_corner: dict[int, list[Fan]] = defaultdict(list)
     for corner, by_first in around.items():  # from each triangle's first spoke to its number and last spoke
         lasts = {last for _, last in by_first.values()}
         for start in [first for first in by_first if first not in lasts] or [next(iter(by_first))]:
@@ -322,5 +322,31 @@ def fans(triangles: Sequence[Triangle]) -> dict[int, list[Fan]]:
                 fan.members.append(number)
             if spoke != start:
                 fan.spokes.append(spoke)
-            found[corner].append(fan)
-    return found
+            by_corner[corner].append(fan)
+    return by_corner
+
+
+def energy(section: Section, height_mm: float, permittivity: Mapping[str, float]) -> float:
+    """Least energy of such potentials at 1 V, per depth and over eps0 [-], the same in each repeating cell.
+
+    Raises
+    ------
+    ValueError
+        The electrodes touch, none lies opposite the other, or the field between them would leave the sensor.
+    """
+    mesh = triangles(cell(section, height_mm))
+    used, corners = np.unique(np.array(mesh.triangles), return_inverse=True)
+    corners = corners.reshape(-1, 3)
+    points = mesh.points[used][corners]
+    sides = np.roll(points, -1, axis=1) - np.roll(points, -2, axis=1)
+    twice = np.abs(np.linalg.det(sides[:, :2]))
+    eps = np.array([permittivity[material] * share for material, share in mesh.regions])
+    stiffness = np.zeros((len(used),) * 2)
+    parts = (eps / (2 * twice))[:, None, None] * (sides @ sides.transpose(0, 2, 1))
+    np.add.at(stiffness, (corners[:, :, None], corners[:, None, :]), parts)
+    volts = np.full(len(used), np.nan)
+    for edge, name in mesh.terminals.items():
+        volts[np.searchsorted(used, edge)] = float(name == "top")
+    free = np.isnan(volts)
+    volts[free] = np.linalg.solve(stiffness[free][:, free], -stiffness[free][:, ~free] @ volts[~free])
+    return float(volts @ stiffness @ volts)

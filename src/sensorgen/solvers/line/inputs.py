@@ -198,26 +198,26 @@ def read(line: PressedLine) -> Inputs:
         if values["force_n"].any():
             raise MissingValue("the line needs modulus_pa: a force strains the film")
         values["modulus_pa"] = np.float64(1.0)  # type: ignore[assignment]
-    found = Inputs(values, far_load(line.far_end))
+    inputs = Inputs(values, far_load(line.far_end))
     try:
-        np.broadcast_shapes(*{v.shape for v in found.arrays()})
+        np.broadcast_shapes(*{v.shape for v in inputs.arrays()})
     except ValueError:
         shapes = ", ".join(f"{k} {v.shape}" for k, v in values.items() if v.ndim)
         raise BadInput(f"the line's inputs do not broadcast together: {shapes}") from None
     with np.errstate(all="ignore"):
-        _check(found)
-    return found
+        _check(inputs)
+    return inputs
 
 
 def numbers(name: str, given: Any, kinds: str = "biuf") -> Real:
     """Numbers of any shape, real unless ``kinds`` (of NumPy's dtypes) allows more; BadInput names what is none."""
     try:
-        found = np.asarray(given)
+        array = np.asarray(given)
     except ValueError:  # rows of unequal length
-        found = np.asarray("")
-    if found.dtype.kind not in kinds:
+        array = np.asarray("")
+    if array.dtype.kind not in kinds:
         raise BadInput(f"{name} takes numbers in SI units, not {str(given)[:60]!r}")
-    return found.astype(np.complex128 if "c" in kinds else np.float64, copy=False)
+    return array.astype(np.complex128 if "c" in kinds else np.float64, copy=False)
 
 
 def passive(name: str, given: Any) -> NDArray[Any]:
@@ -275,27 +275,27 @@ def far_load(far_end: ArrayLike) -> Real | None:
     return None if load.size and np.isposinf(load).all() else in_range("far_end", load)
 
 
-def _check(found: Inputs) -> None:
+def _check(inputs: Inputs) -> None:
     """Refuse a patch beyond the sensor, electrodes that touch, and a negative resistivity.
 
     Extremes of each quantity decide for a million samples, where they can.
     """
-    left, patch, length, force = (found[name] for name in ("left_m", "tip_m", "length_m", "force_n"))
+    left, patch, length, force = (inputs[name] for name in ("left_m", "tip_m", "length_m", "force_n"))
     if _highest(left) + _highest(patch) > _lowest(length):
         end = left + patch
         bad = np.asarray(end > length * (1 + ROUNDING))
         if bad.any():
             far, size = (float(np.broadcast_to(v, bad.shape)[bad].flat[0]) for v in (end, length))
             raise OutOfRange(f"the pressed patch ends at {far:g} m, beyond the sensor's {size:g} m")
-    touches_at = _lowest(found["width_m"]) * _lowest(patch) * _lowest(found["modulus_pa"])
+    touches_at = _lowest(inputs["width_m"]) * _lowest(patch) * _lowest(inputs["modulus_pa"])
     if not (touches_at > 0 and _highest(force) < touches_at * (1 - ROUNDING)):
-        strain = found.strain()
+        strain = inputs.strain()
         if np.isinf(strain).any():
             raise OutOfRange("a force presses on a patch without area: tip_m has to be above 0 where force_n is not 0")
         if (strain >= 1).any():
             raise OutOfRange(f"the force strains the film by {strain.max():.3g}: at 1 its electrodes touch (Eq. B.49)")
     for name in ("top_piezoresistance_per_n", "bottom_piezoresistance_per_n"):
-        if found[name].any() and (rise := found[name] * force).min(initial=0.0) < -1:
+        if inputs[name].any() and (rise := inputs[name] * force).min(initial=0.0) < -1:
             raise OutOfRange(f"{name} times force_n is {rise.min():.3g}: below -1 resistivity is negative")
 
 
@@ -307,8 +307,8 @@ def in_blocks(
     shape = np.broadcast_shapes(*set(shapes))
     first, *more = blocks(tuple(slice(0, n) for n in shape), shapes)
     if not more:
-        found = work(list(arrays))
-        return [np.array(np.broadcast_to(v, shape))[()] if np.shape(v) != shape else v[()] for v in found]
+        results_of = work(list(arrays))
+        return [np.array(np.broadcast_to(v, shape))[()] if np.shape(v) != shape else v[()] for v in results_of]
     results = [np.empty(shape, np.complex128) for _ in range(count)]
     for slices in (first, *more):
         for result, value in zip(results, work([_cut(v, slices) for v in arrays]), strict=True):

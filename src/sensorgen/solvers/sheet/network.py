@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.arrays import Complex, Real
-from sensorgen.solvers.sheet.grid import GridLines
-from sensorgen.solvers.sheet.parts import SIDES, Contact, Port, Sheet, SheetPatch
+from sensorgen.solvers.sheet.parts import SIDES, Contact, GridLines, Port, Sheet, SheetPatch
 
 Index = NDArray[np.intp]
 

@@ -9,9 +9,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
-from sensorgen.solvers.sheet.grid import axes, fold, folds
 from sensorgen.solvers.sheet.network import BY, links, network
-from sensorgen.solvers.sheet.parts import SIDES, Contact, Port, Sheet, SheetPatch, check, check_patch, contacts_of
+from sensorgen.solvers.sheet.parts import (
+    SIDES,
+    Contact,
+    Port,
+    Sheet,
+    SheetPatch,
+    axes,
+    check,
+    check_patch,
+    contacts_of,
+    fold,
+    folds,
+)
 
 COARSEST, FINEST = 10, 320  # cells between which a resolution is looked for
 _HIGHEST_HZ = 1e100
@@ -54,9 +65,23 @@ def solution(
             raise UnknownName("input of a sheet to differentiate by", name, BY)
     if names and not patch:
         raise OutOfRange("a derivative by a patch needs a patch")
-    if cells is not None:
-        return _once(sheet, ports, tones, patch, names, cells)
-    return _fine_enough(sheet, ports, tones, patch, names, accuracy)
+    asked = _Question(sheet, ports, tones, patch, names)
+    return _fine_enough(asked, accuracy) if cells is None else _once(asked, cells)
+
+
+@dataclass(frozen=True)
+class _Question:
+    """A sheet with its ports, frequencies [Hz], patch, and what to differentiate by."""
+
+    sheet: Sheet
+    ports: Sequence[Port]
+    tones: NDArray[Any]
+    patch: SheetPatch | None
+    names: tuple[str, ...]
+
+    def depth_m(self) -> float:
+        """Depth to which current reaches at the highest frequency [m]."""
+        return depth_m(self.sheet, float(self.tones.max()), self.patch)
 
 
 def depth_m(sheet: Sheet, frequency_hz: float, patch: SheetPatch | None = None) -> float:
@@ -76,47 +101,34 @@ def depth_m(sheet: Sheet, frequency_hz: float, patch: SheetPatch | None = None) 
 
 def frequencies(given: ArrayLike) -> Real:
     """Frequencies as an array [Hz], checked."""
-    found = np.atleast_1d(np.asarray(given))
-    if found.dtype.kind not in "iuf" or found.ndim != 1 or not found.size:
+    tones = np.atleast_1d(np.asarray(given))
+    if tones.dtype.kind not in "iuf" or tones.ndim != 1 or not tones.size:
         raise BadInput(f"frequency_hz takes numbers in Hz, not {str(given)[:60]!r}")
-    bad = found[~((found >= 0) & (found < _HIGHEST_HZ))]
+    bad = tones[~((tones >= 0) & (tones < _HIGHEST_HZ))]
     if bad.size:
         raise OutOfRange(f"frequency_hz has to be 0 or more and below {_HIGHEST_HZ:g}, not {bad[0]:g}")
-    return found.astype(float)
+    return tones.astype(float)
 
 
-def _once(
-    sheet: Sheet,
-    ports: Sequence[Port],
-    tones: NDArray[Any],
-    patch: SheetPatch | None,
-    names: tuple[str, ...],
-    cells: int,
-) -> Solution:
+def _once(asked: _Question, cells: int) -> Solution:
     if cells < 1:
         raise OutOfRange(f"a sheet needs one cell or more, not {cells}")
-    if not folds(ports, patch):
-        return _unfolded(sheet, ports, tones, patch, names, cells)
-    half, shares = fold(sheet)
-    sources = {name: shares.get(name, (name, 1.0)) for name in names}
+    if not folds(asked.ports, asked.patch):
+        return _unfolded(asked, cells)
+    half, shares = fold(asked.sheet)
+    sources = {name: shares.get(name, (name, 1.0)) for name in asked.names}
     of = tuple(dict.fromkeys(source for source, _ in sources.values()))
-    found = _unfolded(half, ports, tones, patch, of, cells)
-    by = {name: share * found.by[source] for name, (source, share) in sources.items()}
-    return Solution(found.impedance_ohm, by, cells, found.error)
+    folded = _unfolded(replace(asked, sheet=half, names=of), cells)
+    by = {name: share * folded.by[source] for name, (source, share) in sources.items()}
+    return Solution(folded.impedance_ohm, by, cells, folded.error)
 
 
-def _unfolded(
-    sheet: Sheet,
-    ports: Sequence[Port],
-    tones: NDArray[Any],
-    patch: SheetPatch | None,
-    names: tuple[str, ...],
-    cells: int,
-) -> Solution:
+def _unfolded(asked: _Question, cells: int) -> Solution:
+    sheet, ports, tones, names = asked.sheet, asked.ports, asked.tones, asked.names
     contacts = contacts_of(sheet, ports)
     grid = axes(sheet, contacts, cells)
     longest_m = max(axis.steps_m.max() for axis in grid)
-    depth = depth_m(sheet, float(tones.max()), patch)
+    depth = asked.depth_m()
     if longest_m > depth:
         need = float(cells * longest_m / depth) if depth else float("inf")
         finer = f"{int(np.ceil(need))} cells or more, or " if need < _ANY_CELLS else ""
@@ -124,7 +136,7 @@ def _unfolded(
             f"grid too coarse: at {tones.max():g} Hz current reaches {depth:.3g} m and a cell is {longest_m:.3g} m "
             f"long: use {finer}a lower frequency"
         )
-    of = links(sheet, grid, patch)
+    of = links(sheet, grid, asked.patch)
     net = network(sheet, grid, contacts, ports, of)
     z = np.empty((len(tones), len(ports), len(ports)), complex)
     by = {name: np.empty_like(z) for name in names}
@@ -139,31 +151,28 @@ def _unfolded(
     return Solution(z, by, cells, float("nan"))
 
 
-def _fine_enough(
-    sheet: Sheet, ports: Sequence[Port], tones: NDArray[Any], patch: SheetPatch | None, names: tuple[str, ...],
-    accuracy: float,
-) -> Solution:  # fmt: skip
+def _fine_enough(asked: _Question, accuracy: float) -> Solution:
     cells = COARSEST
-    reach = 2 * max(sheet.length_m, sheet.width_m) / depth_m(sheet, float(tones.max()), patch)
+    reach = 2 * max(asked.sheet.length_m, asked.sheet.width_m) / asked.depth_m()
     while cells < reach and cells < FINEST:
         cells *= 2
     before, error = None, float("inf")
     while cells <= FINEST:
-        found = _once(sheet, ports, tones, patch, names, cells)
+        finer = _once(asked, cells)
         if before is not None:
             # Largest change of resistance or reactance, relative to those of the two ports that it couples
-            finite = np.isfinite(found.impedance_ohm)
+            finite = np.isfinite(finer.impedance_ohm)
             worst = 0.0
             for part in (np.real, np.imag):
-                new, old = (np.where(finite, part(z), 0.0) for z in (found.impedance_ohm, before.impedance_ohm))
+                new, old = (np.where(finite, part(z), 0.0) for z in (finer.impedance_ohm, before.impedance_ohm))
                 own = np.sqrt(np.abs(np.einsum("fpp->fp", new)))
                 scale = own[:, :, None] * own[:, None, :]
                 relative = np.divide(np.abs(new - old), scale, out=np.zeros_like(scale), where=scale > 0)
                 worst = max(worst, float(relative.max()))
             error = worst / 2
             if error <= accuracy:
-                return Solution(found.impedance_ohm, found.by, cells, error)
-        before, cells = found, 2 * cells
+                return Solution(finer.impedance_ohm, finer.by, cells, error)
+        before, cells = finer, 2 * cells
     raise OutOfRange(
         f"{FINEST} cells reach a relative error of {error:.1g}, not {accuracy:g}: ask for less, or give the cells"
     )
@@ -298,9 +307,9 @@ def bounds(
     for count, (i, j) in enumerate(np.ndindex(places, places)):
         if done:
             done(count)
-        found = solution(sheet, ports, tones, _moved(press, float(x[i]), float(y[j])), BY, cells, ACCURACY)
-        z = np.einsum("fpp->fp", found.impedance_ohm)
-        by = {name: np.einsum("fpp->fp", value) / z for name, value in found.by.items()}
+        here = solution(sheet, ports, tones, _moved(press, float(x[i]), float(y[j])), BY, cells, ACCURACY)
+        z = np.einsum("fpp->fp", here.impedance_ohm)
+        by = {name: np.einsum("fpp->fp", value) / z for name, value in here.by.items()}
         by_force = sum((by[name] * slope for name, slope in per_newton.items()), np.zeros_like(z))
         # relative derivatives (3, tones, ports); noise relative to the magnitude in both parts
         relative = np.stack([by_force, by["x_m"], by["y_m"]])

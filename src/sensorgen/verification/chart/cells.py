@@ -55,34 +55,34 @@ def points(name: str, budget_s: float) -> list[ChartPoint]:
         A model is not asked for more where that would take longer, estimated as ten times the last one [s].
     """
     standard = STANDARD[name]()
-    area, found = standard.scene.size_mm[0] * standard.scene.size_mm[1] * M_PER_MM**2, []
+    area, measured = standard.scene.size_mm[0] * standard.scene.size_mm[1] * M_PER_MM**2, []
     for formula, law in thesis_cells.NAMED.items():
         if standard.shape in law.shapes:
             value, seconds = timed(partial(law.value_f_per_m2, standard.params, standard.permittivity["x60"]))
             label = f"thesis_cells: {formula.removeprefix('thesis-')}"
-            found.append(point(name, label, Interval(value, value), standard, seconds, bounded=False))
+            measured.append(point(name, label, Interval(value, value), standard, seconds, bounded=False))
     for model, module in capacitance_models().items():
         if not module.why_not_applicable(standard.scene):
             given = (standard.scene, standard.permittivity)
             for wanted, interval, seconds in _rungs(module.capacitance, given, module, budget_s):
-                found.append(point(name, model, interval.times(1 / area), standard, seconds, wanted=wanted))
+                measured.append(point(name, model, interval.times(1 / area), standard, seconds, wanted=wanted))
     for peer in () if name in _NO_PEERS else peers.FIELD:
         with suppress(ValueError):  # the scene is not for it
-            for said, work in () if peers.missing(peer) else peers.levels(peer, standard.scene, standard.permittivity):
+            for level, work in () if peers.missing(peer) else peers.levels(peer, standard.scene, standard.permittivity):
                 value, seconds = timed(work)
                 one = point(name, peer, Interval(value / area, value / area), standard, seconds, bounded=False)
-                found.append(replace(one, said=f"{said}{one.said}"))
+                measured.append(replace(one, said=f"{level}{one.said}"))
                 if seconds * _DEARER > budget_s:
                     break
-    return found
+    return measured
 
 
 def why_not_applicable(name: str) -> dict[str, str]:
     """Why models of capacitance do not apply to a scene."""
     scene = STANDARD[name]().scene
-    said = {model: module.why_not_applicable(scene) for model, module in capacitance_models().items()}
+    reasons = {model: module.why_not_applicable(scene) for model, module in capacitance_models().items()}
     only = "it has formulas of tri and rect alone"
-    return {model: why for model, why in said.items() if why} | {"thesis_cells": only}
+    return {model: why for model, why in reasons.items() if why} | {"thesis_cells": only}
 
 
 def _rungs(
@@ -112,11 +112,11 @@ def _rungs(
 
 
 def point(
-    scene: str, model: str, found: Interval, standard: KnownCapacitance, seconds: float, *,
+    scene: str, model: str, bounds: Interval, standard: KnownCapacitance, seconds: float, *,
     wanted: float | None = None, bounded: bool = True,
 ) -> ChartPoint:  # fmt: skip
     """Answer of a model per area, compared with the reference."""
-    off = [abs(bound / standard.capacitance_f_per_m2 - 1) for bound in (found.lower, found.upper)]
+    off = [abs(bound / standard.capacitance_f_per_m2 - 1) for bound in (bounds.lower, bounds.upper)]
     error = max(*off, standard.known_to)
-    said = f"{found.lower:.9g} to {found.upper:.9g} F/m²" if bounded else f"{found.lower:.9g} F/m²"
-    return ChartPoint(scene, model, error, seconds, said, bounded, wanted, found.lower, found.upper)
+    words = f"{bounds.lower:.9g} to {bounds.upper:.9g} F/m²" if bounded else f"{bounds.lower:.9g} F/m²"
+    return ChartPoint(scene, model, error, seconds, words, bounded, wanted, bounds.lower, bounds.upper)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sensorgen.models import conduction, line, sheet, stack, traxels
 from sensorgen.models.sheet import Sheet
 from sensorgen.scene.scene import Body, Scene, box
-from sensorgen.solvers.network.nodes import StraightLines
+from sensorgen.solvers.network import StraightLines
 from sensorgen.verification.chart.measured import DIGITS, ChartPoint, Level, climbed
 from sensorgen.verification.chart.rectilinear import plate
 

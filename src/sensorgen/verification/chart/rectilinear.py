@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensorgen.core.units import M_PER_MM
-from sensorgen.solvers.network.nodes import StraightLines
+from sensorgen.solvers.network import StraightLines
 
 WALLS = 2
 OVERLAP = 0.25  # of a line's width, by which infill reaches into the walls (PrusaSlicer's own)

@@ -15,14 +15,13 @@ from sensorgen.models import capacitance_models, thesis_cells
 from sensorgen.models.press2d import BoundaryConditions
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction import mesh_ladder, planning
-from sensorgen.prediction.capacitance import is_plate
+from sensorgen.prediction.capacitance import expected, is_plate
 from sensorgen.prediction.compression_law import CLOSED_FORM, elastic, law_of
-from sensorgen.prediction.cost_model import expected
 from sensorgen.prediction.query import Query
 from sensorgen.prediction.rest_state import rest_state
 from sensorgen.prediction.sensor_model import piece
 from sensorgen.solvers.line.inputs import PressedLine, read
-from sensorgen.verification import line_models, many_digits, peers
+from sensorgen.verification import line_models, peers
 from sensorgen.verification.apart import Work
 from sensorgen.verification.design_chart import works
 
@@ -136,16 +135,16 @@ def _capacitance(body: Body) -> Question:
             series.append(Series(f"thesis_cells: {name.removeprefix('thesis-')}", OWN, (("", work, 0.0),)))
     for name in peers.FIELD:
         try:
-            found = [] if peers.missing(name) else peers.levels(name, scene, eps)
+            runs = [] if peers.missing(name) else peers.levels(name, scene, eps)
             why = peers.missing(name)
         except ValueError as error:
-            found, why = [], str(error)
+            runs, why = [], str(error)
         if why:
             silent.append((name, why))
             continue
         levels = tuple(
             (said.rstrip(", "), partial(works.peer, name, scene, eps, k, count), 0.0)
-            for k, (said, _) in enumerate(found)
+            for k, (said, _) in enumerate(runs)
         )
         series.append(Series(name, name, levels))
     return Question("capacitance", "capacitance at rest", "C at rest", tuple(series), tuple(silent), (), largest)
@@ -157,11 +156,11 @@ def _compression(body: Body, stress_pa: float) -> Question:
     series, silent = [], [("springs", "it has a displacement and no capacitance")]
     for law in (*CLOSED_FORM, ""):
         try:
-            found = law_of(body.design, rest.answer, law, printed=None if body.is_drawn else pressed)
+            law_here = law_of(body.design, rest.answer, law, printed=None if body.is_drawn else pressed)
         except SensorgenError as error:
             silent.append((f"compression: {law}", str(error)))
             continue
-        if law or not (plate or not found.bounded):
+        if law or not (plate or not law_here.bounded):
             name = f"compression: {law or 'stored curve'}"
             series.append(Series(name, OWN, (("", partial(works.rise_by_law, body, law, stress_pa), 0.0),)))
     references: tuple[Reference, ...] = ()
@@ -227,7 +226,7 @@ def exact(line: PressedLine) -> tuple[complex, ...]:
     """Impedance of a line at every frequency, in many digits [ohm]."""
     r, y, length = read(line).sections()
     return tuple(
-        many_digits.impedance(
+        line_models.exact_impedance(
             [float(np.ravel(a)[0]) for a in r], [complex(np.ravel(a)[min(k, np.size(a) - 1)]) for a in y],
             [float(a) for a in length],
         )
@@ -278,17 +277,17 @@ def _seconds(body: Body, query: Query) -> float:
     return sum(c.expected_seconds or 0.0 for c in chosen)
 
 
-def largest(found: tuple[complex, ...], known: tuple[complex, ...]) -> float:
+def largest(answer: tuple[complex, ...], known: tuple[complex, ...]) -> float:
     """Largest relative distance [-]."""
-    return max(abs(a / b - 1) for a, b in zip(found, known, strict=True))
+    return max(abs(a / b - 1) for a, b in zip(answer, known, strict=True))
 
 
-def of_line(found: tuple[complex, ...], known: tuple[complex, ...]) -> float:
+def of_line(answer: tuple[complex, ...], known: tuple[complex, ...]) -> float:
     """The larger one of abs(Z) and of Re Z by itself, at the worst frequency [-]."""
-    real = (abs(a.real / b.real - 1) for a, b in zip(found, known, strict=True))
-    return max(largest(found, known), *real)
+    real = (abs(a.real / b.real - 1) for a, b in zip(answer, known, strict=True))
+    return max(largest(answer, known), *real)
 
 
-def of_modulus(found: tuple[complex, ...], known: tuple[complex, ...]) -> float:
+def of_modulus(answer: tuple[complex, ...], known: tuple[complex, ...]) -> float:
     """Of abs(Z), at the worst frequency [-]."""
-    return max(abs(abs(a) / abs(b) - 1) for a, b in zip(found, known, strict=True))
+    return max(abs(abs(a) / abs(b) - 1) for a, b in zip(answer, known, strict=True))

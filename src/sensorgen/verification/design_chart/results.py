@@ -184,8 +184,8 @@ def chart(
         silent += [Silent(question.key, *each) for each in question.silent]
         runs: list[tuple[Series, str, TimedAnswer]] = []
         for series in question.series:
-            found, why = _climbed(series, budget_s, partial(step, f"{question.key}: {series.model}"), runner)
-            runs += found
+            more, why = _climbed(series, budget_s, partial(step, f"{question.key}: {series.model}"), runner)
+            runs += more
             silent += [Silent(question.key, series.model, why)] if why else []
         known = list(question.references)
         if question.key == "prediction":
@@ -208,25 +208,25 @@ def _climbed(
     series: Series, budget_s: float, step: Callable[[], None], runner: Runner
 ) -> tuple[list[tuple[Series, str, TimedAnswer]], str]:
     """Runs of a model from coarse to fine until the next one would take too long; and why there are no more."""
-    found: list[tuple[Series, str, TimedAnswer]] = []
-    for said, work, expected_s in series.levels:
-        last_s = max((run.cold.cpu_s - _started_s(found) for _, _, run in found[-1:]), default=0.0)
+    done: list[tuple[Series, str, TimedAnswer]] = []
+    for level, work, expected_s in series.levels:
+        last_s = max((run.cold.cpu_s - _started_s(done) for _, _, run in done[-1:]), default=0.0)
         likely_s = max(expected_s, _DEARER * last_s if not expected_s else 0.0)
         if likely_s > budget_s and (
-            series.program == OWN or len(found) >= _LEAST or series.model in peers.SLOW_TO_CONVERGE
+            series.program == OWN or len(done) >= _LEAST or series.model in peers.SLOW_TO_CONVERGE
         ):
-            return found, f"{said}: some {likely_s:.2g} s, more than --budget {budget_s:g}".removeprefix(": ")
+            return done, f"{level}: some {likely_s:.2g} s, more than --budget {budget_s:g}".removeprefix(": ")
         step()
         try:
-            found.append((series, said, runner(work)))
+            done.append((series, level, runner(work)))
         except SensorgenError as error:
-            return found, f"{said}: {error}".removeprefix(": ")
-    return found, ""
+            return done, f"{level}: {error}".removeprefix(": ")
+    return done, ""
 
 
-def _started_s(found: Sequence[tuple[Series, str, TimedAnswer]]) -> float:
+def _started_s(done: Sequence[tuple[Series, str, TimedAnswer]]) -> float:
     """Start of a process and loading of libraries, at most: the least difference of cold and warm [s]."""
-    return min((run.cold.cpu_s - run.warm.cpu_s for _, _, run in found), default=0.0)
+    return min((run.cold.cpu_s - run.warm.cpu_s for _, _, run in done), default=0.0)
 
 
 def _from(runs: Sequence[tuple[Series, str, TimedAnswer]]) -> Iterator[Reference]:
@@ -273,7 +273,7 @@ def _best(references: Sequence[Reference], program: str) -> Reference:
     return min(others or references, key=lambda r: r.doubt)
 
 
-def _point(question: Question, series: Series, said: str, run: TimedAnswer, references: Sequence[Reference]) -> Point:
+def _point(question: Question, series: Series, level: str, run: TimedAnswer, references: Sequence[Reference]) -> Point:
     """A run beside the best answer of another program; beside one of its own program where there is no other."""
     reference = _best(references, series.program)
     answer = run.answer
@@ -286,7 +286,7 @@ def _point(question: Question, series: Series, said: str, run: TimedAnswer, refe
             for end in (1 - answer.stated, 1 + answer.stated)
         )
     return Point(
-        question.key, series.model, said, series.program, max(off, reference.doubt), reference.doubt, answer.stated,
+        question.key, series.model, level, series.program, max(off, reference.doubt), reference.doubt, answer.stated,
         run.cold.cpu_s, run.warm.cpu_s, run.cold.wall_s, run.warm.wall_s, run.memory_mb, reference.name,
         reference.program != series.program, answer.certified, contradicted,
     )  # fmt: skip

@@ -50,12 +50,12 @@ class PlaneSection:
 
     def held(self) -> dict[Edge, str]:
         """Edges of dielectrics on an electrode, and which one."""
-        found = {}
+        by_edge = {}
         for edge, sides in self.faces.items():
             ends = [s for s in sides if s in ENDS]
             if len(ends) == 1 and all(sides):
-                found[edge] = ends[0]
-        return found
+                by_edge[edge] = ends[0]
+        return by_edge
 
 
 def geometry(scene: Scene) -> PlaneSection | Grid:
@@ -68,10 +68,10 @@ def geometry(scene: Scene) -> PlaneSection | Grid:
     """
     if reason := unmirrored(scene):
         raise ValueError(reason)
-    found = sections(scene)
-    if len(found) > 1:
+    cuts = sections(scene)
+    if len(cuts) > 1:
         return grid(scene)
-    return _plane(found[0], scene.size_mm[2])
+    return _plane(cuts[0], scene.size_mm[2])
 
 
 def _plane(section: Section, height_mm: float) -> PlaneSection:
@@ -111,16 +111,16 @@ def _polygons(part: Slice, heights: dict[float, set[float]]) -> Iterator[tuple[s
             yield band.terminal or band.material, [*up, *down]
 
 
-def share(found: PlaneSection | Grid) -> float:
+def share(cell: PlaneSection | Grid) -> float:
     """Number of cells in the sensor [-]; raises ValueError where the sensor's end cuts the cell."""
-    if np.ptp(found.shares) > ROUNDING_MM:
+    if np.ptp(cell.shares) > ROUNDING_MM:
         raise ValueError("the sensor's end cuts its repeating cell")
-    return float(np.ravel(found.shares)[0])
+    return float(np.ravel(cell.shares)[0])
 
 
-def permittivities(found: PlaneSection, permittivity: "dict[str, float]") -> Real:
+def permittivities(section: PlaneSection, permittivity: "dict[str, float]") -> Real:
     """Of each triangle, times how often it occurs [-]."""
-    return np.array([permittivity[name] for name in found.materials]) * found.shares
+    return np.array([permittivity[name] for name in section.materials]) * section.shares
 
 
 def nodes(planes_mm: Real, layers: int) -> Real:

@@ -35,11 +35,11 @@ class _Face:
     within_mm: Real
 
 
-def capacitance(found: cells.PlaneSection | Grid, permittivity: Mapping[str, float], panels: int) -> float:
+def capacitance(cell: cells.PlaneSection | Grid, permittivity: Mapping[str, float], panels: int) -> float:
     """Of the whole sensor [F], by so many panels along the height of the cell."""
     import fastcap2
 
-    faces = list(_of_plane(found) if isinstance(found, cells.PlaneSection) else _of_boxes(found))
+    faces = list(_of_plane(cell) if isinstance(cell, cells.PlaneSection) else _of_boxes(cell))
     corners = np.array([f.corner_mm + k * f.along_mm + n * f.across_mm for f in faces for k in (0, 1) for n in (0, 1)])
     low, high = corners.min(0), corners.max(0)
     height, size = high[2] - low[2], high - low
@@ -64,12 +64,12 @@ def capacitance(found: cells.PlaneSection | Grid, permittivity: Mapping[str, flo
                         surfaces[key].add_quad(*moved)
                     else:
                         surfaces[key].add_quad(*moved, rp=tuple(within))
-    return _charge(surfaces, permittivity) * cells.share(found) * _depths(found, size)
+    return _charge(surfaces, permittivity) * cells.share(cell) * _depths(cell, size)
 
 
-def _depths(found: cells.PlaneSection | Grid, size_mm: Real) -> float:
+def _depths(cell: cells.PlaneSection | Grid, size_mm: Real) -> float:
     """Number of cells, as deep as taken, in the sensor's depth [-]."""
-    return found.depth_mm / float(size_mm[1]) if isinstance(found, cells.PlaneSection) else 1.0
+    return cell.depth_mm / float(size_mm[1]) if isinstance(cell, cells.PlaneSection) else 1.0
 
 
 def _charge(surfaces: "Mapping[tuple[str, str], object]", permittivity: Mapping[str, float]) -> float:
@@ -96,23 +96,23 @@ def _charge(surfaces: "Mapping[tuple[str, str], object]", permittivity: Mapping[
 @contextmanager
 def _mute() -> Iterator[None]:
     """Keep off the standard output what the program writes there past Python."""
-    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    before, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
     try:
         yield
     finally:
-        os.dup2(kept, 1)
-        os.close(kept)
+        os.dup2(before, 1)
+        os.close(before)
         os.close(nowhere)
 
 
 def _image(place: Real, i: int, j: int, low: Real, size: Real) -> Real:
     """A place in the i-th and j-th mirror image of the cell."""
-    found = np.array(place, float)
+    image = np.array(place, float)
     for axis, k in enumerate((i, j)):
-        inside = found[axis] - low[axis]
-        found[axis] = low[axis] + k * size[axis] + (size[axis] - inside if k % 2 else inside)
-    return found
+        inside = image[axis] - low[axis]
+        image[axis] = low[axis] + k * size[axis] + (size[axis] - inside if k % 2 else inside)
+    return image
 
 
 def _panels(face: _Face, longest_mm: float) -> Iterator[list[Real]]:
@@ -124,25 +124,25 @@ def _panels(face: _Face, longest_mm: float) -> Iterator[list[Real]]:
             yield [face.corner_mm + a / n * face.along_mm + b / m * face.across_mm for a, b in steps]
 
 
-def _of_plane(found: cells.PlaneSection) -> Iterator[_Face]:
+def _of_plane(section: cells.PlaneSection) -> Iterator[_Face]:
     """Edges of a cross-section, as deep as the cell is wide."""
-    depth = np.array([0.0, float(np.ptp(found.points_mm[:, 0])), 0.0])
-    for ((ua, va), (ub, vb)), sides in found.faces.items():
+    depth = np.array([0.0, float(np.ptp(section.points_mm[:, 0])), 0.0])
+    for ((ua, va), (ub, vb)), sides in section.faces.items():
         corner, along = np.array([ua, 0.0, va]), np.array([ub - ua, 0.0, vb - va])
         left = np.array([va - vb, 0.0, ub - ua])
         yield from _sided(corner, along, depth, left / 2, sides)
 
 
-def _of_boxes(found: Grid) -> Iterator[_Face]:
+def _of_boxes(grid: Grid) -> Iterator[_Face]:
     """Faces between boxes of two kinds."""
-    names = [name.removeprefix("@") for name in found.names]
-    widths = [np.diff(p) for p in found.planes_mm]
+    names = [name.removeprefix("@") for name in grid.names]
+    widths = [np.diff(p) for p in grid.planes_mm]
     for axis in range(3):
-        after, before = (np.moveaxis(found.fill, axis, 0)[s] for s in (slice(1, None), slice(None, -1)))
+        after, before = (np.moveaxis(grid.fill, axis, 0)[s] for s in (slice(1, None), slice(None, -1)))
         one, other = (k for k in range(3) if k != axis)
         for at in np.argwhere((after != before) & (after >= 0) & (before >= 0)).tolist():
             place = dict(zip((axis, one, other), (at[0] + 1, *at[1:]), strict=True))
-            corner = np.array([found.planes_mm[k][place[k]] for k in range(3)])
+            corner = np.array([grid.planes_mm[k][place[k]] for k in range(3)])
             along, across = (np.eye(3)[k] * widths[k][place[k]] for k in (one, other))
             sides = names[after[tuple(at)]], names[before[tuple(at)]]
             yield from _sided(corner, along, across, np.eye(3)[axis] * widths[axis].min() / 2, sides)

@@ -18,30 +18,30 @@ _BRICK = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 
 _SIDES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (2, 3, 7, 6), (1, 2, 6, 5), (3, 0, 4, 7))  # of a brick
 
 
-def plane(found: cells.PlaneSection, permittivity: Mapping[str, float], unknowns: int) -> float:
+def plane(section: cells.PlaneSection, permittivity: Mapping[str, float], unknowns: int) -> float:
     """From above [F]: triangles are refined until there are that many unknowns."""
     import netgen.meshing as netgen
     import ngsolve as ng
 
-    values = cells.permittivities(found, dict(permittivity))
+    values = cells.permittivities(section, dict(permittivity))
     kinds, which = np.unique(values, return_inverse=True)
-    made = netgen.Mesh(2)
-    made.AddPoints(np.column_stack([found.points_mm, np.zeros(len(found.points_mm))]))
+    netgen_mesh = netgen.Mesh(2)
+    netgen_mesh.AddPoints(np.column_stack([section.points_mm, np.zeros(len(section.points_mm))]))
     for k in range(len(kinds)):
-        made.Add(netgen.FaceDescriptor(surfnr=k + 1, domin=k + 1, domout=0, bc=k + 1))
-        made.AddElements(dim=2, index=k + 1, data=found.triangles[which == k].astype(np.int32), base=0)
-        made.SetMaterial(k + 1, f"m{k}")
-    number = {tuple(p): k for k, p in enumerate(found.points_mm.tolist())}
+        netgen_mesh.Add(netgen.FaceDescriptor(surfnr=k + 1, domin=k + 1, domout=0, bc=k + 1))
+        netgen_mesh.AddElements(dim=2, index=k + 1, data=section.triangles[which == k].astype(np.int32), base=0)
+        netgen_mesh.SetMaterial(k + 1, f"m{k}")
+    number = {tuple(p): k for k, p in enumerate(section.points_mm.tolist())}
     for k, end in enumerate(cells.ENDS):
-        edges = [[number[a], number[b]] for (a, b), held in found.held().items() if held == end]
-        made.AddElements(dim=1, index=k + 1, data=np.array(edges, np.int32), base=0)
-        made.SetBCName(k, end)
-    mesh = ng.Mesh(made)
+        edges = [[number[a], number[b]] for (a, b), name in section.held().items() if name == end]
+        netgen_mesh.AddElements(dim=1, index=k + 1, data=np.array(edges, np.int32), base=0)
+        netgen_mesh.SetBCName(k, end)
+    mesh = ng.Mesh(netgen_mesh)
     eps = ng.CoefficientFunction(kinds.tolist())
     while True:
         energy, field, count = _solved(ng, mesh, eps, _ORDER)
         if count >= unknowns:
-            return energy * EPS0_F_PER_M * M_PER_MM * found.depth_mm
+            return energy * EPS0_F_PER_M * M_PER_MM * section.depth_mm
         smooth = ng.GridFunction(ng.HDiv(mesh, order=_ORDER - 1))
         smooth.Set(eps * ng.grad(field))
         off = eps * ng.grad(field) - smooth
@@ -64,40 +64,40 @@ def _solved(ng: Any, mesh: Any, eps: Any, order: int) -> tuple[float, Any, int]:
     return float(energy), field, fes.ndof
 
 
-def boxes(found: Grid, permittivity: Mapping[str, float], layers: int, order: int) -> float:
+def boxes(grid: Grid, permittivity: Mapping[str, float], layers: int, order: int) -> float:
     """From above [F], each box of the cell with so many layers that shrink towards its edges."""
     import netgen.meshing as netgen
     import ngsolve as ng
 
-    planes = [cells.nodes(p, layers) for p in found.planes_mm]
+    planes = [cells.nodes(p, layers) for p in grid.planes_mm]
     pieces = 2 * layers + 1
-    fill = found.fill.repeat(pieces, 0).repeat(pieces, 1).repeat(pieces, 2)
-    shares = found.shares.repeat(pieces, 0).repeat(pieces, 1)
-    values = np.array([0.0, 0.0, *(permittivity[name] for name in found.names[2:])])
+    fill = grid.fill.repeat(pieces, 0).repeat(pieces, 1).repeat(pieces, 2)
+    shares = grid.shares.repeat(pieces, 0).repeat(pieces, 1)
+    values = np.array([0.0, 0.0, *(permittivity[name] for name in grid.names[2:])])
     kinds = {v: k + 1 for k, v in enumerate(np.unique((values[fill] * shares[:, :, None])[fill > 1]))}
-    made = netgen.Mesh(3)
-    made.Add(netgen.FaceDescriptor(surfnr=1, domin=1, domout=0, bc=1))
-    made.Add(netgen.FaceDescriptor(surfnr=2, domin=1, domout=0, bc=2))
+    netgen_mesh = netgen.Mesh(3)
+    netgen_mesh.Add(netgen.FaceDescriptor(surfnr=1, domin=1, domout=0, bc=1))
+    netgen_mesh.Add(netgen.FaceDescriptor(surfnr=2, domin=1, domout=0, bc=2))
     points: dict[tuple[int, ...], Any] = {}
 
     def point(at: tuple[int, ...]) -> Any:
         if at not in points:
-            points[at] = made.Add(netgen.MeshPoint(netgen.Pnt(*(float(planes[n][k]) for n, k in enumerate(at)))))
+            points[at] = netgen_mesh.Add(netgen.MeshPoint(netgen.Pnt(*(float(planes[n][k]) for n, k in enumerate(at)))))
         return points[at]
 
     padded = np.pad(fill, 1, constant_values=-1)
     for at in np.argwhere(fill > 1).tolist():
         corners = [point(tuple(a + d for a, d in zip(at, step, strict=True))) for step in _BRICK]
-        made.Add(netgen.Element3D(kinds[values[fill[tuple(at)]] * shares[at[0], at[1]]], corners))
+        netgen_mesh.Add(netgen.Element3D(kinds[values[fill[tuple(at)]] * shares[at[0], at[1]]], corners))
         x, y, z = (a + 1 for a in at)
         around = (padded[x, y, z - 1], padded[x, y, z + 1], padded[x, y - 1, z], padded[x, y + 1, z],
                   padded[x + 1, y, z], padded[x - 1, y, z])  # fmt: skip
         for side, neighbour in zip(_SIDES, around, strict=True):
             if neighbour in (0, 1):
-                made.Add(netgen.Element2D(int(neighbour) + 1, [corners[k] for k in side]))
-    made.SetBCName(0, "bottom")
-    made.SetBCName(1, "top")
+                netgen_mesh.Add(netgen.Element2D(int(neighbour) + 1, [corners[k] for k in side]))
+    netgen_mesh.SetBCName(0, "bottom")
+    netgen_mesh.SetBCName(1, "top")
     for k in kinds.values():
-        made.SetMaterial(k, f"m{k}")
-    energy, _, _ = _solved(ng, ng.Mesh(made), ng.CoefficientFunction(list(kinds)), order)
+        netgen_mesh.SetMaterial(k, f"m{k}")
+    energy, _, _ = _solved(ng, ng.Mesh(netgen_mesh), ng.CoefficientFunction(list(kinds)), order)
     return energy * EPS0_F_PER_M * M_PER_MM

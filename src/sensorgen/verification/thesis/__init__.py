@@ -1,8 +1,7 @@
 """The thesis, reproduced: every numbered equation, table and figure with its value, ours, and a verdict."""
 
 from sensorgen.verification.thesis.markdown import markdown
-from sensorgen.verification.thesis.page import html
-from sensorgen.verification.thesis.plain import plain
+from sensorgen.verification.thesis.page import html, plain
 from sensorgen.verification.thesis.reproduced import ReproducedItem, rows
 
 __all__ = ["ReproducedItem", "html", "markdown", "plain", "rows"]

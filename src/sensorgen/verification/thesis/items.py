@@ -76,3 +76,8 @@ def chapter(name: str) -> Chapter:
     data = yamlfile.parse((resources.files("sensorgen.verification.thesis") / file).read_text("utf-8"), file)
     with within(file):
         return checked(Chapter, data)
+
+
+def table(number: str) -> dict[str, Any]:
+    """Values of a table of the thesis, as the chapters keep it."""
+    return next(item.given for item in chapter(number.partition(".")[0]).tables if item.number == number)

@@ -1,8 +1,11 @@
-"""The reproduction as one HTML page that needs no network: filtered by chapter, kind and verdict."""
+"""The reproduction as one HTML page that needs no network, filtered by chapter, kind and verdict; and as plain data."""
 
 from collections.abc import Sequence
+from typing import Any
 
+import numpy as np
 from markupsafe import Markup, escape
+from numpy.typing import ArrayLike
 
 from sensorgen.analysis.plots.pages import render
 from sensorgen.verification.thesis import shown
@@ -30,3 +33,31 @@ def _code(text: str) -> Markup:
         Markup("<code>{}</code>").format(part) if k % 2 else escape(part) for k, part in enumerate(text.split("`"))
     )
     return Markup("").join(parts)
+
+
+def plain(rows: Sequence[ReproducedItem]) -> list[dict[str, Any]]:
+    """One mapping per item, with every value at full length."""
+    return [
+        {
+            "chapter": row.chapter, "kind": row.kind, "number": row.item.number, "says": row.item.says,
+            "model": row.item.check, "verdict": row.verdict.word, "why": row.verdict.why, "erratum": row.item.erratum,
+            "tolerance": row.item.tolerance,
+            "parts": [
+                {"name": part.name, "unit": part.unit, "printed": _values(part.printed), "ours": _values(part.ours),
+                 "corrected": _values(part.corrected)} for part in row.parts
+            ],
+        }
+        for row in rows
+    ]  # fmt: skip
+
+
+def _values(values: ArrayLike | None) -> Any:
+    """Numbers as JSON has them: complex ones as pairs, none for what is no number."""
+    if values is None:
+        return None
+    found = np.asarray(values)
+    if np.iscomplexobj(found):
+        found = np.stack([found.real, found.imag], -1)
+    plain = found.astype(object)
+    plain[~np.isfinite(found)] = None
+    return plain.tolist()

@@ -10,7 +10,7 @@ from sensorgen.checks.review import Review, Step
 from sensorgen.core import files as store
 from sensorgen.core.document import Part
 from sensorgen.core.errors import BadInput, OutOfRange, Unprintable
-from sensorgen.core.findings import Finding, headline, verdict
+from sensorgen.core.findings import headline
 from sensorgen.core.parallel import remembered
 from sensorgen.design.design import Design
 from sensorgen.export import threemf
@@ -19,10 +19,9 @@ from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.results import Prediction, timeless
 from sensorgen.prediction.slices import reviewed
-from sensorgen.workflows.batch import picture, printing, record, sheet, tab
+from sensorgen.workflows.batch import labelling, layout, printing, record
 from sensorgen.workflows.batch.layout import Plate, Room, Size, column, packed, room
-from sensorgen.workflows.batch.pieces import PrintPiece, pieces, shuffled, texts, tools
-from sensorgen.workflows.batch.plan import BatchPlan, load
+from sensorgen.workflows.batch.plan import BatchPlan, PrintPiece, load, pieces, shuffled, texts, tools
 from sensorgen.workflows.batch.record import BatchRecord, ResolvedDesign, SlicedPlate
 from sensorgen.workflows.build import json_bytes, versions
 
@@ -71,22 +70,19 @@ class Batch:
         Where the files are.
     record : BatchRecord
         As in ``batch.json``.
-    findings : dict of str to list of Finding
-        Findings about each design printed alone, by its name.
-    sources : dict of str to str
-        Their sources: slicer and version, or that a print is estimated, and why.
+    reviews : dict of str to Review
+        Findings about each design printed alone, and their source, by its name.
     """
 
     folder: Path
     record: BatchRecord
-    findings: dict[str, list[Finding]]
-    sources: dict[str, str]
+    reviews: dict[str, Review]
 
     def errors(self, *, force: bool = False) -> bool:
         """True where a file for the printer has errors, or, unless ``force``, a design is to be changed."""
         plates = self.record.slicers.values()
-        change = any(verdict(found) == "CHANGE" for found in self.findings.values())
-        missing = any(made.lost for plate in plates for made in plate.printed.values())
+        change = any(review.verdict == "CHANGE" for review in self.reviews.values())
+        missing = any(one.lost for plate in plates for one in plate.printed.values())
         return any(plate.errors() for plate in plates) or ((change or missing) and not force)
 
     def to_json(self) -> str:
@@ -97,7 +93,7 @@ class Batch:
         """The record, the numbers of findings, and the folder."""
         yield from self.record.document()
         yield ""
-        yield from (headline(name, found, self.sources[name]) for name, found in self.findings.items())
+        yield from (headline(name, review.findings, review.source) for name, review in self.reviews.items())
         yield f"{self.folder}: {len(self.record.files) + 1} files"
 
 
@@ -117,27 +113,27 @@ def arranged(path: Path) -> Arranged:
         One of its specimens fits on no plate.
     """
     plan = load(path)
-    found = shuffled(pieces(plan, path.parent), plan.seed)
-    first = found[0].design
-    count = len(tools(piece.design for piece in found))
+    specimens = shuffled(pieces(plan, path.parent), plan.seed)
+    first = specimens[0].design
+    count = len(tools(piece.design for piece in specimens))
     here = room(first.machine, first.layers, count, plan.layout.spacing_mm, plan.layout.brim_mm)
     layout = packed if plan.layout.kind == "packed" else column(plan.layout.per_column)
     try:
-        plates = layout([_size(plan, piece) for piece in found], here)
+        plates = layout([_size(plan, piece) for piece in specimens], here)
     except OutOfRange as error:
         raise error.within(str(path)) from None
     if len(plates) > 1:
         raise BadInput(
-            f"{path}: {len(found)} specimens need {len(plates)} plates, {len(plates[0])} of them on the first "
+            f"{path}: {len(specimens)} specimens need {len(plates)} plates, {len(plates[0])} of them on the first "
             f"(layout {plan.layout.kind}, {here.gap_mm:g} mm apart): make {len(plates)} plans, or ask for fewer"
         )
-    return Arranged(plan, found, here, plates[0])
+    return Arranged(plan, specimens, here, plates[0])
 
 
 def _size(plan: BatchPlan, piece: PrintPiece) -> Size:
     """Length and width that a specimen takes on the plate, its tab included [mm]."""
     length, width, _ = piece.design.printed.size_mm
-    return (length + tab.size_mm(piece.design, piece.name)[0], width) if plan.labels.tab else (length, width)
+    return (length + labelling.size_mm(piece.design, piece.name)[0], width) if plan.labels.tab else (length, width)
 
 
 def make(
@@ -185,68 +181,67 @@ def make(
         nothing was written.
     """
     step("plan")
-    found = arranged(path)
+    placed = arranged(path)
     step("checks")
-    held = {key: reviewed(design) for key, design in found.designs.items()}
-    _refuse_unprintable(found, held, force=force, strict=strict)
+    reviews = {key: reviewed(design) for key, design in placed.designs.items()}
+    _refuse_unprintable(placed, reviews, force=force, strict=strict)
     step("predictions")
-    prints = [(bodies.of_file(design, held[key].file),) for key, design in found.designs.items()]
+    prints = [(bodies.of_file(design, reviews[key].file),) for key, design in placed.designs.items()]
     known = dict(remembered(evaluate, prints, jobs, cluster=cluster))
-    predicted = {key: timeless(known[k]) for k, key in enumerate(found.designs)}
-    folder = out / found.plan.name
+    predicted = {key: timeless(known[k]) for k, key in enumerate(placed.designs)}
+    folder = out / placed.plan.name
     with store.staging(folder) as stage:
         step("3MF")
         store.write(stage, {"plan.yaml": path.read_bytes()})
-        on_plate = printing.placed(found.plan, found.pieces, found.plate)
-        slicers = found.plan.slicers if gcode else ()
+        on_plate = printing.placed(placed.plan, placed.pieces, placed.plate)
+        slicers = placed.plan.slicers if gcode else ()
         sliced_from = {"prusa"} & set(slicers)  # slicing leaves the 3MF that it took; CuraEngine takes none
         families = [family for family in threemf.FAMILIES if family not in sliced_from]
-        for name, content in (*printing.threemfs(found.plan.name, on_plate, families), *_files(found, log_head)):
+        for name, content in (*printing.threemfs(placed.plan.name, on_plate, families), *_files(placed, log_head)):
             store.write(stage, {name: content})
         sliced: dict[str, SlicedPlate] = {
-            s: printing.gcode(found.plan.name, on_plate, s, stage, time_limit_s, step) for s in slicers
+            s: printing.gcode(placed.plan.name, on_plate, s, stage, time_limit_s, step) for s in slicers
         }
         step("record")
-        made = _record(found, predicted, sliced, stage).sealed()
-        store.write(stage, {record.RECORD: made.to_json().encode()})
+        batch = _record(placed, predicted, sliced, stage).sealed()
+        store.write(stage, {record.RECORD: batch.to_json().encode()})
         store.publish(stage, folder, record.RECORD)
     step("done")
-    named = {found.designs[key].name: of for key, of in held.items()}
-    return Batch(folder, made, {k: of.findings for k, of in named.items()}, {k: of.source for k, of in named.items()})
+    return Batch(folder, batch, {placed.designs[key].name: review for key, review in reviews.items()})
 
 
-def _refuse_unprintable(found: Arranged, held: Mapping[str, Review], *, force: bool, strict: bool) -> None:
-    wrong = [key for key in held if held[key].errors(strict)]
+def _refuse_unprintable(placed: Arranged, reviews: Mapping[str, Review], *, force: bool, strict: bool) -> None:
+    wrong = [key for key in reviews if reviews[key].errors(strict)]
     if wrong and not force:
-        every = [f for key in wrong for f in held[key].findings]
-        stopping = [f for key in wrong for f in held[key].errors(strict)]
-        raise Unprintable(every, stopping).within(found.designs[wrong[0]].name)
+        every = [f for key in wrong for f in reviews[key].findings]
+        stopping = [f for key in wrong for f in reviews[key].errors(strict)]
+        raise Unprintable(every, stopping).within(placed.designs[wrong[0]].name)
 
 
-def _files(found: Arranged, log_head: str) -> Iterator[tuple[str, bytes]]:
+def _files(placed: Arranged, log_head: str) -> Iterator[tuple[str, bytes]]:
     """Files for people: designs, plate and labels."""
-    plan, machine = found.plan, found.pieces[0].design.machine
-    for key, design in found.designs.items():
+    plan, machine = placed.plan, placed.pieces[0].design.machine
+    for key, design in placed.designs.items():
         yield f"designs/{key}.json", json_bytes(design.model_dump(mode="json"))
-    yield "plate.svg", picture.svg(plan.name, machine, found.room, found.plate, found.pieces).encode()
+    yield "plate.svg", layout.svg(plan.name, machine, placed.room, placed.plate, placed.pieces).encode()
     if plan.labels.sheet:
-        places = enumerate(found.plate, 1)
-        labels = [sheet.Label.of(found.pieces[n], plan.name, order, log_head) for order, n in places]
-        yield "labels.html", sheet.page(labels, plan.name).encode()
+        places = enumerate(placed.plate, 1)
+        labels = [labelling.Label.of(placed.pieces[n], plan.name, order, log_head) for order, n in places]
+        yield "labels.html", labelling.page(labels, plan.name).encode()
 
 
 def _record(
-    found: Arranged, predicted: dict[str, Prediction], sliced: dict[str, SlicedPlate], stage: Path
+    placed: Arranged, predicted: dict[str, Prediction], sliced: dict[str, SlicedPlate], stage: Path
 ) -> BatchRecord:  # fmt: skip
-    plan, first = found.plan, found.pieces[0].design
-    loaded = record.tools(plan, found.tools, texts(found.designs.values()))
+    plan, first = placed.plan, placed.pieces[0].design
+    loaded = record.tools(plan, placed.tools, texts(placed.designs.values()))
     for plate in reversed(sliced.values()):
-        predicted |= {key: made.prediction for key, made in plate.printed.items() if made.prediction}
+        predicted |= {key: one.prediction for key, one in plate.printed.items() if one.prediction}
     return BatchRecord(
         batch=plan.name, iteration=plan.iteration, seed=plan.seed, printer=first.machine.name,
-        quality=first.layers.name, layout=plan.layout, tower=found.room.kept, tools=loaded,
+        quality=first.layers.name, layout=plan.layout, tower=placed.room.kept, tools=loaded,
         checklist=record.checklist(plan, loaded), bake=plan.bake,
-        specimens=record.specimens(found.pieces, found.plate), predictions=predicted,
-        designs={key: ResolvedDesign(design.name, design.resolved()) for key, design in found.designs.items()},
+        specimens=record.specimens(placed.pieces, placed.plate), predictions=predicted,
+        designs={key: ResolvedDesign(design.name, design.resolved()) for key, design in placed.designs.items()},
         slicers=sliced, versions=versions(), files=store.hashes(stage),
     )  # fmt: skip

@@ -15,8 +15,7 @@ from sensorgen.design import materials
 from sensorgen.export.gcode.check import Checked
 from sensorgen.prediction.results import Prediction
 from sensorgen.workflows.batch.layout import Plate, Rect
-from sensorgen.workflows.batch.pieces import PrintPiece
-from sensorgen.workflows.batch.plan import Bake, BatchPlan, Filament, Layout
+from sensorgen.workflows.batch.plan import Bake, BatchPlan, Filament, Layout, PrintPiece
 from sensorgen.workflows.sealed import seal
 
 if TYPE_CHECKING:
@@ -113,13 +112,13 @@ class PrintedDesign:
     @property
     def words(self) -> str:
         """Gap, resistance and capacitance; or the reason."""
-        found = self.prediction
-        if found is None:
+        prediction = self.prediction
+        if prediction is None:
             return self.reason
-        gaps = [f"{p.gap.value * 1e3:g} mm" for p in (found, found.drawn) if p and p.gap]
+        gaps = [f"{p.gap.value * 1e3:g} mm" for p in (prediction, prediction.drawn) if p and p.gap]
         gap = f"electrode gap {gaps[0]} (drawn {gaps[1]}), " if len(gaps) > 1 else ""
         lost = f"; {self.lost} layers of bodies are not printed at all" if self.lost else ""
-        resistance, capacitance = _expected(found)
+        resistance, capacitance = _expected(prediction)
         if resistance is None or capacitance is None:
             return f"{gap}no prediction{lost}"
         return f"{gap}R {si(resistance, 'ohm')}, C {si(capacitance, 'F')}{lost}"
@@ -154,7 +153,7 @@ class SlicedPlate(Checked):
         taken = f"at least {self.time_s / 3600:.1f} h; {'; '.join(spools)}; {self.tool_changes} tool changes"
         yield f"{slicer} {self.version}: {taken}"
         yield from (f"  {f.severity}: line {f.line}: {f.message}; {f.advice}" for f in self.findings)
-        yield from (f"  {made.design} as printed: {made.words}" for made in self.printed.values())
+        yield from (f"  {one.design} as printed: {one.words}" for one in self.printed.values())
 
 
 @dataclass(frozen=True)
@@ -236,11 +235,11 @@ class BatchRecord:
             yield from ("", *plate.in_short(slicer))
 
 
-def _expected(found: Prediction) -> tuple[float | None, float | None]:
+def _expected(prediction: Prediction) -> tuple[float | None, float | None]:
     """Resistance of all electrodes and capacitance [ohm], [F]; None where nothing is predicted."""
-    if found.capacitance is None:
+    if prediction.capacitance is None:
         return None, None
-    return sum(r.value for r in found.resistance.values()), found.capacitance.value
+    return sum(r.value for r in prediction.resistance.values()), prediction.capacitance.value
 
 
 @cache
@@ -264,7 +263,7 @@ def specimens(pieces: Sequence[PrintPiece], plate: Plate) -> dict[str, PlateSpec
 
 def tools(plan: BatchPlan, loaded: Mapping[int, str], texts: materials.Texts) -> dict[str, Spool]:
     """Spools by the printer's own number of the tool; ``texts`` as of :func:`sensorgen.design.materials.load`."""
-    found = {}
+    spools = {}
     for tool, name in loaded.items():
         material, filament = materials.load(name, texts=texts), plan.filaments.get(name, Filament())
         try:
@@ -272,8 +271,8 @@ def tools(plan: BatchPlan, loaded: Mapping[int, str], texts: materials.Texts) ->
         except MissingValue:
             cam_dial = None
         drying = filament.drying or material.drying or None
-        found[str(tool)] = Spool(name, material.title, filament.lot or None, drying, cam_dial, filament.note)
-    return found
+        spools[str(tool)] = Spool(name, material.title, filament.lot or None, drying, cam_dial, filament.note)
+    return spools
 
 
 def checklist(plan: BatchPlan, loaded: Mapping[str, Spool]) -> tuple[str, ...]:

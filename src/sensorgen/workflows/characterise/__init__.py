@@ -237,11 +237,11 @@ def plan(
     folder, names = out / label, (study.conductor, study.dielectric)
     forms.refuse_filled(folder / FORM)
     step("catalogue")
-    found = selection.candidates(study.coupons, study.unknowns, study.targets, Meters())
+    candidates = selection.candidates(study.coupons, study.unknowns, study.targets, Meters())
     step("selection")
-    chosen = selection.select(found, count - 1, lambda chosen: study.fits(chosen, hours))
+    chosen = selection.select(candidates, count - 1, lambda chosen: study.fits(chosen, hours))
     coupons = named([study.coupons[k] for k in chosen])
-    result = compared(prior(study.unknowns), found.expected(chosen, study.unknowns), study.targets)
+    result = compared(prior(study.unknowns), candidates.expected(chosen, study.unknowns), study.targets)
     plate = plates.arranged(coupons, study.design)
     usual = study.expected()
     expected = {c.name: usual[study.coupons[k].name] for c, k in zip(coupons, chosen, strict=True)}
@@ -258,7 +258,7 @@ def plan(
         }
         store.write(stage, {file: text.encode() for file, text in (study.files() | texts).items()})
         made = Planned(label, folder, tuple(sorted(store.hashes(stage))), (*(c.name for c in coupons), "lines"),
-                       study.hours(coupons), result, tuple(_exposed(found, chosen, coupons, study)))  # fmt: skip
+                       study.hours(coupons), result, tuple(_exposed(candidates, chosen, coupons, study)))  # fmt: skip
         content = {"files": store.hashes(stage), "versions": versions(), "coupons": list(made.coupons)}
         store.write(stage, {store.MANIFEST: json_bytes(content)})
         store.publish(stage, folder)
@@ -391,12 +391,12 @@ def read(path: Path, source: str = "", *, keep: bool = True, force: bool = False
         study = Study.of(form.printer, names, quality=form.quality, tools=form.tools, folder=folder)
         piece = forms.lines_of(form)
         observed = forms.observations(form, study.coupons, study.expected())
-        found = posterior(observed, study.unknowns)
+        values = posterior(observed, study.unknowns)
     except SensorgenError as error:
         raise error.within(str(path)) from None
     made = Characterised(
         label, study.conductor, study.dielectric, sum(bool(o.read.any()) for o in observed),
-        sum(int(o.read.sum()) for o in observed), compared(prior(study.unknowns), found, study.targets), found.dead(),
+        sum(int(o.read.sum()) for o in observed), compared(prior(study.unknowns), values, study.targets), values.dead(),
         tuple(_findings(piece, study.design.machine.line_mm())),
     )  # fmt: skip
     if not keep:

@@ -145,24 +145,27 @@ def read(path: Path) -> Form:
     """
     data = yamlfile.read(path)
     try:
-        for key in data:
-            if key not in _HEAD:
-                raise UnknownName("key", key, _HEAD)
+        if strange := [key for key in data if key not in _HEAD]:
+            raise UnknownName("key", strange[0], _HEAD)
         names = [data.get(key) for key in _HEAD[:5]]
         for key, value in zip(_HEAD, names, strict=False):
             if not isinstance(value, str) or not value:
                 raise BadInput(f"{key} is {shown(value)}; expected its name, as the plate's form has it")
-        coupons = data.get("coupons")
-        if not isinstance(coupons, Mapping) or any(not isinstance(v, Mapping) for v in coupons.values()):
-            raise BadInput("coupons: expected each coupon's name with its readings, as the plate's form has them")
-        plate, printer, quality, conductor, dielectric = map(str, names)
+        coupons: Any = data.get("coupons")
         tools = data.get("tools") or {}
-        if not isinstance(tools, Mapping) or any(type(number) is not int for number in tools.values()):
+        if not _maps_to(coupons, Mapping):
+            raise BadInput("coupons: expected each coupon's name with its readings, as the plate's form has them")
+        if not _maps_to(tools, int) or bool in map(type, tools.values()):
             raise BadInput(f"tools is {shown(tools)}; expected each material's tool, as the plate's form has them")
+        plate, printer, quality, conductor, dielectric = map(str, names)
         meters = _meters(data.get("meters") or {})
         return Form(plate, printer, quality, conductor, dielectric, tools, meters, coupons)
     except SensorgenError as error:
         raise error.within(str(path)) from None
+
+
+def _maps_to(data: Any, kind: type) -> bool:
+    return isinstance(data, Mapping) and all(isinstance(value, kind) for value in data.values())
 
 
 def refuse_filled(path: Path) -> None:
@@ -234,17 +237,17 @@ def observations(form: Form, known: Sequence[Coupon], expected: Mapping[str, Seq
         A value that is no number, negative, or so far from the expected one that its unit is wrong; no reading at all.
     """
     coupons = {coupon.name: coupon for coupon in known}
-    found = []
+    observed = []
     for name, fields in form.coupons.items():
         if name == LINES:
             continue
         base = re.sub(r"-[b-d]$", "", name)
         if base not in coupons:
             raise UnknownName("coupon", name, [*coupons, LINES])
-        found.append(_observation(name, coupons[base], fields, form.meters, expected[base]))
-    if not any(o.read.any() for o in found):
+        observed.append(_observation(name, coupons[base], fields, form.meters, expected[base]))
+    if not any(o.read.any() for o in observed):
         raise BadInput("no reading in the form: fill in the numbers in place of ~")
-    return found
+    return observed
 
 
 def _observation(
@@ -257,12 +260,7 @@ def _observation(
         if key not in keys:
             raise UnknownName(f"reading of {name}", key, keys)
     values = {key: _number(f"{name}.{key}", fields.get(key)) for key in keys}
-    sizes = []
-    for size in coupon.sizes:
-        value = values.get(size.key) if size.measured else None
-        if value is not None and not size.drawn / _SIZES <= value <= size.drawn * _SIZES:
-            raise OutOfRange(f"{name}.{size.key} is {value:g}, drawn {size.drawn:g} mm: check number and unit")
-        sizes.append(size if value is None else replace(size, drawn=value, spread=meters.calipers_mm))
+    sizes = [_size(name, size, values, meters) if size.measured else size for size in coupon.sizes]
     logs, noise = [], []
     for reading, usual in zip(coupon.readings, expected, strict=True):
         value = _si(name, reading.key, reading.kind, values, sizes)
@@ -275,6 +273,16 @@ def _observation(
         load = values.get(f"{reading.key}_load_n") or reading.load_n
         noise.append(meters.noise(replace(reading, load_n=load), value or usual))
     return Observation(replace(coupon, name=name), tuple(sizes), np.array(logs), np.array(noise))
+
+
+def _size(name: str, size: CouponSize, values: Mapping[str, float | None], meters: Meters) -> CouponSize:
+    """A size as it was measured, or as drawn."""
+    value = values[size.key]
+    if value is None:
+        return size
+    if not size.drawn / _SIZES <= value <= size.drawn * _SIZES:
+        raise OutOfRange(f"{name}.{size.key} is {value:g}, drawn {size.drawn:g} mm: check number and unit")
+    return replace(size, drawn=value, spread=meters.calipers_mm)
 
 
 def _si(
@@ -296,6 +304,17 @@ def _si(
     return load / (value * M_PER_MM) / float(secant_stiffening(value / height))
 
 
+def _check_lines(fields: Mapping[str, Any], shorts: Sequence[str], verniers: Sequence[str]) -> None:
+    """Refuse shorts that are neither true nor false, and numbers of lines that verniers do not have."""
+    for key in shorts:
+        if fields.get(key) not in (None, True, False):
+            raise BadInput(f"{LINES}.{key} is {shown(fields[key])}; expected true, false or ~")
+    for key in verniers:
+        value = fields.get(key)
+        if value is not None and (isinstance(value, bool) or value not in range(-5, 6)):
+            raise OutOfRange(f"{LINES}.{key} is {shown(value)}; expected a whole number from -5 to 5, or ~")
+
+
 def lines_of(form: Form) -> LineReadings:
     """Entries of the form for the piece for lines and shorts.
 
@@ -308,16 +327,9 @@ def lines_of(form: Form) -> LineReadings:
     walls, films, combs = ([f"{kind}_{k}_{end}" for k in range(1, count + 1)] for kind, end, count in
                            (("wall", "mm", WALLS), ("film", "short", FILMS), ("comb", "short", COMBS)))  # fmt: skip
     verniers = ["vernier_x", "vernier_y"]
-    for key in fields:
-        if key not in (*walls, *films, *combs, *verniers):
-            raise UnknownName(f"reading of {LINES}", key, (*walls, *verniers, *films, *combs))
-    for key in (*films, *combs):
-        if fields.get(key) not in (None, True, False):
-            raise BadInput(f"{LINES}.{key} is {shown(fields[key])}; expected true, false or ~")
-    for key in verniers:
-        value = fields.get(key)
-        if value is not None and (isinstance(value, bool) or value not in range(-5, 6)):
-            raise OutOfRange(f"{LINES}.{key} is {shown(value)}; expected a whole number from -5 to 5, or ~")
+    if strange := [key for key in fields if key not in (*walls, *films, *combs, *verniers)]:
+        raise UnknownName(f"reading of {LINES}", strange[0], (*walls, *verniers, *films, *combs))
+    _check_lines(fields, (*films, *combs), verniers)
     return LineReadings(
         tuple(_number(f"{LINES}.{key}", fields.get(key)) for key in walls),
         tuple(None if fields.get(key) is None else STEP_MM * fields[key] for key in verniers),

@@ -34,8 +34,7 @@ from sensorgen.export.threemf.part import part_of
 from sensorgen.scene.drawing import paper
 from sensorgen.scene.geometry import meshes
 from sensorgen.scene.scene import Body, Prism, box
-from sensorgen.workflows.batch.layout import Plate, packed, room
-from sensorgen.workflows.batch.picture import bed_of, bed_svg, middle
+from sensorgen.workflows.batch.layout import Plate, bed_of, bed_svg, middle, packed, room
 
 if TYPE_CHECKING:
     from shapely import Polygon
@@ -203,8 +202,8 @@ def threemfs(
             made.append(threemf.Part(**{**vars(part), "settings": {**part.settings, **aligned}}))
         parts += threemf.placed(made, place.centre_mm, coupons[number].name if own else "lines")
     (x, y), (wide, deep) = design.machine.bed_centre_mm(), design.machine.bed_mm
-    found = loads(design)
-    primed, profile = tower(design.machine, design.layers, 2), prusa.profile(design.machine, design.layers, found)
+    by_tool = loads(design)
+    primed, profile = tower(design.machine, design.layers, 2), prusa.profile(design.machine, design.layers, by_tool)
     for family in threemf.FAMILIES:
         content = threemf.plate(family, name, parts, (x - wide / 2, y - deep / 2), primed, profile)
         yield f"{name}.{family}.3mf", content
@@ -235,15 +234,24 @@ def picture(
     for order, (number, place) in enumerate(sorted(plate.items()), 1):
         coupon = coupons[number] if number < len(coupons) else None
         pieces = bodies(coupon, *names) if coupon else lines_bodies(design, *names)
-        spans = [[p.span(axis) for body in pieces for p in body.pieces] for axis in "xy"]
-        centre = [(min(a for a, _ in span) + max(b for _, b in span)) / 2 for span in spans]
         x, y = place.centre_mm[0] - bed.x0, bed.y1 - place.centre_mm[1]
-        shift = x - centre[0], y + centre[1]
-        frame = paper.ViewFrame(*shift, 0.0, 0.0, 1.0, 1.0)
-        for body in pieces:
-            path = "".join(frame.outline(piece.cut("z", piece.span("z")[0])[0]) for piece in body.pieces)
-            shapes.append(paper.element("path", d=path, fill=fills[body.material], **_OUTLINE))
-        shapes += [*(_marks(coupon, pieces, shift) if coupon else ()), middle(x, y, 4.6, str(order), "halo")]
+        shift = _shift(pieces, x, y)
+        shapes += [*_outlines(pieces, shift, fills), *(_marks(coupon, pieces, shift) if coupon else ())]
+        shapes.append(middle(x, y, 4.6, str(order), "halo"))
         listed.append(f"{order}: {coupon.name if coupon else 'lines and shorts'}")
     heading = f"{name}: {len(plate)} coupons on {design.machine.title}"
     return bed_svg(bed, heading, "x to the right, y up; lines of bars run along x", shapes, listed, _NOTES)
+
+
+def _shift(pieces: Sequence[Body], x: float, y: float) -> tuple[float, float]:
+    """Shift of bodies whose middle comes to a place [mm]."""
+    spans = [[p.span(axis) for body in pieces for p in body.pieces] for axis in "xy"]
+    centre = [(min(a for a, _ in span) + max(b for _, b in span)) / 2 for span in spans]
+    return x - centre[0], y + centre[1]
+
+
+def _outlines(pieces: Sequence[Body], shift: tuple[float, float], fills: Mapping[str, str]) -> Iterator[str]:
+    frame = paper.ViewFrame(*shift, 0.0, 0.0, 1.0, 1.0)
+    for body in pieces:
+        path = "".join(frame.outline(piece.cut("z", piece.span("z")[0])[0]) for piece in body.pieces)
+        yield paper.element("path", d=path, fill=fills[body.material], **_OUTLINE)

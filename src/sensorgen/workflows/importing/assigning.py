@@ -1,4 +1,4 @@
-"""Materials, tools and terminals of the bodies of files, from what a user has typed."""
+"""Materials, tools and terminals of the bodies of files, from what a user has typed; and the list to start from."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Annotated
 
+from sensorgen.core.document import Column, Part, Table
 from sensorgen.core.errors import BadInput, MissingValue, SensorgenError, UnknownName
-from sensorgen.core.findings import Finding
+from sensorgen.core.findings import Finding, listed
 from sensorgen.design import design as designs
 from sensorgen.design import imported, packs
 from sensorgen.workflows.importing.reading import Assembly, ReadBody, shared_mm
-
-if TYPE_CHECKING:
-    pass
 
 _CONTACT_MM = 1e-4  # conductors nearer than this are one electrode
 _BY_HEIGHT = ("bottom", "middle", "top")
@@ -134,10 +132,10 @@ def _pairs(words: Sequence[str], form: str) -> list[tuple[str, str]]:
 
 
 def _matching(pattern: str, names: Sequence[str]) -> list[str]:
-    found = [pattern] if pattern in names else [name for name in names if fnmatchcase(name, pattern)]
-    if not found:
+    matching = [pattern] if pattern in names else [name for name in names if fnmatchcase(name, pattern)]
+    if not matching:
         raise UnknownName("body", pattern, names)
-    return found
+    return matching
 
 
 def _terminals(
@@ -211,3 +209,62 @@ def suggested(name: str, colour: str, folder: Path) -> str:
             painted += [material] if designs.material(material, folder).colour.lower() == colour else []
     by_role = [material for role, material in _ROLES if role in word and material in known]
     return next(iter((*named, *painted, *by_role)), "")
+
+
+@dataclass(frozen=True)
+class ListedBody:
+    """A body of a file, as ``--list`` shows it."""
+
+    name: Annotated[str, Column("body")]
+    volume_mm3: Annotated[float, Column("volume", "mm3")]
+    x_mm: Annotated[str, Column("x", "mm", right=True)]
+    y_mm: Annotated[str, Column("y", "mm", right=True)]
+    z_mm: Annotated[str, Column("z", "mm", right=True)]
+    colour: Annotated[str, Column("colour")]
+    faces: Annotated[str, Column("faces")]
+    material: Annotated[str, Column("material")]
+
+
+@dataclass(frozen=True)
+class BodyListing:
+    """Bodies of files, what was repaired or is wrong, and a map to start from.
+
+    Attributes
+    ----------
+    source : str
+        Names of the files.
+    bodies : tuple of ListedBody
+        All of them, with a suggested material; "?" where nothing suggests one.
+    findings : tuple of Finding
+        As of :class:`Assembly`.
+    """
+
+    source: str
+    bodies: tuple[ListedBody, ...]
+    findings: tuple[Finding, ...]
+
+    @classmethod
+    def of(cls, assembly: Assembly, folder: Path) -> "BodyListing":
+        """The listing of an assembly, with materials that ship, are beside a folder, or the user's."""
+        rows = []
+        for body in assembly.bodies:
+            x, y, z = (f"{low:g} to {high:g}" for low, high in (body.box_mm.round(6) + 0.0).T.tolist())
+            chord = body.given.chord_mm
+            faces = f"curved, met to {chord:g} mm" if chord else "flat"
+            material = suggested(body.name, body.given.colour, folder) or "?"
+            rows.append(ListedBody(body.name, body.volume_mm3(), x, y, z, body.given.colour, faces, material))
+        return cls(assembly.source, tuple(rows), assembly.findings)
+
+    def document(self) -> Iterator[Part]:
+        """All of it."""
+        yield Table.of("bodies", "", self.bodies)
+        if self.findings:
+            yield ""
+            yield from listed(self.findings)
+        yield ""
+        yield f"To import it: {self.words()}"
+
+    def words(self) -> str:
+        """Words to type to import it."""
+        maps = " ".join(f"--map {body.name}={body.material.replace('?', 'MATERIAL')}" for body in self.bodies)
+        return f"sensorgen import {self.source} {maps}"

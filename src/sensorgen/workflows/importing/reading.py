@@ -159,29 +159,29 @@ def _separate(solid: FileBody) -> list[FileBody]:
 
 def _names(given: Sequence[str]) -> list[str]:
     """Names that files and slicers can have, each once."""
-    found: list[str] = []
+    names: list[str] = []
     for name in given:
         plain = re.sub("[^A-Za-z0-9._-]+", "_", name).strip("._-")[:60] or "body"
         numbered = (plain, *(f"{plain}-{k}" for k in range(2, len(given) + 2)))
-        found.append(next(name for name in numbered if name not in found))
-    return found
+        names.append(next(name for name in numbered if name not in names))
+    return names
 
 
 def _repaired(name: str, raw: FileBody) -> tuple[ReadBody, list[Finding]]:
     """A body with its surfaces closed, and what was repaired or is wrong."""
-    made = surfaces.closed(raw.vertices_mm, raw.triangles, max(raw.rounding_mm, surfaces.WELD_MM))
-    findings = [Finding("11-surface", "error", name, f.message, f.advice, place_mm=f.place_mm) for f in made.faults]
-    findings += [Finding("11-repaired", "info", name, text, "look whether this is meant") for text in made.repairs]
-    for shell in made.shells:
+    surface = surfaces.closed(raw.vertices_mm, raw.triangles, max(raw.rounding_mm, surfaces.WELD_MM))
+    findings = [Finding("11-surface", "error", name, f.message, f.advice, place_mm=f.place_mm) for f in surface.faults]
+    findings += [Finding("11-repaired", "info", name, text, "look whether this is meant") for text in surface.repairs]
+    for shell in surface.shells:
         place = surfaces.crossing(shell)
         if place:
             findings.append(
                 Finding("11-crossing", "error", name, "faces pass through each other", "make one solid of it in CAD",
                         place_mm=place)
             )  # fmt: skip
-    body = ReadBody(name, made.shells, raw, made.repairs)
-    if len(made.shells) > 1 and not any(f.severity == "error" for f in findings):
-        united = surfaces.united(made.shells)
+    body = ReadBody(name, surface.shells, raw, surface.repairs)
+    if len(surface.shells) > 1 and not any(f.severity == "error" for f in findings):
+        united = surfaces.united(surface.shells)
         twice = body.volume_mm3() - sum(shell.volume_mm3() for shell in united)
         if twice > _OVERLAP_MM * float(np.ptp(body.box_mm, axis=0).max()) ** 2:
             body = replace(body, shells=united, given=replace(raw, revolved=None))
@@ -219,11 +219,11 @@ def _sizes(bodies: Sequence[ReadBody], unit: str) -> list[Finding]:
 
 def _apart(bodies: Sequence[ReadBody]) -> tuple[list[ReadBody], list[Finding]]:
     """Bodies that do not overlap, and findings where they do; what triangles of curved faces share goes to one."""
-    made = {body.name: body for body in bodies}
+    by_name = {body.name: body for body in bodies}
     solids = {body.name: body.solid() for body in bodies}
     findings = []
-    for a, b in combinations(made, 2):
-        one, other = made[a], made[b]
+    for a, b in combinations(by_name, 2):
+        one, other = by_name[a], by_name[b]
         if (shared_mm(one.box_mm, other.box_mm) <= 1e-9).any():
             continue
         common = solids[a] ^ solids[b]
@@ -241,13 +241,13 @@ def _apart(bodies: Sequence[ReadBody]) -> tuple[list[ReadBody], list[Finding]]:
                         "belongs to one body", value_mm=round(depth, 6), limit_mm=0.0, place_mm=at)
             )  # fmt: skip
             continue
-        large, small = sorted((a, b), key=lambda name: -made[name].volume_mm3())
+        large, small = sorted((a, b), key=lambda name: -by_name[name].volume_mm3())
         solids[large] = solids[large] - solids[small]
-        cut = replace(made[large].given, revolved=None)
-        made[large] = replace(made[large], shells=surfaces.shells_of(solids[large]), given=cut)
+        cut = replace(by_name[large].given, revolved=None)
+        by_name[large] = replace(by_name[large], shells=surfaces.shells_of(solids[large]), given=cut)
         text = f"{words}, as the triangles of curved faces do: {small} has it"
         findings.append(Finding("11-repaired", "info", f"{a} / {b}", text, "nothing", place_mm=at))
-    return list(made.values()), findings
+    return list(by_name.values()), findings
 
 
 def shared_mm(one: Real, other: Real) -> Real:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import yaml
@@ -21,9 +21,6 @@ from sensorgen.scene.geometry.meshes import Mesh
 from sensorgen.scene.scene import Piece
 from sensorgen.workflows.importing.assigning import Assigned
 from sensorgen.workflows.importing.reading import Assembly, ReadBody
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)
@@ -122,16 +119,11 @@ def write(
     """
     from sensorgen.models import capacitance_models
 
-    low = np.array([body.box_mm[0] for body in assembly.bodies]).min(0)
-    high = np.array([body.box_mm[1] for body in assembly.bodies]).max(0)
-    by_height = sorted(assembly.bodies, key=lambda body: body.box_mm[::-1, 2].tolist())
-    found = {body.name: _exact(body, low, high) or _flat(body, low) for body in by_height}
-    length, width, height = (high - low).round(9).tolist()
-    chord = max(body.given.chord_mm for body in assembly.bodies)
-    content = imported.text(imported.Bodies(found, (length, width, height), chord, assembly.source))
+    bodies, low = _placed(assembly)
+    content = imported.text(bodies)
     data = {
         "name": name, "shape": imported.SHAPE, **more,
-        "bodies": {n: assigned.filled[n].model_dump(exclude_defaults=True) for n in found},
+        "bodies": {n: assigned.filled[n].model_dump(exclude_defaults=True) for n in bodies.pieces},
         "tools": dict(assigned.tools),
     }  # fmt: skip
     path, beside = folder / f"{name}.yaml", folder / imported.file_name(name, content)
@@ -143,18 +135,31 @@ def write(
     old, drawn = _bodies_of(path), drawn_body(design).cells.first()
     files.replace(beside, content.encode())
     files.replace(path, text.encode())
-    if (
-        old
-        and old != beside
-        and not any(old.name in other.read_text("utf-8", "replace") for other in folder.glob("*.yaml"))
-    ):
-        old.unlink(missing_ok=True)
+    if old and old != beside:
+        _remove_unused(old)
     return Imported(
-        str(path), str(beside), (length, width, height), tuple((-low.round(9) + 0.0).tolist()),
-        {n: _words(design, n, own) for n, own in found.items()},
+        str(path), str(beside), bodies.size_mm, tuple((-low.round(9) + 0.0).tolist()),
+        {n: _words(design, n, own) for n, own in bodies.pieces.items()},
         (*assigned.shorts, *(f for f in assembly.findings if f.severity != "error")),
         {key: model.why_not_applicable(drawn) or "" for key, model in capacitance_models().items()},
     )  # fmt: skip
+
+
+def _placed(assembly: Assembly) -> tuple[imported.Bodies, Real]:
+    """Bodies with the sensor's corner at 0, and where that corner was [mm]."""
+    boxes = np.array([body.box_mm for body in assembly.bodies])
+    low, high = boxes[:, 0].min(0), boxes[:, 1].max(0)
+    by_height = sorted(assembly.bodies, key=lambda body: body.box_mm[::-1, 2].tolist())
+    pieces = {body.name: _exact(body, low, high) or _flat(body, low) for body in by_height}
+    length, width, height = (high - low).round(9).tolist()
+    chord = max(body.given.chord_mm for body in assembly.bodies)
+    return imported.Bodies(pieces, (length, width, height), chord, assembly.source), low
+
+
+def _remove_unused(old: Path) -> None:
+    """Remove a file of bodies that no design beside it names any more."""
+    if not any(old.name in other.read_text("utf-8", "replace") for other in old.parent.glob("*.yaml")):
+        old.unlink(missing_ok=True)
 
 
 def _bodies_of(path: Path) -> Path | None:
@@ -169,15 +174,15 @@ def _bodies_of(path: Path) -> Path | None:
 
 def _exact(body: ReadBody, low: Real, high: Real) -> tuple[Piece, ...]:
     """A body of revolution in the sensor's coordinates; empty where it is none, or wider than the sensor's box."""
-    found = body.given.revolved
-    if found is None:
+    revolved = body.given.revolved
+    if revolved is None:
         return ()
-    spans = np.array([found.span(axis) for axis in "xyz"])
+    spans = np.array([revolved.span(axis) for axis in "xyz"])
     if (spans[:, 0] < low - 1e-9).any() or (spans[:, 1] > high + 1e-9).any():
         return ()
     x, y, z = low.tolist()
-    outline = tuple((r, round(height - z, 9)) for r, height in found.outline)
-    return (replace(found, x_mm=round(found.x_mm - x, 9), y_mm=round(found.y_mm - y, 9), outline=outline),)
+    outline = tuple((r, round(height - z, 9)) for r, height in revolved.outline)
+    return (replace(revolved, x_mm=round(revolved.x_mm - x, 9), y_mm=round(revolved.y_mm - y, 9), outline=outline),)
 
 
 def _flat(body: ReadBody, low: Real) -> tuple[Piece, ...]:

@@ -1,9 +1,8 @@
 """Knowledge of one design, the least expensive first: design rules, bounds at rest, a coarse mesh, everything."""
 
 import json
-from dataclasses import asdict, dataclass, replace
-from functools import cache as once
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict, replace
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from sensorgen.checks.review import review
 from sensorgen.core import cache
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import SensorgenError
+from sensorgen.core.records import adapter
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.body import Body
 from sensorgen.design.design import Design
@@ -25,32 +25,13 @@ from sensorgen.prediction.rest_state import RestState, rest_state
 from sensorgen.prediction.sensor_model import build_sensor, piece, pressure_pa
 from sensorgen.workflows.moves import short
 from sensorgen.workflows.optimise.target import NUMBERS
+from sensorgen.workflows.search import EarlyNumber
 from sensorgen.workflows.trial import Numbers, Trial, trial
-
-if TYPE_CHECKING:
-    from pydantic import TypeAdapter
 
 AT_REST = frozenset({"gap_mm", "capacitance_pf", "top_electrode_ohm", "bottom_electrode_ohm"})
 COARSE = AT_REST | {"force_resolution_n", "position_resolution_mm", "sensitivity_per_kpa"}
 _PA_PER_KPA = 1e3
 _TRIAL = 5  # version of the stored trials
-
-
-@dataclass(frozen=True)
-class EarlyNumber:
-    """A number of one design before it is evaluated.
-
-    Attributes
-    ----------
-    lower, upper : float
-        Bounds where they are certified; else both are a value of unknown error [unit of its name].
-    certified : bool
-        Whether they are proven.
-    """
-
-    lower: float
-    upper: float
-    certified: bool
 
 
 def rules(design: Design) -> list[tuple[str, str]]:
@@ -143,9 +124,10 @@ def everything(design: Design, query: Query, slicer: str) -> Trial:
         found = trial(design, query, slicer=slicer or NONE, drawn=False)
         if design.layout and found.status == "predicted":
             found = replace(found, printed=_of_array(design, query, slicer, found.printed))
-        return json.loads(_adapter().dump_json(found))
+        return json.loads(adapter(Trial).dump_json(found))
 
-    return _adapter().validate_json(json.dumps(cache.answer(question, work)))
+    tried: Trial = adapter(Trial).validate_json(json.dumps(cache.answer(question, work)))
+    return tried
 
 
 def _of_array(design: Design, query: Query, slicer: str, numbers: Numbers) -> Numbers:
@@ -160,10 +142,3 @@ def _of_array(design: Design, query: Query, slicer: str, numbers: Numbers) -> Nu
     sigma = found.sigma_kpa[found.model.here & found.determined]
     resolution = float(np.median(sigma)) if sigma.size else float("inf")
     return replace(numbers, pressure_resolution=resolution, wires=float(len(found.model.wires())))
-
-
-@once
-def _adapter() -> "TypeAdapter[Trial]":
-    from pydantic import TypeAdapter
-
-    return TypeAdapter(Trial)

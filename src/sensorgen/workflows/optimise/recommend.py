@@ -18,11 +18,12 @@ from sensorgen.export.slicers import PROGRAMS
 from sensorgen.export.slicers.run import find
 from sensorgen.workflows.build import build
 from sensorgen.workflows.optimise import ladder
+from sensorgen.workflows.optimise.front import HERE, Front, Workers, value_of
 from sensorgen.workflows.optimise.result import ObjectiveSpread, Recommended, chosen, leads
-from sensorgen.workflows.optimise.search import HERE, Row, Searched, Workers
 from sensorgen.workflows.optimise.space import grid_mm
 from sensorgen.workflows.optimise.target import NUMBERS, Target
 from sensorgen.workflows.optimise.ties import settled, worth
+from sensorgen.workflows.search import Candidate, EarlyNumber
 from sensorgen.workflows.slice import slice_design
 from sensorgen.workflows.trial import trial
 
@@ -30,7 +31,7 @@ Step = Callable[[str], None]
 
 
 def recommended(
-    name: str, found: Searched, out: Path, workers: Workers = HERE, *, keep: bool = True, sliced: bool = True,
+    name: str, found: Front, out: Path, workers: Workers = HERE, *, keep: bool = True, sliced: bool = True,
     step: Step = lambda _: None,
 ) -> tuple[Recommended, ...]:  # fmt: skip
     """Write the files of the designs to print into ``out``.
@@ -44,7 +45,7 @@ def recommended(
     out : Path
         Folder for the designs' folders.
     workers, keep
-        As of :func:`sensorgen.workflows.optimise.search.search`.
+        As of :func:`sensorgen.workflows.optimise.front.search`.
     sliced : bool
         Slice each with PrusaSlicer, where it is installed.
     step : callable
@@ -55,7 +56,7 @@ def recommended(
         f"best {key.rpartition('_')[0]}": (min(rows, key=partial(worth, target, key)), key)
         for key in list(target.objectives)[:2]
     }
-    made: dict[int, tuple[Row, Recommended]] = {}
+    made: dict[int, tuple[Candidate, Recommended]] = {}
     for role, (row, key) in (best | {"balanced": (rows[0], "")}).items():
         row, others = settled(found, row, key)
         if row.number in made:
@@ -89,7 +90,7 @@ def _named(design: Design, name: str) -> Design:
 
 
 def _robust(
-    target: Target, rows: Sequence[Row], workers: Workers, *, keep: bool
+    target: Target, rows: Sequence[Candidate], workers: Workers, *, keep: bool
 ) -> dict[int, dict[str, ObjectiveSpread]]:
     """Of designs by number: objectives on the coarse mesh, over walls of slicers and lengths in the plane."""
     keys, query = [key for key in target.objectives if key in ladder.COARSE], target.query()
@@ -99,7 +100,7 @@ def _robust(
         designs += [(design, rules(None)[0]) for design in within_tolerance(target, row.design)]
         inputs += [(design, query, bool(set(keys) - ladder.AT_REST), rule) for design, rule in designs]
         owners += [row.number] * len(designs)
-    numbers: dict[int, list[dict[str, ladder.EarlyNumber]]] = {row.number: [] for row in rows}
+    numbers: dict[int, list[dict[str, EarlyNumber]]] = {row.number: [] for row in rows}
     for k, one in sorted(workers.results(ladder.known, inputs, "lost", keep=keep)):  # first its own walls
         numbers[owners[k]].append({} if isinstance(one, str) else one)
     return {row.number: dict(_spreads(target, keys, row, numbers[row.number])) for row in rows}
@@ -119,11 +120,11 @@ def within_tolerance(target: Target, design: Design) -> Iterator[Design]:
 
 
 def _spreads(
-    target: Target, keys: Sequence[str], row: Row, numbers: Sequence[dict[str, ladder.EarlyNumber]]
+    target: Target, keys: Sequence[str], row: Candidate, numbers: Sequence[dict[str, EarlyNumber]]
 ) -> Iterator[tuple[str, ObjectiveSpread]]:
     """The value of each objective, changed by the factor that the coarse mesh has from the first of ``numbers`` on."""
     for key in keys:
-        own = NUMBERS[key].of(row.trial.printed) if row.trial else None
+        own = value_of(key, row)
         values = [(one[key].lower + one[key].upper) / 2 for one in numbers if key in one]
         if own and key in numbers[0]:
             varied = [own.value * value / values[0] for value in values]

@@ -10,9 +10,11 @@ from sensorgen.core.display import Displayed
 from sensorgen.core.document import Cell, Column, Part, Table, comma_separated, shown
 from sensorgen.core.findings import Verdict
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
-from sensorgen.workflows.optimise.search import Row, Searched
+from sensorgen.workflows.optimise.front import Front, value_of
 from sensorgen.workflows.optimise.target import NUMBERS, Target
 from sensorgen.workflows.optimise.ties import RULE, tied
+from sensorgen.workflows.optimise.ties import worth as worth_of
+from sensorgen.workflows.search import Candidate
 
 _LISTED = 8  # designs, of those that are tied
 _SAME = 1e-9  # relative difference of numbers that are equal but for rounding
@@ -322,7 +324,7 @@ def _numbers(one: Recommended) -> Table:
     return Table(f"design-{one.design.number}", "", columns, tuple(tuple(cells(key)) for key in one.design.numbers))
 
 
-def result(name: str, found: Searched, recommended: tuple[Recommended, ...] = ()) -> Optimised:
+def result(name: str, found: Front, recommended: tuple[Recommended, ...] = ()) -> Optimised:
     """A search as its answer."""
     front = {row.number for row in found.front}
     ahead, keys = leads(found), list(found.target.objectives)
@@ -340,13 +342,13 @@ def result(name: str, found: Searched, recommended: tuple[Recommended, ...] = ()
         name, len(found.rows), len(found.evaluated),
         {k: goal if isinstance(goal, str) else f"near {goal.near:g}" for k, goal in found.target.objectives.items()},
         tuple(Reason(*reason) for reason in found.reasons()), tuple(designs[row.number - 1] for row in found.front),
-        designs, found.margin, found.largest, recommended, designs[nearest.number - 1] if nearest else None,
+        designs, found.margin, found.largest or None, recommended, designs[nearest.number - 1] if nearest else None,
         () if front else tuple(Binding(*each) for each in found.binding()), tuple(_remarks(found)),
-        found.size,
+        found.whole,
     )  # fmt: skip
 
 
-def _remarks(found: Searched) -> Iterator[str]:
+def _remarks(found: Front) -> Iterator[str]:
     """Accepted doubts that no evaluated design has."""
     doubts = list(dict.fromkeys(doubt for row in found.evaluated if row.trial for doubt in row.trial.doubts))
     for part in found.target.accept_doubts if found.evaluated else ():
@@ -358,36 +360,26 @@ def _remarks(found: Searched) -> Iterator[str]:
             )
 
 
-def chosen(target: Target, row: Row, *, leads: bool = False, ties: tuple[int, ...] = ()) -> Chosen:
+def chosen(target: Target, row: Candidate, *, leads: bool = False, ties: tuple[int, ...] = ()) -> Chosen:
     """A design of the space as plain data."""
-    trial, design = row.trial, row.candidate.design
+    trial, design = row.trial, row.made
     wanted = dict.fromkeys((*target.objectives, *target.limits, "capacitance_pf"))
-    values = {k: NUMBERS[k].of(trial.printed, trial.toolpath) for k in wanted} if trial else {}
+    values = {k: value_of(k, row) for k in wanted}
     uninformed = {k: limit for k in values if trial and (limit := NUMBERS[k].uninformed(trial)) < inf}
     return Chosen(
-        row.number, row.candidate.values, design.name if design else "", design.id() if design else "",
+        row.number, dict(row.values), design.name if design else "", design.id() if design else "",
         row.discarded, tuple(row.violated), trial.verdict if trial else "",
         {key: value for key, value in values.items() if value}, leads, ties, uninformed,
     )  # fmt: skip
 
 
-def leads(found: Searched) -> list[Row]:
+def leads(found: Front) -> list[Candidate]:
     """Of the front, the designs that no other's best values are better than."""
-    worth = {}
-    for row in found.front:
-        if row.trial:
-            numbers = {k: NUMBERS[k].of(row.trial.printed, row.trial.toolpath) for k in found.target.objectives}
-            worth[row.number] = [found.target.worth(k, b.value) for k, b in numbers.items() if b]
+    keys = found.target.objectives
+    worth = {row.number: {key: worth_of(found.target, key, row) for key in keys} for row in found.front}
 
-    def is_beaten(row: Row) -> bool:
-        mine = worth[row.number]
-        others = (other for number, other in worth.items() if number != row.number)
-        steps = ([a - b for a, b in zip(o, mine, strict=True)] for o in others)
-        slack = [_SAME * abs(a) for a in mine]
-        return any(
-            all(s <= t for s, t in zip(step, slack, strict=True))
-            and any(s < -t for s, t in zip(step, slack, strict=True))
-            for step in steps
-        )
+    def is_better(one: dict[str, float], other: dict[str, float]) -> bool:
+        slack = {key: _SAME * abs(other[key]) for key in keys}
+        return all(one[k] <= other[k] + slack[k] for k in keys) and any(one[k] < other[k] - slack[k] for k in keys)
 
-    return [row for row in found.front if not is_beaten(row)]
+    return [row for row in found.front if not any(is_better(one, worth[row.number]) for one in worth.values())]

@@ -7,11 +7,11 @@ from typing import Any
 from sensorgen.core import document
 from sensorgen.core import files as store
 from sensorgen.core.errors import within
+from sensorgen.workflows.optimise.front import HERE, Progress, Workers, search
 from sensorgen.workflows.optimise.page import page
 from sensorgen.workflows.optimise.recommend import recommended
 from sensorgen.workflows.optimise.result import Optimised, Recommended, result
 from sensorgen.workflows.optimise.sample import sample
-from sensorgen.workflows.optimise.search import HERE, Progress, Workers, search
 from sensorgen.workflows.optimise.space import Space, candidates, space
 from sensorgen.workflows.optimise.target import load
 
@@ -31,7 +31,7 @@ def optimise(
     count : int
         Designs to try, chosen by :func:`sensorgen.workflows.optimise.sample.sample`; 0 for all of the space.
     workers, keep, progress
-        As of :func:`sensorgen.workflows.optimise.search.search`.
+        As of :func:`sensorgen.workflows.optimise.front.search`.
     built, sliced : bool
         Build the recommended designs, and slice them.
     tip : mapping, optional

@@ -2,14 +2,13 @@
 
 import importlib.util
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import partial
 
 from sensorgen.core.errors import NotInstalled
-from sensorgen.workflows.optimise.search import HERE, Progress, Row, Searched, Workers, finished, narrowed, results
+from sensorgen.workflows.optimise.front import HERE, Front, Progress, Workers
 from sensorgen.workflows.optimise.space import Space
 from sensorgen.workflows.optimise.target import Target
 from sensorgen.workflows.optimise.ties import worth
+from sensorgen.workflows.search import Candidate
 
 POPULATION = 24  # designs of a generation
 SEED = 1
@@ -21,10 +20,10 @@ _WORST = 1e30  # objective of a design that has none
 def sample(
     target: Target, space: Space, count: int, workers: Workers = HERE, *, keep: bool = True,
     progress: Progress = lambda *_: None,
-) -> Searched:  # fmt: skip
+) -> Front:  # fmt: skip
     """The front of so many designs, which NSGA-II chooses by the results of those before.
 
-    Each generation is checked, bounded and evaluated as by :func:`sensorgen.workflows.optimise.search.search`, against
+    Each generation is checked, bounded and evaluated as by :func:`sensorgen.workflows.optimise.front.search`, against
     all designs before: what is violated, doubts too, counts before any objective.
 
     Parameters
@@ -54,11 +53,10 @@ def sample(
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     sampler = optuna.samplers.NSGAIISampler(population_size=POPULATION, seed=SEED)
     study = optuna.create_study(directions=["minimize"] * len(target.objectives), sampler=sampler)
-    rows: dict[tuple[object, ...], Row] = {}
-    margins: tuple[float, float | None] = 1.0, None
+    rows: dict[tuple[object, ...], Candidate] = {}
     idle = 0
     with workers.opened() as opened:
-        each = partial(results, workers=opened, keep=keep, progress=progress)
+        front = Front(target, opened, keep=keep, progress=progress)
         while len(rows) < count and idle < _IDLE:
             before, asked = len(rows), []
             for trial in [study.ask() for _ in range(POPULATION)]:
@@ -67,16 +65,17 @@ def sample(
                 candidate = space.at(part, shares)
                 values = tuple(candidate.values.values())
                 if values in rows or len(rows) < count:
-                    asked.append((trial, rows.setdefault(values, Row(len(rows) + 1, candidate))))
-            margins = narrowed(target, list(rows.values()), each)
+                    asked.append((trial, rows.setdefault(values, candidate)))
+            front.run(front.made(list(rows.values())[before:]))
             for trial, row in asked:
                 trial.set_constraint("violated", sum(row.violated.values()))
                 study.tell(trial, _objectives(target, row))
             idle = idle + 1 if len(rows) == before else 0
-    return replace(finished(target, list(rows.values()), margins), size=space.size)
+    front.whole = space.size
+    return front
 
 
-def _objectives(target: Target, row: Row) -> Sequence[float]:
+def _objectives(target: Target, row: Candidate) -> Sequence[float]:
     """Objectives of a design, evaluated or on the coarse mesh, the lower the better."""
     if row.trial:
         return [min(worth(target, key, row), _WORST) for key in target.objectives]

@@ -9,32 +9,13 @@ from typing import Any
 
 from sensorgen.core.errors import BadInput, SensorgenError, UnknownName
 from sensorgen.design.design import Design, make, with_own_files
-from sensorgen.workflows.moves import lengths, with_values
+from sensorgen.workflows.moves import Value, lengths, with_values
 from sensorgen.workflows.optimise.target import Range, Target
+from sensorgen.workflows.search import Candidate
 
 MOST = 20_000  # designs: their checks alone take half an hour on two cores
 _NEAR = 1e-9
-Value = float | str
 Data = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A design of the space.
-
-    Attributes
-    ----------
-    values : dict of str to float or str
-        Of the parameters that are varied.
-    design : Design or None
-        None where there is no such design.
-    reason : str
-        Why there is none, or "".
-    """
-
-    values: dict[str, Value]
-    design: Design | None
-    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -68,7 +49,7 @@ class Space:
         try:
             return Candidate(values, make(with_own_files(_with(self.base, self.lengths, values), self.folder)))
         except SensorgenError as error:
-            return Candidate(values, None, str(error))
+            return Candidate(values, discarded=str(error))
 
     def at(self, part: int, shares: Mapping[str, float]) -> Candidate:
         """The design of a part, by the share of each range that lies below its value, from 0 to below 1."""
@@ -104,8 +85,8 @@ def candidates(target: Target, folder: Path = Path()) -> list[Candidate]:
     for key, given in target.parameters.items():
         for value in [] if isinstance(given, Range) else given:
             own = [candidate for candidate in found if candidate.values.get(key) == value]
-            if own and not any(candidate.design for candidate in own):
-                raise BadInput(f"parameters.{key}: no design can have {value!r}: {own[0].reason}")
+            if own and not any(candidate.made for candidate in own):
+                raise BadInput(f"parameters.{key}: no design can have {value!r}: {own[0].discarded}")
     return found
 
 

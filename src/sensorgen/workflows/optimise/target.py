@@ -11,12 +11,11 @@ from pydantic import Field, model_validator
 from sensorgen.checks.rules import RULES
 from sensorgen.core import yamlfile
 from sensorgen.core.bounds import Bounds, Interval
-from sensorgen.core.errors import BadInput, UnknownName, within
+from sensorgen.core.errors import UnknownName, within
 from sensorgen.core.records import Strict, checked
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design import best, packs
 from sensorgen.design.design import Design, make, with_own_files
-from sensorgen.export.slicers import SLICERS
 from sensorgen.prediction.identifiability.results import GUESS
 from sensorgen.prediction.query import DEFAULT, FORCE_N, NOISE, Query
 from sensorgen.scene.scene import Envelope
@@ -261,24 +260,31 @@ def load(word: str | Path, tip: Mapping[str, Any] | None = None) -> Target:
     UnknownName
         Neither a file nor a shape.
     """
+    target = _read(str(word))
+    width = {} if target.load.tip_mm is None else {"width_mm": target.load.tip_mm}
+    if not isinstance(target.design, dict) or not (width or tip):
+        return target
+    own = target.design.get("tip") or {}
+    return target.model_copy(update={"design": target.design | {"tip": own | width | dict(tip or {})}})
+
+
+def _read(word: str) -> Target:
+    """The target of a shape, a design's file, or its own file."""
     path, names = Path(word), packs.names("shapes")
-    if str(word) in names:
-        known = [dict([("shape", path.name), *one.data().items()]) for one in best.of(path.name)]
-        return _with_tip(around(make(known[0] if known else {"shape": path.name})), tip or {})
+    if word in names:
+        known = next((one.data() for one in best.of(word)), {})
+        return around(make({"shape": word} | known))
     if not path.suffix and not path.exists():
-        raise UnknownName("shape or file of a target", str(word), names)
-    with within(str(path)):
+        raise UnknownName("shape or file of a target", word, names)
+    with within(word):
         data = yamlfile.read(path)
         if "shape" in data:
-            return _with_tip(around(make({"name": path.stem} | data, str(path))), tip or {})
+            return around(make({"name": path.stem} | data, word))
         target = checked(Target, data)
         if isinstance(target.design, str):
             file = path.parent / target.design
             data = with_own_files({k: v for k, v in yamlfile.read(file).items() if k != "name"}, file.parent)
             target = target.model_copy(update={"design": data})
-        target = _with_tip(target, tip or {})
-    if target.slicer and target.slicer not in SLICERS:
-        raise BadInput(f"{path}: slicer {target.slicer!r}; expected one of {', '.join(SLICERS)}")
     return target
 
 
@@ -309,12 +315,3 @@ def _beside(design: Design, name: str, value: float, vertical: bool) -> list[flo
     layer, grows = design.layers.layer_mm, name in asdict(Envelope()) or name.endswith("dielectric_mm")
     whole = max(round(value / layer), 1)
     return [round(n * layer, 6) for n in ((whole + 1,) if grows else (whole - 1, whole + 1)) if n]
-
-
-def _with_tip(target: Target, tip: Mapping[str, Any]) -> Target:
-    """The target with a tip of other keys, and with the width that its load names."""
-    width = {} if target.load.tip_mm is None else {"width_mm": target.load.tip_mm}
-    if not isinstance(target.design, dict) or not (width or tip):
-        return target
-    own = target.design.get("tip") or {}
-    return target.model_copy(update={"design": target.design | {"tip": own | width | dict(tip)}})

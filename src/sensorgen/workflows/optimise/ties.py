@@ -3,19 +3,17 @@
 from collections.abc import Sequence
 from functools import partial
 
-from sensorgen.workflows.changes import finding_counts
-from sensorgen.workflows.optimise.search import Row, Searched
-from sensorgen.workflows.optimise.target import NUMBERS, Target
+from sensorgen.workflows.optimise.front import Front, value_of
+from sensorgen.workflows.optimise.target import Target
+from sensorgen.workflows.search import Candidate
 
 RULE = "fewest warnings, then most layers between the electrodes, then best value"
 
 
-def tied(one: Row, other: Row, keys: Sequence[str]) -> bool:
+def tied(one: Candidate, other: Candidate, keys: Sequence[str]) -> bool:
     """Test whether the best value of each lies within what the models leave open of the other, in every objective."""
-    if one.trial is None or other.trial is None:
-        return False
     for key in keys:
-        first, second = (NUMBERS[key].of(t.printed, t.toolpath) for t in (one.trial, other.trial))
+        first, second = value_of(key, one), value_of(key, other)
         if first is None or second is None:
             return False
         alike = first.model.lower <= second.value <= first.model.upper
@@ -24,14 +22,14 @@ def tied(one: Row, other: Row, keys: Sequence[str]) -> bool:
     return True
 
 
-def settled(found: Searched, best: Row, key: str = "") -> tuple[Row, tuple[Row, ...]]:
+def settled(found: Front, best: Candidate, key: str = "") -> tuple[Candidate, tuple[Candidate, ...]]:
     """The design to print among those of the front that equal the best within what the models leave open.
 
     Parameters
     ----------
     found : Searched
         The search.
-    best : Row
+    best : Candidate
         With the best value of an objective, or the best compromise.
     key : str
         The objective: of designs that are equal in it those count that are best in the other objectives, one by one;
@@ -52,15 +50,13 @@ def settled(found: Searched, best: Row, key: str = "") -> tuple[Row, tuple[Row, 
     return chosen, tuple(row for row in group if row is not chosen)
 
 
-def worth(target: Target, key: str, row: Row) -> float:
+def worth(target: Target, key: str, row: Candidate) -> float:
     """An objective's best value of an evaluated design, the lower the better."""
-    value = NUMBERS[key].of(row.trial.printed, row.trial.toolpath) if row.trial else None
+    value = value_of(key, row)
     return target.worth(key, value.value) if value else float("inf")
 
 
-def _rule(row: Row) -> tuple[int, int]:
+def _rule(row: Candidate) -> tuple[int, int]:
     """Warnings, and layers between the electrodes as printed, negative [-]."""
-    if row.trial is None:
-        return 0, 0
-    gap = NUMBERS["gap_mm"].of(row.trial.printed)
-    return finding_counts(row.trial.findings)[1], -round(gap.value / row.design.layers.layer_mm) if gap else 0
+    gap = value_of("gap_mm", row)
+    return row.counts()[1], -round(gap.value / row.design.layers.layer_mm) if gap else 0

@@ -14,7 +14,7 @@ from sensorgen.prediction import compression as compressed
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.query import TONES_HZ
 from sensorgen.prediction.sensor_model import build_sensor
-from sensorgen.verification.thesis.checks._text import table
+from sensorgen.verification.thesis.items import table
 from sensorgen.verification.thesis.verdicts import ItemPart
 
 _KPA = 100.0
@@ -32,9 +32,9 @@ def _pressed(
     shape: str, *, parameters: dict[str, float], base: str = "bonded", period: str = "fixed"
 ) -> compressed.CompressionResult:
     """A cell under 100 kPa, of the cache where it was solved before."""
-    made = designs.make({"shape": shape, "parameters": parameters})
-    found = compressed.answer(
-        drawn(made),
+    design = designs.make({"shape": shape, "parameters": parameters})
+    curve = compressed.answer(
+        drawn(design),
         compressed.PressQuestion(
             (0.0, _KPA),
             compressed.BoundaryConditions(base=base, period=period),
@@ -42,9 +42,9 @@ def _pressed(
             tip=Tip(block=EVEN),
         ),
     )
-    if found.faults:
-        raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {found.faults[0]}")
-    return found
+    if curve.faults:
+        raise SensorgenError(f"the cell under {_KPA:g} kPa was not solved: {curve.faults[0]}")
+    return curve
 
 
 def _top(name: str, moved: compressed.CompressionResult, thesis_mm: float) -> ItemPart:
@@ -53,30 +53,30 @@ def _top(name: str, moved: compressed.CompressionResult, thesis_mm: float) -> It
     return ItemPart(name, "m", ours, thesis_mm * M_PER_MM, shown=_SHOWN)
 
 
-def _rise_f(found: compressed.CompressionResult, cell_m2: float) -> float:
+def _rise_f(curve: compressed.CompressionResult, cell_m2: float) -> float:
     """By how much the capacitance of a cell has risen [F]."""
-    lower, upper = np.array(found.lower_f_per_m2, float), np.array(found.upper_f_per_m2, float)
+    lower, upper = np.array(curve.lower_f_per_m2, float), np.array(curve.upper_f_per_m2, float)
     rest, *_, last = (lower + upper) / 2
     return float(last - rest) * cell_m2
 
 
 def top(shape: str, displacement_mm: float, ways: list[dict[str, Any]]) -> list[ItemPart]:
     """6.5: triangular cell with both films; 6.8: fixed, and free to slide and widen; 6.9: rectangular cell, in 3D."""
-    found = []
+    items = []
     for way in ways:
         film, boundary = way["film_mm"], {k: v for k, v in way.items() if k != "film_mm"}
         named = ", ".join([f"film {film:g} mm", *(f"{key} {value}" for key, value in boundary.items())])
         moved = _pressed(shape, parameters={"dielectric_mm": film}, **boundary)
-        found.append(_top(f"displacement at 100 kPa, {named}", moved, displacement_mm))
-    return found
+        items.append(_top(f"displacement at 100 kPa, {named}", moved, displacement_mm))
+    return items
 
 
 def plates(two_mm: float, three_mm: float, two_f: float, three_f: float) -> list[ItemPart]:
     """6.11: the plain plate, fixed at its sides so that only its bulk deforms."""
-    found = _pressed("reference", parameters={})
+    curve = _pressed("reference", parameters={})
     return [
-        _top("2D", found, two_mm), _top("3D", found, three_mm),
-        *(ItemPart(f"gain of C, {name}, 2 mm by 20 mm", "F", _rise_f(found, _CELL_M2), printed, shown=2)
+        _top("2D", curve, two_mm), _top("3D", curve, three_mm),
+        *(ItemPart(f"gain of C, {name}, 2 mm by 20 mm", "F", _rise_f(curve, _CELL_M2), printed, shown=2)
           for name, printed in (("2D", two_f), ("3D", three_f))),
     ]  # fmt: skip
 
@@ -127,8 +127,8 @@ def more_sensitive(film_mm: float) -> list[ItemPart]:
 
 def several_tones() -> list[ItemPart]:
     """Second research question: errors of force and position by seven tones, over seven readings at the highest one."""
-    found = _plate().response(np.array(TONES_HZ), _MIDDLE_N, _MIDDLE_M)
-    z, by = found.impedance_ohm, np.stack([found.by_force_ohm_per_n, found.by_position_ohm_per_m])
+    response = _plate().response(np.array(TONES_HZ), _MIDDLE_N, _MIDDLE_M)
+    z, by = response.impedance_ohm, np.stack([response.by_force_ohm_per_n, response.by_position_ohm_per_m])
     known = np.einsum("ik,jk->kij", by / abs(z), by.conj() / abs(z)).real  # of noise that is a share of |Z|
     every, highest = (np.sqrt(np.diag(np.linalg.inv(k))) for k in (known.sum(axis=0), len(z) * known[-1]))
     return [
@@ -154,11 +154,11 @@ def impedance() -> list[ItemPart]:
 
 def by_place(of: str) -> list[ItemPart]:
     """6.2 and 6.3: slopes of R or X in the middle."""
-    found = _plate().response(_LOW_AND_HIGH_HZ, _MIDDLE_N, _MIDDLE_M)
+    response = _plate().response(_LOW_AND_HIGH_HZ, _MIDDLE_N, _MIDDLE_M)
     part = np.real if of == "R" else np.imag
     return [
-        ItemPart(f"d{of}/dF at 1.1 and 99.7 kHz, 3 N at 50 mm", "ohm/N", part(found.by_force_ohm_per_n)),
-        ItemPart(f"d{of}/dx there", "ohm/mm", part(found.by_position_ohm_per_m) * M_PER_MM),
+        ItemPart(f"d{of}/dF at 1.1 and 99.7 kHz, 3 N at 50 mm", "ohm/N", part(response.by_force_ohm_per_n)),
+        ItemPart(f"d{of}/dx there", "ohm/mm", part(response.by_position_ohm_per_m) * M_PER_MM),
     ]
 
 

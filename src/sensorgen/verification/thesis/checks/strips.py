@@ -17,7 +17,7 @@ from sensorgen.verification.thesis.checks._columns import (
     pile_f_per_m2,
     piles_f,
 )
-from sensorgen.verification.thesis.checks._text import table
+from sensorgen.verification.thesis.items import table
 from sensorgen.verification.thesis.verdicts import ItemPart
 
 _CELL = rect.Params(dielectric_mm=FILM_MM)

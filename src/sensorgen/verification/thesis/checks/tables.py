@@ -13,15 +13,14 @@ from sensorgen.core.units import M_PER_MM
 from sensorgen.design import design as designs
 from sensorgen.design import materials, printer
 from sensorgen.design.shapes import reference
-from sensorgen.measure.log import tables as readings
+from sensorgen.measure.log import importing as readings
 from sensorgen.measure.log.entries import Reading
 from sensorgen.measure.signal.verdicts import Evidence, verdict
-from sensorgen.prediction import electrodes
+from sensorgen.prediction import rest_state
 from sensorgen.prediction.bodies import drawn
 from sensorgen.prediction.query import TIP_M, TONES_HZ
 from sensorgen.verification.thesis.checks._columns import FILM_MM
-from sensorgen.verification.thesis.checks._text import table
-from sensorgen.verification.thesis.items import chapter
+from sensorgen.verification.thesis.items import chapter, table
 from sensorgen.verification.thesis.verdicts import ItemPart
 
 _UNITS = {"_pa": "Pa", "_kg_m3": "kg/m3", "_c": "°C", "_percent": "%"}  # by the ending of a quantity
@@ -36,7 +35,7 @@ Printed = dict[str, float]
 @cache
 def _prints() -> list[Reading]:
     """Table D.1."""
-    return readings.thesis()
+    return readings.thesis_readings()
 
 
 def _named(material: str, quantity: str) -> tuple[str, str]:
@@ -219,7 +218,7 @@ def multimeter(rows: int, y_ohm: dict[str, list[float]], z_ohm: dict[str, list[f
     ours: dict[str, Any] = {}
     for axis in "xy":
         design = designs.make({"shape": "tri", "parameters": {"dielectric_mm": 0.0, "along": axis}})
-        ours[axis] = 1 / sum(1 / r.value for r in electrodes.electrode_resistance(drawn(design)).values())
+        ours[axis] = 1 / sum(1 / r.value for r in rest_state.electrode_resistance(drawn(design)).values())
     return [
         ItemPart("R of 23 triY over 23 triX, medians", "", ours["y"] / ours["x"], y["y"] / y["x"], shown=3),
         ItemPart("rows with both readings, and those whose Z is of Y's order or less", "", [len(both), sum(both)]),

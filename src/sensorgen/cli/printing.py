@@ -1,0 +1,170 @@
+"""``sensorgen check|build|slice``: whether to print a design, and all files that its print needs."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from sensorgen.cli import FOUND_ERRORS, body_options, render, unread
+from sensorgen.cli.body_options import Compensate
+from sensorgen.cli.designs import of_design
+from sensorgen.cli.options import Advising, Out, Strict, TimeLimit
+from sensorgen.core.errors import Unprintable
+from sensorgen.core.options import Option
+from sensorgen.design.walls import rule
+from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sensorgen.design.design import Design
+
+
+def _tiles(design: "Design", _: dict[str, Any]) -> "Sequence[Design]":
+    """Tiles of an array that the bed does not hold, one of each kind; else the design."""
+    if not design.layout:
+        return (design,)
+    from sensorgen.workflows.tiles import tiles
+
+    kinds = {(t.rows, t.columns, str(each.parameters["seams"])): each for t, each in reversed(tiles(design))}
+    return sorted(kinds.values(), key=lambda each: each.parameters["tile"]) or (design,)
+
+
+@of_design("check", *render.options(), tip=True, parts=_tiles)
+def check_command(design: "Design", advising: Advising, *, strict: Strict = False) -> int:
+    """Decide whether to print a design: check it against nozzle, layers and bed, predict it, and try changes."""
+    from sensorgen.checks.review import STEPS
+    from sensorgen.prediction.slices import reviewed
+    from sensorgen.workflows import decision
+
+    with render.progress((*STEPS, *decision.STEPS)) as step:
+        review = reviewed(design, step)
+        decided = decision.decision(design, review, advising.budget, predict=advising.budget > 0, step=step)
+    render.deliver(decided)
+    if decided.findings and render.early():
+        render.say("each finding in its place, in 3D, drawing and layers: sensorgen show")
+    advising.write(design, decided.advice)
+    return 1 if review.errors(strict) or review.verdict == "CHANGE" else 0
+
+
+def _all_tiles(design: "Design", given: dict[str, Any]) -> "Sequence[Design]":
+    """Tiles of an array that the bed does not hold, with a table of their places; else the design."""
+    if not design.layout:
+        return (design,)
+    from sensorgen.core import document
+    from sensorgen.workflows import tiles
+
+    placed = tiles.tiles(design)
+    if not placed:
+        return (design,)
+    where = Path(given["out"]) / f"{design.name}-tiles.csv"
+    content = document.comma_separated(tiles.table(placed))
+    render.file(where, content, f"{len(placed)} tiles, as it does not fit the bed: ")
+    return [tile for _, tile in placed]
+
+
+@of_design("build", *render.options("json", "markdown", outputs=("--output",)), parts=_all_tiles)
+def build_command(
+    design: "Design", *, out: Path = Path("out"), no_cad: bool = False, force: bool = False, strict: Strict = False,
+    compensate: Compensate = "", verify: bool = False, details: bool = False, advise: bool = False, advising: Advising,
+) -> int:  # fmt: skip
+    """Write everything that a design's print needs: 3MF, STEP, profiles, drawing, prediction.
+
+    Parameters
+    ----------
+    out, --out, -o : DIR
+        Folder for the designs' folders.
+    no_cad
+        Skip the STEP file (saves about 3 s).
+    force
+        Write the files even if checks report errors.
+    verify
+        Write nothing: compare the folder with its record and the log.
+    details
+        Print all findings and the whole prediction.
+    advise
+        Also try changes that remove findings, as sensorgen check does.
+    """
+    from sensorgen.core import document
+    from sensorgen.workflows.build import STEPS, Built, DetailedBuild, build
+
+    if verify:
+        return _verify(design, out / design.name)
+    design, changes = body_options.compensated(design, compensate, design.walls)
+    kind, budget_s = DetailedBuild if details else Built, advising.budget if advise or advising.apply else None
+
+    def decided(built: Built) -> None:  # before the files, which take longer
+        render.clear()
+        with unread():
+            render.deliver(kind(**vars(built)))
+
+    try:
+        with render.progress(STEPS) as step:
+            built = build(
+                design, out, cad=not no_cad, force=force, strict=strict, compensated=changes, budget_s=budget_s,
+                step=step, decided=decided if render.early() else lambda _: None,
+            )  # fmt: skip
+    except Unprintable as error:
+        return _refuse(design, error, budget_s, advising)
+    if render.early():
+        render.say("\n".join(document.text(built.written())))
+    else:
+        render.deliver(kind(**vars(built)))
+    advising.write(design, built.advice)
+    return 1 if built.verdict == "CHANGE" and not force else 0
+
+
+def _refuse(design: "Design", error: Unprintable, budget_s: float | None, advising: Advising) -> int:
+    """Deliver why a design is not built, and the changes that were tried; raise the error unless one is applied."""
+    from sensorgen.prediction.slices import reviewed
+    from sensorgen.workflows.decision import STEPS, RefusedBuild, decision
+
+    with render.progress(STEPS) as step:
+        advice = decision(design, reviewed(design), budget_s, predict=bool(budget_s), step=step).advice
+    render.deliver(RefusedBuild(design.name, tuple(error.findings), len(error.stopping), advice=advice))
+    advising.write(design, advice)
+    if advising.apply is None:
+        raise error
+    return FOUND_ERRORS  # of the design as it was: the file has another one now
+
+
+def _verify(design: "Design", folder: Path) -> int:
+    from sensorgen.cli.options import LogFile
+    from sensorgen.workflows.sealed import build_differences
+
+    with LogFile().existing() as log:
+        differences = build_differences(folder, design, log)
+    render.deliver(differences)
+    return FOUND_ERRORS if differences else 0
+
+
+@of_design("slice", *render.options("json", "markdown"))
+def slice_command(
+    design: "Design", *, slicer: Annotated[str, Option(kind=tuple(SLICERS))] = "prusa", program: str = "",
+    time_limit_s: TimeLimit = TIME_LIMIT_S, out: Out = Path("out"), force: bool = False, strict: Strict = False,
+    compensate: Compensate = "",
+) -> int:  # fmt: skip
+    """Slice a design with a real slicer, and write G-code that the printer takes as it is.
+
+    The file is checked, also against the design. One with errors is written as NAME.SLICER.refused.gcode, whatever
+    --force says, and an earlier NAME.SLICER.gcode is removed: a file of that name has always passed.
+
+    Parameters
+    ----------
+    slicer
+        PrusaSlicer (2.5 or later), or CuraEngine (4.13 or later).
+    program : PATH
+        The slicer's program; the one on PATH if not given.
+    force
+        Slice even if checks of the design report errors.
+    """
+    from sensorgen.export.slicing import STEPS
+    from sensorgen.workflows.slice import slice_design
+
+    walls = rule(slicer, design.walls)
+    design, changes = body_options.compensated(design, compensate, walls, slicer, program)
+    with render.refused(design.name), render.progress(("checks", *STEPS)) as step:
+        gcode = slice_design(
+            design, out, slicer, program=program, time_limit_s=time_limit_s, force=force, strict=strict,
+            compensated=changes, step=step,
+        )  # fmt: skip
+    render.deliver(gcode)
+    return 1 if gcode.refused or (gcode.verdict == "CHANGE" and not force) else 0

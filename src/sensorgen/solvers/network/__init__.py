@@ -1,1 +1,0 @@
-"""Resistor networks of extruded tracks."""

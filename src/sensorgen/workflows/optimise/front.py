@@ -1,0 +1,298 @@
+"""The front of a space of designs: each is discarded for a reason, or evaluated, the most promising first."""
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from math import inf, log
+from typing import Any
+
+from sensorgen.core.bounds import Bounds, Interval
+from sensorgen.core.errors import SensorgenError
+from sensorgen.core.parallel import Lane, open_lanes, remembered, said
+from sensorgen.workflows.optimise import ladder
+from sensorgen.workflows.optimise.ladder import AT_REST, COARSE
+from sensorgen.workflows.optimise.target import NUMBERS, Target
+from sensorgen.workflows.search import Candidate, Search
+from sensorgen.workflows.trial import Trial
+
+MARGIN = 1.5  # between a number on the coarse mesh and its best value; widened where a design shows more
+FEW = 8  # designs that are evaluated without a coarse mesh [-]
+_CHECKS, _BOUNDS, _EVALUATION = range(3)
+_NUMBER = re.compile(r"\d+(\.\d+)?")
+
+Progress = Callable[[str, int, int], None]  # step, how many are done, how many there are
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Where works run: so many processes of this computer, or a Dask cluster; ``lanes`` are those that are open."""
+
+    jobs: int = 1
+    cluster: str = ""
+    lanes: tuple[Lane, ...] = ()
+
+    @contextmanager
+    def opened(self) -> "Iterator[Workers]":
+        """Workers that stay for several rounds of works: a process that begins anew imports the solvers again."""
+        if self.lanes or (self.jobs < 2 and not self.cluster):
+            yield self
+            return
+        with open_lanes(self.jobs, self.cluster) as lanes:
+            yield replace(self, lanes=tuple(lanes))
+
+    def results(
+        self, work: Callable[..., Any], inputs: Sequence[tuple[Any, ...]], lost: str, *, keep: bool
+    ) -> Iterator[tuple[int, Any]]:
+        """Number and result of each work as they come; in place of a result the reason why there is none."""
+        attempt = partial(said, work, refused=(SensorgenError,))
+        return remembered(
+            attempt, inputs, self.jobs, cluster=self.cluster, keep=keep, lost=lambda *_: lost, lanes=self.lanes
+        )
+
+
+HERE = Workers()
+
+
+class Front(Search):
+    """Every design of a space: discarded for a reason, or evaluated as printed, against all that were before.
+
+    Attributes
+    ----------
+    target : Target
+        What the best design is to be best at.
+    workers : Workers
+        Where works run.
+    keep : bool
+        Read the cache and store new answers, so that a search that was stopped goes on where it was.
+    progress : callable
+        Called with the step, how many designs are done, and how many there are.
+    margin, largest : float
+        Between a number on the coarse mesh and its best value: allowed for, and seen; 0 where none was used [-].
+    whole : int
+        Designs of the whole space where only a sample was tried, else 0 [-].
+    """
+
+    def __init__(
+        self, target: Target, workers: Workers = HERE, *, keep: bool = True, progress: Progress = lambda *_: None
+    ) -> None:  # fmt: skip
+        super().__init__()
+        self.target, self.workers, self.keep, self.progress = target, workers, keep, progress
+        self.rows: list[Candidate] = []
+        self.query, self.solve = target.query(), False
+        keys = {*target.objectives, *target.limits}
+        self.is_bounded, self.is_pressed = bool(keys & AT_REST), bool(keys & (COARSE - AT_REST))
+        self.best: list[dict[str, Interval]] = []  # objectives of those that were evaluated and violate nothing
+        self.margin, self.largest, self.whole = MARGIN, 0.0, 0
+        self.together = max(1, workers.jobs, len(workers.lanes))
+        self.identities: set[str] = set()
+
+    def made(self, some: Sequence[Candidate]) -> list[Candidate]:
+        """Further designs: those that can be made, and are no design again."""
+        new, first = [], len(self.rows) + 1
+        self.rows += some
+        for number, one in enumerate(some, first):
+            one.number = number
+            if one.made is None:
+                one.violated = {"cannot be made": 1.0}
+                one.discard(f"cannot be made: {one.discarded}")
+            elif one.design.id() in self.identities:
+                one.discard("the same design as another")
+            else:
+                self.identities.add(one.design.id())
+                new.append(one)
+        self.solve = self.is_pressed and len(new) > FEW
+        return new
+
+    def order(self, one: Candidate) -> tuple[float, ...]:
+        """The least expensive step first; of those to evaluate, the least product of objectives."""
+        if not self._is_known(one):
+            return one.stage, inf, one.number
+        ends = [interval.lower for interval in self._hoped(one, 1.0).values()]
+        return one.stage, sum(log(end) if end > 0 else -1 / (1e-9 - end) for end in ends), one.number
+
+    def batch(self, stage: int) -> int:
+        """All at once, but for evaluations: what they show discards others."""
+        return self.together if stage == _EVALUATION else len(self.rows)
+
+    def results(self, some: Sequence[Candidate]) -> Iterator[tuple[Candidate, Any]]:
+        """Results of all workers: design rules; numbers at rest and on a coarse mesh; everything."""
+        step, work, given = (
+            ("checks", ladder.rules, ()),
+            ("bounds", ladder.known, (self.query, self.solve)),
+            ("evaluation", ladder.everything, (self.query, self.target.slicer)),
+        )[some[0].stage if some else 0]
+        lost = f"{step}: the process ended, as when the memory is full"
+        inputs = [(one.design, *given) for one in some]
+        for done, (k, answer) in enumerate(self.workers.results(work, inputs, lost, keep=self.keep), 1):
+            yield some[k], answer
+            self.progress(step, done, len(some))
+
+    def is_wanted(self, one: Candidate) -> bool:
+        """False for a design that an evaluated one is certain to be at least as good as, in every objective."""
+        if one.stage < _EVALUATION or not self._is_known(one):
+            return True
+        hoped = self._hoped(one, self.margin)
+        if any(_beats(other, hoped) for other in self.best):
+            one.discard("dominated", certified=all(one.known[key].certified for key in self.target.objectives))
+        return not one.discarded
+
+    def take(self, one: Candidate, answer: Any) -> Iterable[Candidate]:
+        """Discard for a finding or a proven limit; after an evaluation, perhaps take discards back."""
+        if one.stage > _EVALUATION:
+            return self._evaluated(one, answer)
+        if one.stage > _BOUNDS:
+            one.known = {} if isinstance(answer, str) else answer
+            self._limit(one)
+        else:
+            self._check(one, [(answer, "error")] if isinstance(answer, str) else answer)
+        return () if one.discarded else (one,)
+
+    def _check(self, one: Candidate, findings: Sequence[tuple[str, str]]) -> None:
+        """Discard a design with a finding that is refused; without an objective at rest, leave out its bounds."""
+        refused = [rule for rule, severity in findings if self.target.refuses(severity, rule)]
+        if refused:
+            one.violated = {f"check {rule}": 1.0 for rule in refused}
+            one.discard(f"checks: {refused[0]}")
+        one.stage += not (self.is_bounded or self.solve)
+
+    def _limit(self, one: Candidate) -> None:
+        """Discard a design whose certified bounds lie beyond a limit."""
+        for key, limit in self.target.limits.items():
+            number = one.known.get(key)
+            if number and number.certified and (number.upper < limit.least or number.lower > limit.most):
+                one.violated = {f"limit {key}": min(limit.beyond(number.lower), limit.beyond(number.upper))}
+                one.discard(f"limit {key}")
+                return
+
+    def _evaluated(self, one: Candidate, answer: Trial | str) -> Iterable[Candidate]:
+        """Compare with the coarse mesh; where it was wrong by more than the margin, take discards back."""
+        if isinstance(answer, str):
+            one.violated = {answer: 1.0}
+            one.discard("killed the process or failed", certified=False)
+            return ()
+        one.trial, one.violated = answer, self.target.violated(answer)
+        if one.violated:
+            return ()
+        self.best.append(badness(self.target, one))
+        self.largest = max(self.largest, *self._factors(one), 0.0)
+        if self.largest <= self.margin:
+            return ()
+        self.margin = 1.1 * self.largest
+        back = [row for row in self.rows if row.discarded == "dominated" and not row.certified]
+        for row in back:
+            row.discarded = ""
+        return back
+
+    def _is_known(self, one: Candidate) -> bool:
+        return all(key in one.known for key in self.target.objectives)
+
+    def _factors(self, one: Candidate) -> Iterator[float]:
+        """Factors between objectives on the coarse mesh and their best values."""
+        for key in self.target.objectives:
+            number, value = one.known.get(key), value_of(key, one)
+            if number and value and not number.certified and value.value > 0 < number.lower:
+                yield max(value.value / number.lower, number.lower / value.value)
+
+    def _hoped(self, one: Candidate, margin: float) -> dict[str, Interval]:
+        """Objectives of a design that is not evaluated yet; the lower the better."""
+        shares = {key: 1.0 if one.known[key].certified else margin for key in self.target.objectives}
+        ends = {key: Interval(one.known[key].lower / s, one.known[key].upper * s) for key, s in shares.items()}
+        return {key: self.target.badness(key, interval) for key, interval in ends.items()}
+
+    @cached_property
+    def front(self) -> tuple[Candidate, ...]:
+        """Designs that no other is certain to be better than, the best compromise first."""
+        feasible = [row for row in self.rows if row.trial and not row.violated]
+        worth = {row.number: badness(self.target, row) for row in feasible}
+        front = [row for row in feasible if not any(_beats(other, worth[row.number]) for other in worth.values())]
+        return tuple(sorted(front, key=_compromise(self.target, front)))
+
+    @property
+    def evaluated(self) -> tuple[Candidate, ...]:
+        """Designs that were evaluated."""
+        return tuple(row for row in self.rows if row.trial)
+
+    def reasons(self) -> list[tuple[str, bool, int]]:
+        """Why designs are out, whether that is proven, and how many; of reasons that differ in numbers the first."""
+        found: Counter[tuple[str, bool]] = Counter()
+        words: dict[str, str] = {}
+        front = {row.number for row in self.front}
+        for row in self.rows:
+            why = row.discarded or (f"violates {min(row.violated)}" if row.violated else "")
+            if not why and row.number not in front:
+                why = "evaluated; another is better in every objective"
+            if why:
+                alike = _NUMBER.sub("#", why)
+                words.setdefault(alike, why)
+                found[alike, row.certified and bool(row.discarded)] += 1
+        return [(words[alike], certified, count) for (alike, certified), count in found.most_common()]
+
+    def nearest(self) -> Candidate | None:
+        """Where nothing meets the target: the design that violates the fewest constraints, and these the least."""
+        tried = [row for row in self.rows if row.violated]
+        return min(
+            tried, key=lambda row: (row.trial is None, len(row.violated), sum(row.violated.values())), default=None
+        )
+
+    def binding(self) -> list[tuple[str, int, int]]:
+        """Constraints, how many designs violate each, and how many violate nothing else."""
+        every, alone = Counter[str](), Counter[str]()
+        for row in self.rows:
+            every.update(list(row.violated))
+            alone.update(list(row.violated) if len(row.violated) == 1 else ())
+        return [
+            (name, count, alone[name]) for name, count in sorted(every.items(), key=lambda i: (-alone[i[0]], -i[1]))
+        ]
+
+
+def search(
+    target: Target, space: Sequence[Candidate], workers: Workers = HERE, *, keep: bool = True,
+    progress: Progress = lambda *_: None,
+) -> Front:  # fmt: skip
+    """Every design of a space: discarded for a reason, or evaluated as printed; arguments as of :class:`Front`.
+
+    Raises
+    ------
+    SensorgenError
+        As :func:`sensorgen.core.parallel.in_parallel`.
+    """
+    with workers.opened() as opened:
+        front = Front(target, opened, keep=keep, progress=progress)
+        front.run(front.made(space))
+    return front
+
+
+def value_of(key: str, row: Candidate) -> Bounds | None:
+    """A number of an evaluated design, as printed."""
+    return NUMBERS[key].of(row.trial.printed, row.trial.toolpath) if row.trial else None
+
+
+def badness(target: Target, row: Candidate) -> dict[str, Interval]:
+    """Objectives of an evaluated design, within what its models leave open; the lower the better."""
+    values = {key: value_of(key, row) for key in target.objectives}
+    return {key: target.badness(key, value.model) for key, value in values.items() if value}
+
+
+def _beats(one: dict[str, Interval], other: dict[str, Interval]) -> bool:
+    """True if one is at least as good in every objective and better in one, wherever both lie in their intervals."""
+    return all(one[key].upper <= other[key].lower for key in other) and any(
+        one[key].upper < other[key].lower for key in other
+    )
+
+
+def _compromise(target: Target, front: Sequence[Candidate]) -> Callable[[Candidate], float]:
+    """Largest distance of a design from the best value of an objective, over the span of the front."""
+    worth = {row.number: badness(target, row) for row in front}
+    spans = {}
+    for key in target.objectives:
+        ends = [worth[row.number][key] for row in front]
+        low, high = min((e.lower for e in ends), default=0.0), max((e.lower for e in ends), default=0.0)
+        spans[key] = low, (high - low) or 1.0
+
+    def distance(row: Candidate) -> float:
+        return max((worth[row.number][key].lower - low) / span for key, (low, span) in spans.items())
+
+    return distance
