@@ -4,6 +4,9 @@ Run as ``python bench/coverage.py [SPECIMENS [FEWER]]``; writes results/coverage
 of a single error, in which they differ by their noise alone. Each specimen (tests/virtual_specimen, which
 shares no line with the package) is pressed 30 times for its calibration and 200 times for the inversion. A twentieth
 of ``SPECIMENS`` of another simulator (tests/independent_sensor.py) change after their calibration.
+
+Each coverage has the binomial interval of 95 % (Wilson) of as many presses as are independent: those of a specimen
+share its calibration, so that specimens differ by more than chance.
 """
 
 import sys
@@ -55,6 +58,23 @@ def before(model, ratio_of, others, truth):
     return np.mean(found.status == 0), force.mean(), position.mean()
 
 
+def interval(shares, of):
+    """Ends of the share that is covered, 95 %, by the shares of specimens with so many presses each."""
+    shares, of = np.asarray(shares, float), np.broadcast_to(of, len(shares))
+    p = np.average(shares, weights=of)
+    chance = np.sum(of * (shares - p) ** 2) / max(len(shares) - 1, 1) / max(p * (1 - p), 1e-9)
+    n, z = of.sum() / max(chance, 1.0), 1.96
+    middle, half = p + z * z / (2 * n), z * (p * (1 - p) / n + z * z / (4 * n * n)) ** 0.5
+    return (middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n)
+
+
+def told(shares, of, digits=3):
+    """Coverage with its interval."""
+    low, high = interval(shares, of)
+    of = np.broadcast_to(of, len(shares))
+    return f"{np.average(shares, weights=of):.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+
+
 def row(name, truth_of, model, specimens, known=KNOWN):
     """Means over specimens, and tenth percentiles."""
     rows, seconds, verdicts = [], [], np.zeros(len(Verdict), int)
@@ -72,11 +92,12 @@ def row(name, truth_of, model, specimens, known=KNOWN):
         widths = np.median(np.ptp(found.force_90_n, axis=1)), 1e3 * np.median(np.ptp(found.position_90_m, axis=1))
         rows.append([*before(model, second, other, truth), force.mean(), position.mean(), *widths])
     ok, force0, position0, force, position, wide_n, wide_mm = np.mean(rows, axis=0)
+    by_specimen = np.array(rows)[:, 3:5].T
     tenth = np.percentile(np.array(rows)[:, 3:5], 10, axis=0)
     print(name, np.round([force, position, *tenth], 3), flush=True)
     return (
         f"| {name} | {specimens} | {known} | {ok:.0%} | {force0:.0%} / {position0:.0%} | "
-        f"{force:.3f} / {position:.3f} | "
+        f"{' / '.join(told(shares, UNKNOWN) for shares in by_specimen)} | "
         f"{tenth[0]:.2f} / {tenth[1]:.2f} | {wide_n:.2f} N | {wide_mm:.0f} mm | "
         f"{verdicts[Verdict.NO_FIT] / verdicts.sum():.1%} |"
     ), np.median(seconds, axis=0)
@@ -118,13 +139,14 @@ def changes(printed, specimens):
                     found = after(model, posterior, reference, change(strip, seed), seed, where)
                     rows.setdefault(known if known < KNOWN else name, []).append(found)
     for key, found in rows.items():
-        ok, answered, force, position, width = (np.concatenate([one[k] for one in found]) for k in range(5))
+        ok, answered, width = (np.concatenate([one[k] for one in found]) for k in (0, 1, 4))
         sound = key == "sound" or isinstance(key, int)
-        covered = f"{force.mean():.2f} / {position.mean():.2f}" if sound else f"{force[answered].mean():.2f}"
-        covered = covered if sound or answered.any() else "-"
-        told = "-" if key == 0 else f"{answered.mean():.2f} ({ok.mean():.2f})"
+        counted = [[one[2 + k][slice(None) if sound else one[1]] for one in found] for k in range(1 + sound)]
+        parts = [[part for part in parts if part.size] for parts in counted]
+        covered = " / ".join(told([p.mean() for p in of], [p.size for p in of], 2) for of in parts if of) or "-"
+        given = "-" if key == 0 else f"{answered.mean():.2f} ({ok.mean():.2f})"
         name = f"sound, {KNOWN if key == 'sound' else key} known presses" if sound else key
-        line = f"| {'printed' if printed else 'drawn'} | {name} | {BEFORE[printed][key]} | {told} | {covered} | "
+        line = f"| {'printed' if printed else 'drawn'} | {name} | {BEFORE[printed][key]} | {given} | {covered} | "
         print(line, flush=True)
         yield line + f"{np.median(width):.2f} N |"
 
@@ -166,7 +188,8 @@ def main():
     fit, invert = np.median(seconds, axis=0)
     head = (
         f"Design: tri 0.2 mm, 100 mm, tip 5 mm, seven tones, noise 0.1 %; {UNKNOWN} presses each of "
-        "0.1 to 6 N, half of them after a higher one, held for 0.3 to 30 s.\n\n"
+        "0.1 to 6 N, half of them after a higher one, held for 0.3 to 30 s. In brackets the binomial interval of 95 %, "
+        "of as many presses as the scatter between specimens makes independent.\n\n"
         "| what is off | specimens | known presses | before: ok | force / place covered | now: force / place covered "
         "| tenth percentile | median width | | no fit |\n|---|---|---|---|---|---|---|---|---|---|\n"
     )

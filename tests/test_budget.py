@@ -142,7 +142,7 @@ def test_a_press_beyond_the_law_at_its_soft_end_is_bounded_from_below():
     assert "exceeds the compression law" in term.what
     assert got.largest().name == "stiffness"
     assert next(line for line in lines(got) if line.startswith("stiffness")).endswith("  at least")
-    assert term.turns == "force"
+    assert term.turns == "cannot sense force"
     assert shares(found("tri", force=3.0), "stiffness").by_force > 0.5
 
 
@@ -207,10 +207,10 @@ def test_ways_to_print_it_are_a_term_of_a_print():
     from sensorgen.prediction.sensor_model import build_sensor
 
     model = build_sensor(estimated(make({"shape": "tri"})), "unconfined")
-    width, film, *_ = [t for t in budget(model).terms if t.kind == "print"]
+    width, film, layer, *_ = [t for t in budget(model).terms if t.kind == "print"]
     rest = model.rest
     c = rest.capacitance
-    assert (width.name, film.name) == ("print", "film thickness")
+    assert (width.name, film.name, layer.name) == ("slicer's walls", "film thickness", "film a layer thinner")
     assert width.changes.magnitude == pytest.approx(c.value / rest.by_width.lower - 1, rel=0.02)  # |Z| of a capacitor
     assert film.changes.magnitude == pytest.approx(1 - c.value / rest.by_film.upper, rel=0.02)
     assert c.print.upper == pytest.approx(rest.by_width.upper * rest.by_film.upper / c.value, rel=1e-12)

@@ -142,9 +142,19 @@ def test_dispersion_by_kramers_and_kronig():
 
 
 def test_what_alone_turns_a_verdict_is_named():
-    """Drift of 10 % in C since the rest reading is more than any press of a stiff plate: no force is told."""
-    assert terms(temperature_k=50, permittivity_per_k=2e-3)["permittivity, temperature"].turns == "both"
+    """Drift of 10 % in C since the rest reading is more than any press of a stiff plate: no force is told.
+
+    A drift of the resistivity hides the place from where a chain of pieces reads it 100 mm / 12^1/2 off.
+    """
+    lost = terms(temperature_k=50, permittivity_per_k=2e-3)["permittivity, temperature"].turns
+    assert lost == "cannot sense force, cannot locate"
     assert terms(temperature_k=1e-3)["permittivity, temperature"].turns == ""
+    guess_m, drift = LENGTH_M / 12**0.5, 2e-3
+    for _ in range(4):
+        drift *= guess_m / max(misread(rho=1 + sign * drift)[1] for sign in (-1, 1))
+    for factor, turns in ((0.95, ""), (1.05, "cannot locate")):
+        found = terms(temperature_k=1, resistivity_per_k=factor * drift)["resistivity, temperature"]
+        assert found.turns == turns
 
 
 W, K, SLOPE, MEAN_PA = 0.01, 2.7e9, np.tan(np.radians(2)), 6e4  # tri 0.2: 36.4 um at 100 kPa

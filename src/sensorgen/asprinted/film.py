@@ -33,7 +33,7 @@ def thicker(scene: Scene, more_mm: float) -> Scene | None:
     Air of a layer that was lost counts as film, and is stretched with it.
     """
     span = span_mm(scene)
-    if span is None or span[1] - span[0] + more_mm <= 0:
+    if span is None or rounded(span[1] - span[0] + more_mm) <= 0:
         return None
     low, high = span
     factor = 1 + more_mm / (high - low)

@@ -22,11 +22,14 @@ class FilmThickness:
         By which it may be thinner or thicker [mm].
     thinner, thicker : Scene or None
         The most likely cell with such a film; None where none is left.
+    layer_thinner : Scene or None
+        The same, one layer of the film missing.
     """
 
     error_mm: float
     thinner: Scene | None
     thicker: Scene
+    layer_thinner: Scene | None = None
 
 
 @dataclass(frozen=True)

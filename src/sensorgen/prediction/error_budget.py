@@ -1,18 +1,18 @@
 """Error budget: the largest relative change of the impedance when each uncertain quantity moves to its ends.
 
 Terms of the models are ``cell`` (bounds of the capacitance), ``compression`` (error of the law), ``boundary`` (boundary
-and contact conditions of the cell), ``line`` (sections under the tip) and ``tip`` (profile of its pressure); ``print``
-is what slicers and walls differ by, ``film thickness`` what the heights of two tools do; then come material values on
-which sources disagree, what leads, contacts and the edge may add, and what a reading is exposed to
-(:mod:`sensorgen.prediction.exposure`).
+and contact conditions of the cell), ``line`` (sections under the tip) and ``tip`` (profile of its pressure);
+``slicer's walls`` is what slicers and line widths differ by, ``film thickness`` what the heights of two tools do,
+``film a layer thinner`` a fault. Then come material values on which sources disagree, what leads, contacts and the
+edge may add, and what a reading is exposed to (:mod:`sensorgen.prediction.exposure`).
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
-from sensorgen.core.bounds import Interval
 from sensorgen.design.design import Design
+from sensorgen.design.effects import GUESS
 from sensorgen.design.materials import PIEZORESISTANCE
 from sensorgen.design.tip import TOPS
 from sensorgen.design.values import ENDS, MaterialValue, material_value, piezoresistance, resistivities, spread
@@ -20,11 +20,13 @@ from sensorgen.models.pressure import PROFILES
 from sensorgen.models.sensor import UNIFORM, Sensor
 from sensorgen.prediction.compression_law import CLOSED_FORM
 from sensorgen.prediction.exposure import exposed
+from sensorgen.prediction.print_faults import CHANGE, by_walls
 from sensorgen.prediction.query import NOISE, Load
 from sensorgen.prediction.reference_load import ReferenceLoad
 from sensorgen.prediction.rest_state import added, permittivity_ratios
 from sensorgen.prediction.results import Changes, ErrorBudget, Term
 from sensorgen.prediction.sensor_model import SensorModel
+from sensorgen.scene.scene import Scene
 
 _NEAR = 1.01  # ratio of moduli that are not told apart
 _MODEL = "model"
@@ -34,7 +36,8 @@ _RICHARDSON = 4 / 3  # of what halving changes, where errors fall by four
 
 def error_budget(
     model: SensorModel, load: Load, accuracy: float | None = None, otherwise: Sequence[Sensor | None] = (),
-    films: Sequence[Sensor | None] = (), noise: float = NOISE,
+    films: Sequence[Sensor | None] = (), layer: Sequence[Sensor | None] = (), noise: float = NOISE,
+    on_bench: tuple[float, float] = (1.0, 1.0),
 ) -> ErrorBudget:  # fmt: skip
     """The error budget of a load.
 
@@ -50,17 +53,21 @@ def error_budget(
         The sensor as it may be printed otherwise; None where one is not known under pressure.
     films : sequence of Sensor or None
         The same with the thickest and the thinnest film.
+    layer : sequence of Sensor or None
+        The same with a film one layer thinner.
     noise : float
         Of a reading, relative to abs(Z) [-].
+    on_bench : (float, float)
+        Standard errors of force and position after known presses, over those of a perfect model [-].
 
     Raises
     ------
     OutOfRange
         A load that the sensor cannot take.
     """
-    reference = ReferenceLoad(model.sensor, load, noise)
+    reference = ReferenceLoad(model.sensor, load, noise, on_bench)
     terms = (
-        *_models(model, reference), *_print(model, reference, otherwise, films), *_materials(model, reference),
+        *_models(model, reference), *_print(model, reference, otherwise, films, layer), *_materials(model, reference),
         *exposed(model, reference),
     )  # fmt: skip
     total = Changes()
@@ -107,25 +114,41 @@ def _models(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
 
 
 def _print(
-    model: SensorModel, reference: ReferenceLoad, otherwise: Sequence[Sensor | None], films: Sequence[Sensor | None]
-) -> Iterator[Term]:
-    """Line widths, and the film's thickness: by the capacitance, and by the law of compression where that is known."""
-    rest, film = model.rest, model.body.cells.film
-
-    def ends(span: Interval, sensors: Sequence[Sensor | None]) -> list[Sensor]:
-        return [*_with_capacitances(model, (span.lower, span.upper)), *(s for s in sensors if s)]
-
-    if rest.by_width.lower < rest.by_width.upper:
-        what = f"line widths of {', '.join(model.body.cells.scenes)}"
-        others = ends(rest.by_width, otherwise)
-        yield reference.term("print", what, "print", others, at_least=None in otherwise, source="slicers")
-    if film:
-        what = f"heights of the tools differ by up to {film.error_mm:g} mm ({model.body.design.machine.name})"
-        at_least = film.thinner is None or None in films
-        others = ends(rest.by_film, films)
+    model: SensorModel, reference: ReferenceLoad, otherwise: Sequence[Sensor | None], films: Sequence[Sensor | None],
+    layer: Sequence[Sensor | None],
+) -> Iterator[Term]:  # fmt: skip
+    """Walls, and the film's thickness: by the capacitance, and by the law of compression where that is known."""
+    rest, film, design = model.rest, model.body.cells.film, model.body.design
+    turns = "" if model.body.is_drawn else by_walls(design)
+    if turns or rest.by_width.lower < rest.by_width.upper:
+        what = f"line shapes or walls: {', '.join(model.body.cells.scenes)}"
+        values_f = rest.by_width.lower, rest.by_width.upper
         yield reference.term(
-            "film thickness", what, "print", others, at_least=at_least, source=model.body.design.machine.name
-        )
+            "slicer's walls", what, "print", _ends(model, values_f, otherwise), at_least=None in otherwise,
+            source="slicers", turns=turns,
+        )  # fmt: skip
+    if film:
+        by, machine = (rest.by_film.lower, rest.by_film.upper), design.machine.name
+        what = f"heights of the tools differ by up to {film.error_mm:g} mm ({machine})"
+        yield _of_film(reference, "film thickness", what, machine, film.thinner, _ends(model, by, films), films)
+        thinner = _ends(model, (rest.layer_thinner_f,) if film.layer_thinner else (), layer)
+        what = f"by {design.layers.layer_mm:g} mm"
+        yield _of_film(reference, "film a layer thinner", what, GUESS, film.layer_thinner, thinner, layer)
+
+
+def _of_film(
+    reference: ReferenceLoad, name: str, what: str, source: str, thinnest: Scene | None, ends: Sequence[Sensor],
+    known: Sequence[Sensor | None],
+) -> Term:  # fmt: skip
+    """A film at the ends of its thickness; CHANGE where none is left."""
+    what += "" if thinnest else ": none is left"
+    at_least = thinnest is None or None in known
+    turns = "" if thinnest else CHANGE
+    return reference.term(name, what, "print", ends, at_least=at_least, source=source, turns=turns)
+
+
+def _ends(model: SensorModel, values_f: Sequence[float], sensors: Sequence[Sensor | None]) -> list[Sensor]:
+    return [*_with_capacitances(model, values_f), *(s for s in sensors if s)]
 
 
 def _materials(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
@@ -225,4 +248,4 @@ def _least_modulus(sensor: Sensor, softest: float, reference: ReferenceLoad) -> 
 
 def _range_text(ranges: Sequence[tuple[float, float]]) -> str:
     low, high = min(a for a, _ in ranges), max(b for _, b in ranges)
-    return f"{low:.3g} to {high:.3g}"
+    return " to ".join(f"{float(f'{end:.3g}'):g}" for end in (low, high))

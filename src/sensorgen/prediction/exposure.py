@@ -17,6 +17,7 @@ from sensorgen.models import pressure
 from sensorgen.models.compression import averaged, beyond
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.compression_law import gap_m
+from sensorgen.prediction.print_faults import by_first_layer
 from sensorgen.prediction.reference_load import Dispersed, ReferenceLoad
 from sensorgen.prediction.results import Changes, Term
 from sensorgen.prediction.sensor_model import SensorModel, piece
@@ -38,6 +39,7 @@ class Exposure(NamedTuple):
     sensors: Sequence[Sensor] | None
     since_rest: bool = True
     at_least: bool = False
+    turns: str = ""
 
 
 def exposed(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
@@ -46,14 +48,14 @@ def exposed(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
     if not reference.force_n > 0:
         return
     for one in chain(_drift(effects, model.sensor), _memory(effects, reference), _tip(effects, model, reference),
-                     _first_layer(effects, model.sensor)):  # fmt: skip
+                     _first_layer(effects, model)):  # fmt: skip
         source = effects.source(*one.keys)
         if one.sensors is None:
-            yield Term(one.name, one.what, one.kind, None, source=source)
+            yield Term(one.name, one.what, one.kind, None, source=source, turns=one.turns)
         elif one.sensors:
             yield reference.term(
                 one.name, one.what, one.kind, one.sensors, since_rest=one.since_rest, at_least=one.at_least,
-                source=source,
+                source=source, turns=one.turns,
             )  # fmt: skip
     if effects.meter:
         gain = Changes(*(effects.meter,) * 5)  # the same at rest: the press is read as it is
@@ -112,16 +114,17 @@ def _tip(e: Effects, model: SensorModel, reference: ReferenceLoad) -> Iterator[E
         yield Exposure(("tilt_deg",), "tip tilted", what, "tip", ends, at_least=ended)
 
 
-def _first_layer(e: Effects, sensor: Sensor) -> Iterator[Exposure]:
+def _first_layer(e: Effects, model: SensorModel) -> Iterator[Exposure]:
     """A bottom electrode thinner than drawn: its first layer squeezed, or the bed uneven."""
-    top, bottom = sensor.electrode_m
+    top, bottom = model.sensor.electrode_m
     for key, least_mm, name in (
         ("squeezed_mm", e.squeezed_mm, "first layer squeezed"), ("bed_mm", e.bed_mm, "bed uneven"),
     ):  # fmt: skip
         thinner = bottom - least_mm * M_PER_MM
-        ends = None if thinner <= 0 else [replace(sensor, electrode_m=(top, thinner))] if least_mm else []
+        ends = None if thinner <= 0 else [replace(model.sensor, electrode_m=(top, thinner))] if least_mm else []
         what = f"by {least_mm:g} mm: bottom electrode thinner"
-        yield Exposure((key,), name, what, "print", ends, since_rest=False)
+        turns = by_first_layer(model.body.design, least_mm) if least_mm else ""
+        yield Exposure((key,), name, what, "print", ends, since_rest=False, turns=turns)
 
 
 def _permittivity(sensor: Sensor, factor: float) -> Sensor:

@@ -270,14 +270,18 @@ def _at_load(result: Prediction, model: SensorModel, load: Load, query: Query) -
             stiffest=stiffest, assumed=_unknown(model),
         )  # fmt: skip
         others: Otherwise = ([None], [None])
+        layer: list[Sensor | None] = []
         if law.bounded:
-            others = list(_printed_otherwise(model, load, query)), list(_other_films(model, load, query))
+            (*films,) = _other_films(model, load, query)
+            others, layer = (list(_printed_otherwise(model, load, query)), films[:2]), films[2:]
         beyond = law.compression.doubt(float(model.sensor.stress_pa(load.force_n, load.position_m)))
         pressed = (beyond, _few_periods(model.body, query), _free_sides(model.body))
         result = replace(
             result, identifiability=known, sensitivity=_sensitivity(model, load, query, others),
             doubts=(*result.doubts, *filter(None, pressed)),
-            budget=error_budget(model, query.load(model.body.design), query.accuracy, *others, query.noise),
+            budget=error_budget(
+                model, query.load(model.body.design), query.accuracy, *others, layer, query.noise, known.bench_ratio()
+            ),
         )  # fmt: skip
         return _with_tops(_resolution(result, model, load, query, others), model, load, query)
     except SensorgenError as error:
@@ -332,11 +336,13 @@ def _printed_otherwise(model: SensorModel, load: Load, query: Query) -> Iterator
 
 
 def _other_films(model: SensorModel, load: Load, query: Query) -> Iterator[Sensor | None]:
-    """Sensors with the thickest and the thinnest film; None where one is not known under pressure."""
+    """Sensors with the thickest and the thinnest film, and one a layer thinner; None where it is not known so."""
     body, rest, tip = model.body, model.rest, query.tip_of(model.body.design)
     film = body.cells.film
     pressure_pa = float(model.sensor.stress_pa(load.force_n, load.position_m))
-    for scene, farad in ((film.thicker, rest.by_film.lower), (film.thinner, rest.by_film.upper)) if film else ():
+    films = ((film.thicker, rest.by_film.lower), (film.thinner, rest.by_film.upper),
+             (film.layer_thinner, rest.layer_thinner_f)) if film else ()  # fmt: skip
+    for scene, farad in films:
         if scene is None:
             yield None
             continue

@@ -13,7 +13,7 @@ from sensorgen.core.arrays import Complex, Real
 from sensorgen.core.errors import OutOfRange
 from sensorgen.models.sensor import Sensor
 from sensorgen.prediction.identifiability.fisher import bounds, relative
-from sensorgen.prediction.identifiability.results import GUESS
+from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE, GUESS
 from sensorgen.prediction.query import NOISE, Load
 from sensorgen.prediction.rest_state import LOWEST_HZ
 from sensorgen.prediction.results import Changes, Term
@@ -67,8 +67,10 @@ class ReferenceLoad:
         A load that the sensor cannot take.
     """
 
-    def __init__(self, sensor: Sensor, load: Load, noise: float = NOISE) -> None:
-        self.sensor, self.force_n, self._noise = sensor, load.force_n, noise
+    def __init__(
+        self, sensor: Sensor, load: Load, noise: float = NOISE, on_bench: tuple[float, float] = (1.0, 1.0)
+    ) -> None:
+        self.sensor, self.force_n, self._noise, self._on_bench = sensor, load.force_n, noise, on_bench
         self.at = load.force_n, load.position_m
         self._frequency = np.asarray(load.frequency_hz, float)
         self._response = lru_cache(lambda other: other.response(self._frequency, *self.at))
@@ -89,11 +91,12 @@ class ReferenceLoad:
 
     def term(
         self, name: str, what: str, kind: Any, others: Sequence[Sensor], *, factor: float = 1.0,
-        since_rest: bool = False, at_least: bool = False, source: str = SOURCES,
+        since_rest: bool = False, at_least: bool = False, source: str = SOURCES, turns: str = "",
     ) -> Term:  # fmt: skip
         """An assumption by the sensors at the ends of its range; parameters as :meth:`change` and of the term."""
         changes = self.change(*others, factor=factor, since_rest=since_rest)
-        return Term(name, what, kind, changes, at_least, source, self.turns(changes, others))
+        turned = ", ".join(filter(None, (turns, self.turns(changes, others))))
+        return Term(name, what, kind, changes, at_least, source, turned)
 
     def change(self, *others: Sensor, factor: float = 1.0, since_rest: bool = False) -> Changes | None:
         """Largest changes over some other sensors, times a factor; None where one of them cannot take the load.
@@ -137,19 +140,20 @@ class ReferenceLoad:
         return float(off[0]), float(off[1])
 
     def _grades(self, sensor: Sensor) -> tuple[float, float]:
-        """Standard errors of force and position, over what a reading without information has."""
+        """Standard errors of force and position on a bench, over what a reading without information has."""
         found = bounds(relative(self._response(sensor), self.force_n), self._noise)
-        force = np.nan_to_num(found.force_n, nan=np.inf) / (GUESS * self.force_n or 1.0)
-        return float(force), float(np.nan_to_num(found.position_m, nan=np.inf) / (GUESS * sensor.length_m))
+        guess = GUESS * self.force_n or 1.0, GUESS * sensor.length_m
+        errors = np.nan_to_num((found.force_n, found.position_m), nan=np.inf) * self._on_bench / guess
+        return float(errors[0]), float(errors[1])
 
     def turns(self, changes: Changes | None, others: Sequence[Sensor] = ()) -> str:
-        """Parts of a press that are measured, and would not be by a change alone: "force", "place", "both", or ""."""
+        """Verdict on a press that a change alone leads to: "cannot ..." of what the sensor does, or "" where none."""
         if changes is None or not self.force_n:
             return ""
         wrong = changes.force_n / (GUESS * self.force_n), changes.position_m / (GUESS * self.sensor.length_m)
         ends = [wrong, *map(self._grades, others)]
-        lost = [own < 1 <= max(end[k] for end in ends) for k, own in enumerate(self._told)]
-        return {(True, True): "both", (True, False): "force", (False, True): "place"}.get((lost[0], lost[1]), "")
+        words = zip((CANNOT_SENSE, CANNOT_LOCATE), self._told, zip(*ends, strict=True), strict=True)
+        return ", ".join(cannot for cannot, own, of in words if own < 1 <= max(of))
 
 
 def _parts(values: Complex) -> Real:

@@ -257,6 +257,8 @@ class RestState:
         Material values that both rest on.
     by_width, by_film : Interval
         What ``capacitance.print`` is the product of: line widths, and the thickness of the film alone [F].
+    layer_thinner_f : float
+        With a film one layer thinner; 0 where none is left, or without ranges [F].
     doubts : tuple of str
         Which other ways to print it have no capacitance, and why.
     """
@@ -268,6 +270,7 @@ class RestState:
     values: tuple[MaterialValue, ...]
     by_width: Interval
     by_film: Interval
+    layer_thinner_f: float = 0.0
     doubts: tuple[str, ...] = ()
 
 
@@ -305,7 +308,7 @@ def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -
     c = answer.capacitance_f
     others, unknown, unbounded = _other_prints(cells, eps, wanted) if ranges else ([], [], False)
     by_width = Interval(min([c.middle(), *others]), max([c.middle(), *others]))
-    thick, thin = _film_ratios(cells, eps) if ranges else (1.0, 1.0)
+    thick, thin, layer = _film_ratios(cells, eps) if ranges else (1.0, 1.0, 0.0)
     by_film = Interval(c.middle() * thick, c.middle() * (thin or 1.0))
     by_print = Interval(by_width.lower * thick, by_width.upper * (thin or 1.0))
     bounds = Bounds.of(
@@ -316,7 +319,9 @@ def rest_state(body: Body, width: float | None = None, *, ranges: bool = True) -
     ends = (rho["top"].value, rho["bottom"].value)
     resistance, missing = _resistance(body)
     doubts = (*remarks, *unknown, *missing)
-    return RestState(answer, bounds, resistance, ends, (*values, *rho.values()), by_width, by_film, doubts)
+    return RestState(
+        answer, bounds, resistance, ends, (*values, *rho.values()), by_width, by_film, layer * c.middle(), doubts
+    )  # fmt: skip
 
 
 def _other_prints(cells: Cells, eps: Mapping[str, float], width: float) -> tuple[list[float], list[str], bool]:
@@ -345,21 +350,22 @@ def _resistance(body: Body) -> tuple[dict[str, Bounds], list[str]]:
     return resistance, reasons
 
 
-def _film_ratios(cells: Cells, eps: Mapping[str, float]) -> tuple[float, float | None]:
-    """Capacitance over that of the most likely cell, with the thickest and the thinnest film [-].
+def _film_ratios(cells: Cells, eps: Mapping[str, float]) -> tuple[float, float | None, float]:
+    """Capacitance over that of the most likely cell, with the thickest, the thinnest film, and one a layer thinner [-].
 
     A cross-section is solved. Other cells, which take seconds, by the closed-form bounds: rect with a film of 0.1 mm
-    and 0.02 mm less or more +23 and -16 %, solved +19 and -13 %. None where the thinnest film is none at all.
+    and 0.02 mm less or more +23 and -16 %, solved +19 and -13 %. None, or 0, where no film is left.
     """
     if not cells.film:
-        return 1.0, 1.0
+        return 1.0, 1.0, 0.0
     width = default_width(cells.first())
 
     def of(scene: Scene) -> float:
         return capacitance(scene, eps, width if width == PLANE else inf).capacitance_f.middle()
 
-    usual, thinner = of(cells.first()), cells.film.thinner
-    return of(cells.film.thicker) / usual, of(thinner) / usual if thinner else None
+    usual, films = of(cells.first()), (cells.film.thinner, cells.film.layer_thinner)
+    thinner, layer = (of(scene) / usual if scene else None for scene in films)
+    return of(cells.film.thicker) / usual, thinner, layer or 0.0
 
 
 def _permittivity_range(design: Design, scene: Scene, middle: float) -> Interval:

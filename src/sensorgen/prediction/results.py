@@ -87,7 +87,7 @@ class Term:
     source : str
         Where its range comes from: also the design, or an assumption.
     turns : str
-        What could no longer be determined of a press, by this alone: "force", "place", "both", or "".
+        Verdicts that this alone leads to, with commas: "CHANGE", "PRINT", "cannot sense force", "cannot locate"; or "".
     """
 
     name: str
@@ -103,11 +103,11 @@ class Term:
         return inf if self.changes is None or self.at_least else self.changes.magnitude
 
     def words(self) -> str:
-        """By how much a press is read wrongly, and what gave the range."""
+        """Range and source, and by how much a press is read wrongly."""
         c = self.changes or Changes()
         wrong = [newtons(c.force_n)] * (c.force_n > _LEAST_N) + [metres(c.position_m)] * (c.position_m > _LEAST_M)
         what = f": {self.what}" * (len(self.what) <= _SHORT)
-        return f"{self.name}{what} ({self.source}), {' and '.join(wrong)}"
+        return f"{self.name}{what} ({self.source}) reads a press wrongly by {' and '.join(wrong)}"
 
     def remark(self) -> str:
         """That it is unknown, or may be larger."""
@@ -150,8 +150,24 @@ class ErrorBudget:
             c = term.changes or Changes()
             return max(c.force_n / (self.force_n or inf), c.position_m / (self.position_m or inf))
 
-        seen = [t for t in self.terms if (c := t.changes) and (c.force_n > _LEAST_N or c.position_m > _LEAST_M)]
+        seen = [t for t in self.terms if t.turns or
+                ((c := t.changes) and (c.force_n > _LEAST_N or c.position_m > _LEAST_M))]  # fmt: skip
         return tuple(sorted(seen, key=effect, reverse=True))
+
+    def rests_on(self, verdict: str = "") -> Iterator[str]:
+        """The largest assumption, and verdicts that assumptions alone lead to in place of that on the print."""
+        by_press = self.by_press()
+        if not by_press:
+            return
+        yield f"largest assumption: {by_press[0].words()}"
+        turned: dict[str, list[str]] = {}
+        for term in by_press:
+            for words in filter(None, term.turns.split(", ")):
+                turned.setdefault(words, []).append(term.name)
+        turned.pop("CHANGE" if verdict == "CHANGE" else "PRINT" if verdict else "", None)
+        if turned:
+            shown = (f"{words} ({name}{f', {len(more)} more' * bool(more)})" for words, (name, *more) in turned.items())
+            yield f"each alone: {'; '.join(shown)}"
 
     def met_by(self, *kinds: str) -> bool:
         """Test whether the terms of some kinds together are within the accuracy."""
@@ -186,16 +202,16 @@ class ErrorBudget:
         """Effects of each assumption alone at the ends of its range, the largest on a press first."""
         columns = (
             Column("assumption"), Column("C", "%", digits=2), Column("R", "%", digits=2), Column("F", "N", digits=2),
-            Column("x", "mm", digits=2), Column("loses"), Column("source"),
+            Column("x", "mm", digits=2), Column("leads to"), Column("source"),
         )  # fmt: skip
         rows = (
             (t.name, 100 * c.capacitance, 100 * c.re, c.force_n, 1e3 * c.position_m, t.turns, t.source)
             for t in self.by_press()
-            if (c := t.changes)
+            for c in (t.changes or Changes(),)
         )
-        caption = "a press read wrongly by one assumption at an end of its range (F, x)"
+        caption = "a press read wrongly by one assumption at an end of its range (F, x), without known presses"
         yield Table("assumptions", caption, columns, tuple(rows))
-        yield "(readings compared with those at rest; loses: what this alone makes impossible to determine)"
+        yield "(readings compared with those at rest; leads to: the verdict that this alone would change to)"
 
 
 def _percent(term: Term, count: int) -> tuple[float | None, ...]:
@@ -379,6 +395,12 @@ class Prediction(Displayed):
             resolved(position, length_m, CANNOT_LOCATE, conditional=self.conditional),
         )
 
+    def rests_on(self, verdict: str = "") -> tuple[str, ...]:
+        """The largest assumption, unless the sensor cannot do anything; verdicts that assumptions alone lead to."""
+        lines = tuple(self.budget.rests_on(verdict)) if self.budget else ()
+        useless = all(words.startswith("cannot") for words in self.resolved())
+        return lines[useless:]
+
     def summary(self) -> Iterator[Part]:
         """Quantities of the print beside the drawing's: the best value and the range with all errors."""
         shown = [self.drawn, self] if self.drawn else [self]
@@ -499,6 +521,7 @@ class Overview(Prediction):
         yield from self.summary()
         if self.reason and not self.identifiability:
             yield f"no load: {self.reason}"
+        yield from self.rests_on()
         yield from (f"doubtful: {doubt}" for doubt in self.doubts)
         yield f"(--details: causes of the ranges, impedance, error budget, {len(self.assumptions)} assumptions)"
 
@@ -548,8 +571,8 @@ def resolved(error: Bounds | None, most: float, cannot: str, *, conditional: boo
         return "–"
     if not (error.lower if conditional else error.value) < GUESS * most:
         return cannot
-    if error.value >= most:
-        return f"{cannot}, at best {si(error.lower, error.unit)}"
+    if not error.value < GUESS * most:
+        return f"{cannot}, at best {si(error.lower, error.unit, 2)}"
     if error.upper > most:
         error = replace(error, upper=most, open="upper")
     return error.words()

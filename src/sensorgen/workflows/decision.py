@@ -7,16 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from sensorgen.checks.review import STEPS as CHECKS
-from sensorgen.checks.review import CheckReport, Review, Step, report, review
+from sensorgen.checks.review import CheckReport, Review, Step, report
 from sensorgen.core.document import Part
 from sensorgen.core.errors import SensorgenError
-from sensorgen.core.findings import Refused, Verdict, headline, listed
+from sensorgen.core.findings import Refused, headline, listed
 from sensorgen.design.design import Design
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.slices import PrintReview, reviewed
 from sensorgen.workflows.changes import Advice
-from sensorgen.workflows.moves import changed
 from sensorgen.workflows.trial import Trial, table, trial
 
 if TYPE_CHECKING:
@@ -39,8 +38,6 @@ class Decision(CheckReport):
         Why nothing is predicted, or "".
     advice : Advice or None
         Changes that were tried; None where none was looked for.
-    turned_by : str
-        Fault of the print that alone turns the verdict into CHANGE, and its finding; "" where none of those tried does.
     """
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
@@ -48,7 +45,6 @@ class Decision(CheckReport):
     trial: Trial | None = None
     reason: str = ""
     advice: Advice | None = None
-    turned_by: str = ""
 
     def document(self) -> Iterator[Part]:
         """Verdict, numbers, findings and changes."""
@@ -71,8 +67,6 @@ class Decision(CheckReport):
 
     def numbers(self) -> Iterator[Part]:
         """The numbers that decide; why there are none."""
-        if self.turned_by:
-            yield f"it would be CHANGE with {self.turned_by}"
         if self.trial:
             yield from table(self.trial)
         elif self.reason:
@@ -133,26 +127,7 @@ def decision(
 
             step("changes")
             advice = advised(design, tried, budget_s, step, time.process_time() - start_s)
-    return Decision(
-        **vars(report(design, held)), trial=tried, reason=reason, advice=advice,
-        turned_by=_turned_by(design, held.verdict),
-    )  # fmt: skip
-
-
-def _turned_by(design: Design, verdict: Verdict) -> str:
-    """A film one layer thinner than drawn, where the checks then have an error, and that error; else ""."""
-    film_mm = getattr(design.params, "dielectric_mm", 0.0)
-    thinner = round(film_mm - design.layers.layer_mm, 9)
-    if not film_mm or verdict == "CHANGE":
-        return ""
-    fault = "a film one layer thinner"
-    if thinner <= 0:
-        return f"{fault}: none is left"
-    try:
-        findings = review(changed(design, {("parameters", "dielectric_mm"): thinner})).findings
-    except SensorgenError as error:
-        return f"{fault}: {error}"
-    return next((f"{fault}: {f.message}" for f in findings if f.severity == "error" and not f.waiver), "")
+    return Decision(**vars(report(design, held)), trial=tried, reason=reason, advice=advice)
 
 
 PAGE_STEPS = (*CHECKS, "prediction", "page", "done")

@@ -147,8 +147,8 @@ class Trial(Displayed):
         Why the print's numbers may be wrong by more than their ranges say.
     toolpath : Toolpath or None
         Of the G-code; None for an estimate.
-    rests_on : str
-        Assumption that a press is read most wrongly by, and by how much; "" where none is known.
+    rests_on : tuple of str
+        Assumption that a press is read most wrongly by, and verdicts that assumptions alone lead to.
     """
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"ser_json_inf_nan": "strings"}
@@ -167,7 +167,7 @@ class Trial(Displayed):
     printed: Numbers
     doubts: tuple[str, ...] = ()
     toolpath: Toolpath | None = None
-    rests_on: str = ""
+    rests_on: tuple[str, ...] = ()
 
     def errors(self) -> tuple[Finding, ...]:
         """Findings that are errors."""
@@ -212,8 +212,7 @@ def table(tried: Trial) -> Iterator[Part]:
     yield caption_of(tried.force_n, tried.position_m, tried.body)
     if tried.printed.by_top:
         yield f"printed, the worst of: {tried.printed.by_top}"
-    if tried.rests_on and any(grade(tried)):
-        yield f"largest assumption: a press is read wrongly by {tried.rests_on}"
+    yield from tried.rests_on
     if tried.reason:
         yield f"{'not predicted: ' * (tried.status == 'not predicted')}{tried.reason}"
     yield from (f"doubtful: {doubt}" for doubt in tried.doubts)
@@ -289,11 +288,11 @@ def trial(
     body = bodies.of_file(design, held.file)
     predicted = evaluate(body, query, keep=keep, beside=drawn)
     findings = tuple(f for f in held.findings if not f.waiver)
-    assumed = predicted.budget.by_press()[:1] if predicted.budget else ()
+    said = verdict(findings)
     return Trial(
         design.name, design.id(), f"{_crossings(design)}{body.provenance}",
-        predicted.status, predicted.reason, verdict(findings), findings,
+        predicted.status, predicted.reason, said, findings,
         predicted.force_n, predicted.position_m, design.params.length_mm * M_PER_MM,
         Numbers.of(predicted.drawn) if predicted.drawn else Numbers(), Numbers.of(predicted), predicted.doubts,
-        Toolpath.of(held.file.report) if held.file else None, "".join(term.words() for term in assumed),
+        Toolpath.of(held.file.report) if held.file else None, predicted.rests_on(said),
     )  # fmt: skip

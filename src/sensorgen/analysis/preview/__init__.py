@@ -71,8 +71,9 @@ def _tornado(predicted: Prediction) -> Iterator[Bar]:
         c = term.changes or Changes()
         shares = c.force_n / budget.force_n, c.position_m / (2 * budget.position_m)  # type: ignore[union-attr]
         force, place = (min(100.0, round(100 * share, 1)) for share in shares)
-        if max(force, place) >= _SEEN:
-            yield Bar(term, (newtons(c.force_n), metres(c.position_m)), (force, place))
+        if max(force, place) >= _SEEN or term.turns:
+            words = newtons(c.force_n) if force else "–", metres(c.position_m) if place else "–"
+            yield Bar(term, words, (force, place))
 
 
 @dataclass(frozen=True)

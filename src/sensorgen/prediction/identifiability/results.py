@@ -257,6 +257,12 @@ class Identifiability(StandardErrors):
     calibrated: StandardErrors | None = None
     uncalibrated: StandardErrors | None = None
 
+    def bench_ratio(self) -> tuple[float, float]:
+        """Standard errors of force and position after known presses, over these; 1 where one is not known [-]."""
+        known = self.calibrated or self
+        force, position = known.sigma_force_n, known.sigma_position_m
+        return (force or 1.0) / (self.sigma_force_n or 1.0), (position or 1.0) / (self.sigma_position_m or 1.0)
+
     def document(self) -> Iterator[Part]:
         """Verdict, errors over all presses, changes that reduce them, and what each frequency contributes."""
         yield Facts(tuple(self._facts()))

@@ -1,0 +1,70 @@
+"""Verdicts that one fault of a print leads to: designs at the edge, by sums on paper.
+
+Nozzle 0.4 mm, lines of 0.44 mm, layers of 0.1 mm. Arachne prints a stretch of 0.12 mm and more, classic walls a line.
+"""
+
+import json
+from types import SimpleNamespace
+
+import pytest
+
+from sensorgen.design.design import make
+from sensorgen.prediction import bodies
+from sensorgen.prediction.evaluate import evaluate
+from sensorgen.prediction.print_faults import by_first_layer, by_walls
+from sensorgen.scene.scene import Body, Scene, box
+
+
+def terms(data):
+    return {t.name: t for t in evaluate(bodies.estimated(make(data)), beside=False).budget.terms}
+
+
+@pytest.mark.parametrize(
+    ("width_mm", "walls", "turns"),
+    [(0.43, None, "CHANGE"), (0.45, None, ""), (0.43, "arachne", ""), (0.11, None, "")],
+)  # fmt: skip
+def test_walls_lose_cogs_that_are_narrower_than_a_line(width_mm, walls, turns):
+    """Of 0.11 mm: CHANGE by the drawing's own rule, whatever walls print them."""
+    data = {"shape": "cog", "parameters": {"cog_width_mm": width_mm, "dielectric_mm": 0.2}}
+    design = make(data | ({"profile": {"walls": walls}} if walls else {}))
+    assert by_walls(design) == turns
+
+
+def test_walls_that_fill_gaps_print_what_arachne_loses():
+    """Apexes of tri 0.2: at mid-layer 0.05 mm wide."""
+    assert by_walls(make({"shape": "tri", "parameters": {"dielectric_mm": 0.2}})) == "PRINT"
+
+
+@pytest.mark.parametrize(("film_mm", "turns", "more"), [(0.1, "CHANGE", None), (0.2, "", 1.0), (0.3, "", 0.5)])
+def test_a_film_of_one_layer_is_none_without_it(film_mm, turns, more):
+    """C of a plate is as one over its film: 0.2 mm less 0.1 have twice, 0.3 less 0.1 have 1.5 times."""
+    term = terms({"shape": "reference", "parameters": {"dielectric_mm": film_mm}})["film a layer thinner"]
+    assert (term.turns, term.at_least) == (turns, not more)
+    if more:
+        assert term.changes.capacitance == pytest.approx(more, rel=1e-6)
+
+
+@pytest.mark.parametrize(("error_mm", "turns"), [(0.09, ""), (0.1, "CHANGE")])
+def test_a_film_is_none_where_tools_differ_by_it(error_mm, turns, tmp_path):
+    shipped, own = make({"shape": "reference"}).machine, tmp_path / "rough.yaml"
+    own.write_text(json.dumps(shipped.model_dump(exclude={"name"}) | {"tool_height_error_mm": error_mm}), "utf-8")
+    data = {"shape": "reference", "parameters": {"dielectric_mm": 0.1}, "printer": str(own)}
+    assert terms(data)["film thickness"].turns == turns
+
+
+@pytest.mark.parametrize(("squeezed_mm", "turns"), [(0.09, ""), (0.1, "CHANGE")])
+def test_no_first_layer_is_left(squeezed_mm, turns):
+    for key, name in (("squeezed_mm", "first layer squeezed"), ("bed_mm", "bed uneven")):
+        assert terms({"shape": "reference", "effects": {key: squeezed_mm}})[name].turns == turns
+
+
+@pytest.mark.parametrize(("gap_mm", "turns"), [(0.43, "CHANGE"), (0.45, "")])
+def test_electrodes_side_by_side_touch_in_a_squeezed_layer(gap_mm, turns):
+    """Squeezed to half, a line of 0.44 mm is 0.88 mm wide: 0.22 mm further to each side."""
+    sides = (("bottom", 0.0), ("top", 5.0 + gap_mm))
+    pair = tuple(Body(end, "etpu", (box(x, x + 5.0, 0, 5, 0, 0.1),), end) for end, x in sides)
+    design = make({"shape": "reference"})
+    side_by_side = SimpleNamespace(
+        printed=Scene(pair, (10.0 + gap_mm, 5.0, 0.1)), layers=design.layers, machine=design.machine
+    )
+    assert by_first_layer(side_by_side, 0.05) == turns
