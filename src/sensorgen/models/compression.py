@@ -312,13 +312,17 @@ def beyond(law: Compression, mean_pa: float, shares: Callable[[float], Real]) ->
     most_pa = float(max((shares(p) * p).max() for p in mean_pa * _NODES[1:]))
     if isinstance(law, Plate) or most_pa <= REACH * law.stress_pa[-1]:
         return (law,)
-    p, g, slope = (getattr(law, name)[-1] for name in ("stress_pa", "ratio", "slope_per_pa"))
-    return tuple(
-        replace(
-            law, stress_pa=(*law.stress_pa, most_pa), ratio=(*law.ratio, g + by * (most_pa - p)),
-            slope_per_pa=(*law.slope_per_pa[:-1], by, by),
-        )
-        for by in (0.0, slope)
+    return tuple(extended(law, most_pa, by) for by in (0.0, law.slope_per_pa[-1]))
+
+
+def extended(law: CapacitanceCurve, most_pa: float, slope_per_pa: float) -> CapacitanceCurve:
+    """Curve with a straight line from its last point to a pressure [Pa], its rise by that slope [1/Pa]."""
+    last_pa, down = law.stress_pa[-1], law.displacement_m
+    ratio = law.ratio[-1] + slope_per_pa * (most_pa - last_pa)
+    return replace(
+        law, stress_pa=(*law.stress_pa, most_pa), ratio=(*law.ratio, ratio),
+        slope_per_pa=(*law.slope_per_pa[:-1], slope_per_pa, slope_per_pa),
+        displacement_m=None if down is None else down * most_pa / last_pa,
     )  # fmt: skip
 
 

@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sensorgen.core.arrays import Real
+from sensorgen.core.bounds import Interval
 from sensorgen.core.errors import MissingValue, OutOfRange, SensorgenError, UnknownName
 from sensorgen.core.units import M_PER_MM
 from sensorgen.design.design import Design
 from sensorgen.design.tip import EVEN, STIFF, Tip
 from sensorgen.design.values import MaterialValue, film, material_value, of_all_materials, permittivities
 from sensorgen.models import compression
-from sensorgen.models.compression import CapacitanceCurve, Compression, curve_of
+from sensorgen.models.compression import CapacitanceCurve, Compression, curve_of, extended
 from sensorgen.prediction.capacitance import Answer, is_plate
 from sensorgen.prediction.mesh_ladder import (
     COARSEST,
@@ -78,6 +79,8 @@ class Law:
         The cell under other boundary and contact conditions.
     bounded : bool
         Whether its error is known: not where a cell with gaps is approximated by a plate.
+    of_mesh : tuple of Compression
+        Laws within the error of the mesh alone, where ``others`` hold too that its solution ended early; else empty.
     """
 
     compression: Compression
@@ -87,6 +90,7 @@ class Law:
     tops: Mapping[str, Compression] = field(default_factory=dict)
     other_boundaries: tuple[Compression, ...] = ()
     bounded: bool = True
+    of_mesh: tuple[Compression, ...] = ()
 
 
 def law_of(
@@ -342,9 +346,14 @@ def _cell(
     curve: CapacitanceCurve, moduli: Mapping[str, MaterialValue], tops: Mapping[str, CapacitanceCurve] | None = None
 ) -> Law:
     """Law of a solved cell, with the errors of its rise and onset, and under other boundary conditions."""
-    others = tuple(replace(curve.scaled_rise(1 + sign * curve.within), onset=1 + sign * _ONSET) for sign in (-1, 1))
     other_boundaries = tuple(curve.scaled_rise(1 + change) for change in curve.boundary_changes)
-    return Law(curve, tuple(moduli.values()), curve.doubts, others, tops or {}, other_boundaries)
+    return Law(curve, tuple(moduli.values()), curve.doubts, _ends(curve), tops or {}, other_boundaries)
+
+
+def _ends(curve: CapacitanceCurve) -> tuple[CapacitanceCurve, CapacitanceCurve]:
+    """A curve with the least and the largest rise within its error."""
+    least, most = (replace(curve.scaled_rise(1 + s * curve.within), onset=1 + s * _ONSET) for s in (-1, 1))
+    return least, most
 
 
 def _stored_law(even: CapacitanceCurve, moduli: Mapping[str, MaterialValue], tip: Tip, *, usual: bool) -> Law:
@@ -406,7 +415,7 @@ def solved(
     case = _case(design, piece, model, boundary) if boundary else case_of(design, piece, model, tip)
     estimate = estimated(case, loads, level, sound=True)
     solution = estimate.found
-    if solution.converged_pa < _ENOUGH * max(until_pa, STRESS_PA[-1]):
+    if solution.converged_pa < _ENOUGH * STRESS_PA[-1]:
         solution = pressed(case, loads, level)
     curve = curve_of(solution)
     shares = estimate.rise_error_f_per_m2[1:] / estimate.rise_f_per_m2[1:]
@@ -420,7 +429,54 @@ def solved(
     ended = [f"the solution of the cell ended at {curve.stress_pa[-1] / 1e3:.3g} kPa"] if short else []
     doubts = (*solution.doubts, *([_LANDING] if solution.fall_m else []), *ended)
     tops = {} if boundary else under_tops(design, piece, model, tip, curve)
-    return _cell(replace(curve, doubts=doubts), {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, tops)
+    law = _cell(replace(curve, doubts=doubts), {**moduli, **{f"{n}'s ratio": t for n, t in ratios.items()}}, tops)
+    at_rest = solution.capacitance_f_per_m2[0]
+    return _further(law, replace(curve, doubts=doubts), tops, replace(case, piece=piece), until_pa, at_rest)
+
+
+def _further(
+    law: Law, own: CapacitanceCurve, tops: Mapping[str, CapacitanceCurve], case: Case, until_pa: float,
+    at_rest: Interval | None,
+) -> Law:  # fmt: skip
+    """A law up to a pressure that its cell was not solved for: between no further rise and that of the closed cell."""
+    from sensorgen.models import closed
+
+    scene, last_pa, (least, upper) = case.piece.scene, own.stress_pa[-1], _ends(own)
+    if not at_rest or until_pa <= last_pa:
+        return law
+    softest_pa = min(case.solids[b.material].youngs_modulus_pa for b in scene.bodies if not b.terminal)
+    try:
+        most = closed.most_f_per_m2(scene, case.permittivity, softest_pa, until_pa) / at_rest.lower
+    except ValueError:
+        return law
+    most = max(most, upper.ratio[-1])
+    slope, highest = ((most - c.ratio[-1]) / (until_pa - last_pa) for c in (own, upper))
+    slope = min(own.slope_per_pa[-1], slope)
+    between = extended(own, until_pa, slope)
+    doubt = (
+        f"from {last_pa / 1e3:.3g} to {until_pa / 1e3:.4g} kPa the rise of C lies between none more, "
+        f"{100 * (least.ratio[-1] - 1):.3g} %, and that of the closed cell, {100 * (most - 1):.3g} %"
+    )
+    return replace(
+        law,
+        compression=between,
+        doubts=(*law.doubts, doubt),
+        others=(extended(least, until_pa, 0.0), extended(upper, until_pa, highest)),
+        tops={name: _as_far(top, between) for name, top in tops.items()},
+        of_mesh=tuple(extended(c, until_pa, slope) for c in (least, upper)),
+    )
+
+
+def _as_far(top: CapacitanceCurve, own: CapacitanceCurve) -> CapacitanceCurve:
+    """A curve continued in proportion to another one, from its last point on."""
+    last_pa = top.stress_pa[-1]
+    thinning = float(own.capacitive_strain(np.asarray(last_pa))[0])
+    share, n = (top.ratio[-1] - 1) / (thinning / (1 - thinning)), sum(p <= last_pa for p in own.stress_pa)
+    return replace(
+        top, stress_pa=(*top.stress_pa, *own.stress_pa[n:]),
+        ratio=(*top.ratio, *(1 + share * (g - 1) for g in own.ratio[n:])),
+        slope_per_pa=(*top.slope_per_pa, *(share * m for m in own.slope_per_pa[n:])),
+    )  # fmt: skip
 
 
 def under_tops(

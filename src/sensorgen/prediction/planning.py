@@ -145,9 +145,9 @@ def execute(planned: PredictionPlan) -> tuple[SensorModel, Plan]:
     law, compression = run_until_within(
         replace(compression, allowed=_left(accuracy - spent - _reach(line), compression)),
         {option.name: option.find for option in planned.options(rest.answer)},
-        lambda law: _error_of_law(sensor, load, law),
+        lambda law: _error_of_law(sensor, load, replace(law, others=law.of_mesh or law.others)),
     )
-    spent += _width(compression)
+    spent += max(_width(compression), _error_of_law(sensor, load, law) if law.of_mesh else 0.0)
     model = build_sensor(planned.body, _with_failures(law, compression), planned.tip, rest=rest)
     line = _line(model.sensor, load, _left(accuracy - spent, line), line)
     if model.sensor.profile != UNIFORM:
