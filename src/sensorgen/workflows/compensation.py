@@ -131,15 +131,15 @@ def compensated(
         return now, changes
     why = "gap, capacitance and stiffness" if stiffness else "gap and capacitance"
     changes += [Adjustment(key[-1], _own(now, key), float(value), why) for key, value in after.values.items()]
-    return _named(made, design), [*changes, *_comes_out(search.quantities(search.first), printed, asked)]
+    return _named(made, design), [*changes, *_comes_out(search.before(), printed, asked)]
 
 
 def _comes_out(before: Quantities, after: Quantities, asked: Quantities) -> Iterator[Adjustment]:
     """Quantities of the print before and after all changes."""
     for key, name in ((GAP, "electrode gap"), (CAPACITANCE, "capacitance"), (STIFFNESS, "stiffness")):
-        if key in after and key in asked:
+        if key in before and key in after and key in asked:
             what, why = f"{name} as printed [{UNITS[key]}]", f"{asked[key]:.4g} {UNITS[key]} asked"
-            yield Adjustment(what, before.get(key, 0.0), after[key], why)
+            yield Adjustment(what, before[key], after[key], why)
 
 
 def _named(changed: Design, design: Design) -> Design:
@@ -247,6 +247,13 @@ class CompensationSearch(Nearest):
     def first(self) -> Candidate:
         """The design as it was."""
         return next(iter(self.estimates))
+
+    def before(self) -> Quantities:
+        """Quantities of the first design's print, also of those that the search did not need."""
+        try:
+            return self.prints.get(self.first) or self._estimate(self.first)
+        except SensorgenError:
+            return self.estimates[self.first]
 
     def quantities(self, one: Candidate) -> Quantities:
         """Those of its print, where it was sliced, or of its estimate."""
