@@ -99,18 +99,21 @@ def by_voxels(design, text: str) -> tuple[float, float]:
     if design.shape == "tri":
         low["xy".index(p.along) ^ 1] = print_.middle()["xy".index(p.along) ^ 1] - period / 2
     conductor, film = (design.tool(design.slot(part)[0].name) for part in ("bottom_electrode", "film"))
-    values, counts = [], (100, 150)
+    is_section = design.shape == "tri"  # strips along y: one row of voxels across them
+    values, counts = [], (400,) if is_section else (100, 150)
     for n in counts:
         tools, heights = voxels.painted(print_, low, period, n, full=0.95)  # slits of thin layers are there
-        thin = n // 25
-        values.append(voxels.capacitance(tools, heights, period, thin, {film: EPS["x60"], -1: EPS["air"]}, conductor))
+        part, rows, thin = (tools[:, :, n // 2, None], n, 8) if is_section else (tools, 1, n // 25)
+        of = {film: EPS["x60"], -1: EPS["air"]}
+        values.append(rows * voxels.capacitance(part, heights, period, thin, of, conductor))
     metal = tools == conductor
     label, _ = voxels.ndimage.label(metal)
     bottom = label == label[0].max()
     gap = min(heights[k] for k in range(len(metal)) if (metal & ~bottom)[k].any())
     gap -= max(heights[k + 1] for k in range(len(metal)) if bottom[k].any())
-    coarse, fine = values
-    limit = fine + (fine - coarse) * counts[0] / (counts[1] - counts[0])
+    limit = values[-1]
+    if len(counts) > 1:
+        limit += (limit - values[0]) * counts[0] / (counts[1] - counts[0])
     return round(gap, 4), limit * 1e12 * size[0] * size[1] / period**2
 
 

@@ -6,6 +6,7 @@ import pytest
 from sensorgen.core.findings import most_severe
 from sensorgen.design.design import make
 from sensorgen.export.slicers import PROGRAMS
+from sensorgen.prediction.new_slice import slice_now
 from sensorgen.prediction.slices import reviewed
 from sensorgen.workflows.optimise.ladder import everything
 from sensorgen.workflows.optimise.target import NUMBERS, Target
@@ -21,6 +22,13 @@ def test_an_array_of_tri_prints(slicer, program, cache):
     held = reviewed(make({"shape": "array", "parameters": PARAMETERS, "cell": {"shape": "tri"}}), slicer=slicer)
     assert held.source.startswith("sliced by")
     assert not [f for f in held.findings if f.severity == "error"], most_severe(held.findings, 9)
+
+
+def test_newer_cura_primes_the_tool_of_an_array_that_lies_on_the_bed(newer_program):
+    """Its skirt is of the base's tool, which is not the lowest number; the engine primes that tool alone there."""
+    design = make({"shape": "array", "parameters": PARAMETERS, "cell": {"shape": "tri"}})
+    report = slice_now(design, "cura", program=str(newer_program("CuraEngine"))).report
+    assert not [f for f in report.of_print() if f.severity == "error"], most_severe(report.of_print(), 9)
 
 
 def test_numbers_of_a_search_are_those_of_the_array(cache):

@@ -85,9 +85,9 @@ def painted(print_, low, size, count, full=0.85):
             start, end = print_.start[rows], print_.end[rows]
             area = print_.volume[rows] / (top - bottom)
             wide = area / np.hypot(*(end - start).T)
-            steps = np.linspace(0.005, 0.995, 100)[:, None, None]
-            along = start + steps * (end - start)
-            inside = ((along > low) & (along < np.array(low) + size)).all(2).mean(0)
+            with np.errstate(divide="ignore"):
+                at = np.sort([(np.add(low, side) - start) / (end - start) for side in (0.0, size)], axis=0)
+            inside = (at[1].min(1).clip(max=1.0) - at[0].max(1).clip(min=0.0)).clip(min=0.0)  # share of a line's length
             deposit = (inside * area).sum()
             nearest = np.full((count, count), np.inf)
             for a, b, w in zip(start, end, wide, strict=True):

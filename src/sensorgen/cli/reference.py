@@ -19,21 +19,21 @@ TEMPLATES = ("material", "shape", "printer", "quality", "instrument", "design", 
 
 
 @of_function("new", *render.options("json", file=False))
-def new_command(what: Annotated[Any, Argument(kind=TEMPLATES)], name: str, *, pack: str = "") -> "Documented":
+def new_command(kind: Annotated[Any, Argument(kind=TEMPLATES)], name: str, *, pack: str = "") -> "Documented":
     """Write a commented file of your own to change, as a material, a shape, a design or an experiment.
 
-    It goes to a folder of its kind in the working folder, as materials/NAME.yaml, where designs in this folder take it
-    by its name; with --pack to one of your packs, for all designs. An existing file is never replaced.
+    A design, target or experiment goes to the working folder; what designs name to a folder of its kind in it, as
+    materials/NAME.yaml, or with --pack to one of your packs, for all designs. An existing file is never replaced.
 
     Parameters
     ----------
-    what : {material|shape|printer|quality|instrument|design|target|experiment}
+    kind : {material|shape|printer|quality|instrument|design|target|experiment}
     pack : PACK
         One of your packs, in place of the working folder.
     """
     from sensorgen.workflows.templates import new
 
-    return new(what, name, pack)
+    return new(kind, name, pack)
 
 
 pack_command = click.Group(

@@ -283,7 +283,8 @@ def find(kind: Kind, name: str, folder: Path | None = None) -> File:
             if packs:
                 check_requires(packs[0])
                 return File(kind, name, packs[0])
-    raise unknown(kind, name, (file.name for file in files(kind, folder)))
+    built_in = ["array"] if kind == "shapes" else []  # crossing tracks: the one shape that is no file
+    raise unknown(kind, name, (*(file.name for file in files(kind, folder)), *built_in))
 
 
 def unknown(kind: Kind, name: str, known: Iterable[str]) -> UnknownName:

@@ -265,7 +265,8 @@ def _run(
         settings = curaengine.engine_settings(design.machine, design.layers, all_loads, version)
         # The engine primes in the first layer only the tool that prints the skirt: that of what lies on the bed
         lowest = min(bodies, key=lambda part: (part.mesh.vertices_mm[:, 2].min(initial=np.inf), part.extruder))
-        settings = replace(settings, common=settings.common | {"adhesion_extruder_nr": str(lowest.extruder)})
+        of_skirt = {key: str(lowest.extruder) for key in curaengine.OF_SKIRT if key in settings.common}
+        settings = replace(settings, common=settings.common | of_skirt)
         shift_mm = np.array([-c for c in design.machine.bed_centre_mm()] + [0.0])
         files = [(folder / f"{part.name}.stl", part) for part in bodies]
         for path, part in files:

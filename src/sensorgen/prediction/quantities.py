@@ -372,7 +372,9 @@ def _with_tops(result: Prediction, model: SensorModel, load: Load, query: Query)
     tip = query.tip_of(model.body.design)
     own = {name: bounds for name in _UNITS if (bounds := getattr(result, name)) and bounds.value}
     others = (
-        _under_top(name, law, own, model, load, query) for name, law in model.law.tops.items() if name != tip.block
+        _under_top(name, law, own, model, load, query)
+        for name, law in sorted(model.law.tops.items())
+        if name != tip.block
     )
     known = result.identifiability
     tops = [

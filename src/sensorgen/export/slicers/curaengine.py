@@ -21,6 +21,7 @@ from sensorgen.export.slicers.loads import ToolLoad, recipes
 from sensorgen.export.slicers.run import USUAL, Runner, find, run
 from sensorgen.export.slicers.versions import Version
 
+OF_SKIRT = ("adhesion_extruder_nr", "skirt_brim_extruder_nr")  # its tool: until 4.13, and from 5.0 on
 RESOURCES = (Path("/usr/share/cura/resources"), Path("/usr/local/share/cura/resources"))
 
 
