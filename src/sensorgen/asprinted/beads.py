@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -143,7 +144,12 @@ def _inside(start_mm: Real, end_mm: Real, size_mm: Real) -> tuple[list[Real], Re
 
 
 def layers(
-    design: Design, lines: Beads, convention: str = "vol", *, electrode_wins: bool = False
+    design: Design,
+    lines: Beads,
+    convention: str = "vol",
+    *,
+    electrode_wins: bool = False,
+    grown: dict[tuple[int, int], NDArray[np.object_]] | None = None,
 ) -> list[LayerRegions]:
     """Regions of every layer of a print.
 
@@ -158,6 +164,8 @@ def layers(
         "deposit", lines that overlap pushed apart until their volume has room.
     electrode_wins : bool
         Whether a place that two tools fill goes to the electrode; else to the tool that comes first.
+    grown : dict, optional
+        Parts of each layer and body, which are those of every convention; filled here.
 
     Raises
     ------
@@ -174,8 +182,9 @@ def layers(
     if convention not in CONVENTIONS:
         raise UnknownName("convention for a line's width", convention, CONVENTIONS)
     scene, printed = design.printed, []
+    union = partial(_union, grown={} if grown is None else grown)
     for number, layer in enumerate(drawn(scene, design.layers.boundaries_mm(scene.size_mm[2]))):
-        here, cover = lines.of(lines.layer == number), _strips if layer.along else _union
+        here, cover = lines.of(lines.layer == number), _strips if layer.along else union
         bodies, regions = np.unique(here.body).tolist(), dict[str, Region]()
         # As they are printed, tool by tool.
         first = {k: here.number[here.tool == here.tool[here.body == k][0]].min() for k in bodies}
@@ -232,15 +241,30 @@ def _merged(runs: Real) -> Real:
     return np.column_stack([runs[starts, 0], reach[np.append(starts[1:], len(runs)) - 1]])
 
 
-def _union(lines: Beads, layer: LayerRegions, size_mm: Sequence[float], convention: str) -> Region:
+def _union(
+    lines: Beads,
+    layer: LayerRegions,
+    size_mm: Sequence[float],
+    convention: str,
+    grown: dict[tuple[int, int], NDArray[np.object_]],
+) -> Region:
     """All lines with round ends, slits between touching ones closed, each part as large as its lines' deposit."""
+    slit, key = ROUND * layer.height_mm, (int(lines.layer[0]), int(lines.body[0]))
+    if key not in grown:
+        grown[key] = _parts(lines, slit)
+    plans = grown[key]
+    if convention == "stadium":
+        plans = shapely.buffer(plans, slit / 2, join_style="mitre")
+    return shapely.clip_by_rect(shapely.union_all(plans), 0.0, 0.0, size_mm[0], size_mm[1])
+
+
+def _parts(lines: Beads, slit_mm: float) -> NDArray[np.object_]:
+    """Separate parts of one body's lines in a layer, each as large as its lines' deposit."""
     ways = shapely.linestrings(np.stack([lines.start_mm, lines.end_mm], axis=1))
-    slit = ROUND * layer.height_mm
-    pieces = np.array(parts(_closed(shapely.buffer(ways, lines.width_mm / 2, quad_segs=4), slit)), dtype=object)
+    pieces = np.array(parts(_closed(shapely.buffer(ways, lines.width_mm / 2, quad_segs=4), slit_mm)), dtype=object)
     owner = shapely.STRtree(pieces).nearest(shapely.points((lines.start_mm + lines.end_mm) / 2))
     deposit: Real = np.bincount(owner, lines.volume_mm3 / lines.height_mm, len(pieces)).astype(float)
-    grown = shapely.union_all(_offset(pieces, deposit, slit / 2 if convention == "stadium" else 0.0))
-    return shapely.clip_by_rect(grown, 0.0, 0.0, size_mm[0], size_mm[1])
+    return _offset(pieces, deposit)
 
 
 def _closed(plans: NDArray[np.object_], slit_mm: float) -> Region:
@@ -256,12 +280,12 @@ def _closed(plans: NDArray[np.object_], slit_mm: float) -> Region:
     return shapely.multipolygons([shapely.Polygon(outer, holes) for outer, *holes in outlines])
 
 
-def _offset(pieces: NDArray[np.object_], area_mm2: Real, more_mm: float) -> NDArray[np.object_]:
-    """Polygons with their outlines moved until they have some areas, then outwards by a length [mm]."""
+def _offset(pieces: NDArray[np.object_], area_mm2: Real) -> NDArray[np.object_]:
+    """Polygons with their outlines moved until they have some areas [mm2]."""
     offset, moved = np.zeros(len(pieces)), pieces.copy()
     for _ in range(_STEPS):  # of Newton's method: the length of the outline is the slope of the area
         away = np.abs(shapely.area(moved) - area_mm2) > _OF_AREA * area_mm2
         step = (area_mm2 - shapely.area(moved)) / np.maximum(shapely.length(moved), SLIVER_MM)
         offset[away] += step[away]
         moved[away] = shapely.buffer(pieces[away], offset[away], join_style="mitre")
-    return shapely.buffer(moved, more_mm, join_style="mitre") if more_mm else moved
+    return moved
