@@ -252,7 +252,7 @@ def test_files_of_both_kinds_say_the_same(tmp_path, model):
         ("f.csv", "r1c1\n1e-12\n", "no frequency of the readings"),
         ("f.csv", "time_ms,frequency_hz,r1c1\n0,1e4,1e-12\n", "'time_ms' is not read; expected the time as time_s"),
         ("f.csv", "time_s,frequency_hz,r1c1\n1,1e4,1e-12\n0,1e4,1e-12\n", "time_s does not rise"),
-        ("f.csv", "frequency_hz,r1c1\n1e4,1e-12\n2e4,1e-12\n", "no frequency of the readings"),
+        ("f.csv", "frequency_hz,r1c1\n1e4,1e-12\n2e4,1e-12\n", "expected one frequency in all frames"),
         ("f.npz", "text", "no NPZ file"),
         ("f.npz", {"siemens": np.ones((2, 6, 5))}, "siemens is 2 x 6 x 5; expected frames x 5 rows x 6 columns"),
         ("f.npz", {"other": np.ones(2)}, "no readings; expected siemens or capacitance_f"),

@@ -58,7 +58,7 @@ def taken(monkeypatch, run):
 
     def design(*words):
         got = []
-        monkeypatch.setattr(printing.command, "work", lambda design, **_: got.append(design) or 0)
+        monkeypatch.setattr(printing.check_command, "work", lambda design, **_: got.append(design) or 0)
         said = run("check", *words)
         assert (said.code, said.err) == (0, "")
         return got[0]

@@ -239,7 +239,7 @@ PLANTED_ELSEWHERE = {
     ),
     "a position that shows at all tones": (Sensor, "response", alike, "claim 7.1.2b"),
     "cogs that carry no current": (
-        tables.electrodes, "electrode_resistance", lambda sound: lambda _: sound(_ALONG_X), "table D.1",
+        tables.rest_state, "electrode_resistance", lambda sound: lambda _: sound(_ALONG_X), "table D.1",
     ),
     "no film that insulates": (tables, "_prints", only_shorts, "table 3.2"),
     "baked and unbaked prints exchanged": (tables, "_prints", unbaked, "claim 4.2.7a"),

@@ -21,8 +21,6 @@ from sensorgen.design.values import (
     resistivities,
     spread,
 )
-from sensorgen.models import conduction
-from sensorgen.models.overlap import edge_fringe_f
 from sensorgen.prediction.capacitance import PLANE, Answer, Unpredictable, capacitance, default_width, of_sensor
 from sensorgen.scene.scene import Scene
 from sensorgen.scene.slabs import is_open
@@ -66,6 +64,8 @@ def electrode_resistance(body: Body, ends: Sequence[str] = ENDS) -> dict[str, Bo
 
 def _of_cell(body: Body, scene: Scene, end: str, resistivity_ohm_m: float) -> Interval:
     """Of the whole sensor, from one unit cell: cells in series along it, in parallel across it [ohm]."""
+    from sensorgen.models import conduction
+
     p = body.design.params
     in_series, in_parallel = p.length_mm / scene.size_mm[0], p.width_mm / scene.size_mm[1]
     return conduction.electrode_resistance(scene, end, resistivity_ohm_m).times(in_series / in_parallel)
@@ -411,6 +411,8 @@ def added(body: Body) -> tuple[Added, Added]:
     MissingValue
         No source gives a permittivity or resistivity.
     """
+    from sensorgen.models.overlap import edge_fringe_f
+
     farad, ohm = (Added(*of) for of in lead_ranges(body.design))
     p, gap_mm = body.design.params, next(iter(body.cells.gap_mm.values()), 0.0)
     if is_open(body.cells.first()) or not 0 < gap_mm < p.width_mm:
