@@ -432,7 +432,14 @@ def test_every_model_is_on_the_chart():
     found = chart.points(names, 0.0, lambda _: None)
     spoke = {p.model.partition(":")[0] for p in found}
     missing = set() if presses.has_mesher() else {"press2d", "press_round"}
-    missing |= {"coupons", "curved", "overlap", "porous", "sandwich"}  # measured by benches and tests of their own
+    missing |= {
+        "closed",
+        "coupons",
+        "curved",
+        "overlap",
+        "porous",
+        "sandwich",
+    }  # measured by benches and tests of their own
     assert set(models.names()) - spoke == missing
     said = {(s.scene, s.model): s.why for s in chart.silent(names, found)}
     both = {(p.scene, p.model.partition(":")[0]) for p in found} | set(said)
@@ -591,4 +598,4 @@ def test_the_command_refuses_other_scenes():
     from sensorgen.verification.chart_command import command
 
     with pytest.raises(UnknownName, match=r"standard scene 'tri, 0.3 mm'; did you mean 'tri, 0.2 mm'|'tri, 0.1 mm'"):
-        command.main(["--scene", "tri, 0.3 mm"], standalone_mode=False)
+        command.main(["--scene", "tri, 0.3 mm"], standalone_mode=False, help_option_names=["-h", "--help"])

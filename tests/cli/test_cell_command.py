@@ -214,6 +214,7 @@ def test_one_design_as_csv_is_a_row(run):
 SWEEP = ["cell", "tri", "--drawn", "--dielectric", "0.3", "--sweep", "dielectric_mm=0.1:0.2:0.1", "--jobs", "2"]
 
 
+@pytest.mark.own_cache
 def test_a_sweep_as_csv_and_json(run):
     rows = list(csv.DictReader(io.StringIO(run(*SWEEP, "--csv").out)))
     assert [float(row["dielectric_mm"]) for row in rows] == [0.1, 0.2]

@@ -162,21 +162,23 @@ def _area_error(model: str) -> float:
 
 def fineness(model: str, level: int) -> "Fineness | BrickCounts":
     """The mesh of a level: triangles of another size, or boxes of more or fewer pieces."""
-    from sensorgen.models import press2d, press3d, press_round
-
     if model == "press3d":
+        from sensorgen.models import press3d  # with SciPy, which sections do without
+
         pieces = press3d.BrickCounts()
         return replace(pieces, pieces=pieces.pieces + level)
+    from sensorgen.models import press2d, press_round
+
     usual = press_round.USUAL if model == "press_round" else press2d.Fineness()
     return usual.scaled(_TIMES[level])
 
 
 def _size(model: str, level: int) -> float:
     """Size of the elements over those of the usual mesh; infinite where there is no such mesh."""
-    from sensorgen.models import press3d
-
     if model != "press3d":
         return _TIMES[level]
+    from sensorgen.models import press3d
+
     usual = press3d.BrickCounts().pieces
     return usual / (usual + level) if usual + level > 0 else inf
 
@@ -414,14 +416,18 @@ def _rise(solution: "Pressed") -> tuple[Real, Real]:
 
 def _press(case: Case) -> "tuple[Callable[..., Pressed], str]":
     """The solver of a case, and its cell as text."""
-    from sensorgen.models import press2d, press3d, press_round
-
     scene = case.piece.scene
     if case.model == "press_round":
+        from sensorgen.models import press_round
+
         return partial(press_round.press, scene), repr([(b.material, b.terminal, b.pieces) for b in scene.bodies])
     if case.model == "press3d":
+        from sensorgen.models import press3d
+
         boxes = press3d.cell(case.piece.scene)
         return partial(press3d.press, boxes), boxes.written()
+    from sensorgen.models import press2d
+
     cell = press2d.cell(case.piece.scene, case.piece.period_mm)
     return partial(press2d.press, cell), repr(cell)
 

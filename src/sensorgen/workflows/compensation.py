@@ -251,7 +251,7 @@ class CompensationSearch(Nearest):
     def before(self) -> Quantities:
         """Quantities of the first design's print, also of those that the search did not need."""
         try:
-            return self.prints.get(self.first) or self._estimate(self.first)
+            return self.prints.get(self.first) or self._estimate(self.first, stiffness=STIFFNESS in self.wanted)
         except SensorgenError:
             return self.estimates[self.first]
 
