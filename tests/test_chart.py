@@ -580,7 +580,8 @@ def test_the_command(tmp_path):
     from sensorgen.verification.chart_command import command
 
     out = tmp_path / "new" / "chart"
-    done = CliRunner().invoke(command, ["--scene", "plate, 0.6 mm", "--budget", "0.1", "-o", str(out)])
+    words = ["--scene", "plate, 0.6 mm", "--budget", "0.1", "-o", str(out)]
+    done = CliRunner().invoke(command, words, help_option_names=["-h", "--help"])
     assert done.exit_code == 0, done.output
     assert sorted(p.name for p in out.iterdir()) == ["chart.csv", "chart.html", "chart.png"]
     rows = list(csv.DictReader((out / "chart.csv").read_text().splitlines()))
