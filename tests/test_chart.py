@@ -581,7 +581,7 @@ def test_the_command(tmp_path):
 
     out = tmp_path / "new" / "chart"
     words = ["--scene", "plate, 0.6 mm", "--budget", "0.1", "-o", str(out)]
-    done = CliRunner().invoke(command, words, help_option_names=["-h", "--help"])
+    done = CliRunner().invoke(command, words)
     assert done.exit_code == 0, done.output
     assert sorted(p.name for p in out.iterdir()) == ["chart.csv", "chart.html", "chart.png"]
     rows = list(csv.DictReader((out / "chart.csv").read_text().splitlines()))
@@ -599,4 +599,4 @@ def test_the_command_refuses_other_scenes():
     from sensorgen.verification.chart_command import command
 
     with pytest.raises(UnknownName, match=r"standard scene 'tri, 0.3 mm'; did you mean 'tri, 0.2 mm'|'tri, 0.1 mm'"):
-        command.main(["--scene", "tri, 0.3 mm"], standalone_mode=False, help_option_names=["-h", "--help"])
+        command.main(["--scene", "tri, 0.3 mm"], standalone_mode=False)

@@ -273,8 +273,5 @@ def test_the_command(tmp_path, program):
 )
 def test_wrong_words(words, said, tmp_path):
     with pytest.raises((SensorgenError, ClickException), match=said):
-        command.main(
-            [*words, *(["-o", str(tmp_path)] if words[0] == "tri" else [])],
-            standalone_mode=False, help_option_names=["-h", "--help"],
-        )  # fmt: skip
+        command.main([*words, *(["-o", str(tmp_path)] if words[0] == "tri" else [])], standalone_mode=False)
     assert not list(tmp_path.iterdir())

@@ -25,7 +25,7 @@ def test_an_array_of_tri_prints(slicer, program, cache):
 
 
 def test_newer_cura_primes_the_tool_of_an_array_that_lies_on_the_bed(newer_program):
-    """Its skirt is of the base's tool, which is not the lowest number; the engine primes that tool alone there."""
+    """A skirt of the base's tool, which has not the lowest number: the engine primes that tool alone there."""
     design = make({"shape": "array", "parameters": PARAMETERS, "cell": {"shape": "tri"}})
     report = slice_now(design, "cura", program=str(newer_program("CuraEngine"))).report
     assert not [f for f in report.of_print() if f.severity == "error"], most_severe(report.of_print(), 9)

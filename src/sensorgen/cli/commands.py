@@ -31,6 +31,9 @@ if TYPE_CHECKING:
     from sensorgen.core.document import Part
 
 Work = Callable[..., Any]
+HELP: dict[str, Any] = {
+    "help_option_names": ["-h", "--help"]
+}  # of each command: click keeps the option of its first call
 _SECTION = re.compile(r"(?:^|\n\n)(?:Parameters|Attributes)\n-+\n(.*?)(?=\n\n[A-Z][a-z]+\n-+\n|\Z)", re.DOTALL)
 _ENTRY = re.compile(r"^(\S[^\n]*)\n?((?:    [^\n]*\n?)*)", re.MULTILINE)
 _UNIT = re.compile(r"_(mm|n|hz|kpa|s|ohm|deg)$")
@@ -199,7 +202,7 @@ def command(
     def made(work: Work) -> click.Command:
         one = click.Command(
             name, params=[*options_of(work), *more], help=about or described(work)[0], short_help=short,
-            callback=lambda **given: ended(work(**arguments(work, given))),
+            context_settings=HELP, callback=lambda **given: ended(work(**arguments(work, given))),
         )  # fmt: skip
         if group is not None:
             group.add_command(one)
@@ -216,7 +219,8 @@ class FirstWord(click.Group):
 
     def __init__(self, name: str, **attributes: Any) -> None:
         """Options belong to the first word."""
-        super().__init__(name, options_metavar="", context_settings={"ignore_unknown_options": True}, **attributes)
+        settings = {"ignore_unknown_options": True, **HELP}
+        super().__init__(name, options_metavar="", context_settings=settings, **attributes)
 
     def of(self, name: str) -> click.Command:
         """The command for a thing."""

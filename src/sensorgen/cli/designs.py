@@ -92,13 +92,8 @@ class DesignGroup(FirstWord):
         taken = {"--help", *(word for other in others for word in other.opts)}
         params = _parameter_options(module.Params, taken) if module else []
         about = _about(module)
-        return click.Command(
-            name,
-            params=[*params, *others],
-            callback=run,
-            help=about,
-            short_help=about.partition("\n")[0],
-        )
+        short = about.partition("\n")[0]
+        return click.Command(name, params=[*params, *others], callback=run, help=about, short_help=short)
 
 
 def of_design(
