@@ -11,10 +11,13 @@ from pathlib import Path
 import jsonschema
 import pytest
 import yaml
+from click.testing import CliRunner
 
 from sensorgen import models
 from sensorgen.cli import COMMANDS, cli
+from sensorgen.cli.commands import command as command_of
 from sensorgen.cli.commands import flag_of as option_of
+from sensorgen.cli.designs import of_design
 from sensorgen.core import plugins as registry
 from sensorgen.design import materials, printer, shapes
 
@@ -32,6 +35,12 @@ def test_help_of_every_command(run, words):
     assert (said.code, said.err) == (0, "")
     assert max(map(len, said.out.splitlines())) <= 80
     assert "..." not in said.out.partition("Commands:")[2]  # no help is cut short
+
+
+def test_a_command_called_alone_has_both_names_of_its_help():
+    """Click keeps the option that a first call made: a call without the command line's group once took -h away."""
+    for alone in (command_of("alone")(lambda: 0), of_design("alone")(lambda _: 0)):
+        assert "-h, --help" in CliRunner().invoke(alone, ["--help"]).output
 
 
 @pytest.mark.parametrize("shape", registry.names(shapes))

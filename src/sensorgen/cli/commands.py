@@ -31,9 +31,7 @@ if TYPE_CHECKING:
     from sensorgen.core.document import Part
 
 Work = Callable[..., Any]
-HELP: dict[str, Any] = {
-    "help_option_names": ["-h", "--help"]
-}  # of each command: click keeps the option of its first call
+HELP: dict[str, Any] = {"help_option_names": ["-h", "--help"]}  # click keeps the option that a first call made
 _SECTION = re.compile(r"(?:^|\n\n)(?:Parameters|Attributes)\n-+\n(.*?)(?=\n\n[A-Z][a-z]+\n-+\n|\Z)", re.DOTALL)
 _ENTRY = re.compile(r"^(\S[^\n]*)\n?((?:    [^\n]*\n?)*)", re.MULTILINE)
 _UNIT = re.compile(r"_(mm|n|hz|kpa|s|ohm|deg)$")
