@@ -167,7 +167,7 @@ class ErrorBudget:
         turned.pop("CHANGE" if verdict == "CHANGE" else "PRINT" if verdict else "", None)
         if turned:
             shown = (f"{words} ({name}{f', {len(more)} more' * bool(more)})" for words, (name, *more) in turned.items())
-            yield f"each alone: {'; '.join(shown)}"
+            yield f"one alone gives: {'; '.join(shown)}"
 
     def met_by(self, *kinds: str) -> bool:
         """Test whether the terms of some kinds together are within the accuracy."""
