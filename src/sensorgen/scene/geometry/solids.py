@@ -20,11 +20,11 @@ cells     compound         fused
 import gc
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, MutableSequence
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import CadFailed, SensorgenError, Unwritable
 from sensorgen.core.worker import answer_input
@@ -258,7 +258,7 @@ def _step_string(text: str) -> bytes:
 class _Unread(ModuleType):
     """Module that build123d imports, and that STEP files do without; it is read when something of it is called."""
 
-    __path__: ClassVar[list[str]] = []
+    __path__: MutableSequence[str] = []  # noqa: RUF012 - as of a package
 
     def __getattr__(self, name: str) -> type:
         if name.startswith("__"):
