@@ -264,3 +264,12 @@ def test_ctrl_c_ends_both_and_only_the_parent_speaks(pretend: Callable[[str], No
     assert gone(pid, within_s=1.0)
     assert said.count("Traceback") == 1
     assert said.strip().endswith("KeyboardInterrupt")
+
+
+def test_a_library_that_step_files_do_without_is_read_when_it_is_called() -> None:
+    program = (
+        "from sensorgen.scene.geometry import solids; solids._load(); import sys; print('scipy._lib' in sys.modules);"
+        "from scipy.optimize import minimize_scalar; print(round(minimize_scalar(lambda x: (x - 2) ** 2).x, 6))"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert run.stdout.split() == ["False", "2.0"], run.stderr

@@ -23,7 +23,7 @@ from sensorgen.scene.scene import Scene
 if TYPE_CHECKING:
     from sensorgen.scene.geometry.mesh_files import FileBody
 
-# Import and work take 4 s together; a cold disk, a slow machine and a large sensor may need twenty times as much.
+# Import and work take 1.5 s together; a cold disk, a slow machine and a large sensor may need twenty times as much.
 TIMEOUT_S = 300.0
 WORKER = ("-P", "-m", "sensorgen.scene.geometry.solids")  # -P: no module of the user's current folder takes part
 

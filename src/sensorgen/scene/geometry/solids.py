@@ -19,8 +19,11 @@ cells     compound         fused
 
 import gc
 import re
-from collections.abc import Callable, Iterator, Mapping
+import sys
+from collections.abc import Callable, Iterator, Mapping, MutableSequence
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from sensorgen.core.errors import CadFailed, SensorgenError, Unwritable
@@ -35,6 +38,9 @@ if TYPE_CHECKING:
 
 VOLUME_RATIO = 1e-9  # how far a solid's volume may be from its piece's; the kernel reaches 1e-13
 TIME_STAMP = "1980-01-01T00:00:00"  # the same in every file, so that a rebuilt file is the same to the byte
+
+# Two thirds of the time that build123d takes to load
+UNREAD = ("scipy", "scipy.optimize", "scipy.spatial", "sklearn", "sklearn.cluster", "svgpathtools")
 
 _LABEL = re.compile(rb"'@(\d+)@'")
 _PLACING = re.compile(rb"(NEXT_ASSEMBLY_USAGE_OCCURRENCE)\(\s*'\d+',\s*'@(\d+)@',\s*'',\s*(#\d+),\s*(#\d+),\s*\$\)")
@@ -249,8 +255,27 @@ def _step_string(text: str) -> bytes:
     return f"'{''.join(characters())}'".encode("ascii")
 
 
+class _Unread(ModuleType):
+    """Module that build123d imports, and that STEP files do without; it is read when something of it is called."""
+
+    __path__: MutableSequence[str] = []  # noqa: RUF012 - as of a package
+
+    def __getattr__(self, name: str) -> type:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return type(name, (), {"__new__": lambda _, *given, **named: self._real(name)(*given, **named)})
+
+    def _real(self, name: str) -> Callable[..., object]:
+        for other in UNREAD:
+            if isinstance(sys.modules.get(other), _Unread):
+                del sys.modules[other]
+        real: Callable[..., object] = getattr(import_module(self.__name__), name)
+        return real
+
+
 def _load() -> None:
     gc.disable()  # what the import makes lives for good: not to look through it for garbage saves a tenth of it
+    sys.modules.update({name: _Unread(name) for name in UNREAD})
     import build123d  # noqa: F401
 
     gc.freeze()
