@@ -229,7 +229,7 @@ def test_lines_are_known_to_the_last_digit(name):
 
 
 def test_the_line_under_a_round_tip_is_known():
-    """Its equation under an ellipse of pressure, over the angle along the tip, by another program's Runge-Kutta."""
+    """Equation under an ellipse of pressure, over the angle along the tip, by another program's Runge-Kutta."""
     from scipy.integrate import solve_ivp
 
     p = vars(lines.STANDARD[ROUND].line())
@@ -471,7 +471,7 @@ def test_what_is_known_of_presses(monkeypatch):
     assert down["springs"].error > 1
     assert rise["thesis_cells: 3.1.2, field"].error == pytest.approx(0.818, abs=0.002)
     assert rise["thesis_cells: 3.1.2, formula 3.35"].error == pytest.approx(0.780, abs=0.002)
-    assert "off by -" in rise["thesis_cells: 3.1.2, field"].said
+    assert "off by -" in rise["thesis_cells: 3.1.2, field"].result
 
 
 def test_the_worst_load_of_a_press_counts():
