@@ -594,9 +594,7 @@ def scene(of: ArrayLayout, fill: Fill, strip: Any, params: Envelope) -> Scene:
     stack.plates(name, fill.dielectric, high, z.above_film, z.columns)
     stack.plates(name, fill.dielectric, high - columns, z.columns, z.cover)
     stack.cover(of, fill.isolation, whole - row_pads - column_pads, z)
-    return _laid(
-        of.params, stack.bodies_in_order(), (of.size_mm[0], rounded(of.size_mm[1] + of.params.ledge_mm), z.top)
-    )
+    return _laid(of.params, stack.ordered(), (of.size_mm[0], rounded(of.size_mm[1] + of.params.ledge_mm), z.top))
 
 
 def _laid(p: Params, bodies: tuple[Body, ...], size_mm: tuple[float, float, float]) -> Scene:
@@ -674,7 +672,7 @@ class _GrowingBodies:
             self.add(first, material, "", self.bodies.pop(name)[1])
         return first
 
-    def bodies_in_order(self) -> tuple[Body, ...]:
+    def ordered(self) -> tuple[Body, ...]:
         """The bodies, from bottom to top as they were added."""
         items = self.bodies.items()
         return tuple(Body(name, material, tuple(pieces), terminal) for name, (material, pieces, terminal) in items)

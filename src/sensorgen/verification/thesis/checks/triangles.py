@@ -221,9 +221,8 @@ def swept(rise_f: float, deepest_mm: float, depth_mm: float) -> list[ItemPart]:
 
     def c_f(press_mm: float) -> float:
         now = thesis_cells.swept(_CELL, press_mm)
-        design = designs.make(
-            {"shape": "tri", "parameters": asdict(replace(now, length_mm=now.period_mm, width_mm=1.0))}
-        )
+        sizes = asdict(replace(now, length_mm=now.period_mm, width_mm=1.0))
+        design = designs.make({"shape": "tri", "parameters": sizes})
         return fem2d.capacitance(design.in_use, PERMITTIVITY).upper * depth_mm
 
     rest, places = c_f(0.0), np.array([0.0, 0.05, 0.1, 0.15, 0.2])
