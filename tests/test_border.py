@@ -185,7 +185,7 @@ def test_the_error_of_a_share_is_that_of_its_farther_end():
 
 
 def test_a_border_counts_the_cells_of_an_array_with_rims(tmp_path):
-    """Its period, not the whole sensor: else a border left all of the capacitance open."""
+    """Period of the cell, not the whole sensor: else a border left all of the capacitance open."""
     design = bordered("cone", svg(tmp_path, ELLIPSE, width="12mm", height="8mm", box=(600, 400)))
     cells = bodies.drawn(design).cells
     tiles = (*cells.beside, (cells.first(), cells.count))

@@ -229,7 +229,7 @@ def test_lines_are_known_to_the_last_digit(name):
 
 
 def test_the_line_under_a_round_tip_is_known():
-    """Its equation under an ellipse of pressure, over the angle along the tip, by another program's Runge-Kutta."""
+    """Equation under an ellipse of pressure, over the angle along the tip, by another program's Runge-Kutta."""
     from scipy.integrate import solve_ivp
 
     p = vars(lines.STANDARD[ROUND].line())
@@ -264,7 +264,7 @@ def of_lines():
 def rungs(found, scene, model):
     """Errors from coarse to fine: points come by time, and the time of a busy computer is no order."""
     points = [p for p in found if (p.scene, p.model) == (scene, model)]
-    return [p.error for p in sorted(points, key=lambda p: int(p.said.split()[0]))]
+    return [p.error for p in sorted(points, key=lambda p: int(p.result.split()[0]))]
 
 
 def test_what_is_known_of_lines(of_lines):
@@ -277,7 +277,7 @@ def test_what_is_known_of_lines(of_lines):
     if shutil.which("ngspice"):
         circuit = rungs(of_lines, "line, seven tones", "ngspice")
         assert [a / b for a, b in pairwise(circuit)] == pytest.approx([100, 100], rel=0.01)
-    assert all(p.seconds > 0 and not p.bounded and "Re Z by" in p.said for p in of_lines)
+    assert all(p.seconds > 0 and not p.bounded and "Re Z by" in p.result for p in of_lines)
 
 
 def test_pieces_of_a_tip_are_of_second_order(of_lines):
@@ -409,7 +409,7 @@ def test_a_printed_electrode_is_that_of_the_reference():
     assert standard.known.tolist() == [known["90"][known["contact_ohm_m2"].index(1e-4)]]
     found, _ = by_model("printed electrode, 1e-4 ohm m²")
     assert found["traxels"].error == 0.05  # no less than the reference's own
-    assert float(found["traxels"].said.split()[2]) < 0.02
+    assert float(found["traxels"].result.split()[2]) < 0.02
 
 
 def test_every_model_is_on_the_chart():
@@ -471,7 +471,7 @@ def test_what_is_known_of_presses(monkeypatch):
     assert down["springs"].error > 1
     assert rise["thesis_cells: 3.1.2, field"].error == pytest.approx(0.818, abs=0.002)
     assert rise["thesis_cells: 3.1.2, formula 3.35"].error == pytest.approx(0.780, abs=0.002)
-    assert "off by -" in rise["thesis_cells: 3.1.2, field"].said
+    assert "off by -" in rise["thesis_cells: 3.1.2, field"].result
 
 
 def test_the_worst_load_of_a_press_counts():

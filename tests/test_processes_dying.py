@@ -128,7 +128,7 @@ def test_a_cluster_that_does_not_answer_is_one_line(monkeypatch):
 
 @pytest.mark.filterwarnings("ignore")
 def test_a_dask_cluster_gives_the_same(tmp_path):
-    """Its workers are threads of this process; the scheduler file names it. When it goes away, one line says so."""
+    """Workers of Dask are threads of this process; the scheduler file names it. When it goes away, one line says so."""
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None, protocol="inproc"

@@ -97,7 +97,7 @@ def test_whoever_seals_a_tuned_prediction_anew_is_found_by_the_log(folder, whole
 
 
 def test_a_build_into_the_folder_of_another_design_says_so(folder, whole):
-    """Its files make room; its G-code is set aside under a name that no printer takes."""
+    """Files make room; G-code is set aside under a name that no printer takes."""
     other = make(SMALL | {"parameters": SMALL["parameters"] | {"width_mm": 9.0}})
     built = build(other, folder.parent, cad=False)
     held, aside = built.replaced

@@ -106,7 +106,7 @@ def test_a_foot_of_a_lines_width_is_stiffer_than_a_sharp_one():
 
 @needs_mesher
 def test_the_printed_sensor_has_the_law_of_its_own_cell():
-    """Its rise is what compressing the print says, and its capacitance lies between all widths of a line."""
+    """Rise is what compressing the print says, and capacitance lies between all widths of a line."""
     printed = estimated(small(), "arachne")
     sensed = build_sensor(printed, "solved", EVENLY)
 

@@ -71,7 +71,7 @@ def test_a_full_plate_stays_clear_of_what_stands_in_its_middle(gap):
 @pytest.mark.parametrize("printer", PRINTERS)
 def test_the_towers_brim_is_kept_clear(printer):
     machine = load_printer(printer)
-    (kept,) = room(machine, FINE, 2, 5.0, 0.0).kept
+    (kept,) = room(machine, FINE, 2, 5.0, 0.0).tower
     at = tower(machine, FINE, 2)
     assert kept == Rect(at.x_mm - 2, at.y_mm - 2, at.x_mm + at.side_mm + 2, at.y_mm + at.side_mm + 2)
 

@@ -109,7 +109,7 @@ def loaded(run, *words):
 
 
 def test_loads_on_a_plate_are_as_drawn(run):
-    """Its print is the plate itself."""
+    """Print that is the plate itself."""
     words = ("reference", "--size", "12x8")
     drawn, printed = loaded(run, *words, "--drawn"), loaded(run, *words)
     assert printed["im_ohm"][0] == [[pytest.approx(x, rel=1e-9) for x in row] for row in drawn["im_ohm"][0]]

@@ -296,7 +296,7 @@ def test_designs_of_a_batch_have_the_files_beside_them(here):
     (here / "sub" / "d.yaml").write_text("shape: reference\nmaterials: {electrode: eel}\ntools: {eel: 1}\n")
     (here / "plan.yaml").write_text("iteration: 1\ndesigns: [{design: sub/d.yaml}]\n")
     plan = plans.load(here / "plan.yaml")
-    assert plan.made(plan.designs[0], here).used()["eel"] == ""
+    assert plan.design(plan.designs[0], here).used()["eel"] == ""
 
 
 @pytest.mark.parametrize(

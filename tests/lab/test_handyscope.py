@@ -311,7 +311,7 @@ def vendor():
 
 
 def test_the_vendors_demo_device_streams(vendor):
-    """Its inputs play signals of their own: 2 V of 200 kHz on channel 1, 6.47 V on channel 2."""
+    """Inputs play signals of their own: 2 V of 200 kHz on channel 1, 6.47 V on channel 2."""
     meter = Handyscope("demo", RealClock(), bridge=Bridge(range_v=8, feedback_f=0))
     identity = meter.identify()
     assert identity.model == "Demo Handyscope HS5-540XMS"

@@ -271,7 +271,7 @@ def test_a_full_buffer_is_reported():
 
 
 def test_the_simulator_answers_as_the_firmware_does():
-    """Its source: answers end with ok; M114 gives the end of the queue; G28 and M400 hold up what comes after."""
+    """Firmware by its source: answers end with ok; M114 gives the end of the queue; G28 and M400 hold up all after."""
     lab = Lab("serial").home()
     firmware, clock = lab.firmware, lab.clock
     assert firmware.exchange(b"G1 X10 F600\n", clock.now()) == b"ok\n"

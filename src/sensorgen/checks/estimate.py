@@ -190,11 +190,11 @@ def _printed(
         if body.name in layer.regions:
             line_mm = laid[body.material].line_mm if body.material in laid else printer.line_mm()
 
-            def made(width_mm: float, line_mm: float = line_mm) -> float:
+            def printed_width(width_mm: float, line_mm: float = line_mm) -> float:
                 return wide(width_mm, layer.height_mm, line_mm, printer.nozzle_mm)
 
             aside = scene.size_mm if wide in (cura, cura_gaps) else None
-            swollen = _widened(layer, body.name, length * width, made, aside)
+            swollen = _widened(layer, body.name, length * width, printed_width, aside)
             inside = shapely.clip_by_rect(swollen, 0.0, 0.0, length, width)
             region, others = united(inside), shapely.get_parts(list(regions.values()))
             met = np.unique(shapely.STRtree(others).query(inside, predicate="intersects")[1])

@@ -355,12 +355,12 @@ class ArrayLayout:
         """Names of the tracks along their leads, of every so many that letters have room, the last one's too [mm]."""
         import shapely
 
-        p, found = self.params, list[shapely.Polygon]()
+        p, lettering = self.params, list[shapely.Polygon]()
         every = ceil((LINE_DOTS + 1) * DOT_MM / p.connector_mm - _WHOLE)
         for tracks in (self.rows, self.columns):
             chosen = {*range(0, max(len(tracks) - every, 0), every), len(tracks) - 1}
-            found += [dots for k in sorted(chosen) for dots in self._name(tracks[k])]
-        return shapely.set_precision(shapely.union_all(found), 1e-6)
+            lettering += [dots for k in sorted(chosen) for dots in self._name(tracks[k])]
+        return shapely.set_precision(shapely.union_all(lettering), 1e-6)
 
     def _name(self, track: ArrayTrack) -> "Iterator[shapely.Polygon]":
         """Rows of dots of a track's name, turned by a quarter, to be read from the right [mm]."""
@@ -426,12 +426,12 @@ def layout(p: Params, outline: str | None = None) -> ArrayLayout:
     fan = ceil(len(columns) / 2) * q if q < px - SLIVER_MM else 0.0
     x0, y0 = rounded(len(rows) * q + 2 * edge), rounded(p.pad_mm + fan + edge)
     x, y = _middles(x0, px, n), _middles(y0, py, m)
-    made = ArrayLayout(p, (), (), x, y, (0.0, 0.0), tuple(map(tuple, here)))
+    bare = ArrayLayout(p, (), (), x, y, (0.0, 0.0), tuple(map(tuple, here)))
     size = rounded(x[columns[-1]] + px / 2 + p.edge("rows")), rounded(y[rows[-1]] + py / 2 + p.edge("columns"))
     return replace(
-        made,
-        rows=tuple(_row(made, i, order, x0) for order, i in enumerate(rows)),
-        columns=tuple(_columns(made, columns, y0 - edge)),
+        bare,
+        rows=tuple(_row(bare, i, order, x0) for order, i in enumerate(rows)),
+        columns=tuple(_columns(bare, columns, y0 - edge)),
         size_mm=size,
     )
 
@@ -457,8 +457,8 @@ def _inside(p: Params, outline: str | None) -> list[list[bool]]:
         for high, count, step in zip(borders.region(outline).bounds[2:], (n, m), (px, py), strict=True)
     )
     squares = shapely.box(x[None, :-1], y[:-1, None], x[None, 1:], y[1:, None])
-    found: list[list[bool]] = shapely.covers(region, squares).tolist()
-    return found
+    covered: list[list[bool]] = shapely.covers(region, squares).tolist()
+    return covered
 
 
 def _row(of: ArrayLayout, i: int, order: int, x0: float) -> ArrayTrack:
@@ -594,7 +594,7 @@ def scene(of: ArrayLayout, fill: Fill, strip: Any, params: Envelope) -> Scene:
     stack.plates(name, fill.dielectric, high, z.above_film, z.columns)
     stack.plates(name, fill.dielectric, high - columns, z.columns, z.cover)
     stack.cover(of, fill.isolation, whole - row_pads - column_pads, z)
-    return _laid(of.params, stack.made(), (of.size_mm[0], rounded(of.size_mm[1] + of.params.ledge_mm), z.top))
+    return _laid(of.params, stack.ordered(), (of.size_mm[0], rounded(of.size_mm[1] + of.params.ledge_mm), z.top))
 
 
 def _laid(p: Params, bodies: tuple[Body, ...], size_mm: tuple[float, float, float]) -> Scene:
@@ -672,10 +672,10 @@ class _GrowingBodies:
             self.add(first, material, "", self.bodies.pop(name)[1])
         return first
 
-    def made(self) -> tuple[Body, ...]:
+    def ordered(self) -> tuple[Body, ...]:
         """The bodies, from bottom to top as they were added."""
-        found = self.bodies.items()
-        return tuple(Body(name, material, tuple(pieces), terminal) for name, (material, pieces, terminal) in found)
+        items = self.bodies.items()
+        return tuple(Body(name, material, tuple(pieces), terminal) for name, (material, pieces, terminal) in items)
 
 
 def _united(tracks: Iterable[ArrayTrack]) -> "shapely.Geometry":
@@ -690,9 +690,9 @@ def _strip(
 ) -> Mapping[tuple[str, str, str], list[Piece]]:
     """Pieces of one column above the rows, by name, material and terminal of their body."""
     p, (x0, _, y0, y1) = of.params, track.body
-    made: Scene = shape_scene(replace(params, width_mm=rounded(y1 - y0)), fill)
-    found: dict[tuple[str, str, str], list[Piece]] = {}
-    for body in made.bodies:
+    cell: Scene = shape_scene(replace(params, width_mm=rounded(y1 - y0)), fill)
+    pieces: dict[tuple[str, str, str], list[Piece]] = {}
+    for body in cell.bodies:
         if body.terminal == "bottom":
             if not all(piece.is_box() and piece.span("z") == (0.0, p.electrode_mm) for piece in body.pieces):
                 raise BadInput("cell: its bottom electrode is no plate; expected a shape with one, as tri or reference")
@@ -700,10 +700,10 @@ def _strip(
         if body.terminal not in ("", "top"):
             raise BadInput(f"cell: it has an electrode {body.terminal!r}; expected a shape with a top and a bottom one")
         key = (body.name, body.material, body.terminal)
-        found[key] = [piece.moved(Move(shift_mm=(x0, y0, p.base_mm))) for piece in body.pieces]
-    if all(terminal != "top" for *_, terminal in found):
+        pieces[key] = [piece.moved(Move(shift_mm=(x0, y0, p.base_mm))) for piece in body.pieces]
+    if all(terminal != "top" for *_, terminal in pieces):
         raise BadInput("cell: it has no top electrode; expected a shape with one, as tri or reference")
-    return found
+    return pieces
 
 
 def _plates(region: "shapely.Geometry", z0: float, z1: float) -> list[Piece]:

@@ -169,18 +169,18 @@ def main() -> None:
         try:
             try:
                 _allow(first["seconds"])
-                line = json.dumps({"answer": (made := work())}, allow_nan=False)
+                line = json.dumps({"answer": (answer := work())}, allow_nan=False)
             except SensorgenError as error:
-                made, line = None, json.dumps({"refused": str(error), "kind": type(error).__name__})
+                answer, line = None, json.dumps({"refused": str(error), "kind": type(error).__name__})
             except (BaseException, RecursionError) as error:
-                made, line = None, json.dumps({"fault": fault(error, file)})
+                answer, line = None, json.dumps({"fault": fault(error, file)})
             sink.write(f"{line}\n".encode())
             sink.flush()
         except TooLong as error:
             sink.write(f"{json.dumps({'fault': fault(error, file)})}\n".encode())
             sink.flush()
-            made = None
-        return made
+            answer = None
+        return answer
 
     module: list[ModuleType] = []
 

@@ -50,8 +50,8 @@ def parts(scene: Scene) -> list[OverlayPart]:
     every = [p for body in scene.bodies for p in body.pieces]
     if all((isinstance(p, Prism) and p.axis != "z") or p.is_box() for p in every):
         return [OverlayPart(s.depth_mm, tuple(columns(s)), tuple(alike(s))) for s in sections(scene)]
-    found = _patches(scene)
-    return [OverlayPart(1.0, found, tuple(range(len(found))), in_plan=True)]
+    patches = _patches(scene)
+    return [OverlayPart(1.0, patches, tuple(range(len(patches))), in_plan=True)]
 
 
 @lru_cache(maxsize=8)
@@ -86,9 +86,9 @@ def _plan(body: Body, piece: Piece) -> shapely.Polygon:
     return plan
 
 
-def _layers(found: Sequence[tuple[Body, Piece]]) -> tuple[Layer, ...]:
+def _layers(pieces: Sequence[tuple[Body, Piece]]) -> tuple[Layer, ...]:
     """Pieces over one place as layers, from bottom to top."""
-    spans = sorted(((*p.span("z"), body) for body, p in found), key=lambda span: span[:2])
+    spans = sorted(((*p.span("z"), body) for body, p in pieces), key=lambda span: span[:2])
     for (_, top, lower), (bottom, _, upper) in pairwise(spans):
         if bottom < top - ROUNDING_MM:
             raise ValueError(f"outlines overlap in plan: {lower.name} and {upper.name} at z = {bottom:g} mm")

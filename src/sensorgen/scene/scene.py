@@ -401,14 +401,14 @@ def clipped(outline: Iterable[Point], end_mm: float) -> Outline:
     """
     points = [(rounded(u), rounded(v)) for u, v in outline]
     for sign, limit in ((-1.0, 0.0), (1.0, end_mm)):
-        kept: list[Point] = []  # on the near side of a vertical line (Sutherland and Hodgman, 1974)
+        inside: list[Point] = []  # on the near side of a vertical line (Sutherland and Hodgman, 1974)
         for a, b in zip(points[-1:] + points[:-1], points, strict=True):
             a_in, b_in = sign * (a[0] - limit) <= 0, sign * (b[0] - limit) <= 0
             if a_in != b_in:
                 share = (limit - a[0]) / (b[0] - a[0])
-                kept.append((limit, round(a[1] + share * (b[1] - a[1]), 12)))
-            kept += [b] if b_in else []
-        points = kept
+                inside.append((limit, round(a[1] + share * (b[1] - a[1]), 12)))
+            inside += [b] if b_in else []
+        points = inside
     distinct = tuple(p for k, p in enumerate(points) if p != points[k - 1])
     width = max((p[0] for p in distinct), default=0.0) - min((p[0] for p in distinct), default=0.0)
     return distinct if len(distinct) > 2 and width > SLIVER_MM else ()
@@ -416,9 +416,9 @@ def clipped(outline: Iterable[Point], end_mm: float) -> Outline:
 
 def without_straight(loop: Sequence[Point]) -> Outline:
     """An outline without the corners at which it goes straight on."""
-    kept: list[Point] = []
+    corners: list[Point] = []
     for k, b in enumerate(loop):
-        a, c = kept[-1] if kept else loop[k - 1], loop[(k + 1) % len(loop)]
+        a, c = corners[-1] if corners else loop[k - 1], loop[(k + 1) % len(loop)]
         if b != a and (b == c or abs((b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])) > SLIVER_MM**2):
-            kept.append(b)
-    return tuple(kept)
+            corners.append(b)
+    return tuple(corners)

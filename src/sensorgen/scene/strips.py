@@ -31,7 +31,7 @@ class StripParams(Envelope):
         spans = (
             (max(k * self.period_mm + start_mm, 0.0), min(k * self.period_mm + stop_mm, end)) for k in range(count)
         )
-        kept = [(a, b) for a, b in spans if b - a > SLIVER_MM]
+        within = [(a, b) for a, b in spans if b - a > SLIVER_MM]
         if self.along == "x":
-            return tuple(box(a, b, 0.0, depth, low_mm, high_mm) for a, b in kept)
-        return tuple(box(0.0, depth, a, b, low_mm, high_mm) for a, b in kept)
+            return tuple(box(a, b, 0.0, depth, low_mm, high_mm) for a, b in within)
+        return tuple(box(0.0, depth, a, b, low_mm, high_mm) for a, b in within)

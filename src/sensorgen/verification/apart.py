@@ -101,10 +101,10 @@ def apart(work: Work) -> TimedAnswer:
     if done.returncode:
         last = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
         raise SensorgenError(f"the process ended before its answer: {last or 'as when the memory is full'}")
-    found: TimedAnswer | str = pickle.loads(done.stdout)  # noqa: S301 - of our own process
-    if isinstance(found, str):
-        raise SensorgenError(found)
-    return found
+    reply: TimedAnswer | str = pickle.loads(done.stdout)  # noqa: S301 - of our own process
+    if isinstance(reply, str):
+        raise SensorgenError(reply)
+    return reply
 
 
 def _measured(work: Work, before_s: float, started: float) -> TimedAnswer:
@@ -146,13 +146,13 @@ def answer_input() -> None:
     target = os.dup(1)
     os.dup2(2, 1)
     started, packed = pickle.loads(sys.stdin.buffer.read())  # noqa: S301 - of our own process
-    found: TimedAnswer | str
+    reply: TimedAnswer | str
     try:
-        found = _measured(pickle.loads(packed), 0.0, started)  # noqa: S301
+        reply = _measured(pickle.loads(packed), 0.0, started)  # noqa: S301
     except SensorgenError as error:
-        found = str(error)
+        reply = str(error)
     with io.FileIO(target, "wb") as file:
-        file.write(pickle.dumps(found))
+        file.write(pickle.dumps(reply))
 
 
 if __name__ == "__main__":  # its classes are those of the module, not of the program

@@ -58,17 +58,17 @@ def _of_design(
             step(words.partition(":")[0])
             step(words)
 
-        found = chart(body(design), Query(force_n=force_n), keys, budget_s=budget, step=on)
-    contents = {"chart.json": to_json(found).encode(), "chart.csv": "".join(found.csv()).encode()}
-    if found.points:
-        contents |= {"chart.png": plot.png(found)}
-    contents["chart.html"] = plot.html(found).encode()
+        measured = chart(body(design), Query(force_n=force_n), keys, budget_s=budget, step=on)
+    contents = {"chart.json": to_json(measured).encode(), "chart.csv": "".join(measured.csv()).encode()}
+    if measured.points:
+        contents |= {"chart.png": plot.png(measured)}
+    contents["chart.html"] = plot.html(measured).encode()
     for name, content in contents.items():
         store.replace(output / name, content)
-    render.deliver(found)
+    render.deliver(measured)
     if not render.form():
         render.say("\n".join(str(output / name) for name in contents))
-    return render.verdict(*found.problems())
+    return render.verdict(*measured.problems())
 
 
 def _of_scenes(

@@ -131,8 +131,8 @@ def exact_impedance(r_ohm_per_m: Sequence[float], y_s_per_m: Sequence[complex], 
                 _plus(_times(_times(shunt, sinhc), voltage), _times(cosh, current)),
             )
         size = current[0] * current[0] + current[1] * current[1]
-        found = _times(voltage, (current[0] / size, -current[1] / size))
-        return complex(float(found[0]), float(found[1]))
+        impedance = _times(voltage, (current[0] / size, -current[1] / size))
+        return complex(float(impedance[0]), float(impedance[1]))
 
 
 def _times(a: Number, b: Number) -> Number:
@@ -146,10 +146,10 @@ def _plus(a: Number, b: Number) -> Number:
 def _series(square: Number, odd: int) -> Number:
     """Sum of square^k / (2 k + odd)!: cosh z, or sinh z / z."""
     term: Number = (Decimal(1), Decimal(0))
-    found, k, least = term, 0, Decimal(10) ** -(_DIGITS - 20)
+    total, k, least = term, 0, Decimal(10) ** -(_DIGITS - 20)
     while abs(term[0]) + abs(term[1]) > least:
         k += 1
         below = Decimal((2 * k + odd) * (2 * k + odd - 1))
         term = _times(term, (square[0] / below, square[1] / below))
-        found = _plus(found, term)
-    return found
+        total = _plus(total, term)
+    return total

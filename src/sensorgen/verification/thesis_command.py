@@ -38,13 +38,13 @@ def command(
         raise NotInstalled("thesis needs the solver NGSolve: pip install 'sensorgen[fem]'")
     with render.progress(CHAPTERS) as step:
         rows = thesis.rows(step)
-    made: dict[str, Callable[[Sequence[thesis.ReproducedItem]], str]] = {
+    documents: dict[str, Callable[[Sequence[thesis.ReproducedItem]], str]] = {
         "html": thesis.html, "md": thesis.markdown,
         "json": lambda rows: json.dumps(thesis.plain(rows), indent=2, ensure_ascii=False) + "\n",
     }  # fmt: skip
     for name in dict.fromkeys(formats):
         file = output / f"thesis.{name}"
-        render.file(file, made[name](rows))
+        render.file(file, documents[name](rows))
     counts = Counter(row.verdict.word for row in rows)
     render.say(", ".join(f"{counts[word]} {word}" for word in WORDS if counts[word]))
     for row in rows:

@@ -70,7 +70,7 @@ def svg(
     letters, marked = panels.letters(scene.bodies), markers.ranked(findings)
     entries = markers.placed(marked, letters, (LEFT + 2, FOOT + 8.5, SPLIT - 3, BOTTOM - 2))
     shown = [entry.mark for entry in entries]
-    gaps = [(found, panel) for panel in details if (found := nearest(panel.view))]
+    gaps = [(measured, panel) for panel in details if (measured := nearest(panel.view))]
     gap = min(gaps, key=lambda pair: round(pair[0].value_mm, 6), default=None)
     taken: list[Point] = [place for panel in details for place in panels.letter_places(panel).values()]
     left, room = SPLIT + 3, RIGHT - SPLIT - 3

@@ -49,9 +49,9 @@ def _beside_lines(middle: float, passing: Sequence[float]) -> float:
     return middle if abs(near - middle) >= CLEAR else near + (CLEAR if middle >= near else -CLEAR)
 
 
-def rows(frame: ViewFrame, found: Sequence[Sequence[Measure]], start: float, step: float) -> Iterator[str]:
+def rows(frame: ViewFrame, measures: Sequence[Sequence[Measure]], start: float, step: float) -> Iterator[str]:
     """Rows of horizontal measures from ``start`` outwards; ``step`` is negative above a view [mm]."""
-    rows_at = [(start + k * step, row) for k, row in enumerate(row for row in found if _fits(frame, row))]
+    rows_at = [(start + k * step, row) for k, row in enumerate(row for row in measures if _fits(frame, row))]
     beyond = 1.0 if step > 0 else -1.0
     for y, row in rows_at:
         for u, z in sorted(_ends(row).items()):
@@ -76,10 +76,10 @@ def _distance(a: Point, b: Point) -> str:
     return line("dim" if length >= ARROWS else "tick", *a, *b)
 
 
-def gap(panel: ViewPanel, found: Gap) -> tuple[str, list[Point]]:
+def gap(panel: ViewPanel, measured: Gap) -> tuple[str, list[Point]]:
     """The electrode gap in its view, and the room on the page that it takes."""
-    (x0, y0), (x1, y1) = panel.place(found.near), panel.place(found.far)
-    words = f"gap {number(found.value_mm)}" if found.value_mm > 1e-6 else "gap 0: short"
+    (x0, y0), (x1, y1) = panel.place(measured.near), panel.place(measured.far)
+    words = f"gap {number(measured.value_mm)}" if measured.value_mm > 1e-6 else "gap 0: short"
     room = width(words) * 1.08
     sides, frame = (max(x0, x1) + 1.4, min(x0, x1) - 1.4 - room), panel.frame
     x = next((x for x in sides if frame.left <= x and x + room <= frame.right), frame.right + 1.4)

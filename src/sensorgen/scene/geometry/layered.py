@@ -37,8 +37,8 @@ def closed(layers: Sequence[LayerRegions], bodies: Iterable[str]) -> Mesh:
             section = manifold3d.CrossSection(rings, manifold3d.FillRule.EvenOdd)
             slab = manifold3d.Manifold.extrude(section, last.top_mm - first.bottom_mm)
             slabs.append(slab.translate((0.0, 0.0, first.bottom_mm)))
-    found = manifold3d.Manifold.batch_boolean(slabs, manifold3d.OpType.Add).simplify(GRID_MM).to_mesh64()
-    return Mesh(np.array(found.vert_properties)[:, :3], np.array(found.tri_verts).astype(np.int32))
+    joined = manifold3d.Manifold.batch_boolean(slabs, manifold3d.OpType.Add).simplify(GRID_MM).to_mesh64()
+    return Mesh(np.array(joined.vert_properties)[:, :3], np.array(joined.tri_verts).astype(np.int32))
 
 
 @dataclass(frozen=True, eq=False)

@@ -311,7 +311,7 @@ def _bodies(
 
 def _parts(archive: zipfile.ZipFile) -> dict[str, list[_Range]]:
     """Named parts by number of the object: volumes of PrusaSlicer; parts of OrcaSlicer and Bambu Studio, each whole."""
-    found: dict[str, list[_Range]] = {}
+    parts: dict[str, list[_Range]] = {}
     last = ""
 
     def start(tag: str, has: Mapping[str, str]) -> None:
@@ -320,15 +320,15 @@ def _parts(archive: zipfile.ZipFile) -> dict[str, list[_Range]]:
         if tag in ("object", "part"):
             last = has.get("id", "")
         elif tag == "volume":
-            found.setdefault(last, []).append((int(has["firstid"]), int(has["lastid"]), ""))
+            parts.setdefault(last, []).append((int(has["firstid"]), int(has["lastid"]), ""))
         elif name and has.get("type") == "volume":
-            found[last][-1] = (*found[last][-1][:2], name)
+            parts[last][-1] = (*parts[last][-1][:2], name)
         elif has.get("key") == "volume_type" and has.get("value") != "ModelPart":
             raise BadInput("it has modifiers or negative volumes of a slicer; expected solid parts only")
         elif name and last and "type" not in has:
-            found.setdefault(last, [(0, MOST_TRIANGLES, name)])
+            parts.setdefault(last, [(0, MOST_TRIANGLES, name)])
 
     for file in ("Metadata/Slic3r_PE_model.config", "Metadata/model_settings.config"):
         if file in archive.namelist():
             _parse(archive, file, start)
-    return found
+    return parts

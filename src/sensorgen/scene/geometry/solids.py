@@ -64,12 +64,12 @@ def solid(piece: Piece) -> "Solid":
 
     try:
         if isinstance(piece, Prism):
-            made = _extruded(piece)
+            shape = _extruded(piece)
         elif isinstance(piece, Revolved):
-            made = _revolved(piece)
+            shape = _revolved(piece)
         else:
-            made = _sewn(piece)
-        volume = made.volume
+            shape = _sewn(piece)
+        volume = shape.volume
     except Exception as error:  # whatever the kernel throws: Standard_Failure, StdFail_NotDone, ValueError
         raise CadFailed(f"{_described(piece)}: {error or type(error).__name__}") from error
     exact = piece.volume_mm3()
@@ -78,7 +78,7 @@ def solid(piece: Piece) -> "Solid":
             f"{_described(piece)}: its solid holds {volume:.12g} mm3, its outline {exact:.12g} mm3; an outline runs"
             " counter-clockwise, does not cross itself, and is no thinner than 1e-7 mm"
         )
-    return made
+    return shape
 
 
 def _extruded(prism: Prism) -> "Solid":
@@ -112,8 +112,8 @@ def _sewn(piece: Piece) -> "Solid":
         whole = surface(piece)
         rings = [tuple(whole.vertices[number] for number in triangle) for triangle in whole.triangles]
     faces = [Face(Wire.make_polygon((*ring, ring[0]), close=False)) for ring in rings]
-    made = Solid(Shell(faces))
-    return made if made.volume > 0 else Solid(made.wrapped.Reversed())
+    sewn = Solid(Shell(faces))
+    return sewn if sewn.volume > 0 else Solid(sewn.wrapped.Reversed())
 
 
 def part(body: Body) -> "Solid | Compound":
@@ -133,9 +133,9 @@ def part(body: Body) -> "Solid | Compound":
         except CadFailed as error:
             place = f"{type(piece).__name__.lower()} {number} of {len(body.pieces)}"
             raise CadFailed(f"the CAD kernel cannot make {body.name} ({body.material}), {place}, {error}") from error
-    made = solids[0] if len(solids) == 1 else Compound(solids)
-    made.label = body.name
-    return made
+    joined = solids[0] if len(solids) == 1 else Compound(solids)
+    joined.label = body.name
+    return joined
 
 
 def write_step(scene: Scene, colours: Mapping[str, str], title: str, path: Path) -> None:
@@ -167,9 +167,9 @@ def write_step(scene: Scene, colours: Mapping[str, str], title: str, path: Path)
     for number, body in enumerate(scene.bodies, 1):
         if body.name not in colours:
             raise CadFailed(f"body {body.name!r} has no colour; colours are given for: {', '.join(sorted(colours))}")
-        made = part(body)
-        made.label, made.color = _label(number), Color(colours[body.name])
-        parts.append(made)
+        product = part(body)
+        product.label, product.color = _label(number), Color(colours[body.name])
+        parts.append(product)
     assembly = Compound(children=parts, label=_label(0))
     try:
         path.write_bytes(b"")  # says why it cannot, which the kernel does not

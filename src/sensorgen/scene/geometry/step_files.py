@@ -135,11 +135,11 @@ def _revolved(shape: Any) -> "Revolved | None":
         outline.append((abs(round(ra, 9)), round(za, 9)))
         bulges.append(-2 * beside / chord if edge.geom_type == GeomType.CIRCLE and chord > 0 else 0.0)
     try:
-        made = Revolved(middle.X, middle.Y, tuple(outline), tuple(bulges))
+        piece = Revolved(middle.X, middle.Y, tuple(outline), tuple(bulges))
     except SensorgenError:
         return None
     exact = shape.solids()[0].volume
-    return made if abs(made.volume_mm3() - exact) < 1e-6 * exact else None
+    return piece if abs(piece.volume_mm3() - exact) < 1e-6 * exact else None
 
 
 def _refuse_missing(shape: Any, name: str, points: Any, triangles: Any, chord_mm: float) -> None:

@@ -31,9 +31,9 @@ def faults(scene: Scene, meshes: Mapping[str, Mesh]) -> list[tuple[str, str]]:
     meshes : mapping of str to Mesh
         One for each body, by its name.
     """
-    found = [(body.name, fault) for body in scene.bodies if (fault := _fault(body, meshes[body.name]))]
-    if found or _are_apart(scene):
-        return found
+    broken = [(body.name, fault) for body in scene.bodies if (fault := _fault(body, meshes[body.name]))]
+    if broken or _are_apart(scene):
+        return broken
     solids = {name: mesh.solid() for name, mesh in meshes.items()}
     return _overlaps(solids, {body.name: _off_mm(body) for body in scene.bodies})
 
@@ -123,7 +123,7 @@ def _shells_are_apart(mesh: Mesh) -> bool:
 
 
 def _overlaps(solids: Mapping[str, "manifold3d.Manifold"], off_mm: Mapping[str, float]) -> list[tuple[str, str]]:
-    found = []
+    overlaps = []
     for a, b in combinations(solids, 2):
         one, other = solids[a], solids[b]
         boxes = np.array([one.bounding_box(), other.bounding_box()])
@@ -131,8 +131,8 @@ def _overlaps(solids: Mapping[str, "manifold3d.Manifold"], off_mm: Mapping[str, 
             volume = (one ^ other).volume()
             depth = OVERLAP_MM + off_mm[a] + off_mm[b]
             if volume > depth * min(one.surface_area(), other.surface_area()):
-                found.append((f"{a} / {b}", f"overlap by {volume:.3g} mm3"))
-    return found
+                overlaps.append((f"{a} / {b}", f"overlap by {volume:.3g} mm3"))
+    return overlaps
 
 
 def electrode_gap_mm(scene: Scene, meshes: Mapping[str, Mesh]) -> float:

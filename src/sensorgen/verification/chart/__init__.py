@@ -27,14 +27,14 @@ def points(scenes: Sequence[str], budget_s: float, started: Callable[[str], None
     started : callable
         Called with each scene's name before it is measured.
     """
-    found = []
+    measured = []
     for name in scenes:
         started(name)
-        found += with_front(kind_of(name).points(name, budget_s))
-    return found
+        measured += with_front(kind_of(name).points(name, budget_s))
+    return measured
 
 
-def silent(scenes: Sequence[str], found: Sequence[ChartPoint]) -> list[SilentModel]:
+def silent(scenes: Sequence[str], answers: Sequence[ChartPoint]) -> list[SilentModel]:
     """Models that gave nothing, scene by scene, and why.
 
     Parameters
@@ -44,7 +44,7 @@ def silent(scenes: Sequence[str], found: Sequence[ChartPoint]) -> list[SilentMod
     found : sequence of ChartPoint
         What the others gave there.
     """
-    spoke = {(p.scene, p.model.partition(":")[0]) for p in found}
+    spoke = {(p.scene, p.model.partition(":")[0]) for p in answers}
     refused = {scene: kind_of(scene).why_not_applicable(scene) for scene in scenes}
     return [
         SilentModel(scene, name, refused[scene].get(name) or _unasked(name, kind_of(scene).ASKED))

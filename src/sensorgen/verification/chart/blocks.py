@@ -75,8 +75,8 @@ def _block(stress_over_mu: Callable[[Real], Real], *, plane: bool) -> KnownBlock
     stress = _RUBBER.youngs_modulus_pa / 3 * stress_over_mu(_STRETCHES)
     height = _BLOCK_MM * M_PER_MM
     laws = (compression.unconfined(_RUBBER.youngs_modulus_pa),)
-    solids, held = dict.fromkeys(("x60", "etpu"), _RUBBER), BoundaryConditions("sliding", "free")
-    return KnownBlock(scene, None, solids, held, stress, (1 - _STRETCHES) * height, DIGITS, laws, height, plane)
+    solids, boundary = dict.fromkeys(("x60", "etpu"), _RUBBER), BoundaryConditions("sliding", "free")
+    return KnownBlock(scene, None, solids, boundary, stress, (1 - _STRETCHES) * height, DIGITS, laws, height, plane)
 
 
 def block() -> KnownBlock:
@@ -181,5 +181,5 @@ def _deep(standard: KnownBlock, pieces: int) -> Real | None:
     return _displacement_m(press3d.press(cell, standard.solids, stress, None, standard.boundary, BrickCounts(pieces)))
 
 
-def _displacement_m(found: Pressed) -> Real | None:
-    return None if found.faults else found.displacement_m[1:]
+def _displacement_m(pressed: Pressed) -> Real | None:
+    return None if pressed.faults else pressed.displacement_m[1:]

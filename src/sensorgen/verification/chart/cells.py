@@ -71,7 +71,7 @@ def points(name: str, budget_s: float) -> list[ChartPoint]:
             for level, work in () if peers.missing(peer) else peers.levels(peer, standard.scene, standard.permittivity):
                 value, seconds = timed(work)
                 one = point(name, peer, Interval(value / area, value / area), standard, seconds, bounded=False)
-                measured.append(replace(one, said=f"{level}{one.said}"))
+                measured.append(replace(one, result=f"{level}{one.result}"))
                 if seconds * _DEARER > budget_s:
                     break
     return measured

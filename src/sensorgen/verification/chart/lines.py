@@ -99,9 +99,9 @@ def points(name: str, budget_s: float) -> list[ChartPoint]:
     standard = STANDARD[name]
     known = np.array(list(standard.known.values()))
 
-    def judge(found: Any) -> tuple[float, str]:
-        whole = float(np.max(abs(found - known) / abs(known)))
-        real = float(np.max(abs(found.real - known.real) / abs(known.real)))
+    def judge(impedance: Any) -> tuple[float, str]:
+        whole = float(np.max(abs(impedance - known) / abs(known)))
+        real = float(np.max(abs(impedance.real - known.real) / abs(known.real)))
         return max(whole, real, DIGITS), f"abs(Z) off by {whole:.2g}, Re Z by {real:.2g}"
 
     levels: dict[str, list[dict[str, Any]]] = dict(line_models.LEVELS)
@@ -114,8 +114,8 @@ def points(name: str, budget_s: float) -> list[ChartPoint]:
 
 
 def _level(model: str, standard: KnownPlatePress, fineness: Mapping[str, Any]) -> Level:
-    said = line_models.words(fineness)
-    return f"{said}, " * bool(said), lambda: line_models.impedance(model, standard.line(), **fineness)
+    words = line_models.words(fineness)
+    return f"{words}, " * bool(words), lambda: line_models.impedance(model, standard.line(), **fineness)
 
 
 def why_not_applicable(name: str) -> dict[str, str]:

@@ -36,7 +36,7 @@ class ChartPoint:
         Relative distance from the reference, of the worse bound; no less than the reference's own [-].
     seconds : float
         Time of the processor [s].
-    said : str
+    result : str
         What it gave, in words.
     bounded : bool
         Whether the truth must lie between its bounds.
@@ -52,7 +52,7 @@ class ChartPoint:
     model: str
     error: float
     seconds: float
-    said: str
+    result: str
     bounded: bool = False
     wanted: float | None = None
     lower_f_per_m2: float | None = None
@@ -74,9 +74,9 @@ def timed(work: Callable[[], Any]) -> tuple[Any, float]:
     taken: list[float] = []
     while len(taken) < _REPEATS and sum(taken) < (_AGAIN_S if len(taken) == 1 else _QUICK_S):
         start = used_s()
-        found = work()
+        result = work()
         taken.append(used_s() - start)
-    return found, sorted(taken)[(len(taken) - 1) // 2]
+    return result, sorted(taken)[(len(taken) - 1) // 2]
 
 
 def climbed(scene: str, ladders: Iterable[Ladder], judge: Judge, budget_s: float) -> Iterator[ChartPoint]:
@@ -94,14 +94,14 @@ def climbed(scene: str, ladders: Iterable[Ladder], judge: Judge, budget_s: float
         A finer level is not tried where that would take longer, estimated as ten times the last one [s].
     """
     for model, levels in ladders:
-        for said, work in levels:
+        for level, work in levels:
             try:
                 value, seconds = timed(work)
             except OutOfRange:
                 break
             if value is not None:
                 error, words = judge(value)
-                yield ChartPoint(scene, model, error, seconds, said + words)
+                yield ChartPoint(scene, model, error, seconds, level + words)
             if _DEARER * seconds > budget_s:
                 break
 
@@ -117,10 +117,10 @@ def relative(known: ArrayLike, known_to: float, words: str = "off by {:+.3g} at 
     return judge
 
 
-def with_front(found: Sequence[ChartPoint]) -> list[ChartPoint]:
+def with_front(points: Sequence[ChartPoint]) -> list[ChartPoint]:
     """Points by time, those marked than which none is quicker and at least as near."""
     ordered, best = [], math.inf
-    for point in sorted(found, key=lambda p: (p.seconds, p.error)):
+    for point in sorted(points, key=lambda p: (p.seconds, p.error)):
         ordered.append(replace(point, front=point.error < best))
         best = min(best, point.error)
     return ordered

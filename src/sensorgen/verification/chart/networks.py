@@ -134,8 +134,8 @@ def points(name: str, budget_s: float) -> list[ChartPoint]:
     """
     standard = STANDARD[name]()
 
-    def judge(found: Values) -> tuple[float, str]:
-        pairs = [(part(found), part(standard.known)) for part in (np.asarray, np.real)]
+    def judge(values: Values) -> tuple[float, str]:
+        pairs = [(part(values), part(standard.known)) for part in (np.asarray, np.real)]
         off = max(float(np.max(abs(ours - known) / abs(known))) for ours, known in pairs)
         return max(off, standard.known_to), f"off by {off:.3g} at most"
 
@@ -157,12 +157,12 @@ def _sections() -> tuple[list[list[float]], Values]:
 def _alone() -> Values:
     """As if no track were shared: nothing off the diagonal."""
     tracks, films = _sections()
-    found = np.zeros_like(_STACK)
+    impedance = np.zeros_like(_STACK)
     for k in (0, 1):
         loop = [np.asarray(section[k] + section[k + 1]) for section in tracks]
         lengths = [np.asarray(length) for length in _LENGTHS_M]
-        found[:, k, k] = line.cascade(loop, list(films[:, :, k]), lengths, "open")
-    return found
+        impedance[:, k, k] = line.cascade(loop, list(films[:, :, k]), lengths, "open")
+    return impedance
 
 
 def _comb(width: float) -> Values:
@@ -182,5 +182,5 @@ def _across() -> Values:
     start, end = (np.column_stack([x, side * reach * full]) for side in (-1, 1))
     lines = StraightLines(start, end, full * pitch, full * high, np.zeros(_ACROSS, np.int64), np.zeros(_ACROSS, bool))
     span, area = (0.0, float(x[-1])), high * 2 * reach
-    found = [traxels.resistance(lines, _RHO_OHM_M, contact, span, area).ratio for contact in _CONTACTS_OHM_M2]
-    return (1 + (_ACROSS - 1) * np.array(found)) / _ACROSS
+    ratios = [traxels.resistance(lines, _RHO_OHM_M, contact, span, area).ratio for contact in _CONTACTS_OHM_M2]
+    return (1 + (_ACROSS - 1) * np.array(ratios)) / _ACROSS

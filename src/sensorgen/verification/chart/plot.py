@@ -47,7 +47,7 @@ def figures(points: Sequence[ChartPoint]) -> Iterator[Figure]:
         curves = [
             curve for model, k in looks(scene, points).items() if (mine := [p for p in here if p.model == model])
             for curve in marks(
-                model, [p.seconds for p in mine], [p.error for p in mine], [f"{p.model}: {p.said}" for p in mine],
+                model, [p.seconds for p in mine], [p.error for p in mine], [f"{p.model}: {p.result}" for p in mine],
                 k, hollow=not mine[0].bounded,
             )
         ]  # fmt: skip

@@ -100,10 +100,10 @@ def points(name: str, budget_s: float) -> list[ChartPoint]:
 def why_not_applicable(name: str) -> dict[str, str]:
     """Why models of compression do not apply to a scene."""
     film, what = STANDARD[name]
-    said = {"press3d": press3d.why_not_applicable(_scene(CELLS[film])) or "", "press2d": _MISSING}
+    reasons = {"press3d": press3d.why_not_applicable(_scene(CELLS[film])) or "", "press2d": _MISSING}
     if what == _DOWN:
-        return said | {"thesis_cells": "the displacement is what 3.1.2 is given"}
-    return said | {"springs": "it has a displacement and no capacitance"}
+        return reasons | {"thesis_cells": "the displacement is what 3.1.2 is given"}
+    return reasons | {"springs": "it has a displacement and no capacitance"}
 
 
 def _down(known: KnownCell) -> Iterator[Ladder]:
@@ -160,14 +160,14 @@ def _levels(known: KnownCell, permittivity: dict[str, float] | None) -> list[Lev
 def _pressed(known: KnownCell, permittivity: dict[str, float] | None, mesh: Fineness) -> Real | None:
     """Displacement [um], or with permittivities the rise [pF/m]; None where not the whole load was reached."""
     cell, stress = press2d.cell(_scene(known), known.params().period_mm), [0.0, *known.stress_pa()]
-    found = press2d.press(cell, SOLIDS, stress, permittivity, fineness=mesh)
-    if found.converged_pa != stress[-1]:
+    pressed = press2d.press(cell, SOLIDS, stress, permittivity, fineness=mesh)
+    if pressed.converged_pa != stress[-1]:
         return None
     if permittivity is None:
-        return 1e6 * found.displacement_m[1:]
-    if None in found.capacitance_f_per_m2:
+        return 1e6 * pressed.displacement_m[1:]
+    if None in pressed.capacitance_f_per_m2:
         return None  # too coarse for a field
-    per_area = np.array([c.middle() for c in found.capacitance_f_per_m2 if c])
+    per_area = np.array([c.middle() for c in pressed.capacitance_f_per_m2 if c])
     return np.asarray(1e12 * (per_area - per_area[0])[1:] * known.params().period_mm * M_PER_MM)
 
 

@@ -37,13 +37,13 @@ def points(name: str, budget_s: float) -> list[ChartPoint]:
     """
     force, position = STANDARD[name]
 
-    def judge(found: Press) -> tuple[float, str]:
-        off = abs(found[0] / force - 1), abs(found[1] - position) / _LENGTH_M
-        return max(*off, DIGITS), f"{found[0]:.6g} N at {1e3 * found[1]:.6g} mm"
+    def judge(press: Press) -> tuple[float, str]:
+        off = abs(press[0] / force - 1), abs(press[1] - position) / _LENGTH_M
+        return max(*off, DIGITS), f"{press[0]:.6g} N at {1e3 * press[1]:.6g} mm"
 
     def sought() -> Press:
-        found = _estimator().one(_READING)
-        return found.force_n, found.position_m
+        inverted = _estimator().one(_READING)
+        return inverted.force_n, inverted.position_m
 
     return list(climbed(name, [("invert: seven tones", [("", sought)])], judge, budget_s))
 

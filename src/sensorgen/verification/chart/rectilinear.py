@@ -37,11 +37,11 @@ def plate(
         for path in _paths(np.array([length_mm, width_mm]), line_mm, angle, walls):
             steps = ((a, b, k > 0) for k, (a, b) in enumerate(pairwise(path)))
             pieces += [(*a, *b, layer, joined) for a, b, joined in steps]
-    found = np.array(pieces)
-    full = np.full(len(found), M_PER_MM)
+    ends = np.array(pieces)
+    full = np.full(len(ends), M_PER_MM)
     return StraightLines(
-        found[:, :2] * M_PER_MM, found[:, 2:4] * M_PER_MM, full * line_mm, full * layer_mm,
-        found[:, 4].astype(np.int64), found[:, 5].astype(bool),
+        ends[:, :2] * M_PER_MM, ends[:, 2:4] * M_PER_MM, full * line_mm, full * layer_mm,
+        ends[:, 4].astype(np.int64), ends[:, 5].astype(bool),
     )  # fmt: skip
 
 

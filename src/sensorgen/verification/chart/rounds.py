@@ -50,7 +50,7 @@ def why_not_applicable(name: str) -> dict[str, str]:
         "it gives the displacement of the top, and not where bodies touch",
         "the mesher is not installed (extra fem)",
     )
-    found = {
+    why = {
         "press2d": missing,
         "press_round": missing,
         "press3d": "a round body is no box",
@@ -58,8 +58,8 @@ def why_not_applicable(name: str) -> dict[str, str]:
         "compression": no_film,
     }
     if name == SPHERE:
-        return found | {"press2d": "a sphere is no prism", "pressure": "its contacts are as long as the sensor is wide"}
-    return found | {"press_round": "a cylinder that lies has no upright axis"}
+        return why | {"press2d": "a sphere is no prism", "pressure": "its contacts are as long as the sensor is wide"}
+    return why | {"press_round": "a cylinder that lies has no upright axis"}
 
 
 def _load_n_per_m() -> float:

@@ -45,9 +45,9 @@ def points(name: str, budget_s: float) -> list[ChartPoint]:
     }
     (reference,) = composed(body, query, best)
 
-    def judge(found: ModelAnswer) -> tuple[float, str]:
-        off = of_modulus(found.value, reference.value)
-        stated = f", {found.stated:.2g} stated" if found.stated is not None else ""
+    def judge(answer: ModelAnswer) -> tuple[float, str]:
+        off = of_modulus(answer.value, reference.value)
+        stated = f", {answer.stated:.2g} stated" if answer.stated is not None else ""
         return max(off, reference.doubt, DIGITS), f"off by {off:.2g}{stated}"
 
     def of(**more: object) -> Callable[[], ModelAnswer]:

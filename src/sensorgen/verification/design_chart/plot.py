@@ -19,35 +19,35 @@ _COSTS = {
 _IN_PICTURE = ("processor time", "peak memory")
 
 
-def png(found: DesignChart) -> bytes:
+def png(chart: DesignChart) -> bytes:
     """Time and memory of all quantities in one picture."""
     panels = {
-        f"{figure.key}, {cost}": figure.choices[cost] for figure in figures(found) for cost in _IN_PICTURE
+        f"{figure.key}, {cost}": figure.choices[cost] for figure in figures(chart) for cost in _IN_PICTURE
         if cost in figure.choices
     }  # fmt: skip
-    return picture("chart", _title(found), ALT, panels)
+    return picture("chart", _title(chart), ALT, panels)
 
 
-def html(found: DesignChart) -> str:
+def html(chart: DesignChart) -> str:
     """A page: each quantity with its figure, whose axis can be chosen, and its table."""
-    shown = {figure.key: figure for figure in figures(found)}
+    shown = {figure.key: figure for figure in figures(chart)}
     sections = [
-        pages.PageSection(key, title, (shown[key],) if key in shown else (), tuple(found.parts(key)))
-        for key, title in found.titles.items()
+        pages.PageSection(key, title, (shown[key],) if key in shown else (), tuple(chart.parts(key)))
+        for key, title in chart.titles.items()
     ]
     return pages.page(
-        _title(found), [f"{found.body}; {found.force_n:g} N at {found.position_m * 1e3:g} mm.", ALT], sections
+        _title(chart), [f"{chart.body}; {chart.force_n:g} N at {chart.position_m * 1e3:g} mm.", ALT], sections
     )
 
 
-def _title(found: DesignChart) -> str:
-    return f"Speed and accuracy for {found.design}"
+def _title(chart: DesignChart) -> str:
+    return f"Speed and accuracy for {chart.design}"
 
 
-def figures(found: DesignChart) -> Iterator[Figure]:
+def figures(chart: DesignChart) -> Iterator[Figure]:
     """A figure per quantity, to choose time or memory in."""
-    for key, title in found.titles.items():
-        points = [p for p in found.points if p.question == key]
+    for key, title in chart.titles.items():
+        points = [p for p in chart.points if p.question == key]
         if points:
             choices = {
                 cost: (_panel(points, title, *about),) for cost, about in _COSTS.items()

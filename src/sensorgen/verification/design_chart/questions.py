@@ -143,8 +143,8 @@ def _capacitance(body: Body) -> Question:
             silent.append((name, why))
             continue
         levels = tuple(
-            (said.rstrip(", "), partial(works.peer, name, scene, eps, k, count), 0.0)
-            for k, (said, _) in enumerate(runs)
+            (level.rstrip(", "), partial(works.peer, name, scene, eps, k, count), 0.0)
+            for k, (level, _) in enumerate(runs)
         )
         series.append(Series(name, name, levels))
     return Question("capacitance", "capacitance at rest", "C at rest", tuple(series), tuple(silent), (), largest)
@@ -263,9 +263,9 @@ def _prediction(body: Body, query: Query) -> Question:
     ]  # fmt: skip
     for name in dict.fromkeys(way[0] for way in ways):
         levels = []
-        for _, said, asked, rough in (way for way in ways if way[0] == name):
+        for _, level, asked, rough in (way for way in ways if way[0] == name):
             work = partial(works.predicted, body, asked, rough=rough)
-            levels.append((said, work, 0.0 if rough else _seconds(body, asked)))
+            levels.append((level, work, 0.0 if rough else _seconds(body, asked)))
         series.append(Series(f"predict: {name}", OWN, tuple(levels)))
     return Question("prediction", "whole prediction", "|Z| under the load", tuple(series), (), (), of_modulus)
 

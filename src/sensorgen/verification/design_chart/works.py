@@ -19,9 +19,9 @@ def capacitance(
 ) -> ModelAnswer:  # fmt: skip
     """Of the whole sensor [F], by one of our models; ``width`` of the bounds is relative [-], or None."""
     module = import_module(f"sensorgen.models.{model}")
-    found = module.capacitance(scene, permittivity, *([] if width is None else [width]))
-    middle = (found.lower + found.upper) / 2
-    return ModelAnswer((count * middle,), (found.upper - found.lower) / 2 / middle, certified=True)
+    bounds = module.capacitance(scene, permittivity, *([] if width is None else [width]))
+    middle = (bounds.lower + bounds.upper) / 2
+    return ModelAnswer((count * middle,), (bounds.upper - bounds.lower) / 2 / middle, certified=True)
 
 
 def formula(name: str, params: Any, eps_r: float, area_m2: float) -> ModelAnswer:
@@ -44,9 +44,9 @@ def rise_by_law(body: "Body", law: str, stress_pa: float) -> ModelAnswer:
 
     from sensorgen.prediction.planning import rough_sensor
 
-    found = rough_sensor(body, law).law.compression
-    strain = float(found.capacitive_strain(np.asarray(stress_pa))[0])
-    return ModelAnswer((strain / (1 - strain),), getattr(found, "within", None))
+    compression = rough_sensor(body, law).law.compression
+    strain = float(compression.capacitive_strain(np.asarray(stress_pa))[0])
+    return ModelAnswer((strain / (1 - strain),), getattr(compression, "within", None))
 
 
 def rise_by_mesh(case: "Case", level: int, stress_pa: float, stated: float) -> ModelAnswer:
@@ -54,10 +54,10 @@ def rise_by_mesh(case: "Case", level: int, stress_pa: float, stated: float) -> M
     from sensorgen.core.errors import OutOfRange
     from sensorgen.prediction.mesh_ladder import pressed
 
-    found = pressed(case, [0.0, stress_pa / 2, stress_pa], level)
-    first, last = found.capacitance_f_per_m2[0], found.capacitance_f_per_m2[-1]
-    if found.faults or not (first and last) or found.converged_pa < stress_pa:
-        raise OutOfRange("; ".join(found.faults) or f"solved up to {found.converged_pa / 1e3:.3g} kPa only")
+    curve = pressed(case, [0.0, stress_pa / 2, stress_pa], level)
+    first, last = curve.capacitance_f_per_m2[0], curve.capacitance_f_per_m2[-1]
+    if curve.faults or not (first and last) or curve.converged_pa < stress_pa:
+        raise OutOfRange("; ".join(curve.faults) or f"solved up to {curve.converged_pa / 1e3:.3g} kPa only")
     return ModelAnswer((last.middle() / first.middle() - 1,), stated)
 
 

@@ -63,4 +63,4 @@ def levels(peer: str, scene: Scene, permittivity: Mapping[str, float]) -> Levels
     else:
         of_order = ((how, "".join(f" of order {p}" for p in how[1:])) for how in _BRICKS[peer])
         work, words = module.boxes, [(f"{how[0]} layers{order}, ", how) for how, order in of_order]
-    return [(said, partial(work, geometry, permittivity, *how)) for said, how in words]
+    return [(level, partial(work, geometry, permittivity, *how)) for level, how in words]

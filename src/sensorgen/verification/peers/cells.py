@@ -48,7 +48,7 @@ class PlaneSection:
     faces: dict[Edge, tuple[str, str]]
     depth_mm: float
 
-    def held(self) -> dict[Edge, str]:
+    def electrode_edges(self) -> dict[Edge, str]:
         """Edges of dielectrics on an electrode, and which one."""
         by_edge = {}
         for edge, sides in self.faces.items():

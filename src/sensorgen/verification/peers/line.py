@@ -69,7 +69,7 @@ def ngspice(line: PressedLine, cells: int) -> Complex:
             ["ngspice", "-b", str(file)],  # noqa: S607
             capture_output=True, encoding="utf-8", errors="replace", cwd=folder, check=False,
         )  # fmt: skip
-    found = re.findall(r"v\(n0\) = ([-+.e\d]+),([-+.e\d]+)", done.stdout)
-    if len(found) != len(frequency):
+    printed = re.findall(r"v\(n0\) = ([-+.e\d]+),([-+.e\d]+)", done.stdout)
+    if len(printed) != len(frequency):
         raise SensorgenError(f"ngspice: {(done.stderr or done.stdout).strip()[-200:]}")
-    return np.array([complex(float(re_ohm), float(im_ohm)) for re_ohm, im_ohm in found])
+    return np.array([complex(float(re_ohm), float(im_ohm)) for re_ohm, im_ohm in printed])

@@ -33,7 +33,7 @@ def plane(section: cells.PlaneSection, permittivity: Mapping[str, float], unknow
         netgen_mesh.SetMaterial(k + 1, f"m{k}")
     number = {tuple(p): k for k, p in enumerate(section.points_mm.tolist())}
     for k, end in enumerate(cells.ENDS):
-        edges = [[number[a], number[b]] for (a, b), name in section.held().items() if name == end]
+        edges = [[number[a], number[b]] for (a, b), name in section.electrode_edges().items() if name == end]
         netgen_mesh.AddElements(dim=1, index=k + 1, data=np.array(edges, np.int32), base=0)
         netgen_mesh.SetBCName(k, end)
     mesh = ng.Mesh(netgen_mesh)

@@ -65,8 +65,8 @@ class Chapter(Strict):
 
     def items(self) -> Iterator[tuple[Kind, ThesisItem]]:
         """All of them, with what they are."""
-        for kind, found in zip(KINDS, (self.equations, self.figures, self.tables, self.claims), strict=True):
-            yield from ((kind, item) for item in found)
+        for kind, listed in zip(KINDS, (self.equations, self.figures, self.tables, self.claims), strict=True):
+            yield from ((kind, item) for item in listed)
 
 
 @cache

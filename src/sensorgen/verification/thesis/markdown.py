@@ -32,22 +32,22 @@ def markdown(rows: Sequence[ReproducedItem]) -> str:
 
 def lead(rows: Sequence[ReproducedItem]) -> str:
     """Sum of the counts, in words."""
-    found = Counter(row.verdict.word for row in rows)
+    total = Counter(row.verdict.word for row in rows)
     copies = [sum(part.copied for part in row.parts) for row in rows if row.verdict.word in JUDGED]
-    counts = [f"{found[word]} {text}" for word, text in zip(JUDGED, ("agree", "are misprints", "differ"), strict=True)]
+    counts = [f"{total[word]} {text}" for word, text in zip(JUDGED, ("agree", "are misprints", "differ"), strict=True)]
     return (
-        f"Of {len(rows)} items {sum(found[word] for word in JUDGED)} are compared with something that does not come "
+        f"Of {len(rows)} items {sum(total[word] for word in JUDGED)} are compared with something that does not come "
         "from the item itself (a model, a solved field, a reading, another table of the thesis): "
         f"{', '.join(counts)}; {sum(map(bool, copies))} of these also have transcribed values, {sum(copies)} in all. "
-        f"Transcribed only: {found[TRANSCRIBED]}; not covered: {found[NOT_COVERED]}; cannot be reproduced: "
-        f"{found[LOST]}."
+        f"Transcribed only: {total[TRANSCRIBED]}; not covered: {total[NOT_COVERED]}; cannot be reproduced: "
+        f"{total[LOST]}."
     )
 
 
 def words(rows: Sequence[ReproducedItem]) -> list[str]:
     """Verdicts in use, in their order; the one that should not occur only where it does."""
-    found = {row.verdict.word for row in rows}
-    return [word for word in WORDS if word != UNEXPLAINED or word in found]
+    used = {row.verdict.word for row in rows}
+    return [word for word in WORDS if word != UNEXPLAINED or word in used]
 
 
 def _lines(rows: Sequence[ReproducedItem]) -> Iterator[str]:
@@ -77,8 +77,8 @@ def heading(name: str) -> str:
 def counted(rows: Sequence[ReproducedItem]) -> Iterator[tuple[str, list[int]]]:
     """Each verdict, and how many equations, figures and tables, and of all, have it; last the sums."""
     for word in (*words(rows), ""):
-        found = Counter(row.kind for row in rows if row.verdict.word == word or not word)
-        yield word, [*(found[kind] for kind in KINDS), sum(found.values())]
+        counts = Counter(row.kind for row in rows if row.verdict.word == word or not word)
+        yield word, [*(counts[kind] for kind in KINDS), sum(counts.values())]
 
 
 def _cells(row: ReproducedItem) -> Iterator[str]:

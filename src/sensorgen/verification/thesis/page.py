@@ -55,9 +55,9 @@ def _values(values: ArrayLike | None) -> Any:
     """Numbers as JSON has them: complex ones as pairs, none for what is no number."""
     if values is None:
         return None
-    found = np.asarray(values)
-    if np.iscomplexobj(found):
-        found = np.stack([found.real, found.imag], -1)
-    plain = found.astype(object)
-    plain[~np.isfinite(found)] = None
+    array = np.asarray(values)
+    if np.iscomplexobj(array):
+        array = np.stack([array.real, array.imag], -1)
+    plain = array.astype(object)
+    plain[~np.isfinite(array)] = None
     return plain.tolist()

@@ -34,11 +34,11 @@ def rows(started: Callable[[str], None] = lambda _: None) -> list[ReproducedItem
     started : callable
         Called with each chapter's name before it is computed.
     """
-    found = []
+    reproduced = []
     for name in CHAPTERS:
         started(name)
-        found += [row(name, kind, item) for kind, item in chapter(name).items()]
-    return found
+        reproduced += [row(name, kind, item) for kind, item in chapter(name).items()]
+    return reproduced
 
 
 def row(of_chapter: str, kind: Kind, item: ThesisItem) -> ReproducedItem:
@@ -67,5 +67,5 @@ def _computed(check: str, given: Mapping[str, Any]) -> list[ItemPart]:
     name, _, check = check.partition(".")
     module = registry.load(checks, name)
     work = getattr(module, "EQUATIONS", {}).get(check) or getattr(module, check)
-    found: list[ItemPart] = work(**given)
-    return found
+    parts: list[ItemPart] = work(**given)
+    return parts

@@ -20,13 +20,13 @@ _PREFIXED = ("A", "C", "F", "Hz", "N", "Pa", "S", "V", "m", "ohm")  # units that
 
 def thesis(parts: Sequence[ItemPart], tolerance: float) -> list[str]:
     """The thesis's values: those that differ, or all where they are few."""
-    found = []
+    texts = []
     for part in _chosen(parts, tolerance):
         if part.printed is not None:
             corrected = "" if part.corrected is None else f"; corrected {_number(part, part.corrected)}"
             limit = "at most " if part.limit else ""
-            found.append(f"{part.name}: {limit}{_number(part, part.printed)}{corrected}")
-    return found
+            texts.append(f"{part.name}: {limit}{_number(part, part.printed)}{corrected}")
+    return texts
 
 
 def ours(parts: Sequence[ItemPart], tolerance: float) -> list[str]:

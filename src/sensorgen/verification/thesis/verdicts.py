@@ -106,8 +106,8 @@ def judged(item: ThesisItem, parts: Sequence[ItemPart]) -> ItemVerdict:
     """
     wrong = [part for part in parts if not abs(part.off()) <= item.tolerance]
     copies = sum(part.copied for part in parts)
-    found = _explained(item, wrong) if wrong else _agreeing(item, parts, copies)
-    return replace(found, why=f"{found.why}; transcribed: {copies}") if copies and found.word in JUDGED else found
+    worst = _explained(item, wrong) if wrong else _agreeing(item, parts, copies)
+    return replace(worst, why=f"{worst.why}; transcribed: {copies}") if copies and worst.word in JUDGED else worst
 
 
 def _agreeing(item: ThesisItem, parts: Sequence[ItemPart], copies: int) -> ItemVerdict:

@@ -239,7 +239,7 @@ def _record(
         predicted |= {key: one.prediction for key, one in plate.printed.items() if one.prediction}
     return BatchRecord(
         batch=plan.name, iteration=plan.iteration, seed=plan.seed, printer=first.machine.name,
-        quality=first.layers.name, layout=plan.layout, tower=placed.room.kept, tools=loaded,
+        quality=first.layers.name, layout=plan.layout, tower=placed.room.tower, tools=loaded,
         checklist=record.checklist(plan, loaded), bake=plan.bake,
         specimens=record.specimens(placed.pieces, placed.plate), predictions=predicted,
         designs={key: ResolvedDesign(design.name, design.resolved()) for key, design in placed.designs.items()},

@@ -63,20 +63,20 @@ class Room:
     ----------
     area : Rect
         Where specimens may lie.
-    kept : tuple of Rect
+    tower : tuple of Rect
         What they must stay clear of: the prime tower with its brim.
     gap_mm : float
         Least distance of neighbours, and of a specimen and the tower [mm].
     """
 
     area: Rect
-    kept: tuple[Rect, ...]
+    tower: tuple[Rect, ...]
     gap_mm: float
 
     def free(self, place: Rect) -> bool:
         """Test whether a specimen may lie there, were it alone."""
         around = place.grown(*[self.gap_mm] * 4)
-        return self.area.holds(place) and not any(around.meets(k) for k in self.kept)
+        return self.area.holds(place) and not any(around.meets(k) for k in self.tower)
 
 
 Plate = dict[int, Rect]  # number in the list of sizes, to place
@@ -149,7 +149,7 @@ def _packed(sizes: Sequence[Size], order: Sequence[int], room: Room) -> list[Pla
 def _all_free(room: Room) -> list[Rect]:
     """The empty plate; each specimen takes its gap along, to the right and the back."""
     free = [room.area.grown(0, 0, room.gap_mm, room.gap_mm)]
-    for taken in room.kept:
+    for taken in room.tower:
         free = _without(free, taken.grown(0, 0, room.gap_mm, room.gap_mm))
     return free
 
@@ -332,7 +332,7 @@ def svg(title: str, printer: Printer, room: Room, plate: Plate, pieces: Sequence
     return bed_svg(
         bed, f"{title}: {len(plate)} specimens on {printer.title}, {size} mm",
         f"y up, x to the right; contacts at the heavy edge; origin of the printer at {origin}",
-        (*(_tower(tower, bed) for tower in room.kept), *_specimens(plate, pieces, bed)), listed,
+        (*(_tower(tower, bed) for tower in room.tower), *_specimens(plate, pieces, bed)), listed,
     )  # fmt: skip
 
 

@@ -113,7 +113,7 @@ class BatchPlan(Strict):
         """Number of specimens."""
         return sum(item.replicates for item in self.designs)
 
-    def made(self, item: Item, folder: Path) -> Design:
+    def design(self, item: Item, folder: Path) -> Design:
         """The design of an item, printed as the plan says.
 
         Raises
@@ -207,7 +207,7 @@ def pieces(plan: BatchPlan, folder: Path) -> tuple[PrintPiece, ...]:
     specimens: list[PrintPiece] = []
     for number, item in enumerate(plan.designs):
         try:
-            design = plan.made(item, folder)
+            design = plan.design(item, folder)
         except SensorgenError as error:
             raise error.within(f"designs.{number}") from None
         copies, key = range(item.first, item.first + item.replicates), design.id()

@@ -117,8 +117,8 @@ def read(paths: Sequence[Path], unit: str = "", chord_mm: float = CHORD_MM) -> A
     names = _names([body.name for body in given])
     findings, bodies = [], []
     for name, raw in zip(names, given, strict=True):
-        found, own = _repaired(name, raw)
-        bodies.append(found)
+        body, own = _repaired(name, raw)
+        bodies.append(body)
         findings += own
     findings += _sizes(bodies, unit)
     if not any(f.severity == "error" for f in findings):

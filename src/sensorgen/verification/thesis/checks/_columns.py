@@ -62,10 +62,10 @@ def exact_f_per_m2(shape: str) -> float:
     MissingValue
         No solver that is installed meets the tolerance.
     """
-    made = designs.make({"shape": shape, "parameters": {"dielectric_mm": FILM_MM}})
-    eps = {taken.material: taken.value for taken in permittivities(made)}
-    found = planner.capacitance(made.in_use, eps, _ACCURACY)
-    if not found.reached():
-        raise MissingValue(f"no model here meets a tolerance of {_ACCURACY:g}: {'; '.join(found.refused)}")
-    area = made.params.length_mm * made.params.width_mm * M_PER_MM**2
-    return (found.capacitance_f.lower + found.capacitance_f.upper) / 2 / area
+    design = designs.make({"shape": shape, "parameters": {"dielectric_mm": FILM_MM}})
+    eps = {taken.material: taken.value for taken in permittivities(design)}
+    solved = planner.capacitance(design.in_use, eps, _ACCURACY)
+    if not solved.reached():
+        raise MissingValue(f"no model here meets a tolerance of {_ACCURACY:g}: {'; '.join(solved.refused)}")
+    area = design.params.length_mm * design.params.width_mm * M_PER_MM**2
+    return (solved.capacitance_f.lower + solved.capacitance_f.upper) / 2 / area

@@ -42,8 +42,8 @@ def earlier() -> list[ItemPart]:
 
 def solved_plate() -> list[ItemPart]:
     """4.1: the same by its field."""
-    found = fem2d.capacitance(_PLATE.in_use, PERMITTIVITY)
-    return [ItemPart("C", "F", found.upper, EPS0_F_PER_M * EPS_R * _PLATE_M2 / _PLATE_M)]
+    bounds = fem2d.capacitance(_PLATE.in_use, PERMITTIVITY)
+    return [ItemPart("C", "F", bounds.upper, EPS0_F_PER_M * EPS_R * _PLATE_M2 / _PLATE_M)]
 
 
 def slice_of_plate() -> list[ItemPart]:
@@ -64,11 +64,11 @@ def air_gaps() -> list[ItemPart]:
     """2.8 to 2.11: strips of dielectric and of air side by side between plates, by their field."""
     beside = [(_STRIP_MM, [("x60", _HIGH_MM)]), (_GAP_MM, [("air", _HIGH_MM)])]
     depth_mm = 1.0
-    found = fem2d.capacitance(piles(beside, depth_mm), PERMITTIVITY)
+    bounds = fem2d.capacitance(piles(beside, depth_mm), PERMITTIVITY)
     c_de, c_air = (
         EPS0_F_PER_M * PERMITTIVITY[layers[0][0]] * width * depth_mm / _HIGH_MM * M_PER_MM for width, layers in beside
     )
-    return [ItemPart("C of both", "F", (found.lower + found.upper) / 2, c_de + c_air)]
+    return [ItemPart("C of both", "F", (bounds.lower + bounds.upper) / 2, c_de + c_air)]
 
 
 def cogs() -> list[ItemPart]:

@@ -64,11 +64,11 @@ def capacitance() -> list[ItemPart]:
 def force() -> list[ItemPart]:
     """C.4: the force that C.1 reads from these capacitances."""
     pressed, _, _, _ = _readings()
-    found = []
+    coefficients = []
     for tone in (_LOW_HZ, _TONE_HZ):
         rise, straight, slope = _straight(tone)
-        found.append(ItemPart(f"F at {tone / 1e3:g} kHz", "N", pressed, pressed + (rise - straight) / slope))
-    return found
+        coefficients.append(ItemPart(f"F at {tone / 1e3:g} kHz", "N", pressed, pressed + (rise - straight) / slope))
+    return coefficients
 
 
 def resistance() -> list[ItemPart]:

@@ -135,8 +135,4 @@ def return_current() -> list[ItemPart]:
     rho = _field.RHO_OHM_M
     apart = {"top_resistivity_ohm_m": 0.5 * rho, "bottom_resistivity_ohm_m": 1.5 * rho}
     ours = line.impedance(line.PressedLine(length_m=LENGTH_M, **TRACKS | apart))
-    printed = _field.unpressed_ohm()
-    return [
-        ItemPart("Re Z", "ohm", np.real(ours), np.real(printed)),
-        ItemPart("Im Z", "ohm", np.imag(ours), np.imag(printed)),
-    ]
+    return _field.both_parts("Z", "ohm", ours, _field.unpressed_ohm())

@@ -112,7 +112,7 @@ def sensitivity(shape: str, film_mm: float, increase: float, cell_f: float, plat
 def _plate_share(shape: str, film_mm: float) -> float:
     """Relative rise of the plate's capacitance at 100 kPa over that of a cell [-]."""
     cell, plate = _pressed(shape, parameters={"dielectric_mm": film_mm}), _pressed("reference", parameters={})
-    by = [_rise_f(found, 1.0) / float(found.lower_f_per_m2[0] or np.nan) for found in (plate, cell)]
+    by = [_rise_f(curve, 1.0) / float(curve.lower_f_per_m2[0] or np.nan) for curve in (plate, cell)]
     return by[0] / by[1]
 
 

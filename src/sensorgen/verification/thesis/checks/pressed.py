@@ -42,13 +42,6 @@ def _z(**given: Any) -> Any:
     return line.impedance(line.PressedLine(**_TRACKS | given))
 
 
-def _both(name: str, ours: Any, printed: Any) -> list[ItemPart]:
-    return [
-        ItemPart(f"Re {name}", "ohm", np.real(ours), np.real(printed)),
-        ItemPart(f"Im {name}", "ohm", np.imag(ours), np.imag(printed)),
-    ]
-
-
 def by_powers() -> list[ItemPart]:
     """2.24, 5.1, B.54: R from what the tracks turn into heat, X from what the film stores, per current squared."""
     nodes, weights = np.polynomial.legendre.leggauss(_GAUSS)
@@ -56,7 +49,9 @@ def by_powers() -> list[ItemPart]:
     current, voltage = _field.LINE.current_a.at(x), _field.LINE.difference_v.at(x)
     heat = weights @ abs(current) ** 2 * _RESISTANCE_OHM / 2
     stored = weights @ abs(voltage) ** 2 * _field.OMEGA * _CAPACITANCE_F / 2
-    return _both("Z", _field.LINE.impedance_ohm, complex(heat, -stored) / abs(_field.LINE.input_a) ** 2)
+    return _field.both_parts(
+        "Z", "ohm", _field.LINE.impedance_ohm, complex(heat, -stored) / abs(_field.LINE.input_a) ** 2
+    )
 
 
 def corner() -> list[ItemPart]:
@@ -102,14 +97,17 @@ def piezoresistive() -> list[ItemPart]:
     """B.50: a line that is pressed all along, of a rigid film, is one of more resistivity."""
     stiff = {"modulus_pa": 1e30, "tip_m": LENGTH_M, "force_n": _FORCE_N, "frequency_hz": _TONES_HZ}
     ours = _z(**stiff, top_piezoresistance_per_n=_S_PER_N, bottom_piezoresistance_per_n=_S_PER_N)
-    return _both("Z", ours, _field.unpressed_ohm(RHO_OHM_M * (1 + _S_PER_N * _FORCE_N), _TONES_HZ))
+    return _field.both_parts("Z", "ohm", ours, _field.unpressed_ohm(RHO_OHM_M * (1 + _S_PER_N * _FORCE_N), _TONES_HZ))
 
 
 def three_sections() -> list[ItemPart]:
     """B.51: product of the three sections' matrices as in B.44 to B.47; and as textbooks have it."""
     ours = [complex(line.impedance(_under_tip(tone))) for tone in _TONES_HZ]
     printed, textbook = ([_product(tone, of) for tone in _TONES_HZ] for of in (_by_exponentials, _by_functions))
-    return [*_both("Z", ours, printed), *_both("Z by cosh and sinh", ours, textbook)]
+    return [
+        *_field.both_parts("Z", "ohm", ours, printed),
+        *_field.both_parts("Z by cosh and sinh", "ohm", ours, textbook),
+    ]
 
 
 def _under_tip(tone_hz: float) -> line.PressedLine:
@@ -143,7 +141,7 @@ def ladder() -> list[ItemPart]:
         for _ in range(_CELLS):
             admittance += complex(y * length / _CELLS) - half
             admittance = admittance / (1 + ohm * admittance) + half
-    return _both("Z", line.impedance(given), 1 / admittance)
+    return _field.both_parts("Z", "ohm", line.impedance(given), 1 / admittance)
 
 
 def cog_resistance() -> list[ItemPart]:

@@ -18,14 +18,6 @@ _MATRIX = np.array([[GAMMA, -GAMMA], [-GAMMA, GAMMA]])
 _ANY_A = 1e-5  # a current that leaves something at the end, unlike the open line's own
 
 
-def _parts(name: str, unit: str, ours: ArrayLike, printed: ArrayLike) -> list[ItemPart]:
-    """Real and imaginary part by themselves: of an impedance, the real one is small and all that tells a position."""
-    return [
-        ItemPart(f"{which} {name}", unit, part(ours), part(printed))
-        for which, part in (("Re", np.real), ("Im", np.imag))
-    ]
-
-
 def _b4() -> complex:
     """By B.37."""
     return complex((-2 * LINE.input_a * RHO_OHM_M + HW * INPUT_V * K) / (4 * HW * K))
@@ -98,9 +90,9 @@ EQUATIONS: dict[str, Callable[[], list[ItemPart]]] = {
                  (np.sqrt(2) * LINE.input_a * RHO_OHM_M + HW * _ROOT * INPUT_V) / (4 * HW * _ROOT))
     ],
     # B.44 to B.47: elements of the transfer matrix
-    "first_element": lambda: _parts("A11", "", LINE.transfer(LENGTH_M)[0], _printed(LENGTH_M)[0]),
-    "second_element": lambda: _parts("A12", "ohm", LINE.transfer(LENGTH_M)[1], _printed(LENGTH_M)[1]),
-    "third_element": lambda: _parts("A21", "S", LINE.transfer(LENGTH_M)[2], _printed(LENGTH_M)[2]),
+    "first_element": lambda: _field.both_parts("A11", "", LINE.transfer(LENGTH_M)[0], _printed(LENGTH_M)[0]),
+    "second_element": lambda: _field.both_parts("A12", "ohm", LINE.transfer(LENGTH_M)[1], _printed(LENGTH_M)[1]),
+    "third_element": lambda: _field.both_parts("A21", "S", LINE.transfer(LENGTH_M)[2], _printed(LENGTH_M)[2]),
 }  # fmt: skip
 
 
@@ -182,4 +174,4 @@ def no_output() -> list[ItemPart]:
 
 def whole() -> list[ItemPart]:
     """2.18, B.53."""
-    return _parts("Z", "ohm", LINE.impedance_ohm, _field.unpressed_ohm())
+    return _field.both_parts("Z", "ohm", LINE.impedance_ohm, _field.unpressed_ohm())

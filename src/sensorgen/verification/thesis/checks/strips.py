@@ -35,12 +35,12 @@ _PRINTED_MM = {
 
 def columns(below: str, above: str = "") -> list[ItemPart]:
     """3.39 to 3.48: one column over a kind of lower strip, or all, per area."""
-    found = []
+    parts = []
     for name in [above] if above else _PRINTED_MM[below]:
         over: list[Layer] = [(below, _T2), *([(name, _T1)] if name != "etpu" else [])] if below != "etpu" else []
         printed = EPS0_F_PER_M * EPS_R / (_PRINTED_MM[below][name] * M_PER_MM)
-        found.append(ItemPart(f"{name} over {below}", "F/m2", pile_f_per_m2([("x60", _D), *over]), printed))
-    return found
+        parts.append(ItemPart(f"{name} over {below}", "F/m2", pile_f_per_m2([("x60", _D), *over]), printed))
+    return parts
 
 
 def in_series() -> list[ItemPart]:
@@ -73,26 +73,26 @@ _EVEN_MM = dict.fromkeys(_OWN_MM, _CELL.period_mm / 4)  # the best reading of on
 def _columns_f(cell: rect.Params = _CELL) -> float:
     """Columns of a cell as drawn [F]."""
     sizes = asdict(replace(cell, length_mm=cell.period_mm, width_mm=cell.period_mm))
-    made = designs.make({"shape": "rect", "parameters": sizes})
-    return every_column.capacitance(made.in_use, PERMITTIVITY).lower
+    design = designs.make({"shape": "rect", "parameters": sizes})
+    return every_column.capacitance(design.in_use, PERMITTIVITY).lower
 
 
 def sixteen_columns() -> list[ItemPart]:
     """3.36, figure 3.6: the sum over the lower strips, each of the upper ones with its own width."""
-    kept = thesis_cells.strips_f_per_m2(_CELL, EPS_R, even=False) * _AREA_M2
+    formula = thesis_cells.strips_f_per_m2(_CELL, EPS_R, even=False) * _AREA_M2
     return [
         ItemPart("C_eq", "F", _columns_f(), _summed_f(_OWN_MM)),
-        ItemPart("as kept in thesis_cells", "F", kept, _summed_f(_OWN_MM), copied=True),
+        ItemPart("as kept in thesis_cells", "F", formula, _summed_f(_OWN_MM), copied=True),
     ]
 
 
 def whole() -> list[ItemPart]:
     """3.49: the formula, and its cell."""
-    printed, kept = _summed_f(_EVEN_MM), thesis_cells.strips_f_per_m2(_CELL, EPS_R) * _AREA_M2
+    printed, formula = _summed_f(_EVEN_MM), thesis_cells.strips_f_per_m2(_CELL, EPS_R) * _AREA_M2
     return [
         ItemPart("C_eq, columns of their own widths", "F", _columns_f(), printed),
         ItemPart("of the exact cell", "F", exact_f_per_m2("rect") * _AREA_M2, printed, shown=SHOWN),
-        ItemPart("as kept in thesis_cells", "F", kept, printed, copied=True),
+        ItemPart("as kept in thesis_cells", "F", formula, printed, copied=True),
     ]
 
 
@@ -141,10 +141,10 @@ def bulging() -> list[ItemPart]:
     area_mm2 = _CELL.x60_width_mm * _CELL.period_mm / 4
     added = 8 / 16 * EPS0_F_PER_M * EPS_R * area_mm2 / (_T1 + _T2 + _D) * M_PER_MM
     rest = _summed_f(_EVEN_MM)
-    kept = [thesis_cells.bulging_f_per_m2(_CELL, EPS_R, 0.0, printed=way) * _AREA_M2 for way in (False, True)]
+    formula = [thesis_cells.bulging_f_per_m2(_CELL, EPS_R, 0.0, printed=way) * _AREA_M2 for way in (False, True)]
     return [
         ItemPart("C_r at rest, strips of their own widths", "F", _columns_f(), _summed_f(_OWN_MM) + added),
-        ItemPart("as kept in thesis_cells, corrected and not", "F", kept, [rest, rest + added], copied=True),
+        ItemPart("as kept in thesis_cells, corrected and not", "F", formula, [rest, rest + added], copied=True),
     ]
 
 

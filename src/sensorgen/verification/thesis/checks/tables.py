@@ -51,21 +51,21 @@ def _of_source(material: str, quantity: str, source: str) -> float:
     return next((v.value for v in values if v.source == source), np.nan)
 
 
-def _copied(source: str, said: dict[str, Printed]) -> list[ItemPart]:
+def _copied(source: str, printed: dict[str, Printed]) -> list[ItemPart]:
     """Values by material and quantity, and what is kept of that source."""
     return [
         ItemPart(*_named(material, quantity), _of_source(material, quantity, source), value, copied=True)
-        for material, values in said.items()
+        for material, values in printed.items()
         for quantity, value in values.items()
     ]
 
 
-def beside(other: str, **said: Printed) -> list[ItemPart]:
+def beside(other: str, **printed: Printed) -> list[ItemPart]:
     """Values by material and quantity, against those of another table of the thesis that has them."""
     there = table(other)
     return [
         ItemPart(f"{name} (ours: Table {other})", unit, there[material][quantity], value)
-        for material, values in said.items()
+        for material, values in printed.items()
         for quantity, value in values.items()
         for name, unit in [_named(material, quantity)]
         if quantity in there.get(material, {})
@@ -93,29 +93,31 @@ def elements(element_mm: float) -> list[ItemPart]:
     ]
 
 
-def filaments(ranges_c: dict[str, list[float]], text_c: dict[str, list[float]], **said: Printed) -> list[ItemPart]:
+def filaments(ranges_c: dict[str, list[float]], text_c: dict[str, list[float]], **printed: Printed) -> list[ItemPart]:
     """Table 4.1: against Table 3.2, and its printing temperatures against those of 4.2.5."""
     return [
-        *beside("3.2", **said),
+        *beside("3.2", **printed),
         *(
             ItemPart(f"{name}: printing temperatures (ours: 4.2.5)", "°C", text_c[name], ranges_c[name])
             for name in text_c
         ),
-        *_copied("thesis-4.1", said),
+        *_copied("thesis-4.1", printed),
     ]
 
 
-def simulated(conductivity: Printed, **said: Printed) -> list[ItemPart]:
+def simulated(conductivity: Printed, **printed: Printed) -> list[ItemPart]:
     """Table 3.2: X60, which as printed conducts better than the electrodes, against the least leaky film of D.1."""
     largest_ohm = max(max(r.z_ohm, default=0.0) for r in _prints())
     film = FILM_MM * M_PER_MM / (largest_ohm * _SENSOR_M2)
     return [
         ItemPart("x60: conductivity (ours: Table D.1, most)", "S/m", film, conductivity["x60"], 0.0, scale=1.0),
-        *_copied("thesis-3.2", said),
+        *_copied("thesis-3.2", printed),
     ]
 
 
-def plate(sizes: Printed, relative_permittivity: list[float], tones_hz: list[float], **said: Printed) -> list[ItemPart]:
+def plate(
+    sizes: Printed, relative_permittivity: list[float], tones_hz: list[float], **printed: Printed
+) -> list[ItemPart]:
     """Table 3.1: a pair of permittivities in the wrong order, and moduli, against Table 3.2."""
     ours = [table("3.2")[name]["relative_permittivity"] for name in ("etpu", "x60")]
     taken = [materials.load(name).value("relative_permittivity").value for name in ("etpu", "x60")]
@@ -123,32 +125,32 @@ def plate(sizes: Printed, relative_permittivity: list[float], tones_hz: list[flo
     return [
         ItemPart("relative permittivity of (electrodes, dielectric) (ours: Table 3.2)", "", ours, relative_permittivity,
                  relative_permittivity[::-1]),
-        *beside("3.2", **said),
+        *beside("3.2", **printed),
         ItemPart("relative permittivities of a prediction", "", taken, relative_permittivity[::-1], copied=True),
         *(ItemPart(name.removesuffix("_mm"), "mm", float(getattr(plain, name)), value, copied=True)
           for name, value in sizes.items()),
         ItemPart("tones", "Hz", TONES_HZ, tones_hz, copied=True),
-        *_copied("thesis-3.1", said),
+        *_copied("thesis-3.1", printed),
     ]  # fmt: skip
 
 
-def flank(radius_mm: float, **said: float) -> list[ItemPart]:
+def flank(radius_mm: float, **printed: float) -> list[ItemPart]:
     """Figure 2.12: the flank's length, by which 3.1.2 turns it; its sizes are our defaults [mm]."""
-    length = np.hypot(said["period_mm"] / 4, said["hang_height_mm"])
-    return [ItemPart("length of a flank (ours: by its sides)", "mm", length, radius_mm), *_sizes("tri", said)]
+    length = np.hypot(printed["period_mm"] / 4, printed["hang_height_mm"])
+    return [ItemPart("length of a flank (ours: by its sides)", "mm", length, radius_mm), *_sizes("tri", printed)]
 
 
-def strips(half_mm: float, **said: float) -> list[ItemPart]:
+def strips(half_mm: float, **printed: float) -> list[ItemPart]:
     """Figures 2.14 and 3.5: four strips make up a period, of which 6.1.2 solves half; their sizes are our defaults."""
-    period = said["etpu_width_mm"] + said["x60_width_mm"] + 2 * said["air_width_mm"]
-    return [ItemPart("period (ours: sum of the strips' widths)", "mm", period, 2 * half_mm), *_sizes("rect", said)]
+    period = printed["etpu_width_mm"] + printed["x60_width_mm"] + 2 * printed["air_width_mm"]
+    return [ItemPart("period (ours: sum of the strips' widths)", "mm", period, 2 * half_mm), *_sizes("rect", printed)]
 
 
-def _sizes(shape: str, said: Printed) -> list[ItemPart]:
+def _sizes(shape: str, printed: Printed) -> list[ItemPart]:
     params = designs.make({"shape": shape, "parameters": {"dielectric_mm": FILM_MM}}).params
     return [
         ItemPart(n.removesuffix("_mm").replace("_", " "), "mm", float(getattr(params, n)), v, copied=True)
-        for n, v in said.items()
+        for n, v in printed.items()
     ]
 
 
@@ -163,7 +165,7 @@ def tones(frequency_hz: list[float], corrected_hz: list[float], weights: list[fl
 
 def settings(
     layer_mm: list[float], nozzle_mm: float, line_mm: float, multiplier: float, infill_percent: list[float],
-    **said: Printed,
+    **printed: Printed,
 ) -> list[ItemPart]:  # fmt: skip
     """Table 4.2: temperatures within the makers' ranges, infill by the remarks of D.1; the rest is transcribed."""
     machine, least = printer.load_printer(_PRINTER), next(r.remark for r in _prints() if "infill" in r.remark)
@@ -172,36 +174,36 @@ def settings(
     return [
         *(ItemPart(f"{name}: nozzle temperature (ours: nearest within Table 4.1)", "°C",
                    float(np.clip(values["nozzle_temperature_c"], *ranges[name])), values["nozzle_temperature_c"])
-          for name, values in said.items()),
+          for name, values in printed.items()),
         ItemPart("x60: least infill (ours: Table D.1)", "%", float(least.partition("%")[0]), min(infill_percent)),
         ItemPart("layer heights", "mm", [printer.load_quality(q).layer_mm for q in ("fine", "extrafine")], layer_mm,
                  copied=True),
         ItemPart("nozzle", "mm", machine.nozzle_mm, nozzle_mm, copied=True),
         ItemPart("extrusion width", "mm", machine.line_mm(), line_mm, copied=True),
         ItemPart("extrusion multiplier", "", flow, [multiplier] * 2, copied=True),
-        *_copied("thesis-4.2", said),
+        *_copied("thesis-4.2", printed),
     ]  # fmt: skip
 
 
 def earlier(
-    tip_mm: float, resistivity_ohm_m: Printed, plate_mm: float, size_mm: list[float], **said: Printed
+    tip_mm: float, resistivity_ohm_m: Printed, plate_mm: float, size_mm: list[float], **printed: Printed
 ) -> list[ItemPart]:
     """Table C.1: the earlier sensor, against Tables 3.1, 3.2 and 4.1."""
     plate = table("3.1")["sizes"]
-    found: list[ItemPart] = [
+    resistivities: list[ItemPart] = [
         ItemPart(f"resistivity of the {end} electrode (ours: 1/conductivity of Table 3.2)", "ohm m",
                  1 / table("3.2")["conductivity"]["etpu"], value)
         for end, value in resistivity_ohm_m.items()
     ]  # fmt: skip
-    kept = [_of_source("etpu", "resistivity_ohm_m", f"thesis-c.1-{end}") for end in resistivity_ohm_m]
+    transcribed = [_of_source("etpu", "resistivity_ohm_m", f"thesis-c.1-{end}") for end in resistivity_ohm_m]
     return [
-        *found,
+        *resistivities,
         ItemPart("dielectric (ours: Table 3.1)", "mm", plate["dielectric_mm"], plate_mm),
         ItemPart("length and width (ours: Table 3.1)", "mm", [plate["length_mm"], plate["width_mm"]], size_mm),
-        *beside("4.1", **said),
+        *beside("4.1", **printed),
         ItemPart("length of the tip", "mm", TIP_M / M_PER_MM, tip_mm, copied=True),
-        ItemPart("resistivities", "ohm m", kept, list(resistivity_ohm_m.values()), copied=True),
-        *_copied("thesis-c.1", said),
+        ItemPart("resistivities", "ohm m", transcribed, list(resistivity_ohm_m.values()), copied=True),
+        *_copied("thesis-c.1", printed),
     ]
 
 
@@ -210,11 +212,11 @@ def multimeter(rows: int, y_ohm: dict[str, list[float]], z_ohm: dict[str, list[f
 
     Without a film these sensors are shorted: top and bottom electrode are read in parallel.
     """
-    found = _prints()
-    orders = [verdict(Evidence(r.written, r.y_ohm, r.z_ohm)).same_order for r in found]
+    prints = _prints()
+    orders = [verdict(Evidence(r.written, r.y_ohm, r.z_ohm)).same_order for r in prints]
     both = [order for order in orders if order is not None]
-    by_name = {reading.written: reading for reading in found}
-    y = {axis: median(r.y_ohm[0] for r in found if r.iteration == 23 and r.design == f"tri{axis}-d0") for axis in "xy"}
+    by_name = {reading.written: reading for reading in prints}
+    y = {axis: median(r.y_ohm[0] for r in prints if r.iteration == 23 and r.design == f"tri{axis}-d0") for axis in "xy"}
     ours: dict[str, Any] = {}
     for axis in "xy":
         design = designs.make({"shape": "tri", "parameters": {"dielectric_mm": 0.0, "along": axis}})
@@ -222,7 +224,7 @@ def multimeter(rows: int, y_ohm: dict[str, list[float]], z_ohm: dict[str, list[f
     return [
         ItemPart("R of 23 triY over 23 triX, medians", "", ours["y"] / ours["x"], y["y"] / y["x"], shown=3),
         ItemPart("rows with both readings, and those whose Z is of Y's order or less", "", [len(both), sum(both)]),
-        ItemPart("rows", "", len(found), rows, copied=True),
+        ItemPart("rows", "", len(prints), rows, copied=True),
         *(ItemPart(f"{name}, Y", "ohm", by_name[name].y_ohm, value, copied=True) for name, value in y_ohm.items()),
         *(ItemPart(f"{name}, Z", "ohm", by_name[name].z_ohm, value, copied=True) for name, value in z_ohm.items()),
     ]
@@ -240,8 +242,8 @@ def baked() -> list[ItemPart]:
 def infill(distance_mm: float, least_percent: float) -> list[ItemPart]:
     """7.2.2, figure 7.2: distance of a grid's lines, of which half of an infill lies each way, as Cura counts it."""
     line_mm = table("4.2")["line_mm"]
-    found = [2 * line_mm * 100 / percent for percent in (100.0, least_percent)]
+    distances = [2 * line_mm * 100 / percent for percent in (100.0, least_percent)]
     return [
         ItemPart(f"line distance at {percent:g} % infill", "mm", at, distance_mm, limit=True)
-        for percent, at in zip((100.0, least_percent), found, strict=True)
+        for percent, at in zip((100.0, least_percent), distances, strict=True)
     ]

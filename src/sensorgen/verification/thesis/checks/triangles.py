@@ -67,9 +67,9 @@ class _Region:
 
     def formula(self) -> ItemPart:
         """Our copy of the thesis's formula, as corrected."""
-        kept = thesis_cells.under_dielectric_f_per_m if self.hangs else thesis_cells.under_cog_f_per_m
+        formula = thesis_cells.under_dielectric_f_per_m if self.hangs else thesis_cells.under_cog_f_per_m
         return ItemPart(
-            "as kept in thesis_cells", "F/m", kept(_CELL, EPS_R), _logarithm(self, self.beta_m), copied=True
+            "as kept in thesis_cells", "F/m", formula(_CELL, EPS_R), _logarithm(self, self.beta_m), copied=True
         )
 
     def reduced(self) -> tuple[float, float]:
@@ -189,18 +189,18 @@ def whole() -> list[ItemPart]:
     """3.35: columns agree with columns; the field that leaves the flanks sideways is not in them."""
     half = _CELL.period_mm / 2 * M_PER_MM
     printed = sum(_logarithm(region, region.beta_m) for region in _UNDER.values())
-    kept = thesis_cells.triangles_f_per_m2(_CELL, EPS_R) * half
+    formula = thesis_cells.triangles_f_per_m2(_CELL, EPS_R) * half
     return [
         ItemPart("C_tot of half a period, columns", "F/m", _half_f_per_m(), printed),
         ItemPart("of the exact cell", "F/m", exact_f_per_m2("tri") * half, printed, shown=SHOWN),
-        ItemPart("as kept in thesis_cells", "F/m", kept, printed, copied=True),
+        ItemPart("as kept in thesis_cells", "F/m", formula, printed, copied=True),
     ]
 
 
 def gauss() -> list[ItemPart]:
     """3.5: flux through the electrode, by a solution whose flux has no sources, and by one whose field has no curl."""
-    found = fem2d.capacitance(_DESIGN.in_use, PERMITTIVITY)
-    return [ItemPart("charge by the flux over charge by the potential", "", 1.0, found.lower / found.upper)]
+    bounds = fem2d.capacitance(_DESIGN.in_use, PERMITTIVITY)
+    return [ItemPart("charge by the flux over charge by the potential", "", 1.0, bounds.lower / bounds.upper)]
 
 
 def coarse() -> list[ItemPart]:
@@ -221,8 +221,9 @@ def swept(rise_f: float, deepest_mm: float, depth_mm: float) -> list[ItemPart]:
 
     def c_f(press_mm: float) -> float:
         now = thesis_cells.swept(_CELL, press_mm)
-        made = designs.make({"shape": "tri", "parameters": asdict(replace(now, length_mm=now.period_mm, width_mm=1.0))})
-        return fem2d.capacitance(made.in_use, PERMITTIVITY).upper * depth_mm
+        sizes = asdict(replace(now, length_mm=now.period_mm, width_mm=1.0))
+        design = designs.make({"shape": "tri", "parameters": sizes})
+        return fem2d.capacitance(design.in_use, PERMITTIVITY).upper * depth_mm
 
     rest, places = c_f(0.0), np.array([0.0, 0.05, 0.1, 0.15, 0.2])
     rises = [c_f(mm) - rest for mm in places.tolist()]
