@@ -104,7 +104,7 @@ def serve(known: dict[str, list[dict[str, Any]]]) -> ThreadingHTTPServer:
             """Nothing."""
 
     server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    Thread(target=server.serve_forever, daemon=True).start()
+    Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
     return server
 
 

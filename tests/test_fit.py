@@ -60,7 +60,7 @@ def test_a_known_resistivity_and_leak_come_back(tmp_path):
     p = design.params
     squares = p.length_mm / (p.electrode_mm * p.width_mm) * 1e3
     r, area = 0.05 * squares * 0.93, p.length_mm * p.width_mm * 1e-6
-    with Log(tmp_path / "log.db", create=True) as log:
+    with Log(tmp_path / "log.db", create=True) as log, roughly_at_rest():
         for k in range(8):
             g = 2e-4 * 1.1 ** (k - 4)
             name = f"60 triX .1mm {k + 1}"
