@@ -73,7 +73,7 @@ class Beads:
         return Beads(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
-def beads(design: Design, paths: "Paths", centre_mm: Point | None = None, *, cut: bool = False) -> Beads:
+def beads(design: Design, paths: "Paths", centre_mm: Point | None = None, *, cut: bool = True) -> Beads:
     """The lines that print a design, each given to the body that it belongs to.
 
     Parameters
@@ -85,7 +85,7 @@ def beads(design: Design, paths: "Paths", centre_mm: Point | None = None, *, cut
     centre_mm : (float, float), optional
         Middle of the piece on the printer's bed [mm]; the middle of the bed if not given.
     cut : bool
-        Cut lines at the piece's outline, as those that run on into a tab; else each is of the piece or not, by its
+        Cut lines at the piece's outline, since some run on into a tab; else each is of the piece or not, by its
         middle.
     """
     scene, machine = design.printed, design.machine

@@ -174,9 +174,7 @@ def pinholes(
     most_layers : int
         Films of more layers are left out [-].
     """
-    return of_lines(
-        design, beads(design, paths, centre_mm, cut=centre_mm is not None), widths=widths, most_layers=most_layers
-    )
+    return of_lines(design, beads(design, paths, centre_mm), widths=widths, most_layers=most_layers)
 
 
 def of_lines(design: Design, lines: Beads, *, widths: Sequence[float], most_layers: int) -> Pinholes:

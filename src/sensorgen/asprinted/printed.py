@@ -175,7 +175,7 @@ def body(
     from sensorgen.asprinted.beads import CONVENTIONS, beads
     from sensorgen.asprinted.beads import layers as printed_layers
 
-    lines = beads(design, paths, centre_mm, cut=centre_mm is not None)
+    lines = beads(design, paths, centre_mm)
     if not len(lines.number):
         tools = sorted({design.tool(body.material) for body in design.printed.bodies})
         raise BadInput(
@@ -198,7 +198,7 @@ def nominal(design: Design, paths: "Paths", slicer: str = "", centre_mm: Point |
     from sensorgen.asprinted.beads import CONVENTIONS, beads
     from sensorgen.asprinted.beads import layers as printed_layers
 
-    lines, first = beads(design, paths, centre_mm, cut=centre_mm is not None), CONVENTIONS[0]
+    lines, first = beads(design, paths, centre_mm), CONVENTIONS[0]
     provenance = f"printed, {slicer or 'from G-code'}"
     return Printed(design, provenance, {first: printed_layers(design, lines, first)}, lines)
 
