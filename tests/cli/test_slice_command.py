@@ -122,7 +122,8 @@ def test_a_missing_slicer(run, monkeypatch, tmp_path):
 
 
 def test_a_file_with_errors_ends_with_1_and_says_them(run, slicer, contents, tmp_path):
-    slicer(f"open(out, 'w').write('''{GCODE}'''.replace('X10', 'X300'))")
+    beside = GCODE.replace("Z.1", "X300 Y90 Z.1").replace("X10 Y0", "X300 Y80").replace("X0 Y0", "X310 Y80")
+    slicer(f"open(out, 'w').write('''{beside}''')")
     said = run("slice", *SMALL, "--name", "a")
     assert said.code == 1
     assert "the axis reaches" in said.out
