@@ -33,7 +33,7 @@ def test_a_plates_range_is_that_of_its_thickness():
     assert (found.gap.lower, found.gap.upper) == (near(0.58e-3), near(0.62e-3))
     term = next(t for t in found.budget.terms if t.name == "film thickness")
     assert term.kind == "print"
-    assert "0.02 mm (diabase-h5)" in term.what
+    assert ("0.02 mm" in term.what, term.source) == (True, "diabase-h5")
     assert found.drawn.capacitance.print.lower == found.drawn.capacitance.print.upper
     assert "film thickness" not in [t.name for t in found.drawn.budget.terms]
 
