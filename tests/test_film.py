@@ -55,7 +55,9 @@ def test_an_exact_printer_is_the_same_sensor():
     same = design.model_copy()
     same.__dict__["machine"] = machine
     assert same.id() == design.id()
-    assert bodies.estimated(same).cells.film is None
+    cells = bodies.estimated(same).cells
+    assert cells.film.error_mm == 0.0
+    assert cells.film.thinner == cells.film.thicker == cells.first()
 
 
 def test_crossed_strips_change_as_an_independent_program_found():

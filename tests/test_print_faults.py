@@ -46,12 +46,13 @@ def test_a_film_of_one_layer_is_none_without_it(film_mm, turns, more):
         assert term.changes.capacitance == pytest.approx(more, rel=1e-6)
 
 
-@pytest.mark.parametrize(("error_mm", "turns"), [(0.09, ""), (0.1, "CHANGE")])
+@pytest.mark.parametrize(("error_mm", "turns"), [(0.0, ""), (0.09, ""), (0.1, "CHANGE")])
 def test_a_film_is_none_where_tools_differ_by_it(error_mm, turns, tmp_path):
     shipped, own = make({"shape": "reference"}).machine, tmp_path / "rough.yaml"
     own.write_text(json.dumps(shipped.model_dump(exclude={"name"}) | {"tool_height_error_mm": error_mm}), "utf-8")
     data = {"shape": "reference", "parameters": {"dielectric_mm": 0.1}, "printer": str(own)}
-    assert terms(data)["film thickness"].turns == turns
+    listed = terms(data)
+    assert (listed["film thickness"].turns, listed["film a layer thinner"].turns) == (turns, "CHANGE")
 
 
 @pytest.mark.parametrize(("squeezed_mm", "turns"), [(0.09, ""), (0.1, "CHANGE")])
