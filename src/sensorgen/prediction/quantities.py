@@ -184,6 +184,15 @@ def impedance_at(prediction: Prediction, frequency_hz: float, gone: Lost) -> Imp
     return _impedance(frequency_hz, whole, c.alone(), gone, leads, Effects().permittivity_dispersion)
 
 
+def parallel_range_f(prediction: Prediction, frequency_hz: float) -> Interval:
+    """Ends of the parallel capacitance at rest, of a line at the ends of its resistances and its capacitance [F]."""
+    omega, c = 2 * pi * frequency_hz, prediction.capacitance or Bounds.of(0.0, "F")
+    ohms = [sum(getattr(r, end) for r in prediction.resistance.values()) for end in ("lower", "upper")]
+    lines = (line.cascade([r], [np.array([1j * omega * f])], [1.0])[0] for r in ohms for f in (c.lower, c.upper))
+    values = [float((1 / z).imag / omega) for z in lines]
+    return Interval(min(values), max(values))
+
+
 def _beyond(quantity: Bounds) -> Added:
     """Least and most that leads may add to the value of a quantity."""
     ends = quantity.leads or Interval(quantity.value, quantity.value)
