@@ -15,6 +15,7 @@ from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from sensorgen.core.document import Documented
     from sensorgen.design.design import Design
 
 
@@ -32,17 +33,31 @@ def _tiles(design: "Design", _: dict[str, Any]) -> "Sequence[Design]":
 def check_command(design: "Design", advising: Advising, *, strict: Strict = False) -> int:
     """Decide whether to print a design: check it against nozzle, layers and bed, predict it, and try changes."""
     from sensorgen.checks.review import STEPS
+    from sensorgen.core import document
     from sensorgen.prediction.slices import reviewed
     from sensorgen.workflows import decision
 
     with render.progress((*STEPS, *decision.STEPS)) as step:
         review = reviewed(design, step)
-        decided = decision.decision(design, review, advising.budget, predict=advising.budget > 0, step=step)
-    render.deliver(decided)
+        decided = decision.decision(
+            design, review, advising.budget, predict=advising.budget > 0, step=step,
+            decided=_shown if render.early() else lambda _: None,
+        )  # fmt: skip
+    if not render.early():
+        render.deliver(decided)
+    elif decided.advice:
+        render.say("\n".join(("", *document.text(decided.advice.document()))))
     if decided.findings and render.early():
         render.say("each finding in its place, in 3D, drawing and layers: sensorgen show")
     advising.write(design, decided.advice)
     return 1 if review.errors(strict) or review.verdict == "CHANGE" else 0
+
+
+def _shown(decided: "Documented") -> None:
+    """Deliver what is decided before what takes longer."""
+    render.clear()
+    with unread():
+        render.deliver(decided)
 
 
 def _all_tiles(design: "Design", given: dict[str, Any]) -> "Sequence[Design]":
@@ -91,16 +106,11 @@ def build_command(
     design, changes = body_options.compensated(design, compensate, design.walls)
     kind, budget_s = DetailedBuild if details else Built, advising.budget if advise or advising.apply else None
 
-    def decided(built: Built) -> None:  # before the files, which take longer
-        render.clear()
-        with unread():
-            render.deliver(kind(**vars(built)))
-
     try:
         with render.progress(STEPS) as step:
             built = build(
                 design, out, cad=not no_cad, force=force, strict=strict, compensated=changes, budget_s=budget_s,
-                step=step, decided=decided if render.early() else lambda _: None,
+                step=step, decided=(lambda built: _shown(kind(**vars(built)))) if render.early() else lambda _: None,
             )  # fmt: skip
     except Unprintable as error:
         return _refuse(design, error, budget_s, advising)
