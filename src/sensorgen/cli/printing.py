@@ -33,20 +33,17 @@ def _tiles(design: "Design", _: dict[str, Any]) -> "Sequence[Design]":
 def check_command(design: "Design", advising: Advising, *, strict: Strict = False) -> int:
     """Decide whether to print a design: check it against nozzle, layers and bed, predict it, and try changes."""
     from sensorgen.checks.review import STEPS
-    from sensorgen.core import document
     from sensorgen.prediction.slices import reviewed
     from sensorgen.workflows import decision
 
+    budget_s = advising.budget
     with render.progress((*STEPS, *decision.STEPS)) as step:
         review = reviewed(design, step)
-        decided = decision.decision(
-            design, review, advising.budget, predict=advising.budget > 0, step=step,
-            decided=_shown if render.early() else lambda _: None,
-        )  # fmt: skip
+        decided = decision.decision(design, review, budget_s, predict=budget_s > 0, step=step, decided=_shown)
     if not render.early():
         render.deliver(decided)
     elif decided.advice:
-        render.say("\n".join(("", *document.text(decided.advice.document()))))
+        render.deliver(decided.advice, before=("",))
     if decided.findings and render.early():
         render.say("each finding in its place, in 3D, drawing and layers: sensorgen show")
     advising.write(design, decided.advice)
@@ -54,10 +51,11 @@ def check_command(design: "Design", advising: Advising, *, strict: Strict = Fals
 
 
 def _shown(decided: "Documented") -> None:
-    """Deliver what is decided before what takes longer."""
-    render.clear()
-    with unread():
-        render.deliver(decided)
+    """Deliver what is decided to a terminal, before what takes longer."""
+    if render.early():
+        render.clear()
+        with unread():
+            render.deliver(decided)
 
 
 def _all_tiles(design: "Design", given: dict[str, Any]) -> "Sequence[Design]":
@@ -110,7 +108,7 @@ def build_command(
         with render.progress(STEPS) as step:
             built = build(
                 design, out, cad=not no_cad, force=force, strict=strict, compensated=changes, budget_s=budget_s,
-                step=step, decided=(lambda built: _shown(kind(**vars(built)))) if render.early() else lambda _: None,
+                step=step, decided=lambda built: _shown(kind(**vars(built))),
             )  # fmt: skip
     except Unprintable as error:
         return _refuse(design, error, budget_s, advising)

@@ -98,11 +98,9 @@ class Query:
 
     def few_periods(self, design: "Design") -> str:
         """Doubt about a tip that is too short for the cells under it to deform as under a uniform pressure; or ""."""
-        period_mm = getattr(design.params, "period_mm", None)
-        if not period_mm or getattr(design.params, "along", "") == "y":
-            return ""
-        count = self.tip_of(design).length_m / (period_mm * M_PER_MM)
-        if count > _PERIODS - 1e-9:
+        period_mm, tip_m = getattr(design.params, "period_mm", None), self.tip_of(design).length_m
+        count = tip_m / (period_mm * M_PER_MM) if period_mm else inf
+        if count > _PERIODS - 1e-9 or getattr(design.params, "along", "") == "y":
             return ""
         tip = f"the tip covers {count:.2g} periods, less than {_PERIODS:g}"
         return f"{tip}: the response depends on where in one it presses"

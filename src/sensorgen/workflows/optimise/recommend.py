@@ -70,23 +70,12 @@ def recommended(
     with workers.opened() as opened:
         step("tolerances")
         robust = _robust(target, [row for row, _ in made.values()], opened, keep=keep)
-        works = [
-            (replace(one, robust=robust[number]), target, _named(row.design, one.design.name), out, sliced)
-            for number, (row, one) in made.items()
-        ]
+        works = [(replace(one, robust=robust[n]), target, row.design, out, sliced) for n, (row, one) in made.items()]
         step("files")
         lanes = () if opened.cluster else opened.lanes  # files are written by this computer
-        lost = partial(_unbuilt, [one for one, *_ in works])
-        written = dict(in_parallel(_built, works, opened.jobs, lost=lost, lanes=lanes))
+        written = dict(in_parallel(_built, works, opened.jobs, lanes=lanes,
+                                   lost=lambda k, reason: replace(works[k][0], slicer=reason)))  # fmt: skip
     return tuple(written[k] for k in range(len(works)))
-
-
-def _unbuilt(each: Sequence[Recommended], k: int, reason: str) -> Recommended:
-    return replace(each[k], slicer=reason)
-
-
-def _named(design: Design, name: str) -> Design:
-    return make(design.model_dump(mode="json", exclude_defaults=True) | {"name": name})
 
 
 def _robust(
@@ -150,8 +139,8 @@ def _spreads(
 
 def _built(one: Recommended, target: Target, design: Design, out: Path, sliced: bool) -> Recommended:
     """With its files, and its numbers by a real slicer, whose file decides the build, too."""
-    one = _with_gcode(one, design, out) if sliced else one
-    folder = out / design.name
+    design = make(design.model_dump(mode="json", exclude_defaults=True) | {"name": one.design.name})
+    one, folder = _with_gcode(one, design, out) if sliced else one, out / design.name
     try:
         built = build(design, out, cad=False)
     except Unprintable as error:

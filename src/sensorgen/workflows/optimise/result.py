@@ -301,10 +301,7 @@ def _designs(some: Sequence[Recommended]) -> Iterator[Part]:
             yield one.slicer
     if any(one.robust for one in some):
         yield ""
-        yield (
-            "median and worst: over walls of slicers and tolerance, under the design's worst top; "
-            "with materials: worst over their ranges"
-        )
+        yield "median, worst: over walls and tolerance, under its worst top; with materials: worst over their ranges"
 
 
 def _numbers(one: Recommended) -> Table:
