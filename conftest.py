@@ -189,6 +189,7 @@ FIRST = (  # longest first, down to ten seconds of work or waiting: a worker tha
     "report/test_contents", "slicers/test_slicing_real", "test_predict", "slicers/test_windows_real", "test_build",
     "cli/test_invert_command", "models/test_porous", "test_chart", "asprinted/test_volume", "test_plots",
     "lab/test_day", "asprinted/test_pressed", "slicers/test_best_tri_real", "test_planned",
+    "batch/test_record", "attacks/test_log", "slicers/test_profiles_real",
 )  # fmt: skip
 
 

@@ -2,9 +2,11 @@
 
 import os
 import stat
+import subprocess
 import sys
 import time
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -192,6 +194,23 @@ def test_a_slicer_that_hangs_is_ended_with_all_that_it_started(slicer, tmp_path,
     with pytest.raises(SlicerFailed, match=r"more than 2 s and was ended.*it last said: 20 => Generating perimeters"):
         sliced([alone(SMALL)], "prusa", tmp_path / "x", time_limit_s=2.0)
     assert_gone(note.read_text())
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # the lock stays taken
+def test_a_signal_within_popens_own_wait_does_not_hang(slicer, tmp_path, monkeypatch):
+    class Interrupted(subprocess.Popen):
+        """A signal comes between the taking of its lock and the block that gives it back."""
+
+        def wait(self, timeout=None):
+            if self._waitpid_lock.acquire(blocking=False) and self.poll() is None:
+                raise KeyboardInterrupt
+            return super().wait(timeout)
+
+    slicer("time.sleep(600)")
+    monkeypatch.setattr(run, "subprocess", SimpleNamespace(**{**vars(subprocess), "Popen": Interrupted}))
+    with ThreadPoolExecutor(1) as other:
+        ended = other.submit(sliced, [alone(SMALL)], "prusa", tmp_path / "x").exception(timeout=30)
+    assert isinstance(ended, KeyboardInterrupt)
 
 
 def assert_gone(process):

@@ -380,9 +380,9 @@ def _merged(faults: Iterable[Disagreement]) -> Iterator[GcodeFinding]:
         for _, run in groupby(enumerate(same), key=lambda pair: pair[1].layer - pair[0]):
             some = [fault for _, fault in run]
             worst = max(some, key=lambda fault: fault.amount)
-            first, last = some[0].layer + 1, some[-1].layer + 1
+            first, last, (x, y) = some[0].layer + 1, some[-1].layer + 1, worst.at_mm
             where = f"in layer {first}" if first == last else f"in layers {first} to {last}"
-            message = f"{worst.message} {where}, at x {worst.at_mm[0]:g}, y {worst.at_mm[1]:g} mm from the corner"
+            message = f"{worst.message} {where}, at x {x:g}, y {y:g} mm from the sensor's corner"
             severity = "warning" if rule == "support" else "error"
             number = min(some, key=lambda fault: fault.line).line
             yield GcodeFinding(rule, severity, number if number < _NOWHERE else 1, message, _ADVICE[rule], len(some))

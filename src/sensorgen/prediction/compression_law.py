@@ -519,6 +519,7 @@ def under_tops(
 
 def at_a_few_pressures(
     design: Design, printed: PressedPiece, answer: Answer, stress_pa: float, name: str = "", *, tip: Tip = FLAT,
+    level: int = COARSEST,
 ) -> Law | None:  # fmt: skip
     """The stored law of a printed cell; else a section or round cell solved at a few pressures on the coarsest mesh.
 
@@ -533,7 +534,9 @@ def at_a_few_pressures(
     stress_pa : float
         Up to which it is wanted [Pa].
     tip : Tip
-        What presses.
+        What presses; an even pressure or a stiff plate at the pressures of :func:`under_tops`, where it is one of them.
+    level : int
+        Of the mesh.
 
     Returns
     -------
@@ -552,7 +555,9 @@ def at_a_few_pressures(
         return infill(design, printed)
     try:
         case = case_of(design, printed, model, tip)
-        solution = pressed(case, [stress_pa * part for part in (0, 0.5, 1, 1.25)], COARSEST)
+        usual = (stresses_pa(stress_pa)[-1] * np.array(_COARSE)).tolist()
+        own = [stress_pa * part for part in (0, 0.5, 1, 1.25)]
+        solution = pressed(case, own if tip.soft or stress_pa not in usual else usual, level)
         curve = curve_of(solution)
     except SensorgenError:
         return None

@@ -31,7 +31,8 @@ MODELS = ("press2d", "press3d", "press_round")
 QUICK = ("press2d", "press_round", "press3d")
 USUAL = 0  # default mesh level; those below it are coarser
 COARSEST = -2  # level that serves for comparison only
-_TIMES = {-2: 2.0, -1: 1.5, USUAL: 1.0, 1: 0.7, 2: 0.5}  # size of triangles by level, over the usual one [-]
+ROUGH = -3  # the same with triangles at an apex as large as elsewhere: small ones fold, and are replaced one by one
+_TIMES = {-3: 2.0, -2: 2.0, -1: 1.5, USUAL: 1.0, 1: 0.7, 2: 0.5}  # size of triangles by level, over the usual one [-]
 SAFETY = 2.0  # error that is expected over the measured one of another cell [-]
 _SHARP = 1.2  # the same of the default mesh in the plane, where gaps end in an apex: bench/rise_errors.py [-]
 _BLUNT = 5.0  # the same where they do not, as in prints: corners carry more [-]
@@ -171,7 +172,8 @@ def fineness(model: str, level: int) -> "Fineness | BrickCounts":
     from sensorgen.models import press2d, press_round
 
     usual = press_round.USUAL if model == "press_round" else press2d.Fineness()
-    return usual.scaled(_TIMES[level])
+    size = usual.scaled(_TIMES[level])
+    return replace(size, apex_mm=size.coarse_mm) if level == ROUGH else size
 
 
 def _size(model: str, level: int) -> float:

@@ -3,13 +3,13 @@
 from array import array
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from sensorgen.core.lazy import Lazy
 from sensorgen.measure.log import Reading
 
 
-@dataclass(frozen=True, slots=True)
-class Words:
+class Words(NamedTuple):
     """Texts that many readings share; attributes as of :class:`sensorgen.measure.log.Reading`."""
 
     specimen: str
@@ -26,8 +26,7 @@ class Words:
     source: str
 
 
-@dataclass(frozen=True, slots=True)
-class Measured:
+class Measured(NamedTuple):
     """A reading.
 
     Attributes

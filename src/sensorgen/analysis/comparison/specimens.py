@@ -3,7 +3,7 @@
 from array import array
 from collections import Counter
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite, isnan, log, nan
 
@@ -33,7 +33,7 @@ from sensorgen.prediction.query import TONES_HZ
 
 _MOST_LEFT_OUT = 1000  # readings that are listed for one reason
 UNTRUSTED = "shape of"  # a specimen, in the list of what was left out
-_KEPT = 120_000  # rows that are kept, in 0.1 GB: a report reads each some 16 times
+_MOST_HELD = 120_000  # rows in memory, in 0.1 GB: a report reads each some 16 times
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,29 +48,30 @@ class Compared:
         None where no design is known.
     evidence, verdict : Evidence, SignalVerdict
         What the readings say by themselves; what an electrode should have is the median of its own shape.
+    expected_ohm : Bounds or None
+        Predicted reading along an electrode of the network that was measured [ohm]; None where none is predicted.
+    residual : float
+        Ln of the least R_Y over the predicted value [-]; nan where one is missing.
     """
 
     reading: Measured
     predicted: Predicted | None
     evidence: Evidence
     verdict: SignalVerdict
+    expected_ohm: Bounds | None = field(init=False)
+    residual: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        ry, expected = self.verdict.ry_ohm, self.predicted.along_ohm(self.across_ohm) if self.predicted else None
+        object.__setattr__(self, "expected_ohm", expected)
+        residual = log(ry / expected.value) if expected and isfinite(ry) and ry > 0 else nan
+        object.__setattr__(self, "residual", residual)
 
     @property
     def across_ohm(self) -> float:
         """The least reading between the electrodes [ohm]; without one, 0 where they touch as printed, else nan."""
         rz = self.verdict.rz_ohm
         return 0.0 if isnan(rz) and self.evidence.touching else rz
-
-    @property
-    def expected_ohm(self) -> Bounds | None:
-        """Predicted reading along an electrode of the network that was measured [ohm]; None where none is predicted."""
-        return self.predicted.along_ohm(self.across_ohm) if self.predicted else None
-
-    @property
-    def residual(self) -> float:
-        """Ln of the least R_Y over the predicted value [-]; nan where one is missing."""
-        ry, expected = self.verdict.ry_ohm, self.expected_ohm
-        return log(ry / expected.value) if expected and isfinite(ry) and ry > 0 else nan
 
     @property
     def inside(self) -> bool | None:
@@ -172,20 +173,14 @@ def of_iteration(
         by_shape.setdefault(reading.shape, array("d")).extend(least(_evidence(reading, None)))
     usual = {shape: expected_from(values) for shape, values in by_shape.items()}
 
-    cached: dict[int, Compared] = {}
-
     def compared(place: int) -> Compared:
-        if place in cached:
-            return cached[place]
         reading = measured.rows[place]
         of = expected.get(names.get(reading.specimen, ""))
         evidence = _evidence(reading, of, usual[reading.shape])
-        row = Compared(reading, of, evidence, verdict(evidence, _intact_ohm(of, reading.words.instrument)))
-        if len(cached) < _KEPT:
-            cached[place] = row
-        return row
+        return Compared(reading, of, evidence, verdict(evidence, _intact_ohm(of, reading.words.instrument)))
 
-    rows = Lazy(compared, range(len(measured.rows)))
+    places = range(len(measured.rows))
+    rows = Lazy([compared(k) for k in places].__getitem__ if len(places) <= _MOST_HELD else compared, places)
     ac = {reading.number for reading in measured.alternating}
     return Comparison(rows, measured.alternating, built, names, expected, (*left_out, *_first(_unused(rows, ac))))
 

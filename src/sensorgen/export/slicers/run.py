@@ -18,6 +18,7 @@ from sensorgen.export.slicers import TIME_LIMIT_S
 
 KEPT_LINES = 12
 _TICK_S = 0.1
+_KILLED_S = 2.0  # for which a killed process is waited for
 _KEPT_BYTES = 1 << 16
 _SIGNALS = {number.value: number.name for number in signal.Signals}  # SIGXFSZ where files may not be larger
 
@@ -115,7 +116,9 @@ def _wait(command: Sequence[str], output: BinaryIO, environment: Mapping[str, st
                     os.killpg(process.pid, signal.SIGKILL)
                 else:  # Windows
                     process.kill()
-            process.wait()
+            # A signal between two steps of Popen's own wait leaves its lock taken: without a limit this would hang.
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(timeout=_KILLED_S)
         if process.stdin:
             process.stdin.close()
 

@@ -14,7 +14,7 @@ import sqlite3
 import struct
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager, suppress
 from datetime import UTC, datetime
 from importlib.resources import files
@@ -55,10 +55,12 @@ _COLUMNS = ("sequence", "id", "parents", "kind", "version", "logged_at", "conten
 _INSERT = f"INSERT INTO record ({', '.join(_COLUMNS)}) VALUES ({', '.join('?' * len(_COLUMNS))})"  # noqa: S608
 
 
-def insert(connection: sqlite3.Connection, record: Record, sequence: int, number: int | None) -> None:
-    """Store a record with its number among all, and among its kind."""
+def insert(
+    connection: sqlite3.Connection, record: Record, sequence: int, number: int | None, index: Iterable[str | int | None]
+) -> None:
+    """Store a record with its number among all, and among its kind, and its entries of the index."""
     of = (record.id, ",".join(record.parents), record.kind, record.version, record.logged_at, record.content)
-    connection.execute(_INSERT, [sequence, *of, number, *indexed(record.content)])
+    connection.execute(_INSERT, [sequence, *of, number, *index])
 
 
 _TABLES = ("raw_file", "batch", "print", "reading", "bench_run", "prediction")  # a row before those that refer to it
@@ -99,7 +101,7 @@ def _append(
     connection: sqlite3.Connection, head: str, sequence: int, kind: str, logged_at: str, content: str, number: int
 ) -> tuple[str, int]:
     record = chain.made([head] if head else [], kind, 1, logged_at, content)
-    insert(connection, record, sequence + 1, number)
+    insert(connection, record, sequence + 1, number, indexed(content))
     return record.id, sequence + 1
 
 

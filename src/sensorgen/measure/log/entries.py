@@ -10,9 +10,10 @@ Pydantic is not used here: ``sensorgen log list`` would spend most of its time o
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import cache, lru_cache
-from operator import eq
+from operator import attrgetter, eq
 from types import NoneType
 from typing import Any, Self, TypeVar, cast, get_args, get_type_hints
 
@@ -45,9 +46,17 @@ class Entry:
 
     def numbered(self, number: int, logged_at: str) -> Self:
         """The row as the log has it; what makes it a row was checked before, and is not again."""
-        row = object.__new__(type(self))
-        vars(row).update(vars(self), number=number, logged_at=logged_at)
-        return row
+        return _row(type(self), {**vars(self), "number": number, "logged_at": logged_at})
+
+
+_Kind = TypeVar("_Kind", bound=Entry)
+
+
+def _row(kind: type[_Kind], values: Mapping[str, object]) -> _Kind:
+    """Row of all its fields: the initialiser of a frozen class sets one after the other, in ten times the time."""
+    row = object.__new__(kind)
+    vars(row).update(values)
+    return row
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -391,7 +400,6 @@ REFERENCES: dict[type[Entry], dict[str, type[Entry]]] = {
 Value = str | int | float | bool | tuple[float, ...] | tuple[str, ...] | None
 UNHASHED = ("number", "logged_at")  # given by the log, and by the record
 INDEXED: dict[str, type] = {"uid": str, "specimen": str, "iteration": int, "design_id": str, "supersedes": str}
-_Kind = TypeVar("_Kind", bound=Entry)
 _COLUMNS: dict[type[Entry], dict[str, Any]] = {kind: get_type_hints(kind) for kind in KINDS.values()}
 _Kinds = tuple[bool, Any, frozenset[type]]
 
@@ -407,12 +415,18 @@ def _kinds(annotation: Any) -> _Kinds:
     return NoneType in kinds, next(kind for kind in kinds if kind is not NoneType), frozenset()
 
 
-_TEXT = _kinds(str)
 _ENCODER = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"))
 _HELD: dict[type[Entry], dict[str, tuple[_Kinds, object]]] = {  # by a record: types and defaults
     kind: {f.name: (_kinds(of[f.name]), f.default) for f in fields(kind) if f.name not in UNHASHED}
     for kind, of in _COLUMNS.items()
 }
+_PLAIN: dict[type[Entry], dict[str, type | None]] = {  # type that a field's value may have as it is
+    kind: {name: of if of in (str, int, bool) else None for name, ((_, of, _), _) in held.items()}
+    for kind, held in _HELD.items()
+}
+_USUAL = {kind: tuple(usual for _, usual in held.values()) for kind, held in _HELD.items()}
+_OPTIONAL = {kind: {f.name: f.default for f in fields(kind) if f.default is not MISSING} for kind in _COLUMNS}
+_VALUES = {kind: attrgetter(*held) for kind, held in _HELD.items()}
 _REQUIRED = {kind: {name for name, (_, usual) in held.items() if usual is MISSING} for kind, held in _HELD.items()}
 
 
@@ -429,13 +443,24 @@ def encode(entry: Entry) -> str:
     BadInput
         A value that the field cannot have.
     """
-    kind, data = type(entry), dict[str, Any]()
-    for name, (kinds, usual) in _HELD[kind].items():
-        value = getattr(entry, name)
-        if value != usual:
-            data[name] = value
-            if kinds is not _TEXT or type(value) is not str:
-                _checked(name, kinds, list(value) if isinstance(value, tuple) else value, kind)
+    return encoded(content_of(entry))
+
+
+def content_of(entry: Entry) -> dict[str, Any]:
+    """Fields of a row that its record holds: those that are not as usual; errors as of :func:`encode`."""
+    kind = type(entry)
+    types = _HELD[kind]
+    values = zip(types, _USUAL[kind], _VALUES[kind](entry), strict=True)
+    data = {name: value for name, usual, value in values if value != usual}
+    plain = _PLAIN[kind]
+    for name, value in data.items():
+        if type(value) is not plain[name]:
+            _checked(name, types[name][0], list(value) if isinstance(value, tuple) else value, kind)
+    return data
+
+
+def encoded(data: Mapping[str, Any]) -> str:
+    """Text of a record's content."""
     text = _ENCODER.encode(data)
     if "Infinity" not in text:
         return text
@@ -457,17 +482,25 @@ def decode(kind: type[_Kind], content: str, number: int, logged_at: str) -> _Kin
         strange, missing = data.keys() - kinds.keys(), [name for name in kinds if name in _REQUIRED[kind] - data.keys()]
         wrong = f"has {min(strange)!r:.40}" if strange else f"lacks {missing[0]!r}"
         raise BadInput(f"a {kind.__name__} {wrong}; expected {', '.join(kinds)}")
+    plain = _PLAIN[kind]
     values = {
-        name: value if kinds[name][0] is _TEXT and type(value) is str else _checked(name, kinds[name][0], value, kind)
+        name: value if type(value) is plain[name] else _checked(name, kinds[name][0], value, kind)
         for name, value in data.items()
     }
-    return kind(**values, number=number, logged_at=logged_at)  # type: ignore[arg-type]
+    row = _row(kind, {**_OPTIONAL[kind], **values, "number": number, "logged_at": logged_at})
+    if isinstance(row, Reading):
+        row.__post_init__()
+    return row
 
 
 def indexed(content: str) -> tuple[str | int | None, ...]:
-    """Entries of the log's index for a record's content: the fields of ``INDEXED``, None for those that it has not."""
-    fields_ = _object(content) or {}
-    return tuple([fields_[name] if type(fields_.get(name)) is kind else None for name, kind in INDEXED.items()])
+    """Entries of the log's index for a record's content; as :func:`index`, nothing else in what is no JSON object."""
+    return index(_object(content) or {})
+
+
+def index(data: Mapping[str, Any]) -> tuple[str | int | None, ...]:
+    """Entries of the log's index for a record's fields: those of ``INDEXED``, None for those that it has not."""
+    return tuple([data[name] if type(data.get(name)) is kind else None for name, kind in INDEXED.items()])
 
 
 @lru_cache(maxsize=1)  # a record is decoded, and then indexed

@@ -36,8 +36,12 @@ from sensorgen.measure.log.entries import (
     Value,
     Withdrawal,
     columns,
+    content_of,
     decode,
     encode,
+    encoded,
+    index,
+    indexed,
     word,
 )
 
@@ -375,8 +379,8 @@ class Log:
             yield merging
             if merging.added:
                 if len(merging.heads) > 1:
-                    row = Merge(uid="")
-                    writer.append(chain.made(list(merging.heads), NAMES[Merge], 1, now, encode(row)), copy=False)
+                    content = encode(Merge(uid=""))
+                    writer.append(chain.made(list(merging.heads), NAMES[Merge], 1, now, content), indexed(content))
                 writer.finish()
 
     def sequence(self, key: str) -> int:
@@ -420,8 +424,9 @@ class Log:
         if entry.logged_at and not entry.claimed_at:
             entry = dataclasses.replace(entry, claimed_at=entry.logged_at)
         version = VERSIONS.get(NAMES[kind], 1)
-        record = chain.made([writer.head] if writer.head else [], NAMES[kind], version, now, encode(entry))
-        return entry.numbered(writer.append(record, copy=False), now)
+        content = content_of(entry)
+        record = chain.made([writer.head] if writer.head else [], NAMES[kind], version, now, encoded(content))
+        return entry.numbered(writer.append(record, index(content)), now)
 
     def _check(self, entry: Entry) -> None:
         """Refuse a row that refers to none, corrects none, cannot be read later, or gives a name a second design."""
@@ -558,7 +563,8 @@ class Merging:
         for parent in record.parents:
             if parent != self._writer.head and not self._log.sequence(parent):
                 return parent
-        self._writer.append(record, self._log.has(self._log.received(record)))
+        copy = self._log.has(self._log.received(record))
+        self._writer.append(record, indexed(record.content), copy=copy)
         self.offered.append(1)
         self.added += 1
         for parent in record.parents:
@@ -576,8 +582,8 @@ class _Appender:
         self._numbers: dict[str, int] = {}
         self.printed: dict[str, dict[str, Any]] = {}  # batch and design of the latest print, by specimen
 
-    def append(self, record: Record, copy: bool) -> int:
-        """Append a record; a copy of a row that the log has gets no number of its own."""
+    def append(self, record: Record, index: Iterable[str | int | None], *, copy: bool = False) -> int:
+        """Append a record with its entries of the index; a copy of a row that the log has gets no number of its own."""
         if record.kind not in self._numbers:
             sql = "SELECT max(number) FROM record WHERE kind = ?"
             self._numbers[record.kind] = self._connection.execute(sql, [record.kind]).fetchone()[0] or 0
@@ -586,7 +592,7 @@ class _Appender:
         self._numbers[record.kind] += not copy
         number = None if copy else self._numbers[record.kind]
         self.sequence, self.head = self.sequence + 1, record.id
-        database.insert(self._connection, record, self.sequence, number)
+        database.insert(self._connection, record, self.sequence, number, index)
         return number or 0
 
     def finish(self) -> None:
