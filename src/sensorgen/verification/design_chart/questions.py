@@ -134,11 +134,7 @@ def _capacitance(body: Body) -> Question:
             work = partial(works.formula, name, params, eps[film(body.design)], area_m2)
             series.append(Series(f"thesis_cells: {name.removeprefix('thesis-')}", OWN, (("", work, 0.0),)))
     for name in peers.FIELD:
-        try:
-            runs = [] if peers.missing(name) else peers.levels(name, scene, eps)
-            why = peers.missing(name)
-        except ValueError as error:
-            runs, why = [], str(error)
+        runs, why = peers.applicable(name, scene, eps)
         if why:
             silent.append((name, why))
             continue
@@ -284,8 +280,7 @@ def largest(answer: tuple[complex, ...], known: tuple[complex, ...]) -> float:
 
 def of_line(answer: tuple[complex, ...], known: tuple[complex, ...]) -> float:
     """The larger one of abs(Z) and of Re Z by itself, at the worst frequency [-]."""
-    real = (abs(a.real / b.real - 1) for a, b in zip(answer, known, strict=True))
-    return max(largest(answer, known), *real)
+    return max(line_models.differences(answer, known))
 
 
 def of_modulus(answer: tuple[complex, ...], known: tuple[complex, ...]) -> float:
