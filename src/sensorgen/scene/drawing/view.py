@@ -9,7 +9,7 @@ from functools import cached_property
 from itertools import pairwise, permutations
 from math import hypot
 
-from sensorgen.scene.scene import AXES, SLIVER_MM, Body, Outline, Point, Scene, area_mm2, clipped
+from sensorgen.scene.scene import AXES, SLIVER_MM, Body, Outline, Point, Scene, area_mm2, clipped, sides
 from sensorgen.scene.sections import Section, SectionColumn, alike, columns
 
 PLACES = 8  # places tried for a section: two periods of crossed strips change eight times
@@ -197,8 +197,8 @@ def widths(view: View) -> tuple[list[list[Measure]], list[list[Measure]]]:
 
 def _flats(view: View) -> list[Measure]:
     """Level edges that the view's ends do not cut, from left to right."""
-    sides = (side for _, outline in view.regions for side in _sides(outline))
-    flats = sorted((min(a[0], b[0]), max(a[0], b[0]), a[1]) for a, b in sides if a[1] == b[1])
+    edges = (edge for _, outline in view.regions for edge in sides(outline))
+    flats = sorted((min(a[0], b[0]), max(a[0], b[0]), a[1]) for a, b in edges if a[1] == b[1])
     return [Measure(low, high, (z, z)) for low, high, z in flats if low > SAME_MM and high < view.end_mm - SAME_MM]
 
 
@@ -216,8 +216,8 @@ def nearest(view: View) -> Gap | None:
             terminals.setdefault(body.terminal, []).append(outline)
     gaps = []
     for corners, others in permutations(terminals.values(), 2):
-        edges = [edge for outline in others for edge in _sides(outline)]
-        for a, b in (side for outline in corners for side in _sides(outline)):
+        edges = [edge for outline in others for edge in sides(outline)]
+        for a, b in (side for outline in corners for side in sides(outline)):
             between = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
             for place, at_corner in ((a, True), (between, False)):
                 gaps += [Gap(place, _foot(place, *edge), at_corner) for edge in edges]
@@ -263,10 +263,6 @@ def _distinct(values: Iterable[float]) -> list[float]:
         if not distinct or value - distinct[-1] > SAME_MM:
             distinct.append(value)
     return distinct
-
-
-def _sides(outline: Outline) -> Iterator[tuple[Point, Point]]:
-    return zip(outline, outline[1:] + outline[:1], strict=True)
 
 
 def _foot(p: Point, a: Point, b: Point) -> Point:
