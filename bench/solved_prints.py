@@ -30,8 +30,8 @@ FILE, CELLS = MODELS / "solved_prints.yaml", MODELS / "solved_cells.yaml"
 HEAD = """\
 # Rise of the capacitance of printed triangular cells with stress, as bench/solved_prints.py solved it: by press2d, its
 # usual mesh; "within" by bench/rise_errors.py, of slices ("prusa") against the next coarser mesh; layers of 0.1 and
-# 0.06 mm, walls as named, the film as thin and as thick as the printer's tools may make it, too. Keys are the content
-# of the section. "stiff" and "block" are the changes under a stiff plate and
+# 0.06 mm, walls as named, the film as thin and as thick as the printer's tools may make it, and less a layer, too.
+# Keys are the content of the section. "stiff" and "block" are the changes under a stiff plate and
 # under 10 mm of NinjaFlex, from the even pressure, at 60 kPa on the coarsest mesh.
 source: plane-strain finite elements with frictionless contact, neo-Hookean, nu 0.4999, of the printed cell
 youngs_modulus_pa: {etpu: 22.0e6, x60: 6.0e6}
@@ -120,9 +120,10 @@ def cells(design: Design, walls: str) -> Iterator[tuple[str, PressedPiece]]:
         yield f" ({rule})", piece(body.printed_otherwise(rule))
     film = body.cells.film
     if walls in ("arachne", "prusa") and film:
-        for sign, scene in (("-", film.thinner), ("+", film.thicker)):
+        layer = (f"- a layer, {design.layers.layer_mm:g}", film.layer_thinner)
+        for change, scene in ((f"- {film.error_mm:g}", film.thinner), (f"+ {film.error_mm:g}", film.thicker), layer):
             if scene:
-                yield f" {sign} {film.error_mm:g}", PressedPiece(scene, body.cells.period_mm)
+                yield f" {change}", PressedPiece(scene, body.cells.period_mm)
 
 
 if __name__ == "__main__":

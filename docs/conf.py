@@ -54,7 +54,7 @@ def display(self, node):
 def titled(_: Sphinx, docname: str, source: list[str]) -> None:
     """Put a title over a table that a program of bench/ wrote without one."""
     if docname.startswith("bench/") and not source[0].startswith("#"):
-        source[0] = f"# Measured: {docname.rpartition('/')[2]}\n\n{source[0]}"
+        source[0] = f"# {docname.rpartition('/')[2].replace('_', ' ').capitalize()}\n\n{source[0]}"
 
 
 def offline(app: Sphinx, problem: Exception | None) -> None:

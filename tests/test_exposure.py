@@ -17,7 +17,7 @@ FORCE_N, PLACE_M = 6.0, 0.04
 STILL = {
     "temperature_k": 0, "humidity_percent": 0, "permittivity_dispersion": 0, "resistivity_dispersion": 0,
     "piezoresistance": 0, "hysteresis": 0, "creep": 0, "off_middle_mm": 0, "tilt_deg": 0, "meter": 0, "squeezed_mm": 0,
-    "bed_mm": 0, "person_n": 0, "person_mm": 0,
+    "bed_mm": 0, "person_n": 0, "person_mm": 0, "meter_circuit": False,
 }  # fmt: skip
 # of the plain plate, as the thesis has it: 100 x 10 mm, 4.68, 0.6 mm of 6 MPa, 0.3 mm of 0.07 and 0.2 ohm m
 VALUES = {"etpu": {"resistivity_ohm_m": 0.2}, "x60": {"relative_permittivity": 4.68, "youngs_modulus_pa": 1e6}}
@@ -90,8 +90,60 @@ def test_a_rise_that_is_larger_is_a_larger_force():
     assert found.position_m < 1e-6
 
 
+@pytest.mark.parametrize("hertz", [1e4, 1e5])
+def test_a_series_circuit_that_is_taken_for_a_parallel_one(hertz):
+    """A resistor before a plate: D = w R C. Values of R and C in parallel with that impedance, and the press read."""
+    ohm, omega, area_m2 = 2e4, 2 * np.pi * hertz, WIDTH_M * TIP_M
+    values = {"etpu": {"resistivity_ohm_m": 1e-13}, "x60": VALUES["x60"]}
+    leads = {"resistance_ohm": ohm, "capacitance_pf": 0}
+    data = {"shape": "reference", "material_values": values, "leads": leads, "effects": STILL | {"meter_circuit": True}}
+    budget = error_budget(sensor_of(make(data), "unconfined"), Load((hertz,), FORCE_N, PLACE_M))
+    found = next(t for t in budget.terms if t.name == "meter: series or parallel")
+
+    def farad(force):
+        strain = force / area_m2 / MODULUS_PA
+        return C_F_PER_M * (LENGTH_M + TIP_M * strain / (1 - strain))
+
+    def impedance(force):
+        return ohm + 1 / (1j * omega * farad(force))
+
+    def parallel(force):  # R and C with the impedance
+        y = 1 / impedance(force)
+        return 1 / y.real, y.imag / omega
+
+    rp, cp = parallel(FORCE_N)
+    assert found.changes.re == pytest.approx(rp / ohm - 1, rel=1e-3)
+    assert found.changes.capacitance == pytest.approx(farad(0) / parallel(0)[1] - 1, rel=1e-3)
+    assert found.changes.magnitude == pytest.approx(farad(FORCE_N) / cp - 1, rel=1e-3)
+
+    def taken(force, c, power):  # of C and D in a circuit, as readings of the other one
+        d = omega * ohm * farad(force)
+        return (1 / (omega * c(force))) * (d - 1j) * (1 + d * d) ** power
+
+    def misread_by(c, power):
+        seen = taken(FORCE_N, c, power) / taken(0, c, power)
+        fit = least_squares(
+            lambda f: [np.log(z := impedance(f[0]) / impedance(0) / seen).real, np.angle(z)], [FORCE_N], xtol=1e-14
+        )
+        return abs(fit.x[0] - FORCE_N)
+
+    def slope_off(*other):
+        own, others = (
+            one(FORCE_N + 0.01) - one(FORCE_N - 0.01) for one in (impedance, lambda force: taken(force, *other))
+        )
+        return abs(others / own - 1)
+
+    circuits = (farad, -1), (lambda force: parallel(force)[1], 0)
+    wrong = [misread_by(*one) for one in circuits]
+    assert found.changes.by_force == pytest.approx(max(slope_off(*one) for one in circuits), rel=1e-3)
+    assert found.changes.force_n == pytest.approx(max(wrong), rel=1e-2)
+    assert (found.changes.position_m, found.kind, found.source) == (0.0, "meter", "the design")
+
+
 def test_what_a_design_leaves_out_is_no_term_and_what_it_states_has_it_as_source():
-    assert not {"creep", "dispersion", "person", "meter's gain", "tip tilted"} & set(terms())
+    assert not {"creep", "dispersion", "person", "meter's gain", "meter: series or parallel", "tip tilted"} & set(
+        terms()
+    )
     given = terms(creep=0.1)
     assert (given["creep"].source, given["cell"].source) == ("the design", "model")
     own = make({"shape": "reference"})

@@ -33,7 +33,7 @@ def test_a_plates_range_is_that_of_its_thickness():
     assert (found.gap.lower, found.gap.upper) == (near(0.58e-3), near(0.62e-3))
     term = next(t for t in found.budget.terms if t.name == "film thickness")
     assert term.kind == "print"
-    assert "0.02 mm (diabase-h5)" in term.what
+    assert ("0.02 mm" in term.what, term.source) == (True, "diabase-h5")
     assert found.drawn.capacitance.print.lower == found.drawn.capacitance.print.upper
     assert "film thickness" not in [t.name for t in found.drawn.budget.terms]
 
@@ -55,7 +55,9 @@ def test_an_exact_printer_is_the_same_sensor():
     same = design.model_copy()
     same.__dict__["machine"] = machine
     assert same.id() == design.id()
-    assert bodies.estimated(same).cells.film is None
+    cells = bodies.estimated(same).cells
+    assert cells.film.error_mm == 0.0
+    assert cells.film.thinner == cells.film.thicker == cells.first()
 
 
 def test_crossed_strips_change_as_an_independent_program_found():

@@ -8,10 +8,12 @@ from types import SimpleNamespace
 
 import pytest
 
+from sensorgen.analysis.preview import _tornado
 from sensorgen.design.design import make
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.print_faults import by_first_layer, by_walls
+from sensorgen.prediction.results import Changes, ErrorBudget, Term
 from sensorgen.scene.scene import Body, Scene, box
 
 
@@ -44,12 +46,13 @@ def test_a_film_of_one_layer_is_none_without_it(film_mm, turns, more):
         assert term.changes.capacitance == pytest.approx(more, rel=1e-6)
 
 
-@pytest.mark.parametrize(("error_mm", "turns"), [(0.09, ""), (0.1, "CHANGE")])
+@pytest.mark.parametrize(("error_mm", "turns"), [(0.0, ""), (0.09, ""), (0.1, "CHANGE")])
 def test_a_film_is_none_where_tools_differ_by_it(error_mm, turns, tmp_path):
     shipped, own = make({"shape": "reference"}).machine, tmp_path / "rough.yaml"
     own.write_text(json.dumps(shipped.model_dump(exclude={"name"}) | {"tool_height_error_mm": error_mm}), "utf-8")
     data = {"shape": "reference", "parameters": {"dielectric_mm": 0.1}, "printer": str(own)}
-    assert terms(data)["film thickness"].turns == turns
+    listed = terms(data)
+    assert (listed["film thickness"].turns, listed["film a layer thinner"].turns) == (turns, "CHANGE")
 
 
 @pytest.mark.parametrize(("squeezed_mm", "turns"), [(0.09, ""), (0.1, "CHANGE")])
@@ -68,3 +71,33 @@ def test_electrodes_side_by_side_touch_in_a_squeezed_layer(gap_mm, turns):
         printed=Scene(pair, (10.0 + gap_mm, 5.0, 0.1)), layers=design.layers, machine=design.machine
     )
     assert by_first_layer(side_by_side, 0.05) == turns
+
+
+ASSUMED = {
+    "boundary", "tip off the middle", "tip tilted", "stiffness", "resistivity", "permittivity of x60", "bed uneven",
+    "slicer's walls", "film thickness", "film a layer thinner", "first layer squeezed", "lead capacitance",
+    "piezoresistance", "contact resistance", "meter's gain", "meter: series or parallel", "permittivity, temperature",
+    "permittivity, humidity", "resistivity, temperature", "resistivity, humidity", "dispersion", "creep", "person",
+    "hysteresis",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("shape", ["reference", "tri"])
+def test_every_assumption_is_listed_with_its_range_and_source(shape):
+    budget = evaluate(bodies.estimated(make({"shape": shape})), beside=False).budget
+    effects, _, ranges = budget.assumed()
+    names = [row[0] for row in effects.cells]
+    assert {"cell", "compression", "line", "tip"} | ASSUMED == set(names)
+    assert [row[0] for row in ranges.cells] == names
+    assert not [words for _, words in ranges.cells if words.startswith(" ") or words.endswith("()")]
+    assert None not in {cell for row in effects.cells for cell in row}
+
+
+def test_the_picture_has_effects_at_rest_beside_those_on_a_press():
+    """Of 6 N on 100 mm: 3 N are half, 30 N all, 25 mm a quarter."""
+    changes = Changes(re=12.0, capacitance=0.002), Changes(force_n=3.0, position_m=0.025), Changes(force_n=30.0)
+    terms = (*(Term(str(k), "", "meter", c) for k, c in enumerate(changes)), Term("none", "", "meter", Changes()))
+    bars = list(_tornado(SimpleNamespace(budget=ErrorBudget(6.0, 0.05, terms, None, at_least=False))))
+    assert [(bar.term.name, bar.term.at_rest(), bar.shares) for bar in bars] == [
+        ("2", "", (100.0, 0.0)), ("1", "", (50.0, 25.0)), ("0", "C 0.2 %, R 1200 %", (0.0, 0.0)),
+    ]  # fmt: skip

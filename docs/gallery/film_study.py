@@ -6,10 +6,8 @@
 import sensorgen as sg
 
 films = [0.1, 0.2, 0.3]
-rows = []
-for film in films:
-    p = sg.predict(sg.Design(shape="tri", parameters={"dielectric_mm": film}))
-    rows.append((film, p.drawn, p))
+predictions = [sg.predict(sg.Design(shape="tri", parameters={"dielectric_mm": film})) for film in films]
+for film, p in zip(films, predictions, strict=True):
     print(
         f"{film:.1f} mm: gap {p.drawn.gap.value * 1e3:.1f} -> {p.gap.value * 1e3:.1f} mm, "
         f"C {p.drawn.capacitance.value * 1e12:.1f} -> {p.capacitance.value * 1e12:.1f} pF, "
@@ -20,20 +18,7 @@ for film in films:
 # The printed gap is a whole number of layers above the drawn one: the tips vanish.
 
 # %%
-assert all(p.gap.value >= drawn.gap.value for _, drawn, p in rows)
+assert all(p.gap.value >= p.drawn.gap.value for p in predictions)
 
 # %%
-from matplotlib.figure import Figure
-
-figure = Figure(figsize=(6, 3.5), layout="constrained")
-axes = figure.subplots()
-for label, values in (("drawn", [d for _, d, _ in rows]), ("printed", [p for _, _, p in rows])):
-    c = [v.capacitance for v in values]
-    errors = [[b.value - b.lower for b in c], [b.upper - b.value for b in c]]
-    axes.errorbar(
-        films, [b.value * 1e12 for b in c], [[e * 1e12 for e in side] for side in errors], fmt="o-", label=label
-    )
-axes.set_xlabel("film [mm]")
-axes.set_ylabel("capacitance [pF]")
-axes.legend()
-figure
+predictions[-1].plot()

@@ -9,7 +9,7 @@ design = sg.Design(shape="tri", parameters={"dielectric_mm": 0.2})
 design.show()  # section with layers and findings
 
 # %% [markdown]
-# The checks know the nozzle and the layers. Tips narrower than a line vanish in the slicer.
+# Tips narrower than a line vanish in the slicer.
 
 # %%
 found = sg.check(design)

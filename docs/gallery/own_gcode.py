@@ -1,6 +1,6 @@
 # %% [markdown]
 # # Your own G-code
-# What a slicer really prints, read back from its G-code. Without a slicer installed the estimate is used.
+# What a slicer prints, from its G-code. Without a slicer the estimate is used.
 
 # %%
 import shutil

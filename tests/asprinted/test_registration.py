@@ -90,13 +90,13 @@ def test_the_piece_of_a_plate_that_has_a_fault_is_named(made, tmp_path):
     alone, (x, y) = done.ready.read_text("utf-8"), design.machine.bed_centre_mm()
     places = [lambda u, v: (u, v), lambda u, v: (u - 40, v + 20), lambda u, v: (y - v + 40, u - x)]
     turns = [changed(alone, place) for place in places]
-    for broken, at in ((1, f"at x {x - 40:.4g}, y {y + 20:.4g} mm"), (2, "at x 40, y 0 mm")):
+    for broken, at in ((1, f"at x {x - 40:.4g}, y {y + 20:.4g} mm on the bed"), (2, "at x 40, y 0 mm on the bed")):
         texts = [without(text, 3) if k == broken else text for k, text in enumerate(turns)]
         motion = follow("".join(texts).encode())
         assert len(pieces(design, motion)) == 3
         faults = [f for f in agreement.check_motion(design, motion) if f.rule == "volume"]
         assert faults
-        assert all(re.match(rf"piece \d of 3, {at}: .* mm3 in layer", f.message) for f in faults), faults
+        assert all(re.match(rf"piece \d of 3, {at} on the bed: .* mm3 in layer", f.message) for f in faults), faults
     with_all = agreement.check_motion(design, follow("".join(turns).encode()))
     assert not [f for f in with_all if f.rule in ("volume", "material", "place", "width")]
 

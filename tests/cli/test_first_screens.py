@@ -1,7 +1,11 @@
 """First screens: 30 lines of 80 columns, verdict and numbers before the files, and what a sweep says of its sources."""
 
+import json
+import re
 from dataclasses import replace
 from pathlib import Path
+
+import click
 
 from sensorgen.core.bounds import Bounds
 from sensorgen.core.document import text
@@ -41,7 +45,7 @@ def test_verdict_and_numbers_come_before_any_file(tmp_path):
 def test_no_change_is_tried_unless_that_is_asked_for(run, monkeypatch):
     tried = []
     monkeypatch.setattr("sensorgen.workflows.advice.advised", lambda *_: tried.append("changes"))
-    words = ("build", "reference", "--dielectric", "0.1", "--length", "10", "--no-cad")
+    words = ("build", "reference", "--dielectric", "0.1", "--budget", "9", "--length", "10", "--no-cad")
     assert (run(*words).code, tried) == (0, [])
     assert (run(*words, "--advise").code, tried) == (0, ["changes"])
 
@@ -83,3 +87,18 @@ def _of_100_mm():
         map, calibrated = Map, None
 
     return Known
+
+
+def test_check_shows_its_verdict_before_changes_are_tried(run, monkeypatch):
+    """Also where they are never tried to the end; JSON is one document all the same."""
+
+    def asked(*_):
+        click.echo("changes are tried now")
+
+    monkeypatch.setattr("sensorgen.workflows.advice.advised", asked)
+    said = run("check", "reference", "--dielectric", "0.1", "--budget", "9")
+    assert re.search(r"^[A-Z ]+  reference.*^capacitance .*changes are tried now", said.out, re.DOTALL | re.MULTILINE)
+    assert said.out.count("capacitance ") == 1
+    assert json.loads(
+        run("check", "reference", "--dielectric", "0.1", "--budget", "9", "--json").out.partition("now\n")[2]
+    )["verdict"]

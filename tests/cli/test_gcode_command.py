@@ -39,6 +39,7 @@ def test_a_good_file(run, file):
     assert (said.code, said.err) == (0, "")
     assert "   3  etpu" in said.out
     assert "1 info" in said.out
+    assert "y 0 to 0, z 0.1 to 0.1 mm in the file's coordinates" in said.words
 
 
 @pytest.mark.parametrize(

@@ -12,12 +12,10 @@ COMMANDS = [  # and what they never load; those with fewest modules first, as mo
         "thesis --help",
     )),
     *((words.split(), CAD) for words in (
-        "list materials", "schema", "check tri", "cell reference", "draw tri -o -",
+        "list materials", "schema", "check tri", "predict tri", "predict tri --force 0:6:1", "cell reference",
+        "draw tri -o -",
     )),
-    *((words.split(), tuple(name for name in CAD if name != "scipy")) for words in (  # of films that are pressed
-        "predict tri", "predict tri --force 0:6:1",
-    )),
-    (["build", "tri", "--no-cad"], tuple(name for name in CAD if name != "scipy" and not name.startswith("sensorgen"))),
+    (["build", "tri", "--no-cad"], tuple(name for name in CAD if not name.startswith("sensorgen"))),
 ]  # fmt: skip
 
 

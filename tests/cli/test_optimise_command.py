@@ -12,7 +12,7 @@ import pytest
 from sensorgen.core import cache
 from sensorgen.core.bounds import Bounds, Interval
 from sensorgen.core.document import text
-from sensorgen.core.errors import BadInput, OutOfRange, UnknownName
+from sensorgen.core.errors import BadInput, MissingValue, OutOfRange, UnknownName
 from sensorgen.core.findings import Finding
 from sensorgen.core.records import checked
 from sensorgen.design.design import load as load_design
@@ -20,7 +20,7 @@ from sensorgen.design.design import make
 from sensorgen.prediction import bodies
 from sensorgen.prediction.evaluate import evaluate
 from sensorgen.prediction.query import Query
-from sensorgen.workflows.optimise import ladder, recommend, result
+from sensorgen.workflows.optimise import front, ladder, recommend, result
 from sensorgen.workflows.optimise.front import Front, search
 from sensorgen.workflows.optimise.result import ObjectiveSpread, Recommended
 from sensorgen.workflows.optimise.sample import _objectives, sample
@@ -309,6 +309,94 @@ def test_ties_and_what_cannot_be_sensed_are_shown(plate):
     force = next(line for line in shown if line.startswith("force_resolution_n"))
     assert force.split()[1:] == ["0.5", "–", "–", "–", "0.55", "(+10.0%)"]
     assert "tied with 2 within what the models leave open; chosen by fewest warnings" in " ".join(shown)
+
+
+def planted_space(monkeypatch, plate, off):
+    """40 plates of planted force and place, 2 % off on coarse meshes, the first lead there by a factor more.
+
+    With them the numbers of those that no other is better than, by a plain loop.
+    """
+    rng = np.random.default_rng(7)
+    truth = np.exp(rng.uniform(-1.0, 1.0, (40, 2)))
+    best = {k for k, own in enumerate(truth) if not any((t <= own).all() and (t < own).any() for t in truth)}
+    coarse = truth * np.exp(rng.uniform(-np.log(1.02), np.log(1.02), truth.shape))
+    coarse[min(best)] *= off
+
+    def number(design):
+        return round(10 * design.params.dielectric_mm) - 2
+
+    def known(design, *_):
+        pair = zip(BOTH, coarse[number(design)].tolist(), strict=True)
+        return {key: EarlyNumber(value, value, False) for key, value in pair}
+
+    def everything(design, *_):
+        force, place = (Bounds.of(v, "", model=Interval(0.98 * v, 1.02 * v)) for v in truth[number(design)].tolist())
+        printed = replace(plate[1].printed, force_resolution=force, position_resolution=place.times(1e-3, "m"))
+        return replace(plate[1], printed=printed, doubts=(), findings=())
+
+    for name, work in (("rules", lambda _: []), ("known", known), ("everything", everything)):
+        monkeypatch.setattr(ladder, name, work)
+    films = [k / 10 for k in range(2, 42)]
+    return [Candidate({"k": k}, make({"shape": "reference", "parameters": {"dielectric_mm": film}}))
+            for k, film in enumerate(films)], best  # fmt: skip
+
+
+@pytest.mark.parametrize("off", [1.0, 1.08, 1 / 1.4])
+def test_a_margin_that_narrows_finds_the_same_designs(monkeypatch, plate, off):
+    """Those of a plain loop, by fewer evaluations; what one coarse mesh shows that is worse than others widens it."""
+    evaluated = []
+    for sure in (3, 99):
+        monkeypatch.setattr(front, "_SURE", sure)
+        space_, best = planted_space(monkeypatch, plate, off)
+        search_ = search(target(objectives=BOTH), space_)
+        assert {row.values["k"] for row in result.leads(search_)} == best
+        evaluated.append(len(search_.evaluated))
+        assert search_.margin >= 1.1 * search_.largest
+        assert (search_.largest > 1.3) == (off < 1)
+    assert evaluated[0] < 0.8 * evaluated[1] or off != 1
+
+
+def test_a_doubt_that_is_known_before_costs_no_evaluation(monkeypatch):
+    """A tip over 1.3 periods is doubted by the design alone; where none is good it is evaluated, for its numbers."""
+    tried = []
+
+    def tried_alone(design, *_):
+        tried.append(design.params.period_mm)
+        raise MissingValue("planted")
+
+    monkeypatch.setattr(ladder, "everything", tried_alone)
+    monkeypatch.setattr(ladder, "rules", lambda _: [])
+    wanted = checked(Target, {
+        "design": {"shape": "tri", "parameters": {"dielectric_mm": 0.2}}, "parameters": {"period_mm": [8.0, 2.0]},
+        "objectives": FORCE,
+    })  # fmt: skip
+    search(wanted, candidates(wanted), keep=False)
+    assert tried == [2.0, 8.0]
+    one = Front(wanted)
+    one.best = [{}]
+    long, short = candidates(wanted)
+    long.stage = short.stage = 2
+    assert [one.is_wanted(row) for row in (long, short)] == [False, True]
+    assert long.discarded.startswith("violates doubt: the tip covers 1.2 periods")
+
+
+def test_the_spread_is_under_the_worst_top_of_the_design(monkeypatch):
+    """Of a cell that a stiff plate presses less well: the walls of slicers are not pressed evenly, too."""
+    asked = []
+
+    def known(design, query, solve, rule="", tops=("even", "stiff"), level=-2):
+        asked.append((rule, tuple(tops), level))
+        value = max({"even": 0.1, "stiff": 0.3}[top] for top in tops) * (2 if rule == "cura" else 1)
+        return {"force_resolution_n": EarlyNumber(value, value, False)}
+
+    monkeypatch.setattr(ladder, "known", known)
+    wanted = target(objectives=FORCE)
+    trial = replace(ladder.everything(make({"shape": "reference"}), wanted.query(), ""), doubts=())
+    row = Candidate({}, make({"shape": "reference"}), 1, trial=trial)
+    spread = recommend._robust(wanted, [row], recommend.HERE, keep=False)[1]["force_resolution_n"]
+    assert {tops for rule, tops, _ in asked if rule} == {("stiff",)}
+    assert spread.worst == pytest.approx(2 * spread.value)
+    assert spread.median == pytest.approx(spread.value)
 
 
 def test_a_huge_space_is_refused_with_its_size():

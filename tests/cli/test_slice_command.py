@@ -45,6 +45,7 @@ def test_a_design_is_sliced(run, contents, tmp_path):
     said = run("slice", *SMALL, "--name", "a")
     assert (said.code, said.err) == (0, "")
     assert "PrusaSlicer" not in said.out or "2.5.0" in said.out
+    assert "mm from the sensor's corner, as all places above" in said.words
     assert sorted(contents(tmp_path / "out")) == ["a/a.prusa.gcode", "a/a.prusa.gcode.json", "a/a.prusa.layers.html"]
     found = json.loads((tmp_path / "out/a/a.prusa.gcode.json").read_text())
     assert found["slicer"] == {"name": "prusa", "version": "2.5.0"}

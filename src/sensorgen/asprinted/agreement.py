@@ -75,7 +75,7 @@ def check_motion(design: Design, motion: Motion) -> list[GcodeFinding]:
     places, found = pieces(design, motion), list[GcodeFinding]()
     for number, place in enumerate(places, 1):
         x, y = place.bed_mm
-        name = f"piece {number} of {len(places)}, at x {x:.4g}, y {y:.4g} mm" if len(places) > 1 else ""
+        name = f"piece {number} of {len(places)}, at x {x:.4g}, y {y:.4g} mm on the bed" if len(places) > 1 else ""
         found += check(design, place.paths, motion, place.centre_mm, piece=name)
     return found
 
@@ -264,7 +264,7 @@ def _floating(design: Design, paths: Paths, outside: Mask) -> Iterator[GcodeFind
     if paths.length_mm()[rows[air]].sum() > design.machine.line_mm():
         row = int(rows[air][0])
         x, y = paths.end_mm[row, :2]
-        message = f"lines are printed in air at x {x:.4g}, y {y:.4g} mm, beside the sensor"
+        message = f"lines are printed in air at x {x:.4g}, y {y:.4g} mm on the bed, beside the sensor"
         yield GcodeFinding("clear", "error", int(paths.number[row]), message, "leave them out", int(air.sum()))
 
 
@@ -287,5 +287,5 @@ def _beside(
     if stray.any():
         number, count = _line(paths.number, stray)
         x, y = paths.end_mm[stray][0, :2]
-        message = f"lines that belong to no body are printed at x {x:g}, y {y:g} mm"
+        message = f"lines that belong to no body are printed at x {x:g}, y {y:g} mm on the bed"
         yield GcodeFinding("clear", "error", number, message, "leave them out, or print them as skirt or tower", count)

@@ -24,6 +24,7 @@ PITCH_MM = 0.1
 NEAR_MIDDLE = 0.1  # of a layer: slicers may sample a face this near to mid-height on either side
 _MARGIN = 10  # cells around the piece
 _MOST_CELLS = 10_000  # along a line; longer ones are slips
+_LOT = 100_000  # points of lines that are laid at once
 _ROWS = 4  # scan lines of a row of cells
 # Volume of a body in a layer over the least and the most that any walls make of it: whole layers, strips, other parts
 # (of tips under two lines wide slicers leave out more), and strips of classic walls, which print whole lines
@@ -155,23 +156,24 @@ def deposit(lines: Beads, shape: tuple[int, ...]) -> Real:
         np.clip(np.round(size / PITCH_MM), 1, most).astype(np.int64)
         for size, most in ((length, _MOST_CELLS), (lines.width_mm, _MOST_CELLS // 100))
     )
-    count = long * wide
-    which = np.repeat(np.arange(len(count)), count)
-    step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
-    along = ((step // wide[which] + 0.5) / long[which])[:, None]
-    aside = ((step % wide[which] + 0.5) / wide[which] - 0.5)[:, None]
+    counts = long * wide
     across = way[:, ::-1] * [-1, 1] * (lines.width_mm / length)[:, None]
-    place = (lines.start_mm[which] + along * way[which] + aside * across[which]) / PITCH_MM + _MARGIN - 0.5
-    share = (lines.volume_mm3 / lines.height_mm / count / PITCH_MM**2)[which]
-    cell = np.floor(place).astype(np.int64)
-    rest = place - cell
-    inside = ((cell >= 0) & (cell < np.array(shape) - 1)).all(1)
-    cell, rest, share = cell[inside], rest[inside], share[inside]
-    filled = np.zeros(shape[0] * shape[1])
-    for i in (0, 1):
-        for j in (0, 1):
-            weight = share * np.abs(1 - i - rest[:, 0]) * np.abs(1 - j - rest[:, 1])
-            filled += np.bincount((cell[:, 0] + i) * shape[1] + cell[:, 1] + j, weight, len(filled))
+    shares, filled = lines.volume_mm3 / lines.height_mm / counts / PITCH_MM**2, np.zeros(shape[0] * shape[1])
+    for lot in np.array_split(
+        np.arange(len(counts)), counts.sum() // _LOT + 1
+    ):  # which a processor's cache has room for
+        count = counts[lot]
+        which, step = np.repeat(lot, count), np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        along = ((step // wide[which] + 0.5) / long[which])[:, None]
+        aside = ((step % wide[which] + 0.5) / wide[which] - 0.5)[:, None]
+        place = (lines.start_mm[which] + along * way[which] + aside * across[which]) / PITCH_MM + _MARGIN - 0.5
+        cell = np.floor(place).astype(np.int64)
+        inside = ((cell >= 0) & (cell < np.array(shape) - 1)).all(1)
+        cell, rest, share = cell[inside], (place - cell)[inside], shares[which][inside]
+        for i in (0, 1):
+            for j in (0, 1):
+                weight = share * np.abs(1 - i - rest[:, 0]) * np.abs(1 - j - rest[:, 1])
+                np.add.at(filled, (cell[:, 0] + i) * shape[1] + cell[:, 1] + j, weight)
     return filled.reshape(shape).astype(np.float32)
 
 
@@ -378,9 +380,9 @@ def _merged(faults: Iterable[Disagreement]) -> Iterator[GcodeFinding]:
         for _, run in groupby(enumerate(same), key=lambda pair: pair[1].layer - pair[0]):
             some = [fault for _, fault in run]
             worst = max(some, key=lambda fault: fault.amount)
-            first, last = some[0].layer + 1, some[-1].layer + 1
+            first, last, (x, y) = some[0].layer + 1, some[-1].layer + 1, worst.at_mm
             where = f"in layer {first}" if first == last else f"in layers {first} to {last}"
-            message = f"{worst.message} {where}, at x {worst.at_mm[0]:g}, y {worst.at_mm[1]:g} mm from the corner"
+            message = f"{worst.message} {where}, at x {x:g}, y {y:g} mm from the sensor's corner"
             severity = "warning" if rule == "support" else "error"
             number = min(some, key=lambda fault: fault.line).line
             yield GcodeFinding(rule, severity, number if number < _NOWHERE else 1, message, _ADVICE[rule], len(some))

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from sensorgen.checks import estimate, volumes
 from sensorgen.checks.volumes import LayerVolume
@@ -65,7 +64,7 @@ class Printed:
     layers: Mapping[str, Sequence[LayerRegions]]
     lines: "Beads | None" = None
 
-    @property
+    @cached_property
     def scene(self) -> Scene:
         """The whole print as it lies on the bed."""
         return scene_of(self.first, self.design.printed)
@@ -182,8 +181,7 @@ def body(
             f"no line of {design.name} in this G-code: expected tools {tools} in layers of "
             f"{design.layers.layer_mm:g} mm at its place on the bed; was it sliced from this design?"
         )
-    grown: dict[tuple[int, int], NDArray[np.object_]] = {}
-    by_convention = {name: printed_layers(design, lines, name, grown=grown) for name in CONVENTIONS}
+    by_convention = {name: printed_layers(design, lines, name) for name in CONVENTIONS}
     return Printed(design, f"printed, {slicer or 'from G-code'}", by_convention, lines)
 
 

@@ -86,7 +86,7 @@ def pieces(design: Design, motion: Motion) -> list[PlacedPiece]:
     if not any(fits):
         line = design.machine.line_mm()
         there = "; ".join(
-            f"{w + line:.4g} x {h + line:.4g} mm at x {x:.4g}, y {y:.4g}"
+            f"{w + line:.4g} x {h + line:.4g} mm at x {x:.4g}, y {y:.4g} on the bed"
             for (w, h), (x, y) in sorted({(tuple(b[1] - b[0]), tuple(b.mean(0))) for b in boxes})[:3]
         )
         length, width, _ = design.printed.size_mm

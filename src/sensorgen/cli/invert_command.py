@@ -62,8 +62,8 @@ class _ByRatio:
         if not task.rest_file and _REST not in source.numbers:
             raise BadInput(
                 f"{task.measured}: no reading at rest; expected a column 'rest' with 1 where nothing was on the "
-                "sensor, or --rest FILE.csv: what counts is the ratio to it (or --perfect, as if the sensor were as "
-                "predicted)"
+                "sensor, or --rest FILE.csv: what counts is the ratio to it"
+                f"{' (or --perfect, as if the sensor were as predicted)' * (sensor.tones_hz is None)}"
             )
         apart, at_s = _at_rest(task.rest_file, self.tones_hz) if task.rest_file else (None, np.nan)
         self.rest = Rest(apart, at_s, sensor.baseline)

@@ -15,6 +15,7 @@ from sensorgen.export.slicers import SLICERS, TIME_LIMIT_S
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from sensorgen.core.document import Documented
     from sensorgen.design.design import Design
 
 
@@ -35,14 +36,26 @@ def check_command(design: "Design", advising: Advising, *, strict: Strict = Fals
     from sensorgen.prediction.slices import reviewed
     from sensorgen.workflows import decision
 
+    budget_s = advising.budget
     with render.progress((*STEPS, *decision.STEPS)) as step:
         review = reviewed(design, step)
-        decided = decision.decision(design, review, advising.budget, predict=advising.budget > 0, step=step)
-    render.deliver(decided)
+        decided = decision.decision(design, review, budget_s, predict=budget_s > 0, step=step, decided=_shown)
+    if not render.early():
+        render.deliver(decided)
+    elif decided.advice:
+        render.deliver(decided.advice, before=("",))
     if decided.findings and render.early():
         render.say("each finding in its place, in 3D, drawing and layers: sensorgen show")
     advising.write(design, decided.advice)
     return 1 if review.errors(strict) or review.verdict == "CHANGE" else 0
+
+
+def _shown(decided: "Documented") -> None:
+    """Deliver what is decided to a terminal, before what takes longer."""
+    if render.early():
+        render.clear()
+        with unread():
+            render.deliver(decided)
 
 
 def _all_tiles(design: "Design", given: dict[str, Any]) -> "Sequence[Design]":
@@ -91,16 +104,11 @@ def build_command(
     design, changes = body_options.compensated(design, compensate, design.walls)
     kind, budget_s = DetailedBuild if details else Built, advising.budget if advise or advising.apply else None
 
-    def decided(built: Built) -> None:  # before the files, which take longer
-        render.clear()
-        with unread():
-            render.deliver(kind(**vars(built)))
-
     try:
         with render.progress(STEPS) as step:
             built = build(
                 design, out, cad=not no_cad, force=force, strict=strict, compensated=changes, budget_s=budget_s,
-                step=step, decided=decided if render.early() else lambda _: None,
+                step=step, decided=lambda built: _shown(kind(**vars(built))),
             )  # fmt: skip
     except Unprintable as error:
         return _refuse(design, error, budget_s, advising)

@@ -39,6 +39,7 @@ class Effects(Strict):
     off_middle_mm: Size = stated(2.0, "Tip off the middle of the width [mm].")
     tilt_deg: Annotated[float, Field(ge=0, lt=45)] = stated(2.0, "Tilt of the tip across the sensor [degree].")
     meter: Size = stated(1e-3, "Gain error of the meter, relative [-].")
+    meter_circuit: bool = stated(True, "C and R of a series circuit may be taken for those of a parallel one.")
     squeezed_mm: Size = stated(0.05, "First layer squeezed by this much [mm].")
     bed_mm: Size = stated(0.05, "Height of the bed differs over the sensor by this much [mm].")
     person_n: Size = stated(0.1, "Error of the force that a person notes [N].")

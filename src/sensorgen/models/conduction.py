@@ -2,7 +2,7 @@ r"""Resistance of an electrode with its cogs, from end to end.
 
 Current obeys the same equation as flux in a dielectric, with the conductivity for the permittivity:
 :math:`\nabla \cdot (\nabla u / \varrho) = 0`, u held at both ends of the sensor, no current through the surface. So the
-solvers of the capacitance give both bounds. See docs/conduction.md.
+solvers of the capacitance give both bounds.
 """
 
 from collections.abc import Iterator

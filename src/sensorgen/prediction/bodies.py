@@ -257,7 +257,7 @@ def _printed_cells(prints: "Mapping[str, Printed]") -> Cells:
     error_mm = printed.design.machine.tool_height_error_mm
     thicker = film.thicker(first.scene, error_mm)
     less = map(partial(film.thicker, first.scene), (-error_mm, -printed.design.layers.layer_mm))
-    films = FilmThickness(error_mm, next(less), thicker, next(less)) if error_mm and thicker else None
+    films = FilmThickness(error_mm, next(less), thicker, next(less)) if thicker else None
     whole = Cells(scenes, first.count, period, partial(_printed_gaps, scenes), printed.lines, remarks, films)
     return _inside(printed.design, whole) if printed.design.border else whole
 

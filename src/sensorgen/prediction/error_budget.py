@@ -97,11 +97,11 @@ def _models(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
         yield reference.term("compression", why, "model", others, source=_MODEL)
     else:
         yield Term("compression", why, "model", None, source=_MODEL)
-    if law.tops or law.other_boundaries:
-        held = [replace(sensor, compression=o) for o in (*law.tops.values(), *law.other_boundaries)]
-        more = ", faces that stick, or a cell free to widen" if law.other_boundaries else ""
-        what = f"even pressure or a stiff plate on the top{more}"
-        yield reference.term("boundary", what, "model", held, at_least=len(law.tops) < len(TOPS), source=_MODEL)
+    tops = [replace(sensor, compression=o) for o in (*law.tops.values(), *law.other_boundaries)]
+    solid = not tops and law.bounded and law.compression.name in CLOSED_FORM
+    more = ", faces that stick, or a cell free to widen" if law.other_boundaries else ": layers take both alike" * solid
+    what, at_least = f"even pressure or a stiff plate on the top{more}", not solid and len(law.tops) < len(TOPS)
+    yield reference.term("boundary", what, "model", tops, at_least=at_least, source=_MODEL)
     if sensor.profile == UNIFORM:
         yield reference.term("line", "one section under the tip is exact", "model", [sensor], source=_MODEL)
     else:
@@ -119,17 +119,19 @@ def _print(
 ) -> Iterator[Term]:  # fmt: skip
     """Walls, and the film's thickness: by the capacitance, and by the law of compression where that is known."""
     rest, film, design = model.rest, model.body.cells.film, model.body.design
-    turns = "" if model.body.is_drawn else by_walls(design)
-    if turns or rest.by_width.lower < rest.by_width.upper:
-        what = f"line shapes or walls: {', '.join(model.body.cells.scenes)}"
+    if not model.body.is_drawn:
+        turns = by_walls(design)
+        what = (
+            f"line shapes or walls: {', '.join(model.body.cells.scenes)}{'; verdict by estimated walls' * bool(turns)}"
+        )
         values_f = rest.by_width.lower, rest.by_width.upper
         yield reference.term(
             "slicer's walls", what, "print", _ends(model, values_f, otherwise), at_least=None in otherwise,
-            source="slicers", turns=turns,
+            source="slicers" if model.body.cells.tracks else "estimate", turns=turns,
         )  # fmt: skip
     if film:
         by, machine = (rest.by_film.lower, rest.by_film.upper), design.machine.name
-        what = f"heights of the tools differ by up to {film.error_mm:g} mm ({machine})"
+        what = f"heights of the tools differ by up to {film.error_mm:g} mm"
         yield _of_film(reference, "film thickness", what, machine, film.thinner, _ends(model, by, films), films)
         thinner = _ends(model, (rest.layer_thinner_f,) if film.layer_thinner else (), layer)
         what = f"by {design.layers.layer_mm:g} mm"

@@ -61,6 +61,12 @@ def exposed(model: SensorModel, reference: ReferenceLoad) -> Iterator[Term]:
         gain = Changes(*(effects.meter,) * 5)  # the same at rest: the press is read as it is
         what = f"{effects.meter:.2g} of every reading"
         yield Term("meter's gain", what, "meter", gain, source=effects.source("meter"))
+    if effects.meter_circuit:
+        circuit, what = reference.other_circuit(), "C, R and D of one circuit taken for those of the other"
+        yield Term(
+            "meter: series or parallel", what, "meter", circuit, source=effects.source("meter_circuit"),
+            turns=reference.turns(circuit),
+        )  # fmt: skip
     if effects.person_n or effects.person_mm:
         press = Changes(force_n=effects.person_n, position_m=effects.person_mm * M_PER_MM)
         what = f"press noted {effects.person_n:g} N and {effects.person_mm:g} mm off"

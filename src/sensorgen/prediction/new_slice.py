@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -71,6 +71,8 @@ class SliceReport(Checked):
     lifting : Lifting
         Travel over other tools' material before and after lifts.
     """
+
+    PLACES: ClassVar[str] = "from the sensor's corner, as all places above; without tower and skirt"
 
     name: str
     design: str

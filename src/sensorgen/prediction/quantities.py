@@ -110,7 +110,6 @@ Otherwise = tuple[Sequence[Sensor | None], Sequence[Sensor | None]]  # by other 
 _ASSUMED = "the cell was not solved, and is taken to deform as a solid plate"
 _PA_PER_KPA = 1e3
 _UNITS = {"force_resolution": "N", "position_resolution": "m", "sensitivity": "1/kPa"}
-_PERIODS = 1.5  # under the tip, from which on the cell is taken as one of an endless pattern
 _SAME = 0.05  # capacitances that differ by less are not told apart: solving takes seconds
 
 
@@ -182,6 +181,15 @@ def impedance_at(prediction: Prediction, frequency_hz: float, gone: Lost) -> Imp
     leads = _beyond(c), _beyond(ends[0])
     whole = _in_series(ends[0].alone(), ends[1].alone())
     return _impedance(frequency_hz, whole, c.alone(), gone, leads, Effects().permittivity_dispersion)
+
+
+def parallel_range_f(prediction: Prediction, frequency_hz: float) -> Interval:
+    """Ends of the parallel capacitance at rest, of a line at the ends of its resistances and its capacitance [F]."""
+    omega, c = 2 * pi * frequency_hz, prediction.capacitance or Bounds.of(0.0, "F")
+    ohms = [sum(getattr(r, end) for r in prediction.resistance.values()) for end in ("lower", "upper")]
+    lines = (line.cascade([r], [np.array([1j * omega * f])], [1.0])[0] for r in ohms for f in (c.lower, c.upper))
+    values = [float((1 / z).imag / omega) for z in lines]
+    return Interval(min(values), max(values))
 
 
 def _beyond(quantity: Bounds) -> Added:
@@ -275,7 +283,7 @@ def _at_load(result: Prediction, model: SensorModel, load: Load, query: Query) -
             (*films,) = _other_films(model, load, query)
             others, layer = (list(_printed_otherwise(model, load, query)), films[:2]), films[2:]
         beyond = law.compression.doubt(float(model.sensor.stress_pa(load.force_n, load.position_m)))
-        pressed = (beyond, _few_periods(model.body, query), _free_sides(model.body))
+        pressed = (beyond, query.few_periods(model.body.design), _free_sides(model.body))
         result = replace(
             result, identifiability=known, sensitivity=_sensitivity(model, load, query, others),
             doubts=(*result.doubts, *filter(None, pressed)),
@@ -301,19 +309,6 @@ def _free_sides(body: Body) -> str:
     if not is_open(body.cells.first()):
         return ""
     return "compressed as a cell that its neighbours hold: the sides of this sensor are free, so that it deforms more"
-
-
-def _few_periods(body: Body, query: Query) -> str:
-    """That a tip is too short for the cells under it to deform as under a uniform pressure."""
-    period_mm = getattr(body.design.params, "period_mm", None)
-    if not period_mm or getattr(body.design.params, "along", "") == "y":
-        return ""
-    count = query.tip_of(body.design).length_m / (period_mm * M_PER_MM)
-    if count > _PERIODS - 1e-9:
-        return ""
-    return (
-        f"the tip covers {count:.2g} periods, less than {_PERIODS:g}: the response depends on where in one it presses"
-    )
 
 
 def _printed_otherwise(model: SensorModel, load: Load, query: Query) -> Iterator[Sensor | None]:

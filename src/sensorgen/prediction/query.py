@@ -16,6 +16,7 @@ TONES_HZ = (1.1e3, 2.3e3, 5.3e3, 10.1e3, 19.9e3, 49.9e3, 99.7e3)  # thesis, Tabl
 FORCE_N = 6.0  # thesis 5.2: presses of 0 to 6 N
 NOISE = 1e-3  # of Re Z and of Im Z, each, relative to abs(Z)
 FLAT = Tip()  # the default
+_PERIODS = 1.5  # under the tip, from which on the cell is taken as one of an endless pattern
 LAWS = ("unconfined", "bonded", "symmetric", "infill", "free", "solved")  # of compression, closed forms first
 
 Frequencies = Annotated[
@@ -94,6 +95,15 @@ class Query:
         """The reference load."""
         middle = design.params.length_mm * M_PER_MM / 2
         return Load(self.frequency_hz, self.force_n, middle if self.position_m is None else self.position_m)
+
+    def few_periods(self, design: "Design") -> str:
+        """Doubt about a tip that is too short for the cells under it to deform as under a uniform pressure; or ""."""
+        period_mm, tip_m = getattr(design.params, "period_mm", None), self.tip_of(design).length_m
+        count = tip_m / (period_mm * M_PER_MM) if period_mm else inf
+        if count > _PERIODS - 1e-9 or getattr(design.params, "along", "") == "y":
+            return ""
+        tip = f"the tip covers {count:.2g} periods, less than {_PERIODS:g}"
+        return f"{tip}: the response depends on where in one it presses"
 
 
 DEFAULT = Query()

@@ -116,6 +116,23 @@ class ReferenceLoad:
             found = found.max(Changes(*(factor * d for d in (*parts, slope, c, *press))))
         return found
 
+    def other_circuit(self) -> Changes:
+        """Changes where values of one equivalent circuit are taken for those of the other.
+
+        Cs = Cp (1 + D^2), Rp = Rs (1 + 1/D^2). A press is read from C and D: Z times 1 + D^2 or over it, as at rest.
+        """
+        own, changes = self._own, Changes()
+        pressed, rest, slope = own.pressed, own.rest, own.by_force
+        c_pressed, c = (_difference(np.abs(z) ** 2, z.imag**2) for z in (pressed, rest))
+        r = _difference(np.abs(pressed) ** 2, pressed.real**2)
+        for power in (2, -2):
+            factor, at_rest = ((np.abs(z) / z.imag) ** power for z in (pressed, rest))
+            grows = power * ((slope / pressed).real - slope.imag / pressed.imag)  # of the factor's logarithm, by force
+            by_force = _difference(factor * (slope + grows * pressed), slope)
+            press = self._misread(own._replace(pressed=factor * pressed, rest=at_rest * rest))
+            changes = changes.max(Changes(c_pressed, r, c_pressed, by_force, c, *press))
+        return changes
+
     def _misread(self, read: LoadedImpedance) -> tuple[float, float]:
         """By how much force and position [N], [m] are wrong that the sensor's own model finds in a reading.
 

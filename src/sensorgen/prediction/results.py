@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 _SHORT = 60  # characters that say what an assumption is, on a first screen
 _LEAST_PERCENT = 0.005  # change of a value that is not rounding
+_LEAST_SHARE = 1e-3  # change of C and R: less is not said
 _LEAST_N, _LEAST_M = 1e-3, 1e-5  # by which a press is read wrongly: less is not said
 UNPREDICTED = "12-numbers"  # rule of the finding that there are none
 SCHEMA = (
@@ -104,10 +105,18 @@ class Term:
 
     def words(self) -> str:
         """Range and source, and by how much a press is read wrongly."""
-        c = self.changes or Changes()
-        wrong = [newtons(c.force_n)] * (c.force_n > _LEAST_N) + [metres(c.position_m)] * (c.position_m > _LEAST_M)
         what = f": {self.what}" * (len(self.what) <= _SHORT)
-        return f"{self.name}{what} ({self.source}) reads a press wrongly by {' and '.join(wrong)}"
+        return f"{self.name}{what} ({self.source}) reads a press wrongly by {' and '.join(self.wrong())}"
+
+    def wrong(self) -> list[str]:
+        """Force and position by which a press is read wrongly, where these are more than nothing."""
+        c = self.changes or Changes()
+        return [newtons(c.force_n)] * (c.force_n > _LEAST_N) + [metres(c.position_m)] * (c.position_m > _LEAST_M)
+
+    def at_rest(self) -> str:
+        """Changes of C and R in per cent, from a thousandth on."""
+        sizes = ("C", (self.changes or Changes()).capacitance), ("R", (self.changes or Changes()).re)
+        return ", ".join(f"{name} {float(f'{100 * size:.2g}'):g} %" for name, size in sizes if size >= _LEAST_SHARE)
 
     def remark(self) -> str:
         """That it is unknown, or may be larger."""
@@ -144,22 +153,19 @@ class ErrorBudget:
         return max(self.terms, key=Term.magnitude)
 
     def by_press(self) -> tuple[Term, ...]:
-        """Terms with a known effect on what a press is read as, the largest share of the load first."""
+        """All terms, that with the largest effect on what a press is read as first, in shares of the load."""
 
         def effect(term: Term) -> float:
             c = term.changes or Changes()
             return max(c.force_n / (self.force_n or inf), c.position_m / (self.position_m or inf))
 
-        seen = [t for t in self.terms if t.turns or
-                ((c := t.changes) and (c.force_n > _LEAST_N or c.position_m > _LEAST_M))]  # fmt: skip
-        return tuple(sorted(seen, key=effect, reverse=True))
+        return tuple(sorted(self.terms, key=effect, reverse=True))
 
     def rests_on(self, verdict: str = "") -> Iterator[str]:
         """The largest assumption, and verdicts that assumptions alone lead to in place of that on the print."""
         by_press = self.by_press()
-        if not by_press:
-            return
-        yield f"largest assumption: {by_press[0].words()}"
+        if by_press[0].wrong():
+            yield f"largest assumption: {by_press[0].words()}"
         turned: dict[str, list[str]] = {}
         for term in by_press:
             for words in filter(None, term.turns.split(", ")):
@@ -202,16 +208,19 @@ class ErrorBudget:
         """Effects of each assumption alone at the ends of its range, the largest on a press first."""
         columns = (
             Column("assumption"), Column("C", "%", digits=2), Column("R", "%", digits=2), Column("F", "N", digits=2),
-            Column("x", "mm", digits=2), Column("leads to"), Column("source"),
+            Column("x", "mm", digits=2), Column("leads to"),
         )  # fmt: skip
+        by_press = self.by_press()
         rows = (
-            (t.name, 100 * c.capacitance, 100 * c.re, c.force_n, 1e3 * c.position_m, t.turns, t.source)
-            for t in self.by_press()
-            for c in (t.changes or Changes(),)
+            (t.name, *((100 * c.capacitance, 100 * c.re, c.force_n, 1e3 * c.position_m) if c else (None,) * 4), t.turns)
+            for t in by_press
+            for c in (t.changes,)
         )
         caption = "a press read wrongly by one assumption at an end of its range (F, x), without known presses"
         yield Table("assumptions", caption, columns, tuple(rows))
         yield "(readings compared with those at rest; leads to: the verdict that this alone would change to)"
+        ranges = tuple((t.name, f"{t.what} ({t.source})") for t in by_press)
+        yield Table("assumed_ranges", "", (Column("assumption"), Column("range (source)")), ranges)
 
 
 def _percent(term: Term, count: int) -> tuple[float | None, ...]:
@@ -396,10 +405,8 @@ class Prediction(Displayed):
         )
 
     def rests_on(self, verdict: str = "") -> tuple[str, ...]:
-        """The largest assumption, unless the sensor cannot do anything; verdicts that assumptions alone lead to."""
-        lines = tuple(self.budget.rests_on(verdict)) if self.budget else ()
-        useless = all(words.startswith("cannot") for words in self.resolved())
-        return lines[useless:]
+        """The largest assumption, and verdicts that assumptions alone lead to."""
+        return tuple(self.budget.rests_on(verdict)) if self.budget else ()
 
     def summary(self) -> Iterator[Part]:
         """Quantities of the print beside the drawing's: the best value and the range with all errors."""

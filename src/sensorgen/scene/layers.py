@@ -207,7 +207,7 @@ def outlines(region: Region) -> Iterator[Outline]:
 def _cut_at(part: Polygon) -> float | None:
     """Where to cut a polygon that is rectilinear or has holes; None where it is neither."""
     if part.interiors:
-        hole = part.interiors[0]
+        hole = part.interiors[len(part.interiors) // 2]  # halves of many holes are cut sooner than one after the other
         return float(hole.bounds[0] if is_rectilinear(part) else hole.centroid.x)
     x = shapely.get_coordinates(part)[:, 0]
     inside = x[(x > part.bounds[0] + SLIVER_MM) & (x < part.bounds[2] - SLIVER_MM)]

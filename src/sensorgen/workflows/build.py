@@ -3,8 +3,8 @@
 import json
 import platform
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future
-from contextlib import ExitStack
+from concurrent.futures import Future, wait
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -13,9 +13,11 @@ from typing import Any, ClassVar
 from sensorgen.checks.review import Step, draw, report
 from sensorgen.core import document
 from sensorgen.core import files as store
+from sensorgen.core.cache import Unknown, only_known
 from sensorgen.core.document import Part
-from sensorgen.core.errors import Unprintable
+from sensorgen.core.errors import SensorgenError, Unprintable
 from sensorgen.core.findings import Finding, headline, listed, most_severe
+from sensorgen.core.parallel import open_lanes
 from sensorgen.core.version import __version__
 from sensorgen.design import printer
 from sensorgen.design.design import Design
@@ -164,14 +166,24 @@ def build(
     Unwritable, CadFailed, MissingValue
         See there; nothing was written.
     """
-    folder = out / design.name
+    folder, ahead = out / design.name, list[Future[Any]]()
     with ExitStack() as stack:
+        if design.layout and not _is_known(design.crossing):
+            (lane,) = stack.enter_context(open_lanes(1))
+            ahead.append(lane.submit(_predict, [(design.crossing,)]))  # beside slicing and checks of the whole array
         review = reviewed(design, step, folder=folder)
         if review.errors(strict) and not force:
             raise Unprintable(review.findings, review.errors(strict))
         review = review.with_meshes(design)
         stage = stack.enter_context(store.staging(folder))
+        job = None
+        if cad:
+            from sensorgen.scene.geometry.cad import CadProcess
+
+            kernel = stack.enter_context(CadProcess())  # its import runs beside everything below
+            job = kernel.submit(design.printed, _colours(design), design.name, stage / f"{design.name}.step")
         step("prediction")
+        wait(ahead)
         predicted = evaluate(bodies.of_file(design, review.file))
         final = decision.decision(design, review, budget_s, step=step)
         built = Built(
@@ -179,12 +191,6 @@ def build(
             final.trial, final.advice, review.source,
         )  # fmt: skip
         decided(built)
-        job = None
-        if cad:
-            from sensorgen.scene.geometry.cad import CadProcess
-
-            kernel = stack.enter_context(CadProcess())  # its import runs beside everything below
-            job = kernel.submit(design.printed, _colours(design), design.name, stage / f"{design.name}.step")
         for name, content in _files(design, review, predicted, final, step):
             store.write(stage, {name: content})
         if job:
@@ -195,6 +201,22 @@ def build(
         replaced += sealed.set_aside(folder, design)
         step("done")
     return replace(built, files=tuple(sorted([*store.listed(folder), store.MANIFEST])), replaced=replaced)
+
+
+def _predict(design: Design) -> None:
+    """Predict a design, for the stored prediction alone."""
+    with suppress(SensorgenError):  # which the build itself meets and reports
+        evaluate(bodies.default_body(design))
+
+
+def _is_known(design: Design) -> bool:
+    """Test whether the prediction of a design is stored."""
+    try:
+        with only_known():
+            _predict(design)
+    except Unknown:
+        return False
+    return True
 
 
 def _replaced(folder: Path, design: Design) -> tuple[str, ...]:

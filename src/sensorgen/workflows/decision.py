@@ -1,8 +1,8 @@
 """Decision to print a design: verdict, the numbers that decide, findings, changes that were tried; and its page."""
 
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -96,6 +96,7 @@ def decision(
     *,
     predict: bool = True,
     step: Step = lambda _: None,
+    decided: Callable[["Decision"], None] = lambda _: None,
 ) -> Decision:
     """Decide on a print by its findings: prediction, and changes that remove them.
 
@@ -111,8 +112,10 @@ def decision(
         Also predict drawing and print, without which no change is tried.
     step : callable
         Called with the next step, for a progress display.
+    decided : callable
+        Called with verdict and numbers before any change is tried.
     """
-    tried, advice, start_s = None, None, time.process_time()
+    tried, start_s = None, time.process_time()
     reason = "" if predict else "checks alone (--budget 0)"
     if predict and held.meshes:
         step("prediction")
@@ -122,12 +125,14 @@ def decision(
             reason = str(error)
     if tried:
         reason = tried.reason if tried.status == "not predicted" else ""
-        if budget_s is not None:
-            from sensorgen.workflows.advice import advised
+    result = Decision(**vars(report(design, held)), trial=tried, reason=reason)
+    decided(result)
+    if not tried or budget_s is None:
+        return result
+    from sensorgen.workflows.advice import advised
 
-            step("changes")
-            advice = advised(design, tried, budget_s, step, time.process_time() - start_s)
-    return Decision(**vars(report(design, held)), trial=tried, reason=reason, advice=advice)
+    step("changes")
+    return replace(result, advice=advised(design, tried, budget_s, step, time.process_time() - start_s))
 
 
 PAGE_STEPS = (*CHECKS, "prediction", "page", "done")

@@ -14,7 +14,7 @@ from sensorgen.core.findings import headline
 from sensorgen.prediction.identifiability.results import GUESS, Identifiability, Rows, metres, newtons
 from sensorgen.prediction.results import Changes, Prediction, Term
 
-_SEEN = 1.0  # per cent: shorter bars are left out
+_SEEN = 0.1  # per cent: smaller effects are left out
 
 
 def page(
@@ -71,7 +71,7 @@ def _tornado(predicted: Prediction) -> Iterator[Bar]:
         c = term.changes or Changes()
         shares = c.force_n / budget.force_n, c.position_m / (2 * budget.position_m)  # type: ignore[union-attr]
         force, place = (min(100.0, round(100 * share, 1)) for share in shares)
-        if max(force, place) >= _SEEN or term.turns:
+        if max(force, place) >= _SEEN or term.turns or term.at_rest():
             words = newtons(c.force_n) if force else "–", metres(c.position_m) if place else "–"
             yield Bar(term, words, (force, place))
 

@@ -4,7 +4,7 @@ from cmath import phase
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import degrees, inf, isfinite, nan, pi
+from math import degrees, isfinite, nan, pi
 from statistics import median
 from typing import Annotated
 
@@ -14,6 +14,7 @@ from sensorgen.core.document import Cell, Column, Table, some
 from sensorgen.core.units import frequency_text
 from sensorgen.measure import accuracy
 from sensorgen.measure.log import Reading
+from sensorgen.prediction.quantities import parallel_range_f
 from sensorgen.prediction.query import TONES_HZ
 
 F_PER_PF = 1e-12
@@ -107,11 +108,9 @@ def _predicted(of: Predicted | None, frequency_hz: float) -> tuple[_Range, _Rang
     z = of.impedance_at(frequency_hz) if of else None
     if of is None or z is None:
         return nothing, nothing
-    bounds = of.prediction.capacitance
-    c = (1 / z[0]).imag / (2 * pi * frequency_hz)
-    by = (bounds.lower / bounds.value, bounds.upper / bounds.value) if bounds else (0.0, inf)
+    c, by = (1 / z[0]).imag / (2 * pi * frequency_hz), parallel_range_f(of.prediction, frequency_hz)
     low, high = sorted((abs(z[1]), abs(z[2])))
-    return (c, c * by[0], c * by[1]), (abs(z[0]), min(low, abs(z[0])), max(high, abs(z[0])))
+    return (c, min(by.lower, c), max(by.upper, c)), (abs(z[0]), min(low, abs(z[0])), max(high, abs(z[0])))
 
 
 def table(rows: Sequence[AcRow]) -> Table:

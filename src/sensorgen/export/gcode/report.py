@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -46,6 +46,8 @@ class FileNeeds:
         Around all printed lines [mm].
     """
 
+    PLACES: ClassVar[str] = "in the file's coordinates, tower and skirt too"
+
     lines: int
     moves: int
     layers: int
@@ -63,7 +65,7 @@ class FileNeeds:
         ]
         if self.box_mm:
             spans = (f"{axis} {low:g} to {high:g}" for axis, low, high in zip("xyz", *self.box_mm, strict=True))
-            facts.append(("printed", f"{', '.join(spans)} mm"))
+            facts.append(("printed", f"{', '.join(spans)} mm {self.PLACES}"))
         yield Facts(tuple(facts))
         if self.tools:
             yield Table.of("tools", "", self.tools)

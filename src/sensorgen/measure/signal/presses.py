@@ -201,7 +201,10 @@ def pairs(
             *_course(time_s, force_n, press.start_s, end - window_s / 2),
         ))  # fmt: skip
     if not rows:
-        raise BadInput(f"{len(presses)} presses, none with {_LEAST} readings before and under it; expected some")
+        raise BadInput(
+            f"{len(presses)} presses, none with {_LEAST} readings in the {window_s:g} s before it and before its end; "
+            f"expected some: record {_LEAST / window_s:g} readings a second or more"
+        )
     start, force, position, unloaded, loaded, error, samples, peak, hold = map(np.array, zip(*rows, strict=True))
     return Pairs(
         start, force, position, unloaded, loaded, loaded - unloaded, error, samples, peak, hold, tuple(left_out)

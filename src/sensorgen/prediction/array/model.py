@@ -371,8 +371,11 @@ class ArrayModel:
 
 
 def wire_table(design: Design) -> Table:
-    """Wires of an array's connector; BadInput of any other design."""
-    return Table.of("wires", "", array_model(design).wires())
+    """Wires of an array's connector, for which nothing is pressed; BadInput of any other design."""
+    from sensorgen.prediction.planning import rough_sensor
+
+    _layout(design)
+    return Table.of("wires", "", _of_crossing(design, rough_sensor(bodies.default_body(design.crossing))).wires())
 
 
 def array_model(design: Design, until_kpa: float = USUAL_KPA, body: Body | None = None) -> ArrayModel:
@@ -396,11 +399,21 @@ def array_model(design: Design, until_kpa: float = USUAL_KPA, body: Body | None 
     """
     from sensorgen.prediction.planning import sensor_model
 
+    p = _layout(design).params
+    query = Query(force_n=until_kpa * p.column_mm * p.row_mm * _N_PER_KPA_MM2)
+    return _of_crossing(design, sensor_model(body or bodies.default_body(design.crossing), query)[0])
+
+
+def _layout(design: Design) -> ArrayLayout:
+    """Layout of an array; BadInput of any other design."""
     if not design.layout:
         raise BadInput(f"{design.name}: {design.shape} has no crossings; expected shape: array")
-    p = design.layout.params
-    query = Query(force_n=until_kpa * p.column_mm * p.row_mm * _N_PER_KPA_MM2)
-    model, _ = sensor_model(body or bodies.default_body(design.crossing), query)
+    return design.layout
+
+
+def _of_crossing(design: Design, model: SensorModel) -> ArrayModel:
+    """An array of crossings of one model, with the resistances of its tracks."""
+    p = _layout(design).params
     top, bottom = (model.rest.resistance[end] for end in ("top", "bottom"))
     scene = model.body.cells.first()
     mean_mm = sum(b.volume_mm3() for b in scene.bodies if b.terminal == "top") / (scene.size_mm[0] * scene.size_mm[1])

@@ -9,11 +9,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
 
 from sensorgen.core.arrays import Mask, Real, Whole
 
+_Short = NDArray[np.float32]
 _PIVOT = 1e-3  # share of its column below which a pivot of an indefinite matrix is exchanged [-]
 _LEAST = 60  # unknowns that are not halved any more
 _MOST_TURNS = 30  # of conjugate gradients, before new factors are made
@@ -130,21 +132,24 @@ def _cut(places: Whole) -> Mask | None:
 
 @dataclass(frozen=True)
 class Factors:
-    """Of a positive matrix: of each front the inverse of its own triangle, and what couples it to the rest."""
+    """Of a positive matrix: of each front the inverse of its own triangle, and what couples it to the rest.
+
+    Of seven digits: conjugate gradients take as many turns with them, and reading them is most of a turn's time.
+    """
 
     order: Order
-    parts: list[tuple[Real, Real]]
+    parts: list[tuple[_Short, _Short]]
 
     def solve(self, right: Real) -> Real:
-        """Solution of a right side."""
-        x = right[self.order.turn]
+        """Solution of a right side, to some digits."""
+        x = right[self.order.turn].astype(np.float32)
         for front, (inverse, coupling) in zip(self.order.fronts, self.parts, strict=True):
             own = x[front.start : front.stop] = inverse @ x[front.start : front.stop]
             x[front.outer] -= own @ coupling
         for front, (inverse, coupling) in zip(reversed(self.order.fronts), reversed(self.parts), strict=True):
             own = x[front.start : front.stop] - coupling @ x[front.outer]
             x[front.start : front.stop] = own @ inverse
-        solution = np.empty_like(x)
+        solution = np.empty(len(x))
         solution[self.order.turn] = x
         return solution
 
@@ -155,7 +160,7 @@ def factored(matrix: csr_matrix, order: Order) -> Factors | None:
 
     turned = matrix[order.turn][:, order.turn].tocsr()
     rests: dict[int, Real] = {}
-    parts: list[tuple[Real, Real]] = []
+    parts: list[tuple[_Short, _Short]] = []
     for number, front in enumerate(order.fronts):
         n = front.stop - front.start
         whole = np.zeros((n + len(front.outer),) * 2)  # its own entries, and what its children leave
@@ -172,7 +177,7 @@ def factored(matrix: csr_matrix, order: Order) -> Factors | None:
             return None
         inverse = np.ascontiguousarray(lapack.dtrtri(lower, lower=True)[0]) if n else lower
         coupling = inverse @ whole[:n, n:]
-        parts.append((inverse, coupling))
+        parts.append((inverse.astype(np.float32), coupling.astype(np.float32)))
         rests[number] = whole[n:, n:] - coupling.T @ coupling
     return Factors(order, parts)
 

@@ -19,6 +19,7 @@ from sensorgen.workflows.search import Candidate, Search
 from sensorgen.workflows.trial import Trial
 
 MARGIN = 1.5  # between a number on the coarse mesh and its best value; widened where a design shows more
+_SURE, _POWER, _WIDER = 3, 5, 1.1  # evaluated designs from which on it is a power of the largest seen, or wider by 1.1
 FEW = 8  # designs that are evaluated without a coarse mesh [-]
 _CHECKS, _BOUNDS, _EVALUATION = range(3)
 _NUMBER = re.compile(r"\d+(\.\d+)?")
@@ -108,10 +109,11 @@ class Front(Search):
 
     def order(self, one: Candidate) -> tuple[float, ...]:
         """The least expensive step first; of those to evaluate, the least product of objectives."""
+        last = bool(self._doubt(one))
         if not self._is_known(one):
-            return one.stage, inf, one.number
+            return one.stage, last, inf, one.number
         ends = [interval.lower for interval in self._hoped(one, 1.0).values()]
-        return one.stage, sum(log(end) if end > 0 else -1 / (1e-9 - end) for end in ends), one.number
+        return one.stage, last, sum(log(end) if end > 0 else -1 / (1e-9 - end) for end in ends), one.number
 
     def batch(self, stage: int) -> int:
         """All at once, but for evaluations: what they show discards others."""
@@ -130,12 +132,19 @@ class Front(Search):
             yield some[k], answer
             self.progress(step, done, len(some))
 
+    def _doubt(self, one: Candidate) -> str:
+        """Doubt that an evaluation would show, known before it; "" where the target accepts it."""
+        doubt = self.query.few_periods(one.design)
+        return "" if self.target.accepts(doubt) else f"doubt: {doubt}"
+
     def is_wanted(self, one: Candidate) -> bool:
-        """False for a design that an evaluated one is certain to be at least as good as, in every objective."""
-        if one.stage < _EVALUATION or not self._is_known(one):
+        """False for a design that an evaluated one is certain to be at least as good as, or with a doubt beside one."""
+        if one.stage < _EVALUATION:
             return True
-        hoped = self._hoped(one, self.margin)
-        if any(_beats(other, hoped) for other in self.best):
+        if self.best and (doubt := self._doubt(one)):
+            one.violated = {doubt: 1.0}
+            one.discard(f"violates {doubt}", certified=False)
+        elif self._is_known(one) and any(_beats(other, self._hoped(one, self.margin)) for other in self.best):
             one.discard("dominated", certified=all(one.known[key].certified for key in self.target.objectives))
         return not one.discarded
 
@@ -178,9 +187,10 @@ class Front(Search):
             return ()
         self.best.append(badness(self.target, one))
         self.largest = max(self.largest, *self._factors(one), 0.0)
-        if self.largest <= self.margin:
+        is_sure, before = self.largest and len(self.best) >= _SURE, self.margin
+        self.margin = max(_WIDER * self.largest, min(self.largest**_POWER, MARGIN) if is_sure else before)
+        if self.margin <= before:
             return ()
-        self.margin = 1.1 * self.largest
         back = [row for row in self.rows if row.discarded == "dominated" and not row.certified]
         for row in back:
             row.discarded = ""

@@ -1,6 +1,7 @@
 """Knowledge of one design, the least expensive first: design rules, bounds at rest, a coarse mesh, everything."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -19,6 +20,7 @@ from sensorgen.design.walls import rules as wall_rules
 from sensorgen.prediction import bodies
 from sensorgen.prediction.compression_law import at_a_few_pressures
 from sensorgen.prediction.identifiability.fisher import bounds, slopes
+from sensorgen.prediction.mesh_ladder import COARSEST
 from sensorgen.prediction.print_files import NONE
 from sensorgen.prediction.query import DEFAULT, Query
 from sensorgen.prediction.rest_state import RestState, rest_state
@@ -44,18 +46,23 @@ def rules(design: Design) -> list[tuple[str, str]]:
     return [(r, s) for r, s in cache.answer({"what": "rules", "short": design.id(), "waivers": waived}, work)]
 
 
-def known(design: Design, query: Query, solve: bool, rule: str = "") -> dict[str, EarlyNumber]:
+def known(
+    design: Design, query: Query, solve: bool, rule: str = "", tops: Sequence[str] = TOPS, level: int = COARSEST
+) -> dict[str, EarlyNumber]:
     """Numbers by the least expensive models: certified bounds at rest, and, if ``solve``, under load on a coarse mesh.
 
-    Of the print by a rule for walls, the most likely one if not given. Empty where no model applies, as of a short.
+    Of the print by a rule for walls, the most likely one if not given; under the worst of some tops, on a mesh of a
+    level. Empty where no model applies, as of a short.
     """
     query = query.of(design)
     body = bodies.estimated(design, rule or wall_rules(design.profile.walls)[0])
     question = {"what": "known", "body": body.identity, "query": asdict(query), "solve": solve}
+    question |= {"tops": list(tops), "level": level} if solve else {}
 
     def work() -> dict[str, list[float]]:
         try:
-            return {key: [k.lower, k.upper, float(k.certified)] for key, k in _known(body, query, solve).items()}
+            numbers = _known(body, query, solve, tops, level)
+            return {key: [k.lower, k.upper, float(k.certified)] for key, k in numbers.items()}
         except SensorgenError:
             return {}
 
@@ -63,7 +70,7 @@ def known(design: Design, query: Query, solve: bool, rule: str = "") -> dict[str
     return {key: EarlyNumber(low, high, bool(certified)) for key, (low, high, certified) in found.items()}
 
 
-def _known(body: Body, query: Query, solve: bool) -> dict[str, EarlyNumber]:
+def _known(body: Body, query: Query, solve: bool, tops: Sequence[str], level: int) -> dict[str, EarlyNumber]:
     rule, gap_mm = next(iter(body.cells.gap_mm.items()))
     body = body.printed_otherwise(rule)
     rest = rest_state(body, ranges=False)
@@ -78,19 +85,20 @@ def _known(body: Body, query: Query, solve: bool) -> dict[str, EarlyNumber]:
             found[key] = EarlyNumber(value.model.lower, value.model.upper, value.certified)
     if not solve:
         return found
-    return found | {k: EarlyNumber(v, v, False) for k, v in _under_load(body, rest, query).items() if np.isfinite(v)}
+    pressed = _under_load(body, rest, query, tops, level)
+    return found | {k: EarlyNumber(v, v, False) for k, v in pressed.items() if np.isfinite(v)}
 
 
-def _under_load(body: Body, rest: RestState, query: Query) -> dict[str, float]:
-    """Numbers under the reference load on the coarsest mesh, the worse of an even pressure and a stiff plate.
+def _under_load(body: Body, rest: RestState, query: Query, tops: Sequence[str], level: int) -> dict[str, float]:
+    """Numbers under the reference load on a coarse mesh, the worse of an even pressure and a stiff plate.
 
     Those of a block lie between, or near one of both.
     """
     load, tip, found = query.load(body.design), query.tip_of(body.design), list[tuple[float, float, float]]()
     pressed_pa = pressure_pa(body, tip, load.force_n)
     low_pa, high_pa = (_PA_PER_KPA * kpa for kpa in query.range_kpa) if query.range_kpa else (0.0, pressed_pa)
-    for top in (replace(tip, block=block) for block in TOPS):
-        law = at_a_few_pressures(body.design, piece(body), rest.answer, max(pressed_pa, high_pa), tip=top)
+    for top in (replace(tip, block=block) for block in tops):
+        law = at_a_few_pressures(body.design, piece(body), rest.answer, max(pressed_pa, high_pa), tip=top, level=level)
         if law:
             sensor = build_sensor(body, law, top, rest=rest).sensor
             force_n, position_m, _ = bounds(

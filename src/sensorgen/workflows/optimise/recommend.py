@@ -4,18 +4,18 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import partial
+from math import inf
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 from sensorgen.core import files as store
-from sensorgen.core.bounds import Bounds
 from sensorgen.core.errors import SensorgenError, Unprintable
 from sensorgen.core.parallel import in_parallel
 from sensorgen.design.design import Design, make
+from sensorgen.design.tip import EVEN, TOPS
 from sensorgen.design.walls import rules
-from sensorgen.export.slicers import PROGRAMS
-from sensorgen.export.slicers.run import find
+from sensorgen.prediction.mesh_ladder import ROUGH
 from sensorgen.workflows.build import build
 from sensorgen.workflows.optimise import ladder
 from sensorgen.workflows.optimise.front import HERE, Front, Workers, value_of
@@ -70,40 +70,40 @@ def recommended(
     with workers.opened() as opened:
         step("tolerances")
         robust = _robust(target, [row for row, _ in made.values()], opened, keep=keep)
-        works = [
-            (replace(one, robust=robust[number]), target, _named(row.design, one.design.name), out, sliced)
-            for number, (row, one) in made.items()
-        ]
+        works = [(replace(one, robust=robust[n]), target, row.design, out, sliced) for n, (row, one) in made.items()]
         step("files")
         lanes = () if opened.cluster else opened.lanes  # files are written by this computer
-        lost = partial(_unbuilt, [one for one, *_ in works])
-        written = dict(in_parallel(_built, works, opened.jobs, lost=lost, lanes=lanes))
+        written = dict(in_parallel(_built, works, opened.jobs, lanes=lanes,
+                                   lost=lambda k, reason: replace(works[k][0], slicer=reason)))  # fmt: skip
     return tuple(written[k] for k in range(len(works)))
-
-
-def _unbuilt(each: Sequence[Recommended], k: int, reason: str) -> Recommended:
-    return replace(each[k], slicer=reason)
-
-
-def _named(design: Design, name: str) -> Design:
-    return make(design.model_dump(mode="json", exclude_defaults=True) | {"name": name})
 
 
 def _robust(
     target: Target, rows: Sequence[Candidate], workers: Workers, *, keep: bool
 ) -> dict[int, dict[str, ObjectiveSpread]]:
-    """Of designs by number: objectives on the coarse mesh, over walls of slicers and lengths in the plane."""
+    """Of designs by number: objectives on the coarse mesh, over walls of slicers and lengths in the plane.
+
+    Under the top that is the worst of the design itself: another one seldom overtakes it, and takes as long.
+    """
     keys, query = [key for key in target.objectives if key in ladder.COARSE], target.query()
+    pressed = [key for key in keys if key not in ladder.AT_REST]
     inputs, owners = list[tuple[Any, ...]](), list[int]()
     for row in rows:
+        top = max(TOPS, key=partial(_under, target, row.design, pressed[0])) if pressed else EVEN
         designs = [(row.design, ""), *((row.design, rule) for rule in rules(None))]
         designs += [(design, rules(None)[0]) for design in within_tolerance(target, row.design)]
-        inputs += [(design, query, bool(set(keys) - ladder.AT_REST), rule) for design, rule in designs]
+        inputs += [(design, query, bool(pressed), rule, (top,), ROUGH) for design, rule in designs]
         owners += [row.number] * len(designs)
     numbers: dict[int, list[dict[str, EarlyNumber]]] = {row.number: [] for row in rows}
     for k, one in sorted(workers.results(ladder.known, inputs, "lost", keep=keep)):  # first its own walls
         numbers[owners[k]].append({} if isinstance(one, str) else one)
     return {row.number: dict(_spreads(target, keys, row, numbers[row.number])) for row in rows}
+
+
+def _under(target: Target, design: Design, key: str, top: str) -> float:
+    """An objective under a top, the lower the better, as solved for the search already."""
+    numbers = ladder.known(design, target.query(), True, tops=(top,))
+    return target.worth(key, numbers[key].lower) if key in numbers else -inf
 
 
 def within_tolerance(target: Target, design: Design) -> Iterator[Design]:
@@ -138,31 +138,34 @@ def _spreads(
 
 
 def _built(one: Recommended, target: Target, design: Design, out: Path, sliced: bool) -> Recommended:
-    """With its files, and its numbers by a real slicer."""
-    folder = out / design.name
+    """With its files, and its numbers by a real slicer, whose file decides the build, too."""
+    design = make(design.model_dump(mode="json", exclude_defaults=True) | {"name": one.design.name})
+    one, folder = _with_gcode(one, design, out) if sliced else one, out / design.name
     try:
         built = build(design, out, cad=False)
     except Unprintable as error:
-        return replace(one, verdict="CHANGE", slicer=str(error))
+        return replace(one, verdict="CHANGE", slicer=str(error), sliced=None)
     store.replace(out / f"{design.name}.yaml", _yaml(design))
     one = replace(one, folder=str(folder), verdict=built.verdict)
-    try:
-        find(*PROGRAMS["prusa"])
-    except SensorgenError as error:
-        return replace(one, slicer=str(error)) if sliced else one
-    if not sliced:
+    if one.sliced is None:
         return one
     try:
-        printed = slice_design(design, out, "prusa")
         tried = trial(design, target.query(), folder=folder, drawn=False)
     except SensorgenError as error:
+        return replace(one, slicer=str(error), sliced=None)
+    values = {key: NUMBERS[key].of(tried.printed, tried.toolpath) for key in target.objectives}
+    return replace(one, sliced={key: value for key, value in values.items() if value and key in one.design.numbers})
+
+
+def _with_gcode(one: Recommended, design: Design, out: Path) -> Recommended:
+    """With a file of PrusaSlicer and no numbers yet; or why there is none, unless the build says that."""
+    try:
+        slicer = slice_design(design, out, "prusa").slicer
+    except Unprintable:
+        return one
+    except SensorgenError as error:
         return replace(one, slicer=str(error))
-    numbers: dict[str, Bounds] = {}
-    for key in target.objectives:
-        value = NUMBERS[key].of(tried.printed, tried.toolpath)
-        if value and key in one.design.numbers:
-            numbers[key] = value
-    return replace(one, sliced=numbers, slicer=f"PrusaSlicer {printed.slicer.version}")
+    return replace(one, sliced={}, slicer=f"PrusaSlicer {slicer.version}")
 
 
 def _yaml(design: Design) -> bytes:

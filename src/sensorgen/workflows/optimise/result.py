@@ -11,7 +11,7 @@ from sensorgen.core.document import Cell, Column, Part, Table, comma_separated, 
 from sensorgen.core.findings import Verdict
 from sensorgen.prediction.identifiability.results import CANNOT_LOCATE, CANNOT_SENSE
 from sensorgen.workflows.optimise.front import Front, value_of
-from sensorgen.workflows.optimise.target import NUMBERS, Target
+from sensorgen.workflows.optimise.target import NUMBERS, OURS, Target
 from sensorgen.workflows.optimise.ties import RULE, tied
 from sensorgen.workflows.optimise.ties import worth as worth_of
 from sensorgen.workflows.search import Candidate
@@ -301,7 +301,7 @@ def _designs(some: Sequence[Recommended]) -> Iterator[Part]:
             yield one.slicer
     if any(one.robust for one in some):
         yield ""
-        yield "median and worst: over walls of slicers and tolerance; with materials: worst over their ranges"
+        yield "median, worst: over walls and tolerance, under its worst top; with materials: worst over their ranges"
 
 
 def _numbers(one: Recommended) -> Table:
@@ -349,9 +349,9 @@ def result(name: str, found: Front, recommended: tuple[Recommended, ...] = ()) -
 
 
 def _remarks(found: Front) -> Iterator[str]:
-    """Accepted doubts that no evaluated design has."""
+    """Doubts that the user accepts and no evaluated design has."""
     doubts = list(dict.fromkeys(doubt for row in found.evaluated if row.trial for doubt in row.trial.doubts))
-    for part in found.target.accept_doubts if found.evaluated else ():
+    for part in sorted({*found.target.accept_doubts} - {*OURS}) if found.evaluated else ():
         if not any(part in doubt for doubt in doubts):
             known = "; ".join(f"{doubt:.60}" for doubt in doubts[:3]) or "none"
             yield (

@@ -93,6 +93,7 @@ _NOT_PREDICTED = {
     "hysteresis": "cannot be predicted: no material file has the viscoelastic data (loss factor or relaxation times) "
     "that a model of it needs; leave it out, and measure the printed designs (sensorgen bench hysteresis)"
 }
+OURS = ("plate bonded",)  # doubts that targets which sensorgen writes accept, of whatever shape
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -230,13 +231,17 @@ class Target(Strict):
         found = {f"check {f.rule}": 1.0 for f in trial.findings if self.refuses(f.severity, f.rule)}
         if trial.status != "predicted":
             found[trial.status] = 1.0
-        found |= {f"doubt: {d}": 1.0 for d in trial.doubts if not any(part in d for part in self.accept_doubts)}
+        found |= {f"doubt: {d}": 1.0 for d in trial.doubts if not self.accepts(d)}
         for key, limit in self.limits.items():
             value = NUMBERS[key].of(trial.printed, trial.toolpath)
             if value is None or limit.beyond(value.value):
                 found[f"limit {key}"] = 1.0 if value is None else limit.beyond(value.value)
         unknown = (k for k in self.objectives if NUMBERS[k].of(trial.printed, trial.toolpath) is None)
         return found | ({f"unknown {key}": 1.0 for key in unknown} if trial.status == "predicted" else {})
+
+    def accepts(self, doubt: str) -> bool:
+        """Test whether there is no doubt, or an accepted one."""
+        return not doubt or any(part in doubt for part in self.accept_doubts)
 
     def refuses(self, severity: str, rule: str) -> bool:
         """Test whether a design with such a finding is out."""
@@ -301,7 +306,7 @@ def around(design: Design) -> Target:
     ]
     return checked(Target, {
         "design": design.model_dump(mode="json", exclude_unset=True, exclude={"name"}),
-        "parameters": {key: [value] for key, value in own.items()}, "accept_doubts": ["plate bonded"],
+        "parameters": {key: [value] for key, value in own.items()}, "accept_doubts": OURS,
         "objectives": dict.fromkeys(("force_resolution_n", "position_resolution_mm"), "minimise"),
         "also": [{**own, **one} for one in near]
         + [{**own, **one.parameters, "quality": one.quality} for one in best.of(design.shape)],
