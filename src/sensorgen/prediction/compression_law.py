@@ -594,9 +594,8 @@ def at_a_few_pressures(
     if model == "press3d":
         law = infill(design, printed) or nearest(design, printed, answer, stress_pa)
         return law if law.bounded else None
-    loads = [stress_pa * part for part in (0, 0.5, 1, _PAST)]
-    if stress_pa > _PAST * STRESS_PA[-1]:
-        loads = [STRESS_PA[-1] * part for part in (0, 0.5, 1)]
+    last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
+    loads = (last_pa * np.array([0.0, 0.4, 0.8, 1.0])).tolist()
     try:
         case = case_of(design, printed, model, tip)
         solution = pressed(case, loads, COARSEST)
