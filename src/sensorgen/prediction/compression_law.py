@@ -597,14 +597,13 @@ def at_a_few_pressures(
     if model == "press3d":
         law = infill(design, printed) or nearest(design, printed, answer, stress_pa)
         return law if law.bounded else None
-    loads, usual = [stress_pa * part for part in (0, 0.5, 1, _PAST)], stresses_pa(stress_pa)[-1] * np.array(_COARSE)
-    if stress_pa > _PAST * STRESS_PA[-1]:
-        loads = [STRESS_PA[-1] * part for part in (0, 0.5, 1)]
-    elif not tip.soft and stress_pa in usual:
-        loads = usual.tolist()
+    last_pa = STRESS_PA[-1] if stress_pa > _PAST * STRESS_PA[-1] else _PAST * stress_pa
+    loads, usual = last_pa * np.array([0.0, 0.4, 0.8, 1.0]), stresses_pa(stress_pa)[-1] * np.array(_COARSE)
+    if stress_pa <= last_pa and not tip.soft and stress_pa in usual:
+        loads = usual
     try:
         case = case_of(design, printed, model, tip)
-        solution = pressed(case, loads, level)
+        solution = pressed(case, loads.tolist(), level)
         curve = curve_of(solution)
     except SensorgenError:
         return None
